@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+/*
+ * What a filter is made of. It stands here so that the caller can reserve it statically; nothing of
+ * it is for direct use, and its layout may change with any version.
+ */
+#ifndef PELORUS_STATE_H
+#define PELORUS_STATE_H
+
+#include <stddef.h>
+
+#include "pelorus/config.h"
+#include "pelorus/settings.h"
+#include "pelorus/types.h"
+
+/* Where landmarks go to and come from. Both functions may be NULL. They must not call the filter. */
+typedef struct plr_map {
+    void *context;
+    /* Takes an evicted landmark. 0 = taken; anything else: the filter keeps the landmark. */
+    int (*sink)(void *context, const plr_landmark *landmark);
+    /* Looks up an id: fills position, covariance and id, and returns true; false if unknown. */
+    bool (*source)(void *context, uint32_t id, plr_landmark *landmark);
+} plr_map;
+
+/* Counts since init or reset. */
+typedef struct plr_totals {
+    uint32_t twists;        /* accepted */
+    uint32_t frames;        /* accepted */
+    uint32_t late;          /* frames refused with PLR_E_LATE */
+    uint32_t refused;       /* other calls refused for their data */
+    uint32_t resets;        /* poses set from outside */
+    uint32_t locks;         /* times the gate was locked */
+    uint32_t range_limited; /* landmark corrections stopped at max_range */
+    uint32_t blocks_failed;
+    uint64_t observations, matched, used, gated, created, evicted;
+    plr_time_ns diverged_ns; /* when a variance ceased to be positive; 0: never */
+} plr_totals;
+
+/* One landmark slot. */
+typedef struct plr_slot {
+    plr_real x[PLR_LANDMARK_DIM]; /* body: q in the current left camera; world: m; metres */
+    uint32_t id;
+    uint32_t times_seen;
+    uint32_t times_gated;
+    uint32_t last_frame; /* number of the frame that saw it last */
+    plr_time_ns last_seen_ns;
+    uint8_t known;
+} plr_slot;
+
+/* Motion since the covariance was last brought up to date: xi+ = Ad(D^-1) xi + B db + N(0, Q). */
+typedef struct plr_motion {
+    plr_real R[9], p[3]; /* D */
+    plr_real Q[36];      /* 6x6 */
+    plr_real B[36];      /* 6x6 */
+    plr_real seconds;    /* for the bias walk */
+    uint8_t pending;     /* 1 if any motion is accumulated */
+} plr_motion;
+
+/* The settings as the filter computes with them, and the camera. */
+typedef struct plr_parameters {
+    plr_real fx, fy, cx, cy, baseline;
+    plr_real R_CB[9], t_CB[3];
+    plr_real Ad_CB[36];
+    plr_real pixel_variance;
+    plr_real velocity_variance, gyro_variance;
+    plr_real bias_velocity_walk, bias_gyro_walk;
+    plr_real gate_d2, gate_residual2;
+    plr_real min_disparity, max_depth, max_row_gap, min_depth;
+    plr_real landmark_variance;
+    plr_real min_inverse_range;
+    plr_time_ns max_gap_ns;
+} plr_parameters;
+
+/* Workspace of one update; nothing in it lives longer than a call. */
+typedef struct plr_workspace {
+    plr_real Vt[PLR_BLOCK_ROWS * PLR_MAX_STATE]; /* rows of V^T; also [Y G]^T of a predict */
+    plr_real S[PLR_BLOCK_ROWS * PLR_BLOCK_ROWS];
+    plr_real y[PLR_BLOCK_ROWS];
+    plr_real dx[PLR_MAX_STATE];
+    plr_real F[PLR_MAX_LANDMARKS * 9];      /* a 3x3 transport a landmark */
+    uint16_t order[PLR_MAX_OBSERVATIONS];   /* observations by id; then those used */
+    uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* their slots */
+} plr_workspace;
+
+struct plr_model;
+
+typedef struct plr_filter {
+    uint32_t magic; /* set by a successful init */
+    plr_config config;
+    plr_calibration calibration;
+    plr_map map;
+    plr_parameters par;
+    const struct plr_model *model;
+
+    plr_time_ns t_ns;       /* of the estimate */
+    plr_time_ns reading_ns; /* of the last twist */
+    plr_real interval_s;    /* between the last two twists */
+    uint8_t clock_started, reading_valid;
+    uint8_t diverged;
+
+    plr_real R_WB[9];
+    double p_WB[3]; /* double in both builds: a float32 would round small steps away */
+    plr_real bias[PLR_BIAS_DIM];
+    plr_real reading[6]; /* last twist */
+    plr_motion motion;
+
+    unsigned count; /* active slots, dense from 0 */
+    plr_slot slots[PLR_MAX_LANDMARKS];
+    plr_real P[PLR_PACKED_SIZE]; /* packed lower triangle: pose, bias, landmarks */
+    plr_workspace work;
+
+    uint32_t frame_number;
+    uint16_t frames_without_use, frames_mostly_gated;
+    uint32_t matches_since_gated;
+    plr_totals totals;
+} plr_filter;
+
+#endif

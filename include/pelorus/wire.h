@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The frame format: one for file, wire and flash. docs/REPLAY-FORMAT.md gives every byte.
+ *
+ * A reader takes bytes as they come and gives messages; what is damaged, unknown, malformed or too
+ * long is skipped and counted. A writer takes messages and gives bytes to a function. Neither
+ * allocates; neither knows the filter. Numbers are double on this side, whatever the frame holds.
+ */
+#ifndef PELORUS_WIRE_H
+#define PELORUS_WIRE_H
+
+#include <stddef.h>
+
+#include "pelorus/types.h"
+
+typedef enum plr_kind {
+    PLR_KIND_NONE = 0,
+    PLR_KIND_HEADER = 1,
+    PLR_KIND_CONFIG = 2,
+    PLR_KIND_START = 3,
+    PLR_KIND_TWIST = 4,
+    PLR_KIND_STEREO = 5,
+    PLR_KIND_TRUTH = 6,
+    PLR_KIND_LANDMARK = 7,
+    PLR_KIND_POSE = 8,
+    PLR_KIND_REPORT = 9,
+    PLR_KIND_TEXT = 10,
+    PLR_KIND_END = 11
+} plr_kind;
+
+enum {
+    PLR_WIRE_VERSION_MAJOR = 1,
+    PLR_WIRE_VERSION_MINOR = 0,
+    PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
+    PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
+    PLR_WIRE_MAX_SETTINGS = 64,
+    PLR_WIRE_MAX_OBSERVATIONS = 4096,
+    PLR_WIRE_MAX_TEXT = 240
+};
+
+/* Bytes of a body that holds n observations: the buffer that a reader needs for them. At least
+ * PLR_WIRE_MIN_BUFFER, which holds every other kind. */
+#define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))
+#define PLR_WIRE_MIN_BUFFER     (PLR_WIRE_OVERHEAD + 36 + 63 * 8)
+
+typedef enum plr_body_axes {
+    PLR_AXES_FLU = 0, /* forward, left, up */
+    PLR_AXES_FRD = 1, /* forward, right, down */
+    PLR_AXES_OTHER = 2
+} plr_body_axes;
+
+typedef struct plr_header {
+    uint8_t version_major, version_minor;
+    uint8_t body_axes;                        /* plr_body_axes */
+    uint8_t twist_timing;                     /* plr_twist_timing */
+    uint16_t image_width_px, image_height_px; /* 0: unknown */
+    plr_calibration calibration;
+    /* Suggestions, negative where there is none. */
+    double pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps;
+    double bias_velocity_sigma_mps, bias_gyro_sigma_radps;
+    double bias_velocity_walk, bias_gyro_walk;
+    char name[PLR_WIRE_NAME_SIZE];
+} plr_header;
+
+typedef struct plr_wire_setting {
+    uint8_t id;
+    double value;
+} plr_wire_setting;
+
+typedef struct plr_config_message {
+    uint32_t build_fingerprint; /* 0: wanted settings, not a build's echo */
+    uint16_t max_landmarks, max_observations;
+    uint8_t block_observations;
+    uint8_t real_bytes;
+    uint8_t count;
+    plr_wire_setting settings[PLR_WIRE_MAX_SETTINGS];
+} plr_config_message;
+
+typedef struct plr_start {
+    plr_time_ns t_ns;
+    plr_pose T_WB;
+    bool has_covariance, has_bias;
+    double P_xi[21]; /* packed */
+    double bias[6], bias_variance[6];
+} plr_start;
+
+typedef struct plr_twist_message {
+    plr_time_ns t_ns;
+    plr_twist twist;
+} plr_twist_message;
+
+typedef struct plr_truth {
+    plr_time_ns t_ns;
+    plr_pose T_WB;
+} plr_truth;
+
+typedef enum plr_landmark_role {
+    PLR_LANDMARK_KNOWN = 0,
+    PLR_LANDMARK_EVICTED = 1,
+    PLR_LANDMARK_FINAL = 2
+} plr_landmark_role;
+
+typedef struct plr_landmark_message {
+    uint8_t role;          /* plr_landmark_role */
+    plr_landmark landmark; /* times_gated is not sent; known is set from the role */
+} plr_landmark_message;
+
+typedef struct plr_pose_message {
+    plr_time_ns t_ns;
+    uint8_t real_bytes; /* 4 or 8: the precision of the filter, and of the frame */
+    bool after_update;  /* after a STEREO; else after a TWIST */
+    uint16_t reset_count;
+    plr_pose T_WB;
+    double P_xi[21]; /* packed */
+    plr_twist velocity;
+    double bias[6];
+    double P_u[21]; /* packed, of (v, w) */
+} plr_pose_message;
+
+typedef struct plr_report_message {
+    uint8_t subject; /* plr_kind of the message that it answers */
+    plr_report report;
+    uint32_t update_us;
+} plr_report_message;
+
+typedef enum plr_severity {
+    PLR_SEVERITY_INFO = 0,
+    PLR_SEVERITY_WARNING = 1,
+    PLR_SEVERITY_ERROR = 2
+} plr_severity;
+
+typedef struct plr_text {
+    uint8_t severity;                 /* plr_severity */
+    char text[PLR_WIRE_MAX_TEXT + 1]; /* closed by zero; longer ones are cut */
+} plr_text;
+
+typedef struct plr_end {
+    uint32_t twists, stereos, truths, landmarks, frames;
+} plr_end;
+
+/* One message. A frame's observations point into the reader's array: they hold until the next
+ * call on the reader. */
+typedef struct plr_message {
+    plr_kind kind;
+    uint16_t sequence;
+    union {
+        plr_header header;
+        plr_config_message config;
+        plr_start start;
+        plr_twist_message twist;
+        plr_frame stereo;
+        plr_truth truth;
+        plr_landmark_message landmark;
+        plr_pose_message pose;
+        plr_report_message report;
+        plr_text text;
+        plr_end end;
+    } as;
+} plr_message;
+
+/* --- reading --- */
+
+typedef struct plr_reader_counts {
+    uint64_t bytes;
+    uint32_t frames;    /* good ones */
+    uint32_t damaged;   /* CRC, stuffing or length wrong */
+    uint32_t unknown;   /* kind not known */
+    uint32_t malformed; /* CRC good, payload too short or contradicting itself */
+    uint32_t too_long;  /* did not fit the buffer or the observation array */
+    uint32_t missing;   /* gaps in the sequence, in frames */
+} plr_reader_counts;
+
+/* What the last call on a reader met. */
+typedef enum plr_read_event {
+    PLR_READ_MORE = 0,    /* all bytes are taken, no frame is complete */
+    PLR_READ_MESSAGE = 1, /* a good message */
+    PLR_READ_SKIPPED = 2, /* a frame was skipped; the counts tell why, .skipped_at where */
+    PLR_READ_FUTURE = 3   /* a HEADER of a higher major version: do not go on */
+} plr_read_event;
+
+typedef struct plr_reader {
+    uint8_t *buffer; /* the body of one frame, unstuffed */
+    size_t buffer_size;
+    plr_observation *observations;
+    unsigned max_observations;
+    size_t length;      /* bytes of the body so far */
+    uint8_t block_left; /* COBS: bytes until the next code byte */
+    uint8_t block_code; /* COBS: the current code byte, 0 before the first */
+    bool overrun, broken;
+    bool sequence_known;
+    uint16_t next_sequence;
+    uint64_t frame_start; /* byte offset at which the current frame began */
+    uint64_t skipped_at;  /* byte offset of the last skipped frame */
+    plr_reader_counts counts;
+} plr_reader;
+
+/* Prepares a reader over the caller's buffer (at least PLR_WIRE_MIN_BUFFER bytes) and observation
+ * array. PLR_E_ARGUMENT if the buffer is smaller or a pointer is null. */
+plr_status plr_reader_init(plr_reader *r, uint8_t *buffer, size_t buffer_size,
+                           plr_observation *observations, unsigned max_observations);
+
+/* Takes bytes up to the end of the next frame, and tells in *taken how many. Call again with the
+ * rest. *message is filled on PLR_READ_MESSAGE only. Bounded by n. */
+plr_read_event plr_reader_feed(plr_reader *r, const uint8_t *bytes, size_t n, size_t *taken,
+                               plr_message *message);
+
+/* True if the stream stopped in the middle of a frame: what a truncated file looks like. */
+bool plr_reader_mid_frame(const plr_reader *r);
+
+/* --- writing --- */
+
+/* Takes n bytes: 0 = all taken, else a failure, which the writer returns as PLR_E_IO. */
+typedef int (*plr_write_function)(void *context, const uint8_t *bytes, size_t n);
+
+typedef struct plr_writer {
+    plr_write_function write;
+    void *context;
+    uint16_t sequence;
+    uint32_t crc;
+    uint8_t block[255]; /* COBS: code byte and what follows it */
+    uint8_t fill;
+    plr_status status; /* of the frame in progress */
+    plr_end counts;    /* what an END will tell */
+} plr_writer;
+
+plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *context);
+
+/* Writes one message as a frame, with the writer's own sequence number; message->sequence is not
+ * looked at. END's counts are the writer's own. PLR_E_ARGUMENT if the message contradicts itself
+ * (nothing is written); PLR_E_IO if the function failed. */
+plr_status plr_writer_put(plr_writer *w, const plr_message *message);
+
+/* --- parts, for tests and other links --- */
+
+/* CRC-32 as in zlib; start with crc = 0 and hand the result back in for more bytes. */
+uint32_t plr_crc32(uint32_t crc, const uint8_t *bytes, size_t n);
+
+#endif
