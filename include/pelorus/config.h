@@ -40,6 +40,15 @@
 #define PLR_PORTABLE 0
 #endif
 
+/* Columns of the tile that the update's kernel keeps in registers. It changes the speed, no bit. */
+#ifndef PLR_TILE_COLUMNS
+#if defined(__AVX__)
+#define PLR_TILE_COLUMNS 16
+#else
+#define PLR_TILE_COLUMNS 4
+#endif
+#endif
+
 #if defined(__FAST_MATH__)
 #error "Pelorus needs IEEE arithmetic: build without -ffast-math."
 #endif
@@ -86,6 +95,7 @@ enum {
     PLR_LANDMARK_DIM = 3, /* w_i or dm_i */
     PLR_ROWS = 3,         /* rows of an observation: uL, uR, v */
     PLR_BLOCK_ROWS = PLR_ROWS * PLR_BLOCK_OBSERVATIONS,
+    PLR_WORK_ROWS = PLR_BLOCK_ROWS > 24 ? PLR_BLOCK_ROWS : 24, /* a predict needs 4 x 6 */
     PLR_MAX_STATE = PLR_POSE_DIM + PLR_BIAS_DIM + PLR_LANDMARK_DIM * PLR_MAX_LANDMARKS,
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
 };

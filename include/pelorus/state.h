@@ -70,13 +70,15 @@ typedef struct plr_parameters {
     plr_time_ns max_gap_ns;
 } plr_parameters;
 
-/* Workspace of one update; nothing in it lives longer than a call. */
+/* Workspace of one call; nothing in it lives longer. */
 typedef struct plr_workspace {
-    plr_real Vt[PLR_BLOCK_ROWS * PLR_MAX_STATE]; /* rows of V^T; also [Y G]^T of a predict */
-    plr_real S[PLR_BLOCK_ROWS * PLR_BLOCK_ROWS];
+    /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
+     * The kernel reads a little further than it uses, hence the margin. */
+    plr_real Vt[PLR_WORK_ROWS * PLR_MAX_STATE + PLR_TILE_COLUMNS + 4];
+    plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2]; /* packed */
     plr_real y[PLR_BLOCK_ROWS];
     plr_real dx[PLR_MAX_STATE];
-    plr_real F[PLR_MAX_LANDMARKS * 9];      /* a 3x3 transport a landmark */
+    plr_real gain[PLR_MAX_OBSERVATIONS];    /* how much an observation would tell */
     uint16_t order[PLR_MAX_OBSERVATIONS];   /* observations by id; then those used */
     uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* their slots */
 } plr_workspace;
@@ -86,7 +88,6 @@ struct plr_model;
 typedef struct plr_filter {
     uint32_t magic; /* set by a successful init */
     plr_config config;
-    plr_calibration calibration;
     plr_map map;
     plr_parameters par;
     const struct plr_model *model;

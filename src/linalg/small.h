@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+/*
+ * Vectors of 3 and matrices of 3x3, row by row. Everything is inlined: these are too small for a
+ * call. Sums run from left to right in fused steps, so that every target computes the same bits.
+ */
+#ifndef PLR_LINALG_SMALL_H
+#define PLR_LINALG_SMALL_H
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "pelorus/config.h"
+
+/* a^T b */
+static inline plr_real plr_dot3(const plr_real a[3], const plr_real b[3]) {
+    return PLR_FMA(a[2], b[2], PLR_FMA(a[1], b[1], a[0] * b[0]));
+}
+
+/* c = a x b; c may not be a or b */
+static inline void plr_cross3(plr_real c[3], const plr_real a[3], const plr_real b[3]) {
+    c[0] = PLR_FMA(a[1], b[2], -(a[2] * b[1]));
+    c[1] = PLR_FMA(a[2], b[0], -(a[0] * b[2]));
+    c[2] = PLR_FMA(a[0], b[1], -(a[1] * b[0]));
+}
+
+/* y = A x; y may not be x */
+static inline void plr_mat3_vec(plr_real y[3], const plr_real A[9], const plr_real x[3]) {
+    for (int i = 0; i < 3; i++)
+        y[i] = plr_dot3(A + 3 * i, x);
+}
+
+/* y = A^T x; y may not be x */
+static inline void plr_mat3_tvec(plr_real y[3], const plr_real A[9], const plr_real x[3]) {
+    for (int i = 0; i < 3; i++)
+        y[i] = PLR_FMA(A[6 + i], x[2], PLR_FMA(A[3 + i], x[1], A[i] * x[0]));
+}
+
+/* C = A B; C may not be A or B */
+static inline void plr_mat3_mul(plr_real C[9], const plr_real A[9], const plr_real B[9]) {
+    for (int i = 0; i < 3; i++)
+        plr_mat3_tvec(C + 3 * i, B, A + 3 * i);
+}
+
+/* C = A B^T; C may not be A or B */
+static inline void plr_mat3_mul_nt(plr_real C[9], const plr_real A[9], const plr_real B[9]) {
+    for (int i = 0; i < 3; i++)
+        plr_mat3_vec(C + 3 * i, B, A + 3 * i);
+}
+
+/* C = A^T B; C may not be A or B */
+static inline void plr_mat3_mul_tn(plr_real C[9], const plr_real A[9], const plr_real B[9]) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            C[3 * i + j] = PLR_FMA(A[6 + i], B[6 + j], PLR_FMA(A[3 + i], B[3 + j], A[i] * B[j]));
+}
+
+/* T = A^T; T may not be A */
+static inline void plr_mat3_transpose(plr_real T[9], const plr_real A[9]) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            T[3 * i + j] = A[3 * j + i];
+}
+
+/* S = [x]x, so that S y = x cross y */
+static inline void plr_skew(plr_real S[9], const plr_real x[3]) {
+    const plr_real S_of_x[9] = {0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0};
+    memcpy(S, S_of_x, sizeof S_of_x);
+}
+
+static inline void plr_mat3_identity(plr_real A[9]) {
+    static const plr_real identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    memcpy(A, identity, sizeof identity);
+}
+
+static inline plr_real plr_abs(plr_real x) {
+    return x < 0 ? -x : x;
+}
+
+/* False for NaN and infinities. */
+static inline bool plr_is_finite(plr_real x) {
+    return x - x == 0;
+}
+
+#endif
