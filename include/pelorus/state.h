@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 
+#include "pelorus/camera.h"
 #include "pelorus/config.h"
 #include "pelorus/settings.h"
 #include "pelorus/types.h"
@@ -55,11 +56,10 @@ typedef struct plr_motion {
     uint8_t pending;     /* 1 if any motion is accumulated */
 } plr_motion;
 
-/* The settings as the filter computes with them, and the camera. */
+/* The settings and the camera as the filter computes with them: in its own precision, squared. */
 typedef struct plr_parameters {
-    plr_real fx, fy, cx, cy, baseline;
-    plr_real R_CB[9], t_CB[3];
-    plr_real Ad_CB[36];
+    plr_camera camera;
+    plr_real Ad_CB[36]; /* Ad(T_CB): body twists to the camera */
     plr_real pixel_variance;
     plr_real velocity_variance, gyro_variance;
     plr_real bias_velocity_walk, bias_gyro_walk;

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The rectified stereo pair (course report III.1 to III.3), as pure functions.
+ *
+ * A point q = (x, y, z) in the left camera (x right, y down, z forward) is seen at
+ *   uL = fx x / z + cx,  uR = fx (x - baseline) / z + cx,  vL = vR = fy y / z + cy.
+ * vL and vR carry the same information, so a filter uses three rows, in this order everywhere:
+ *   (uL, uR, v) with v = (vL + vR) / 2, variances s^2, s^2, s^2 / 2. That is exact.
+ */
+#ifndef PLR_CAMERA_STEREO_H
+#define PLR_CAMERA_STEREO_H
+
+#include "pelorus/camera.h"
+
+/* z = (uL, uR, v) of the point q, px. Needs q[2] != 0. */
+void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real q[3]);
+
+/* Dz = d(uL, uR, v) / dq, 3x3, px/m. Needs q[2] != 0. */
+void plr_stereo_jacobian(plr_real Dz[9], const plr_camera *camera, const plr_real q[3]);
+
+/* The point q whose projection is z, m, and Dq = dq / d(uL, uR, v), 3x3, m/px.
+ * Needs a disparity z[0] - z[1] > 0. */
+void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *camera,
+                             const plr_real z[3]);
+
+/* q = R_CB s + t_CB: body to left camera. */
+void plr_camera_from_body(plr_real q[3], const plr_camera *camera, const plr_real s[3]);
+
+/* s = R_CB^T (q - t_CB): left camera to body. */
+void plr_camera_to_body(plr_real s[3], const plr_camera *camera, const plr_real q[3]);
+
+#endif

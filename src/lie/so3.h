@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+/*
+ * SO(3): the exponential and its Jacobians, by series of fixed length. No library function takes
+ * part, so every target computes the same bits. Accurate to rounding for |theta| <= pi.
+ */
+#ifndef PLR_LIE_SO3_H
+#define PLR_LIE_SO3_H
+
+#include "pelorus/config.h"
+
+/* The coefficients that SO(3) and SE(3) share, as functions of t = |theta|. */
+typedef struct plr_so3_series {
+    plr_real a; /* sin t / t */
+    plr_real b; /* (1 - cos t) / t^2 */
+    plr_real c; /* (t - sin t) / t^3 */
+    plr_real d; /* (t^2 + 2 cos t - 2) / (2 t^4) */
+    plr_real e; /* (2 t - 3 sin t + t cos t) / (2 t^5) */
+} plr_so3_series;
+
+/* All five at theta2 = |theta|^2. */
+void plr_so3_series_at(plr_so3_series *s, plr_real theta2);
+
+/* R = Exp(theta) = I + a [theta]x + b [theta]x^2 (Rodrigues). */
+void plr_so3_exp(plr_real R[9], const plr_real theta[3]);
+
+/* R <- R (3 I - R^T R) / 2: one Newton step towards the nearest rotation. What a frame of rounding
+ * has put wrong is squared away. */
+void plr_so3_orthonormalise(plr_real R[9]);
+
+#endif
