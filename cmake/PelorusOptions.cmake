@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+# Everything that a user may choose. The defaults are the desktop's.
+
+set(PLR_MAX_LANDMARKS 256 CACHE STRING "Most landmarks a filter can hold, 1 to 1024")
+set(PLR_MAX_OBSERVATIONS 1024 CACHE STRING "Most observations in one frame, 1 to 4096")
+set(PLR_BLOCK_OBSERVATIONS 8 CACHE STRING
+  "Observations processed at once, 1 to 16; results depend on it in their last bits")
+option(PLR_PORTABLE
+  "Exact fused multiply-add in software: runs on any processor, slower, the same bits" OFF)
+
+# float32 kernels need the fused multiply-add of x86-64-v3 (2013 and later). On other processors the
+# compiler's own choice is left alone.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+  set(pelorus_default_arch x86-64-v3)
+else()
+  set(pelorus_default_arch "")
+endif()
+set(PELORUS_ARCH "${pelorus_default_arch}" CACHE STRING
+  "-march of the library: x86-64-v3, native, ...; empty: the compiler's; unused if PLR_PORTABLE")
+
+# CMake 3.21's PROJECT_IS_TOP_LEVEL: inside another project only the library is wanted.
+option(PELORUS_BUILD_REPLAY "Build pelorus-replay" ${PROJECT_IS_TOP_LEVEL})
+option(PELORUS_BUILD_TESTS "Build the tests and benches" ${PROJECT_IS_TOP_LEVEL})
+option(PELORUS_INSTALL "Make install rules" ${PROJECT_IS_TOP_LEVEL})
+option(PELORUS_WERROR "Take warnings as errors (the project's own tests do)" OFF)
+option(PELORUS_REQUIRE_ORACLE "Stop if OpenBLAS or LAPACKE is missing, instead of leaving tests out"
+  OFF)
+set(PELORUS_DEPS_DIR "${PROJECT_BINARY_DIR}/deps" CACHE PATH
+  "Where the test framework is kept once fetched; share it between build folders")
+
+if(PROJECT_IS_TOP_LEVEL)
+  if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+    set(CMAKE_BUILD_TYPE Release CACHE STRING "Release, Debug, RelWithDebInfo" FORCE)
+  endif()
+  set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
+  set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+endif()

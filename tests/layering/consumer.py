@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Uses the library as a stranger would: the README's C example, built in three ways and run.
+
+usage: consumer.py PROJECT_ROOT BUILD_FOLDER CMAKE CC
+
+The ways: installed and found by find_package(pelorus); as add_subdirectory(pelorus); and by one
+compiler command over all sources. Exit status 77 (skipped) as long as there is no README.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+SKIPPED = 77
+C_BLOCK = re.compile(r"^```c\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+CMAKE_LISTS = """cmake_minimum_required(VERSION 3.22)
+project(consumer LANGUAGES C)
+{get_pelorus}
+add_executable(example example.c)
+target_link_libraries(example PRIVATE pelorus::pelorus)
+"""
+
+
+def run(*command: str | Path) -> str:
+    """The command's output; what it printed and SystemExit if it failed."""
+    result = subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, check=False
+    )
+    if result.returncode != 0:
+        print("$", *command)
+        print(result.stdout, result.stderr, sep="\n")
+        raise SystemExit(1)
+    return result.stdout
+
+
+def build_with_cmake(folder: Path, example: str, cmake: str, cc: str, get_pelorus: str) -> Path:
+    folder.mkdir()
+    (folder / "example.c").write_text(example, encoding="utf-8")
+    (folder / "CMakeLists.txt").write_text(
+        CMAKE_LISTS.format(get_pelorus=get_pelorus), encoding="utf-8"
+    )
+    run(cmake, "-S", folder, "-B", folder / "build", f"-DCMAKE_C_COMPILER={cc}")
+    run(cmake, "--build", folder / "build", "-j2")
+    return folder / "build/example"
+
+
+def build_with_one_command(folder: Path, example: str, root: Path, cc: str) -> Path:
+    folder.mkdir()
+    (folder / "example.c").write_text(example, encoding="utf-8")
+    sources = sorted((root / "src").glob("*/*.c"))
+    run(
+        cc, "-std=c99", "-O2", "-ffp-contract=off", f"-I{root / 'include'}", f"-I{root / 'src'}",
+        folder / "example.c", *sources, "-o", folder / "example", "-lm",
+    )  # fmt: skip
+    return folder / "example"
+
+
+def readme_example(root: Path) -> str:
+    readme = root / "README.md"
+    if not readme.is_file():
+        print("skipped: no README.md yet")
+        raise SystemExit(SKIPPED)
+    block = C_BLOCK.search(readme.read_text(encoding="utf-8"))
+    if block is None:
+        print("README.md holds no ```c block")
+        raise SystemExit(1)
+    return block.group(1)
+
+
+def main() -> int:
+    if len(sys.argv) != 5:
+        print(__doc__, file=sys.stderr)
+        return 2
+    root, build, cmake, cc = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], sys.argv[4]
+    example = readme_example(root)
+    with tempfile.TemporaryDirectory(prefix="pelorus-consumer-") as name:
+        here = Path(name)
+        prefix = here / "prefix"
+        run(cmake, "--install", build, "--prefix", prefix)
+        programs = [
+            build_with_cmake(
+                here / "installed",
+                example,
+                cmake,
+                cc,
+                f'find_package(pelorus REQUIRED PATHS "{prefix}" NO_DEFAULT_PATH)',
+            ),
+            build_with_cmake(
+                here / "inside", example, cmake, cc, f'add_subdirectory("{root}" pelorus)'
+            ),
+            build_with_one_command(here / "bare", example, root, cc),
+        ]
+        outputs = [run(program) for program in programs]
+    print(outputs[0], end="")
+    if len(set(outputs)) != 1:
+        print("the three builds print different things:", *outputs, sep="\n")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Holds the sources against the rules of the design: who may include whom, and what must not occur.
+
+usage: sources.py PROJECT_ROOT
+
+Prints every breach as file:line: what, and what would be right. Exit status 1 if there is any.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+LONGEST_FILE = 600
+LONG_FILE = 400
+
+# Folders of src/ that a folder of src/ may include, and the public headers that it may see.
+FOLDERS: dict[str, set[str]] = {
+    "linalg": {"linalg"},
+    "lie": {"lie", "linalg"},
+    "camera": {"camera", "lie", "linalg"},
+    "filter": {"filter", "camera", "lie", "linalg"},
+    "wire": {"wire"},
+    "session": {"session", "filter", "wire"},
+}
+FILTER_HEADERS = {"config.h", "camera.h", "types.h", "settings.h", "state.h", "filter.h", "pelorus.h"}
+HEADERS: dict[str, set[str]] = {
+    "linalg": {"config.h"},
+    "lie": {"config.h"},
+    "camera": {"config.h", "types.h", "camera.h"},
+    "filter": FILTER_HEADERS,
+    "wire": {"types.h", "wire.h"},
+    "session": FILTER_HEADERS | {"wire.h", "port.h", "session.h"},
+}
+# No heap, no stdio, no mathematics: what is left of the standard library.
+STANDARD = {"float.h", "limits.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+CONDITION = re.compile(r"^\s*#\s*(if|ifdef|ifndef|elif)\b\s*(.*)")
+COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Breach:
+    """One line that breaks a rule."""
+
+    path: Path
+    line: int
+    text: str
+
+
+def without_comments(text: str) -> str:
+    """The text with comments blanked, so that line numbers stay."""
+    return COMMENT.sub(lambda match: re.sub(r"[^\n]", " ", match.group()), text)
+
+
+def code_lines(path: Path) -> Iterator[tuple[int, str]]:
+    yield from enumerate(without_comments(path.read_text(encoding="utf-8")).splitlines(), start=1)
+
+
+def includes(path: Path) -> Iterator[tuple[int, bool, str]]:
+    """(line, is it <...>, name) of every include."""
+    for number, line in code_lines(path):
+        if match := INCLUDE.match(line):
+            yield number, match.group(1) == "<", match.group(2)
+
+
+def check_include(root: Path, path: Path, number: int, system: bool, name: str) -> Iterator[Breach]:
+    """An include of a file in src/."""
+    folder = path.relative_to(root / "src").parts[0]
+    first, _, rest = name.partition("/")
+    if system:
+        if name not in STANDARD:
+            allowed = ", ".join(sorted(STANDARD))
+            yield Breach(path, number, f"<{name}> is not for src/; only {allowed}")
+    elif first == "pelorus":
+        if rest not in HEADERS[folder]:
+            allowed = ", ".join(sorted(HEADERS[folder]))
+            yield Breach(path, number, f"src/{folder} may not see {name}; only {allowed}")
+    elif not (root / "src" / name).is_file():
+        yield Breach(path, number, f'"{name}" is not a file of src/: name it from there')
+    elif first not in FOLDERS[folder]:
+        allowed = ", ".join(sorted(FOLDERS[folder]))
+        yield Breach(path, number, f"src/{folder} may not include src/{first}; only {allowed}")
+
+
+def check_layers(root: Path) -> Iterator[Breach]:
+    """Includes point one way."""
+    for path in sorted((root / "src").rglob("*.[ch]")):
+        if path.relative_to(root / "src").parts[0] not in FOLDERS:
+            yield Breach(path, 1, f"a folder that the layering does not know: add it to {__file__}")
+            continue
+        for number, system, name in includes(path):
+            yield from check_include(root, path, number, system, name)
+    for path in sorted((root / "include").rglob("*.h")):
+        for number, system, name in includes(path):
+            if system and name not in STANDARD:
+                yield Breach(path, number, f"<{name}> is not for a public header")
+            if not system and not (root / "include" / name).is_file():
+                yield Breach(path, number, f'"{name}" is not a public header')
+
+
+def check_conditions(root: Path) -> Iterator[Breach]:
+    """`#if` stands in config.h alone; elsewhere only include guards and `extern "C"`."""
+    config = root / "include/pelorus/config.h"
+    paths = [*(root / "src").rglob("*.[ch]"), *(root / "include").rglob("*.h")]
+    for path in sorted(set(paths) - {config}):
+        guard = "PELORUS_" if "include" in path.relative_to(root).parts else "PLR_"
+        guards = 0
+        for number, line in code_lines(path):
+            match = CONDITION.match(line)
+            if not match or match.group(2).strip() == "__cplusplus":
+                continue
+            is_guard = match.group(1) == "ifndef" and match.group(2).strip().endswith("_H")
+            guards += is_guard
+            if not is_guard or guards > 1 or path.suffix == ".c":
+                yield Breach(path, number, "a preprocessor condition: choose by file or by table")
+        if path.suffix == ".h" and guards != 1:
+            yield Breach(path, 1, f"no include guard ({guard}..._H)")
+
+
+def check_lengths(root: Path) -> Iterator[Breach]:
+    """A file over 400 lines is a question, over 600 a split."""
+    for folder in ("include", "src", "port", "tests", "tools"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix not in {".c", ".h", ".py", ".sh"} or not path.is_file():
+                continue
+            lines = len(path.read_text(encoding="utf-8").splitlines())
+            if lines > LONGEST_FILE:
+                yield Breach(path, lines, f"{lines} lines: split it ({LONGEST_FILE} at most)")
+            elif lines > LONG_FILE:
+                print(f"note: {path.relative_to(root)} has {lines} lines: one responsibility?")
+
+
+def check_licence_lines(root: Path) -> Iterator[Breach]:
+    """An SPDX line on top of each source file (behind `#!` in scripts)."""
+    for folder in ("cmake", "include", "src", "port", "tests", "tools"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix not in {".c", ".h", ".py", ".sh", ".cmake", ".S", ".ld"}:
+                continue
+            if ".egg-info" in str(path) or not path.is_file():
+                continue
+            head = path.read_text(encoding="utf-8").splitlines()[:3]
+            if not any("SPDX-License-Identifier: MIT" in line for line in head):
+                yield Breach(path, 1, "no line `SPDX-License-Identifier: MIT` on top")
+
+
+def check_port_is_outside(root: Path) -> Iterator[Breach]:
+    """The port may include src/session's public header, never the inside of src/."""
+    for path in sorted((root / "port").rglob("*.[ch]")):
+        for number, system, name in includes(path):
+            if not system and name.partition("/")[0] in FOLDERS:
+                yield Breach(path, number, f'"{name}" is inside the library: use include/pelorus')
+
+
+CHECKS = (
+    check_layers,
+    check_conditions,
+    check_lengths,
+    check_licence_lines,
+    check_port_is_outside,
+)
+
+
+def main() -> int:
+    if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "src").is_dir():
+        print(__doc__, file=sys.stderr)
+        return 2
+    root = Path(sys.argv[1]).resolve()
+    breaches = [breach for check in CHECKS for breach in check(root)]
+    for breach in breaches:
+        print(f"{breach.path.relative_to(root)}:{breach.line}: {breach.text}")
+    files = len(list((root / "src").rglob("*.[ch]")))
+    print(f"{files} files in src/, {len(breaches)} breaches")
+    return 1 if breaches or files == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
