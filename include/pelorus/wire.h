@@ -13,6 +13,10 @@
 
 #include "pelorus/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum plr_kind {
     PLR_KIND_NONE = 0,
     PLR_KIND_HEADER = 1,
@@ -38,10 +42,11 @@ enum {
     PLR_WIRE_MAX_TEXT = 240
 };
 
-/* Bytes of a body that holds n observations: the buffer that a reader needs for them. At least
- * PLR_WIRE_MIN_BUFFER, which holds every other kind. */
+/* Bytes of a body that holds n observations: the buffer that a reader needs for them. */
 #define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))
-#define PLR_WIRE_MIN_BUFFER     (PLR_WIRE_OVERHEAD + 36 + 63 * 8)
+
+/* The least buffer of a reader: it holds every other kind, of which a CONFIG may be the longest. */
+#define PLR_WIRE_MIN_BUFFER (PLR_WIRE_OVERHEAD + 11 + 9 * PLR_WIRE_MAX_SETTINGS)
 
 typedef enum plr_body_axes {
     PLR_AXES_FLU = 0, /* forward, left, up */
@@ -50,7 +55,7 @@ typedef enum plr_body_axes {
 } plr_body_axes;
 
 typedef struct plr_header {
-    uint8_t version_major, version_minor;
+    uint8_t version_major, version_minor;     /* as read; a writer always writes its own */
     uint8_t body_axes;                        /* plr_body_axes */
     uint8_t twist_timing;                     /* plr_twist_timing */
     uint16_t image_width_px, image_height_px; /* 0: unknown */
@@ -102,12 +107,13 @@ typedef enum plr_landmark_role {
 
 typedef struct plr_landmark_message {
     uint8_t role;          /* plr_landmark_role */
-    plr_landmark landmark; /* times_gated is not sent; known is set from the role */
+    plr_landmark landmark; /* times_gated is not sent; known is set from the role; of P_W_m2 the
+                              lower triangle is sent */
 } plr_landmark_message;
 
 typedef struct plr_pose_message {
     plr_time_ns t_ns;
-    uint8_t real_bytes; /* 4 or 8: the precision of the filter, and of the frame */
+    uint8_t real_bytes; /* 4 or 8: the precision of the filter, and of the frame (but for p) */
     bool after_update;  /* after a STEREO; else after a TWIST */
     uint16_t reset_count;
     plr_pose T_WB;
@@ -131,7 +137,7 @@ typedef enum plr_severity {
 
 typedef struct plr_text {
     uint8_t severity;                 /* plr_severity */
-    char text[PLR_WIRE_MAX_TEXT + 1]; /* closed by zero; longer ones are cut */
+    char text[PLR_WIRE_MAX_TEXT + 1]; /* closed by zero; a reader cuts what is longer */
 } plr_text;
 
 typedef struct plr_end {
@@ -166,41 +172,69 @@ typedef struct plr_reader_counts {
     uint32_t damaged;   /* CRC, stuffing or length wrong */
     uint32_t unknown;   /* kind not known */
     uint32_t malformed; /* CRC good, payload too short or contradicting itself */
-    uint32_t too_long;  /* did not fit the buffer or the observation array */
-    uint32_t missing;   /* gaps in the sequence, in frames */
+    uint32_t too_long;  /* CRC good, did not fit the buffer or the observation array */
+    uint32_t missing;   /* gaps in the sequence, in frames: the damaged and the lost */
 } plr_reader_counts;
 
 /* What the last call on a reader met. */
 typedef enum plr_read_event {
     PLR_READ_MORE = 0,    /* all bytes are taken, no frame is complete */
     PLR_READ_MESSAGE = 1, /* a good message */
-    PLR_READ_SKIPPED = 2, /* a frame was skipped; the counts tell why, .skipped_at where */
-    PLR_READ_FUTURE = 3   /* a HEADER of a higher major version: do not go on */
+    PLR_READ_SKIPPED = 2, /* a frame was skipped; .skipped_why and .skipped_at tell more */
+    PLR_READ_FUTURE = 3   /* a HEADER of a higher major version: nothing more can be read */
 } plr_read_event;
 
+/* Why a frame was skipped: the count that it went into. */
+typedef enum plr_skip {
+    PLR_SKIP_NONE = 0,
+    PLR_SKIP_DAMAGED = 1,
+    PLR_SKIP_UNKNOWN = 2,
+    PLR_SKIP_MALFORMED = 3,
+    PLR_SKIP_TOO_LONG = 4
+} plr_skip;
+
+/* Stuffing in progress. */
+typedef struct plr_cobs_decoder {
+    uint8_t code; /* of the current block, 0 before the first */
+    uint8_t left; /* data bytes until the next code byte */
+} plr_cobs_decoder;
+
+typedef struct plr_cobs_encoder {
+    uint8_t block[256]; /* code byte, at most 254 data bytes, delimiter */
+    uint8_t fill;       /* bytes of the open block with its code byte; 0: no block is open */
+} plr_cobs_encoder;
+
+/* `counts` and `skipped_*` are for the caller to read; the rest is the reader's own. */
 typedef struct plr_reader {
+    plr_reader_counts counts;
+    uint64_t skipped_at;  /* byte offset at which the last skipped frame began */
+    plr_skip skipped_why; /* of the last skipped frame */
+    uint8_t skipped_kind; /* its kind, if it was not damaged */
+
     uint8_t *buffer; /* the body of one frame, unstuffed */
     size_t buffer_size;
     plr_observation *observations;
     unsigned max_observations;
-    size_t length;      /* bytes of the body so far */
-    uint8_t block_left; /* COBS: bytes until the next code byte */
-    uint8_t block_code; /* COBS: the current code byte, 0 before the first */
-    bool overrun, broken;
-    bool sequence_known;
+    plr_cobs_decoder cobs;
+    size_t length; /* bytes of the body so far, as far as they fit */
+    uint32_t crc;  /* of the whole body so far, whether it fits or not */
+    bool overrun;  /* it does not */
+    bool future;
     uint16_t next_sequence;
     uint64_t frame_start; /* byte offset at which the current frame began */
-    uint64_t skipped_at;  /* byte offset of the last skipped frame */
-    plr_reader_counts counts;
 } plr_reader;
 
 /* Prepares a reader over the caller's buffer (at least PLR_WIRE_MIN_BUFFER bytes) and observation
- * array. PLR_E_ARGUMENT if the buffer is smaller or a pointer is null. */
+ * array. PLR_E_ARGUMENT if the buffer is smaller or a pointer is null; without observations
+ * (max_observations 0) that pointer may be null, and every STEREO that holds some is too long. */
 plr_status plr_reader_init(plr_reader *r, uint8_t *buffer, size_t buffer_size,
                            plr_observation *observations, unsigned max_observations);
 
 /* Takes bytes up to the end of the next frame, and tells in *taken how many. Call again with the
- * rest. *message is filled on PLR_READ_MESSAGE only. Bounded by n. */
+ * rest. *message is filled on PLR_READ_MESSAGE; otherwise its kind is PLR_KIND_NONE and the rest
+ * means nothing, but on the first PLR_READ_FUTURE it is a HEADER of which only the version is set.
+ * After that the reader takes every byte, gives PLR_READ_FUTURE again, and reads nothing.
+ * Bounded by n and the frame's length. No pointer may be null, but `bytes` where n is 0. */
 plr_read_event plr_reader_feed(plr_reader *r, const uint8_t *bytes, size_t n, size_t *taken,
                                plr_message *message);
 
@@ -209,7 +243,7 @@ bool plr_reader_mid_frame(const plr_reader *r);
 
 /* --- writing --- */
 
-/* Takes n bytes: 0 = all taken, else a failure, which the writer returns as PLR_E_IO. */
+/* Takes n bytes, 1 to 256: 0 = all taken, else a failure, which the writer returns as PLR_E_IO. */
 typedef int (*plr_write_function)(void *context, const uint8_t *bytes, size_t n);
 
 typedef struct plr_writer {
@@ -217,22 +251,30 @@ typedef struct plr_writer {
     void *context;
     uint16_t sequence;
     uint32_t crc;
-    uint8_t block[255]; /* COBS: code byte and what follows it */
-    uint8_t fill;
+    plr_cobs_encoder cobs;
     plr_status status; /* of the frame in progress */
-    plr_end counts;    /* what an END will tell */
+    bool torn;         /* the last frame failed: the next begins with a delimiter */
+    plr_end counts;    /* what an END will tell: the frames that were wholly written */
 } plr_writer;
 
+/* Prepares a writer; `context` is handed to the function and may be null. PLR_E_ARGUMENT if another
+ * pointer is. */
 plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *context);
 
 /* Writes one message as a frame, with the writer's own sequence number; message->sequence is not
- * looked at. END's counts are the writer's own. PLR_E_ARGUMENT if the message contradicts itself
- * (nothing is written); PLR_E_IO if the function failed. */
+ * looked at. A HEADER's version and END's counts are the writer's own. PLR_E_ARGUMENT if the
+ * message contradicts itself (nothing is written). PLR_E_IO if the function failed: the message is
+ * lost and its sequence number used up, so that a reader counts it as missing; the next frame
+ * begins with a delimiter of its own and is whole again. */
 plr_status plr_writer_put(plr_writer *w, const plr_message *message);
 
 /* --- parts, for tests and other links --- */
 
 /* CRC-32 as in zlib; start with crc = 0 and hand the result back in for more bytes. */
 uint32_t plr_crc32(uint32_t crc, const uint8_t *bytes, size_t n);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

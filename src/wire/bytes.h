@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+/* Numbers as little-endian bytes, at any alignment and on any processor. */
+#ifndef PELORUS_WIRE_BYTES_H
+#define PELORUS_WIRE_BYTES_H
+
+#include <stdint.h>
+#include <string.h>
+
+/* The unsigned number in n bytes, n <= 8, least significant first. */
+static inline uint64_t plr_bytes_get(const uint8_t *bytes, unsigned n) {
+    uint64_t value = 0;
+    for (unsigned i = n; i > 0; i--)
+        value = value << 8 | bytes[i - 1];
+    return value;
+}
+
+/* The lowest n bytes of value, n <= 8, least significant first. */
+static inline void plr_bytes_put(uint8_t *bytes, unsigned n, uint64_t value) {
+    for (unsigned i = 0; i < n; i++) {
+        bytes[i] = (uint8_t)(value & 0xFF);
+        value >>= 8;
+    }
+}
+
+/* The bits of a real, and the real of bits. Copied, not converted: a signalling NaN stays one. */
+static inline uint32_t plr_bits_of_f32(const float *x) {
+    uint32_t bits;
+    memcpy(&bits, x, sizeof bits);
+    return bits;
+}
+
+static inline void plr_f32_of_bits(float *x, uint32_t bits) {
+    memcpy(x, &bits, sizeof bits);
+}
+
+static inline uint64_t plr_bits_of_f64(const double *x) {
+    uint64_t bits;
+    memcpy(&bits, x, sizeof bits);
+    return bits;
+}
+
+static inline void plr_f64_of_bits(double *x, uint64_t bits) {
+    memcpy(x, &bits, sizeof bits);
+}
+
+#endif
