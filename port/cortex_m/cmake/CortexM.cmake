@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+# How an image is made of the library, the port and a board.
+
+file(GLOB PELORUS_SOURCES CONFIGURE_DEPENDS "${PELORUS_ROOT}/src/*/*.c")
+set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
+set(IMAGES "${CMAKE_CURRENT_BINARY_DIR}/images")
+file(MAKE_DIRECTORY "${IMAGES}")
+
+# What every image needs: reset to main, link, clock, fault reports.
+set(PORT_SOURCES startup.c serial.c clock.c fault.c panic.c text.c)
+list(TRANSFORM PORT_SOURCES PREPEND "${PORT}/")
+
+# No function of these may be linked: the library and the firmware have neither heap nor stdio, and
+# newlib's fma is not fused. --wrap turns every reference into one that nobody defines.
+set(FORBIDDEN malloc calloc realloc free _malloc_r _free_r _sbrk printf snprintf vsnprintf fprintf
+  puts fopen fma fmaf sin cos tan atan2 exp log pow sinf cosf tanf atan2f expf logf powf)
+list(TRANSFORM FORBIDDEN PREPEND "-Wl,--wrap=")
+
+function(cortexm_options target cpu)
+  set_target_properties(${target} PROPERTIES
+    C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF EXCLUDE_FROM_ALL ON)
+  target_compile_options(${target} PRIVATE ${cpu_${cpu}}
+    -O2 -g -ffp-contract=off -fno-math-errno -ffunction-sections -fdata-sections -fno-common -fsigned-char
+    -fstack-usage -fcallgraph-info=su
+    -Wall -Wextra -pedantic -Wconversion -Wdouble-promotion -Wvla -Wshadow -Wmissing-prototypes
+    $<$<BOOL:${PELORUS_WERROR}>:-Werror>)
+endfunction()
+
+# The library for a processor, a capacity and a precision; boards of the same processor share it.
+function(cortexm_library result cpu capacity bits)
+  set(name pelorus-${cpu}-n${capacity}-f${bits})
+  if(NOT TARGET ${name})
+    add_library(${name} STATIC ${PELORUS_SOURCES})
+    cortexm_options(${name} ${cpu})
+    target_include_directories(${name}
+      PUBLIC "${PELORUS_ROOT}/include" PRIVATE "${PELORUS_ROOT}/src")
+    target_compile_definitions(${name} PUBLIC PLR_REAL=${bits} PLR_MAX_LANDMARKS=${capacity}
+      PLR_MAX_OBSERVATIONS=${PLR_MAX_OBSERVATIONS} PLR_BLOCK_OBSERVATIONS=8 PLR_PORTABLE=0)
+  endif()
+  set(${result} ${name} PARENT_SCOPE)
+endfunction()
+
+# An image `name` for a board, out of sources and a library, in all three forms.
+function(cortexm_image name board library)
+  set(cpu ${board_${board}_cpu})
+  set(drivers ${board_${board}_drivers} ${cpu_${cpu}_guard})
+  list(TRANSFORM drivers PREPEND "${PORT}/drivers/")
+  set(folder "${PORT}/boards/${board}")
+  add_executable(${name} ${ARGN} ${PORT_SOURCES} ${drivers} "${folder}/board.c")
+  cortexm_options(${name} ${cpu})
+  set_target_properties(${name} PROPERTIES
+    SUFFIX .elf RUNTIME_OUTPUT_DIRECTORY "${IMAGES}"
+    LINK_DEPENDS "${folder}/memory.ld;${PORT}/boards/sections.ld")
+  target_link_libraries(${name} PRIVATE ${library})
+  target_link_options(${name} PRIVATE ${cpu_${cpu}} -nostartfiles --specs=nano.specs
+    -T "${folder}/memory.ld" "-L${PORT}/boards" -Wl,--gc-sections -Wl,--fatal-warnings
+    "-Wl,-Map=${IMAGES}/${name}.map" ${FORBIDDEN})
+  add_custom_command(TARGET ${name} POST_BUILD
+    COMMAND "${CMAKE_OBJCOPY}" -O binary "${IMAGES}/${name}.elf" "${IMAGES}/${name}.bin"
+    COMMAND "${CMAKE_OBJCOPY}" -O ihex "${IMAGES}/${name}.elf" "${IMAGES}/${name}.hex")
+endfunction()
+
+function(cortexm_bringup board)
+  cortexm_library(library ${board_${board}_cpu} 8 32)
+  cortexm_image(bringup-${board} ${board} ${library} "${PORT}/main_bringup.c")
+  add_dependencies(bringup bringup-${board})
+endfunction()
+
+function(cortexm_firmware board capacity bits)
+  cortexm_library(library ${board_${board}_cpu} ${capacity} ${bits})
+  set(suffix ${board}-n${capacity})
+  if(bits EQUAL 64)
+    string(APPEND suffix -f64)
+  endif()
+  cortexm_image(pelorus-${suffix} ${board} ${library}
+    "${PORT}/main_firmware.c" "${PORT}/port_serial.c")
+  add_dependencies(boards pelorus-${suffix})
+endfunction()

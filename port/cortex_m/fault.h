@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+/*
+ * What happens when the processor cannot go on: a TEXT frame of severity error tells what and
+ * where, over the link, by polling; then the board is reset. What happened is kept over the reset,
+ * for the boot message.
+ */
+#ifndef PELORUS_CORTEX_M_FAULT_H
+#define PELORUS_CORTEX_M_FAULT_H
+
+#include <stdint.h>
+
+#include "text.h"
+
+/* Adds to a message why the board started: "power-on", or the last fault, and how many there were
+ * since power-on. */
+void fault_add_history(text *t);
+
+/* Faults since power-on. */
+uint32_t fault_count(void);
+
+#endif

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+/* What is flashed: the session, over the link, for ever. */
+#include <string.h>
+
+#include "board.h"
+#include "clock.h"
+#include "core.h"
+#include "fault.h"
+#include "pelorus/pelorus.h"
+#include "pelorus/session.h"
+#include "port_serial.h"
+#include "serial.h"
+#include "startup.h"
+#include "text.h"
+
+static plr_session session;
+
+/* The first frame of a life: who speaks, which build, and why it started. A host that meets it in
+ * mid-flight knows that the board has lost its state. */
+static void announce(void) {
+    static plr_message message;
+    static text words;
+    const uint8_t delimiter = 0; /* ends what the last life may have left open */
+    (void)serial_write(&delimiter, 1);
+    text_clear(&words);
+    text_add(&words, "pelorus ");
+    text_add(&words, plr_version());
+    text_add(&words, " on ");
+    text_add(&words, board_name);
+    text_add(&words, ", build ");
+    text_add_hex(&words, plr_build_fingerprint());
+    text_add(&words, ": ");
+    fault_add_history(&words);
+    message.kind = PLR_KIND_TEXT;
+    message.as.text.severity = fault_count() == 0 ? PLR_SEVERITY_INFO : PLR_SEVERITY_WARNING;
+    memcpy(message.as.text.text, words.characters, words.length + 1);
+    (void)plr_writer_put(&session.writer, &message);
+}
+
+int main(void) {
+    board_init();
+    clock_start(board_core_hz());
+    serial_start();
+    board_watchdog_start();
+    core_irq_on();
+    const plr_port port = port_serial();
+    plr_session_options options;
+    plr_session_options_default(&options);
+    if (plr_session_init(&session, &port, &options) != PLR_OK) {
+        return 1; /* startup resets the board: only a broken build comes here */
+    }
+    announce();
+    for (;;) {
+        (void)plr_session_step(&session);
+    }
+}
