@@ -40,6 +40,7 @@ def run(*command: str | Path) -> str:
 
 
 def build_with_cmake(folder: Path, example: str, cmake: str, cc: str, get_pelorus: str) -> Path:
+    """The program, from a CMake project that gets the library by the line `get_pelorus`."""
     folder.mkdir()
     (folder / "example.c").write_text(example, encoding="utf-8")
     (folder / "CMakeLists.txt").write_text(
@@ -51,6 +52,7 @@ def build_with_cmake(folder: Path, example: str, cmake: str, cc: str, get_peloru
 
 
 def build_with_one_command(folder: Path, example: str, root: Path, cc: str) -> Path:
+    """The program, from one call of the compiler."""
     folder.mkdir()
     (folder / "example.c").write_text(example, encoding="utf-8")
     sources = sorted((root / "src").glob("*/*.c"))
@@ -62,6 +64,7 @@ def build_with_one_command(folder: Path, example: str, root: Path, cc: str) -> P
 
 
 def readme_example(root: Path) -> str:
+    """The first C block of the README."""
     readme = root / "README.md"
     if not readme.is_file():
         print("skipped: no README.md yet")
@@ -74,6 +77,7 @@ def readme_example(root: Path) -> str:
 
 
 def main() -> int:
+    """Builds and runs the example in three ways; the exit status."""
     if len(sys.argv) != 5:
         print(__doc__, file=sys.stderr)
         return 2

@@ -14,11 +14,9 @@ from pathlib import Path
 
 C_COMPILERS = ("gcc", "clang", "clang-14")
 CXX_COMPILERS = ("g++", "clang++", "clang++-14")
-C_FLAGS = (
-    "-std=c99 -Wall -Wextra -pedantic -Wconversion -Wdouble-promotion -Wvla -Wshadow"
-    " -Wmissing-prototypes -Werror"
-).split()
-CXX_FLAGS = "-std=c++17 -Wall -Wextra -pedantic -Wconversion -Wshadow -Werror".split()
+WARNINGS = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror"]
+C_FLAGS = ["-std=c99", *WARNINGS, "-Wdouble-promotion", "-Wvla", "-Wmissing-prototypes"]
+CXX_FLAGS = ["-std=c++17", *WARNINGS]
 
 
 def compile_alone(compiler: str, flags: list[str], language: str, root: Path, header: Path) -> bool:
@@ -37,6 +35,7 @@ def compile_alone(compiler: str, flags: list[str], language: str, root: Path, he
 
 
 def main() -> int:
+    """Compiles them all; the exit status."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2

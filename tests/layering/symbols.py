@@ -29,6 +29,7 @@ def symbols(nm: str, library: str) -> list[tuple[str, str]]:
 
 
 def breaches(found: list[tuple[str, str]]) -> list[str]:
+    """A sentence for every symbol that should not be there."""
     defined = {name for letter, name in found if letter not in "Uw"}
     texts = []
     for letter, name in sorted(set(found)):
@@ -42,6 +43,7 @@ def breaches(found: list[tuple[str, str]]) -> list[str]:
 
 
 def main() -> int:
+    """Looks at one library; the exit status."""
     if len(sys.argv) != 3:
         print(__doc__, file=sys.stderr)
         return 2

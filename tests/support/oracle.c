@@ -59,9 +59,8 @@ void oracle_solve_lower(unsigned n, unsigned columns, const double *L, double *X
 }
 
 bool oracle_solve_spd(unsigned n, unsigned columns, double *A, double *X) {
-    const lapack_int info =
-        LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, (lapack_int)columns, A, at_least_1(n),
-                      X, at_least_1(columns));
+    const lapack_int info = LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, (lapack_int)columns,
+                                          A, at_least_1(n), X, at_least_1(columns));
     demand_arguments("dposv", info);
     return info == 0;
 }

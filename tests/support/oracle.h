@@ -9,10 +9,7 @@
 
 #include <stdbool.h>
 
-typedef enum oracle_op {
-    ORACLE_PLAIN,
-    ORACLE_TRANSPOSED
-} oracle_op;
+typedef enum oracle_op { ORACLE_PLAIN, ORACLE_TRANSPOSED } oracle_op;
 
 /* C = alpha op(A) op(B) + beta C: op(A) is m x k, op(B) is k x n, C is m x n. */
 void oracle_gemm(oracle_op op_A, oracle_op op_B, unsigned m, unsigned n, unsigned k, double alpha,

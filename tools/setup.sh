@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+# shellcheck shell=bash
+# What tools/demo.sh and tools/test.sh share: installing what is missing, the Python environment,
+# building. Sourced, not run. Works on Debian 12 and Ubuntu 22.04 or later; elsewhere it names what
+# is missing and stops.
+
+ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+VENV=$ROOT/.venv
+LOGS=$ROOT/build-logs
+JOBS=${JOBS:-2}
+export PIP_DISABLE_PIP_VERSION_CHECK=1
+
+# Packages by Debian name; a|b: the first one that is installed or can be had.
+PACKAGES_BUILD=(gcc libc6-dev make cmake python3 python3-venv ca-certificates)
+PACKAGES_TEST=(g++ 'clang-14|clang' libopenblas-dev liblapacke-dev
+    gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm)
+# Without these a check is skipped, saying so.
+PACKAGES_WANTED=(clang-format-14)
+
+heading() {
+    printf '\n=== %s\n' "$*"
+}
+
+die() {
+    printf '%s: %s\n' "$(basename "$0")" "$*" >&2
+    exit 1
+}
+
+# --- packages ------------------------------------------------------------------------------------
+
+package_installed() {
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]
+}
+
+any_installed() {
+    local name
+    for name in ${1//|/ }; do
+        package_installed "$name" && return 0
+    done
+    return 1
+}
+
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then
+        "$@"
+    elif command -v sudo >/dev/null; then
+        sudo "$@"
+    else
+        die "not root and no sudo. As root: $*"
+    fi
+}
+
+# The first of a|b|c that apt knows.
+first_available() {
+    local name
+    for name in ${1//|/ }; do
+        if [ -n "$(apt-cache policy "$name" 2>/dev/null | grep 'Candidate: [^(]')" ]; then
+            printf '%s\n' "$name"
+            return 0
+        fi
+    done
+    return 1
+}
+
+# ensure_packages WORD...: installs what is missing. A word that ends in ? may stay missing.
+ensure_packages() {
+    local word name wanted=() install=()
+    command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
+        { note_foreign_system "$@" && return 0; }
+    for word in "$@"; do
+        any_installed "${word%\?}" || wanted+=("$word")
+    done
+    [ ${#wanted[@]} -eq 0 ] && { echo 'Debian packages: all present'; return 0; }
+
+    echo "Debian packages missing: ${wanted[*]}"
+    as_root apt-get update -qq || die 'apt-get update failed: is there a network?'
+    for word in "${wanted[@]}"; do
+        if name=$(first_available "${word%\?}"); then
+            install+=("$name")
+        elif [ "$word" = "${word%\?}" ]; then
+            die "apt knows no package $word"
+        else
+            echo "not to be had here: ${word%\?}"
+        fi
+    done
+    [ ${#install[@]} -eq 0 ] && return 0
+    echo "installing: ${install[*]}"
+    as_root env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends "${install[@]}" >/dev/null ||
+        die "apt-get install ${install[*]} failed"
+}
+
+note_foreign_system() {
+    echo "No apt here. Needed, by their Debian names: $*"
+    local tool
+    for tool in cc make cmake python3; do
+        command -v "$tool" >/dev/null || die "no $tool: install it first"
+    done
+}
+
+# --- Python --------------------------------------------------------------------------------------
+
+# ensure_python: the command pelorus and its development tools, pinned, in .venv.
+ensure_python() {
+    local lock=$ROOT/tools/requirements.lock stamp=$VENV/pelorus-installed-from
+    local wanted
+    python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' ||
+        die "Python $(python3 -V 2>&1 | cut -d' ' -f2) is too old: 3.10 or later is needed"
+    wanted="$ROOT $(python3 -V) $(cat "$lock" "$ROOT/tools/pyproject.toml" | sha256sum)"
+    if [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then
+        echo 'Python environment: up to date'
+        return 0
+    fi
+    echo "Python environment: installing $(grep -c '^[a-zA-Z].*==' "$lock") pinned packages into .venv"
+    rm -rf "$VENV"
+    python3 -m venv "$VENV" || die 'python3 -m venv failed: install python3-venv'
+    "$VENV/bin/python" -m pip install --quiet --requirement "$lock" ||
+        die 'pip could not install tools/requirements.lock: is there a network?'
+    "$VENV/bin/python" -m pip install --quiet --no-deps --editable "$ROOT/tools" ||
+        die 'pip could not install tools/'
+    printf '%s' "$wanted" >"$stamp"
+}
+
+# --- building ------------------------------------------------------------------------------------
+
+# build_preset NAME [CMAKE OPTION...]: configures and builds, in the preset's own folder.
+build_preset() {
+    local preset=$1
+    shift
+    (cd "$ROOT" &&
+        cmake --preset "$preset" -DPython3_EXECUTABLE="$VENV/bin/python" "$@" &&
+        cmake --build --preset "$preset" -j "$JOBS")
+}

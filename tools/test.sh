@@ -1,0 +1,164 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Sets up, builds in every way that the project promises, and runs all tests.
+#
+# usage: tools/test.sh [--quick | --long]
+#
+#   --quick   one compiler, without sanitizers, portable build and microcontroller
+#   --long    adds the tests that take minutes (PELORUS_LONG=1)
+#
+# Real recordings are looked for in $PELORUS_DATA, by default ../shared/data; tests that need an
+# absent one are skipped, saying so. The last line counts what passed and failed.
+set -uo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+extent=normal
+for option in "$@"; do
+    case $option in
+    --quick) extent=quick ;;
+    --long) extent=long ;;
+    -h | --help)
+        sed -n '3,11s/^# \{0,1\}//p' "$0"
+        exit 0
+        ;;
+    *) die "no option $option: tools/test.sh [--quick | --long]" ;;
+    esac
+done
+
+export PELORUS_DATA=${PELORUS_DATA:-$ROOT/../shared/data}
+export PELORUS_LONG=0
+[ $extent = long ] && PELORUS_LONG=1
+cd "$ROOT" || exit 1
+rm -rf "$LOGS"
+mkdir -p "$LOGS"
+
+passed=0 failed=0 skipped=0
+failures=()
+
+# count LOG STATUS NAME: adds a step's tests to the totals: those that ctest or pytest counted, else
+# the step itself.
+count() {
+    local log=$1 status=$2 name=$3 good=0 bad=0 total
+    if grep -q 'tests passed, .* tests failed out of' "$log"; then
+        bad=$(sed -n 's/.*tests passed, \([0-9]*\) tests failed out of.*/\1/p' "$log" | tail -1)
+        total=$(sed -n 's/.*tests failed out of \([0-9]*\).*/\1/p' "$log" | tail -1)
+        good=$((total - bad))
+    elif grep -qE '^=* ?[0-9]+ (passed|failed).* in [0-9.]+s' "$log"; then
+        good=$(grep -oE '[0-9]+ passed' "$log" | tail -1 | cut -d' ' -f1)
+        bad=$(grep -oE '[0-9]+ (failed|errors?)' "$log" | tail -1 | cut -d' ' -f1)
+    elif [ "$status" -eq 0 ]; then
+        good=1
+    fi
+    good=${good:-0} bad=${bad:-0}
+    [ "$status" -ne 0 ] && [ "$bad" -eq 0 ] && bad=1
+    passed=$((passed + good)) failed=$((failed + bad))
+    [ "$status" -eq 0 ] || failures+=("$name (build-logs/$(basename "$log"))")
+}
+
+# step NAME COMMAND...: runs it, shows its end, and counts.
+step() {
+    local name=$1 log status started=$SECONDS
+    shift
+    log=$LOGS/$(tr -cs 'A-Za-z0-9\n' '-' <<<"$name").log
+    heading "$name"
+    "$@" >"$log" 2>&1
+    status=$?
+    if [ $status -eq 0 ]; then
+        tail -3 "$log"
+        echo "ok, $((SECONDS - started)) s"
+    else
+        tail -80 "$log"
+        echo "FAILED with status $status after $((SECONDS - started)) s"
+    fi
+    show_skips "$log"
+    count "$log" $status "$name"
+    return $status
+}
+
+# What tests said when they left something out: Unity's IGNORE lines and pytest's SKIPPED lines.
+show_skips() {
+    grep -hE ':IGNORE|^SKIPPED |\*\*\*Skipped' "$1" | sort -u | sed 's/^/skipped: /'
+}
+
+skip() {
+    heading "$1"
+    echo "skipped: $2"
+    skipped=$((skipped + 1))
+}
+
+run_ctest() {
+    ctest --test-dir "$1" --output-on-failure -j "$JOBS" "${@:2}"
+    local status=$?
+    grep -hE ':IGNORE' "$1/Testing/Temporary/LastTest.log"
+    return $status
+}
+
+# build_and_test PRESET WHAT [CMAKE OPTION...]
+build_and_test() {
+    local preset=$1 what=$2
+    shift 2
+    step "build: $what" build_preset "$preset" "$@" || return 1
+    step "test: $what" run_ctest "build${preset:+-$preset}"
+}
+
+check_format() {
+    find include src port tests -name '*.[ch]' -print0 |
+        xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
+}
+
+# Warnings are errors, and the machine must have OpenBLAS: no test is left out in silence.
+strict=(-DPELORUS_BUILD_TESTS=ON -DPELORUS_WERROR=ON -DPELORUS_REQUIRE_ORACLE=ON)
+
+heading 'Set-up'
+if [ $extent = quick ]; then
+    ensure_packages "${PACKAGES_BUILD[@]}" g++ libopenblas-dev liblapacke-dev
+else
+    ensure_packages "${PACKAGES_BUILD[@]}" "${PACKAGES_TEST[@]}" "${PACKAGES_WANTED[@]/%/?}"
+fi
+ensure_python
+if [ -d "$PELORUS_DATA" ]; then
+    echo "real recordings: $PELORUS_DATA"
+else
+    echo "skipped: no real recordings at $PELORUS_DATA; tests that need them say so"
+fi
+
+# --- form ----------------------------------------------------------------------------------------
+
+if command -v clang-format-14 >/dev/null; then
+    step 'C format' check_format
+else
+    skip 'C format' 'clang-format-14 is not here'
+fi
+step 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
+step 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
+step 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
+    tools/pelorus tests/python tests/layering
+
+# --- the desktop ---------------------------------------------------------------------------------
+
+step 'build: gcc' build_preset release "${strict[@]}" && step 'test: gcc' run_ctest build
+step 'test: Python' "$VENV/bin/python" -m pytest -q -rs tests/python
+
+if [ $extent != quick ]; then
+    clang=$(command -v clang-14 || command -v clang)
+    build_and_test debug 'sanitizers' "${strict[@]}"
+    build_and_test clang 'clang' "${strict[@]}" -DCMAKE_C_COMPILER="$clang"
+    build_and_test portable 'portable' "${strict[@]}"
+    build_and_test o2 'less optimised' "${strict[@]}"
+    if [ -x tests/golden/same_bits.sh ]; then
+        step 'same bits from every build' tests/golden/same_bits.sh \
+            build build-clang build-portable build-o2
+    fi
+    if [ -x tests/target/run.sh ]; then
+        step 'microcontroller' tests/target/run.sh
+    fi
+fi
+
+# --- summary -------------------------------------------------------------------------------------
+
+heading "Summary, after $((SECONDS / 60)) min $((SECONDS % 60)) s"
+for failure in "${failures[@]+"${failures[@]}"}"; do
+    echo "failed: $failure"
+done
+echo "$passed passed, $failed failed, $skipped skipped"
+[ "$failed" -eq 0 ]
