@@ -56,7 +56,10 @@ typedef enum plr_output {
 enum {
     PLR_SESSION_HELD_TWISTS = 64, /* most twists that a twist-delay holds back */
     PLR_SESSION_CHUNK = 256,      /* bytes asked of the port at once */
-    PLR_SESSION_AGREEING = 3      /* messages that must agree before a new time is believed */
+    PLR_SESSION_AGREEING = 3,     /* messages that must agree before a new time is believed */
+    PLR_SESSION_BODY = PLR_WIRE_STEREO_BODY(PLR_MAX_OBSERVATIONS) > PLR_WIRE_MIN_BUFFER
+                           ? PLR_WIRE_STEREO_BODY(PLR_MAX_OBSERVATIONS)
+                           : PLR_WIRE_MIN_BUFFER /* bytes of the longest frame */
 };
 
 /* What came of one STEREO. */
@@ -163,7 +166,7 @@ typedef struct plr_session {
     plr_reader reader;
     uint8_t chunk[PLR_SESSION_CHUNK];
     unsigned chunk_at, chunk_count;
-    uint8_t body[PLR_WIRE_STEREO_BODY(PLR_MAX_OBSERVATIONS) + PLR_WIRE_MIN_BUFFER];
+    uint8_t body[PLR_SESSION_BODY];
     plr_observation observations[PLR_MAX_OBSERVATIONS];
     plr_message in;
     uint8_t last_skip; /* plr_skip of the last frame, so that a run of noise is answered once */

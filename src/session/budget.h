@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+/*
+ * A deadline in time becomes a budget of observations.
+ *
+ * The rule: let c be the cost of one observation. After a frame that used n > 0 observations and
+ * took t, its own cost is t / n, but at most the deadline; c rises to it at once, and falls towards
+ * it by an eighth of the difference. The next frame may use deadline / c observations, therefore
+ * always at least one. Until a cost is known it may use one block of them.
+ *
+ * The fixed part of a frame's time is charged to its observations, so c is too high after a small
+ * frame and falls as the budget grows; where time is linear in n the budget settles at the largest
+ * n that keeps the deadline. The number is recorded in the echoed STEREO, so a replay of the log
+ * takes the same observations on any machine.
+ */
+#ifndef PLR_SESSION_BUDGET_H
+#define PLR_SESSION_BUDGET_H
+
+#include "pelorus/session.h"
+
+/* deadline_us = 0: no limit. */
+void plr_budget_init(plr_budget *budget, uint32_t deadline_us);
+
+/* Observations that the next frame may use; PLR_NO_BUDGET without a deadline. */
+uint16_t plr_budget_next(const plr_budget *budget);
+
+/* What a frame took. elapsed_ns = 0, a stalled or missing clock, teaches nothing. */
+void plr_budget_learn(plr_budget *budget, uint64_t elapsed_ns, unsigned used);
+
+#endif

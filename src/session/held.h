@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+/*
+ * Twists held back for a late camera.
+ *
+ * A frame that is older than the last twist is refused, so with a camera that needs, say, 80 ms
+ * from shutter to message the session hands twists to the filter 80 ms late (setting twist-delay).
+ * A twist is due once a newer one is `delay` ahead of it, or when a frame at or after it is used.
+ */
+#ifndef PLR_SESSION_HELD_H
+#define PLR_SESSION_HELD_H
+
+#include "pelorus/session.h"
+
+void plr_held_init(plr_held_twists *held);
+
+bool plr_held_full(const plr_held_twists *held);
+
+/* Appends a twist. The ring may not be full. */
+void plr_held_push(plr_held_twists *held, const plr_twist_message *twist);
+
+/* True if this twist's time does not follow the newest one's: then order means nothing any more,
+ * and what is held is due. False for an empty ring. */
+bool plr_held_contradicts(const plr_held_twists *held, plr_time_ns t_ns);
+
+/* Takes the oldest twist if it is at most at t_ns; false if there is none such. */
+bool plr_held_pop_until(plr_held_twists *held, plr_time_ns t_ns, plr_twist_message *twist);
+
+/* Takes the oldest twist if the newest is at least delay_ns ahead of it. */
+bool plr_held_pop_due(plr_held_twists *held, plr_time_ns delay_ns, plr_twist_message *twist);
+
+/* Takes the oldest twist; false if there is none. */
+bool plr_held_pop(plr_held_twists *held, plr_twist_message *twist);
+
+#endif

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "session/layers.h"
+
+/* Settings that a HEADER suggests, by name, in the order of the fields. */
+typedef struct {
+    const char *name;
+    double value;
+} plr_suggestion;
+
+static void suggest(plr_config *config, const char *name, double value) {
+    if (value >= 0)
+        (void)plr_config_set(config, plr_setting_by_name(name), value);
+}
+
+static void apply_header(plr_config *config, const plr_header *header, bool sigmas_of_a_reading) {
+    const plr_suggestion suggestions[] = {
+        {"twist-timing", header->twist_timing},
+        {"pixel-sigma", header->pixel_sigma_px},
+        {"bias-velocity-sigma", header->bias_velocity_sigma_mps},
+        {"bias-gyro-sigma", header->bias_gyro_sigma_radps},
+        {"bias-velocity-walk", header->bias_velocity_walk},
+        {"bias-gyro-walk", header->bias_gyro_walk},
+    };
+    for (unsigned i = 0; i < sizeof suggestions / sizeof suggestions[0]; i++)
+        suggest(config, suggestions[i].name, suggestions[i].value);
+    if (sigmas_of_a_reading) {
+        suggest(config, "velocity-sigma", header->velocity_sigma_mps);
+        suggest(config, "gyro-sigma", header->gyro_sigma_radps);
+    }
+}
+
+/* The row of the first value that no setting allows, else NULL; *status tells. */
+static plr_status apply_values(plr_config *config, const plr_wire_setting *values, unsigned count,
+                               const plr_setting **culprit) {
+    for (unsigned i = 0; i < count; i++) {
+        const plr_setting *setting = plr_setting_by_id(values[i].id);
+        if (setting == NULL || plr_config_set(config, setting, values[i].value) != PLR_OK) {
+            *culprit = setting;
+            return PLR_E_CONFIG;
+        }
+    }
+    return PLR_OK;
+}
+
+static plr_status apply_all(plr_config *config, const plr_layers *layers, bool sigmas_of_a_reading,
+                            const plr_setting **culprit) {
+    plr_config_default(config);
+    apply_header(config, layers->header, sigmas_of_a_reading);
+    plr_status status =
+        apply_values(config, layers->wanted->settings, layers->wanted->count, culprit);
+    if (status == PLR_OK)
+        status = apply_values(config, layers->overrides, layers->override_count, culprit);
+    return status;
+}
+
+plr_status plr_layers_compose(plr_config *config, const plr_layers *layers,
+                              const plr_setting **culprit) {
+    *culprit = NULL;
+    plr_status status = apply_all(config, layers, true, culprit);
+    if (status == PLR_OK && config->noise == PLR_NOISE_STEP)
+        status = apply_all(config, layers, false, culprit);
+    return status == PLR_OK ? plr_config_check(config, culprit) : status;
+}
+
+plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
+    plr_config scratch;
+    const plr_setting *culprit;
+    plr_config_default(&scratch);
+    if (apply_values(&scratch, &value, 1, &culprit) != PLR_OK)
+        return PLR_E_CONFIG;
+    unsigned i = 0;
+    while (i < wanted->count && wanted->settings[i].id != value.id)
+        i++;
+    if (i == PLR_WIRE_MAX_SETTINGS)
+        return PLR_E_CONFIG;
+    wanted->settings[i] = value;
+    if (i == wanted->count)
+        wanted->count++;
+    return PLR_OK;
+}
+
+void plr_layers_describe(plr_config_message *message, const plr_config *config) {
+    message->build_fingerprint = plr_build_fingerprint();
+    message->max_landmarks = PLR_MAX_LANDMARKS;
+    message->max_observations = PLR_MAX_OBSERVATIONS;
+    message->block_observations = PLR_BLOCK_OBSERVATIONS;
+    message->real_bytes = (uint8_t)sizeof(plr_real);
+    message->count = (uint8_t)plr_setting_count();
+    for (unsigned i = 0; i < message->count; i++) {
+        const plr_setting *setting = plr_setting_at(i);
+        message->settings[i].id = setting->id;
+        message->settings[i].value = plr_config_get(config, setting);
+    }
+}
+
+bool plr_layers_agree(const plr_config_message *message, const plr_config *config) {
+    for (unsigned i = 0; i < message->count; i++) {
+        const plr_setting *setting = plr_setting_by_id(message->settings[i].id);
+        if (setting != NULL && plr_config_get(config, setting) != message->settings[i].value)
+            return false;
+    }
+    return true;
+}

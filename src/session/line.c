@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+#include "session/line.h"
+
+#include <string.h>
+
+void plr_line_begin(plr_text *line, plr_severity severity) {
+    line->severity = (uint8_t)severity;
+    line->text[0] = '\0';
+}
+
+/* The length of UTF-8 text when it is cut to `room` bytes: never inside a character. */
+static size_t whole_characters(const char *words, size_t room) {
+    size_t n = 0;
+    while (n < room && words[n] != '\0')
+        n++;
+    if (words[n] != '\0')
+        while (n > 0 && ((unsigned char)words[n] & 0xC0u) == 0x80u)
+            n--;
+    return n;
+}
+
+void plr_line_words(plr_text *line, const char *words) {
+    const size_t at = strlen(line->text);
+    const size_t n = whole_characters(words, PLR_WIRE_MAX_TEXT - at);
+    memcpy(line->text + at, words, n);
+    line->text[at + n] = '\0';
+}
+
+/* Decimal digits of a number, at least `width` of them. */
+static void put_digits(plr_text *line, uint64_t number, unsigned width) {
+    char digits[21];
+    unsigned at = sizeof digits - 1;
+    digits[at] = '\0';
+    for (unsigned n = 0; number > 0 || n < width; n++) {
+        digits[--at] = (char)('0' + number % 10u);
+        number /= 10u;
+    }
+    plr_line_words(line, digits + at);
+}
+
+void plr_line_count(plr_text *line, uint64_t number) {
+    put_digits(line, number, 1);
+}
+
+/* digits 10^-decimals, without the zeros at its end. */
+static void put_decimal(plr_text *line, uint32_t digits, unsigned decimals) {
+    while (decimals > 0 && digits % 10u == 0) {
+        digits /= 10u;
+        decimals--;
+    }
+    uint32_t unit = 1;
+    for (unsigned i = 0; i < decimals; i++)
+        unit *= 10u;
+    put_digits(line, digits / unit, 1);
+    if (decimals > 0) {
+        plr_line_words(line, ".");
+        put_digits(line, digits % unit, decimals);
+    }
+}
+
+void plr_line_number(plr_text *line, double number) {
+    if (number != number) {
+        plr_line_words(line, "NaN");
+        return;
+    }
+    if (number < 0) {
+        plr_line_words(line, "-");
+        number = -number;
+    }
+    if (number > 1.7e308) {
+        plr_line_words(line, "infinity");
+        return;
+    }
+    int exponent = 0; /* number 10^exponent was asked for, with number in [1, 10) */
+    if (number > 0) {
+        for (; number >= 10; exponent++)
+            number /= 10;
+        for (; number < 1; exponent--)
+            number *= 10;
+    }
+    uint32_t digits = (uint32_t)(number * 1e5 + 0.5);
+    if (digits >= 1000000u) {
+        digits /= 10u;
+        exponent++;
+    }
+    if (exponent >= 0 && exponent <= 5) {
+        put_decimal(line, digits, (unsigned)(5 - exponent));
+    } else if (exponent < 0 && exponent >= -4) {
+        put_decimal(line, digits, (unsigned)(5 - exponent));
+    } else {
+        put_decimal(line, digits, 5);
+        plr_line_words(line, exponent < 0 ? "e-" : "e+");
+        put_digits(line, (uint64_t)(exponent < 0 ? -exponent : exponent), 2);
+    }
+}
+
+void plr_line_time(plr_text *line, plr_time_ns t_ns) {
+    put_digits(line, t_ns / 1000000000u, 1);
+    plr_line_words(line, ".");
+    put_digits(line, t_ns / 1000000u % 1000u, 3);
+    plr_line_words(line, " s");
+}

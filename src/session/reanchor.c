@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include "session/reanchor.h"
+
+#include <string.h>
+
+#include "session/line.h"
+#include "session/send.h"
+
+/* The most that is ever claimed not to be known. */
+#define MAX_POSITION_VARIANCE 1e6                /* (1 km)^2 */
+#define MAX_ANGLE_VARIANCE    3.2898681336964528 /* pi^2 / 3 */
+
+void plr_clock_watch_init(plr_clock_watch *watch) {
+    watch->agreeing = 0;
+    watch->last_ns = 0;
+}
+
+static plr_time_ns distance_ns(plr_time_ns a, plr_time_ns b) {
+    return a > b ? a - b : b - a;
+}
+
+bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status status,
+                          plr_time_ns filter_ns, plr_time_ns max_gap_ns) {
+    if (status == PLR_OK || status == PLR_E_DIVERGED) {
+        watch->agreeing = 0;
+        return false;
+    }
+    if (status != PLR_E_TIME && status != PLR_E_LATE && status != PLR_E_GAP)
+        return false; /* says nothing about the clock */
+    if (distance_ns(t_ns, filter_ns) <= max_gap_ns)
+        return false;
+    if (watch->agreeing > 0 && t_ns == watch->last_ns)
+        return false;
+    const bool agrees = t_ns > watch->last_ns && t_ns - watch->last_ns <= max_gap_ns;
+    watch->agreeing = watch->agreeing > 0 && agrees ? watch->agreeing + 1u : 1u;
+    watch->last_ns = t_ns;
+    if (watch->agreeing < PLR_SESSION_AGREEING)
+        return false;
+    watch->agreeing = 0;
+    return true;
+}
+
+static double absolute(double x) {
+    return x < 0 ? -x : x;
+}
+
+/* |x_1| + |x_2| + |x_3|: never less than the norm. */
+static double sum3(const double x[3]) {
+    return absolute(x[0]) + absolute(x[1]) + absolute(x[2]);
+}
+
+/* (speed seconds)^2, at most `limit`. */
+static double wandered(double speed, double seconds, double limit) {
+    const double variance = speed * seconds * (speed * seconds);
+    return variance < limit ? variance : limit;
+}
+
+/* The last pose with a covariance that a gap of so many seconds leaves. */
+static plr_status widen(double P[36], const plr_filter *f, double seconds) {
+    const plr_config *config = plr_filter_config(f);
+    const bool of_reading = config->noise == PLR_NOISE_TWIST;
+    plr_twist u;
+    if (plr_filter_velocity(f, &u) != PLR_OK || plr_filter_pose_covariance(f, P) != PLR_OK)
+        return PLR_E_NOT_READY;
+    const double speed = sum3(u.v_B_mps) + (of_reading ? config->velocity_sigma : 0);
+    const double rate = sum3(u.w_B_radps) + (of_reading ? config->gyro_sigma : 0);
+    for (unsigned i = 0; i < 3; i++) {
+        P[7 * i] += wandered(speed, seconds, MAX_POSITION_VARIANCE);
+        P[7 * (i + 3)] += wandered(rate, seconds, MAX_ANGLE_VARIANCE);
+    }
+    return PLR_OK;
+}
+
+/* For a covariance that was not positive even before: nothing is known. */
+static void know_nothing(double P[36]) {
+    memset(P, 0, 36 * sizeof *P);
+    for (unsigned i = 0; i < 3; i++) {
+        P[7 * i] = MAX_POSITION_VARIANCE;
+        P[7 * (i + 3)] = MAX_ANGLE_VARIANCE;
+    }
+}
+
+static void tell(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
+    plr_text *line = &s->out.as.text;
+    plr_line_begin(line, PLR_SEVERITY_WARNING);
+    plr_line_words(line, "the clock jumped from ");
+    plr_line_time(line, from_ns);
+    plr_line_words(line, " to ");
+    plr_line_time(line, to_ns);
+    plr_line_words(line, ", further than max-gap; three messages agree, so it is followed: "
+                         "landmarks leave, the pose stays with a wider covariance");
+    plr_send_text(s);
+}
+
+plr_status plr_reanchor(plr_session *s, plr_time_ns t_ns) {
+    plr_filter *f = &s->filter;
+    plr_pose pose;
+    double P[36];
+    const plr_time_ns from_ns = plr_filter_time(f);
+    const double seconds = (double)distance_ns(from_ns, t_ns) * 1e-9;
+
+    plr_status status = plr_filter_pose(f, &pose);
+    if (status == PLR_OK)
+        status = widen(P, f, seconds);
+    if (status != PLR_OK)
+        return status;
+    (void)plr_filter_flush_map(f); /* the session's sink takes all */
+    status = plr_filter_set_pose(f, t_ns, &pose, P);
+    if (status == PLR_E_ARGUMENT) {
+        know_nothing(P);
+        status = plr_filter_set_pose(f, t_ns, &pose, P);
+    }
+    if (status == PLR_OK) {
+        s->totals.reanchored++;
+        tell(s, from_ns, t_ns);
+    }
+    return status;
+}

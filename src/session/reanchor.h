@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+/*
+ * Following a clock that jumped.
+ *
+ * The filter refuses a step of more than max-gap, and everything older than its estimate. So one
+ * damaged time stamp cannot throw the estimate away; but after a true jump (a clock that was set, a
+ * sender that started anew) everything would be refused for ever. The rule:
+ *
+ * - A message is out of reach if its time is further than max-gap from the estimate's, ahead or
+ *   behind, and the filter refused it for that. (What is behind by less needs no help: the clock
+ *   catches up within max-gap.)
+ * - Two successive messages out of reach agree if the second is later than the first by at most
+ *   max-gap. Equal times are one message received twice: they count once.
+ * - After PLR_SESSION_AGREEING of them that agree, with none accepted in between, the new time is
+ *   believed. The session hands the landmarks to the map, sets the pose at the new time to the
+ *   last one, and widens its covariance: how far the body went meanwhile is not known. To each
+ *   variance of rho is added ((v + sigma_v) gap)^2, where v is the sum of the last velocity's
+ *   absolute components (never less than its norm), at most (1 km)^2; to each of theta
+ *   ((w + sigma_w) gap)^2, at most pi^2 / 3, the variance of an angle of which nothing is known.
+ *   The gap is the whole jump: how much of it is the clock's alone the session cannot know.
+ *
+ * The third message is then taken. It is counted, and told in a TEXT.
+ */
+#ifndef PLR_SESSION_REANCHOR_H
+#define PLR_SESSION_REANCHOR_H
+
+#include "pelorus/session.h"
+
+void plr_clock_watch_init(plr_clock_watch *watch);
+
+/* What the filter, whose estimate is at filter_ns, said to a message of t_ns. True if the new time
+ * is to be believed now. */
+bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status status,
+                          plr_time_ns filter_ns, plr_time_ns max_gap_ns);
+
+/* Takes the estimate to t_ns as described above. */
+plr_status plr_reanchor(plr_session *s, plr_time_ns t_ns);
+
+#endif

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+#include "session/send.h"
+
+#include <string.h>
+
+#include "session/layers.h"
+
+static void put(plr_session *s, uint32_t bit, const plr_message *message) {
+    if (s->port.write == NULL || (s->options.output & bit) == 0)
+        return;
+    if (plr_writer_put(&s->writer, message) != PLR_OK)
+        s->totals.not_sent++;
+}
+
+void plr_send_echo(plr_session *s) {
+    put(s, PLR_OUTPUT_ECHO, &s->in);
+}
+
+void plr_send_config(plr_session *s) {
+    s->out.kind = PLR_KIND_CONFIG;
+    plr_layers_describe(&s->out.as.config, plr_filter_config(&s->filter));
+    put(s, PLR_OUTPUT_CONFIG, &s->out);
+}
+
+/* The lower triangle of a 6x6, row by row. */
+static void pack6(double packed[21], const double full[36]) {
+    for (unsigned i = 0, k = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++)
+            packed[k++] = full[6 * i + j];
+}
+
+static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
+    double P[36];
+    if (plr_filter_pose(f, &pose->T_WB) != PLR_OK || plr_filter_pose_covariance(f, P) != PLR_OK)
+        return false;
+    pack6(pose->P_xi, P);
+    if (plr_filter_velocity(f, &pose->velocity) != PLR_OK ||
+        plr_filter_velocity_covariance(f, P) != PLR_OK)
+        return false;
+    pack6(pose->P_u, P);
+    return plr_filter_bias(f, pose->bias, NULL) == PLR_OK;
+}
+
+const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
+    plr_pose_message *pose = &s->out.as.pose;
+    plr_totals totals;
+    s->out.kind = PLR_KIND_POSE;
+    memset(pose, 0, sizeof *pose);
+    if (plr_filter_totals(&s->filter, &totals) != PLR_OK || !describe_pose(pose, &s->filter))
+        return NULL;
+    pose->t_ns = plr_filter_time(&s->filter);
+    pose->real_bytes = (uint8_t)sizeof(plr_real);
+    pose->after_update = after_update;
+    pose->reset_count = (uint16_t)(totals.resets - s->start_resets);
+    put(s, after_update ? PLR_OUTPUT_POSE : PLR_OUTPUT_TWIST_POSE, &s->out);
+    if (s->options.observer.pose != NULL)
+        s->options.observer.pose(s->options.observer.context, pose);
+    return pose;
+}
+
+static void put_report(plr_session *s, plr_kind subject, const plr_report *report,
+                       uint64_t compute_ns) {
+    const uint64_t us = compute_ns / 1000u;
+    s->out.kind = PLR_KIND_REPORT;
+    s->out.as.report.subject = (uint8_t)subject;
+    s->out.as.report.report = *report;
+    s->out.as.report.update_us = us < UINT32_MAX ? (uint32_t)us : UINT32_MAX;
+    put(s, PLR_OUTPUT_REPORT, &s->out);
+}
+
+void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns) {
+    put_report(s, PLR_KIND_STEREO, report, compute_ns);
+}
+
+void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                      const plr_setting *culprit) {
+    plr_report report;
+    memset(&report, 0, sizeof report);
+    report.t_ns = t_ns;
+    report.status = status;
+    report.health = s->last.health;
+    report.reasons = s->last.reasons;
+    report.budget = PLR_NO_BUDGET;
+    report.active = s->last.active;
+    s->totals.refused++;
+    put_report(s, subject, &report, 0);
+    if (s->options.observer.refused != NULL)
+        s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
+}
+
+void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
+    s->out.kind = PLR_KIND_LANDMARK;
+    s->out.as.landmark.role = (uint8_t)role;
+    s->out.as.landmark.landmark = *landmark;
+    put(s, PLR_OUTPUT_LANDMARK, &s->out);
+    if (s->options.observer.landmark != NULL)
+        s->options.observer.landmark(s->options.observer.context, &s->out.as.landmark);
+}
+
+void plr_send_text(plr_session *s) {
+    s->out.kind = PLR_KIND_TEXT;
+    put(s, PLR_OUTPUT_TEXT, &s->out);
+    if (s->options.observer.text != NULL)
+        s->options.observer.text(s->options.observer.context, &s->out.as.text);
+}
+
+void plr_send_end(plr_session *s) {
+    s->out.kind = PLR_KIND_END;
+    put(s, PLR_OUTPUT_END, &s->out);
+}

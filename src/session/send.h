@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+/* What a session sends, and what it shows to its observer. Each message is sent only if its bit of
+ * plr_session_options.output is set; the observer sees it in any case. A message that the port does
+ * not take is counted, and the loop goes on. */
+#ifndef PLR_SESSION_SEND_H
+#define PLR_SESSION_SEND_H
+
+#include "pelorus/session.h"
+
+/* The message that just came in. */
+void plr_send_echo(plr_session *s);
+
+/* The settings in force, and the build. */
+void plr_send_config(plr_session *s);
+
+/* The estimate at the filter's time. Holds until the next plr_send_*; NULL if there is none. */
+const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
+
+/* The report of a frame. */
+void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
+
+/* Something was refused: counted, shown, and sent as a REPORT with the health of the last frame.
+ * `culprit` is the setting to change, or NULL. */
+void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                      const plr_setting *culprit);
+
+void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark);
+
+/* A line, built with session/line.h in s->out.as.text. */
+void plr_send_text(plr_session *s);
+
+void plr_send_end(plr_session *s);
+
+#endif

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+#include "pelorus/session.h"
+
+#include <string.h>
+
+#include "session/begin.h"
+#include "session/inputs.h"
+#include "session/send.h"
+
+void plr_session_options_default(plr_session_options *options) {
+    memset(options, 0, sizeof *options);
+    options->start = PLR_START_AUTO;
+    options->output = PLR_OUTPUT_CONFIG | PLR_OUTPUT_POSE | PLR_OUTPUT_REPORT |
+                      PLR_OUTPUT_LANDMARK | PLR_OUTPUT_TEXT | PLR_OUTPUT_END;
+}
+
+static plr_status check_overrides(const plr_session_options *options) {
+    plr_config config;
+    plr_config_default(&config);
+    for (unsigned i = 0; i < options->override_count; i++) {
+        const plr_setting *setting = plr_setting_by_id(options->overrides[i].id);
+        if (setting == NULL ||
+            plr_config_set(&config, setting, options->overrides[i].value) != PLR_OK)
+            return PLR_E_CONFIG;
+    }
+    return PLR_OK;
+}
+
+static int write_to_port(void *context, const uint8_t *bytes, size_t n) {
+    plr_session *s = context;
+    return s->port.write(s->port.context, bytes, n);
+}
+
+plr_status plr_session_init(plr_session *s, const plr_port *port,
+                            const plr_session_options *options) {
+    if (s == NULL || port == NULL || options == NULL || port->read == NULL ||
+        (options->override_count > 0 && options->overrides == NULL))
+        return PLR_E_ARGUMENT;
+    if (check_overrides(options) != PLR_OK)
+        return PLR_E_CONFIG;
+    memset(s, 0, sizeof *s);
+    s->port = *port;
+    s->options = *options;
+    s->phase = PLR_PHASE_WAITING;
+    plr_begin_anew(s);
+    plr_status status =
+        plr_reader_init(&s->reader, s->body, sizeof s->body, s->observations, PLR_MAX_OBSERVATIONS);
+    if (status == PLR_OK)
+        status = plr_writer_init(&s->writer, write_to_port, s);
+    return status;
+}
+
+/* A run of frames that are skipped for the same reason is answered once: noise would otherwise be
+ * answered with more bytes than it has. */
+static void answer_skip(plr_session *s) {
+    static const plr_status statuses[] = {
+        [PLR_SKIP_NONE] = PLR_OK,           [PLR_SKIP_DAMAGED] = PLR_E_CORRUPT,
+        [PLR_SKIP_UNKNOWN] = PLR_E_FOREIGN, [PLR_SKIP_MALFORMED] = PLR_E_ARGUMENT,
+        [PLR_SKIP_TOO_LONG] = PLR_E_FULL,
+    };
+    const plr_skip why = s->reader.skipped_why;
+    const plr_kind subject =
+        why == PLR_SKIP_DAMAGED ? PLR_KIND_NONE : (plr_kind)s->reader.skipped_kind;
+    if (why != (plr_skip)s->last_skip)
+        plr_send_refusal(s, subject, 0, statuses[why], NULL);
+    else
+        s->totals.refused++;
+    s->last_skip = (uint8_t)why;
+}
+
+/* A sender of a later version: refused, and read on, for it may not be the last sender. */
+static void refuse_future(plr_session *s) {
+    const plr_reader_counts counts = s->reader.counts;
+    (void)plr_reader_init(&s->reader, s->body, sizeof s->body, s->observations,
+                          PLR_MAX_OBSERVATIONS);
+    s->reader.counts = counts;
+    plr_send_refusal(s, PLR_KIND_HEADER, 0, PLR_E_FOREIGN, NULL);
+}
+
+static plr_step take_bytes(plr_session *s) {
+    size_t taken = 0;
+    const plr_read_event event = plr_reader_feed(&s->reader, s->chunk + s->chunk_at,
+                                                 s->chunk_count - s->chunk_at, &taken, &s->in);
+    s->chunk_at += (unsigned)taken;
+    switch (event) {
+    case PLR_READ_MESSAGE:
+        s->last_skip = PLR_SKIP_NONE;
+        if (!plr_take_message(s))
+            return PLR_STEP_MESSAGE;
+        plr_session_finish(s);
+        return PLR_STEP_ENDED;
+    case PLR_READ_SKIPPED:
+        answer_skip(s);
+        return PLR_STEP_SKIPPED;
+    case PLR_READ_FUTURE:
+        refuse_future(s);
+        return PLR_STEP_FUTURE;
+    case PLR_READ_MORE:
+        break;
+    }
+    return PLR_STEP_BYTES;
+}
+
+plr_step plr_session_step(plr_session *s) {
+    if (s->port.feed_watchdog != NULL)
+        s->port.feed_watchdog(s->port.context);
+    if (s->chunk_at == s->chunk_count) {
+        const int count = s->port.read(s->port.context, s->chunk, sizeof s->chunk);
+        if (count < 0)
+            return count == PLR_PORT_CLOSED ? PLR_STEP_CLOSED : PLR_STEP_FAILED;
+        if (count == PLR_PORT_NOTHING) {
+            if (s->port.idle != NULL)
+                s->port.idle(s->port.context);
+            return PLR_STEP_IDLE;
+        }
+        if ((size_t)count > sizeof s->chunk)
+            return PLR_STEP_FAILED; /* the port wrote past its bytes: nothing of it is used */
+        s->chunk_at = 0;
+        s->chunk_count = (unsigned)count;
+    }
+    return take_bytes(s);
+}
+
+void plr_session_finish(plr_session *s) {
+    if (s->phase == PLR_PHASE_RUNNING) {
+        plr_landmark landmark;
+        plr_take_all_held(s);
+        for (unsigned slot = 0; slot < plr_filter_landmark_count(&s->filter); slot++)
+            if (plr_filter_landmark(&s->filter, slot, &landmark) == PLR_OK)
+                plr_send_landmark(s, PLR_LANDMARK_FINAL, &landmark);
+    }
+    s->phase = PLR_PHASE_WAITING;
+    plr_send_end(s);
+}
