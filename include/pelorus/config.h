@@ -12,6 +12,9 @@
 
 #include <stdint.h>
 
+/* Version, major << 16 | minor << 8 | patch; plr_version() has it as text. */
+#define PLR_VERSION_NUMBER 0x000100
+
 /* Bits of a real: 32 (float, the main road) or 64 (double). */
 #ifndef PLR_REAL
 #define PLR_REAL 32
@@ -74,14 +77,14 @@ float plr_fmaf_exact(float a, float b, float c);
 #else
 #define PLR_FMA(a, b, c) __builtin_fmaf((a), (b), (c))
 #endif
-#define PLR_SQRT(x) __builtin_sqrtf(x)
-#define PLR_EPSILON 1.1920929e-07F
+#define PLR_SQRT(x)         __builtin_sqrtf(x)
+#define PLR_SMALLEST_NORMAL 1.17549435e-38F
 #elif PLR_REAL == 64
 typedef double plr_real;
 /* float64 rounds twice on every target: not all of them fuse it. */
-#define PLR_FMA(a, b, c) ((a) * (b) + (c))
-#define PLR_SQRT(x)      __builtin_sqrt(x)
-#define PLR_EPSILON      2.220446049250313e-16
+#define PLR_FMA(a, b, c)    ((a) * (b) + (c))
+#define PLR_SQRT(x)         __builtin_sqrt(x)
+#define PLR_SMALLEST_NORMAL 2.2250738585072014e-308
 #else
 #error "PLR_REAL must be 32 or 64."
 #endif

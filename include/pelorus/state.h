@@ -54,6 +54,7 @@ typedef struct plr_motion {
     plr_real B[36];      /* 6x6 */
     plr_real seconds;    /* for the bias walk */
     uint8_t pending;     /* 1 if any motion is accumulated */
+    uint8_t noisy;       /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
 
 /* The settings and the camera as the filter computes with them: in its own precision, squared. */
@@ -78,9 +79,10 @@ typedef struct plr_workspace {
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2]; /* packed */
     plr_real y[PLR_BLOCK_ROWS];
     plr_real dx[PLR_MAX_STATE];
-    plr_real gain[PLR_MAX_OBSERVATIONS];    /* how much an observation would tell */
-    uint16_t order[PLR_MAX_OBSERVATIONS];   /* observations by id; then those used */
-    uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* their slots */
+    plr_real gain[PLR_MAX_OBSERVATIONS];    /* how much order[k] would tell; see gate.h */
+    uint16_t order[PLR_MAX_OBSERVATIONS];   /* good observations of the frame, by id */
+    uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* the slot of order[k], or PLR_NO_SLOT */
+    uint16_t used[PLR_MAX_OBSERVATIONS];    /* positions k in order that go into the update */
 } plr_workspace;
 
 struct plr_model;

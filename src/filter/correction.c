@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#include "filter/correction.h"
+
+#include <string.h>
+
+#include "filter/covariance.h"
+#include "filter/gate.h"
+#include "filter/motion.h"
+#include "linalg/dense.h"
+#include "linalg/packed.h"
+#include "linalg/small.h"
+
+/* One block of observations, stacked: S = H P H^T + R and y = r - H dx. */
+typedef struct plr_block {
+    unsigned count;
+    unsigned n;                              /* dimension of the state */
+    unsigned row_of[PLR_BLOCK_OBSERVATIONS]; /* first row of each landmark in the state */
+    plr_linearisation lin[PLR_BLOCK_OBSERVATIONS];
+} plr_block;
+
+/* sum = H_a x: x is a vector over the state. */
+static plr_real apply_row(const plr_block *block, unsigned a, unsigned r, const plr_real *x) {
+    const plr_linearisation *lin = &block->lin[a];
+    plr_real sum = plr_dot3(lin->H_landmark + 3 * r, x + block->row_of[a]);
+    if (lin->uses_pose)
+        for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+            sum = PLR_FMA(lin->H_pose[6 * r + c], x[c], sum);
+    return sum;
+}
+
+/* Linearises the block's observations; fills rows of (P H^T)^T, S and y in the workspace. */
+static void stack_block(plr_filter *f, const plr_observation *observations, const uint16_t *used,
+                        plr_block *block) {
+    plr_workspace *w = &f->work;
+    for (unsigned a = 0; a < block->count; a++) {
+        const unsigned slot = w->slot_of[used[a]];
+        plr_linearisation *lin = &block->lin[a];
+        (void)f->model->linearise(f, &f->slots[slot], lin); /* the gate has seen it succeed */
+        block->row_of[a] = plr_covariance_row(f, slot);
+        plr_covariance_project(f, slot, lin, w->Vt + PLR_ROWS * a * block->n, block->n);
+
+        plr_real r[3];
+        plr_gate_innovation(r, &observations[w->order[used[a]]], lin);
+        for (unsigned i = 0; i < PLR_ROWS; i++)
+            w->y[PLR_ROWS * a + i] = r[i] - apply_row(block, a, i, w->dx);
+    }
+    for (unsigned i = 0; i < PLR_ROWS * block->count; i++) {
+        plr_real *S_row = w->S + plr_packed_row(i);
+        for (unsigned j = 0; j <= i; j++)
+            S_row[j] = apply_row(block, j / PLR_ROWS, j % PLR_ROWS, w->Vt + i * block->n);
+        S_row[i] += plr_gate_noise(f, i % PLR_ROWS);
+    }
+}
+
+/* V^T = L^-1 (P H^T)^T, P -= V V^T, dx += V L^-1 y. False, and nothing changed but the workspace, if
+ * S is not positive (*factorised = false) or a variance would be lost. */
+static bool apply_block(plr_filter *f, const plr_block *block, bool *factorised) {
+    plr_workspace *w = &f->work;
+    const unsigned rows = PLR_ROWS * block->count;
+    *factorised = plr_cholesky_packed(rows, w->S);
+    if (!*factorised)
+        return false;
+    plr_solve_lower_packed(rows, block->n, w->S, w->Vt, block->n);
+    plr_solve_lower_packed(rows, 1, w->S, w->y, 1);
+    if (!plr_covariance_subtract(f, rows))
+        return false;
+    plr_gemm_nn(1, block->n, rows, w->y, rows, w->Vt, block->n, w->dx, block->n);
+    return true;
+}
+
+/* Is the correction one that a retraction can follow? */
+static bool is_sane(const plr_filter *f, unsigned n) {
+    static const plr_real max_turn2 = 9, max_way2 = 1e6;
+    const plr_real *dx = f->work.dx;
+    for (unsigned i = 0; i < n; i++)
+        if (!plr_is_finite(dx[i]))
+            return false;
+    return plr_dot3(dx, dx) < max_way2 && plr_dot3(dx + 3, dx + 3) < max_turn2;
+}
+
+plr_correction plr_correct(plr_filter *f, const plr_observation *observations, unsigned count) {
+    plr_correction result = {0};
+    const unsigned n = plr_covariance_dim(f);
+    memset(f->work.dx, 0, n * sizeof *f->work.dx);
+    for (unsigned at = 0; at < count && !f->diverged; at += PLR_BLOCK_OBSERVATIONS) {
+        plr_block block = {.n = n, .count = count - at};
+        if (block.count > PLR_BLOCK_OBSERVATIONS)
+            block.count = PLR_BLOCK_OBSERVATIONS;
+        bool factorised;
+        stack_block(f, observations, f->work.used + at, &block);
+        if (apply_block(f, &block, &factorised))
+            result.applied += block.count;
+        else if (!factorised)
+            result.failed_blocks++;
+        else
+            plr_filter_diverge(f);
+    }
+    if (result.applied == 0)
+        return result;
+    if (!is_sane(f, n)) {
+        plr_filter_diverge(f);
+        return result;
+    }
+    if (f->config.bias)
+        for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+            f->bias[i] += f->work.dx[PLR_POSE_DIM + i];
+    result.cut = f->model->retract(f, f->work.dx);
+    plr_motion_correct_pose(f, f->work.dx);
+    if (!plr_covariance_is_positive(f))
+        plr_filter_diverge(f);
+    return result;
+}

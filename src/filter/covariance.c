@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: MIT
+#include "filter/covariance.h"
+
+#include "linalg/dense.h"
+#include "linalg/packed.h"
+#include "linalg/small.h"
+
+enum { POSE = 0, BIAS = PLR_POSE_DIM };
+
+static unsigned first_landmark_row(const plr_filter *f) {
+    return f->config.bias ? BIAS + PLR_BIAS_DIM : BIAS;
+}
+
+unsigned plr_covariance_row(const plr_filter *f, unsigned slot) {
+    return first_landmark_row(f) + PLR_LANDMARK_DIM * slot;
+}
+
+unsigned plr_covariance_dim(const plr_filter *f) {
+    return plr_covariance_row(f, f->count);
+}
+
+/* B (rows x columns) = P[row.., column..], dense, whichever side of the diagonal. */
+static void get_block(const plr_filter *f, unsigned row, unsigned rows, unsigned column,
+                      unsigned columns, plr_real *B) {
+    for (unsigned i = 0; i < rows; i++)
+        for (unsigned j = 0; j < columns; j++)
+            B[i * columns + j] = f->P[plr_packed_at(row + i, column + j)];
+}
+
+/* The reverse. Of a block on the diagonal the lower triangle is taken. */
+static void set_block(plr_filter *f, unsigned row, unsigned rows, unsigned column, unsigned columns,
+                      const plr_real *B) {
+    for (unsigned i = 0; i < rows; i++)
+        for (unsigned j = 0; j < columns; j++)
+            if (row + i >= column + j)
+                f->P[plr_packed_row(row + i) + column + j] = B[i * columns + j];
+}
+
+/* ---------------------------------------------------------------- blocks */
+
+void plr_covariance_set_pose(plr_filter *f, const double P_xi[36]) {
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++)
+            f->P[plr_packed_at(POSE + i, POSE + j)] = (plr_real)P_xi[6 * i + j];
+    if (f->config.bias) {
+        static const plr_real zero[36] = {0};
+        set_block(f, BIAS, 6, POSE, 6, zero);
+    }
+}
+
+void plr_covariance_set_bias(plr_filter *f, const double variance[6]) {
+    for (unsigned i = 0; i < 6; i++) {
+        plr_real *row = f->P + plr_packed_row(BIAS + i);
+        memset(row, 0, (BIAS + i) * sizeof *row);
+        row[BIAS + i] = (plr_real)variance[i];
+    }
+}
+
+void plr_covariance_pose(const plr_filter *f, plr_real P_xi[36]) {
+    get_block(f, POSE, 6, POSE, 6, P_xi);
+}
+
+void plr_covariance_bias(const plr_filter *f, plr_real P_b[36]) {
+    get_block(f, BIAS, 6, BIAS, 6, P_b);
+}
+
+void plr_covariance_pose_bias(const plr_filter *f, plr_real P_xib[36]) {
+    get_block(f, POSE, 6, BIAS, 6, P_xib);
+}
+
+void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_pose[18],
+                          const plr_real J_landmark[9], plr_real P_out[9]) {
+    const unsigned s = plr_covariance_row(f, slot);
+    plr_real P_xx[36], P_lx[18], P_ll[9];
+    get_block(f, POSE, 6, POSE, 6, P_xx);
+    get_block(f, s, 3, POSE, 6, P_lx);
+    get_block(f, s, 3, s, 3, P_ll);
+
+    /* Jx P_xx + Jl P_lx and Jx P_xl + Jl P_ll, then times [Jx Jl]^T */
+    plr_real left[18] = {0}, right[9] = {0};
+    plr_gemm_nn(3, 6, 6, J_pose, 6, P_xx, 6, left, 6);
+    plr_gemm_nn(3, 6, 3, J_landmark, 3, P_lx, 6, left, 6);
+    plr_gemm_nt(3, 3, 6, J_pose, 6, P_lx, 6, right, 3);
+    plr_gemm_nn(3, 3, 3, J_landmark, 3, P_ll, 3, right, 3);
+    memset(P_out, 0, 9 * sizeof *P_out);
+    plr_gemm_nt(3, 3, 6, left, 6, J_pose, 6, P_out, 3);
+    plr_gemm_nt(3, 3, 3, right, 3, J_landmark, 3, P_out, 3);
+}
+
+double plr_covariance_trace(const plr_filter *f) {
+    const unsigned n = plr_covariance_dim(f);
+    double trace = 0;
+    for (unsigned i = 0; i < n; i++)
+        trace += (double)f->P[plr_packed_row(i) + i];
+    return trace;
+}
+
+bool plr_covariance_is_positive(const plr_filter *f) {
+    const unsigned n = plr_covariance_dim(f);
+    for (unsigned i = 0; i < n; i++) {
+        const plr_real variance = f->P[plr_packed_row(i) + i];
+        if (!(variance >= 0) || !plr_is_finite(variance))
+            return false;
+    }
+    return true;
+}
+
+/* ---------------------------------------------------------------- motion */
+
+/* row[0..5] <- row[0..5] A^T */
+static void turn_pose_columns(plr_real *row, const plr_real A[36]) {
+    plr_real turned[6] = {0};
+    plr_gemm_nt(1, 6, 6, row, 6, A, 6, turned, 6);
+    memcpy(row, turned, sizeof turned);
+}
+
+/* The three rows of one landmark: left by F, right by what stands at each column. */
+static void transport_landmark(plr_filter *f, unsigned slot, const plr_real A[36],
+                               const plr_real *F) {
+    const unsigned s = plr_covariance_row(f, slot), first = first_landmark_row(f);
+    plr_real *restrict r0 = f->P + plr_packed_row(s);
+    plr_real *restrict r1 = f->P + plr_packed_row(s + 1);
+    plr_real *restrict r2 = f->P + plr_packed_row(s + 2);
+    const plr_real *own = F + 9 * slot;
+
+    for (unsigned j = 0; j < s; j++) {
+        const plr_real x0 = r0[j], x1 = r1[j], x2 = r2[j];
+        r0[j] = PLR_FMA(own[2], x2, PLR_FMA(own[1], x1, own[0] * x0));
+        r1[j] = PLR_FMA(own[5], x2, PLR_FMA(own[4], x1, own[3] * x0));
+        r2[j] = PLR_FMA(own[8], x2, PLR_FMA(own[7], x1, own[6] * x0));
+    }
+    plr_real D[9], FD[9], FDFt[9];
+    get_block(f, s, 3, s, 3, D);
+    plr_mat3_mul(FD, own, D);
+    plr_mat3_mul_nt(FDFt, FD, own);
+    set_block(f, s, 3, s, 3, FDFt);
+
+    for (unsigned i = 0; i < 3; i++) {
+        plr_real *row = f->P + plr_packed_row(s + i);
+        turn_pose_columns(row, A);
+        const plr_real *G = F;
+        for (plr_real *x = row + first; x < row + s; x += 3, G += 9) {
+            const plr_real x0 = x[0], x1 = x[1], x2 = x[2];
+            x[0] = PLR_FMA(G[2], x2, PLR_FMA(G[1], x1, G[0] * x0));
+            x[1] = PLR_FMA(G[5], x2, PLR_FMA(G[4], x1, G[3] * x0));
+            x[2] = PLR_FMA(G[8], x2, PLR_FMA(G[7], x1, G[6] * x0));
+        }
+    }
+}
+
+void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F) {
+    plr_real P_xi[36], turned[36];
+    get_block(f, POSE, 6, POSE, 6, P_xi);
+    plr_sandwich6(turned, A, P_xi);
+    set_block(f, POSE, 6, POSE, 6, turned);
+    for (unsigned i = BIAS; i < first_landmark_row(f); i++)
+        turn_pose_columns(f->P + plr_packed_row(i), A);
+    for (unsigned slot = 0; slot < f->count; slot++)
+        transport_landmark(f, slot, A, F);
+}
+
+/* Rows of the workspace in a predict: U^T = [-Y -G]^T, W^T = [G Y]^T, six rows each part. */
+enum { MINUS_Y = 0, MINUS_G = 6, PLUS_G = 12, PLUS_Y = 18 };
+
+plr_real *plr_covariance_motion_rows(plr_filter *f) {
+    return f->work.Vt + PLUS_G * plr_covariance_dim(f);
+}
+
+/* B P_bb B^T + Q, 6x6 */
+static void motion_covariance(const plr_filter *f, const plr_motion *motion, plr_real M[36]) {
+    memset(M, 0, 36 * sizeof *M);
+    if (f->config.bias) {
+        plr_real P_b[36];
+        plr_covariance_bias(f, P_b);
+        plr_sandwich6(M, motion->B, P_b);
+    }
+    for (unsigned i = 0; i < 36; i++)
+        M[i] += motion->Q[i];
+}
+
+/*
+ * With M = B P_bb B^T + Q and Y = P_(:,b) B^T + G M / 2 the whole effect is Y G^T + G Y^T: one
+ * symmetric product of depth 12, by the same kernel that an update uses.
+ */
+void plr_covariance_add_motion(plr_filter *f, const plr_motion *motion) {
+    const unsigned n = plr_covariance_dim(f);
+    plr_real *Vt = f->work.Vt;
+    plr_real *Gt = Vt + PLUS_G * n, *Yt = Vt + PLUS_Y * n;
+    plr_real M[36];
+    motion_covariance(f, motion, M);
+    for (unsigned i = 0; i < 36; i++)
+        M[i] *= PLR_R(0.5);
+
+    memset(Yt, 0, 6 * n * sizeof *Yt);
+    plr_gemm_nn(6, n, 6, M, 6, Gt, n, Yt, n);
+    if (f->config.bias)
+        for (unsigned i = 0; i < n; i++) {
+            plr_real P_ib[6];
+            get_block(f, i, 1, BIAS, 6, P_ib);
+            for (unsigned k = 0; k < 6; k++)
+                for (unsigned l = 0; l < 6; l++)
+                    Yt[k * n + i] = PLR_FMA(motion->B[6 * k + l], P_ib[l], Yt[k * n + i]);
+        }
+    for (unsigned i = 0; i < 6 * n; i++) {
+        Vt[MINUS_Y * n + i] = -Yt[i];
+        Vt[MINUS_G * n + i] = -Gt[i];
+    }
+    plr_packed_subtract(n, 12, Vt, Gt, n, f->P);
+}
+
+void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion) {
+    const unsigned n = plr_covariance_dim(f);
+    plr_real P_xi[36], turned[36];
+    get_block(f, POSE, 6, POSE, 6, P_xi);
+    plr_sandwich6(turned, A, P_xi);
+    if (f->config.bias) {
+        plr_real P_xib[36], AP[36] = {0}, cross[36] = {0};
+        get_block(f, POSE, 6, BIAS, 6, P_xib);
+        plr_gemm_nn(6, 6, 6, A, 6, P_xib, 6, AP, 6);
+        plr_gemm_nt(6, 6, 6, AP, 6, motion->B, 6, cross, 6);
+        for (unsigned i = 0; i < 6; i++)
+            for (unsigned j = 0; j < 6; j++)
+                turned[6 * i + j] += cross[6 * i + j] + cross[6 * j + i];
+    }
+    plr_real M[36];
+    motion_covariance(f, motion, M);
+    for (unsigned i = 0; i < 36; i++)
+        turned[i] += M[i];
+    set_block(f, POSE, 6, POSE, 6, turned);
+
+    /* the other rows begin with their pose columns, and the bias columns follow */
+    for (unsigned i = PLR_POSE_DIM; i < n; i++) {
+        plr_real *row = f->P + plr_packed_row(i);
+        plr_real P_ib[6];
+        if (f->config.bias)
+            get_block(f, i, 1, BIAS, 6, P_ib);
+        turn_pose_columns(row, A);
+        if (f->config.bias)
+            plr_gemm_nt(1, 6, 6, P_ib, 6, motion->B, 6, row, 6);
+    }
+}
+
+void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyro) {
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        f->P[plr_packed_at(BIAS + i, BIAS + i)] += i < 3 ? velocity : gyro;
+}
+
+/* ---------------------------------------------------------------- update */
+
+void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                               plr_real S[6]) {
+    const unsigned s = plr_covariance_row(f, slot);
+    plr_real full[9];
+    if (lin->uses_pose) {
+        plr_covariance_joint(f, slot, lin->H_pose, lin->H_landmark, full);
+    } else {
+        plr_real P_ll[9], HP[9];
+        get_block(f, s, 3, s, 3, P_ll);
+        plr_mat3_mul(HP, lin->H_landmark, P_ll);
+        plr_mat3_mul_nt(full, HP, lin->H_landmark);
+    }
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j <= i; j++)
+            S[plr_packed_row(i) + j] = full[3 * i + j];
+}
+
+/* out[i] += a P(i, column) for all rows i, whichever side of the diagonal. */
+static void add_column(const plr_filter *f, unsigned n, unsigned column, plr_real a,
+                       plr_real *restrict out) {
+    const plr_real *restrict row = f->P + plr_packed_row(column);
+    for (unsigned i = 0; i < column; i++)
+        out[i] = PLR_FMA(a, row[i], out[i]);
+    const plr_real *x = row + column;
+    for (unsigned i = column; i < n; i++) {
+        out[i] = PLR_FMA(a, *x, out[i]);
+        x += i + 1;
+    }
+}
+
+/* rows[r][i] = sum_c H[r][c] P(i, s + c): one pass over P, three columns at a time. */
+static void project_landmark(const plr_filter *f, unsigned n, unsigned s, const plr_real H[9],
+                             plr_real *restrict rows, size_t ld) {
+    for (unsigned r = 0; r < PLR_ROWS; r++) {
+        const plr_real *restrict x0 = f->P + plr_packed_row(s);
+        const plr_real *restrict x1 = f->P + plr_packed_row(s + 1);
+        const plr_real *restrict x2 = f->P + plr_packed_row(s + 2);
+        const plr_real *h = H + 3 * r;
+        plr_real *restrict out = rows + r * ld;
+        for (unsigned i = 0; i < s; i++)
+            out[i] = PLR_FMA(h[2], x2[i], PLR_FMA(h[1], x1[i], h[0] * x0[i]));
+    }
+    plr_real own[9];
+    get_block(f, s, 3, s, 3, own);
+    for (unsigned i = s; i < n; i++) {
+        const plr_real *x = i < s + 3 ? own + 3 * (i - s) : f->P + plr_packed_row(i) + s;
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            rows[r * ld + i] = plr_dot3(H + 3 * r, x);
+    }
+}
+
+void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                            plr_real *rows, size_t ld) {
+    const unsigned n = plr_covariance_dim(f);
+    project_landmark(f, n, plr_covariance_row(f, slot), lin->H_landmark, rows, ld);
+    if (lin->uses_pose)
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+                add_column(f, n, POSE + c, lin->H_pose[6 * r + c], rows + r * ld);
+}
+
+bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
+    const unsigned n = plr_covariance_dim(f);
+    for (unsigned i = 0; i < n; i++) {
+        const plr_real before = f->P[plr_packed_row(i) + i];
+        plr_real after = before;
+        for (unsigned k = 0; k < depth; k++)
+            after = PLR_FMA(-f->work.Vt[k * n + i], f->work.Vt[k * n + i], after);
+        const bool stays_zero = before <= 0 && before >= 0 && after <= 0 && after >= 0;
+        if (!(after > 0) && !stays_zero)
+            return false;
+    }
+    plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, n, f->P);
+    return true;
+}
+
+/* ---------------------------------------------------------------- slots */
+
+void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
+    const unsigned s = plr_covariance_dim(f);
+    for (unsigned i = 0; i < 3; i++)
+        memset(f->P + plr_packed_row(s + i), 0, (s + i + 1) * sizeof *f->P);
+    plr_real own[9];
+    memcpy(own, landmark->P, sizeof own);
+    if (landmark->uses_pose) {
+        const plr_real *J = landmark->J_pose;
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+                add_column(f, s, POSE + c, J[6 * i + c], f->P + plr_packed_row(s + i));
+        for (unsigned i = 0; i < 3; i++)
+            plr_gemm_nt(1, 3, 6, f->P + plr_packed_row(s + i), 6, J, 6, own + 3 * i, 3);
+    }
+    set_block(f, s, 3, s, 3, own);
+}
+
+void plr_covariance_remove(plr_filter *f, unsigned slot) {
+    const unsigned to = plr_covariance_row(f, slot);
+    const unsigned from = plr_covariance_row(f, f->count - 1);
+    if (to == from)
+        return;
+    plr_real own[9];
+    get_block(f, from, 3, from, 3, own);
+    for (unsigned i = 0; i < 3; i++)
+        memcpy(f->P + plr_packed_row(to + i), f->P + plr_packed_row(from + i), to * sizeof *f->P);
+    set_block(f, to, 3, to, 3, own);
+    for (unsigned i = to + 3; i < from; i++)
+        for (unsigned c = 0; c < 3; c++)
+            f->P[plr_packed_row(i) + to + c] = f->P[plr_packed_row(from + c) + i];
+}

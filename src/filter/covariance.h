@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The covariance P of the whole state: pose (6), bias (6, if on), landmarks (3 each), as a packed
+ * lower triangle. No other file touches an element of it.
+ */
+#ifndef PLR_FILTER_COVARIANCE_H
+#define PLR_FILTER_COVARIANCE_H
+
+#include <stdbool.h>
+
+#include "filter/model.h"
+#include "pelorus/state.h"
+
+/* Rows of P in use: 6 (+ 6) + 3 count. */
+unsigned plr_covariance_dim(const plr_filter *f);
+
+/* The first of the three rows of a landmark. */
+unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
+
+/* --- blocks --- */
+
+/* Sets the pose block to P_xi (6x6) and its correlation with the bias to zero. Only without
+ * landmarks. */
+void plr_covariance_set_pose(plr_filter *f, const double P_xi[36]);
+
+/* Sets the bias block to a diagonal, uncorrelated with anything. Only without landmarks. */
+void plr_covariance_set_bias(plr_filter *f, const double variance[6]);
+
+/* The blocks of pose (xi, xi), bias (db, db) and their correlation (xi, db), 6x6. */
+void plr_covariance_pose(const plr_filter *f, plr_real P_xi[36]);
+void plr_covariance_bias(const plr_filter *f, plr_real P_b[36]);
+void plr_covariance_pose_bias(const plr_filter *f, plr_real P_xib[36]);
+
+/* P_out = [J_pose J_landmark] P_(xi, slot) [...]^T, 3x3: J_pose 3x6, J_landmark 3x3. */
+void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_pose[18],
+                          const plr_real J_landmark[9], plr_real P_out[9]);
+
+double plr_covariance_trace(const plr_filter *f);
+
+/* False if a variance is negative or not finite. */
+bool plr_covariance_is_positive(const plr_filter *f);
+
+/* --- motion --- */
+
+/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
+void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F);
+
+/* Where a model puts the rows of G^T (6 x dim, leading dimension dim) for plr_covariance_add_motion:
+ * G says how the noise n of the motion enters the state. */
+plr_real *plr_covariance_motion_rows(plr_filter *f);
+
+/* P <- P + the effect of x <- x + G n, n = B db + N(0, Q), over the whole matrix. G's rows of the
+ * bias must be zero. */
+void plr_covariance_add_motion(plr_filter *f, const plr_motion *motion);
+
+/* The pose's rows alone: xi <- A xi + B db + N(0, Q). */
+void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion);
+
+/* The bias variances grow by velocity (first three) and gyro (last three). */
+void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyro);
+
+/* --- update --- */
+
+/* S = H P H^T of one observation, 3x3 packed (6 numbers). */
+void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                               plr_real S[6]);
+
+/* Three rows of (P H^T)^T, each dim long, with leading dimension ld. */
+void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                            plr_real *rows, size_t ld);
+
+/* P -= V V^T, V^T being depth x dim in the workspace. False, and nothing changed, if a variance
+ * would cease to be positive. */
+bool plr_covariance_subtract(plr_filter *f, unsigned depth);
+
+/* --- slots --- */
+
+/* Appends the rows of slot f->count (not yet counted): error = J_pose xi + N(0, landmark->P). */
+void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark);
+
+/* Moves the rows of the last slot into those of `slot`. */
+void plr_covariance_remove(plr_filter *f, unsigned slot);
+
+#endif

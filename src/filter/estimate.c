@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+/* What the filter believes, as doubles. Nothing here changes the estimate, but for the two calls
+ * that first bring landmarks and covariance up to the pose. */
+#include <string.h>
+
+#include "filter/covariance.h"
+#include "filter/filter_internal.h"
+#include "filter/motion.h"
+#include "filter/slots.h"
+
+static bool ready(const plr_filter *f) {
+    return f && f->magic == PLR_FILTER_MAGIC;
+}
+
+static void to_double(double *y, const plr_real *x, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        y[i] = (double)x[i];
+}
+
+plr_time_ns plr_filter_time(const plr_filter *f) {
+    return ready(f) ? f->t_ns : 0;
+}
+
+plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
+    if (!f || !T_WB)
+        return PLR_E_ARGUMENT;
+    if (!ready(f))
+        return PLR_E_NOT_READY;
+    to_double(T_WB->R, f->R_WB, 9);
+    memcpy(T_WB->p, f->p_WB, sizeof T_WB->p);
+    return PLR_OK;
+}
+
+plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
+    if (!f || !P_xi)
+        return PLR_E_ARGUMENT;
+    if (!ready(f))
+        return PLR_E_NOT_READY;
+    if (f->diverged)
+        return PLR_E_DIVERGED;
+    plr_real P[36];
+    plr_motion_pose_covariance(f, P);
+    to_double(P_xi, P, 36);
+    return PLR_OK;
+}
+
+plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
+    if (!f || !velocity)
+        return PLR_E_ARGUMENT;
+    if (!ready(f))
+        return PLR_E_NOT_READY;
+    for (int i = 0; i < 3; i++) {
+        velocity->v_B_mps[i] = (double)(f->reading[i] - f->bias[i]);
+        velocity->w_B_radps[i] = (double)(f->reading[3 + i] - f->bias[3 + i]);
+    }
+    return PLR_OK;
+}
+
+/* The bias covariance at the time of the estimate: P_b and the walk not yet applied. */
+static void bias_covariance(const plr_filter *f, plr_real P_b[36]) {
+    plr_covariance_bias(f, P_b);
+    for (int i = 0; i < 6; i++)
+        P_b[7 * i] +=
+            f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
+}
+
+plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
+    if (!f || !P_u)
+        return PLR_E_ARGUMENT;
+    if (!ready(f))
+        return PLR_E_NOT_READY;
+    if (f->diverged)
+        return PLR_E_DIVERGED;
+    plr_real P[36] = {0};
+    if (f->config.bias)
+        bias_covariance(f, P);
+    /* with noise = step the sigmas are of a displacement: divide by the step */
+    const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
+                               ? PLR_R(1) / (f->interval_s * f->interval_s)
+                               : PLR_R(1);
+    for (int i = 0; i < 6; i++)
+        P[7 * i] += scale * (i < 3 ? f->par.velocity_variance : f->par.gyro_variance);
+    to_double(P_u, P, 36);
+    return PLR_OK;
+}
+
+plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
+    if (!f || !b)
+        return PLR_E_ARGUMENT;
+    if (!ready(f))
+        return PLR_E_NOT_READY;
+    if (f->diverged && P_b)
+        return PLR_E_DIVERGED;
+    plr_real P[36] = {0};
+    if (f->config.bias)
+        bias_covariance(f, P);
+    to_double(b, f->bias, 6);
+    if (P_b)
+        to_double(P_b, P, 36);
+    return PLR_OK;
+}
+
+double plr_filter_trace(plr_filter *f) {
+    if (!ready(f))
+        return 0;
+    plr_motion_settle(f);
+    return plr_covariance_trace(f);
+}
+
+plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals) {
+    if (!f || !totals)
+        return PLR_E_ARGUMENT;
+    if (!ready(f))
+        return PLR_E_NOT_READY;
+    *totals = f->totals;
+    return PLR_OK;
+}
+
+const plr_config *plr_filter_config(const plr_filter *f) {
+    return ready(f) ? &f->config : NULL;
+}

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: MIT
+/* A filter's life: init, reset, pose from outside, and the twists that carry it on. */
+#include "pelorus/filter.h"
+
+#include <string.h>
+
+#include "filter/covariance.h"
+#include "filter/filter_internal.h"
+#include "filter/model.h"
+#include "filter/motion.h"
+#include "lie/se3.h"
+#include "lie/so3.h"
+#include "linalg/small.h"
+
+/* ---------------------------------------------------------------- init */
+
+/* The bits of a result depend on subnormals: a processor that flushes them computes others. */
+static bool keeps_subnormals(void) {
+    volatile plr_real tiny = PLR_SMALLEST_NORMAL;
+    volatile plr_real half = tiny * PLR_R(0.5);
+    return half > 0;
+}
+
+static bool is_calibration(const plr_calibration *c) {
+    const double positive[3] = {c->fx_px, c->fy_px, c->baseline_m};
+    const double centre[2] = {c->cx_px, c->cy_px};
+    for (int i = 0; i < 3; i++)
+        if (!(positive[i] > 0))
+            return false;
+    return plr_all_finite(positive, 3) && plr_all_finite(centre, 2) &&
+           plr_all_finite(c->T_CB.p, 3) && plr_is_rotation(c->T_CB.R);
+}
+
+static void set_camera(plr_camera *camera, const plr_calibration *c) {
+    camera->fx = (plr_real)c->fx_px;
+    camera->fy = (plr_real)c->fy_px;
+    camera->cx = (plr_real)c->cx_px;
+    camera->cy = (plr_real)c->cy_px;
+    camera->baseline = (plr_real)c->baseline_m;
+    for (int i = 0; i < 9; i++)
+        camera->R_CB[i] = (plr_real)c->T_CB.R[i];
+    for (int i = 0; i < 3; i++)
+        camera->t_CB[i] = (plr_real)c->T_CB.p[i];
+    plr_so3_orthonormalise(camera->R_CB);
+}
+
+static plr_real squared(double x) {
+    return (plr_real)(x * x);
+}
+
+static void set_parameters(plr_parameters *par, const plr_calibration *calibration,
+                           const plr_config *c) {
+    set_camera(&par->camera, calibration);
+    plr_se3_adjoint(par->Ad_CB, par->camera.R_CB, par->camera.t_CB);
+    par->pixel_variance = squared(c->pixel_sigma_px);
+    par->velocity_variance = squared(c->velocity_sigma);
+    par->gyro_variance = squared(c->gyro_sigma);
+    par->bias_velocity_walk = (plr_real)c->bias_velocity_walk;
+    par->bias_gyro_walk = (plr_real)c->bias_gyro_walk;
+    par->gate_d2 = (plr_real)c->gate_d2;
+    par->gate_residual2 = squared(c->gate_residual_px);
+    par->min_disparity = (plr_real)c->min_disparity_px;
+    par->max_depth = (plr_real)c->max_depth_m;
+    par->max_row_gap = (plr_real)c->max_row_gap_px;
+    par->min_depth = (plr_real)c->min_depth_m;
+    par->landmark_variance = squared(c->landmark_sigma_m);
+    par->min_inverse_range = (plr_real)(1 / c->max_range_m);
+    par->max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
+}
+
+plr_status plr_filter_init(plr_filter *f, const plr_calibration *calibration,
+                           const plr_config *config, const plr_map *map) {
+    if (!f)
+        return PLR_E_ARGUMENT;
+    f->magic = 0;
+    if (!calibration || !config)
+        return PLR_E_ARGUMENT;
+    if (plr_config_check(config, NULL) != PLR_OK)
+        return PLR_E_CONFIG;
+    if (!is_calibration(calibration))
+        return PLR_E_CALIBRATION;
+    if (config->mode == PLR_MODE_LOCALIZATION && (!map || !map->source))
+        return PLR_E_MODE;
+    if (!keeps_subnormals())
+        return PLR_E_CPU;
+
+    memset(f, 0, sizeof *f);
+    f->config = *config;
+    if (map)
+        f->map = *map;
+    f->model = config->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
+    set_parameters(&f->par, calibration, config);
+    f->magic = PLR_FILTER_MAGIC;
+    return plr_filter_reset(f);
+}
+
+/* P_xi = start_sigma^2 I, or zero where poses are given exactly. */
+static void start_covariance(const plr_filter *f, double P_xi[36]) {
+    const double sigma = f->config.mode == PLR_MODE_MAPPING ? 0 : f->config.start_sigma;
+    memset(P_xi, 0, 36 * sizeof *P_xi);
+    for (int i = 0; i < 6; i++)
+        P_xi[7 * i] = sigma * sigma;
+}
+
+static void start_bias(plr_filter *f) {
+    double variance[6] = {0};
+    if (f->config.mode != PLR_MODE_MAPPING)
+        for (int i = 0; i < 6; i++) {
+            const double sigma =
+                i < 3 ? f->config.bias_velocity_sigma_mps : f->config.bias_gyro_sigma_radps;
+            variance[i] = sigma * sigma;
+        }
+    plr_covariance_set_bias(f, variance);
+}
+
+plr_status plr_filter_reset(plr_filter *f) {
+    double P_xi[36];
+    if (!f)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    f->t_ns = f->reading_ns = 0;
+    f->interval_s = 0;
+    f->clock_started = f->reading_valid = f->diverged = 0;
+    memset(f->reading, 0, sizeof f->reading);
+    memset(f->bias, 0, sizeof f->bias);
+    memset(f->p_WB, 0, sizeof f->p_WB);
+    memset(&f->totals, 0, sizeof f->totals);
+    plr_mat3_identity(f->R_WB);
+    plr_motion_clear(&f->motion);
+    f->count = 0;
+    f->frame_number = 0;
+    f->frames_without_use = f->frames_mostly_gated = 0;
+    f->matches_since_gated = 0;
+    start_covariance(f, P_xi);
+    plr_covariance_set_pose(f, P_xi);
+    if (f->config.bias)
+        start_bias(f);
+    return PLR_OK;
+}
+
+/* ---------------------------------------------------------------- from outside */
+
+void plr_filter_count_refusal(plr_filter *f, plr_status status) {
+    if (status == PLR_E_LATE)
+        f->totals.late++;
+    else
+        f->totals.refused++;
+}
+
+static plr_status refuse(plr_filter *f, plr_status status) {
+    plr_filter_count_refusal(f, status);
+    return status;
+}
+
+static plr_status check_pose(const plr_pose *T_WB) {
+    if (!plr_all_finite(T_WB->R, 9) || !plr_all_finite(T_WB->p, 3))
+        return PLR_E_NOT_FINITE;
+    return plr_is_rotation(T_WB->R) ? PLR_OK : PLR_E_ARGUMENT;
+}
+
+static void get_rotation(plr_real R[9], const plr_pose *T_WB) {
+    for (int i = 0; i < 9; i++)
+        R[i] = (plr_real)T_WB->R[i];
+    plr_so3_orthonormalise(R);
+}
+
+static void put_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
+    get_rotation(f->R_WB, T_WB);
+    memcpy(f->p_WB, T_WB->p, sizeof f->p_WB);
+    f->t_ns = t_ns;
+    f->clock_started = 1;
+}
+
+plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB,
+                               const double *P_xi) {
+    if (!f || !T_WB)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    if (f->config.mode == PLR_MODE_MAPPING)
+        return refuse(f, PLR_E_MODE);
+    const plr_status status = check_pose(T_WB);
+    if (status != PLR_OK)
+        return refuse(f, status);
+    if (P_xi && !plr_all_finite(P_xi, 36))
+        return refuse(f, PLR_E_NOT_FINITE);
+    if (P_xi && !plr_is_covariance(P_xi, 6))
+        return refuse(f, PLR_E_ARGUMENT);
+
+    double P_start[36];
+    start_covariance(f, P_start);
+    plr_motion_settle(f); /* so that the bias has its walk */
+    plr_motion_clear(&f->motion);
+    if (f->clock_started)
+        f->totals.resets++;
+    f->count = 0;
+    plr_covariance_set_pose(f, P_xi ? P_xi : P_start);
+    put_pose(f, t_ns, T_WB);
+    f->diverged = 0;
+    f->frames_without_use = f->frames_mostly_gated = 0;
+    /* a reading of another clock says nothing any more */
+    if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
+        f->reading_valid = 0;
+    if (!plr_covariance_is_positive(f) && f->config.bias)
+        start_bias(f);
+    return PLR_OK;
+}
+
+plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *variance) {
+    if (!f || !mean || !variance)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    if (!f->config.bias || f->totals.twists > 0 || f->config.mode == PLR_MODE_MAPPING)
+        return refuse(f, PLR_E_MODE);
+    if (!plr_all_finite(mean, 6) || !plr_all_finite(variance, 6))
+        return refuse(f, PLR_E_NOT_FINITE);
+    for (int i = 0; i < 6; i++)
+        if (variance[i] < 0)
+            return refuse(f, PLR_E_ARGUMENT);
+    for (int i = 0; i < 6; i++)
+        f->bias[i] = (plr_real)mean[i];
+    plr_covariance_set_bias(f, variance);
+    return PLR_OK;
+}
+
+plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
+    if (!f || !T_WB)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    if (f->config.mode != PLR_MODE_MAPPING)
+        return refuse(f, PLR_E_MODE);
+    const plr_status status = check_pose(T_WB);
+    if (status != PLR_OK)
+        return refuse(f, status);
+    if (f->clock_started && t_ns <= f->t_ns)
+        return refuse(f, PLR_E_TIME);
+    if (!f->clock_started) {
+        put_pose(f, t_ns, T_WB);
+        return PLR_OK;
+    }
+    plr_real R[9];
+    get_rotation(R, T_WB);
+    plr_motion_jump(f, t_ns, R, T_WB->p);
+    return PLR_OK;
+}
+
+/* ---------------------------------------------------------------- twists */
+
+/* The twist that holds over the step that ends with this reading. */
+static void twist_of_step(const plr_filter *f, const plr_real reading[6], plr_real held[6]) {
+    const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
+    for (int i = 0; i < 6; i++)
+        held[i] = timing == PLR_TWIST_END     ? reading[i]
+                  : timing == PLR_TWIST_START ? f->reading[i]
+                                              : PLR_R(0.5) * (f->reading[i] + reading[i]);
+}
+
+static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
+    if (!f->clock_started)
+        return PLR_OK;
+    if ((f->reading_valid && t_ns <= f->reading_ns) || t_ns < f->t_ns)
+        return PLR_E_TIME;
+    return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
+}
+
+static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
+                         plr_real interval) {
+    memcpy(f->reading, reading, sizeof f->reading);
+    f->reading_ns = t_ns;
+    f->reading_valid = 1;
+    f->interval_s = interval;
+    f->totals.twists++;
+}
+
+plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
+    if (!f || !twist)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
+        return refuse(f, PLR_E_NOT_FINITE);
+
+    plr_real reading[6], held[6];
+    for (int i = 0; i < 3; i++) {
+        reading[i] = (plr_real)twist->v_B_mps[i];
+        reading[3 + i] = (plr_real)twist->w_B_radps[i];
+        if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
+            return refuse(f, PLR_E_RANGE);
+    }
+    if (f->config.mode == PLR_MODE_MAPPING) {
+        f->totals.twists++;
+        return PLR_OK;
+    }
+    const plr_status in_time = check_time(f, t_ns);
+    if (in_time != PLR_OK)
+        return refuse(f, in_time);
+    if (!f->clock_started) {
+        f->t_ns = t_ns;
+        f->clock_started = 1;
+    }
+    twist_of_step(f, reading, held);
+    const plr_real seconds = plr_seconds(t_ns - f->t_ns);
+    const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
+    const plr_status in_range = plr_motion_check(f, held, seconds);
+    if (in_range != PLR_OK)
+        return refuse(f, in_range);
+    if (t_ns > f->t_ns)
+        plr_motion_step(f, t_ns, held, seconds, interval);
+    take_reading(f, t_ns, reading, interval);
+    return PLR_OK;
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+/* What the files of the filter share and no caller sees. */
+#ifndef PLR_FILTER_INTERNAL_H
+#define PLR_FILTER_INTERNAL_H
+
+#include <stdbool.h>
+
+#include "pelorus/filter.h"
+
+/* In a filter that was initialised. */
+#define PLR_FILTER_MAGIC 0x504C5231U
+
+/* ns to s, in the filter's precision. */
+static inline plr_real plr_seconds(plr_time_ns ns) {
+    return (plr_real)((double)ns * 1e-9);
+}
+
+/* A refused call in the totals. */
+void plr_filter_count_refusal(plr_filter *f, plr_status status);
+
+/* Finite, with a covariance that is symmetric and positive. */
+bool plr_landmark_is_valid(const plr_landmark *landmark);
+
+/* Checks of what comes in as double. */
+bool plr_all_finite(const double *x, unsigned n);
+bool plr_is_rotation(const double R[9]);
+bool plr_is_covariance(const double *P, unsigned n);
+
+#endif

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "filter/gate.h"
+
+#include "filter/covariance.h"
+#include "linalg/dense.h"
+#include "linalg/packed.h"
+#include "linalg/small.h"
+
+void plr_gate_innovation(plr_real r[3], const plr_observation *seen, const plr_linearisation *lin) {
+    r[0] = (plr_real)seen->uL_px - lin->z[0];
+    r[1] = (plr_real)seen->uR_px - lin->z[1];
+    r[2] = PLR_R(0.5) * ((plr_real)seen->vL_px + (plr_real)seen->vR_px) - lin->z[2];
+}
+
+plr_real plr_gate_noise(const plr_filter *f, unsigned row) {
+    return row == 2 ? PLR_R(0.5) * f->par.pixel_variance : f->par.pixel_variance;
+}
+
+/* The course's gate: squared norm of the four residuals, px^2. */
+static plr_real residual_norm2(const plr_observation *seen, const plr_linearisation *lin) {
+    const plr_real residual[4] = {
+        (plr_real)seen->uL_px - lin->z[0], (plr_real)seen->uR_px - lin->z[1],
+        (plr_real)seen->vL_px - lin->z[2], (plr_real)seen->vR_px - lin->z[2]};
+    return PLR_FMA(residual[3], residual[3], plr_dot3(residual, residual));
+}
+
+plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
+    plr_verdict verdict = {.accepted = false};
+    plr_linearisation lin;
+    if (!f->model->linearise(f, &f->slots[slot], &lin))
+        return verdict;
+
+    plr_real S[6], r[3];
+    plr_covariance_innovation(f, slot, &lin, S);
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        S[plr_packed_at(i, i)] += plr_gate_noise(f, i);
+    if (!plr_cholesky_packed(PLR_ROWS, S))
+        return verdict;
+    plr_gate_innovation(r, seen, &lin);
+    plr_solve_lower_packed(PLR_ROWS, 1, S, r, 1);
+    const plr_real row_gap = (plr_real)seen->vL_px - (plr_real)seen->vR_px;
+    verdict.d2 = plr_dot3(r, r) + row_gap * row_gap / (PLR_R(2) * f->par.pixel_variance);
+    verdict.gain = S[0] * S[0] * S[2] * S[2] * S[5] * S[5];
+
+    if (f->par.gate_residual2 > 0)
+        verdict.accepted = residual_norm2(seen, &lin) <= f->par.gate_residual2;
+    else
+        verdict.accepted =
+            plr_is_finite(verdict.d2) && (f->par.gate_d2 <= 0 || verdict.d2 <= f->par.gate_d2);
+    return verdict;
+}

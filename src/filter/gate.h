@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+/* The gate: is an observation believable, given the prediction? (DESIGN 2.3) */
+#ifndef PLR_FILTER_GATE_H
+#define PLR_FILTER_GATE_H
+
+#include <stdbool.h>
+
+#include "filter/model.h"
+#include "pelorus/state.h"
+
+/* What the gate says of one observation. */
+typedef struct plr_verdict {
+    bool accepted;
+    plr_real d2;   /* r^T S^-1 r + (vL - vR)^2 / (2 s^2): 4 degrees of freedom */
+    plr_real gain; /* det(S): the larger, the more the observation tells beyond its own noise */
+} plr_verdict;
+
+/* r = (uL, uR, (vL + vR) / 2) - z: the innovation, px. */
+void plr_gate_innovation(plr_real r[3], const plr_observation *seen, const plr_linearisation *lin);
+
+/* R, the noise of rows (uL, uR, v): s^2, s^2, s^2 / 2. */
+plr_real plr_gate_noise(const plr_filter *f, unsigned row);
+
+/* Judges an observation of a slot at the current estimate. */
+plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observation *seen);
+
+#endif

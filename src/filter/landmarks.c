@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+/* Landmarks as the caller sees them: in the world, in and out. */
+#include "filter/covariance.h"
+#include "filter/filter_internal.h"
+#include "filter/model.h"
+#include "filter/motion.h"
+#include "filter/slots.h"
+
+unsigned plr_filter_landmark_count(const plr_filter *f) {
+    return f && f->magic == PLR_FILTER_MAGIC ? f->count : 0;
+}
+
+plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark) {
+    if (!f || !landmark)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    plr_motion_settle(f);
+    if (f->diverged)
+        return PLR_E_DIVERGED;
+    if (slot >= f->count)
+        return PLR_E_ARGUMENT;
+    plr_slots_export(f, slot, landmark);
+    return PLR_OK;
+}
+
+plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) {
+    if (!f || !landmark)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    if (!plr_all_finite(landmark->p_W_m, 3) || !plr_all_finite(landmark->P_W_m2, 9))
+        return PLR_E_NOT_FINITE;
+    if (!plr_landmark_is_valid(landmark))
+        return PLR_E_ARGUMENT;
+    plr_motion_settle(f);
+    if (f->diverged)
+        return PLR_E_DIVERGED;
+    if (plr_slots_find(f, landmark->id) != PLR_NO_SLOT)
+        return PLR_E_EXISTS;
+    if (f->count >= f->config.slots)
+        return PLR_E_FULL;
+    plr_new_landmark entering;
+    if (!f->model->adopt(f, landmark, &entering))
+        return PLR_E_RANGE;
+    plr_slots_append(f, landmark->id, true, &entering);
+    return PLR_OK;
+}
+
+plr_status plr_filter_flush_map(plr_filter *f) {
+    if (!f)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    if (!f->map.sink)
+        return PLR_E_MODE;
+    plr_motion_settle(f);
+    if (f->diverged)
+        return PLR_E_DIVERGED;
+    for (unsigned slot = f->count; slot-- > 0;) { /* backwards: removing moves the last */
+        plr_landmark landmark;
+        plr_slots_export(f, slot, &landmark);
+        if (f->map.sink(f->map.context, &landmark) == 0)
+            plr_slots_remove(f, slot);
+    }
+    return f->count == 0 ? PLR_OK : PLR_E_IO;
+}

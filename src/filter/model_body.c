@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The `body` model: landmarks in the current left camera, q, with errors in the polar chart at q.
+ * An observation depends on its landmark alone; motion moves all landmarks together. Invariant: the
+ * directions that nothing observes stay so, and the filter does not believe more than it knows.
+ * docs/MATH.md, "body".
+ */
+#include "filter/covariance.h"
+#include "filter/model.h"
+#include "filter/polar.h"
+#include "filter/slots.h"
+
+#include "camera/stereo.h"
+#include "lie/se3.h"
+#include "linalg/dense.h"
+#include "linalg/small.h"
+
+/* K = [-I | [q]x], 3x6: how a twist of the camera moves a point seen from it. */
+static void point_by_twist(plr_real K[18], const plr_real q[3]) {
+    const plr_real rows[18] = {
+        -1, 0,  0,  0,     -q[2], q[1],  /**/
+        0,  -1, 0,  q[2],  0,     -q[0], /**/
+        0,  0,  -1, -q[1], q[0],  0,
+    };
+    memcpy(K, rows, sizeof rows);
+}
+
+/* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q. */
+static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, const plr_real q[3],
+                                plr_real J[18]) {
+    plr_real Jw[9], K[18], JwK[18] = {0};
+    plr_polar_from_point(Jw, chart);
+    point_by_twist(K, q);
+    plr_gemm_nn(3, 6, 3, Jw, 3, K, 6, JwK, 6);
+    memset(J, 0, 18 * sizeof *J);
+    plr_gemm_nn(3, 6, 6, JwK, 6, f->par.Ad_CB, 6, J, 6);
+}
+
+/* F = Jw(q+) R^T Ji(q), 3x3: a chart's error carried along a rigid motion with rotation R. */
+static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
+                        const plr_polar *from) {
+    plr_real Jw[9], Ji[9], RtJi[9];
+    plr_polar_from_point(Jw, to);
+    plr_polar_to_point(Ji, from);
+    plr_mat3_mul_tn(RtJi, R, Ji);
+    plr_mat3_mul(F, Jw, RtJi);
+}
+
+/* D_C = T_CB D T_CB^-1: the body's motion, as the camera makes it. */
+static void motion_of_camera(const plr_camera *camera, const plr_motion *motion, plr_real R[9],
+                             plr_real p[3]) {
+    plr_real RD[9], moved[3], back[3];
+    plr_mat3_mul(RD, camera->R_CB, motion->R);
+    plr_mat3_mul_nt(R, RD, camera->R_CB);
+    plr_camera_from_body(moved, camera, motion->p);
+    plr_mat3_vec(back, R, camera->t_CB);
+    for (int i = 0; i < 3; i++)
+        p[i] = moved[i] - back[i];
+}
+
+static void body_propagate(plr_filter *f) {
+    plr_real R[9], p[3];
+    motion_of_camera(&f->par.camera, &f->motion, R, p);
+
+    plr_real *F = f->work.Vt;
+    for (unsigned slot = 0; slot < f->count;) {
+        plr_slot *s = &f->slots[slot];
+        plr_real q[3];
+        plr_se3_inverse_point(q, R, p, s->x);
+        if (plr_dot3(q, q) < PLR_MIN_RANGE * PLR_MIN_RANGE) {
+            plr_slots_remove(f, slot); /* the last one takes its place: look at it next */
+            continue;
+        }
+        plr_polar from, to;
+        plr_polar_at(&from, s->x);
+        plr_polar_at(&to, q);
+        carry_chart(F + 9 * slot, &to, R, &from);
+        memcpy(s->x, q, sizeof q);
+        slot++;
+    }
+    plr_real A[36];
+    plr_se3_adjoint_inverse(A, f->motion.R, f->motion.p);
+    plr_covariance_transport(f, A, F);
+    if (!f->motion.noisy)
+        return;
+
+    const unsigned n = plr_covariance_dim(f);
+    plr_real *Gt = plr_covariance_motion_rows(f);
+    memset(Gt, 0, 6 * n * sizeof *Gt);
+    for (unsigned k = 0; k < 6; k++)
+        Gt[k * n + k] = 1;
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const unsigned row = plr_covariance_row(f, slot);
+        plr_polar chart;
+        plr_real G[18];
+        plr_polar_at(&chart, f->slots[slot].x);
+        chart_by_body_twist(f, &chart, f->slots[slot].x, G);
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned k = 0; k < 6; k++)
+                Gt[k * n + row + i] = G[6 * i + k];
+    }
+    plr_covariance_add_motion(f, &f->motion);
+}
+
+static bool body_linearise(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin) {
+    const plr_camera *camera = &f->par.camera;
+    lin->depth = slot->x[2];
+    lin->uses_pose = false;
+    if (!(lin->depth >= f->par.min_depth))
+        return false;
+    plr_polar chart;
+    plr_real Dz[9], Ji[9];
+    plr_stereo_project(lin->z, camera, slot->x);
+    plr_stereo_jacobian(Dz, camera, slot->x);
+    plr_polar_at(&chart, slot->x);
+    plr_polar_to_point(Ji, &chart);
+    plr_mat3_mul(lin->H_landmark, Dz, Ji);
+    return true;
+}
+
+static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real P_q[9],
+                            plr_new_landmark *landmark) {
+    (void)f;
+    plr_polar chart;
+    plr_real Jw[9], JP[9];
+    plr_polar_at(&chart, q);
+    plr_polar_from_point(Jw, &chart);
+    plr_mat3_mul(JP, Jw, P_q);
+    plr_mat3_mul_nt(landmark->P, JP, Jw);
+    memcpy(landmark->x, q, 3 * sizeof *q);
+    landmark->uses_pose = false;
+}
+
+static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark) {
+    plr_real offset_W[3], s_B[3], R_CW[9];
+    for (int i = 0; i < 3; i++)
+        offset_W[i] = (plr_real)(known->p_W_m[i] - f->p_WB[i]);
+    plr_mat3_tvec(s_B, f->R_WB, offset_W);
+    plr_camera_from_body(landmark->x, &f->par.camera, s_B);
+    const plr_real range2 = plr_dot3(landmark->x, landmark->x);
+    if (!(range2 > PLR_MIN_RANGE * PLR_MIN_RANGE) ||
+        !(range2 * f->par.min_inverse_range * f->par.min_inverse_range < 1))
+        return false;
+
+    plr_polar chart;
+    plr_real Jw[9], J_W[9], P_W[9], JP[9];
+    plr_polar_at(&chart, landmark->x);
+    chart_by_body_twist(f, &chart, landmark->x, landmark->J_pose);
+    landmark->uses_pose = true;
+    plr_polar_from_point(Jw, &chart);
+    plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, f->R_WB);
+    plr_mat3_mul(J_W, Jw, R_CW);
+    for (int i = 0; i < 9; i++)
+        P_W[i] = (plr_real)known->P_W_m2[i];
+    plr_mat3_mul(JP, J_W, P_W);
+    plr_mat3_mul_nt(landmark->P, JP, J_W);
+    return true;
+}
+
+/*
+ * What is common to all landmarks is a rigid motion and is applied as one; only the rest of each
+ * correction goes through the chart:
+ *   w_rest = w - Jw(q) [-I | [q]x] xi_C,  q~ = retr(q, w_rest),  q+ = Exp(xi_C)^-1 q~.
+ * P is transported by Jw(q+) Exp(-theta_C) Ji(q~) diag(M, 1), the pose by Ad(Exp(-xi)).
+ */
+static unsigned body_retract(plr_filter *f, const plr_real *dx) {
+    plr_real R_xi[9], p_xi[3], A[36], xi_C[6] = {0}, R_C[9], p_C[3];
+    plr_se3_exp(R_xi, p_xi, dx);
+    plr_se3_adjoint_inverse(A, R_xi, p_xi);
+    plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, dx, 1, xi_C, 1);
+    plr_se3_exp(R_C, p_C, xi_C);
+
+    unsigned cut = 0;
+    plr_real *F = f->work.Vt;
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        plr_slot *s = &f->slots[slot];
+        plr_polar from, there, to;
+        plr_real J[18], M[4], w[3], q[3], rigid[9];
+        plr_polar_at(&from, s->x);
+        chart_by_body_twist(f, &from, s->x, J);
+        memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 6; k++)
+                w[i] = PLR_FMA(-J[6 * i + k], dx[k], w[i]);
+        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range);
+        for (int i = 0; i < 3; i++)
+            q[i] = there.r * there.mu[i];
+        plr_se3_inverse_point(s->x, R_C, p_C, q);
+
+        plr_polar_at(&to, s->x);
+        carry_chart(rigid, &to, R_C, &there);
+        plr_real *own = F + 9 * slot;
+        for (int i = 0; i < 3; i++) {
+            const plr_real *row = rigid + 3 * i;
+            own[3 * i] = PLR_FMA(row[1], M[2], row[0] * M[0]);
+            own[3 * i + 1] = PLR_FMA(row[1], M[3], row[0] * M[1]);
+            own[3 * i + 2] = row[2];
+        }
+    }
+    plr_covariance_transport(f, A, F);
+    return cut;
+}
+
+static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
+    plr_polar chart;
+    plr_real s_B[3], offset[3], K[18], Ji[9], R_WC[9];
+    plr_camera_to_body(s_B, &f->par.camera, slot->x);
+    plr_mat3_vec(offset, f->R_WB, s_B);
+    for (int i = 0; i < 3; i++)
+        point->p_W[i] = f->p_WB[i] + (double)offset[i];
+
+    point_by_twist(K, s_B);
+    for (int i = 0; i < 18; i++)
+        K[i] = -K[i];
+    memset(point->J_pose, 0, sizeof point->J_pose);
+    plr_gemm_nn(3, 6, 3, f->R_WB, 3, K, 6, point->J_pose, 6);
+    plr_polar_at(&chart, slot->x);
+    plr_polar_to_point(Ji, &chart);
+    plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
+    plr_mat3_mul(point->J_landmark, R_WC, Ji);
+}
+
+const struct plr_model plr_model_body = {
+    .name = "body",
+    .propagate = body_propagate,
+    .linearise = body_linearise,
+    .initialise = body_initialise,
+    .adopt = body_adopt,
+    .retract = body_retract,
+    .in_world = body_in_world,
+};

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+#include "filter/motion.h"
+
+#include "filter/covariance.h"
+#include "lie/se3.h"
+#include "lie/so3.h"
+#include "linalg/dense.h"
+#include "linalg/small.h"
+
+/* The series of SO(3) hold up to here; a robot that turns further in a step cannot be followed. */
+#define MAX_TURN PLR_R(3.1415926)
+#define MAX_WAY  PLR_R(1000)
+
+void plr_motion_clear(plr_motion *motion) {
+    memset(motion, 0, sizeof *motion);
+    plr_mat3_identity(motion->R);
+}
+
+/* xi = seconds (reading - b) */
+static void displacement(const plr_filter *f, const plr_real reading[6], plr_real seconds,
+                         plr_real xi[6]) {
+    for (int i = 0; i < 6; i++)
+        xi[i] = seconds * (reading[i] - f->bias[i]);
+}
+
+plr_status plr_motion_check(const plr_filter *f, const plr_real reading[6], plr_real seconds) {
+    plr_real xi[6];
+    displacement(f, reading, seconds, xi);
+    const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
+    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
+}
+
+/* p <- p + R d, in double; R <- R dR */
+static void move_pose(plr_filter *f, const plr_real dR[9], const plr_real d[3]) {
+    plr_real step[3], R[9];
+    plr_mat3_vec(step, f->R_WB, d);
+    plr_mat3_mul(R, f->R_WB, dR);
+    for (int i = 0; i < 3; i++)
+        f->p_WB[i] += (double)step[i];
+    memcpy(f->R_WB, R, sizeof R);
+}
+
+/* Variance of a step's displacement, for rho (first) and theta. */
+static void step_variance(const plr_filter *f, plr_real seconds, plr_real interval,
+                          plr_real variance[2]) {
+    const plr_real share = f->config.noise == PLR_NOISE_STEP
+                               ? (interval > 0 ? seconds / interval : PLR_R(1))
+                               : seconds * interval;
+    variance[0] = f->par.velocity_variance * share;
+    variance[1] = f->par.gyro_variance * share;
+}
+
+void plr_motion_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
+                     plr_real interval) {
+    plr_real xi[6], R[9], p[3], A[36], next[36], variance[2];
+    plr_motion *m = &f->motion;
+    displacement(f, reading, seconds, xi);
+    plr_se3_exp(R, p, xi);
+    plr_se3_adjoint_inverse(A, R, p);
+    f->t_ns = t_ns;
+    move_pose(f, R, p);
+    plr_se3_append(m->R, m->p, R, p);
+
+    plr_sandwich6(next, A, m->Q);
+    step_variance(f, seconds, interval, variance);
+    for (int i = 0; i < 6; i++)
+        next[7 * i] += variance[i / 3];
+    memcpy(m->Q, next, sizeof next);
+
+    if (f->config.bias) {
+        plr_real Jr[36];
+        plr_se3_right_jacobian(Jr, xi);
+        memset(next, 0, sizeof next);
+        plr_gemm_nn(6, 6, 6, A, 6, m->B, 6, next, 6);
+        for (int i = 0; i < 36; i++)
+            m->B[i] = PLR_FMA(-seconds, Jr[i], next[i]);
+    }
+    m->seconds += seconds;
+    m->pending = 1;
+    m->noisy = 1;
+}
+
+void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
+                     const double p_WB[3]) {
+    plr_real offset[3], d[3], dR[9];
+    for (int i = 0; i < 3; i++)
+        offset[i] = (plr_real)(p_WB[i] - f->p_WB[i]);
+    plr_mat3_tvec(d, f->R_WB, offset);
+    plr_mat3_mul_tn(dR, f->R_WB, R_WB);
+    plr_se3_append(f->motion.R, f->motion.p, dR, d);
+    f->motion.pending = 1;
+    f->t_ns = t_ns;
+    memcpy(f->R_WB, R_WB, sizeof f->R_WB);
+    memcpy(f->p_WB, p_WB, sizeof f->p_WB);
+}
+
+void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]) {
+    plr_real R[9], p[3];
+    plr_se3_exp(R, p, xi);
+    move_pose(f, R, p);
+    plr_so3_orthonormalise(f->R_WB);
+}
+
+void plr_motion_settle(plr_filter *f) {
+    if (!f->motion.pending || f->diverged)
+        return;
+    f->model->propagate(f);
+    if (f->config.bias)
+        plr_covariance_add_bias_walk(f, f->par.bias_velocity_walk * f->motion.seconds,
+                                     f->par.bias_gyro_walk * f->motion.seconds);
+    plr_motion_clear(&f->motion);
+    if (!plr_covariance_is_positive(f))
+        plr_filter_diverge(f);
+}
+
+void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
+    const plr_motion *m = &f->motion;
+    plr_real A[36], P[36];
+    plr_se3_adjoint_inverse(A, m->R, m->p);
+    plr_covariance_pose(f, P);
+    plr_sandwich6(P_xi, A, P);
+    for (int i = 0; i < 36; i++)
+        P_xi[i] += m->Q[i];
+    if (!f->config.bias)
+        return;
+    plr_real AP[36] = {0}, cross[36] = {0}, BPB[36];
+    plr_covariance_pose_bias(f, P);
+    plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
+    plr_gemm_nt(6, 6, 6, AP, 6, m->B, 6, cross, 6);
+    plr_covariance_bias(f, P);
+    plr_sandwich6(BPB, m->B, P);
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            P_xi[6 * i + j] += cross[6 * i + j] + cross[6 * j + i] + BPB[6 * i + j];
+}
+
+void plr_filter_diverge(plr_filter *f) {
+    if (!f->diverged)
+        f->totals.diverged_ns = f->t_ns;
+    f->diverged = 1;
+}

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+#include "pelorus/settings.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "pelorus/config.h"
+
+static const char *const model_words[] = {"body", "world", NULL};
+static const char *const mode_words[] = {"slam", "mapping", "localization", "dead_reckoning", NULL};
+static const char *const timing_words[] = {"start", "end", "mid", NULL};
+static const char *const noise_words[] = {"twist", "step", NULL};
+static const char *const switch_words[] = {"off", "on", NULL};
+
+/* How a field of plr_config is stored. */
+typedef enum plr_storage { STORE_U8, STORE_U16, STORE_DOUBLE } plr_storage;
+
+typedef struct plr_row {
+    plr_setting setting;
+    size_t offset;
+    plr_storage storage;
+} plr_row;
+
+#define AT(field) offsetof(plr_config, field)
+/* clang-format off */
+static const plr_row rows[] = {
+    {{1, "model", "", "where landmarks live", PLR_SETTING_CHOICE, model_words, 0, 1, PLR_MODEL_BODY}, AT(model), STORE_U8},
+    {{2, "mode", "", "what is estimated", PLR_SETTING_CHOICE, mode_words, 0, 3, PLR_MODE_SLAM}, AT(mode), STORE_U8},
+    {{3, "bias", "", "estimate the biases of the twist", PLR_SETTING_SWITCH, switch_words, 0, 1, 0}, AT(bias), STORE_U8},
+    {{4, "slots", "", "landmarks held at once", PLR_SETTING_COUNT, NULL, 1, PLR_MAX_LANDMARKS, PLR_MAX_LANDMARKS < 100 ? PLR_MAX_LANDMARKS : 100}, AT(slots), STORE_U16},
+    {{5, "known-map", "", "slam uses known landmarks too", PLR_SETTING_SWITCH, switch_words, 0, 1, 0}, AT(known_map), STORE_U8},
+    {{6, "twist-timing", "", "which interval a reading stands for", PLR_SETTING_CHOICE, timing_words, 0, 2, PLR_TWIST_START}, AT(twist_timing), STORE_U8},
+    {{7, "noise", "", "the sigmas are a reading's, or a step's", PLR_SETTING_CHOICE, noise_words, 0, 1, PLR_NOISE_TWIST}, AT(noise), STORE_U8},
+    {{8, "pixel-sigma", "px", "noise of a pixel coordinate", PLR_SETTING_NUMBER, NULL, 1e-3, 1e3, 2}, AT(pixel_sigma_px), STORE_DOUBLE},
+    {{9, "velocity-sigma", "m/s", "noise of a velocity reading, per axis", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma), STORE_DOUBLE},
+    {{10, "gyro-sigma", "rad/s", "noise of a rate reading, per axis", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma), STORE_DOUBLE},
+    {{11, "bias-velocity-sigma", "m/s", "prior of the velocity bias", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.03}, AT(bias_velocity_sigma_mps), STORE_DOUBLE},
+    {{12, "bias-gyro-sigma", "rad/s", "prior of the gyro bias", PLR_SETTING_NUMBER, NULL, 0, 10, 0.01}, AT(bias_gyro_sigma_radps), STORE_DOUBLE},
+    {{13, "bias-velocity-walk", "(m/s)^2/s", "variance that the velocity bias gains in a second", PLR_SETTING_NUMBER, NULL, 0, 1e2, 1e-8}, AT(bias_velocity_walk), STORE_DOUBLE},
+    {{14, "bias-gyro-walk", "(rad/s)^2/s", "variance that the gyro bias gains in a second", PLR_SETTING_NUMBER, NULL, 0, 1e2, 1e-10}, AT(bias_gyro_walk), STORE_DOUBLE},
+    {{15, "gate-d2", "", "largest squared Mahalanobis distance, 4 d.o.f.; 0 = off", PLR_SETTING_NUMBER, NULL, 0, 1e12, 13.276704135987622}, AT(gate_d2), STORE_DOUBLE},
+    {{16, "gate-residual", "px", "instead: largest norm of the four residuals; 0 = off", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0}, AT(gate_residual_px), STORE_DOUBLE},
+    {{17, "min-disparity", "px", "least disparity of a new landmark", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0.1}, AT(min_disparity_px), STORE_DOUBLE},
+    {{18, "max-depth", "m", "greatest depth of a new landmark; 0 = no limit", PLR_SETTING_NUMBER, NULL, 0, 1e6, 0}, AT(max_depth_m), STORE_DOUBLE},
+    {{19, "max-row-gap", "px", "greatest |vL - vR| of a new landmark; 0 = no limit", PLR_SETTING_NUMBER, NULL, 0, 1e4, 2}, AT(max_row_gap_px), STORE_DOUBLE},
+    {{20, "min-depth", "m", "predicted depth below which nothing is linearised", PLR_SETTING_NUMBER, NULL, 0.01, 1e3, 0.3}, AT(min_depth_m), STORE_DOUBLE},
+    {{21, "start-sigma", "m and rad", "initial pose, where no covariance is given", PLR_SETTING_NUMBER, NULL, 1e-9, 1e3, 1e-4}, AT(start_sigma), STORE_DOUBLE},
+    {{22, "landmark-sigma", "m", "initial landmark, world model; 0 = from the pixels", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0}, AT(landmark_sigma_m), STORE_DOUBLE},
+    {{23, "max-range", "m", "greatest distance of any landmark", PLR_SETTING_NUMBER, NULL, 1, 1e6, 1e5}, AT(max_range_m), STORE_DOUBLE},
+    {{24, "max-gap", "s", "longest pause in the data that is bridged", PLR_SETTING_NUMBER, NULL, 1e-3, 60, 2}, AT(max_gap_s), STORE_DOUBLE},
+    {{25, "twist-delay", "s", "twists wait so long for a late camera", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
+};
+/* clang-format on */
+
+enum { COUNT = sizeof rows / sizeof *rows };
+
+unsigned plr_setting_count(void) {
+    return COUNT;
+}
+
+const plr_setting *plr_setting_at(unsigned index) {
+    return index < COUNT ? &rows[index].setting : NULL;
+}
+
+const plr_setting *plr_setting_by_id(uint8_t id) {
+    for (unsigned i = 0; i < COUNT; i++)
+        if (rows[i].setting.id == id)
+            return &rows[i].setting;
+    return NULL;
+}
+
+const plr_setting *plr_setting_by_name(const char *name) {
+    for (unsigned i = 0; name && i < COUNT; i++)
+        if (strcmp(rows[i].setting.name, name) == 0)
+            return &rows[i].setting;
+    return NULL;
+}
+
+static const plr_row *row_of(const plr_setting *setting) {
+    for (unsigned i = 0; i < COUNT; i++)
+        if (&rows[i].setting == setting)
+            return &rows[i];
+    return NULL;
+}
+
+double plr_config_get(const plr_config *config, const plr_setting *setting) {
+    const plr_row *row = row_of(setting);
+    if (!config || !row)
+        return 0;
+    const unsigned char *field = (const unsigned char *)config + row->offset;
+    uint16_t count;
+    double number;
+    switch (row->storage) {
+    case STORE_U8:
+        return *field;
+    case STORE_U16:
+        memcpy(&count, field, sizeof count);
+        return count;
+    case STORE_DOUBLE:
+        memcpy(&number, field, sizeof number);
+        return number;
+    }
+    return 0;
+}
+
+static bool is_allowed(const plr_setting *setting, double value) {
+    if (!(value >= setting->minimum && value <= setting->maximum))
+        return false;
+    if (setting->kind == PLR_SETTING_NUMBER)
+        return true;
+    const double whole = (double)(uint16_t)value; /* the limits of whole ones are below 65536 */
+    return whole <= value && whole >= value;
+}
+
+plr_status plr_config_set(plr_config *config, const plr_setting *setting, double value) {
+    const plr_row *row = row_of(setting);
+    if (!config || !row || !is_allowed(setting, value))
+        return PLR_E_CONFIG;
+    unsigned char *field = (unsigned char *)config + row->offset;
+    uint16_t count;
+    switch (row->storage) {
+    case STORE_U8:
+        *field = (uint8_t)value;
+        break;
+    case STORE_U16:
+        count = (uint16_t)value;
+        memcpy(field, &count, sizeof count);
+        break;
+    case STORE_DOUBLE:
+        memcpy(field, &value, sizeof value);
+        break;
+    }
+    return PLR_OK;
+}
+
+void plr_config_default(plr_config *config) {
+    memset(config, 0, sizeof *config);
+    for (unsigned i = 0; i < COUNT; i++)
+        (void)plr_config_set(config, &rows[i].setting, rows[i].setting.standard);
+}
+
+void plr_config_course(plr_config *config) {
+    plr_config_default(config);
+    config->model = PLR_MODEL_WORLD;
+    config->bias = 0;
+    config->twist_timing = PLR_TWIST_START;
+    config->noise = PLR_NOISE_STEP;
+    config->landmark_sigma_m = 1.4142135623730951; /* variance 2 m^2 */
+    config->start_sigma = 0.022360679774997897;    /* variance 5e-4 */
+    config->pixel_sigma_px = 2.23606797749979;     /* variance 5 px^2 */
+    config->velocity_sigma = 0.03162277660168379;  /* variance 1e-3 m^2 a step */
+    config->gyro_sigma = 0.03162277660168379;      /* variance 1e-3 rad^2 a step */
+    config->gate_residual_px = 30;
+    config->max_depth_m = 60;
+}
+
+static plr_status refuse(const plr_setting **culprit, const plr_setting *setting) {
+    if (culprit)
+        *culprit = setting;
+    return PLR_E_CONFIG;
+}
+
+plr_status plr_config_check(const plr_config *config, const plr_setting **culprit) {
+    if (culprit)
+        *culprit = NULL;
+    if (!config)
+        return PLR_E_ARGUMENT;
+    for (unsigned i = 0; i < COUNT; i++)
+        if (!is_allowed(&rows[i].setting, plr_config_get(config, &rows[i].setting)))
+            return refuse(culprit, &rows[i].setting);
+    if (config->model == PLR_MODEL_BODY && config->landmark_sigma_m > 0)
+        return refuse(culprit, plr_setting_by_name("landmark-sigma"));
+    if (config->min_depth_m >= config->max_range_m)
+        return refuse(culprit, plr_setting_by_name("min-depth"));
+    return PLR_OK;
+}

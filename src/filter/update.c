@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: MIT
+/*
+ * A stereo frame: predict, match, gate, update, retract, evict, initialise, in this order.
+ * Observations are looked at by id, so the order in which they arrive changes no bit.
+ */
+#include <string.h>
+
+#include "camera/stereo.h"
+#include "filter/correction.h"
+#include "filter/filter_internal.h"
+#include "filter/gate.h"
+#include "filter/health.h"
+#include "filter/model.h"
+#include "filter/motion.h"
+#include "filter/order.h"
+#include "filter/slots.h"
+#include "linalg/small.h"
+
+/* ---------------------------------------------------------------- cleaning and order */
+
+/* A coordinate beyond this lies in no image, px. */
+#define MAX_PIXEL 1e6F
+
+static bool is_pixel(float x) {
+    return x > -MAX_PIXEL && x < MAX_PIXEL; /* false for NaN too */
+}
+
+static bool id_before(const void *context, uint16_t a, uint16_t b) {
+    const plr_observation *observations = context;
+    return observations[a].id < observations[b].id;
+}
+
+/* work.order: the good observations by id. Returns their number; malformed ones are counted, and so
+ * are all copies of an id that stands twice: none of them can be told to be the right one. */
+static unsigned put_in_order(plr_filter *f, const plr_frame *frame, plr_report *report) {
+    uint16_t *order = f->work.order;
+    const plr_observation *seen = frame->observations;
+    unsigned n = 0;
+    for (uint16_t i = 0; i < frame->count; i++) {
+        const plr_observation *o = &seen[i];
+        if (is_pixel(o->uL_px) && is_pixel(o->vL_px) && is_pixel(o->uR_px) && is_pixel(o->vR_px))
+            order[n++] = i;
+        else
+            report->refused++;
+    }
+    plr_order_sort(order, n, id_before, seen);
+    unsigned kept = 0;
+    for (unsigned i = 0; i < n;) {
+        unsigned end = i + 1;
+        while (end < n && seen[order[end]].id == seen[order[i]].id)
+            end++;
+        if (end == i + 1)
+            order[kept++] = order[i];
+        else
+            report->duplicates = (uint16_t)(report->duplicates + end - i);
+        i = end;
+    }
+    return kept;
+}
+
+/* ---------------------------------------------------------------- matching */
+
+/* work.slot_of[k] = the slot of observation order[k]: one binary search a slot. */
+static void match(plr_filter *f, const plr_observation *seen, unsigned n) {
+    plr_workspace *w = &f->work;
+    for (unsigned k = 0; k < n; k++)
+        w->slot_of[k] = PLR_NO_SLOT;
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const uint32_t id = f->slots[slot].id;
+        unsigned low = 0, high = n;
+        while (low < high) {
+            const unsigned middle = (low + high) / 2;
+            if (seen[w->order[middle]].id < id)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        if (low < n && seen[w->order[low]].id == id) {
+            w->slot_of[low] = (uint16_t)slot;
+            f->slots[slot].last_frame = f->frame_number; /* so it is not evicted for another */
+        }
+    }
+}
+
+static void count_seen(plr_filter *f, unsigned n) {
+    for (unsigned k = 0; k < n; k++)
+        if (f->work.slot_of[k] != PLR_NO_SLOT) {
+            plr_slot *slot = &f->slots[f->work.slot_of[k]];
+            slot->times_seen++;
+            slot->last_seen_ns = f->t_ns;
+        }
+}
+
+/* Asks the map source for the ids that the state does not hold. */
+static void adopt_known(plr_filter *f, const plr_observation *seen, unsigned n,
+                        plr_frame_events *events, plr_report *report) {
+    const bool asks = f->config.mode == PLR_MODE_LOCALIZATION ||
+                      (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
+    if (!asks || !f->map.source)
+        return;
+    bool moved = false;
+    for (unsigned k = 0; k < n; k++) {
+        const uint32_t id = seen[f->work.order[k]].id;
+        plr_landmark known;
+        plr_new_landmark landmark;
+        if (f->work.slot_of[k] != PLR_NO_SLOT || !f->map.source(f->map.context, id, &known))
+            continue;
+        if (!plr_landmark_is_valid(&known) || !f->model->adopt(f, &known, &landmark)) {
+            report->poor++;
+            continue;
+        }
+        if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+            report->no_room++;
+            continue;
+        }
+        plr_slots_append(f, id, true, &landmark);
+        report->created++;
+        moved = true;
+    }
+    if (moved)
+        match(f, seen, n);
+}
+
+/* ---------------------------------------------------------------- gate and budget */
+
+static bool gain_before(const void *context, uint16_t a, uint16_t b) {
+    const plr_real *gain = context;
+    return gain[a] > gain[b] || (!(gain[a] < gain[b]) && a < b);
+}
+
+static bool position_before(const void *context, uint16_t a, uint16_t b) {
+    (void)context;
+    return a < b;
+}
+
+/* work.used: the positions in order that pass the gate, at most `budget` of them: those with the
+ * largest gain, ties to the lower id. */
+static unsigned gate_all(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
+    plr_workspace *w = &f->work;
+    unsigned used = 0;
+    for (unsigned k = 0; k < n; k++) {
+        const uint16_t slot = w->slot_of[k];
+        if (slot == PLR_NO_SLOT)
+            continue;
+        report->matched++;
+        const plr_verdict verdict = plr_gate_judge(f, slot, &frame->observations[w->order[k]]);
+        if (!verdict.accepted) {
+            report->gated++;
+            f->slots[slot].times_gated++;
+            continue;
+        }
+        w->gain[k] = verdict.gain;
+        report->nis += (float)verdict.d2;
+        w->used[used++] = (uint16_t)k;
+    }
+    if (used <= frame->budget)
+        return used;
+    plr_order_sort(w->used, used, gain_before, w->gain);
+    report->left_out = (uint16_t)(used - frame->budget);
+    plr_order_sort(w->used, frame->budget, position_before, NULL);
+    return frame->budget;
+}
+
+/* ---------------------------------------------------------------- new landmarks */
+
+/* The tests that pixels must pass before they may make a landmark. */
+static bool is_worth_a_landmark(const plr_filter *f, const plr_observation *o, plr_real z[3]) {
+    z[0] = (plr_real)o->uL_px;
+    z[1] = (plr_real)o->uR_px;
+    z[2] = PLR_R(0.5) * ((plr_real)o->vL_px + (plr_real)o->vR_px);
+    const plr_real disparity = z[0] - z[1];
+    const plr_real row_gap = plr_abs((plr_real)o->vL_px - (plr_real)o->vR_px);
+    const plr_real depth = f->par.camera.fx * f->par.camera.baseline / disparity;
+    return disparity >= f->par.min_disparity && disparity > 0 && depth >= f->par.min_depth &&
+           (f->par.max_depth <= 0 || depth <= f->par.max_depth) &&
+           (f->par.max_row_gap <= 0 || row_gap <= f->par.max_row_gap) &&
+           depth * f->par.min_inverse_range < 1;
+}
+
+/* P_q = Dq R Dq^T of the pixels, or the course's constant. */
+static void initial_covariance(const plr_filter *f, const plr_real Dq[9], plr_real P_q[9]) {
+    if (f->par.landmark_variance > 0) {
+        plr_mat3_identity(P_q);
+        for (int i = 0; i < 9; i++)
+            P_q[i] *= f->par.landmark_variance;
+        return;
+    }
+    plr_real DR[9];
+    for (unsigned i = 0; i < 9; i++)
+        DR[i] = Dq[i] * plr_gate_noise(f, i % 3);
+    plr_mat3_mul_nt(P_q, DR, Dq);
+}
+
+static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
+                           plr_frame_events *events, plr_report *report) {
+    const bool makes = f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
+    for (unsigned k = 0; k < n; k++) {
+        const plr_observation *o = &frame->observations[f->work.order[k]];
+        plr_real z[3], q[3], Dq[9], P_q[9];
+        plr_new_landmark landmark;
+        if (f->work.slot_of[k] != PLR_NO_SLOT)
+            continue;
+        if (!makes || !is_worth_a_landmark(f, o, z)) {
+            report->poor++;
+            continue;
+        }
+        if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+            report->no_room++;
+            continue;
+        }
+        plr_stereo_back_project(q, Dq, &f->par.camera, z);
+        initial_covariance(f, Dq, P_q);
+        f->model->initialise(f, q, P_q, &landmark);
+        plr_slots_append(f, o->id, false, &landmark);
+        report->created++;
+    }
+}
+
+/* ---------------------------------------------------------------- the frame */
+
+/* Drops the landmarks that the gate rejected in this frame: it has been wrong about them for too
+ * long. Their observations count as new ones. */
+static void unlock(plr_filter *f, const plr_frame *frame, unsigned n, unsigned used) {
+    plr_workspace *w = &f->work;
+    for (unsigned k = 0, next = 0; k < n; k++) {
+        const bool was_used = next < used && w->used[next] == k;
+        if (was_used)
+            next++;
+        else if (w->slot_of[k] != PLR_NO_SLOT)
+            plr_slots_remove(f, plr_slots_find(f, frame->observations[w->order[k]].id));
+    }
+    for (unsigned k = 0; k < n; k++)
+        w->slot_of[k] = plr_slots_find(f, frame->observations[w->order[k]].id);
+}
+
+static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
+    plr_frame_events events = {0};
+    const plr_observation *seen = frame->observations;
+    const unsigned n = put_in_order(f, frame, report);
+    match(f, seen, n);
+    adopt_known(f, seen, n, &events, report);
+    count_seen(f, n);
+    const unsigned used = gate_all(f, frame, n, report);
+    const plr_correction correction = plr_correct(f, seen, used);
+    report->used = (uint16_t)correction.applied;
+    report->blocks_failed = (uint16_t)correction.failed_blocks;
+    report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
+    events.cut = correction.cut;
+    if (!f->diverged) {
+        events.locked = plr_health_gate_is_locked(f, report);
+        if (events.locked)
+            unlock(f, frame, n, used);
+        initialise_new(f, frame, n, &events, report);
+    }
+    plr_health_judge(f, &events, report);
+}
+
+/* Time and mode: may this frame be taken? */
+static plr_status check(const plr_filter *f, const plr_frame *frame) {
+    if (frame->count > PLR_MAX_OBSERVATIONS || (frame->count > 0 && !frame->observations))
+        return PLR_E_ARGUMENT;
+    if (f->config.mode == PLR_MODE_MAPPING)
+        return f->clock_started && f->t_ns == frame->t_ns ? PLR_OK : PLR_E_MODE;
+    if (!f->clock_started)
+        return PLR_OK;
+    if (frame->t_ns < f->t_ns)
+        return PLR_E_LATE;
+    if (frame->t_ns - f->t_ns > f->par.max_gap_ns)
+        return PLR_E_GAP;
+    return plr_motion_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
+}
+
+static void predict_to(plr_filter *f, plr_time_ns t_ns) {
+    if (f->clock_started && t_ns > f->t_ns) {
+        const plr_real seconds = plr_seconds(t_ns - f->t_ns);
+        const plr_real interval = f->interval_s > 0 ? f->interval_s : seconds;
+        plr_motion_step(f, t_ns, f->reading, seconds, interval);
+    }
+    f->t_ns = t_ns;
+    f->clock_started = 1;
+}
+
+plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report) {
+    plr_report scratch;
+    plr_report *r = report ? report : &scratch;
+    memset(r, 0, sizeof *r);
+    if (!f || !frame)
+        return r->status = PLR_E_ARGUMENT;
+    r->t_ns = frame->t_ns;
+    r->budget = frame->budget;
+    r->observations = frame->count;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return r->status = PLR_E_NOT_READY;
+    r->status = check(f, frame);
+    if (r->status != PLR_OK) {
+        plr_filter_count_refusal(f, r->status);
+        plr_health_after_refusal(f, r);
+        return r->status;
+    }
+    predict_to(f, frame->t_ns);
+    f->frame_number++;
+    f->totals.frames++;
+    if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
+        plr_motion_settle(f);
+        if (!f->diverged)
+            process(f, frame, r);
+    }
+    if (f->diverged) {
+        r->status = PLR_E_DIVERGED;
+        r->health = PLR_HEALTH_DIVERGED;
+        r->reasons |= PLR_REASON_NOT_POSITIVE;
+    }
+    r->active = (uint16_t)f->count;
+    plr_health_count(f, r);
+    return r->status;
+}
