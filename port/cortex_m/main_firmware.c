@@ -13,7 +13,11 @@
 #include "startup.h"
 #include "text.h"
 
+/* Landmarks of known position that the board can be given: a map for mode localization. */
+enum { KNOWN_LANDMARKS = 64 };
+
 static plr_session session;
+static plr_landmark known[KNOWN_LANDMARKS];
 
 /* The first frame of a life: who speaks, which build, and why it started. A host that meets it in
  * mid-flight knows that the board has lost its state. */
@@ -46,6 +50,8 @@ int main(void) {
     const plr_port port = port_serial();
     plr_session_options options;
     plr_session_options_default(&options);
+    options.known = known;
+    options.known_capacity = KNOWN_LANDMARKS;
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1; /* startup resets the board: only a broken build comes here */
     }

@@ -28,4 +28,4 @@ set(board_mps3_an547_largest 64)
 
 set(board_stm32f405_cpu m4f)
 set(board_stm32f405_drivers stm32_usart.c)
-set(board_stm32f405_largest 32)
+set(board_stm32f405_largest 48)

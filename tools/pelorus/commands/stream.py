@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus stream IN.plr --to TARGET`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import typer
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from pelorus.console import err, out
+from pelorus.errors import PelorusError
+from pelorus.frames import Kind, Message, Pose
+from pelorus.robot.compare import Comparison, desktop_poses, digest, replay_program
+from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
+from pelorus.robot.target import FORMS, open_target
+from pelorus.wire import header_of, read_file
+
+
+def register(app: typer.Typer) -> None:
+    """Add `stream` to the command line."""
+    app.command(epilog="Example:  pelorus stream drive.plr --to qemu:stm32f405 --compare")(stream)
+
+
+def stream(
+    source: Path = typer.Argument(..., metavar="IN.plr", help="The recording to send."),
+    to: str = typer.Option(..., metavar="TARGET", help=f"Where to: {FORMS}."),
+    record: Path | None = typer.Option(
+        None, metavar="OUT.plr", help="Keep what both sides said: the flight recorder."
+    ),
+    compare: bool = typer.Option(
+        False,
+        "--compare",
+        help="Replay it on this machine too, and compare every bit of the poses.",
+    ),
+    image: Path | None = typer.Option(
+        None, metavar="ELF", help="Firmware for qemu:BOARD; else that of build/robot."
+    ),
+    replay: Path | None = typer.Option(
+        None, metavar="PROGRAM", help="The desktop replay to compare with; else that of build/bin."
+    ),
+    frames: int | None = typer.Option(
+        None, min=1, metavar="N", help="Stop after so many stereo frames."
+    ),
+    answer: float = typer.Option(
+        ANSWER_S, min=0.01, metavar="S", help="How long to wait for the answer to a frame."
+    ),
+) -> None:
+    """Send a recording to a robot controller, real or emulated, as its sensors would."""
+    received, _ = read_file(source)
+    header_of(received, source)
+    messages = _first_frames([frame.message for frame in received], frames)
+    if compare and frames is not None:
+        raise PelorusError("--compare replays the whole recording: leave --frames out")
+    with _log_file(record) as log, open_target(to, image) as link, _display(messages) as show:
+        streamer = Streamer(link, log, show, answer)
+        outcome = streamer.run(messages)
+    _tell(outcome, record)
+    if compare:
+        _compare(source, outcome, replay)
+    if not outcome.poses:
+        raise PelorusError(f"{to}: took {outcome.frames} frames and gave no pose")
+
+
+def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:
+    """The recording up to and with its n-th stereo frame."""
+    stereos = [at for at, message in enumerate(messages) if message.kind == Kind.STEREO]
+    if frames is None or frames >= len(stereos):
+        return messages
+    return messages[: stereos[frames - 1] + 1]
+
+
+@contextmanager
+def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
+    if path is None:
+        yield None
+        return
+    try:
+        with path.open("wb") as stream:
+            yield stream
+    except OSError as error:
+        raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+class _Display:
+    """A bar with the latest position, on a terminal."""
+
+    def __init__(self, progress: Progress, total: int) -> None:
+        self._progress = progress
+        self._task = progress.add_task("streaming", total=total, where="")
+
+    def __call__(self, pose: Pose) -> None:
+        x, y, z = pose.p_WB_m
+        where = f"{pose.t_ns * 1e-9:.2f} s   x {x:.2f}  y {y:.2f}  z {z:.2f} m"
+        self._progress.update(self._task, advance=1, where=where)
+
+
+@contextmanager
+def _display(messages: list[Message]) -> Iterator[_Display]:
+    total = sum(message.kind == Kind.STEREO for message in messages)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[where]}"),
+    )
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+        yield _Display(progress, total)
+
+
+def _tell(outcome: Outcome, record: Path | None) -> None:
+    table = Table(show_header=False, box=None)
+    for remark in outcome.texts:
+        table.add_row("board", remark.text)
+    if outcome.config is not None:
+        build = outcome.config
+        table.add_row(
+            "build",
+            f"{build.build_fingerprint:#010x}: {build.max_landmarks} landmarks, "
+            f"{build.max_observations} observations, float{8 * build.real_bytes}",
+        )
+    table.add_row("frames", f"{outcome.frames} sent, {len(outcome.poses)} answered with a pose")
+    lost = outcome.unanswered
+    table.add_row("lost", f"{lost} without an answer, {outcome.restarts} restarts of the board")
+    refused = {status: n for status, n in outcome.reports.items() if status != 0}
+    for status, count in sorted(refused.items()):
+        table.add_row("refused", f"{count} frames with status {status}")
+    for (subject, status), count in sorted(outcome.refused.items()):
+        table.add_row("refused", f"{count} messages of kind {subject} with status {status}")
+    if outcome.worst_update_us:
+        table.add_row("slowest", f"{outcome.worst_update_us} us for a frame, by the board's clock")
+    if record is not None:
+        table.add_row("recorded", str(record))
+    out.print(table)
+
+
+def _compare(source: Path, outcome: Outcome, replay: Path | None) -> None:
+    if outcome.config is None:
+        raise PelorusError("the board told no settings: nothing to compare with")
+    program = replay_program(outcome.config.real_bytes, replay)
+    slots = outcome.config.max_landmarks
+    result = Comparison(desktop_poses(source, program, slots), outcome.poses)
+    out.print(f"desktop {digest(result.desktop)}  {len(result.desktop)} poses")
+    out.print(f"board   {digest(result.board)}  {len(result.board)} poses")
+    if not result.equal:
+        raise PelorusError(f"they differ from pose {result.first_difference} on")
+    out.print("[bold green]the same bits[/]")

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""Do two filters agree to the bit? The desktop's replay against what a board answered."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pelorus.errors import PelorusError
+from pelorus.frames import Pose
+from pelorus.robot.emulator import SOURCE_ROOT
+from pelorus.wire import read_file
+
+REPLAYS = {4: Path("build/bin/pelorus-replay"), 8: Path("build/bin/pelorus-replay-f64")}
+
+
+def digest(poses: Iterable[Pose]) -> str:
+    """SHA-256 over the payloads of the poses, in hexadecimal."""
+    total = hashlib.sha256()
+    for pose in poses:
+        total.update(pose.pack())
+    return total.hexdigest()
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The poses after each frame, here and there."""
+
+    desktop: list[Pose]
+    board: list[Pose]
+
+    @property
+    def equal(self) -> bool:
+        return bool(self.desktop) and digest(self.desktop) == digest(self.board)
+
+    @property
+    def first_difference(self) -> int | None:
+        """The number of the first pose that differs, or that only one side has."""
+        for number, (ours, theirs) in enumerate(zip(self.desktop, self.board, strict=False)):
+            if ours != theirs:
+                return number
+        shorter = min(len(self.desktop), len(self.board))
+        return None if len(self.desktop) == len(self.board) else shorter
+
+
+def replay_program(real_bytes: int, program: Path | None) -> Path:
+    """The desktop replay of that precision: the given one, or that of the usual build folder."""
+    name = REPLAYS[real_bytes]
+    candidates = (program,) if program else (name, SOURCE_ROOT / name)
+    for candidate in candidates:
+        if candidate.exists():
+            return candidate
+    raise PelorusError(f"{candidates[0]}: no such program; build it, or give --replay")
+
+
+def desktop_poses(recording: Path, program: Path, slots: int) -> list[Pose]:
+    """Replay a recording on this machine, with as many landmark slots as the board has."""
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        answers = Path(folder) / "answers.plr"
+        command = [str(program), str(recording), "--quiet", "--slots", str(slots)]
+        command += ["--out", str(answers)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+        except OSError as error:
+            raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
+        if done.returncode != 0:
+            raise PelorusError(f"{program} failed on {recording}: {done.stderr.strip()}")
+        received, _ = read_file(answers)
+    messages = (frame.message for frame in received)
+    return [message for message in messages if isinstance(message, Pose) and message.after_stereo]

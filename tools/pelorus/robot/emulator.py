@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""A board in QEMU: its machine, its image, and the socket that is its UART."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+import tempfile
+from pathlib import Path
+from types import TracebackType
+
+from pelorus.errors import PelorusError
+from pelorus.robot import link
+from pelorus.robot.link import Link
+
+MACHINES = {
+    "mps2_an386": "mps2-an386",
+    "mps2_an500": "mps2-an500",
+    "mps3_an547": "mps3-an547",
+    "stm32f405": "netduinoplus2",
+}
+IMAGES = Path("build/robot/images")
+SOURCE_ROOT = Path(__file__).resolve().parents[3]
+STOP_S = 5.0
+
+
+def image_of(board: str) -> Path:
+    """The firmware that tools/robot-demo.sh builds: below this folder, or in the source tree."""
+    if board not in MACHINES:
+        raise PelorusError(f"there is no board {board}; QEMU can be {', '.join(MACHINES)}")
+    name = IMAGES / f"pelorus-{board}-n32.elf"
+    for image in (name, SOURCE_ROOT / name):
+        if image.exists():
+            return image
+    raise PelorusError(f"{name}: no such image; build it with tools/robot-demo.sh, or give --image")
+
+
+class Emulator:
+    """Runs an image; a context manager that ends the emulator with the block."""
+
+    def __init__(self, board: str, image: Path, options: tuple[str, ...] = ()) -> None:
+        if board not in MACHINES:
+            raise PelorusError(f"there is no board {board}; QEMU can be {', '.join(MACHINES)}")
+        if not image.exists():
+            raise PelorusError(f"{image}: no such image")
+        self.board = board
+        self._image = image
+        self._options = options
+
+    def __enter__(self) -> Emulator:
+        program = shutil.which("qemu-system-arm")
+        if program is None:
+            raise PelorusError("qemu-system-arm is not installed (Debian: qemu-system-arm)")
+        self._folder = tempfile.TemporaryDirectory(prefix="pelorus-")
+        self._uart = Path(self._folder.name) / "uart"
+        self._control = Path(self._folder.name) / "control"
+        self._log = (Path(self._folder.name) / "log").open("w+")
+        command = [program, "-M", MACHINES[self.board], "-kernel", str(self._image)]
+        command += ["-display", "none", "-monitor", "none", *self._options]
+        command += ["-chardev", f"socket,id=link,path={self._uart},server=on,wait=on"]
+        command += ["-serial", "chardev:link"]
+        command += ["-qmp", f"unix:{self._control},server=on,wait=off"]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log
+        )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._process.terminate()
+        try:
+            self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._log.close()
+        self._folder.cleanup()
+
+    def connect(self) -> Link:
+        """The board's UART. The board starts with the first connection."""
+        try:
+            return link.unix(self._uart)
+        except PelorusError as error:
+            raise PelorusError(f"{self.board}: {self.trouble() or error}") from error
+
+    def trouble(self) -> str:
+        """What the emulator said, if it has stopped; else nothing."""
+        if self._process.poll() is None:
+            return ""
+        self._log.seek(0)
+        return f"QEMU stopped with status {self._process.returncode}: {self._log.read().strip()}"
+
+    def reset(self) -> None:
+        """Press the board's reset button."""
+        with socket.socket(socket.AF_UNIX) as control:
+            control.settimeout(STOP_S)
+            control.connect(str(self._control))
+            stream = control.makefile("rw")
+            stream.readline()  # the greeting
+            for command in ("qmp_capabilities", "system_reset"):
+                stream.write(json.dumps({"execute": command}) + "\n")
+                stream.flush()
+                while "return" not in json.loads(stream.readline()):
+                    pass  # an event

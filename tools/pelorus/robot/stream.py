@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""Sends a recording to a board, frame by frame, and keeps what both sides said.
+
+The rule of docs/PORTING.md, "Flow control": after each STEREO the sender waits for the REPORT that
+answers it, or for a time-out; it never waits without reading. A board that starts anew announces
+itself with a TEXT; it is then given HEADER, settings and its own last pose, and the drive goes on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import BinaryIO
+
+import numpy as np
+
+from pelorus.errors import PelorusError
+from pelorus.frames import (
+    Config,
+    End,
+    Header,
+    Kind,
+    Landmark,
+    Message,
+    Pose,
+    Report,
+    Start,
+    StartFlag,
+    Stereo,
+    Text,
+)
+from pelorus.robot.link import Link
+from pelorus.wire import DELIMITER, Reader, Writer, encode
+
+BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
+ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
+QUIET_S = 0.3
+UNANSWERED_MAX = 5  # in a row: then nobody is there
+WINDOW_BYTES = 2048  # half of the board's receive ring
+SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
+
+
+@dataclass
+class Outcome:
+    """What came of a stream."""
+
+    poses: list[Pose] = field(default_factory=list)  # one a frame
+    reports: Counter[int] = field(default_factory=Counter)  # of STEREO, by status
+    refused: Counter[tuple[int, int]] = field(
+        default_factory=Counter
+    )  # (subject, status) of others
+    config: Config | None = None  # in force
+    texts: list[Text] = field(default_factory=list)
+    frames: int = 0  # STEREO sent
+    unanswered: int = 0
+    restarts: int = 0
+    worst_update_us: int = 0
+
+
+class Streamer:
+    """One drive over one link."""
+
+    def __init__(
+        self,
+        link: Link,
+        log: BinaryIO | None = None,
+        on_pose: Callable[[Pose], None] = lambda _: None,
+        answer_s: float = ANSWER_S,
+    ) -> None:
+        self.outcome = Outcome()
+        self.reader = Reader()
+        self._link = link
+        self._log = None if log is None else Writer(log)
+        self._on_pose = on_pose
+        self._answer_s = answer_s
+        self._sequence = 0
+        self._sent: Counter[Kind] = Counter()
+        self._setup: list[Message] = []
+        self._unread_bytes = 0
+        self._answered: int | None = None  # time of the last STEREO that was answered
+        self._unanswered_in_a_row = 0
+        self._ended = False
+        self._under_way = False
+        self._board_is_new = False  # it announced itself, and has not been given its set-up yet
+
+    def run(self, messages: Iterable[Message]) -> Outcome:
+        """Send everything; END goes last, whether it is among the messages or not."""
+        self.greet()
+        for message in messages:
+            if message.kind == Kind.END:
+                continue
+            if message.kind in (Kind.POSE, Kind.REPORT, Kind.TEXT):
+                continue  # another filter's answers, in a log
+            self.send(message)
+        self.finish()
+        return self.outcome
+
+    def greet(self) -> None:
+        """End whatever the board was in the middle of, and let it finish talking."""
+        self._exchange(DELIMITER + encode(End(0, 0, 0, 0, 0), 0), 0.0)
+        self._sequence = 1
+        quiet_since = time.monotonic()
+        while time.monotonic() - quiet_since < QUIET_S:
+            if self._exchange(b"", QUIET_S):
+                quiet_since = time.monotonic()
+        self.outcome = Outcome(texts=self.outcome.texts)
+        self.reader = Reader()
+        self._ended = False
+        self._under_way = True
+
+    def send(self, message: Message) -> None:
+        """Send one message; for a STEREO, wait for the answer."""
+        if self._board_is_new:
+            self._start_over()
+        if message.kind in SETUP_KINDS and not self.outcome.frames:
+            self._setup.append(message)
+        self._put(message)
+        if isinstance(message, Stereo):
+            self.outcome.frames += 1
+            self._await_answer(message.t_ns)
+        elif self._unread_bytes > WINDOW_BYTES:
+            self._link_pause()
+
+    def finish(self) -> None:
+        """Say END, and hear the board's."""
+        self._put(self._end(), logged=False)
+        deadline = time.monotonic() + self._answer_s
+        while not self._ended and time.monotonic() < deadline:
+            self._exchange(b"", 0.1)
+        if self._log is not None:
+            self._log.end()
+
+    def _end(self) -> End:
+        sent = self._sent
+        counts = (sent[Kind.TWIST], sent[Kind.STEREO], sent[Kind.TRUTH], sent[Kind.LANDMARK])
+        return End(*counts, frames=sum(sent.values()))
+
+    def _put(self, message: Message, logged: bool = True) -> None:
+        if logged and self._log is not None:
+            self._log.write(message)
+        frame = encode(message, self._sequence)
+        self._sequence += 1
+        self._sent[message.kind] += 1
+        self._unread_bytes += len(frame)
+        self._exchange(frame, 0.0)
+
+    def _link_pause(self) -> None:
+        """Give a board time for what has no answer, many twists without a frame between them."""
+        self._exchange(b"", 0.01)
+        self._unread_bytes = 0
+
+    def _await_answer(self, t_ns: int) -> None:
+        deadline = time.monotonic() + self._answer_s
+        while time.monotonic() < deadline and not self._board_is_new:
+            self._exchange(b"", deadline - time.monotonic())
+            if self._answered == t_ns:
+                self._unread_bytes = 0
+                self._unanswered_in_a_row = 0
+                return
+        self.outcome.unanswered += 1  # lost on the way, or with the board
+        self._unanswered_in_a_row += 1
+        if self._unanswered_in_a_row >= UNANSWERED_MAX:
+            raise PelorusError(
+                f"{self._link.what}: {UNANSWERED_MAX} frames in a row without an answer; "
+                "is the board running the firmware, at this baud rate?"
+            )
+
+    def _exchange(self, outgoing: bytes, wait_s: float) -> bool:
+        """Send and take in; whether anything came."""
+        incoming = self._link.exchange(outgoing, wait_s)
+        for received in list(self.reader.feed(incoming)):
+            self._take(received.message)
+        return bool(incoming)
+
+    def _take(self, message: Message) -> None:
+        if self._under_way and self._log is not None and message.kind != Kind.END:
+            self._log.write(message)
+        match message:
+            case Pose() if message.after_stereo:
+                self.outcome.poses.append(message)
+                self._on_pose(message)
+            case Report():
+                self._take_report(message)
+            case Config():
+                self.outcome.config = message
+            case Text():
+                self.outcome.texts.append(message)
+                if self._under_way and message.text.startswith(BOOT_WORDS):
+                    self._board_is_new = True
+            case End():
+                self._ended = True
+            case _:
+                pass  # landmarks: they are in the log
+
+    def _take_report(self, report: Report) -> None:
+        if report.subject != Kind.STEREO:
+            self.outcome.refused[report.subject, report.status] += 1
+            return
+        self.outcome.reports[report.status] += 1
+        self.outcome.worst_update_us = max(self.outcome.worst_update_us, report.update_us)
+        self._answered = report.t_ns
+
+    def _start_over(self) -> None:
+        """The board has lost its state: give it the set-up, and the pose that it last told."""
+        self._board_is_new = False
+        self.outcome.restarts += 1
+        for message in self._setup:
+            if isinstance(message, Header | Config | Landmark) or not self.outcome.poses:
+                self._put(message)
+        if self.outcome.poses:
+            self._put(start_from(self.outcome.poses[-1]))
+
+
+def start_from(pose: Pose) -> Start:
+    """A START that goes on from a pose."""
+    return Start(
+        t_ns=pose.t_ns,
+        R_WB=np.asarray(pose.R_WB),
+        p_WB_m=np.asarray(pose.p_WB_m),
+        flags=StartFlag.COVARIANCE,
+        covariance=np.asarray(pose.covariance),
+    )

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""What `--to` names: qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pelorus.errors import PelorusError
+from pelorus.robot import link
+from pelorus.robot.emulator import Emulator, image_of
+from pelorus.robot.link import Link
+
+BAUD = 921600
+FORMS = "qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]"
+
+
+@contextmanager
+def open_target(target: str, image: Path | None) -> Iterator[Link]:
+    """Connect to a target, for the block's length. `image` is the emulator's firmware."""
+    scheme, _, rest = target.partition(":")
+    if scheme == "qemu" and rest:
+        with Emulator(rest, image or image_of(rest)) as emulator:
+            yield from _closing(emulator.connect())
+        return
+    if image is not None:
+        raise PelorusError(f"{target}: --image is for qemu:BOARD alone")
+    yield from _closing(_open(target, scheme, rest))
+
+
+def _closing(opened: Link) -> Iterator[Link]:
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def _open(target: str, scheme: str, rest: str) -> Link:
+    if scheme == "tcp":
+        host, _, port = rest.rpartition(":")
+        if host and port.isdecimal() and 0 < int(port) < 65536:
+            return link.tcp(host, int(port))
+    if scheme == "serial" and rest:
+        device, _, baud = rest.rpartition(":")
+        if device and baud.isdecimal():
+            return link.serial(Path(device), int(baud))
+        return link.serial(Path(rest), BAUD)
+    raise PelorusError(f"{target}: no such target; it may be {FORMS}")
