@@ -12,6 +12,9 @@
 #include "pelorus/config.h"
 #include "support/random.h"
 
+/* The filter's rounding: the step from 1 to the next number. */
+#define REAL_EPSILON (PLR_REAL == 32 ? 0x1p-23 : 0x1p-52)
+
 /* --- made at random --- */
 
 /* A symmetric positive definite n x n matrix G G^T / n + floor I, G normal. Its smallest eigenvalue

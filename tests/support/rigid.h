@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+/*
+ * SE(3) in double from first principles: 4x4 matrices and power series, no closed form. Slow, and
+ * independent of src/lie. Tangent vectors are (rho, theta).
+ */
+#ifndef PELORUS_TEST_RIGID_H
+#define PELORUS_TEST_RIGID_H
+
+/* C = A B for n x n; C overlaps neither. */
+void square_multiply(unsigned n, const double *A, const double *B, double *C);
+
+/* M = Exp(xi), 4x4: the power series of the matrix exponential, for |theta| <= pi. */
+void rigid_exp(double M[16], const double xi[6]);
+
+/* N = M^-1 for a rigid motion: [R^T, -R^T p]. */
+void rigid_inverse(double N[16], const double M[16]);
+
+/* The first-order part of a motion near identity: M = I + [xi]^ + O(xi^2). */
+void rigid_vee(double xi[6], const double M[16]);
+
+/* ad(xi) = [ [theta]x, [rho]x; 0, [theta]x ], 6x6. */
+void rigid_ad(double ad[36], const double xi[6]);
+
+/* Jr(xi) = sum_k (-ad xi)^k / (k+1)!, 6x6, for |theta| <= pi. */
+void rigid_right_jacobian(double Jr[36], const double xi[6]);
+
+#endif

@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: MIT
+#include "support/wire_samples.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+/* --- making --- */
+
+/* Reals that a careless codec would lose. */
+static const double extreme[] = {NAN,     INFINITY,    -INFINITY, DBL_MAX, -DBL_MAX,
+                                 DBL_MIN, 4.9407e-324, -0.0,      0.0,     DBL_EPSILON};
+static const float extreme_f32[] = {NAN,     INFINITY, -INFINITY, FLT_MAX, -FLT_MAX,
+                                    FLT_MIN, 1.4e-45F, -0.0F,     0.0F,    FLT_EPSILON};
+
+enum { EXTREMES = sizeof extreme / sizeof *extreme };
+
+static double real_of(unsigned variant, unsigned i) {
+    if (variant == WIRE_SAMPLE_LEAST)
+        return 0;
+    return variant == WIRE_SAMPLE_MOST ? extreme[i % EXTREMES] : 0.1 * (double)i - 1.7;
+}
+
+static float real_of_f32(unsigned variant, unsigned i) {
+    if (variant == WIRE_SAMPLE_LEAST)
+        return 0;
+    return variant == WIRE_SAMPLE_MOST ? extreme_f32[i % EXTREMES] : 0.1F * (float)i - 1.7F;
+}
+
+static void fill(double *x, unsigned n, unsigned variant, unsigned first) {
+    for (unsigned i = 0; i < n; i++)
+        x[i] = real_of(variant, first + i);
+}
+
+/* Reals that a float holds. */
+static void fill_narrow(double *x, unsigned n, unsigned variant, unsigned first) {
+    for (unsigned i = 0; i < n; i++)
+        x[i] = (double)real_of_f32(variant, first + i);
+}
+
+static uint64_t whole(unsigned variant, uint64_t most, uint64_t common) {
+    if (variant == WIRE_SAMPLE_LEAST)
+        return 0;
+    return variant == WIRE_SAMPLE_MOST ? most : common;
+}
+
+static uint32_t whole32(unsigned variant, uint32_t common) {
+    return (uint32_t)whole(variant, UINT32_MAX, common);
+}
+
+static uint16_t whole16(unsigned variant, uint16_t common) {
+    return (uint16_t)whole(variant, UINT16_MAX, common);
+}
+
+static uint8_t whole8(unsigned variant, uint8_t most, uint8_t common) {
+    return (uint8_t)whole(variant, most, common);
+}
+
+static plr_time_ns time_of(unsigned variant) {
+    return whole(variant, UINT64_MAX, UINT64_C(1317384506400000001));
+}
+
+static void fill_text(char *text, size_t size, unsigned variant) {
+    static const char common[] = "d\xC3\xA9j\xC3\xA0 vu";
+    memset(text, 0, size);
+    if (variant == WIRE_SAMPLE_MOST)
+        memset(text, 0xFF, size - 1);
+    if (variant == WIRE_SAMPLE_COMMON)
+        memcpy(text, common, sizeof common);
+}
+
+static void make_header(plr_header *m, unsigned variant) {
+    m->version_major = PLR_WIRE_VERSION_MAJOR;
+    m->version_minor = PLR_WIRE_VERSION_MINOR;
+    m->body_axes = whole8(variant, PLR_AXES_OTHER, PLR_AXES_FRD);
+    m->twist_timing = whole8(variant, 2, 1);
+    m->image_width_px = whole16(variant, 1226);
+    m->image_height_px = whole16(variant, 370);
+    double calibration[17], noise[7];
+    fill(calibration, 17, variant, 0);
+    fill(noise, 7, variant, 17);
+    m->calibration.fx_px = calibration[0];
+    m->calibration.fy_px = calibration[1];
+    m->calibration.cx_px = calibration[2];
+    m->calibration.cy_px = calibration[3];
+    m->calibration.baseline_m = calibration[4];
+    memcpy(m->calibration.T_CB.R, calibration + 5, sizeof m->calibration.T_CB.R);
+    memcpy(m->calibration.T_CB.p, calibration + 14, sizeof m->calibration.T_CB.p);
+    m->pixel_sigma_px = noise[0];
+    m->velocity_sigma_mps = noise[1];
+    m->gyro_sigma_radps = noise[2];
+    m->bias_velocity_sigma_mps = noise[3];
+    m->bias_gyro_sigma_radps = noise[4];
+    m->bias_velocity_walk = noise[5];
+    m->bias_gyro_walk = noise[6];
+    fill_text(m->name, sizeof m->name, variant);
+}
+
+static void make_config(plr_config_message *m, unsigned variant) {
+    m->build_fingerprint = whole32(variant, 0x12345678);
+    m->max_landmarks = whole16(variant, 120);
+    m->max_observations = whole16(variant, 256);
+    m->block_observations = whole8(variant, UINT8_MAX, 8);
+    m->real_bytes = whole8(variant, UINT8_MAX, 4);
+    m->count = whole8(variant, PLR_WIRE_MAX_SETTINGS, 5);
+    for (unsigned i = 0; i < m->count; i++) {
+        m->settings[i].id = (uint8_t)(255 - i);
+        m->settings[i].value = real_of(variant, i);
+    }
+}
+
+static void make_start(plr_start *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    fill(m->T_WB.R, 9, variant, 0);
+    fill(m->T_WB.p, 3, variant, 9);
+    m->has_covariance = variant == WIRE_SAMPLE_MOST;
+    m->has_bias = variant != WIRE_SAMPLE_LEAST;
+    fill(m->P_xi, 21, variant, 12);
+    fill(m->bias, 6, variant, 33);
+    fill(m->bias_variance, 6, variant, 39);
+}
+
+static void make_stereo(plr_frame *m, unsigned variant) {
+    static plr_observation observations[WIRE_SAMPLE_VARIANTS][PLR_WIRE_MAX_OBSERVATIONS];
+    plr_observation *o = observations[variant];
+    m->t_ns = time_of(variant);
+    m->budget = whole16(variant, 40);
+    m->count = (uint16_t)whole(variant, PLR_WIRE_MAX_OBSERVATIONS, 3);
+    m->observations = o;
+    for (unsigned i = 0; i < m->count; i++) {
+        o[i].id = UINT32_MAX - 7 * i;
+        o[i].uL_px = real_of_f32(variant, i);
+        o[i].vL_px = real_of_f32(variant, i + 1);
+        o[i].uR_px = real_of_f32(variant, i + 2);
+        o[i].vR_px = real_of_f32(variant, i + 5);
+    }
+    const uint32_t signalling = 0x7F800001; /* a NaN that a conversion would change */
+    if (variant == WIRE_SAMPLE_MOST)
+        memcpy(&o[1].vL_px, &signalling, sizeof signalling);
+}
+
+static void make_landmark(plr_landmark_message *m, unsigned variant) {
+    m->role = whole8(variant, PLR_LANDMARK_FINAL, PLR_LANDMARK_EVICTED);
+    m->landmark.last_seen_ns = time_of(variant);
+    m->landmark.id = whole32(variant, 4711);
+    m->landmark.times_seen = whole32(variant, 12);
+    m->landmark.known = m->role == PLR_LANDMARK_KNOWN;
+    fill(m->landmark.p_W_m, 3, variant, 0);
+    double packed[6], *P = m->landmark.P_W_m2;
+    fill(packed, 6, variant, 3);
+    P[0] = packed[0];
+    P[1] = P[3] = packed[1];
+    P[4] = packed[2];
+    P[2] = P[6] = packed[3];
+    P[5] = P[7] = packed[4];
+    P[8] = packed[5];
+}
+
+/* The least one in float64, the others in float32. */
+static void make_pose(plr_pose_message *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    m->real_bytes = variant == WIRE_SAMPLE_LEAST ? 8 : 4;
+    m->after_update = variant != WIRE_SAMPLE_LEAST;
+    m->reset_count = whole16(variant, 2);
+    fill(m->T_WB.p, 3, variant, 3);
+    fill_narrow(m->T_WB.R, 9, variant, 0);
+    fill_narrow(m->P_xi, 21, variant, 9);
+    fill_narrow(m->velocity.v_B_mps, 3, variant, 30);
+    fill_narrow(m->velocity.w_B_radps, 3, variant, 33);
+    fill_narrow(m->bias, 6, variant, 36);
+    fill_narrow(m->P_u, 21, variant, 42);
+}
+
+static void make_report(plr_report_message *m, unsigned variant) {
+    plr_report *r = &m->report;
+    m->subject = whole8(variant, UINT8_MAX, PLR_KIND_STEREO);
+    m->update_us = whole32(variant, 310);
+    r->t_ns = time_of(variant);
+    r->status = variant == WIRE_SAMPLE_LEAST ? PLR_OK : PLR_E_LATE;
+    if (variant == WIRE_SAMPLE_MOST)
+        r->status = PLR_E_IO;
+    r->health = variant == WIRE_SAMPLE_LEAST  ? PLR_HEALTH_GOOD
+                : variant == WIRE_SAMPLE_MOST ? PLR_HEALTH_DIVERGED
+                                              : PLR_HEALTH_DEGRADED;
+    r->reasons = whole16(variant, PLR_REASON_FEW_OBSERVATIONS);
+    r->budget = whole16(variant, 100);
+    r->observations = whole16(variant, 101);
+    r->matched = whole16(variant, 102);
+    r->used = whole16(variant, 103);
+    r->gated = whole16(variant, 104);
+    r->created = whole16(variant, 105);
+    r->evicted = whole16(variant, 106);
+    r->refused = whole16(variant, 107);
+    r->duplicates = whole16(variant, 108);
+    r->no_room = whole16(variant, 109);
+    r->poor = whole16(variant, 110);
+    r->left_out = whole16(variant, 111);
+    r->blocks_failed = whole16(variant, 112);
+    r->active = whole16(variant, 113);
+    r->nis_dof = whole16(variant, 114);
+    r->nis = real_of_f32(variant, 3);
+}
+
+plr_message wire_sample(plr_kind kind, unsigned variant) {
+    plr_message m;
+    memset(&m, 0, sizeof m);
+    m.kind = kind;
+    switch (kind) {
+    case PLR_KIND_HEADER:
+        make_header(&m.as.header, variant);
+        break;
+    case PLR_KIND_CONFIG:
+        make_config(&m.as.config, variant);
+        break;
+    case PLR_KIND_START:
+        make_start(&m.as.start, variant);
+        break;
+    case PLR_KIND_TWIST:
+        m.as.twist.t_ns = time_of(variant);
+        fill(m.as.twist.twist.v_B_mps, 3, variant, 0);
+        fill(m.as.twist.twist.w_B_radps, 3, variant, 3);
+        break;
+    case PLR_KIND_STEREO:
+        make_stereo(&m.as.stereo, variant);
+        break;
+    case PLR_KIND_TRUTH:
+        m.as.truth.t_ns = time_of(variant);
+        fill(m.as.truth.T_WB.R, 9, variant, 0);
+        fill(m.as.truth.T_WB.p, 3, variant, 9);
+        break;
+    case PLR_KIND_LANDMARK:
+        make_landmark(&m.as.landmark, variant);
+        break;
+    case PLR_KIND_POSE:
+        make_pose(&m.as.pose, variant);
+        break;
+    case PLR_KIND_REPORT:
+        make_report(&m.as.report, variant);
+        break;
+    case PLR_KIND_TEXT:
+        m.as.text.severity = whole8(variant, PLR_SEVERITY_ERROR, PLR_SEVERITY_WARNING);
+        fill_text(m.as.text.text, sizeof m.as.text.text, variant);
+        break;
+    case PLR_KIND_END:
+    case PLR_KIND_NONE:
+        break;
+    }
+    return m;
+}
+
+/* --- comparing --- */
+
+/* Structures without padding, or single fields. */
+#define SAME(field) TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&e->field, &a->field, sizeof e->field, #field)
+
+static void same_header(const plr_header *e, const plr_header *a) {
+    SAME(version_major);
+    SAME(version_minor);
+    SAME(body_axes);
+    SAME(twist_timing);
+    SAME(image_width_px);
+    SAME(image_height_px);
+    SAME(calibration);
+    SAME(pixel_sigma_px);
+    SAME(velocity_sigma_mps);
+    SAME(gyro_sigma_radps);
+    SAME(bias_velocity_sigma_mps);
+    SAME(bias_gyro_sigma_radps);
+    SAME(bias_velocity_walk);
+    SAME(bias_gyro_walk);
+    TEST_ASSERT_EQUAL_STRING(e->name, a->name);
+}
+
+static void same_config(const plr_config_message *e, const plr_config_message *a) {
+    SAME(build_fingerprint);
+    SAME(max_landmarks);
+    SAME(max_observations);
+    SAME(block_observations);
+    SAME(real_bytes);
+    SAME(count);
+    for (unsigned i = 0; i < e->count; i++) {
+        SAME(settings[i].id);
+        SAME(settings[i].value);
+    }
+}
+
+static void same_start(const plr_start *e, const plr_start *a) {
+    SAME(t_ns);
+    SAME(T_WB);
+    SAME(has_covariance);
+    SAME(has_bias);
+    SAME(P_xi);
+    SAME(bias);
+    SAME(bias_variance);
+}
+
+static void same_stereo(const plr_frame *e, const plr_frame *a) {
+    SAME(t_ns);
+    SAME(budget);
+    SAME(count);
+    for (unsigned i = 0; i < e->count; i++)
+        SAME(observations[i]);
+}
+
+static void same_landmark(const plr_landmark_message *e, const plr_landmark_message *a) {
+    SAME(role);
+    SAME(landmark.id);
+    SAME(landmark.times_seen);
+    SAME(landmark.times_gated);
+    SAME(landmark.last_seen_ns);
+    SAME(landmark.known);
+    SAME(landmark.p_W_m);
+    SAME(landmark.P_W_m2);
+}
+
+static void same_pose(const plr_pose_message *e, const plr_pose_message *a) {
+    SAME(t_ns);
+    SAME(real_bytes);
+    SAME(after_update);
+    SAME(reset_count);
+    SAME(T_WB);
+    SAME(P_xi);
+    SAME(velocity);
+    SAME(bias);
+    SAME(P_u);
+}
+
+static void same_report(const plr_report_message *e, const plr_report_message *a) {
+    SAME(subject);
+    SAME(update_us);
+    SAME(report.t_ns);
+    SAME(report.status);
+    SAME(report.health);
+    SAME(report.reasons);
+    SAME(report.budget);
+    SAME(report.observations);
+    SAME(report.matched);
+    SAME(report.used);
+    SAME(report.gated);
+    SAME(report.created);
+    SAME(report.evicted);
+    SAME(report.refused);
+    SAME(report.duplicates);
+    SAME(report.no_room);
+    SAME(report.poor);
+    SAME(report.left_out);
+    SAME(report.blocks_failed);
+    SAME(report.active);
+    SAME(report.nis_dof);
+    SAME(report.nis);
+}
+
+void wire_assert_same(const plr_message *e, const plr_message *a) {
+    TEST_ASSERT_EQUAL_INT(e->kind, a->kind);
+    switch (e->kind) {
+    case PLR_KIND_HEADER:
+        same_header(&e->as.header, &a->as.header);
+        break;
+    case PLR_KIND_CONFIG:
+        same_config(&e->as.config, &a->as.config);
+        break;
+    case PLR_KIND_START:
+        same_start(&e->as.start, &a->as.start);
+        break;
+    case PLR_KIND_TWIST:
+        SAME(as.twist);
+        break;
+    case PLR_KIND_STEREO:
+        same_stereo(&e->as.stereo, &a->as.stereo);
+        break;
+    case PLR_KIND_TRUTH:
+        SAME(as.truth);
+        break;
+    case PLR_KIND_LANDMARK:
+        same_landmark(&e->as.landmark, &a->as.landmark);
+        break;
+    case PLR_KIND_POSE:
+        same_pose(&e->as.pose, &a->as.pose);
+        break;
+    case PLR_KIND_REPORT:
+        same_report(&e->as.report, &a->as.report);
+        break;
+    case PLR_KIND_TEXT:
+        TEST_ASSERT_EQUAL_UINT8(e->as.text.severity, a->as.text.severity);
+        TEST_ASSERT_EQUAL_STRING(e->as.text.text, a->as.text.text);
+        break;
+    case PLR_KIND_END:
+        SAME(as.end);
+        break;
+    case PLR_KIND_NONE:
+        break;
+    }
+}
