@@ -45,8 +45,9 @@ struct plr_model {
      * the camera: no basis for a linearisation. */
     bool (*linearise)(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin);
 
-    /* A new landmark from its pixels: q in the camera, P_q its covariance (3x3). */
-    void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real P_q[9],
+    /* A new landmark from its pixels: q in the camera, with covariance S_q S_q^T (3x3). A factor,
+     * for the product itself would drown a far point's bearing in the rounding of its range. */
+    void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 
     /* A landmark of known place in the world. False if this place cannot be represented. */
@@ -59,6 +60,9 @@ struct plr_model {
     /* Where a landmark is in the world. */
     void (*in_world)(const plr_filter *f, const plr_slot *slot, plr_world_point *point);
 };
+
+/* J = R_WB [I | -[s]x], 3x6: how the pose's error moves a point that stands at s in the body. */
+void plr_world_by_pose(const plr_filter *f, const plr_real s_B[3], plr_real J[18]);
 
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;

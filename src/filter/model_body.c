@@ -15,35 +15,54 @@
 #include "linalg/dense.h"
 #include "linalg/small.h"
 
-/* K = [-I | [q]x], 3x6: how a twist of the camera moves a point seen from it. */
-static void point_by_twist(plr_real K[18], const plr_real q[3]) {
-    const plr_real rows[18] = {
-        -1, 0,  0,  0,     -q[2], q[1],  /**/
-        0,  -1, 0,  q[2],  0,     -q[0], /**/
-        0,  0,  -1, -q[1], q[0],  0,
-    };
-    memcpy(K, rows, sizeof rows);
-}
+/*
+ * Three products of Jw and Ji are written out below: in each of them q^T N = 0 or q x q = 0 takes a
+ * large number from itself, which float32 would leave to rounding for a point a kilometre away.
+ */
 
-/* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q. */
-static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, const plr_real q[3],
-                                plr_real J[18]) {
-    plr_real Jw[9], K[18], JwK[18] = {0};
-    plr_polar_from_point(Jw, chart);
-    point_by_twist(K, q);
-    plr_gemm_nn(3, 6, 3, Jw, 3, K, 6, JwK, 6);
+/* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q.
+ * Jw [-I | [q]x] = [ -N^T / r | N^T [mu]x ; mu^T / r^2 | 0 ]. */
+static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, plr_real J[18]) {
+    const plr_real inverse = PLR_R(1) / chart->r;
+    plr_real K[18] = {0};
+    for (int row = 0; row < 2; row++) {
+        const plr_real n[3] = {chart->N[row], chart->N[2 + row], chart->N[4 + row]};
+        plr_real turn[3];
+        plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
+        for (int j = 0; j < 3; j++) {
+            K[6 * row + j] = -n[j] * inverse;
+            K[6 * row + 3 + j] = turn[j];
+        }
+    }
+    for (int j = 0; j < 3; j++)
+        K[12 + j] = chart->mu[j] * inverse * inverse;
     memset(J, 0, 18 * sizeof *J);
-    plr_gemm_nn(3, 6, 6, JwK, 6, f->par.Ad_CB, 6, J, 6);
+    plr_gemm_nn(3, 6, 6, K, 6, f->par.Ad_CB, 6, J, 6);
 }
 
-/* F = Jw(q+) R^T Ji(q), 3x3: a chart's error carried along a rigid motion with rotation R. */
+/* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): a chart's error carried along a rigid motion.
+ * With N+^T q+ = 0 and q^T N = 0:
+ *   F = [ r/r+ N+^T R^T N | -r/r+ N+^T R^T p ; r/r+^3 p^T N | (r - p^T mu) r^2 / r+^3 ]. */
 static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
-                        const plr_polar *from) {
-    plr_real Jw[9], Ji[9], RtJi[9];
-    plr_polar_from_point(Jw, to);
-    plr_polar_to_point(Ji, from);
-    plr_mat3_mul_tn(RtJi, R, Ji);
-    plr_mat3_mul(F, Jw, RtJi);
+                        const plr_real p[3], const plr_polar *from) {
+    const plr_real ratio = from->r / to->r;
+    const plr_real shrink = ratio / (to->r * to->r);
+    plr_real turned[3];
+    for (int column = 0; column < 2; column++) {
+        const plr_real n[3] = {from->N[column], from->N[2 + column], from->N[4 + column]};
+        plr_mat3_tvec(turned, R, n);
+        for (int row = 0; row < 2; row++) {
+            const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
+            F[3 * row + column] = ratio * plr_dot3(m, turned);
+        }
+        F[6 + column] = shrink * plr_dot3(p, n);
+    }
+    plr_mat3_tvec(turned, R, p);
+    for (int row = 0; row < 2; row++) {
+        const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
+        F[3 * row + 2] = -ratio * plr_dot3(m, turned);
+    }
+    F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
 /* D_C = T_CB D T_CB^-1: the body's motion, as the camera makes it. */
@@ -74,7 +93,7 @@ static void body_propagate(plr_filter *f) {
         plr_polar from, to;
         plr_polar_at(&from, s->x);
         plr_polar_at(&to, q);
-        carry_chart(F + 9 * slot, &to, R, &from);
+        carry_chart(F + 9 * slot, &to, R, p, &from);
         memcpy(s->x, q, sizeof q);
         slot++;
     }
@@ -94,7 +113,7 @@ static void body_propagate(plr_filter *f) {
         plr_polar chart;
         plr_real G[18];
         plr_polar_at(&chart, f->slots[slot].x);
-        chart_by_body_twist(f, &chart, f->slots[slot].x, G);
+        chart_by_body_twist(f, &chart, G);
         for (unsigned i = 0; i < 3; i++)
             for (unsigned k = 0; k < 6; k++)
                 Gt[k * n + row + i] = G[6 * i + k];
@@ -102,6 +121,7 @@ static void body_propagate(plr_filter *f) {
     plr_covariance_add_motion(f, &f->motion);
 }
 
+/* H_l = Dz Ji(q). */
 static bool body_linearise(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin) {
     const plr_camera *camera = &f->par.camera;
     lin->depth = slot->x[2];
@@ -109,24 +129,30 @@ static bool body_linearise(const plr_filter *f, const plr_slot *slot, plr_linear
     if (!(lin->depth >= f->par.min_depth))
         return false;
     plr_polar chart;
-    plr_real Dz[9], Ji[9];
+    plr_real Dz[9];
     plr_stereo_project(lin->z, camera, slot->x);
     plr_stereo_jacobian(Dz, camera, slot->x);
     plr_polar_at(&chart, slot->x);
-    plr_polar_to_point(Ji, &chart);
-    plr_mat3_mul(lin->H_landmark, Dz, Ji);
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 2; column++) {
+            const plr_real n[3] = {chart.N[column], chart.N[2 + column], chart.N[4 + column]};
+            lin->H_landmark[3 * row + column] = chart.r * plr_dot3(Dz + 3 * row, n);
+        }
+    /* -r^2 Dz mu: along its own ray a point moves in the right image alone */
+    lin->H_landmark[2] = lin->H_landmark[8] = 0;
+    lin->H_landmark[5] = -camera->fx * camera->baseline * chart.r / slot->x[2];
     return true;
 }
 
-static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real P_q[9],
+static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                             plr_new_landmark *landmark) {
     (void)f;
     plr_polar chart;
-    plr_real Jw[9], JP[9];
+    plr_real Jw[9], JS[9];
     plr_polar_at(&chart, q);
     plr_polar_from_point(Jw, &chart);
-    plr_mat3_mul(JP, Jw, P_q);
-    plr_mat3_mul_nt(landmark->P, JP, Jw);
+    plr_mat3_mul(JS, Jw, S_q);
+    plr_mat3_mul_nt(landmark->P, JS, JS);
     memcpy(landmark->x, q, 3 * sizeof *q);
     landmark->uses_pose = false;
 }
@@ -145,7 +171,7 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     plr_polar chart;
     plr_real Jw[9], J_W[9], P_W[9], JP[9];
     plr_polar_at(&chart, landmark->x);
-    chart_by_body_twist(f, &chart, landmark->x, landmark->J_pose);
+    chart_by_body_twist(f, &chart, landmark->J_pose);
     landmark->uses_pose = true;
     plr_polar_from_point(Jw, &chart);
     plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, f->R_WB);
@@ -177,7 +203,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         plr_polar from, there, to;
         plr_real J[18], M[4], w[3], q[3], rigid[9];
         plr_polar_at(&from, s->x);
-        chart_by_body_twist(f, &from, s->x, J);
+        chart_by_body_twist(f, &from, J);
         memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
@@ -188,7 +214,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         plr_se3_inverse_point(s->x, R_C, p_C, q);
 
         plr_polar_at(&to, s->x);
-        carry_chart(rigid, &to, R_C, &there);
+        carry_chart(rigid, &to, R_C, p_C, &there);
         plr_real *own = F + 9 * slot;
         for (int i = 0; i < 3; i++) {
             const plr_real *row = rigid + 3 * i;
@@ -203,17 +229,13 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
 
 static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
     plr_polar chart;
-    plr_real s_B[3], offset[3], K[18], Ji[9], R_WC[9];
+    plr_real s_B[3], offset[3], Ji[9], R_WC[9];
     plr_camera_to_body(s_B, &f->par.camera, slot->x);
     plr_mat3_vec(offset, f->R_WB, s_B);
     for (int i = 0; i < 3; i++)
         point->p_W[i] = f->p_WB[i] + (double)offset[i];
 
-    point_by_twist(K, s_B);
-    for (int i = 0; i < 18; i++)
-        K[i] = -K[i];
-    memset(point->J_pose, 0, sizeof point->J_pose);
-    plr_gemm_nn(3, 6, 3, f->R_WB, 3, K, 6, point->J_pose, 6);
+    plr_world_by_pose(f, s_B, point->J_pose);
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
     plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);

@@ -20,18 +20,6 @@ static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
     plr_mat3_tvec(s, f->R_WB, offset);
 }
 
-/* J = R [I | -[s]x], 3x6: how the pose's error moves a point fixed to the body at s. */
-static void world_by_pose(const plr_filter *f, const plr_real s[3], plr_real J[18]) {
-    plr_real S[9], RS[9];
-    plr_skew(S, s);
-    plr_mat3_mul(RS, f->R_WB, S);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            J[6 * i + j] = f->R_WB[3 * i + j];
-            J[6 * i + 3 + j] = -RS[3 * i + j];
-        }
-}
-
 static void world_propagate(plr_filter *f) {
     plr_real A[36];
     plr_se3_adjoint_inverse(A, f->motion.R, f->motion.p);
@@ -62,18 +50,18 @@ static bool world_linearise(const plr_filter *f, const plr_slot *slot, plr_linea
     return true;
 }
 
-static void world_initialise(const plr_filter *f, const plr_real q[3], const plr_real P_q[9],
+static void world_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                              plr_new_landmark *landmark) {
-    plr_real s[3], offset[3], R_WC[9], RP[9];
+    plr_real s[3], offset[3], R_WC[9], RS[9];
     plr_camera_to_body(s, &f->par.camera, q);
     plr_mat3_vec(offset, f->R_WB, s);
     for (int i = 0; i < 3; i++)
         landmark->x[i] = (plr_real)(f->p_WB[i] + (double)offset[i]);
-    world_by_pose(f, s, landmark->J_pose);
+    plr_world_by_pose(f, s, landmark->J_pose);
     landmark->uses_pose = true;
     plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
-    plr_mat3_mul(RP, R_WC, P_q);
-    plr_mat3_mul_nt(landmark->P, RP, R_WC);
+    plr_mat3_mul(RS, R_WC, S_q);
+    plr_mat3_mul_nt(landmark->P, RS, RS);
 }
 
 static bool world_adopt(const plr_filter *f, const plr_landmark *known,

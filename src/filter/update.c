@@ -177,18 +177,12 @@ static bool is_worth_a_landmark(const plr_filter *f, const plr_observation *o, p
            depth * f->par.min_inverse_range < 1;
 }
 
-/* P_q = Dq R Dq^T of the pixels, or the course's constant. */
-static void initial_covariance(const plr_filter *f, const plr_real Dq[9], plr_real P_q[9]) {
-    if (f->par.landmark_variance > 0) {
-        plr_mat3_identity(P_q);
-        for (int i = 0; i < 9; i++)
-            P_q[i] *= f->par.landmark_variance;
-        return;
-    }
-    plr_real DR[9];
+/* S_q with S_q S_q^T = Dq R Dq^T, the pixels' noise in the camera; or the course's constant. */
+static void initial_factor(const plr_filter *f, const plr_real Dq[9], plr_real S_q[9]) {
+    const plr_real constant = f->par.landmark_variance;
     for (unsigned i = 0; i < 9; i++)
-        DR[i] = Dq[i] * plr_gate_noise(f, i % 3);
-    plr_mat3_mul_nt(P_q, DR, Dq);
+        S_q[i] = constant > 0 ? (i % 4 == 0 ? PLR_SQRT(constant) : PLR_R(0))
+                              : Dq[i] * PLR_SQRT(plr_gate_noise(f, i % 3));
 }
 
 static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
@@ -196,7 +190,7 @@ static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
     const bool makes = f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
-        plr_real z[3], q[3], Dq[9], P_q[9];
+        plr_real z[3], q[3], Dq[9], S_q[9];
         plr_new_landmark landmark;
         if (f->work.slot_of[k] != PLR_NO_SLOT)
             continue;
@@ -209,8 +203,8 @@ static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
             continue;
         }
         plr_stereo_back_project(q, Dq, &f->par.camera, z);
-        initial_covariance(f, Dq, P_q);
-        f->model->initialise(f, q, P_q, &landmark);
+        initial_factor(f, Dq, S_q);
+        f->model->initialise(f, q, S_q, &landmark);
         plr_slots_append(f, o->id, false, &landmark);
         report->created++;
     }
