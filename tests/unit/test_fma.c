@@ -79,19 +79,15 @@ static void test_subnormal_results(void) {
     }
 }
 
-/* The addend decides a tie of the double sum: rounding twice would go wrong. */
+/* The exact product lies halfway between two float32, and an addend too small for a double to hold
+ * beside it decides: rounding twice would go wrong. */
 static void test_double_rounding_is_avoided(void) {
-    const float one = 1, tiny = ldexpf(1, -60);
-    const float tie = 1 + ldexpf(1, -12);
-    assert_same(tie, tie, tiny);
-    assert_same(tie, tie, -tiny);
-    assert_same(one, tie, tiny);
-    /* a b = 1 + 2^-24 exactly halfway; c moves it off by less than a double can show. */
-    const float a = 1 + ldexpf(1, -8), b = from_bits(0x3F7F00FF);
-    for (int e = -100; e < -20; e++) {
-        assert_same(a, b, ldexpf(1, e));
-        assert_same(a, b, -ldexpf(1, e));
-    }
+    const float halfway = 1 + ldexpf(1, -12); /* its square is 1 + 2^-11 + 2^-24 */
+    for (int e = -100; e < -30; e++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            assert_same(halfway, halfway, (float)sign * ldexpf(1, e));
+            assert_same(-halfway, halfway, (float)sign * ldexpf(1, e));
+        }
 }
 
 static void test_zeros_infinities_and_the_largest_numbers(void) {
