@@ -90,6 +90,17 @@ static void test_double_rounding_is_avoided(void) {
         }
 }
 
+/* Sums a few double roundings beside the middle between two float32: none may be moved onto it. */
+static void test_sums_just_beside_a_tie(void) {
+    rng r = rng_seeded(35);
+    for (int i = 0; i < 100000; i++) {
+        const float a = (float)rng_uniform(&r, 1, 2), b = ldexpf(1, -24) / a;
+        assert_same(a, b, 1);
+        assert_same(-a, b, -1);
+        assert_same(a, b, -1);
+    }
+}
+
 static void test_zeros_infinities_and_the_largest_numbers(void) {
     const uint32_t special[] = {0x00000000, 0x80000000, 0x7F800000, 0xFF800000, 0x7FC00000,
                                 0x00000001, 0x80000001, 0x007FFFFF, 0x00800000, 0x7F7FFFFF,
@@ -108,6 +119,7 @@ int main(void) {
     RUN_TEST(test_cancellation);
     RUN_TEST(test_subnormal_results);
     RUN_TEST(test_double_rounding_is_avoided);
+    RUN_TEST(test_sums_just_beside_a_tie);
     RUN_TEST(test_zeros_infinities_and_the_largest_numbers);
     return UNITY_END();
 }
