@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""The command `pelorus`. Each command lives in its own file under pelorus/commands.
+
+To add one: write commands/NAME.py with a function `register(app)` and name it in COMMANDS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import typer
+from rich.markup import escape
+
+from pelorus import __version__
+from pelorus.commands import convert, evaluate, info, simulate, stream
+from pelorus.console import err, out
+from pelorus.errors import PelorusError
+
+COMMANDS = (convert, info, evaluate, simulate, stream)
+
+app = typer.Typer(
+    name="pelorus",
+    help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
+    epilog="Example:  pelorus simulate drive.plr  &&  pelorus info drive.plr",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+for _command in COMMANDS:
+    _command.register(app)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        out.print(f"pelorus {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(
+        False, "--version", help="Print the version.", callback=_show_version, is_eager=True
+    ),
+) -> None:
+    del version  # its callback has done the work
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; 0, or 1 after an error that was told, or 2 if the call makes no sense."""
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="pelorus")
+    except PelorusError as error:
+        err.print(f"[bold red]error:[/] {escape(str(error))}")
+        return 1
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else 1
+    return 0

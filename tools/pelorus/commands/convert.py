@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus convert FORMAT IN OUT.plr`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import typer
+from rich.markup import escape
+
+from pelorus.commands.choices import Fix, Timing, TimingOrAuto
+from pelorus.console import out
+from pelorus.converters import csv as csv_converter
+from pelorus.converters import ece276a as ece276a_converter
+from pelorus.converters import matlab
+from pelorus.faults.finding import Finding
+from pelorus.frames import TEXT_BYTES_MAX, Text
+from pelorus.recording import Recording
+
+SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
+TARGET = typer.Argument(..., metavar="OUT.plr", help="The recording to write.")
+FIX = typer.Option(
+    Fix.AUTO,
+    help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "
+    "and mend them; none: leave the data as they are.",
+)
+
+app = typer.Typer(
+    help="Convert other formats to a .plr recording.",
+    no_args_is_help=True,
+    epilog="Example:  pelorus convert ece276a 0027.npz 0027.plr --truth kitti-07.txt",
+)
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `convert` to the command line."""
+    parent.add_typer(app, name="convert")
+
+
+@app.command(
+    epilog="Example:  pelorus convert ece276a 0027.npz 0027.plr --truth kitti-07.txt",
+)
+def ece276a(
+    source: Path = SOURCE,
+    target: Path = TARGET,
+    truth: Path | None = typer.Option(
+        None, metavar="POSES.txt", help="KITTI poses of the left camera; row k is frame k."
+    ),
+    fix: Fix = FIX,
+    twist_timing: TimingOrAuto = typer.Option(
+        TimingOrAuto.AUTO,
+        help="When a twist reading holds; auto: end if the data say so clearly, else start.",
+    ),
+) -> None:
+    """Convert a .npz file of UCSD's ECE276A project 3 (visual-inertial SLAM)."""
+    recording, findings = ece276a_converter.convert(
+        source, truth, fix is Fix.AUTO, twist_timing.value_in_header
+    )
+    _write(recording, findings, target)
+
+
+@app.command(
+    "starry-night",
+    epilog="Example:  pelorus convert starry-night dataset3.mat starry.plr",
+)
+def starry_night(
+    source: Path = SOURCE,
+    target: Path = TARGET,
+    twist_timing: Timing = typer.Option(Timing.START, help="When a twist reading holds."),
+    landmark_sigma: float = typer.Option(
+        matlab.LANDMARK_SIGMA_M,
+        metavar="M",
+        help="Standard deviation of the known landmarks, each axis.",
+    ),
+) -> None:
+    """Convert UTIAS's Starry Night, with its landmarks as known ones."""
+    recording = matlab.starry_night(source, twist_timing.value_in_header, landmark_sigma)
+    _write(recording, [], target)
+
+
+@app.command(
+    epilog="Example:  pelorus convert klt 2011_09_26_drive_0001_sync_KLT.mat drive.plr",
+)
+def klt(
+    source: Path = SOURCE,
+    target: Path = TARGET,
+    twist_timing: Timing = typer.Option(Timing.MID, help="When a twist reading holds."),
+) -> None:
+    """Convert a KITTI drive with KLT stereo tracks (.mat)."""
+    _write(matlab.klt(source, twist_timing.value_in_header), [], target)
+
+
+@app.command(
+    epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
+    "--calibration camera.json mine.plr",
+)
+def csv(
+    target: Path = TARGET,
+    twists: Path = typer.Option(
+        ..., help="Columns t_s (or t_ns), vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps."
+    ),
+    stereo: Path = typer.Option(
+        ...,
+        help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame.",
+    ),
+    calibration: Path = typer.Option(
+        ...,
+        help="JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB with t_CB_m (body to left "
+        "camera) or R_BC with t_BC_m (the camera's pose in the body); optional image_width_px, "
+        "image_height_px, body_axes, twist_timing, noise, name.",
+    ),
+    truth: Path | None = typer.Option(
+        None, help="Columns t_s (or t_ns), px_m, py_m, pz_m, qx, qy, qz, qw: body to world."
+    ),
+    fix: Fix = FIX,
+    twist_timing: Timing | None = typer.Option(
+        None, help="When a twist reading holds; else the calibration says it, else start."
+    ),
+) -> None:
+    """Convert your own data: CSV files with named columns in any order, and a JSON file."""
+    recording, findings = csv_converter.convert(
+        csv_converter.Sources(twists, stereo, calibration, truth),
+        fix is Fix.AUTO,
+        twist_timing.value_in_header if twist_timing else None,
+    )
+    _write(recording, findings, target)
+
+
+def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
+    """Say what was found, keep it in the recording as TEXT, and write the file."""
+    for finding in findings:
+        verdict = "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
+        out.print(f"{finding.subject}: {verdict}: {escape(finding.evidence)}")
+        out.print(f"    -> {escape(finding.action)}")
+    remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found]
+    size = replace(recording, remarks=remarks).write(target)
+    tracks = recording.tracks
+    out.print(
+        f"{escape(str(target))}: {size} bytes, {len(recording.twist_t_ns)} twists, "
+        f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
+        f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
+    )

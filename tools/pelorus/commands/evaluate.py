@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus evaluate TRAJECTORY.tum --truth FILE | --road FILE.csv`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import typer
+from rich.table import Table
+
+from pelorus import figures, road
+from pelorus.console import out
+from pelorus.trajectory import Trajectory, read_truth, read_tum
+
+MEANING = {
+    "err0_m": "RMS position error, first poses aligned",
+    "ate_m": "RMS position error after the best rigid fit",
+    "rot_deg": "RMS rotation error, first poses aligned",
+    "poses": "poses compared",
+    "path_m": "length of the trajectory",
+    "road_m": "RMS distance to the road",
+    "out_of_plane_m": "RMS distance out of the trajectory's plane",
+    "tilt_deg": "tilt of that plane against the first pose's z",
+}
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `evaluate` to the command line."""
+    parent.command(
+        epilog="Example:  pelorus evaluate drive.tum --truth drive.plr",
+    )(evaluate)
+
+
+def evaluate(
+    trajectory: Path = typer.Argument(
+        ..., metavar="TRAJECTORY.tum", help="Rows t x y z qx qy qz qw, s and m."
+    ),
+    truth: Path | None = typer.Option(
+        None,
+        metavar="FILE",
+        help="The reference: a .plr with TRUTH, a TUM file, or KITTI poses (then give "
+        "--recording or --times).",
+    ),
+    road_file: Path | None = typer.Option(
+        None, "--road", metavar="FILE.csv", help="A digitised road: rows arc_m,x_m,y_m."
+    ),
+    recording: Path | None = typer.Option(
+        None,
+        metavar="IN.plr",
+        help="For KITTI poses: times and extrinsic; they are brought from the camera to the body.",
+    ),
+    times: Path | None = typer.Option(
+        None, metavar="TIMES.txt", help="For KITTI poses of the body: a time in s a row."
+    ),
+    skip: float = typer.Option(45.0, metavar="M", help="With --road: leave out the first metres."),
+    tolerance: float = typer.Option(
+        1e-6, metavar="S", help="Times that differ by no more are equal."
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),
+) -> None:
+    """Compare a trajectory with a reference, or with a road."""
+    if (truth is None) == (road_file is None):
+        raise typer.BadParameter("either --truth or --road is due", param_hint="--truth / --road")
+    estimate = read_tum(trajectory)
+    if truth is not None:
+        reference = read_truth(truth, times, recording)
+        tolerance_ns = round(tolerance * 1e9)
+        found = asdict(figures.compare(estimate, reference, tolerance_ns, (trajectory, truth)))
+    else:
+        assert road_file is not None
+        found = _road(estimate, road_file, skip)
+    if as_json:
+        typer.echo(json.dumps(found))
+    else:
+        _show(found)
+
+
+def _road(estimate: Trajectory, path: Path, skip: float) -> dict[str, float]:
+    return asdict(road.compare(estimate.poses.p, road.read_road(path), skip))
+
+
+def _show(found: dict[str, float]) -> None:
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for key, value in found.items():
+        text = str(value) if isinstance(value, int) else f"{value:.3f}"
+        table.add_row(key, text, MEANING[key])
+    out.print(table)

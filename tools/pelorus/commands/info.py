@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus info IN.plr`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from pelorus.console import out
+from pelorus.frames import Config, Header, Kind
+from pelorus.settings import describe
+from pelorus.survey import Survey, Tracks, require_useful, survey
+
+GAPS_SHOWN = 5
+FAULTS_SHOWN = 10
+SEVERITIES = ("info", "warning", "error")
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `info` to the command line."""
+    parent.command(epilog="Example:  pelorus info drive.plr")(info)
+
+
+def info(
+    recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to look into."),
+) -> None:
+    """Show what a recording holds: header, settings, counts, rates, gaps, damage.
+
+    The exit status is 1 if nothing in it can be used.
+    """
+    found = survey(recording)
+    out.print(f"[bold]{escape(str(found.path))}[/]  {found.counts.bytes} bytes")
+    if found.header is not None:
+        _show_header(found.header)
+    for config in found.configs[-1:]:
+        _show_config(config, len(found.configs))
+    _show_counts(found)
+    _show_streams(found)
+    if found.tracks is not None:
+        _show_tracks(found.tracks)
+    for text in found.texts:
+        severity = SEVERITIES[text.severity] if text.severity < len(SEVERITIES) else "?"
+        out.print(f"{severity}: {escape(text.text)}")
+    _show_damage(found)
+    require_useful(found)
+
+
+def _show_header(header: Header) -> None:
+    table = _two_columns(f"HEADER (version {header.version_major}.{header.version_minor})")
+    camera = header.camera
+    table.add_row("name", escape(header.name))
+    table.add_row("body axes", header.body_axes.name.lower().replace("_", "-"))
+    table.add_row("twist timing", header.twist_timing.name.lower())
+    size = f"{header.image_width_px} x {header.image_height_px} px"
+    table.add_row("image", size if header.image_width_px else "size unknown")
+    table.add_row("focal lengths", f"{camera.fx_px:g}, {camera.fy_px:g} px")
+    table.add_row("principal point", f"{camera.cx_px:g}, {camera.cy_px:g} px")
+    table.add_row("baseline", f"{camera.baseline_m:g} m")
+    for label, row in zip(("R_CB", "", ""), header.R_CB, strict=True):
+        table.add_row(label, "  ".join(f"{x:9.6f}" for x in row))
+    table.add_row("t_CB", "  ".join(f"{x:9.6f}" for x in header.t_CB_m) + "  m")
+    for name, value in vars(header.noise).items():
+        if value >= 0:
+            table.add_row(f"suggests {name}", f"{value:g}")
+    out.print(table)
+
+
+def _show_config(config: Config, count: int) -> None:
+    which = "in force" if config.build_fingerprint else "wanted"
+    table = _two_columns(f"CONFIG ({which}{f', the last of {count}' if count > 1 else ''})")
+    if config.build_fingerprint:
+        table.add_row("build fingerprint", f"{config.build_fingerprint:08x}")
+        table.add_row("landmarks of the build", str(config.max_landmarks))
+        table.add_row("observations of the build", str(config.max_observations))
+        table.add_row("observations a block", str(config.block_observations))
+        table.add_row("bytes of a real", str(config.real_bytes))
+    for id, value in config.settings.items():
+        table.add_row(*describe(id, value))
+    out.print(table)
+
+
+def _show_counts(found: Survey) -> None:
+    table = Table("frames", "count", "remark", box=None, pad_edge=False, title_justify="left")
+    for kind in Kind:
+        if found.counts.frames[kind]:
+            roles = ", ".join(f"{n} {role}" for role, n in found.landmarks.items())
+            table.add_row(
+                kind.name, str(found.counts.frames[kind]), roles if kind == Kind.LANDMARK else ""
+            )
+    out.print(table)
+
+
+def _show_streams(found: Survey) -> None:
+    if not found.streams:
+        return
+    origin = min(stream.first_ns for stream in found.streams.values())
+    table = Table(
+        "stream", "from s", "to s", "rate Hz", "gaps", "longest s", box=None, pad_edge=False
+    )
+    for kind, stream in found.streams.items():
+        longest = max((gap.length_ns for gap in stream.gaps), default=0)
+        table.add_row(
+            kind.name,
+            _seconds(stream.first_ns - origin),
+            _seconds(stream.last_ns - origin),
+            f"{stream.rate_hz:.2f}",
+            str(len(stream.gaps)),
+            _seconds(longest) if longest else "",
+        )
+    out.print(table)
+    out.print(f"time 0 is {origin} ns")
+    for kind, stream in found.streams.items():
+        worst = sorted(stream.gaps, key=lambda gap: -gap.length_ns)[:GAPS_SHOWN]
+        for gap in worst:
+            at = _seconds(gap.after_ns - origin)
+            out.print(f"gap: {kind.name} pauses for {_seconds(gap.length_ns)} s after {at} s")
+
+
+def _show_tracks(tracks: Tracks) -> None:
+    least, median, most = tracks.per_frame
+    out.print(
+        f"{tracks.observations} observations, {least} / {median} / {most} a frame "
+        f"(least, median, most), of {tracks.landmarks} ids seen in "
+        f"{tracks.frames_per_landmark:g} frames (median); {tracks.no_disparity} without disparity"
+    )
+
+
+def _show_damage(found: Survey) -> None:
+    counts = found.counts
+    for remark in found.remarks:
+        out.print(f"[yellow]note:[/] {escape(remark)}")
+    if counts.clean:
+        out.print("[green]no damage[/]")
+        return
+    out.print(
+        f"[bold red]damage:[/] {counts.damaged} frames damaged, {counts.missing} missing in the "
+        f"sequence, {counts.malformed} malformed, {counts.unknown} of unknown kind, "
+        f"{counts.too_long} too long"
+    )
+    for fault in counts.faults[:FAULTS_SHOWN]:
+        out.print(f"  byte {fault.offset}: {escape(fault.what)}")
+    told = counts.damaged + counts.malformed + counts.unknown + counts.too_long
+    if told > FAULTS_SHOWN:
+        out.print(f"  and {told - FAULTS_SHOWN} more")
+
+
+def _two_columns(title: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, show_header=False, pad_edge=False)
+    table.add_column(style="cyan")
+    table.add_column()
+    return table
+
+
+def _seconds(ns: int) -> str:
+    return f"{ns * 1e-9:.3f}"

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""One file a source format: read it, check it, hand it back as a Recording."""

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""A user's own data: CSV files with a row of column names, in any order, and a calibration (JSON).
+
+twists   t_s or t_ns, vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps
+stereo   t_s or t_ns, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
+truth    t_s or t_ns, px_m, py_m, pz_m, qx, qy, qz, qw: body to world (optional)
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pelorus import calibration, se3
+from pelorus.errors import PelorusError
+from pelorus.faults.finding import Finding
+from pelorus.faults.mend import mend
+from pelorus.frames import TwistTiming
+from pelorus.motion import Times
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from pelorus.table import Table
+from pelorus.tracks import Tracks
+
+ID_MAX = 2**32 - 1
+QUATERNION_NORM_TOLERANCE = 1e-2
+
+
+class Sources(NamedTuple):
+    """The files of one recording."""
+
+    twists: Path
+    stereo: Path
+    calibration: Path
+    truth: Path | None = None
+
+
+def convert(
+    sources: Sources, fix: bool = True, twist_timing: TwistTiming | None = None
+) -> tuple[Recording, list[Finding]]:
+    """Read, and mend if asked. `twist_timing` overrides the calibration's."""
+    recording = read(sources)
+    if twist_timing is not None:
+        recording = recording.with_header(twist_timing=twist_timing)
+    return mend(recording) if fix else (recording, [])
+
+
+def read(sources: Sources) -> Recording:
+    """The files as they are."""
+    header = calibration.read(sources.calibration)
+    twists = Table.read(sources.twists)
+    twist_t_ns = twists.ascending_times()
+    v = twists.numbers("vx_mps", "vy_mps", "vz_mps")
+    w = twists.numbers("wx_radps", "wy_radps", "wz_radps")
+    frame_t_ns, tracks = _stereo(sources.stereo)
+    if frame_t_ns[-1] < twist_t_ns[0] or twist_t_ns[-1] < frame_t_ns[0]:
+        raise PelorusError(
+            f"{sources.stereo}: spans {frame_t_ns[0]} to {frame_t_ns[-1]} ns, {sources.twists} "
+            f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap"
+        )
+    recording = Recording(header, twist_t_ns, v, w, frame_t_ns, tracks)
+    if sources.truth is None:
+        return recording
+    truth_t_ns, truth = _truth(sources.truth)
+    return recording.with_truth(truth_t_ns, truth)
+
+
+def _stereo(path: Path) -> tuple[Times, Tracks]:
+    table = Table.read(path)
+    row_t_ns = table.times()
+    frame_t_ns, frame = np.unique(row_t_ns, return_inverse=True)
+    id = table.integers("id", ID_MAX)
+    pixels = table.numbers("uL_px", "vL_px", "uR_px", "vR_px")
+    tracks = Tracks.from_rows(len(frame_t_ns), frame.reshape(-1).astype(np.intp), id, pixels)
+    tracks.check(str(path))
+    twice = (np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)
+    if twice.any():
+        row = int(np.nonzero(twice)[0][0])
+        raise PelorusError(
+            f"{path}: id {tracks.id[row]} stands twice in the frame at "
+            f"{frame_t_ns[tracks.frame[row]]} ns"
+        )
+    return frame_t_ns, tracks
+
+
+def _truth(path: Path) -> tuple[Times, Poses]:
+    table = Table.read(path)
+    t_ns = table.ascending_times()
+    quaternions = table.numbers("qx", "qy", "qz", "qw")
+    off = np.abs(np.linalg.norm(quaternions, axis=1) - 1)
+    if off.max() > QUATERNION_NORM_TOLERANCE:
+        raise PelorusError(
+            f"{path}: row {int(off.argmax()) + 2}: the quaternion's norm is not 1 "
+            "(the columns are qx, qy, qz, qw)"
+        )
+    return t_ns, Poses(se3.from_quaternion(quaternions), table.numbers("px_m", "py_m", "pz_m"))

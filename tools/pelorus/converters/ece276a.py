@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""The .npz files of UCSD's ECE276A project 3, editions 2019 to 2021.
+
+`time_stamps` (1, T) s; `features` (4, M, T) px in the order uL vL uR vR, all four -1 where absent;
+`linear_velocity` (3, T) m/s; `angular_velocity` or `rotational_velocity` (3, T) rad/s; `K` (3, 3);
+`b` baseline, m; `imu_T_cam` or `cam_T_imu` (4, 4).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pelorus import arrays, kitti, se3
+from pelorus.arrays import Arrays
+from pelorus.errors import PelorusError
+from pelorus.faults import axes, timing
+from pelorus.faults.finding import Finding
+from pelorus.faults.mend import mend
+from pelorus.frames import Header, TwistTiming
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from pelorus.tracks import Tracks
+
+
+def convert(
+    source: Path,
+    truth: Path | None = None,
+    fix: bool = True,
+    twist_timing: TwistTiming | None = None,
+) -> tuple[Recording, list[Finding]]:
+    """Read, mend if asked, and add the truth. `twist_timing` None: let the data decide."""
+    recording = read(source)
+    findings: list[Finding] = []
+    if fix:
+        recording, findings = mend(recording)
+    if twist_timing is None:
+        recording, finding = timing.choose(recording)
+        findings.append(finding)
+    else:
+        recording = recording.with_header(twist_timing=twist_timing)
+    recording = recording.with_header(body_axes=axes.body_axes(recording.T_CB.R))
+    return (with_truth(recording, truth) if truth else recording), findings
+
+
+def read(source: Path) -> Recording:
+    """The file as it is."""
+    file = arrays.read_npz(source)
+    t_ns = arrays.nanoseconds(source, "time_stamps", file.get("time_stamps").ravel())
+    count = len(t_ns)
+    K = file.get("K", shape=(3, 3))
+    camera = arrays.camera_of(source, K[0, 0], K[1, 1], K[0, 2], K[1, 2], file.scalar("b"))
+    T_CB = _extrinsic(file)
+    tracks = Tracks.from_dense(file.get("features", shape=(4, None, count)))
+    tracks.check(str(source))
+    w = file.get("angular_velocity", "rotational_velocity", shape=(3, count)).T
+    header = Header(camera, T_CB.R, T_CB.p, name=source.stem[:60])
+    v = file.get("linear_velocity", shape=(3, count)).T
+    return Recording(header, t_ns, v, w, t_ns, tracks)
+
+
+def _extrinsic(file: Arrays) -> Poses:
+    """T_CB: `cam_T_imu` brings the body to the camera, `imu_T_cam` is its inverse."""
+    key = file.one_of("cam_T_imu", "imu_T_cam")
+    matrix = file.get(key, shape=(4, 4))
+    if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
+        raise PelorusError(f"{file.path}: the last row of {key} is {matrix[3]}, due is 0 0 0 1")
+    T = Poses(arrays.rotation(file.path, key, matrix[:3, :3]), matrix[:3, 3])
+    return T if key == "cam_T_imu" else se3.inverse(T)
+
+
+def with_truth(recording: Recording, path: Path) -> Recording:
+    """KITTI poses of the left camera; row k belongs to frame k. Fewer rows than frames are fine."""
+    poses = kitti.read_poses(path)
+    frames = len(recording.frame_t_ns)
+    if len(poses.p) > frames:
+        raise PelorusError(f"{path}: {len(poses.p)} poses for {frames} frames, at most one each")
+    body = kitti.body_poses(poses, recording.T_CB)
+    return recording.with_truth(recording.frame_t_ns[: len(poses.p)], body)

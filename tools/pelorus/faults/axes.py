@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Axes: the twists are in other body axes than the extrinsic.
+
+Shown by: points carried through the twists' motion come out far from their tracks, and far less
+so when the body axes of the extrinsic are permuted or turned. All 24 right-handed choices
+compete, so nothing need be known about the convention. Remedy: T_CB diag(F, 1).
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+
+from pelorus import se3
+from pelorus.faults.duel import Duel, duel
+from pelorus.faults.finding import Finding
+from pelorus.frames import BodyAxes
+from pelorus.recording import Recording
+from pelorus.se3 import Floats, Poses
+from pelorus.visual_motion import SeenPairs, seen_pairs
+
+LAG = 5
+RATIO_MAX = 0.6  # the error must fall below this share of the given one
+SHARE_MIN = 0.75  # in at least so many frames
+Z_MIN = 4.0  # and with this significance
+
+LETTERS = (("forward", "backward"), ("left", "right"), ("up", "down"))
+FORWARD_LEFT_UP_IN_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+
+
+def turns() -> list[Floats]:
+    """The 24 rotations that map axes to axes; identity first."""
+    found: list[Floats] = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            F: Floats = np.zeros((3, 3))
+            F[range(3), order] = signs
+            if np.linalg.det(F) > 0:
+                found.append(F)
+    return found
+
+
+def mend(recording: Recording) -> tuple[Recording, Finding]:
+    """Turn the body axes of the extrinsic if the data say so loudly."""
+    seen = seen_pairs(recording.tracks, recording.header.camera, LAG)
+    candidates = turns()
+    errors = [_errors(recording, seen, F) for F in candidates]
+    scores = [np.median(e[np.isfinite(e)]) if np.isfinite(e).any() else np.inf for e in errors]
+    best = int(np.argmin(scores))
+    result = duel(errors[0], errors[best], LAG)
+    subject = "body axes"
+    if best == 0 or not result.clearly_won(RATIO_MAX, SHARE_MIN, Z_MIN):
+        return recording, Finding(subject, False, _quiet(scores, result), "nothing to mend")
+    mended = _turned(recording.T_CB, candidates[best])
+    evidence = (
+        f"lag-{LAG} reprojection falls from {result.given:.1f} to {result.challenger:.1f} px with "
+        f"the axes turned, in {100 * result.share:.0f} % of {result.frames} frames"
+    )
+    action = f"T_CB turned by {_text(candidates[best])}: body axes are now {name(mended.R)}"
+    return recording.with_extrinsic(mended), Finding(subject, True, evidence, action)
+
+
+def _turned(T_CB: Poses, F: Floats) -> Poses:
+    return Poses(T_CB.R @ F, T_CB.p)
+
+
+def _errors(recording: Recording, seen: SeenPairs, F: Floats) -> Floats:
+    camera = recording.header.camera
+    motion = recording.with_extrinsic(_turned(recording.T_CB, F)).camera_motion(LAG)
+    return seen.median_by_frame(seen.reproject(camera, motion))
+
+
+def _quiet(scores: list[float], result: Duel) -> str:
+    if not result.frames:
+        return "too few common tracks to judge"
+    rival = min(scores[1:])
+    return (
+        f"lag-{LAG} reprojection is {scores[0]:.1f} px as given, "
+        f"{rival:.1f} px with the best other axes"
+    )
+
+
+def _text(F: Floats) -> str:
+    if np.count_nonzero(F - np.diag(np.diag(F))) == 0:
+        return f"diag({', '.join(f'{x:.0f}' for x in np.diag(F))})"
+    return str(F.astype(int).tolist())
+
+
+def name(R_CB: Floats) -> str:
+    """The body axes in words, for a camera that looks forward."""
+    R = se3.nearest_rotation(R_CB)
+    in_camera = FORWARD_LEFT_UP_IN_CAMERA.T @ R  # columns: body axes in forward, left, up
+    words = []
+    for axis in in_camera.T:
+        which = int(np.argmax(np.abs(axis)))
+        words.append(LETTERS[which][int(axis[which] < 0)])
+    return "-".join(words)
+
+
+def body_axes(R_CB: Floats) -> BodyAxes:
+    """HEADER's name of the body axes, for a camera that looks forward."""
+    return {
+        "forward-left-up": BodyAxes.FORWARD_LEFT_UP,
+        "forward-right-down": BodyAxes.FORWARD_RIGHT_DOWN,
+    }.get(name(R_CB), BodyAxes.OTHER)

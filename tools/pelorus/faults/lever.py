@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""Lever: the extrinsic's translation is not t_CB but the camera's position in the body.
+
+A matrix [R | p_BC] looks like an extrinsic; right is [R | -R p_BC]. Turns tell: with the turn R_C
+and the way p_C of the camera over some frames, and the way of the body from the twists,
+
+    p_C = (I - R_C) t_CB + R_CB p_back          (coordinates in camera k -> camera k + lag)
+
+R_C and p_C come from the images alone, since a gyro may be noisy or biased. Along the line from
+t (s = 0) to -R t (s = 1), s is the one unknown of a robust regression. Remedy where s is
+nearer to 1 beyond doubt: t_CB = -R t.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3, visual_motion
+from pelorus.faults.finding import Finding
+from pelorus.recording import Recording
+from pelorus.se3 import Floats, Poses
+from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
+
+LAG = 5
+SIGMAS_MIN = 4.0  # s must exceed one half by so many of its own standard deviations
+SEPARATED_MIN_M = 0.1  # hypotheses that never part farther cannot be told apart
+REWEIGHTINGS = 20
+
+
+def mend(recording: Recording) -> tuple[Recording, Finding]:
+    """Replace t by -R t if the turns say so."""
+    subject = "lever of the extrinsic"
+    camera = recording.header.camera
+    given = recording.T_CB
+    other = Poses(given.R, -given.R @ given.p)
+    seen = seen_pairs(recording.tracks, camera, LAG)
+    usable = seen.counts() >= PAIRS_MIN
+    seen_motion = visual_motion.estimate(seen, camera)
+    apart = (np.eye(3) - seen_motion.R) @ (other.p - given.p)
+    distance = np.linalg.norm(apart, axis=1)
+    turning = usable & (distance > SEPARATED_MIN_M)
+    if turning.sum() < PAIRS_MIN:
+        evidence = f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are due"
+        return recording, Finding(subject, False, evidence, "left as given")
+    way = _way(recording, seen_motion.R, given)
+    s, sigma = _regress(seen_motion.p[usable] - way[usable], apart[usable])
+    errors = [
+        _reprojection(recording, seen, Poses(seen_motion.R, way_), turning)
+        for way_ in (way, way + apart)
+    ]
+    evidence = (
+        f"between [R | t] (0) and [R | -R t] (1) the data say {s:.2f} +- {sigma:.2f}; lag-{LAG} "
+        f"reprojection in {int(turning.sum())} turning frames is {errors[0]:.1f} and "
+        f"{errors[1]:.1f} px"
+    )
+    if s - 0.5 < SIGMAS_MIN * sigma:
+        return recording, Finding(subject, False, evidence, "nothing to mend")
+    action = f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"
+    return recording.with_extrinsic(other), Finding(subject, True, evidence, action)
+
+
+def _way(recording: Recording, R_C: Floats, T_CB: Poses) -> Floats:
+    """p_C of each k from the images' turn, the twists' way and this lever."""
+    path = recording.dead_reckoning()
+    later, earlier = path.at(slice(LAG, None)), path.at(slice(None, len(path.p) - LAG))
+    back = se3.compose(se3.inverse(later), earlier)
+    return np.asarray(T_CB.p - R_C @ T_CB.p + back.p @ T_CB.R.T)
+
+
+def _regress(offset: Floats, apart: Floats) -> tuple[float, float]:
+    """offset = s apart + noise, by rows of metres: s and its standard deviation.
+
+    Weights as of Geman and McClure; the windows overlap LAG-fold, so the variance is LAG times
+    that of independent ones.
+    """
+    along, leverage = np.sum(offset * apart, axis=1), np.sum(apart**2, axis=1)
+    weight = np.ones(len(offset))
+    strong = leverage >= np.median(leverage)
+    s = 0.0
+    for _ in range(REWEIGHTINGS):
+        s = float(np.sum(weight * along) / np.sum(weight * leverage))
+        residual = offset - s * apart
+        squared = np.sum(residual**2, axis=1)
+        weight = 1 / (1 + squared / (np.median(squared[strong]) + 1e-12)) ** 2
+    score = weight * np.sum(residual * apart, axis=1)
+    variance = LAG * np.sum(score**2) / np.sum(weight * leverage) ** 2
+    return s, float(np.sqrt(variance))
+
+
+def _reprojection(
+    recording: Recording, seen: SeenPairs, motion: Poses, turning: NDArray[np.bool_]
+) -> float:
+    errors = seen.reproject(recording.header.camera, motion)
+    return float(np.median(errors[turning[seen.frame]]))
+
+
+def _metres(p: Floats) -> str:
+    return "(" + ", ".join(f"{x:.3f}" for x in p) + ") m"

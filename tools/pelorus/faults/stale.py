@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Stale tracks: a tracker that re-detects keeps all live ids at their previous pixels for one
+frame, then follows whatever lies there. From that frame on each id is another point of the world.
+
+Shown by: in some frames every live track repeats its four numbers bit for bit although the body
+moves so far that the image must have moved too. A camera at rest, or a track that happens to
+repeat alone, is no such frame. Remedy: a new id from there on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.faults.finding import Finding
+from pelorus.recording import Recording
+from pelorus.tracks import Pairs, Tracks
+from pelorus.visual_motion import seen_pairs
+
+MOVED_MIN_PX = 0.1  # median image motion that the twists must predict for a repeat to be false
+LIVE_MIN = 3  # tracks that must repeat together
+
+
+def mend(recording: Recording) -> tuple[Recording, Finding]:
+    """Give the tracks of stale frames new ids."""
+    pairs = recording.tracks.pairs(1)
+    repeats = _repeats(recording.tracks, pairs)
+    frames = _stale_frames(recording, pairs, repeats)
+    stale = pairs.second[repeats & frames[recording.tracks.frame[pairs.second]]]
+    subject = "stale tracks"
+    if not len(stale):
+        evidence = f"no moving frame repeats all its pixels ({int(repeats.sum())} single repeats)"
+        return recording, Finding(subject, False, evidence, "nothing to mend")
+    tracks = _split(recording.tracks, stale)
+    moved = _predicted_px(recording)
+    evidence = (
+        f"in {int(frames.sum())} of {recording.tracks.frame_count} frames all live tracks repeat "
+        f"their pixels bit for bit ({len(stale)} observations, "
+        f"{100 * len(stale) / len(recording.tracks):.1f} %), though the twists move the image by "
+        f"{np.nanmedian(moved[frames]):.1f} px there"
+    )
+    action = f"{len(stale)} tracks split: a new id from the repeated pixel on"
+    return replace(recording, tracks=tracks), Finding(subject, True, evidence, action)
+
+
+def _repeats(tracks: Tracks, pairs: Pairs) -> NDArray[np.bool_]:
+    same = tracks.pixels[pairs.first] == tracks.pixels[pairs.second]
+    return np.asarray(same.all(axis=1))
+
+
+def _stale_frames(
+    recording: Recording, pairs: Pairs, repeats: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(T,): frames in which all live tracks repeat while the body moves."""
+    count = recording.tracks.frame_count
+    frame = recording.tracks.frame[pairs.second]
+    live = np.bincount(frame, minlength=count)
+    repeated = np.bincount(frame, repeats, minlength=count)
+    moves = np.nan_to_num(_predicted_px(recording)) > MOVED_MIN_PX
+    return np.asarray((live >= LIVE_MIN) & (repeated == live) & moves)
+
+
+def _predicted_px(recording: Recording) -> NDArray[np.float64]:
+    """(T,): how far the twists say the image moved since the previous frame, median, px.
+
+    Where a point was and where the motion brings it: the pixels of the later frame are not used.
+    """
+    camera = recording.header.camera
+    seen = seen_pairs(recording.tracks, camera, 1)
+    first = replace(seen, pixels=seen.first_pixels)
+    moved = first.reproject(camera, recording.camera_motion(1))
+    return np.concatenate(([np.nan], first.median_by_frame(moved, at_least=LIVE_MIN)))
+
+
+def _split(tracks: Tracks, stale: NDArray[np.intp]) -> Tracks:
+    """A new id for each stale row, kept by the later rows of that track up to the next one."""
+    order = np.lexsort((tracks.frame, tracks.id))
+    begins = np.zeros(len(tracks), bool)
+    begins[stale] = True
+    breaks = np.cumsum(begins[order])  # over all tracks in the order (id, frame)
+    id = tracks.id[order]
+    first_of_id = np.concatenate(([True], id[1:] != id[:-1]))
+    before = np.maximum.accumulate(np.where(first_of_id, breaks - begins[order], 0))
+    new = np.where(breaks > before, tracks.id.max() + breaks, id)
+    out = np.empty_like(tracks.id)
+    out[order] = new
+    return tracks.with_ids(out)

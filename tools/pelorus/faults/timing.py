@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""Twist timing: does the reading of frame k hold behind it or before it?
+
+Shown by: points of frame k carried to frame k + 1 with either reading. `mid` does not compete: a
+mean of two noisy readings has less noise and would win for that alone.
+"""
+
+from __future__ import annotations
+
+from pelorus.faults.duel import duel
+from pelorus.faults.finding import Finding
+from pelorus.frames import TwistTiming
+from pelorus.recording import Recording
+from pelorus.visual_motion import seen_pairs
+
+Z_MIN = 3.0
+
+
+def choose(recording: Recording) -> tuple[Recording, Finding]:
+    """START unless END explains clearly more frames."""
+    camera = recording.header.camera
+    seen = seen_pairs(recording.tracks, camera, 1)
+    choices = [
+        recording.with_header(twist_timing=timing)
+        for timing in (TwistTiming.START, TwistTiming.END)
+    ]
+    errors = [
+        seen.median_by_frame(seen.reproject(camera, choice.camera_motion(1))) for choice in choices
+    ]
+    result = duel(errors[0], errors[1], 1)
+    late = result.z > Z_MIN
+    evidence = "too few common tracks to judge"
+    if result.frames:
+        evidence = (
+            f"lag-1 reprojection is {result.given:.2f} px with start and "
+            f"{result.challenger:.2f} px with end, "
+            f"smaller in {100 * result.share:.0f} % of {result.frames} frames"
+        )
+    action = f"twist timing is {'end' if late else 'start'}"
+    return choices[int(late)], Finding("twist timing", bool(late), evidence, action)

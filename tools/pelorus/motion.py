@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""Dead reckoning: the path that the twists alone give."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.frames import TwistTiming
+from pelorus.se3 import Floats, Poses
+
+Times = NDArray[np.int64]
+
+
+def held(readings: Floats, timing: TwistTiming) -> Floats:
+    """(n, k) readings -> (n-1, k): what holds on each interval between two of them."""
+    if timing is TwistTiming.START:
+        return readings[:-1]
+    if timing is TwistTiming.END:
+        return readings[1:]
+    return 0.5 * (readings[:-1] + readings[1:])
+
+
+def steps(t_ns: Times, v: Floats, w: Floats, timing: TwistTiming) -> Poses:
+    """(n-1) motions D_j = T_j^-1 T_j+1 = Exp(tau u) between the times of the readings."""
+    tau = (np.diff(t_ns.astype(np.int64)) * 1e-9)[:, None]
+    return se3.exp(tau * held(v, timing), tau * held(w, timing))
+
+
+def chain(motions: Poses, first: Poses | None = None) -> Poses:
+    """T_0, T_0 D_0, T_0 D_0 D_1, ...: n motions give n + 1 poses. T_0 is identity by default."""
+    count = len(motions.p) + 1
+    R, p = np.empty((count, 3, 3)), np.empty((count, 3))
+    R[0], p[0] = (np.eye(3), np.zeros(3)) if first is None else first
+    for k in range(count - 1):
+        p[k + 1] = p[k] + R[k] @ motions.p[k]
+        R[k + 1] = R[k] @ motions.R[k]
+    return Poses(R, p)
+
+
+def dead_reckoning(
+    t_ns: Times, v: Floats, w: Floats, timing: TwistTiming, first: Poses | None = None
+) -> Poses:
+    """The n poses at the times of n readings, v in m/s and w in rad/s, both in body axes."""
+    return chain(steps(t_ns, v, w, timing), first)
+
+
+def path_at(t_ns: Times, reading_t_ns: Times, v: Floats, w: Floats, timing: TwistTiming) -> Poses:
+    """Poses at any times from the readings; the pose at the first reading is the origin.
+
+    Between two readings, and behind the last one, the latest reading holds; before the first
+    one the body rests.
+    """
+    nodes = dead_reckoning(reading_t_ns, v, w, timing)
+    latest = np.maximum(np.searchsorted(reading_t_ns, t_ns, side="right") - 1, 0)
+    tau = np.maximum(t_ns.astype(np.int64) - reading_t_ns[latest].astype(np.int64), 0) * 1e-9
+    return se3.compose(
+        nodes.at(latest), se3.exp(tau[:, None] * v[latest], tau[:, None] * w[latest])
+    )

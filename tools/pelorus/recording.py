@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""A whole recording in memory: what the converters and the simulator write."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pelorus import motion, se3
+from pelorus.console import progress
+from pelorus.errors import PelorusError
+from pelorus.frames import Header, Landmark, Message, Stereo, Text, Truth, Twist
+from pelorus.motion import Times
+from pelorus.se3 import Floats, Poses
+from pelorus.tracks import Tracks
+from pelorus.wire import Writer
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Twists (m, 3) at `twist_t_ns`, frame k of the tracks at `frame_t_ns[k]`, body poses."""
+
+    header: Header
+    twist_t_ns: Times
+    v_B_mps: Floats
+    w_B_radps: Floats
+    frame_t_ns: Times
+    tracks: Tracks
+    truth_t_ns: Times = field(default_factory=lambda: np.empty(0, np.int64))
+    truth: Poses = field(default_factory=lambda: Poses(np.empty((0, 3, 3)), np.empty((0, 3))))
+    known: list[Landmark] = field(default_factory=list)
+    remarks: list[Text] = field(default_factory=list)
+    camera_delay_ns: int = 0  # frames stand so much later in the file, as they come off a robot
+
+    def with_header(self, **changes: Any) -> Recording:
+        return replace(self, header=replace(self.header, **changes))
+
+    def with_truth(self, t_ns: Times, poses: Poses) -> Recording:
+        return replace(self, truth_t_ns=t_ns, truth=poses)
+
+    def with_extrinsic(self, T_CB: Poses) -> Recording:
+        return self.with_header(R_CB=T_CB.R, t_CB_m=T_CB.p)
+
+    @property
+    def T_CB(self) -> Poses:
+        return Poses(np.asarray(self.header.R_CB), np.asarray(self.header.t_CB_m))
+
+    def dead_reckoning(self) -> Poses:
+        """The body's poses at the frames, from the twists alone; the first twist is the origin."""
+        timing = self.header.twist_timing
+        return motion.path_at(
+            self.frame_t_ns, self.twist_t_ns, self.v_B_mps, self.w_B_radps, timing
+        )
+
+    def camera_motion(self, lag: int) -> Poses:
+        """(T - lag) motions: coordinates in camera k -> camera k + lag, from the twists alone."""
+        path = self.dead_reckoning()
+        later, earlier = path.at(slice(lag, None)), path.at(slice(None, len(path.p) - lag))
+        body = se3.compose(se3.inverse(later), earlier)
+        return se3.compose(se3.compose(self.T_CB, body), se3.inverse(self.T_CB))
+
+    def messages(self) -> Iterator[Message]:
+        """In the order that docs/REPLAY-FORMAT.md asks for."""
+        yield self.header
+        yield from self.remarks
+        yield from self.known
+        streams = (self._twists(), self._truths(), self._stereos())
+        for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
+            yield message
+
+    def __len__(self) -> int:
+        data = len(self.twist_t_ns) + len(self.truth_t_ns) + len(self.frame_t_ns)
+        return 1 + len(self.remarks) + len(self.known) + data
+
+    def _twists(self) -> Iterator[tuple[int, int, Message]]:
+        for t, v, w in zip(self.twist_t_ns.tolist(), self.v_B_mps, self.w_B_radps, strict=True):
+            yield t, 0, Twist(t, v, w)
+
+    def _truths(self) -> Iterator[tuple[int, int, Message]]:
+        for t, R, p in zip(self.truth_t_ns.tolist(), *self.truth, strict=True):
+            yield t, 1, Truth(t, R, p)
+
+    def _stereos(self) -> Iterator[tuple[int, int, Message]]:
+        bounds = self.tracks.bounds()
+        ids = self.tracks.id.astype(np.uint32)
+        pixels = self.tracks.pixels.astype(np.float32)
+        for k, t in enumerate(self.frame_t_ns.tolist()):
+            rows = slice(bounds[k], bounds[k + 1])
+            yield t + self.camera_delay_ns, 2, Stereo(t, ids[rows], pixels[rows])
+
+    def write(self, path: Path) -> int:
+        """Write the whole file; its size in bytes. Nothing is left behind if that fails."""
+        self._check(path)
+        part = path.with_name(path.name + ".part")
+        try:
+            with part.open("wb") as stream:
+                writer = Writer(stream)
+                for message in progress(self.messages(), "writing", len(self)):
+                    writer.write(message)
+                writer.end()
+            size = part.stat().st_size
+            part.replace(path)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
+        return size
+
+    def _check(self, path: Path) -> None:
+        for name, times in (
+            ("twist", self.twist_t_ns),
+            ("frame", self.frame_t_ns),
+            ("truth", self.truth_t_ns),
+        ):
+            back = np.nonzero(np.diff(times) <= 0)[0]
+            if len(back):
+                raise PelorusError(
+                    f"{path}: {name} {int(back[0]) + 1}: time does not ascend "
+                    f"({times[back[0]]} ns, then {times[back[0] + 1]} ns)"
+                )
+            if len(times) and times[0] < 0:
+                raise PelorusError(f"{path}: {name} 0: negative time {times[0]} ns")

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Distance of a trajectory to a digitised road, where no other reference exists.
+
+The trajectory is levelled, that is projected on the plane of its two largest principal axes, and
+fitted to the road by a rigid planar motion of fixed scale. The first metres are left out: the
+road on the map may begin later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial import cKDTree
+
+from pelorus.console import progress
+from pelorus.errors import PelorusError
+from pelorus.se3 import Floats
+
+ROAD_STEP_M = 1.0  # the road's points are interpolated to this spacing
+EVERY = 5  # one pose in five is compared
+STARTS = 24  # headings from which the fit is tried, each mirrored too
+EVALUATIONS_MAX = 60
+POINTS_MIN = 10
+
+
+@dataclass(frozen=True)
+class RoadFigures:
+    """RMS distance to the road, RMS distance out of the plane, tilt of the plane against z."""
+
+    road_m: float
+    out_of_plane_m: float
+    tilt_deg: float
+
+
+def read_road(path: Path) -> Floats:
+    """(n, 2), m: the last two columns of a CSV; lines with # in front are comments."""
+    try:
+        rows = np.loadtxt(path, delimiter=",", comments="#", ndmin=2)
+    except OSError as error:
+        raise PelorusError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, UnicodeDecodeError) as error:
+        raise PelorusError(f"{path}: is no road: rows arc_m,x_m,y_m are due: {error}") from error
+    if rows.shape[0] < 2 or rows.shape[1] < 2 or not np.isfinite(rows).all():
+        raise PelorusError(
+            f"{path}: {rows.shape[0]} rows of {rows.shape[1]} numbers; at least two rows of finite "
+            "arc_m,x_m,y_m are due"
+        )
+    return np.asarray(rows[:, -2:])
+
+
+def compare(position: Floats, road: Floats, skip_m: float) -> RoadFigures:
+    """Positions (n, 3), m, against the road (n, 2), m."""
+    centred = position - position.mean(axis=0)
+    _, _, axes = np.linalg.svd(centred, full_matrices=False)
+    plane = (centred @ axes[:2].T)[arc_length(position) > skip_m][::EVERY]
+    if len(plane) < POINTS_MIN:
+        raise PelorusError(
+            f"the trajectory is {arc_length(position)[-1]:.1f} m long: too short to compare behind "
+            f"the first {skip_m:g} m"
+        )
+    return RoadFigures(
+        road_m=_fit(plane, densified(road)),
+        out_of_plane_m=float(np.sqrt(np.mean((centred @ axes[2]) ** 2))),
+        tilt_deg=float(np.degrees(np.arccos(min(1.0, abs(axes[2][2]))))),
+    )
+
+
+def arc_length(points: Floats) -> Floats:
+    """(n,): way along the points from the first one, m."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def densified(road: Floats) -> Floats:
+    """The road with a point every ROAD_STEP_M."""
+    arc = arc_length(road)
+    at = np.arange(0, arc[-1], ROAD_STEP_M)
+    return np.stack([np.interp(at, arc, road[:, axis]) for axis in range(2)], axis=-1)
+
+
+def _fit(points: Floats, road: Floats) -> float:
+    """The smallest RMS distance over all planar motions, mirrored or not (axes have no sign)."""
+    nearest = cKDTree(road)
+
+    def distance(x: Floats, mirror: Floats) -> Floats:
+        c, s = np.cos(x[0]), np.sin(x[0])
+        moved = (points * mirror) @ np.array([[c, s], [-s, c]]) + x[1:]
+        return np.asarray(nearest.query(moved)[0])
+
+    headings = np.arange(STARTS) * 2 * np.pi / STARTS
+    tries = [(heading, sign) for sign in (1.0, -1.0) for heading in headings]
+    best = np.inf
+    for heading, sign in progress(tries, "fitting to the road"):
+        start = np.concatenate(([heading], road.mean(axis=0)))
+        mirror = np.array([1.0, sign])
+        found = least_squares(distance, start, args=(mirror,), max_nfev=EVALUATIONS_MAX)
+        best = min(best, float(np.sqrt(np.mean(found.fun**2))))
+    return best

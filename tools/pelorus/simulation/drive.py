@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Where the robot drives: twists by a smooth rule, poses by exact integration of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pelorus import motion
+from pelorus.frames import TwistTiming
+from pelorus.motion import Times
+from pelorus.se3 import Floats, Poses
+
+SERIES_TERMS = 9  # of the exponential map: exact to rounding up to 1 rad a step
+TURN_MAX_RAD = 1.0
+
+FIRST_R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a quarter turn left
+FIRST_P_M = np.array([10.0, -5.0, 1.0])  # not the origin: a mistaken world frame would show
+
+
+class Drive(NamedTuple):
+    """True twists at t_ns (what a perfect sensor reads) and the poses at these times."""
+
+    t_ns: Times
+    v_B_mps: Floats
+    w_B_radps: Floats
+    poses: Poses
+
+
+def drive(t_ns: Times, timing: TwistTiming, speed_mps: float, lap_s: float) -> Drive:
+    """Laps of an uneven oval, rolling and pitching a little.
+
+    The reading at t_j is what `timing` makes of it: the poses are the integral of the readings, to
+    rounding, so truth and twists agree exactly.
+    """
+    v, w = profile(t_ns, speed_mps, lap_s)
+    tau = (np.diff(t_ns) * 1e-9)[:, None]
+    steps = exp(tau * motion.held(v, timing), tau * motion.held(w, timing))
+    return Drive(t_ns, v, w, chain(steps))
+
+
+def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
+    """Linear and angular velocity (n, 3) in a forward-left-up body."""
+    t = np.asarray(t_ns * 1e-9, np.float64)
+    lap_rate = 6.283185307179586 / lap_s
+    v = np.stack(
+        (
+            speed_mps * (1 + 0.2 * wave(t / 17.0)),
+            0.02 * speed_mps * wave(t / 5.0),
+            0.02 * speed_mps * wave(t / 3.0),
+        ),
+        axis=-1,
+    )
+    w = np.stack(
+        (0.05 * wave(t / 2.7), 0.04 * wave(t / 3.9), lap_rate * (1 + 0.6 * wave(3 * t / lap_s))),
+        axis=-1,
+    )
+    return v, w
+
+
+def wave(x: Floats) -> Floats:
+    """A sine's likeness of period 1 and amplitude 1, from parabolas."""
+    x = x - np.floor(x)
+    half = x < 0.5
+    return np.where(half, 16 * x * (0.5 - x), -16 * (x - 0.5) * (1 - x))
+
+
+def exp(rho: Floats, theta: Floats) -> Poses:
+    """Exp of SE(3) by its power series, (n, 3) and (n, 3)."""
+    s = theta[:, 0] ** 2 + theta[:, 1] ** 2 + theta[:, 2] ** 2
+    if len(s) and s.max() > TURN_MAX_RAD**2:
+        raise ValueError(f"a step of {np.sqrt(s.max()):.2f} rad, at most {TURN_MAX_RAD} are exact")
+    a, b, c = _series(s, 1), _series(s, 2), _series(s, 3)
+    identity = np.broadcast_to(np.eye(3), (len(s), 3, 3))
+    hat: Floats = np.zeros((len(s), 3, 3))
+    hat[:, 2, 1], hat[:, 0, 2], hat[:, 1, 0] = theta[:, 0], theta[:, 1], theta[:, 2]
+    hat = hat - np.swapaxes(hat, 1, 2)
+    squared = theta[:, :, None] * theta[:, None, :] - s[:, None, None] * identity
+    R = identity + a[:, None, None] * hat + b[:, None, None] * squared
+    V = identity + b[:, None, None] * hat + c[:, None, None] * squared
+    return Poses(R, rotate(V, rho))
+
+
+def _series(s: Floats, order: int) -> Floats:
+    """sum_k (-s)^k / (2k + order)!, s = a^2.
+
+    That is sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for order 1, 2 and 3.
+    """
+    total = np.ones_like(s)
+    for k in range(SERIES_TERMS, 0, -1):
+        n = 2 * k + order
+        total = 1 - s / (n * (n - 1)) * total
+    return total / (1.0, 1.0, 2.0, 6.0)[order]
+
+
+def rotate(R: Floats, x: Floats) -> Floats:
+    """R x for stacks, in a fixed order of operations."""
+    return (
+        R[..., :, 0] * x[..., None, 0]
+        + R[..., :, 1] * x[..., None, 1]
+        + (R[..., :, 2] * x[..., None, 2])
+    )
+
+
+def chain(steps: Poses) -> Poses:
+    """The first pose, and each step after it."""
+    count = len(steps.p) + 1
+    R, p = np.empty((count, 3, 3)), np.empty((count, 3))
+    R[0], p[0] = FIRST_R, FIRST_P_M
+    for k in range(count - 1):
+        p[k + 1] = p[k] + rotate(R[k], steps.p[k])
+        R[k + 1] = rotate(R[k][None], steps.R[k].T).T
+    return Poses(R, p)

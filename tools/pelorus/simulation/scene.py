@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""What there is to see: landmarks along the way, and the camera that sees them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.frames import Camera
+from pelorus.se3 import Floats, Poses
+from pelorus.simulation.drive import rotate
+
+CAMERA = Camera(fx_px=420.0, fy_px=420.0, cx_px=320.0, cy_px=240.0, baseline_m=0.2)
+IMAGE_PX = (640, 480)
+R_CB = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])  # body forward-left-up
+CAMERA_IN_BODY_M = np.array([0.3, 0.1, 0.2])
+T_CB = Poses(R_CB, -rotate(R_CB, CAMERA_IN_BODY_M))
+
+DEPTH_MIN_M = 0.8
+SIDE_M = (3.0, 15.0)  # distance of landmarks from the way, on either side
+HEIGHT_M = (-1.0, 5.0)
+
+
+class View(NamedTuple):
+    """Landmarks in the left camera (m, 3) and in the images (m, 4), and which can be seen."""
+
+    q_C: Floats
+    pixels: Floats
+    visible: NDArray[np.bool_]
+
+
+def landmarks(path: Poses, count: int, chance: np.random.Generator) -> Floats:
+    """(count, 3) in the world, beside random poses of the path."""
+    at = chance.integers(0, len(path.p), count)
+    side = chance.uniform(*SIDE_M, count) * chance.choice((-1.0, 1.0), count)
+    ahead = chance.uniform(-3.0, 3.0, count)
+    up = chance.uniform(*HEIGHT_M, count)
+    return path.p[at] + rotate(path.R[at], np.stack((ahead, side, up), axis=-1))
+
+
+def view(R_WB: Floats, p_WB: Floats, points_W: Floats, range_m: float) -> View:
+    """What the camera of a body at (R, p) sees of the points."""
+    in_body = rotate(R_WB.T, points_W - p_WB)
+    q = rotate(T_CB.R, in_body) + T_CB.p
+    x, y, z = q.T
+    depth = np.maximum(z, DEPTH_MIN_M)
+    u_left = CAMERA.fx_px * x / depth + CAMERA.cx_px
+    v = CAMERA.fy_px * y / depth + CAMERA.cy_px
+    u_right = CAMERA.fx_px * (x - CAMERA.baseline_m) / depth + CAMERA.cx_px
+    width, height = IMAGE_PX
+    distance = np.sqrt(x * x + y * y + z * z)
+    visible = (z > DEPTH_MIN_M) & (distance < range_m) & (u_left < width) & (u_right >= 0)
+    visible &= (v >= 0) & (v < height)
+    return View(q, np.stack((u_left, v, u_right, v), axis=-1), visible)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: MIT
+"""The whole simulated recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pelorus.console import progress
+from pelorus.errors import PelorusError
+from pelorus.frames import OBSERVATIONS_MAX, BodyAxes, Header, Landmark, Noise, TwistTiming
+from pelorus.motion import Times
+from pelorus.recording import Recording
+from pelorus.se3 import Floats, Poses
+from pelorus.simulation import scene, sensors
+from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive
+from pelorus.tracks import Tracks
+
+FRAMES_MAX = 1_000_000
+PEAK_TURN = 1.7  # the peak of the turn rate over its mean, and some roll and pitch
+
+
+@dataclass(frozen=True)
+class Options:
+    """What can be chosen; the names are those of the command's options."""
+
+    seed: int = 1
+    duration_s: float = 60.0
+    frame_rate_hz: float = 10.0
+    twist_rate_hz: float = 100.0
+    twist_timing: TwistTiming = TwistTiming.START
+    speed_mps: float = 3.0
+    lap_s: float = 40.0
+    landmarks: int = 800
+    observations: int = 60
+    range_m: float = 30.0
+    keep_ids: bool = False
+    known: bool = False
+    known_sigma_m: float = 0.01
+    loss: float = 0.01
+    pixel_sigma_px: float = 1.0
+    velocity_sigma_mps: float = 0.05
+    gyro_sigma_radps: float = 0.01
+    bias_velocity_sigma_mps: float = 0.05
+    bias_gyro_sigma_radps: float = 0.005
+    bias_velocity_walk: float = 0.0
+    bias_gyro_walk: float = 0.0
+    outliers: float = 0.02
+    drop: float = 0.01
+    camera_delay_s: float = 0.0
+
+    def check(self) -> None:
+        """Refuse what makes no sense, by the option's name."""
+        for name in ("duration_s", "frame_rate_hz", "twist_rate_hz", "lap_s", "range_m"):
+            self._require(name, getattr(self, name) > 0, "a positive number")
+        for name in ("loss", "outliers", "drop"):
+            self._require(name, 0 <= getattr(self, name) < 1, "a fraction from 0 to below 1")
+        for name in vars(self):
+            number = getattr(self, name)
+            if isinstance(number, float):
+                self._require(name, 0 <= number < np.inf, "a finite number, not negative")
+        self._require("landmarks", self.landmarks > 0, "at least 1")
+        self._require("known_sigma_m", self.known_sigma_m > 0, "a positive number")
+        self._require(
+            "observations", 0 < self.observations <= OBSERVATIONS_MAX, f"1 to {OBSERVATIONS_MAX}"
+        )
+        self._require("seed", self.seed >= 0, "a whole number, not negative")
+        ratio = self.twist_rate_hz / self.frame_rate_hz
+        self._require(
+            "twist_rate_hz", round(ratio) == ratio >= 1, "a whole multiple of the frame rate"
+        )
+        self._require("duration_s", self.frames <= FRAMES_MAX, f"at most {FRAMES_MAX} frames")
+        turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
+        self._require("lap_s", turn < TURN_MAX_RAD, f"at most {TURN_MAX_RAD} rad a twist")
+
+    @property
+    def frames(self) -> int:
+        return int(self.duration_s * self.frame_rate_hz) + 1
+
+    @property
+    def twists_per_frame(self) -> int:
+        return round(self.twist_rate_hz / self.frame_rate_hz)
+
+    def _require(self, name: str, good: bool, due: str) -> None:
+        if not good:
+            option = name
+            for unit in ("_s", "_hz", "_mps", "_radps", "_px", "_m"):
+                option = option.removesuffix(unit)
+            given = getattr(self, name)
+            raise PelorusError(f"--{option.replace('_', '-')} is {given}: {due} is due")
+
+
+class _Chances:
+    """An independent stream for each source of chance: changing one option leaves the others."""
+
+    def __init__(self, seed: int) -> None:
+        names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
+        self._names = (*names, "bias_w")
+        seeds = np.random.SeedSequence(seed).spawn(len(self._names))
+        self._streams = [np.random.Generator(np.random.PCG64(s)) for s in seeds]
+
+    def __getitem__(self, name: str) -> np.random.Generator:
+        return self._streams[self._names.index(name)]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """The recording, and what no robot would know."""
+
+    recording: Recording
+    points_W: Floats  # (landmarks, 3)
+    bias_velocity_mps: Floats  # (twists, 3)
+    bias_gyro_radps: Floats
+    outlier: np.ndarray[tuple[int], np.dtype[np.bool_]]  # of each observation
+
+
+def simulate(options: Options) -> Simulation:
+    """Drive, look, and measure."""
+    options.check()
+    chances = _Chances(options.seed)
+    t_ns = _node_times(options)
+    way = drive(t_ns, options.twist_timing, options.speed_mps, options.lap_s)
+    points = scene.landmarks(way.poses, options.landmarks, chances["scene"])
+    v, w, bias_v, bias_w = _readings(options, way, chances)
+    at_frames = np.arange(options.frames) * options.twists_per_frame
+    truth = way.poses.at(at_frames)
+    kept = np.nonzero(chances["drops"].random(options.frames) >= options.drop)[0]
+    tracks, outlier = _observe(options, truth.at(kept), points, chances)
+    recording = Recording(
+        _header(options),
+        t_ns,
+        v,
+        w,
+        t_ns[at_frames][kept],
+        tracks,
+        t_ns[at_frames],
+        truth,
+        known=_known(options, points),
+        camera_delay_ns=round(options.camera_delay_s * 1e9),
+    )
+    return Simulation(recording, points, bias_v, bias_w, outlier)
+
+
+def _node_times(options: Options) -> Times:
+    nodes = np.arange((options.frames - 1) * options.twists_per_frame + 1)
+    return np.round(nodes * (1e9 / options.twist_rate_hz)).astype(np.int64)
+
+
+def _readings(
+    options: Options, way: Drive, chances: _Chances
+) -> tuple[Floats, Floats, Floats, Floats]:
+    tau = np.diff(way.t_ns) * 1e-9
+    count = len(way.t_ns)
+    bias_v = sensors.biases(
+        options.bias_velocity_sigma_mps, options.bias_velocity_walk, tau, chances["bias_v"]
+    )
+    bias_w = sensors.biases(
+        options.bias_gyro_sigma_radps, options.bias_gyro_walk, tau, chances["bias_w"]
+    )
+    v = way.v_B_mps + sensors.white(options.velocity_sigma_mps, count, chances["velocity"]) + bias_v
+    w = way.w_B_radps + sensors.white(options.gyro_sigma_radps, count, chances["gyro"]) + bias_w
+    return v, w, bias_v, bias_w
+
+
+def _observe(
+    options: Options, poses: Poses, points: Floats, chances: _Chances
+) -> tuple[Tracks, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    tracker = sensors.Tracker(
+        options.landmarks,
+        options.observations,
+        options.loss,
+        options.keep_ids or options.known,
+        chances["tracker"],
+    )
+    frames, ids, pixels, wrong = [], [], [], []
+    for k, (R, p) in enumerate(progress(zip(*poses, strict=True), "simulating", len(poses.p))):
+        seen = scene.view(R, p, points, options.range_m)
+        landmarks = tracker.follow(seen.visible)
+        measured, bad = sensors.measure(
+            seen,
+            landmarks,
+            options.pixel_sigma_px,
+            options.outliers,
+            chances["pixels"],
+            chances["outliers"],
+        )
+        frames.append(np.full(len(landmarks), k, np.intp))
+        ids.append(tracker.ids(landmarks))
+        pixels.append(measured)
+        wrong.append(bad)
+    id = np.concatenate(ids)
+    frame = np.concatenate(frames)
+    order = np.lexsort((id, frame))
+    tracks = Tracks.from_rows(len(poses.p), frame, id, np.concatenate(pixels))
+    return tracks, np.concatenate(wrong)[order]
+
+
+def _header(options: Options) -> Header:
+    """The noise as it is; what there is none of is no suggestion."""
+    suggested = {name: getattr(options, name) for name in vars(Noise())}
+    width, height = scene.IMAGE_PX
+    return Header(
+        scene.CAMERA,
+        scene.T_CB.R,
+        scene.T_CB.p,
+        body_axes=BodyAxes.FORWARD_LEFT_UP,
+        twist_timing=options.twist_timing,
+        image_width_px=width,
+        image_height_px=height,
+        noise=Noise(**{name: value if value > 0 else -1.0 for name, value in suggested.items()}),
+        name=f"simulated, seed {options.seed}"[:60],
+    )
+
+
+def _known(options: Options, points: Floats) -> list[Landmark]:
+    if not options.known:
+        return []
+    variance = options.known_sigma_m * options.known_sigma_m
+    covariance = variance * np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
+    return [Landmark(k, p, covariance) for k, p in enumerate(points)]

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""What a recording holds, counted: the numbers behind `pelorus info`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pelorus import wire
+from pelorus.errors import PelorusError
+from pelorus.frames import Config, End, Header, Kind, Landmark, Message, Stereo, Text
+from pelorus.wire import Counts, Received
+
+GAP_RATIO = 1.5  # an interval is a gap if it exceeds the median one so much
+DATA = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.POSE)
+
+
+class Gap(NamedTuple):
+    """A pause in a stream."""
+
+    after_ns: int
+    length_ns: int
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The frames of one kind over time."""
+
+    count: int
+    first_ns: int
+    last_ns: int
+    rate_hz: float  # from the median interval
+    gaps: list[Gap]
+    steps_back: int  # times that do not ascend
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Observations of all STEREO frames."""
+
+    observations: int
+    per_frame: tuple[int, int, int]  # least, median, most
+    landmarks: int
+    frames_per_landmark: float  # median
+    no_disparity: int  # uL <= uR: no point of the world
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Everything that `info` shows."""
+
+    path: Path
+    counts: Counts
+    header: Header | None
+    configs: list[Config]
+    landmarks: dict[str, int]  # by role
+    texts: list[Text]
+    streams: dict[Kind, Stream]
+    tracks: Tracks | None
+    end: End | None
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def useful(self) -> bool:
+        """A header, and something to which it applies."""
+        return self.header is not None and any(kind in self.streams for kind in DATA)
+
+
+def survey(path: Path) -> Survey:
+    """Read a recording, damaged or not. PelorusError where not one frame can be read."""
+    received, counts = wire.read_file(path)
+    messages = [frame.message for frame in received]
+    header = next((m for m in messages if isinstance(m, Header)), None)
+    end = next((m for m in reversed(messages) if isinstance(m, End)), None)
+    streams = {kind: _stream(messages, kind) for kind in DATA if counts.frames[kind]}
+    stereos = [m for m in messages if isinstance(m, Stereo)]
+    roles = [m.role.name.lower() for m in messages if isinstance(m, Landmark)]
+    found = Survey(
+        path=path,
+        counts=counts,
+        header=header,
+        configs=[m for m in messages if isinstance(m, Config)],
+        landmarks={role: roles.count(role) for role in dict.fromkeys(roles)},
+        texts=[m for m in messages if isinstance(m, Text)],
+        streams=streams,
+        tracks=_tracks(stereos) if stereos else None,
+        end=end,
+    )
+    found.remarks.extend(_remarks(found, received))
+    return found
+
+
+def _stream(messages: Sequence[Message], kind: Kind) -> Stream:
+    t_ns = np.array([m.t_ns for m in messages if m.kind == kind], np.float64)  # type: ignore[attr-defined]
+    exact = [int(m.t_ns) for m in messages if m.kind == kind]  # type: ignore[attr-defined]
+    steps = np.diff(t_ns)
+    ahead = steps[steps > 0]
+    usual = float(np.median(ahead)) if len(ahead) else 0.0
+    late = np.nonzero((steps > GAP_RATIO * usual) & (steps > 0))[0]
+    return Stream(
+        count=len(exact),
+        first_ns=exact[0],
+        last_ns=exact[-1],
+        rate_hz=1e9 / usual if usual else 0.0,
+        gaps=[Gap(exact[k], exact[k + 1] - exact[k]) for k in late],
+        steps_back=int(np.sum(steps <= 0)),
+    )
+
+
+def _tracks(stereos: list[Stereo]) -> Tracks:
+    per_frame = np.array([len(m.ids) for m in stereos])
+    ids = np.concatenate([m.ids for m in stereos])
+    pixels = np.concatenate([m.pixels for m in stereos])
+    _, seen = np.unique(ids, return_counts=True)
+    with np.errstate(invalid="ignore"):
+        no_disparity = int(np.sum(~(pixels[:, 0] > pixels[:, 2])))
+    return Tracks(
+        observations=len(ids),
+        per_frame=(int(per_frame.min()), int(np.median(per_frame)), int(per_frame.max())),
+        landmarks=len(seen),
+        frames_per_landmark=float(np.median(seen)) if len(seen) else 0.0,
+        no_disparity=no_disparity,
+    )
+
+
+def _remarks(found: Survey, received: list[Received]) -> list[str]:
+    """What a reader of the recording should know."""
+    said = []
+    if found.header is None:
+        said.append("there is no HEADER: without the calibration nothing can be replayed")
+    elif not isinstance(received[0].message, Header):
+        said.append("HEADER is not the first frame")
+    if found.header is not None and not found.useful:
+        said.append("there are no data: neither TWIST nor STEREO nor TRUTH nor POSE")
+    if found.end is None:
+        said.append("there is no END: the recording was cut short")
+    else:
+        said.extend(_end_differences(found.end, found.counts))
+    for kind, stream in found.streams.items():
+        if stream.steps_back:
+            said.append(f"{kind.name}: time does not ascend {stream.steps_back} times")
+    return said
+
+
+def _end_differences(end: End, counts: Counts) -> list[str]:
+    told = {
+        Kind.TWIST: end.twists,
+        Kind.STEREO: end.stereos,
+        Kind.TRUTH: end.truths,
+        Kind.LANDMARK: end.landmarks,
+    }
+    return [
+        f"END tells of {due} {kind.name} frames, {counts.frames[kind]} can be read"
+        for kind, due in told.items()
+        if due != counts.frames[kind]
+    ]
+
+
+def require_useful(found: Survey) -> None:
+    """Raise where nothing in the recording can be used."""
+    if not found.useful:
+        raise PelorusError(f"{found.path}: nothing useful in it: {'; '.join(found.remarks)}")

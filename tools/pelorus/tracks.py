@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""Stereo tracks: which landmark id was seen where in which frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.errors import PelorusError
+from pelorus.frames import OBSERVATIONS_MAX, Camera
+from pelorus.se3 import Floats
+
+Indices = NDArray[np.intp]
+
+ABSENT = -1.0  # all four numbers of a landmark that a frame does not show
+
+
+def project(camera: Camera, q_C: Floats) -> Floats:
+    """Points in the left camera (n, 3), m -> (n, 4) px: uL vL uR vR. Depth must be positive."""
+    x, y, z = q_C.T
+    v = camera.fy_px * y / z + camera.cy_px
+    u_left = camera.fx_px * x / z + camera.cx_px
+    return np.stack((u_left, v, camera.fx_px * (x - camera.baseline_m) / z + camera.cx_px, v), -1)
+
+
+def triangulate(camera: Camera, pixels: Floats) -> Floats:
+    """(n, 4) px with positive disparity -> points in the left camera (n, 3), m."""
+    u_left, v_left, u_right, v_right = pixels.T
+    scale = camera.baseline_m / (u_left - u_right)
+    y = (0.5 * (v_left + v_right) - camera.cy_px) * scale * camera.fx_px / camera.fy_px
+    return np.stack(((u_left - camera.cx_px) * scale, y, camera.fx_px * scale), -1)
+
+
+class Pairs(NamedTuple):
+    """The same landmark in frames k and k + lag: `first` and `second` are rows of Tracks."""
+
+    frame: Indices  # k of each pair, ascending
+    first: Indices
+    second: Indices
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Rows sorted by frame, then id: frame index, id, pixels (n, 4) in the order uL vL uR vR."""
+
+    frame_count: int
+    frame: Indices
+    id: NDArray[np.int64]
+    pixels: Floats
+
+    @classmethod
+    def from_rows(
+        cls, frame_count: int, frame: Indices, id: NDArray[np.int64], pixels: Floats
+    ) -> Tracks:
+        order = np.lexsort((id, frame))
+        return cls(frame_count, frame[order], id[order], pixels[order])
+
+    @classmethod
+    def from_dense(cls, features: Floats) -> Tracks:
+        """(4, M, T): M landmarks in T frames, all four -1 where absent; the id is the column."""
+        seen = ~(features == ABSENT).all(axis=0)
+        frame, id = np.nonzero(seen.T)
+        return cls(features.shape[2], frame, id.astype(np.int64), features[:, id, frame].T)
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def with_ids(self, id: NDArray[np.int64]) -> Tracks:
+        return self.from_rows(self.frame_count, self.frame, id, self.pixels)
+
+    def with_pixels(self, pixels: Floats) -> Tracks:
+        return replace(self, pixels=pixels)
+
+    def counts(self) -> NDArray[np.int64]:
+        """Observations of each frame."""
+        return np.bincount(self.frame, minlength=self.frame_count)
+
+    def bounds(self) -> NDArray[np.int64]:
+        """Frame k has the rows bounds[k] to bounds[k + 1]."""
+        return np.concatenate(([0], np.cumsum(self.counts())))
+
+    def pairs(self, lag: int) -> Pairs:
+        """All landmarks that are seen in frame k and, under the same id, in frame k + lag."""
+        stride = np.int64(self.id.max() + 1) if len(self) else np.int64(1)
+        key = self.frame * stride + self.id
+        wanted = key + lag * stride
+        at = np.searchsorted(key, wanted)
+        found = (at < len(key)) & (key[np.minimum(at, len(key) - 1)] == wanted)
+        first = np.nonzero(found)[0]
+        return Pairs(self.frame[first], first, at[first])
+
+    def check(self, source: str) -> None:
+        """Refuse what no recording can hold."""
+        if not len(self):
+            raise PelorusError(f"{source}: holds no observation at all")
+        if not np.isfinite(self.pixels).all():
+            row = int(np.nonzero(~np.isfinite(self.pixels).all(axis=1))[0][0])
+            raise PelorusError(
+                f"{source}: frame {self.frame[row]}, landmark {self.id[row]}: a pixel is not finite"
+            )
+        fullest = int(self.counts().max())
+        if fullest > OBSERVATIONS_MAX:
+            raise PelorusError(
+                f"{source}: a frame has {fullest} observations, "
+                f"at most {OBSERVATIONS_MAX} fit a STEREO frame"
+            )

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""The camera's motion between two frames from their common stereo tracks alone.
+
+Gauss-Newton on the reprojection of the first frame's points into the second, with the weights
+of Geman and McClure (1987) against bad matches; all frames at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.frames import Camera
+from pelorus.se3 import Floats, Poses
+from pelorus.tracks import Indices, Tracks, project, triangulate
+
+DISPARITY_MIN_PX = 1.0  # below it a triangulated depth means little
+ROW_GAP_MAX_PX = 2.0  # a rectified pair shows a point in one row; more is a bad match
+DEPTH_MIN_M = 0.5
+PAIRS_MIN = 10  # with fewer a motion is not trusted
+ITERATIONS = 12
+WIDE_ITERATIONS = 6  # the first ones accept larger residuals
+WIDE_PX, NARROW_PX = 10.0, 2.0
+RIDGE = 1e-3  # keeps frames without observations solvable
+STEP_MAX = 1.0  # m and rad an iteration
+
+
+@dataclass(frozen=True)
+class SeenPairs:
+    """Usable pairs of frames k and k + lag: pixels in both, points in camera k."""
+
+    frame_count: int  # number of k
+    frame: Indices
+    first_pixels: Floats
+    q_C: Floats
+    pixels: Floats
+
+    def counts(self) -> NDArray[np.int64]:
+        return np.bincount(self.frame, minlength=self.frame_count)
+
+    def reproject(self, camera: Camera, motion: Poses) -> Floats:
+        """RMS over the four pixel numbers of each pair, px; infinite behind the camera."""
+        q = np.einsum("nij,nj->ni", motion.R[self.frame], self.q_C) + motion.p[self.frame]
+        ahead = q[:, 2] > DEPTH_MIN_M
+        error = np.full(len(q), np.inf)
+        residual = project(camera, q[ahead]) - self.pixels[ahead]
+        error[ahead] = np.sqrt(np.mean(residual**2, axis=1))
+        return error
+
+    def median_by_frame(self, values: Floats, at_least: int = PAIRS_MIN) -> Floats:
+        """(frame_count,): the median of each frame's values, NaN with fewer than `at_least`."""
+        order = np.lexsort((values, self.frame))
+        counts = self.counts()
+        middle = np.concatenate(([0], np.cumsum(counts)[:-1])) + counts // 2
+        enough = counts >= at_least
+        out = np.full(self.frame_count, np.nan)
+        out[enough] = values[order][middle[enough]]
+        return out
+
+
+def seen_pairs(tracks: Tracks, camera: Camera, lag: int) -> SeenPairs:
+    """The pairs whose first pixels give a depth and whose rows agree."""
+    pairs = tracks.pairs(lag)
+    first, second = tracks.pixels[pairs.first], tracks.pixels[pairs.second]
+    good = (
+        (first[:, 0] - first[:, 2] > DISPARITY_MIN_PX)
+        & (second[:, 0] > second[:, 2])
+        & (np.abs(first[:, 1] - first[:, 3]) < ROW_GAP_MAX_PX)
+        & (np.abs(second[:, 1] - second[:, 3]) < ROW_GAP_MAX_PX)
+    )
+    frame_count = max(tracks.frame_count - lag, 0)
+    return SeenPairs(
+        frame_count,
+        pairs.frame[good],
+        first[good],
+        triangulate(camera, first[good]),
+        second[good],
+    )
+
+
+def estimate(seen: SeenPairs, camera: Camera) -> Poses:
+    """For each k the motion that brings coordinates in camera k to camera k + lag."""
+    motion = Poses(np.tile(np.eye(3), (seen.frame_count, 1, 1)), np.zeros((seen.frame_count, 3)))
+    for iteration in range(ITERATIONS):
+        scale_px = WIDE_PX if iteration < WIDE_ITERATIONS else NARROW_PX
+        step = se3.exp(*_gauss_newton(seen, camera, motion, scale_px))
+        motion = se3.compose(step, motion)
+    return Poses(se3.nearest_rotation(motion.R), motion.p)
+
+
+def _gauss_newton(
+    seen: SeenPairs, camera: Camera, motion: Poses, scale_px: float
+) -> tuple[Floats, Floats]:
+    """One robust step (rho, theta) on the left of each motion."""
+    q = np.einsum("nij,nj->ni", motion.R[seen.frame], seen.q_C) + motion.p[seen.frame]
+    ahead = q[:, 2] > DEPTH_MIN_M
+    q[:, 2] = np.maximum(q[:, 2], DEPTH_MIN_M)
+    residual = seen.pixels - project(camera, q)
+    weight = ahead / (1 + np.sum(residual**2, axis=1) / scale_px**2) ** 2
+    D = point_jacobian(camera, q)
+    J = np.concatenate((D, -D @ se3.skew(q)), axis=-1)
+    H = _sum_by_frame(seen, np.einsum("nai,naj,n->nij", J, J, weight)) + RIDGE * np.eye(6)
+    g = _sum_by_frame(seen, np.einsum("nai,na,n->ni", J, residual, weight))
+    step = np.clip(np.linalg.solve(H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
+    return step[:, :3], step[:, 3:]
+
+
+def point_jacobian(camera: Camera, q: Floats) -> Floats:
+    """d project / d q, (n, 4, 3)."""
+    x, y, z = q.T
+    D = np.zeros((len(q), 4, 3))
+    D[:, 0, 0] = D[:, 2, 0] = camera.fx_px / z
+    D[:, 1, 1] = D[:, 3, 1] = camera.fy_px / z
+    D[:, 0, 2] = -camera.fx_px * x / z**2
+    D[:, 2, 2] = -camera.fx_px * (x - camera.baseline_m) / z**2
+    D[:, 1, 2] = D[:, 3, 2] = -camera.fy_px * y / z**2
+    return D
+
+
+def _sum_by_frame(seen: SeenPairs, values: Floats) -> Floats:
+    counts = seen.counts()
+    out = np.zeros((seen.frame_count, *values.shape[1:]))
+    if len(values):
+        filled = counts > 0
+        starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
+        out[filled] = np.add.reduceat(values, starts[filled], axis=0)
+    return out

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: MIT
+"""Frames on the wire: sequence, CRC-32, COBS and delimiter (docs/REPLAY-FORMAT.md).
+
+`Reader` takes bytes in pieces of any size, as a UART or a file delivers them, and goes on behind
+damage; `Writer` is its counterpart. `Counts` says what was read and what was lost.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from pelorus import cobs
+from pelorus.errors import PelorusError
+from pelorus.frames import KINDS, End, Header, Kind, MalformedPayload, Message
+
+VERSION_MAJOR = 1
+DELIMITER = b"\0"
+BODY_BYTES_MIN = 7  # kind, sequence, CRC
+STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; bounds what is held
+SEQUENCE_MODULUS = 1 << 16
+FAULTS_KEPT = 100  # the first ones are remembered with their place, all are counted
+
+
+class VersionError(PelorusError):
+    """The recording is of a later major version."""
+
+
+class Received(NamedTuple):
+    """A good frame, and where in the stream it began."""
+
+    message: Message
+    sequence: int
+    offset: int
+
+
+class Fault(NamedTuple):
+    """A frame that was skipped."""
+
+    offset: int
+    what: str
+
+
+@dataclass
+class Counts:
+    """What a reader met. `missing` are the gaps of the sequence, damaged frames among them."""
+
+    bytes: int = 0
+    frames: Counter[Kind] = field(default_factory=Counter)
+    damaged: int = 0
+    unknown: int = 0
+    malformed: int = 0
+    too_long: int = 0
+    missing: int = 0
+    faults: list[Fault] = field(default_factory=list)
+
+    @property
+    def good(self) -> int:
+        return sum(self.frames.values())
+
+    @property
+    def clean(self) -> bool:
+        return not (self.damaged or self.unknown or self.malformed or self.too_long or self.missing)
+
+    @property
+    def ended(self) -> bool:
+        """Whether an END was read; without one the recording was cut short."""
+        return self.frames[Kind.END] > 0
+
+    def fault(self, offset: int, what: str) -> None:
+        if len(self.faults) < FAULTS_KEPT:
+            self.faults.append(Fault(offset, what))
+
+
+def encode(message: Message, sequence: int) -> bytes:
+    """One whole frame: COBS(kind, sequence, payload, CRC) and the delimiter."""
+    body = struct.pack("<BH", message.kind, sequence % SEQUENCE_MODULUS) + message.pack()
+    return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + DELIMITER
+
+
+class Reader:
+    """Turns a byte stream into messages. Feed it pieces, then `finish` it."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self._held = bytearray()
+        self._held_at = 0  # offset in the stream of the first held byte
+        self._overlong = False  # the held bytes are the rest of a frame that was given up
+        self._expected = 0
+
+    def feed(self, piece: bytes) -> Iterator[Received]:
+        """Yield the frames that `piece` completes."""
+        self.counts.bytes += len(piece)
+        self._held += piece
+        *whole, rest = bytes(self._held).split(DELIMITER)
+        self._held = bytearray(rest)
+        offset = self._held_at
+        self._held_at += sum(len(stuffed) + 1 for stuffed in whole)
+        for stuffed in whole:
+            received = self._frame(stuffed, offset)
+            offset += len(stuffed) + 1
+            if received is not None:
+                yield received
+        self._give_up_on_overlong()
+
+    def finish(self) -> None:
+        """The stream is over: a frame that lacks its delimiter was cut off, hence damaged."""
+        if self._held and not self._overlong:
+            self._damaged(self._held_at, "cut off by the end of the stream")
+        self._held.clear()
+
+    def _give_up_on_overlong(self) -> None:
+        if len(self._held) <= STUFFED_BYTES_MAX:
+            return
+        if not self._overlong:
+            self._overlong = True
+            self._too_long(self._held_at)
+        self._held_at += len(self._held)
+        self._held.clear()
+
+    def _frame(self, stuffed: bytes, offset: int) -> Received | None:
+        if self._overlong:  # already counted; this is its tail
+            self._overlong = False
+            return None
+        if len(stuffed) > STUFFED_BYTES_MAX:
+            self._too_long(offset)
+            return None
+        content = self._checked(stuffed, offset) if stuffed else None
+        if content is None:
+            return None
+        kind, sequence = struct.unpack_from("<BH", content)
+        self._count_missing(sequence)
+        return self._message(kind, sequence, content[3:], offset)
+
+    def _checked(self, stuffed: bytes, offset: int) -> bytes | None:
+        """Kind, sequence and payload of an undamaged frame."""
+        body = cobs.decode(stuffed)
+        if body is None:
+            self._damaged(offset, "not valid COBS")
+        elif len(body) < BODY_BYTES_MIN:
+            self._damaged(offset, f"{len(body)} bytes, at least {BODY_BYTES_MIN} are due")
+        elif zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+            self._damaged(offset, "the CRC does not fit")
+        else:
+            return body[:-4]
+        return None
+
+    def _message(self, kind: int, sequence: int, payload: bytes, offset: int) -> Received | None:
+        if kind not in KINDS:
+            self.counts.unknown += 1
+            self.counts.fault(offset, f"unknown kind {kind}")
+            return None
+        if kind == Kind.HEADER and payload and payload[0] > VERSION_MAJOR:
+            raise VersionError(
+                f"byte {offset}: the recording is of format version {payload[0]}, "
+                f"this reader knows up to {VERSION_MAJOR}"
+            )
+        try:
+            message = KINDS[kind].unpack(payload)
+        except MalformedPayload as error:
+            self.counts.malformed += 1
+            self.counts.fault(offset, f"malformed {Kind(kind).name}: {error}")
+            return None
+        self.counts.frames[Kind(kind)] += 1
+        return Received(message, sequence, offset)
+
+    def _count_missing(self, sequence: int) -> None:
+        """A step back, as after a sender's restart, is no gap of almost 2^16 frames."""
+        gap = (sequence - self._expected) % SEQUENCE_MODULUS
+        if gap < SEQUENCE_MODULUS // 2:
+            self.counts.missing += gap
+        self._expected = (sequence + 1) % SEQUENCE_MODULUS
+
+    def _damaged(self, offset: int, what: str) -> None:
+        self.counts.damaged += 1
+        self.counts.fault(offset, f"damaged: {what}")
+
+    def _too_long(self, offset: int) -> None:
+        self.counts.too_long += 1
+        self.counts.fault(offset, f"longer than {STUFFED_BYTES_MAX} bytes")
+
+
+class Writer:
+    """Writes messages as frames, counts them, and closes the stream with END."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._counts: Counter[Kind] = Counter()
+
+    def write(self, message: Message) -> None:
+        self._stream.write(encode(message, sum(self._counts.values())))
+        self._counts[message.kind] += 1
+
+    def end(self) -> None:
+        counts = self._counts
+        self.write(
+            End(
+                twists=counts[Kind.TWIST],
+                stereos=counts[Kind.STEREO],
+                truths=counts[Kind.TRUTH],
+                landmarks=counts[Kind.LANDMARK],
+                frames=sum(counts.values()),
+            )
+        )
+
+
+def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], Counts]:
+    """All good frames of a file, and the counts. Raises PelorusError where nothing can be read."""
+    reader = Reader()
+    received: list[Received] = []
+    try:
+        with path.open("rb") as stream:
+            while piece := stream.read(piece_bytes):
+                received.extend(reader.feed(piece))
+    except OSError as error:
+        raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
+    except VersionError as error:
+        raise VersionError(f"{path}: {error}") from None
+    reader.finish()
+    if not reader.counts.bytes:
+        raise PelorusError(f"{path}: the file is empty, a recording begins with a HEADER frame")
+    if not received:
+        raise PelorusError(
+            f"{path}: holds no frame in {reader.counts.bytes} bytes; this is no .plr recording"
+        )
+    return received, reader.counts
+
+
+def header_of(received: list[Received], path: Path) -> Header:
+    """The first HEADER; without one nothing in the recording has a meaning."""
+    for frame in received:
+        if isinstance(frame.message, Header):
+            return frame.message
+    raise PelorusError(f"{path}: holds no HEADER frame; without the calibration it is of no use")
