@@ -200,7 +200,7 @@ typedef struct plr_cobs_decoder {
 } plr_cobs_decoder;
 
 typedef struct plr_cobs_encoder {
-    uint8_t block[256]; /* code byte, at most 254 data bytes, delimiter */
+    uint8_t block[255]; /* code byte and data bytes; at the end, the delimiter */
     uint8_t fill;       /* bytes of the open block with its code byte; 0: no block is open */
 } plr_cobs_encoder;
 
@@ -243,7 +243,7 @@ bool plr_reader_mid_frame(const plr_reader *r);
 
 /* --- writing --- */
 
-/* Takes n bytes, 1 to 256: 0 = all taken, else a failure, which the writer returns as PLR_E_IO. */
+/* Takes n bytes, 1 to 255: 0 = all taken, else a failure, which the writer returns as PLR_E_IO. */
 typedef int (*plr_write_function)(void *context, const uint8_t *bytes, size_t n);
 
 typedef struct plr_writer {

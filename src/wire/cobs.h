@@ -34,7 +34,7 @@ void plr_cobs_begin(plr_cobs_encoder *e);
  * that the block is the encoder's again. */
 unsigned plr_cobs_encode(plr_cobs_encoder *e, uint8_t data);
 
-/* Ends the frame: the bytes of e->block still to be sent, the delimiter last, 1 to 256. */
+/* Ends the frame: the bytes of e->block still to be sent, the delimiter last, 1 to 255. */
 unsigned plr_cobs_end(plr_cobs_encoder *e);
 
 #endif

@@ -5,7 +5,8 @@
 #include <unity.h>
 
 byte_sink byte_sink_over(uint8_t *bytes, size_t capacity) {
-    return (byte_sink){.bytes = bytes, .capacity = capacity, .fail_at = capacity};
+    return (byte_sink){
+        .bytes = bytes, .capacity = capacity, .fail_at = capacity, .shortest_call = capacity};
 }
 
 int byte_sink_write(void *sink, const uint8_t *bytes, size_t n) {
@@ -16,6 +17,8 @@ int byte_sink_write(void *sink, const uint8_t *bytes, size_t n) {
     s->calls++;
     if (n > s->longest_call)
         s->longest_call = n;
+    if (n < s->shortest_call)
+        s->shortest_call = n;
     return fits < n;
 }
 

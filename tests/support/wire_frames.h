@@ -16,7 +16,7 @@ typedef struct byte_sink {
     uint8_t *bytes;
     size_t capacity, length, fail_at;
     unsigned calls;
-    size_t longest_call;
+    size_t longest_call, shortest_call;
 } byte_sink;
 
 /* A sink that fails at its capacity only. */

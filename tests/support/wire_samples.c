@@ -9,8 +9,9 @@
 /* --- making --- */
 
 /* Reals that a careless codec would lose. */
-static const double extreme[] = {NAN,     INFINITY,    -INFINITY, DBL_MAX, -DBL_MAX,
-                                 DBL_MIN, 4.9407e-324, -0.0,      0.0,     DBL_EPSILON};
+static const double extreme[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, DBL_MAX,
+                                 -DBL_MAX,    DBL_MIN,          4.9407e-324,       -0.0,
+                                 0.0,         DBL_EPSILON};
 static const float extreme_f32[] = {NAN,     INFINITY, -INFINITY, FLT_MAX, -FLT_MAX,
                                     FLT_MIN, 1.4e-45F, -0.0F,     0.0F,    FLT_EPSILON};
 
@@ -104,7 +105,7 @@ static void make_config(plr_config_message *m, unsigned variant) {
     m->block_observations = whole8(variant, UINT8_MAX, 8);
     m->real_bytes = whole8(variant, UINT8_MAX, 4);
     m->count = whole8(variant, PLR_WIRE_MAX_SETTINGS, 5);
-    for (unsigned i = 0; i < m->count; i++) {
+    for (unsigned i = 0; i < PLR_WIRE_MAX_SETTINGS; i++) {
         m->settings[i].id = (uint8_t)(255 - i);
         m->settings[i].value = real_of(variant, i);
     }
