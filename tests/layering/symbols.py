@@ -13,33 +13,46 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import dataclass
 
 ALLOWED = {"memcpy", "memmove", "memset", "memcmp", "strcmp", "strlen"}
 # Put there by the compiler or linker, not by a source.
 MACHINERY = {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+# Constants that hold addresses, in position-independent code: read-only once the loader has run.
+RELOCATED_CONSTANTS = ".data.rel.ro"
 
 
-def symbols(nm: str, library: str) -> list[tuple[str, str]]:
-    """(type letter, name) of every symbol."""
+@dataclass(frozen=True)
+class Symbol:
+    """One line of nm."""
+
+    name: str
+    letter: str
+    section: str
+
+
+def symbols(nm: str, library: str) -> list[Symbol]:
+    """Every symbol of the library."""
     lines = subprocess.run(
-        [nm, library], capture_output=True, text=True, check=True
+        [nm, "--format=sysv", library], capture_output=True, text=True, check=True
     ).stdout.splitlines()
-    words = [line.split() for line in lines if line.strip() and not line.endswith(":")]
-    return [(word[-2], word[-1]) for word in words if len(word) >= 2]
+    rows = [[cell.strip() for cell in line.split("|")] for line in lines]
+    return [Symbol(row[0], row[2], row[6]) for row in rows if len(row) == 7]
 
 
-def breaches(found: list[tuple[str, str]]) -> list[str]:
+def breaches(found: list[Symbol]) -> list[str]:
     """A sentence for every symbol that should not be there."""
-    defined = {name for letter, name in found if letter not in "Uw"}
-    texts = []
-    for letter, name in sorted(set(found)):
+    defined = {symbol.name for symbol in found if symbol.letter not in "Uw"}
+    texts = set()
+    for symbol in found:
+        name, letter = symbol.name, symbol.letter
         if letter in "Uw" and name not in defined | ALLOWED | MACHINERY:
-            texts.append(f"needs {name} from outside")
-        if letter in "dDbBCsSgG":
-            texts.append(f"{name} is writable data (nm: {letter})")
-        if letter in "TRDBVW" and not name.startswith("plr_"):
-            texts.append(f"defines {name}, which does not begin with plr_")
-    return texts
+            texts.add(f"needs {name} from outside")
+        if letter in "dDbBCsSgG" and not symbol.section.startswith(RELOCATED_CONSTANTS):
+            texts.add(f"{name} is writable data (section {symbol.section})")
+        if letter in "TRDBVWC" and not name.startswith("plr_"):
+            texts.add(f"defines {name}, which does not begin with plr_")
+    return sorted(texts)
 
 
 def main() -> int:
@@ -51,7 +64,7 @@ def main() -> int:
     texts = breaches(found)
     for text in texts:
         print(f"{sys.argv[2]}: {text}")
-    functions = sum(letter == "T" for letter, _ in found)
+    functions = sum(symbol.letter == "T" for symbol in found)
     print(f"{functions} functions, {len(texts)} breaches")
     return 1 if texts or functions == 0 else 0
 
