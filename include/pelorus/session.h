@@ -82,7 +82,7 @@ typedef struct plr_session_observer {
     void (*truth)(void *context, const plr_truth *truth);
     void (*landmark)(void *context, const plr_landmark_message *landmark);
     void (*text)(void *context, const plr_text *text); /* the session's own */
-    /* Something was refused. `culprit` is the setting to change, NULL where it is not one. */
+    /* A message was refused. (Frames that are no message: PLR_STEP_SKIPPED.) `culprit` is the setting to change, NULL where it is not one. */
     void (*refused)(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                     const plr_setting *culprit);
 } plr_session_observer;
@@ -114,7 +114,8 @@ typedef enum plr_step {
 /* Counts since init or since the HEADER that followed an END. */
 typedef struct plr_session_totals {
     uint32_t twists, stereos, truths, landmarks; /* received */
-    uint32_t refused;                            /* messages refused, of whatever kind */
+    uint32_t refused;                            /* messages refused, of whatever kind; what the
+                                                    reader skips is in reader.counts */
     uint32_t without_truth;                      /* mapping: frames without a TRUTH of their time */
     uint32_t reanchored;                         /* times a jump of the clock was followed */
     uint32_t held_short;    /* twists not held as long as asked: more than fit */

@@ -92,24 +92,30 @@ static void tell(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_send_text(s);
 }
 
-plr_status plr_reanchor(plr_session *s, plr_time_ns t_ns) {
-    plr_filter *f = &s->filter;
+/* The last pose at t_ns, with what is then known of it. */
+static plr_status carry_pose(plr_filter *f, plr_time_ns t_ns, double seconds) {
     plr_pose pose;
     double P[36];
-    const plr_time_ns from_ns = plr_filter_time(f);
-    const double seconds = (double)distance_ns(from_ns, t_ns) * 1e-9;
-
     plr_status status = plr_filter_pose(f, &pose);
     if (status == PLR_OK)
         status = widen(P, f, seconds);
-    if (status != PLR_OK)
-        return status;
-    (void)plr_filter_flush_map(f); /* the session's sink takes all */
-    status = plr_filter_set_pose(f, t_ns, &pose, P);
+    if (status == PLR_OK)
+        status = plr_filter_set_pose(f, t_ns, &pose, P);
     if (status == PLR_E_ARGUMENT) {
         know_nothing(P);
         status = plr_filter_set_pose(f, t_ns, &pose, P);
     }
+    return status;
+}
+
+plr_status plr_reanchor(plr_session *s, plr_time_ns t_ns) {
+    plr_filter *f = &s->filter;
+    const plr_time_ns from_ns = plr_filter_time(f);
+    const double seconds = (double)distance_ns(from_ns, t_ns) * 1e-9;
+
+    (void)plr_filter_flush_map(f); /* the session's sink takes all */
+    const bool mapping = plr_filter_config(f)->mode == PLR_MODE_MAPPING;
+    const plr_status status = mapping ? plr_filter_reset(f) : carry_pose(f, t_ns, seconds);
     if (status == PLR_OK) {
         s->totals.reanchored++;
         tell(s, from_ns, t_ns);

@@ -19,6 +19,8 @@
  *   ((w + sigma_w) gap)^2, at most pi^2 / 3, the variance of an angle of which nothing is known.
  *   The gap is the whole jump: how much of it is the clock's alone the session cannot know.
  *
+ *   In mapping every pose is given, so there the filter just begins anew.
+ *
  * The third message is then taken. It is counted, and told in a TEXT.
  */
 #ifndef PLR_SESSION_REANCHOR_H

@@ -19,8 +19,11 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 /* The report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
 
-/* Something was refused: counted, shown, and sent as a REPORT with the health of the last frame.
- * `culprit` is the setting to change, or NULL. */
+/* A REPORT that says what was refused, with the health of the last frame. */
+void plr_send_refusal_report(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status);
+
+/* A message was refused: counted, shown, and sent as a REPORT. `culprit` is the setting to change,
+ * or NULL. */
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                       const plr_setting *culprit);
 

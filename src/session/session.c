@@ -62,9 +62,7 @@ static void answer_skip(plr_session *s) {
     const plr_kind subject =
         why == PLR_SKIP_DAMAGED ? PLR_KIND_NONE : (plr_kind)s->reader.skipped_kind;
     if (why != (plr_skip)s->last_skip)
-        plr_send_refusal(s, subject, 0, statuses[why], NULL);
-    else
-        s->totals.refused++;
+        plr_send_refusal_report(s, subject, 0, statuses[why]);
     s->last_skip = (uint8_t)why;
 }
 

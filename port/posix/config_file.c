@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include "posix/config_file.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "posix/settings_text.h"
+
+#define BLANKS " \t\r\n"
+
+enum { LINE_SIZE = 512 };
+
+/* Cuts blanks off both ends, in place. */
+static char *trim(char *text) {
+    text += strspn(text, BLANKS);
+    size_t n = strlen(text);
+    while (n > 0 && strchr(BLANKS, text[n - 1]) != NULL)
+        n--;
+    text[n] = '\0';
+    return text;
+}
+
+/* One line without its comment. */
+static bool take_line(char *line, setting_list *list, char *problem) {
+    char *name = trim(line);
+    if (*name == '\0')
+        return true;
+    char *equals = strchr(name, '=');
+    if (equals == NULL) {
+        snprintf(problem, PROBLEM_SIZE, "%.64s: should be `name = value`", name);
+        return false;
+    }
+    *equals = '\0';
+    name = trim(name);
+    if (!setting_list_knows(name)) {
+        snprintf(problem, PROBLEM_SIZE,
+                 "%.64s is not a setting: --print-config lists them, and gate, preset, start and "
+                 "deadline are taken too",
+                 name);
+        return false;
+    }
+    return setting_list_put(list, name, trim(equals + 1), problem);
+}
+
+static bool take_file(FILE *file, const char *path, setting_list *list, char *problem) {
+    char line[LINE_SIZE], cause[PROBLEM_SIZE];
+    for (unsigned number = 1; fgets(line, sizeof line, file) != NULL; number++) {
+        bool good = strchr(line, '\n') != NULL || feof(file);
+        if (!good)
+            snprintf(cause, sizeof cause, "the line is longer than %d characters", LINE_SIZE - 2);
+        line[strcspn(line, "#")] = '\0';
+        good = good && take_line(line, list, cause);
+        if (!good) {
+            snprintf(problem, PROBLEM_SIZE, "%.128s, line %u: %.300s", path, number, cause);
+            return false;
+        }
+    }
+    if (ferror(file)) {
+        snprintf(problem, PROBLEM_SIZE, "%.128s: %s", path, strerror(errno));
+        return false;
+    }
+    return true;
+}
+
+bool config_file_read(const char *path, setting_list *list, char problem[PROBLEM_SIZE]) {
+    FILE *file = fopen(path, "r");
+    if (file == NULL) {
+        snprintf(problem, PROBLEM_SIZE, "%.256s: %s", path, strerror(errno));
+        return false;
+    }
+    const bool good = take_file(file, path, list, problem);
+    fclose(file);
+    return good;
+}
+
+void config_file_print(const plr_config *config) {
+    for (unsigned i = 0; i < plr_setting_count(); i++) {
+        const plr_setting *setting = plr_setting_at(i);
+        char value[64], pair[128];
+        setting_value_to_text(setting, plr_config_get(config, setting), value, sizeof value);
+        snprintf(pair, sizeof pair, "%s = %s", setting->name, value);
+        printf("%-36s # %s%s%s\n", pair, setting->unit, setting->unit[0] != '\0' ? ": " : "",
+               setting->about);
+    }
+}

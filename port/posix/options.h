@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+/* The command line of pelorus-replay. */
+#ifndef PELORUS_POSIX_OPTIONS_H
+#define PELORUS_POSIX_OPTIONS_H
+
+#include "posix/setting_list.h"
+
+typedef struct replay_options {
+    const char *input; /* "-" is the standard input; NULL if none was given */
+    const char *config, *trajectory, *map, *frames, *out; /* paths, NULL where not wanted */
+    bool print_config, json, quiet, help, version;
+
+    /* From config file and command line, in the order of their precedence. */
+    plr_wire_setting overrides[4 * SETTING_LIST_MAX];
+    unsigned override_count;
+    plr_start_choice start;
+    uint32_t deadline_us;
+} replay_options;
+
+/* Reads the command line, and the config file that it names. On false, `problem` says what is wrong
+ * and what would be right. */
+bool options_parse(replay_options *options, int argc, char *const *argv,
+                   char problem[PROBLEM_SIZE]);
+
+/* The long options that are not settings, for the help text; NULL beyond the last. */
+typedef struct option_description {
+    const char *name;
+    const char *value; /* what stands behind it; NULL: nothing does */
+    const char *about;
+} option_description;
+
+const option_description *options_describe(unsigned index);
+
+#endif

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+/* A line on the terminal that shows how far the replay is. Nothing where stderr is no terminal. */
+#ifndef PELORUS_POSIX_PROGRESS_H
+#define PELORUS_POSIX_PROGRESS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct progress {
+    bool shown;
+    uint64_t total_bytes; /* 0: not known */
+    uint64_t start_ns, drawn_ns;
+} progress;
+
+void progress_begin(progress *p, bool wanted, uint64_t total_bytes);
+
+/* Draws the line anew, at most ten times a second. */
+void progress_show(progress *p, uint64_t bytes, uint64_t frames);
+
+/* Takes the line away: before other words are printed, and at the end. */
+void progress_clear(const progress *p);
+
+#endif

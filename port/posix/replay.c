@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: MIT
+#include "posix/replay.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "posix/complaints.h"
+#include "posix/config_file.h"
+#include "posix/file_port.h"
+#include "posix/help.h"
+#include "posix/options.h"
+#include "posix/progress.h"
+#include "posix/result_file.h"
+#include "posix/summary.h"
+#include "posix/tables.h"
+
+enum {
+    KNOWN_LANDMARKS = 1 << 16,
+    FOREIGN_BYTES = 1 << 20 /* without one good frame: no recording */
+};
+
+/* Everything that one run needs; too large for a stack. */
+typedef struct replay {
+    replay_options options;
+    plr_session session;
+    plr_landmark known[KNOWN_LANDMARKS];
+    file_port port;
+    result_file trajectory, map, frames, out;
+    samples landmarks; /* plr_landmark_message */
+    summary summary;
+    complaints complaints;
+    progress progress;
+    bool started, future, failed, foreign;
+    plr_status init_status; /* why the filter did not start */
+    char culprit[64];       /* setting to change, "" where it is not one */
+} replay;
+
+/* --- what the session shows --- */
+
+static void on_started(void *context) {
+    replay *run = context;
+    run->started = true;
+}
+
+/* Trace of the whole covariance. In dead reckoning it is put together from parts that leave the
+ * filter's pending motion alone, so that no output changes the bits of another. */
+static double whole_trace(replay *run, const plr_pose_message *pose, const double P_b[36]) {
+    plr_filter *f = &run->session.filter;
+    double trace = 0;
+    if (plr_filter_config(f)->mode != PLR_MODE_DEAD_RECKONING)
+        return plr_filter_trace(f);
+    for (int i = 0; i < 6; i++)
+        trace += pose->P_xi[i * (i + 3) / 2] + P_b[7 * i];
+    return trace;
+}
+
+static void put_frame_row(replay *run, const plr_frame_result *result) {
+    double bias[6], P_b[36] = {0}, variances[6] = {0}, trace = 0;
+    if (run->frames.file == NULL)
+        return;
+    if (result->pose != NULL && plr_filter_bias(&run->session.filter, bias, P_b) == PLR_OK) {
+        for (int i = 0; i < 6; i++)
+            variances[i] = P_b[7 * i];
+        trace = whole_trace(run, result->pose, P_b);
+    }
+    frames_put(run->frames.file, result, trace, variances);
+}
+
+static void on_frame(void *context, const plr_frame_result *result) {
+    replay *run = context;
+    summary_add_frame(&run->summary, result);
+    if (result->pose != NULL)
+        trajectory_put(run->trajectory.file, result->pose);
+    put_frame_row(run, result);
+    complaints_observations(&run->complaints, run->session.totals.stereos, result->report);
+}
+
+static void on_truth(void *context, const plr_truth *truth) {
+    replay *run = context;
+    evaluation_add_truth(&run->summary.evaluation, truth);
+}
+
+static void on_landmark(void *context, const plr_landmark_message *landmark) {
+    replay *run = context;
+    if (run->map.file != NULL)
+        samples_add(&run->landmarks, landmark);
+}
+
+static void on_text(void *context, const plr_text *text) {
+    replay *run = context;
+    if (text->severity != PLR_SEVERITY_INFO)
+        run->summary.warnings++;
+    progress_clear(&run->progress);
+    complaints_say(&run->complaints, text->text);
+}
+
+static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
+    switch (kind) {
+    case PLR_KIND_TWIST:
+        return totals->twists;
+    case PLR_KIND_STEREO:
+        return totals->stereos;
+    case PLR_KIND_TRUTH:
+        return totals->truths;
+    case PLR_KIND_LANDMARK:
+        return totals->landmarks;
+    default:
+        return 0;
+    }
+}
+
+static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                       const plr_setting *culprit) {
+    replay *run = context;
+    if (run->session.init_failed && run->init_status == PLR_OK) {
+        run->init_status = status; /* told at the end */
+        if (culprit != NULL)
+            snprintf(run->culprit, sizeof run->culprit, "%s", culprit->name);
+        return;
+    }
+    progress_clear(&run->progress);
+    complaints_refused(&run->complaints, subject, number_of(&run->session.totals, subject), t_ns,
+                       status, culprit);
+}
+
+/* --- the run --- */
+
+static bool open_outputs(replay *run) {
+    const replay_options *o = &run->options;
+    if (o->print_config)
+        return true; /* nothing is computed */
+    return result_file_open(&run->trajectory, o->trajectory, o->input) &&
+           result_file_open(&run->map, o->map, o->input) &&
+           result_file_open(&run->frames, o->frames, o->input) &&
+           result_file_open(&run->out, o->out, o->input);
+}
+
+static bool close_outputs(replay *run) {
+    map_put(run->map.file, &run->landmarks);
+    bool good = result_file_close(&run->trajectory);
+    good = result_file_close(&run->map) && good;
+    good = result_file_close(&run->frames) && good;
+    good = result_file_close(&run->out) && good;
+    return good;
+}
+
+static plr_status start_session(replay *run) {
+    const plr_port port = file_port_functions(&run->port);
+    plr_session_options options;
+    plr_session_options_default(&options);
+    options.overrides = run->options.overrides;
+    options.override_count = run->options.override_count;
+    options.start = run->options.start;
+    options.deadline_us = run->options.deadline_us;
+    options.output |= PLR_OUTPUT_ECHO;
+    options.known = run->known;
+    options.known_capacity = KNOWN_LANDMARKS;
+    options.observer = (plr_session_observer){.context = run,
+                                              .started = on_started,
+                                              .frame = on_frame,
+                                              .truth = on_truth,
+                                              .landmark = on_landmark,
+                                              .text = on_text,
+                                              .refused = on_refused};
+    return plr_session_init(&run->session, &port, &options);
+}
+
+/* True as long as there is a reason to go on. */
+static bool take_step(replay *run) {
+    const plr_reader_counts *counts = &run->session.reader.counts;
+    switch (plr_session_step(&run->session)) {
+    case PLR_STEP_CLOSED:
+        return false;
+    case PLR_STEP_FAILED:
+        run->failed = true;
+        return false;
+    case PLR_STEP_FUTURE:
+        run->future = true;
+        return run->started; /* in the midst of a recording it is just refused */
+    case PLR_STEP_ENDED:
+        run->summary.ended = true;
+        return false;
+    case PLR_STEP_SKIPPED:
+        progress_clear(&run->progress);
+        complaints_skipped(&run->complaints, &run->session.reader);
+        break;
+    case PLR_STEP_IDLE:
+    case PLR_STEP_BYTES:
+    case PLR_STEP_MESSAGE:
+        break;
+    }
+    run->foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
+    progress_show(&run->progress, counts->bytes, run->summary.frames);
+    return !run->foreign && run->init_status == PLR_OK &&
+           !(run->started && run->options.print_config);
+}
+
+static void tell_ending(replay *run) {
+    const plr_session *s = &run->session;
+    char words[128];
+    if (run->summary.cut_in_frame) {
+        snprintf(words, sizeof words, "ends in the middle of a frame, at byte %" PRIu64,
+                 s->reader.counts.bytes);
+        complaints_say(&run->complaints, words);
+    }
+    if (!run->summary.ended)
+        complaints_say(&run->complaints, "has no END: it was cut short; what is there was used");
+    else if (s->chunk_at < s->chunk_count || run->port.at < run->port.count)
+        complaints_say(&run->complaints, "goes on behind END; that was not read");
+    if (run->summary.frames > 1 && run->summary.used == 0 &&
+        plr_filter_config(&s->filter)->mode <= PLR_MODE_LOCALIZATION &&
+        plr_filter_config(&s->filter)->mode != PLR_MODE_MAPPING)
+        complaints_say(&run->complaints,
+                       "not one observation was used: the result is dead reckoning");
+    complaints_end(&run->complaints);
+}
+
+static void read_recording(replay *run) {
+    const uint64_t begin = monotonic_ns();
+    frames_put_titles(run->frames.file);
+    progress_begin(&run->progress, !run->options.quiet && !run->options.print_config,
+                   run->port.size);
+    while (take_step(run))
+        continue;
+    run->summary.cut_in_frame = plr_reader_mid_frame(&run->session.reader);
+    if (!run->summary.ended && run->started && !run->options.print_config)
+        plr_session_finish(&run->session);
+    run->summary.wall_s = (double)(monotonic_ns() - begin) * 1e-9;
+    progress_clear(&run->progress);
+}
+
+/* --- what it came to --- */
+
+static int complain(const replay *run, int status, const char *words) {
+    fprintf(stderr, PELORUS_NAME ": %s: %s\n", run->options.input, words);
+    return status;
+}
+
+static int explain_no_start(const replay *run) {
+    char words[256];
+    if (run->init_status == PLR_E_CONFIG) {
+        snprintf(words, sizeof words,
+                 "the settings in force make no sense together: change %.64s (--print-config shows "
+                 "them, --help their limits)",
+                 run->culprit[0] != '\0' ? run->culprit : "one of them");
+        return complain(run, REPLAY_EXIT_USAGE, words);
+    }
+    snprintf(words, sizeof words, "HEADER: %.200s", plr_status_text(run->init_status));
+    return complain(run, REPLAY_EXIT_RECORDING, words);
+}
+
+/* Why nothing useful was done; REPLAY_EXIT_OK if something was. */
+static int judge_recording(const replay *run) {
+    const plr_session *s = &run->session;
+    const plr_reader_counts *counts = &s->reader.counts;
+    char words[256];
+    if (run->failed)
+        return complain(run, REPLAY_EXIT_RECORDING, strerror(run->port.read_error));
+    if (run->future && !run->started) {
+        snprintf(words, sizeof words,
+                 "is written in version %u of the format, and this program reads version %u: take "
+                 "a later one",
+                 (unsigned)s->in.as.header.version_major, (unsigned)PLR_WIRE_VERSION_MAJOR);
+        return complain(run, REPLAY_EXIT_RECORDING, words);
+    }
+    if (counts->bytes == 0)
+        return complain(run, REPLAY_EXIT_RECORDING, "is empty");
+    if (counts->frames == 0) {
+        snprintf(words, sizeof words,
+                 "is not a Pelorus recording: not one good frame in its first %" PRIu64 " bytes",
+                 counts->bytes);
+        return complain(run, REPLAY_EXIT_RECORDING, words);
+    }
+    if (run->init_status != PLR_OK)
+        return explain_no_start(run);
+    if (s->header.version_major == 0) {
+        snprintf(words, sizeof words,
+                 "has no HEADER among its %" PRIu32 " good frames, so the camera is not known",
+                 counts->frames);
+        return complain(run, REPLAY_EXIT_RECORDING, words);
+    }
+    if (!run->started)
+        return complain(run, REPLAY_EXIT_RECORDING, "holds no data: neither TWIST nor STEREO");
+    return REPLAY_EXIT_OK;
+}
+
+static int judge_frames(const replay *run) {
+    char words[128];
+    if (run->summary.frames > 0)
+        return REPLAY_EXIT_OK;
+    snprintf(words, sizeof words, "no frame could be used: %" PRIu32 " STEREO, %" PRIu64 " refused",
+             run->session.totals.stereos, run->summary.frames_refused);
+    return complain(run, REPLAY_EXIT_RECORDING, words);
+}
+
+static bool print_results(replay *run) {
+    const replay_options *o = &run->options;
+    const char *path = o->input;
+    if (o->json)
+        summary_print_json(&run->summary, &run->session, path);
+    else if (!o->quiet)
+        summary_print(&run->summary, &run->session, path);
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return true;
+    fprintf(stderr, PELORUS_NAME ": standard output: %s\n", strerror(errno));
+    return false;
+}
+
+static bool memory_sufficed(const replay *run) {
+    const samples *lists[] = {&run->landmarks, &run->summary.compute_us,
+                              &run->summary.evaluation.estimates, &run->summary.evaluation.truths};
+    for (unsigned i = 0; i < sizeof lists / sizeof lists[0]; i++)
+        if (lists[i]->out_of_memory) {
+            fprintf(stderr, PELORUS_NAME ": out of memory: map and figures are not complete\n");
+            return false;
+        }
+    return true;
+}
+
+static int run_recording(replay *run) {
+    read_recording(run);
+    int status = judge_recording(run);
+    if (status == REPLAY_EXIT_OK && run->options.print_config) {
+        config_file_print(plr_filter_config(&run->session.filter));
+        return fflush(stdout) == 0 ? REPLAY_EXIT_OK : REPLAY_EXIT_OUTPUT;
+    }
+    if (status == REPLAY_EXIT_OK) {
+        tell_ending(run);
+        status = judge_frames(run);
+    }
+    const bool printed = status != REPLAY_EXIT_OK || print_results(run);
+    const bool written = close_outputs(run);
+    const bool complete = memory_sufficed(run);
+    return status == REPLAY_EXIT_OK && !(printed && written && complete) ? REPLAY_EXIT_OUTPUT
+                                                                         : status;
+}
+
+/* --print-config without a recording: what options and file alone give. */
+static int print_settings(const replay_options *options) {
+    plr_config config;
+    const plr_setting *culprit = NULL;
+    plr_config_default(&config);
+    for (unsigned i = 0; i < options->override_count; i++)
+        (void)plr_config_set(&config, plr_setting_by_id(options->overrides[i].id),
+                             options->overrides[i].value);
+    if (plr_config_check(&config, &culprit) != PLR_OK) {
+        fprintf(stderr, PELORUS_NAME ": the settings make no sense together: change %s\n",
+                culprit != NULL ? culprit->name : "one of them");
+        return REPLAY_EXIT_USAGE;
+    }
+    config_file_print(&config);
+    return REPLAY_EXIT_OK;
+}
+
+static int usage_error(const char *problem) {
+    fprintf(stderr, PELORUS_NAME ": %s\n", problem);
+    return REPLAY_EXIT_USAGE;
+}
+
+static int open_and_run(replay *run) {
+    const replay_options *o = &run->options;
+    int status = REPLAY_EXIT_OUTPUT;
+    if (!file_port_open(&run->port, o->input))
+        return complain(run, REPLAY_EXIT_RECORDING, strerror(errno));
+    samples_init(&run->landmarks, sizeof(plr_landmark_message));
+    summary_init(&run->summary);
+    complaints_init(&run->complaints, o->input, o->quiet);
+    if (open_outputs(run)) {
+        run->port.output = run->out.file;
+        status = start_session(run) == PLR_OK
+                     ? run_recording(run)
+                     : usage_error("the settings asked for are outside their limits");
+    }
+    summary_free(&run->summary);
+    samples_free(&run->landmarks);
+    file_port_close(&run->port);
+    return status;
+}
+
+int replay_main(int argc, char **argv) {
+    static replay run;
+    char problem[PROBLEM_SIZE];
+    if (!options_parse(&run.options, argc, argv, problem))
+        return usage_error(problem);
+    if (run.options.help) {
+        help_print();
+        return REPLAY_EXIT_OK;
+    }
+    if (run.options.version) {
+        help_print_version();
+        return REPLAY_EXIT_OK;
+    }
+    if (run.options.input == NULL && run.options.print_config)
+        return print_settings(&run.options);
+    if (run.options.input == NULL)
+        return usage_error("no recording was given: " PELORUS_NAME " IN.plr [options]; --help "
+                           "tells more");
+    return open_and_run(&run);
+}

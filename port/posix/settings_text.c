@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+#include "posix/settings_text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool text_to_number(const char *text, double *number) {
+    char *end;
+    if (text[strspn(text, "+-.0123456789eE")] != '\0')
+        return false; /* strtod would also take blanks, words and hexadecimals */
+    const double parsed = strtod(text, &end);
+    if (end == text || *end != '\0' || !isfinite(parsed))
+        return false;
+    *number = parsed;
+    return true;
+}
+
+static bool choice_from_text(const char *const *choices, const char *text, double *value) {
+    for (unsigned i = 0; choices[i] != NULL; i++)
+        if (strcmp(choices[i], text) == 0) {
+            *value = i;
+            return true;
+        }
+    return false;
+}
+
+bool setting_value_from_text(const plr_setting *setting, const char *text, double *value) {
+    double parsed;
+    if (setting->choices != NULL)
+        return choice_from_text(setting->choices, text, value);
+    if (!text_to_number(text, &parsed))
+        return false;
+    if (parsed < setting->minimum || parsed > setting->maximum)
+        return false;
+    if (setting->kind == PLR_SETTING_COUNT && parsed != floor(parsed))
+        return false;
+    *value = parsed;
+    return true;
+}
+
+static void number_to_text(double value, char *text, size_t size) {
+    for (int digits = 1; digits <= 17; digits++) {
+        snprintf(text, size, "%.*g", digits, value);
+        if (strtod(text, NULL) == value)
+            return;
+    }
+}
+
+void setting_value_to_text(const plr_setting *setting, double value, char *text, size_t size) {
+    if (setting->choices != NULL)
+        snprintf(text, size, "%s", setting->choices[(unsigned)value]);
+    else if (setting->kind == PLR_SETTING_COUNT)
+        snprintf(text, size, "%.0f", value);
+    else
+        number_to_text(value, text, size);
+}
+
+static void append(char *text, size_t size, const char *more) {
+    const size_t at = strlen(text);
+    snprintf(text + at, size - at, "%s", more);
+}
+
+static void choices_to_text(const char *const *choices, char *text, size_t size) {
+    text[0] = '\0';
+    for (unsigned i = 0; choices[i] != NULL; i++) {
+        if (i > 0)
+            append(text, size, choices[i + 1] == NULL ? " or " : ", ");
+        append(text, size, choices[i]);
+    }
+}
+
+void setting_allowed_text(const plr_setting *setting, char *text, size_t size) {
+    char low[32], high[32];
+    if (setting->choices != NULL) {
+        choices_to_text(setting->choices, text, size);
+        return;
+    }
+    setting_value_to_text(setting, setting->minimum, low, sizeof low);
+    setting_value_to_text(setting, setting->maximum, high, sizeof high);
+    snprintf(text, size, "%s from %s to %s%s%s",
+             setting->kind == PLR_SETTING_COUNT ? "a whole number" : "a number", low, high,
+             setting->unit[0] != '\0' ? " " : "", setting->unit);
+}

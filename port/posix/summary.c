@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "posix/summary.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "posix/settings_text.h"
+
+void summary_init(summary *s) {
+    memset(s, 0, sizeof *s);
+    samples_init(&s->compute_us, sizeof(double));
+    evaluation_init(&s->evaluation);
+}
+
+void summary_free(summary *s) {
+    samples_free(&s->compute_us);
+    evaluation_free(&s->evaluation);
+}
+
+static void add_counts(summary *s, const plr_report *report) {
+    s->observations += report->observations;
+    s->matched += report->matched;
+    s->used += report->used;
+    s->gated += report->gated;
+    s->created += report->created;
+    s->evicted += report->evicted;
+    s->refused_observations += report->refused;
+    s->duplicates += report->duplicates;
+    s->no_room += report->no_room;
+    s->poor += report->poor;
+    s->left_out += report->left_out;
+    s->blocks_failed += report->blocks_failed;
+    s->health[report->health]++;
+    if (report->health == PLR_HEALTH_DIVERGED && s->diverged_ns == 0)
+        s->diverged_ns = report->t_ns;
+}
+
+static void add_pose(summary *s, const plr_pose_message *pose) {
+    double squared = 0;
+    if (s->frames == 0) {
+        s->first_ns = pose->t_ns;
+        s->last_pose = pose->T_WB;
+    }
+    for (int i = 0; i < 3; i++)
+        squared += pow(pose->T_WB.p[i] - s->last_pose.p[i], 2);
+    s->path_m += sqrt(squared);
+    s->last_pose = pose->T_WB;
+    s->last_ns = pose->t_ns;
+    evaluation_add_estimate(&s->evaluation, pose);
+}
+
+void summary_add_frame(summary *s, const plr_frame_result *result) {
+    const double us = (double)result->compute_ns / 1e3;
+    if (result->pose == NULL) {
+        s->frames_refused++;
+        return;
+    }
+    add_pose(s, result->pose);
+    add_counts(s, result->report);
+    samples_add(&s->compute_us, &us);
+    s->compute_ns += result->compute_ns;
+    s->frames++;
+}
+
+void summary_figures_of(summary *s, summary_figures *figures) {
+    evaluation_figures_of(&s->evaluation, &figures->truth);
+    samples_sort_doubles(&s->compute_us);
+    figures->update_us_median = samples_quantile(&s->compute_us, 0.5);
+    figures->update_us_p99 = samples_quantile(&s->compute_us, 0.99);
+    figures->update_us_max = samples_quantile(&s->compute_us, 1);
+    figures->duration_s = s->last_ns > s->first_ns ? (double)(s->last_ns - s->first_ns) * 1e-9 : 0;
+    figures->realtime_factor =
+        s->compute_ns > 0 ? figures->duration_s * 1e9 / (double)s->compute_ns : (double)NAN;
+}
+
+static void print_filter(const plr_session *session) {
+    static const char *const shown[] = {"model", "mode", "bias", "twist-timing"};
+    const plr_config *config = plr_filter_config(&session->filter);
+    printf("filter        float%u", (unsigned)(8 * sizeof(plr_real)));
+    for (unsigned i = 0; i < sizeof shown / sizeof shown[0]; i++) {
+        const plr_setting *setting = plr_setting_by_name(shown[i]);
+        char value[64];
+        setting_value_to_text(setting, plr_config_get(config, setting), value, sizeof value);
+        printf(", %s %s", shown[i], value);
+    }
+    printf(", %u slots\n", (unsigned)config->slots);
+}
+
+static double percent(uint64_t part, uint64_t whole) {
+    return whole > 0 ? 100 * (double)part / (double)whole : 0;
+}
+
+static void print_counts(const summary *s, const plr_session *session) {
+    printf("frames        %" PRIu64 " used, %" PRIu64 " refused; %" PRIu32 " twists\n", s->frames,
+           s->frames_refused, session->totals.twists);
+    printf("observations  %" PRIu64 ": %" PRIu64 " used, %" PRIu64 " gated (%.1f %% of matched), "
+           "%" PRIu64 " new, %" PRIu64 " evicted\n",
+           s->observations, s->used, s->gated, percent(s->gated, s->matched), s->created,
+           s->evicted);
+    printf("not used      %" PRIu64 " without a slot, %" PRIu64 " too poor to start from, %" PRIu64
+           " malformed, %" PRIu64 " doubled, %" PRIu64 " over budget\n",
+           s->no_room, s->poor, s->refused_observations, s->duplicates, s->left_out);
+    printf("health        %" PRIu64 " frames good, %" PRIu64 " degraded, %" PRIu64 " lost, %" PRIu64
+           " diverged\n",
+           s->health[PLR_HEALTH_GOOD], s->health[PLR_HEALTH_DEGRADED], s->health[PLR_HEALTH_LOST],
+           s->health[PLR_HEALTH_DIVERGED]);
+}
+
+static void print_truth(const evaluation_figures *truth) {
+    if (truth->frames == 0) {
+        printf("accuracy      the recording holds no TRUTH at its frames\n");
+        return;
+    }
+    printf("accuracy      err0 %.3f m, ATE %.3f m, rotation %.3f deg", truth->err0_m, truth->ate_m,
+           truth->rot_deg);
+    if (!isnan(truth->nees_per_dof))
+        printf(", NEES/6 %.2f", truth->nees_per_dof);
+    printf(" (%zu frames with truth)\n", truth->frames);
+    if (truth->not_positive > 0)
+        printf("              NEES leaves out %zu frames whose covariance has no inverse\n",
+               truth->not_positive);
+}
+
+static void print_damage(const summary *s, const plr_session *session) {
+    const plr_reader_counts *c = &session->reader.counts;
+    const uint32_t skipped = c->damaged + c->unknown + c->malformed + c->too_long;
+    if (skipped == 0 && c->missing == 0 && session->totals.refused == 0 && !s->cut_in_frame &&
+        s->ended)
+        return;
+    printf("damage        frames skipped: %" PRIu32 " damaged, %" PRIu32 " unknown, %" PRIu32
+           " malformed, %" PRIu32 " too long; %" PRIu32 " missing; messages refused: %" PRIu32
+           "%s\n",
+           c->damaged, c->unknown, c->malformed, c->too_long, c->missing, session->totals.refused,
+           s->ended ? "" : "; no END");
+}
+
+void summary_print(summary *s, const plr_session *session, const char *path) {
+    summary_figures figures;
+    summary_figures_of(s, &figures);
+    printf("recording     %s%s%s%s, %.1f s\n", path, session->header.name[0] != '\0' ? " (" : "",
+           session->header.name, session->header.name[0] != '\0' ? ")" : "", figures.duration_s);
+    print_filter(session);
+    print_counts(s, session);
+    printf("path          %.1f m\n", s->path_m);
+    printf("time a frame  median %.0f us, p99 %.0f us, max %.0f us; %.0f times real time; the "
+           "replay took %.2f s\n",
+           figures.update_us_median, figures.update_us_p99, figures.update_us_max,
+           figures.realtime_factor, s->wall_s);
+    print_truth(&figures.truth);
+    print_damage(s, session);
+}

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+/* What a replay came to: collected frame by frame, told at the end to a human or as JSON. */
+#ifndef PELORUS_POSIX_SUMMARY_H
+#define PELORUS_POSIX_SUMMARY_H
+
+#include "pelorus/session.h"
+#include "posix/evaluation.h"
+
+typedef struct summary {
+    uint64_t frames, frames_refused;
+    uint64_t observations, matched, used, gated, created, evicted;
+    uint64_t refused_observations, duplicates, no_room, poor, left_out, blocks_failed;
+    uint64_t health[PLR_HEALTH_DIVERGED + 1]; /* frames in each */
+    uint64_t warnings;
+    plr_time_ns first_ns, last_ns, diverged_ns;
+    plr_pose last_pose;
+    double path_m;
+    samples compute_us; /* double, a frame each */
+    uint64_t compute_ns;
+    evaluation evaluation;
+
+    /* Filled in at the end. */
+    double wall_s;
+    bool cut_in_frame, ended;
+    uint64_t bytes;
+} summary;
+
+void summary_init(summary *s);
+void summary_free(summary *s);
+
+void summary_add_frame(summary *s, const plr_frame_result *result);
+
+/* Both sort what was collected. `path` is the recording's. */
+void summary_print(summary *s, const plr_session *session, const char *path);
+void summary_print_json(summary *s, const plr_session *session, const char *path);
+
+/* The figures that both print. */
+typedef struct summary_figures {
+    evaluation_figures truth;
+    double update_us_median, update_us_p99, update_us_max; /* NaN without frames */
+    double duration_s, realtime_factor;
+} summary_figures;
+
+void summary_figures_of(summary *s, summary_figures *figures);
+
+#endif

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+#include "posix/tables.h"
+
+#include <inttypes.h>
+#include <math.h>
+
+#include "posix/rigid.h"
+
+/* Seconds without a rounding: a double holds no nanoseconds of this century. */
+static void put_time(FILE *file, plr_time_ns t_ns) {
+    fprintf(file, "%" PRIu64 ".%09" PRIu64, t_ns / 1000000000u, t_ns % 1000000000u);
+}
+
+void trajectory_put(FILE *file, const plr_pose_message *pose) {
+    double q[4];
+    if (file == NULL)
+        return;
+    rigid_quaternion(q, pose->T_WB.R);
+    put_time(file, pose->t_ns);
+    for (int i = 0; i < 3; i++)
+        fprintf(file, " %.9g", pose->T_WB.p[i]);
+    for (int i = 0; i < 4; i++)
+        fprintf(file, " %.9g", q[i]);
+    fputc('\n', file);
+}
+
+void frames_put_titles(FILE *file) {
+    if (file == NULL)
+        return;
+    fputs("t_s,x_m,y_m,z_m,qx,qy,qz,qw,"
+          "var_rho_x,var_rho_y,var_rho_z,var_theta_x,var_theta_y,var_theta_z,trace,"
+          "vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps,"
+          "bias_vx,bias_vy,bias_vz,bias_wx,bias_wy,bias_wz,"
+          "var_bias_vx,var_bias_vy,var_bias_vz,var_bias_wx,var_bias_wy,var_bias_wz,"
+          "status,health,reasons,budget,observations,matched,used,gated,new,evicted,refused,"
+          "duplicates,no_room,poor,left_out,blocks_failed,active,nis,nis_dof,update_us\n",
+          file);
+}
+
+static void put_numbers(FILE *file, const double *numbers, int n) {
+    for (int i = 0; i < n; i++)
+        fprintf(file, ",%.9g", numbers[i]);
+}
+
+enum { ESTIMATE_COLUMNS = 32 };
+
+static void put_estimate(FILE *file, const plr_pose_message *pose, double trace,
+                         const double *bias_variance) {
+    double q[4], variances[6];
+    rigid_quaternion(q, pose->T_WB.R);
+    for (int i = 0; i < 6; i++)
+        variances[i] = pose->P_xi[i * (i + 3) / 2];
+    put_numbers(file, pose->T_WB.p, 3);
+    put_numbers(file, q, 4);
+    put_numbers(file, variances, 6);
+    put_numbers(file, &trace, 1);
+    put_numbers(file, pose->velocity.v_B_mps, 3);
+    put_numbers(file, pose->velocity.w_B_radps, 3);
+    put_numbers(file, pose->bias, 6);
+    put_numbers(file, bias_variance, 6);
+}
+
+static void put_report(FILE *file, const plr_report *r) {
+    const unsigned counts[] = {
+        r->observations, r->matched, r->used, r->gated,    r->created,       r->evicted, r->refused,
+        r->duplicates,   r->no_room, r->poor, r->left_out, r->blocks_failed, r->active};
+    fprintf(file, ",%d,%s,%u,%u", (int)r->status, plr_health_text(r->health), (unsigned)r->reasons,
+            (unsigned)r->budget);
+    for (unsigned i = 0; i < sizeof counts / sizeof counts[0]; i++)
+        fprintf(file, ",%u", counts[i]);
+    fprintf(file, ",%.7g,%u", (double)r->nis, (unsigned)r->nis_dof);
+}
+
+void frames_put(FILE *file, const plr_frame_result *result, double trace,
+                const double *bias_variance) {
+    if (file == NULL)
+        return;
+    put_time(file, result->frame->t_ns);
+    if (result->pose != NULL)
+        put_estimate(file, result->pose, trace, bias_variance);
+    else
+        for (int i = 0; i < ESTIMATE_COLUMNS; i++)
+            fputc(',', file);
+    put_report(file, result->report);
+    fprintf(file, ",%.3f\n", (double)result->compute_ns / 1e3);
+}
+
+static void put_landmark(FILE *file, const plr_landmark_message *message) {
+    const plr_landmark *l = &message->landmark;
+    const double mean_variance = (l->P_W_m2[0] + l->P_W_m2[4] + l->P_W_m2[8]) / 3;
+    fprintf(file, "%.9g %.9g %.9g %" PRIu32 " %u %" PRIu32 " %.6g\n", l->p_W_m[0], l->p_W_m[1],
+            l->p_W_m[2], l->id, (unsigned)message->role, l->times_seen, sqrt(mean_variance));
+}
+
+void map_put(FILE *file, const samples *landmarks) {
+    if (file == NULL)
+        return;
+    fprintf(file,
+            "ply\nformat ascii 1.0\n"
+            "comment landmarks in the world, m; role 1: left the state, 2: held at the end\n"
+            "comment sigma: root of the mean variance of an axis, m\n"
+            "element vertex %zu\n"
+            "property double x\nproperty double y\nproperty double z\n"
+            "property uint id\nproperty uchar role\nproperty uint times_seen\n"
+            "property float sigma\nend_header\n",
+            landmarks->count);
+    const plr_landmark_message *items = landmarks->items;
+    for (size_t i = 0; i < landmarks->count; i++)
+        put_landmark(file, &items[i]);
+}
