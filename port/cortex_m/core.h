@@ -33,8 +33,10 @@ enum {
     ICSR_PENDSTSET = 1 << 26,
     FPSCR_MODES = 0x1F << 22 | 1 << 19, /* AHP, DN, FZ, rounding; FZ16 */
     SCB_CCR_DIV_0_TRP = 1 << 4,
-    SHCSR_FAULTS = 7 << 16, /* memory, bus and usage faults have handlers of their own */
-    CORE_EXCEPTIONS = 16    /* entries of the vector table before the first interrupt */
+    SHCSR_FAULTS = 7 << 16,  /* memory, bus and usage faults have handlers of their own */
+    CFSR_MMARVALID = 1 << 7, /* MMFAR holds an address */
+    CFSR_STACK = 1 << 4 | 1 << 12 | 1 << 20, /* MSTKERR, STKERR, STKOF: no room to save registers */
+    CORE_EXCEPTIONS = 16 /* entries of the vector table before the first interrupt */
 };
 
 #define AIRCR_RESET 0x05FA0004U /* key and SYSRESETREQ */

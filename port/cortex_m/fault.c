@@ -75,15 +75,16 @@ __attribute__((noreturn, used)) void fault_report(const stacked_registers *at) {
     uint32_t exception;
     __asm volatile("mrs %0, ipsr" : "=r"(exception));
     const uint32_t count = record_valid() ? record.count + 1 : 1;
+    const bool overflow = !stack_holds(at) || (SCB_CFSR & CFSR_STACK) != 0;
     record = (fault_record){.magic = RECORD_MAGIC,
                             .count = count,
                             .exception = exception,
-                            .pc = stack_holds(at) ? at->pc : 0,
+                            .pc = overflow ? 0 : at->pc,
                             .status = SCB_CFSR,
-                            .address = (SCB_CFSR & 0x80U) != 0 ? SCB_MMFAR : SCB_BFAR};
+                            .address = (SCB_CFSR & CFSR_MMARVALID) != 0 ? SCB_MMFAR : SCB_BFAR};
     record.check = record_check(&record);
     text_clear(&message);
-    if (!stack_holds(at)) {
+    if (overflow) {
         text_add(&message, "stack overflow: ");
     }
     add_record(&message);

@@ -32,7 +32,7 @@ from pelorus.frames import (
     Text,
 )
 from pelorus.robot.link import Link
-from pelorus.wire import DELIMITER, Reader, Writer, encode
+from pelorus.wire import DELIMITER, Counts, Reader, Writer, encode
 
 BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
@@ -106,7 +106,7 @@ class Streamer:
             if self._exchange(b"", QUIET_S):
                 quiet_since = time.monotonic()
         self.outcome = Outcome(texts=self.outcome.texts)
-        self.reader = Reader()
+        self.reader.counts = Counts()  # what came before is not this drive's
         self._ended = False
         self._under_way = True
 

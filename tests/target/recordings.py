@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""Makes the recordings that the emulated boards are given.
+
+usage: recordings.py FOLDER [--long]
+
+The simulated one always; Starry Night and sequence 03 where $PELORUS_DATA has them: 200 steps and
+30 frames of them, with --long the whole of both. What is there already is kept.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from pelorus.frames import Kind, Message
+from pelorus.wire import Writer, read_file
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
+SIMULATION = ("simulate", "{out}", "--seed", "7", "--duration", "15")
+REAL = {
+    "starry-night": (
+        ("convert", "starry-night", "{in}", "{out}"),
+        "starry-night/dataset3.mat",
+        200,
+    ),
+    "03": (("convert", "ece276a", "{in}", "{out}"), "ece276a/03.npz", 30),
+}
+
+
+def pelorus(words: tuple[str, ...], source: Path, target: Path) -> None:
+    """Run the command `pelorus`."""
+    arguments = [word.format(**{"in": source, "out": target}) for word in words]
+    subprocess.run([sys.executable, "-m", "pelorus", *arguments], check=True, stdout=sys.stderr)
+
+
+def cut(whole: Path, part: Path, frames: int) -> None:
+    """Keep what comes up to and with the n-th stereo frame."""
+    messages = [frame.message for frame in read_file(whole)[0]]
+    with part.open("wb") as stream:
+        writer = Writer(stream)
+        for message in first_frames(messages, frames):
+            writer.write(message)
+        writer.end()
+
+
+def first_frames(messages: list[Message], frames: int) -> list[Message]:
+    """The messages up to and with the n-th stereo frame, without END."""
+    stereos = [at for at, message in enumerate(messages) if message.kind == Kind.STEREO]
+    last = stereos[min(frames, len(stereos)) - 1]
+    return [message for message in messages[: last + 1] if message.kind != Kind.END]
+
+
+def main() -> None:
+    """See the module's text."""
+    folder = Path(sys.argv[1])
+    (folder / "whole").mkdir(parents=True, exist_ok=True)
+    simulated = folder / "simulated.plr"
+    if not simulated.exists():
+        pelorus(SIMULATION, simulated, simulated)
+    for name, (words, path, frames) in REAL.items():
+        source, whole, part = DATA / path, folder / "whole" / f"{name}.plr", folder / f"{name}.plr"
+        if not source.exists():
+            print(f"SKIPPED {source}: not there, so the boards are not given {name}")
+            continue
+        if not whole.exists():
+            pelorus(words, source, whole)
+        if not part.exists():
+            cut(whole, part, frames)
+        if "--long" in sys.argv[2:] and not (folder / f"{name}-whole.plr").exists():
+            (folder / f"{name}-whole.plr").symlink_to(whole.resolve())
+
+
+if __name__ == "__main__":
+    main()

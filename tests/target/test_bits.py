@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""The board computes what the desk computes, to the bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from pelorus.frames import Kind
+from pelorus.robot.compare import Comparison, desktop_poses, digest
+from pelorus.robot.emulator import Emulator
+from pelorus.robot.stream import Streamer
+from pelorus.wire import read_file
+
+SLOTS = 32
+FLOAT64_BOARD = "mps2_an500"
+
+
+def board_poses(board: str, image: Path, recording: Path):
+    messages = [frame.message for frame in read_file(recording)[0]]
+    with Emulator(board, image) as emulator:
+        link = emulator.connect()
+        outcome = Streamer(link).run(messages)
+        link.close()
+    assert outcome.unanswered == 0
+    assert outcome.frames == sum(message.kind == Kind.STEREO for message in messages)
+    return outcome.poses
+
+
+def desktop_all_equal(request: pytest.FixtureRequest, recording: Path, program: str):
+    """The poses on which every build of the desktop's replay agrees."""
+    folders = request.config.getoption("--desktops")
+    assert folders, "run.sh names the desktop builds"
+    poses = [desktop_poses(recording, Path(folder) / "bin" / program, SLOTS) for folder in folders]
+    digests = {digest(found) for found in poses}
+    assert len(digests) == 1, "the desktop's builds differ among themselves"
+    return poses[0]
+
+
+def same_bits(desktop, board_answer) -> None:
+    comparison = Comparison(desktop, board_answer)
+    assert comparison.first_difference is None
+    assert comparison.equal
+    print(f"\n{len(comparison.board)} poses, SHA-256 {digest(comparison.board)}")
+
+
+def test_float32(
+    request: pytest.FixtureRequest, board: str, firmware: Path, recording: Path
+) -> None:
+    desktop = desktop_all_equal(request, recording, "pelorus-replay")
+    same_bits(desktop, board_poses(board, firmware, recording))
+
+
+def test_float64(request: pytest.FixtureRequest, board: str, robot: Path, recording: Path) -> None:
+    if board != FLOAT64_BOARD:
+        pytest.skip("an image in float64 is made for the M7 alone: it has the FPU for it")
+    desktop = desktop_all_equal(request, recording, "pelorus-replay-f64")
+    image = robot / "images" / f"pelorus-{board}-n{SLOTS}-f64.elf"
+    same_bits(desktop, board_poses(board, image, recording))
