@@ -21,7 +21,8 @@ static plr_fault pass_payload(plr_pass p, plr_writer *w, const plr_message *mess
 
 static plr_status send_frame(plr_writer *w, const plr_message *message) {
     uint8_t head[3] = {(uint8_t)message->kind};
-    plr_bytes_put(head + 1, 2, w->sequence++);
+    plr_bytes_put(head + 1, 2, w->sequence);
+    w->sequence = (uint16_t)(w->sequence + 1);
     plr_frame_out_begin(w);
     plr_frame_out_put(w, head, sizeof head);
     pass_payload((plr_pass){.direction = PLR_PASS_WRITE, .writer = w}, w, message);
