@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+/*
+ * pelorus-bench [SECONDS_PER_LINE]: what a frame costs, beside a dense textbook EKF on OpenBLAS, in
+ * one run, float32, one thread. A frame is predict, gate, update and retract with all N landmarks
+ * seen. It reports; it judges nothing.
+ */
+#define _POSIX_C_SOURCE 200112L
+#include <cblas.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "pelorus/pelorus.h"
+#include "scene.h"
+#include "textbook.h"
+
+/* OpenBLAS's own, which Debian's cblas.h does not declare for every build. */
+void openblas_set_num_threads(int threads);
+
+enum { MAX_RUNS = 4000, MIN_RUNS = 9, WARM_UP = 3 };
+
+typedef struct timing {
+    double us[MAX_RUNS];
+    unsigned count;
+    double total_us;
+} timing;
+
+static double now_us(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
+}
+
+static bool wants_more(const timing *t, double budget_us) {
+    return t->count < MIN_RUNS || (t->count < MAX_RUNS && t->total_us < budget_us);
+}
+
+static void add(timing *t, double us) {
+    t->us[t->count++] = us;
+    t->total_us += us;
+}
+
+static int ascending(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Sorts the times; the share-th of them. */
+static double quantile(timing *t, double share) {
+    qsort(t->us, t->count, sizeof *t->us, ascending);
+    return t->us[(unsigned)(share * (double)(t->count - 1))];
+}
+
+/* The filter at N landmarks: frames into *frames, single predicts into *predicts. */
+static bool time_filter(unsigned n, double budget_us, timing *frames, timing *predicts) {
+    static plr_filter filter;
+    static scene world;
+    plr_config config;
+    scene_init(&world, n > 0 ? n : 1);
+    plr_config_default(&config);
+    config.slots = (uint16_t)(n > 0 ? n : 1);
+    config.bias = 1;
+    config.mode = n > 0 ? PLR_MODE_SLAM : PLR_MODE_DEAD_RECKONING;
+    config.pixel_sigma_px = 1;
+    if (plr_filter_init(&filter, &world.calibration, &config, NULL) != PLR_OK)
+        return false;
+    frames->count = predicts->count = 0;
+    frames->total_us = predicts->total_us = 0;
+    for (unsigned k = 0; wants_more(frames, budget_us); k++) {
+        plr_twist twist;
+        plr_frame frame;
+        plr_report report;
+        scene_twist(&world, k, &twist);
+        scene_frame(&world, k, &frame);
+        const double start = now_us();
+        if (plr_filter_predict(&filter, frame.t_ns, &twist) != PLR_OK)
+            return false;
+        const double predicted = now_us();
+        if (plr_filter_update(&filter, &frame, &report) != PLR_OK)
+            return false;
+        const double end = now_us();
+        const bool all_seen = n == 0 || report.matched == n;
+        if (k >= WARM_UP && all_seen && predicts->count < MAX_RUNS) {
+            add(frames, end - start);
+            add(predicts, predicted - start);
+        }
+        if (k > 2 * MAX_RUNS)
+            return false; /* the scene does not hold what it promises */
+    }
+    return true;
+}
+
+static bool time_textbook(unsigned n, bool symmetric, double budget_us, timing *updates) {
+    textbook t;
+    if (!textbook_init(&t, (int)n, symmetric))
+        return false;
+    updates->count = 0;
+    updates->total_us = 0;
+    bool good = true;
+    for (unsigned k = 0; good && wants_more(updates, budget_us); k++) {
+        const double start = now_us();
+        good = textbook_update(&t);
+        const double end = now_us();
+        if (k >= WARM_UP)
+            add(updates, end - start);
+    }
+    textbook_free(&t);
+    return good;
+}
+
+int main(int argc, char **argv) {
+    static const unsigned sizes[] = {16, 32, 50, 64, 100, 128, 256};
+    static timing frames, predicts, gain, symmetric;
+    const double budget_us = 1e6 * (argc > 1 ? atof(argv[1]) : 1.0);
+    openblas_set_num_threads(1);
+
+    printf("pelorus %s, float%d, one thread; a frame with all N landmarks seen, bias on\n",
+           plr_version(), PLR_REAL);
+    printf("%5s | %21s | %9s | %21s | %21s | %s\n", "N", "pelorus frame, us", "predict",
+           "textbook gemm, us", "textbook syrk, us", "faster than");
+    printf("%5s | %10s %10s | %9s | %10s %10s | %10s %10s | gemm, syrk\n", "", "median", "p99",
+           "us", "median", "p99", "median", "p99");
+    if (!time_filter(0, 0.1 * budget_us, &frames, &predicts))
+        return EXIT_FAILURE;
+    printf("%5u | %10s %10s | %9.3f |\n", 0U, "", "", quantile(&predicts, 0.5));
+    for (unsigned i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        const unsigned n = sizes[i];
+        if (n > PLR_MAX_LANDMARKS)
+            continue;
+        if (!time_filter(n, budget_us, &frames, &predicts) ||
+            !time_textbook(n, false, budget_us, &gain) ||
+            !time_textbook(n, true, budget_us, &symmetric)) {
+            fprintf(stderr, "pelorus-bench: N = %u could not be run\n", n);
+            return EXIT_FAILURE;
+        }
+        const double own = quantile(&frames, 0.5);
+        printf("%5u | %10.1f %10.1f | %9.3f | %10.1f %10.1f | %10.1f %10.1f | %5.1f %5.1f\n", n,
+               own, quantile(&frames, 0.99), quantile(&predicts, 0.5), quantile(&gain, 0.5),
+               quantile(&gain, 0.99), quantile(&symmetric, 0.5), quantile(&symmetric, 0.99),
+               quantile(&gain, 0.5) / own, quantile(&symmetric, 0.5) / own);
+        fflush(stdout);
+    }
+    return EXIT_SUCCESS;
+}
