@@ -52,6 +52,7 @@ count() {
     good=${good:-0} bad=${bad:-0}
     [ "$status" -ne 0 ] && [ "$bad" -eq 0 ] && bad=1
     passed=$((passed + good)) failed=$((failed + bad))
+    count_skips "$log"
     [ "$status" -eq 0 ] || failures+=("$name (build-logs/$(basename "$log"))")
 }
 
@@ -60,7 +61,7 @@ step() {
     local name=$1 log status started=$SECONDS
     shift
     log=$LOGS/$(tr -cs 'A-Za-z0-9\n' '-' <<<"$name").log
-    heading "$name"
+    heading "$name (build-logs/$(basename "$log"))"
     "$@" >"$log" 2>&1
     status=$?
     if [ $status -eq 0 ]; then
@@ -70,14 +71,18 @@ step() {
         tail -80 "$log"
         echo "FAILED with status $status after $((SECONDS - started)) s"
     fi
-    show_skips "$log"
     count "$log" $status "$name"
     return $status
 }
 
-# What tests said when they left something out: Unity's IGNORE lines and pytest's SKIPPED lines.
-show_skips() {
-    grep -hE ':IGNORE|^SKIPPED |\*\*\*Skipped' "$1" | sort -u | sed 's/^/skipped: /'
+# What tests said when they left something out: Unity's IGNORE lines, pytest's SKIPPED lines and the
+# words of the scripts in tests/layering. Shown, and counted.
+count_skips() {
+    local said
+    said=$(grep -hE ':IGNORE|^SKIPPED |^skipped: ' "$1" | sed 's/^skipped: //' | sort -u)
+    [ -z "$said" ] && return 0
+    sed 's/^/skipped: /' <<<"$said"
+    skipped=$((skipped + $(wc -l <<<"$said")))
 }
 
 skip() {
@@ -89,7 +94,7 @@ skip() {
 run_ctest() {
     ctest --test-dir "$1" --output-on-failure -j "$JOBS" "${@:2}"
     local status=$?
-    grep -hE ':IGNORE' "$1/Testing/Temporary/LastTest.log"
+    grep -hE ':IGNORE|^skipped: ' "$1/Testing/Temporary/LastTest.log"
     return $status
 }
 
