@@ -15,7 +15,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-ALLOWED = {"memcpy", "memmove", "memset", "memcmp", "strcmp", "strlen"}
+ALLOWED = {"memcpy", "memmove", "memset", "memcmp", "bcmp", "strcmp", "strlen"}
 # Put there by the compiler or linker, not by a source.
 MACHINERY = {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
 # Constants that hold addresses, in position-independent code: read-only once the loader has run.
