@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: MIT
+/*
+ * Whole frames of the filter against the textbook filter in double
+ * (support/dense_ekf.h): state and covariance after accumulated predicts, gate,
+ * blocks, retraction, eviction and new landmarks.
+ *
+ * Built for several block sizes too: all of them must agree with the one gain
+ * of the oracle.
+ *
+ * Tolerances are a part for the oracle's own rounding (its numbers are of
+ * metres and kilometres) and a part for the filter's, in units of its epsilon;
+ * both are several times what was measured. `world` in float32 loses digits
+ * from frame to frame (docs/NUMERICS.md): it is held to the first frames, and
+ * to fewer digits.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <unity.h>
+
+#include "support/dense_ekf.h"
+#include "support/matrices.h"
+#include "support/oracle.h" /* without OpenBLAS this test is left out */
+#include "support/scene.h"
+
+enum { STEP_NS = 10000000, TWISTS = 10, FRAMES = 40, FRAGILE_FRAMES = 5 };
+
+static plr_filter filter;
+static dense_ekf dense;
+static scene world;
+static scene_options options;
+static plr_config config;
+static uint32_t evicted[PLR_MAX_LANDMARKS];
+static unsigned evictions;
+static plr_report report;
+
+static int note_eviction(void *context, const plr_landmark *landmark) {
+    (void)context;
+    evicted[evictions++] = landmark->id;
+    return 0;
+}
+
+void setUp(void) {
+    plr_config_default(&config);
+    config.slots = PLR_MAX_LANDMARKS < DENSE_MAX ? PLR_MAX_LANDMARKS : DENSE_MAX;
+    config.start_sigma = 0.01;
+    scene_options_default(&options);
+    options.most_seen = 24;
+}
+
+void tearDown(void) {
+}
+
+static bool is_fragile(void) {
+    return PLR_REAL == 32 && config.model == PLR_MODEL_WORLD;
+}
+
+static unsigned frames(void) {
+    return is_fragile() ? FRAGILE_FRAMES : FRAMES;
+}
+
+/* Runs a test for both models, without and with biases. */
+static void for_each_model(void (*run)(void)) {
+    for (uint8_t model = 0; model < 2; model++)
+        for (uint8_t bias = 0; bias < 2; bias++) {
+            setUp();
+            config.model = model;
+            config.bias = bias;
+            evictions = 0;
+            run();
+        }
+}
+
+static void begin(void) {
+    const plr_map map = {.sink = note_eviction};
+    scene_start(&world, &options);
+    dense_init(&dense, &world.calibration, &config);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, &map));
+}
+
+/* One twist in both; the oracle, which has no clock, then holds it for a step.
+ */
+static void drive(plr_time_ns step_ns) {
+    const plr_twist reading = scene_read(&world);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
+    scene_move(&world, step_ns);
+    dense_hold(&dense, &reading, (double)step_ns * 1e-9, (double)step_ns * 1e-9);
+}
+
+/* One frame in both. What the filter evicts leaves the oracle too. */
+static void look(void) {
+    const plr_frame frame = scene_look(&world);
+    evictions = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &frame, &report));
+    const dense_report expected = dense_update(&dense, &frame);
+    for (unsigned i = 0; i < evictions; i++)
+        dense_remove(&dense, evicted[i]);
+    const unsigned created =
+        config.mode == PLR_MODE_LOCALIZATION ? 0 : dense_create(&dense, &frame);
+    TEST_ASSERT_EQUAL_UINT(expected.matched, report.matched);
+    TEST_ASSERT_EQUAL_UINT(expected.gated, report.gated);
+    TEST_ASSERT_EQUAL_UINT(expected.used, report.used);
+    TEST_ASSERT_EQUAL_UINT(created, report.created);
+    TEST_ASSERT_DOUBLE_WITHIN((1e-6 + 1e4 * REAL_EPSILON) * (1 + expected.nis), expected.nis,
+                              (double)report.nis); /* a float in both precisions */
+}
+
+static void compare(unsigned frame) {
+    const double own = REAL_EPSILON * (is_fragile() ? 50 : 1);
+    dense_gap gap;
+    char at[48];
+    snprintf(at, sizeof at, "model %d, bias %d, frame %u", config.model, config.bias, frame);
+    TEST_ASSERT_TRUE_MESSAGE(dense_compare(&dense, &filter, &gap), at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 500 * own, 0, gap.position_m, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 50 * own, 0, gap.rotation_rad, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 100 * own, 0, gap.bias, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(5e-9 + 4000 * own, 0, gap.landmark, at);
+    /* P -= V V^T leaves the rounding of the variance before in the one after, and
+   * a landmark's first frames make it a thousand times smaller */
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8 + 4e4 * own, 0, gap.covariance, at);
+}
+
+static void run_frames(void) {
+    begin();
+    for (unsigned frame = 0; frame < frames(); frame++) {
+        for (unsigned k = 0; k < TWISTS; k++)
+            drive(STEP_NS);
+        look();
+        compare(frame);
+    }
+}
+
+/* ---------------------------------------------------------------- tests */
+
+static void test_frames_agree_with_the_textbook_filter(void) {
+    for_each_model(run_frames);
+    TEST_ASSERT_GREATER_THAN_UINT(8, report.used);
+}
+
+static void run_outliers(void) {
+    options.outliers = 0.1;
+    run_frames();
+    TEST_ASSERT_GREATER_THAN_UINT(0, filter.totals.gated);
+}
+
+static void test_the_gate_rejects_what_the_textbook_rejects(void) {
+    for_each_model(run_outliers);
+}
+
+static void run_small_ring(void) {
+    config.slots = 9;
+    run_frames();
+    if (!is_fragile())
+        TEST_ASSERT_GREATER_THAN_UINT(5, filter.totals.evicted);
+}
+
+static void test_eviction_removes_rows_and_columns(void) {
+    for_each_model(run_small_ring);
+}
+
+static void run_step_noise(void) {
+    config.noise = PLR_NOISE_STEP;
+    config.velocity_sigma = 2e-3;
+    config.gyro_sigma = 5e-4;
+    if (config.model == PLR_MODEL_WORLD)
+        config.landmark_sigma_m = 1.4;
+    run_frames();
+}
+
+static void test_noise_of_a_step_and_constant_landmarks_agree(void) {
+    for_each_model(run_step_noise);
+}
+
+/* A frame that lies 4 ms behind a twist: the reading is held in two parts, 4
+ * and 6 ms, of which the noise is charged once in all. */
+static void run_frames_between_twists(void) {
+    enum { PART_NS = 4000000 };
+    begin();
+    for (unsigned frame = 0; frame < frames(); frame++) {
+        plr_twist reading;
+        for (unsigned k = 0; k < TWISTS; k++) {
+            reading = scene_read(&world);
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
+            const bool last = k + 1 == TWISTS;
+            scene_move(&world, last ? PART_NS : STEP_NS);
+            dense_hold(&dense, &reading, last ? PART_NS * 1e-9 : STEP_NS * 1e-9, STEP_NS * 1e-9);
+        }
+        look();
+        compare(frame);
+        scene_move(&world, STEP_NS - PART_NS);
+        dense_hold(&dense, &reading, (STEP_NS - PART_NS) * 1e-9, STEP_NS * 1e-9);
+    }
+}
+
+static void test_frames_between_twists_agree(void) {
+    for_each_model(run_frames_between_twists);
+}
+
+/* Pose covariance while motion is accumulated: the filter computes it on the
+ * side. */
+static void run_pose_covariance(void) {
+    begin();
+    for (unsigned frame = 0; frame < FRAGILE_FRAMES; frame++) {
+        for (unsigned k = 0; k < TWISTS; k++) {
+            double P_xi[36], expected[36];
+            drive(STEP_NS);
+            /* the filter has not yet held the last reading: ask after the next one */
+            const plr_twist ahead = scene_read(&world);
+            plr_filter copy = filter;
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&copy, world.t_ns, &ahead));
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&copy, P_xi));
+            const unsigned n = dense_dim(&dense);
+            for (unsigned i = 0; i < 36; i++)
+                expected[i] = dense.P[i / 6 * n + i % 6];
+            for (unsigned i = 0; i < 36; i++)
+                TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 1e4 * REAL_EPSILON) *
+                                              sqrt(expected[7 * (i / 6)] * expected[7 * (i % 6)]),
+                                          expected[i], P_xi[i]);
+        }
+        look();
+    }
+}
+
+static void test_pose_covariance_between_frames_agrees(void) {
+    for_each_model(run_pose_covariance);
+}
+
+/* World positions and covariances of landmarks, through pose and cross terms.
+ */
+static void run_landmarks(void) {
+    run_frames();
+    for (unsigned slot = 0; slot < filter.count; slot++) {
+        plr_landmark landmark;
+        double p[3], P[9];
+        unsigned i = 0;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&filter, slot, &landmark));
+        while (dense.id[i] != landmark.id)
+            i++;
+        dense_landmark(&dense, i, p, P);
+        const double trace = P[0] + P[4] + P[8], rounding = is_fragile() ? 0.05 : 1e-3;
+        const double relative = PLR_REAL == 64 ? 1e-8 : rounding;
+        TEST_ASSERT_DOUBLE_WITHIN(30 * relative, 0, largest_difference(p, landmark.p_W_m, 3));
+        TEST_ASSERT_DOUBLE_WITHIN(relative * trace, 0, largest_difference(P, landmark.P_W_m2, 9));
+    }
+}
+
+static void test_landmarks_in_the_world_agree(void) {
+    for_each_model(run_landmarks);
+}
+
+/* Known landmarks enter through the pose; the state holds both kinds. */
+static void run_known(void) {
+    begin();
+    for (unsigned frame = 0; frame < frames(); frame++) {
+        for (unsigned k = 0; k < TWISTS; k++)
+            drive(STEP_NS);
+        look();
+        if (frame % 4 == 0) {
+            plr_landmark known = {.id = 100 + 7 * frame,
+                                  .P_W_m2 = {0.04, 0.01, 0, 0.01, 0.03, -0.01, 0, -0.01, 0.05}};
+            for (int i = 0; i < 3; i++)
+                known.p_W_m[i] = scene_landmark(&world, known.id)[i];
+            const plr_status status = plr_filter_insert_known(&filter, &known);
+            if (status == PLR_OK)
+                dense_insert_known(&dense, &known);
+            else
+                TEST_ASSERT_EQUAL_INT(PLR_E_EXISTS, status);
+        }
+        compare(frame);
+    }
+}
+
+static void test_known_landmarks_enter_as_in_the_textbook(void) {
+    for_each_model(run_known);
+}
+
+static void run_mapping(void) {
+    config.mode = PLR_MODE_MAPPING;
+    begin();
+    for (unsigned frame = 0; frame < frames(); frame++) {
+        plr_pose T_WB;
+        for (unsigned k = 0; k < TWISTS; k++)
+            scene_move(&world, STEP_NS);
+        scene_pose(&world, &T_WB);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, world.t_ns, &T_WB));
+        dense_move_to(&dense, &T_WB);
+        look();
+        compare(frame);
+    }
+    double P_xi[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, P_xi));
+    TEST_ASSERT_DOUBLE_WITHIN(0, 0, largest(P_xi, 36));
+}
+
+static void test_mapping_agrees_and_keeps_the_given_pose_exact(void) {
+    setUp();
+    for (config.model = 0; config.model < 2; config.model++)
+        run_mapping();
+}
+
+/* A pose from outside in the middle of a run: the map is gone, the biases stay.
+ */
+static void run_new_pose(void) {
+    double P_xi[36] = {0};
+    plr_pose T_WB;
+    run_frames();
+    for (int i = 0; i < 6; i++)
+        P_xi[7 * i] = i < 3 ? 0.01 : 1e-4;
+    P_xi[1] = P_xi[6] = 0.004;
+    scene_pose(&world, &T_WB);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, world.t_ns, &T_WB, P_xi));
+    dense_set_pose(&dense, &T_WB, P_xi);
+    for (unsigned frame = 0; frame < FRAGILE_FRAMES; frame++) {
+        look();
+        compare(frame);
+        for (unsigned k = 0; k < TWISTS; k++)
+            drive(STEP_NS);
+    }
+}
+
+static void test_a_pose_from_outside_drops_the_map_and_keeps_the_bias(void) {
+    for_each_model(run_new_pose);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_frames_agree_with_the_textbook_filter);
+    RUN_TEST(test_the_gate_rejects_what_the_textbook_rejects);
+    RUN_TEST(test_eviction_removes_rows_and_columns);
+    RUN_TEST(test_noise_of_a_step_and_constant_landmarks_agree);
+    RUN_TEST(test_frames_between_twists_agree);
+    RUN_TEST(test_pose_covariance_between_frames_agrees);
+    RUN_TEST(test_landmarks_in_the_world_agree);
+    RUN_TEST(test_known_landmarks_enter_as_in_the_textbook);
+    RUN_TEST(test_mapping_agrees_and_keeps_the_given_pose_exact);
+    RUN_TEST(test_a_pose_from_outside_drops_the_map_and_keeps_the_bias);
+    return UNITY_END();
+}

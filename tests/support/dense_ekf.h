@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The textbook extended Kalman filter, as the oracle for whole frames: full matrices in double, one
+ * Jacobian a step, every observation of a frame in one gain, Joseph's form. It follows DESIGN
+ * section 2 and shares nothing with src/.
+ *
+ * Errors: pose (rho, theta) on the right, biases, and for each landmark the error of its point: of q
+ * in the camera (`body`) or of m in the world (`world`). Where the filter has the polar chart, this
+ * one stays with points: a linear filter does not depend on the chart, and what the chart does to a
+ * correction is written without its basis.
+ *
+ * A test that uses it must include support/oracle.h, so that it is left out where OpenBLAS is not.
+ */
+#ifndef PELORUS_TEST_DENSE_EKF_H
+#define PELORUS_TEST_DENSE_EKF_H
+
+#include "pelorus/filter.h"
+
+enum { DENSE_MAX = 64, DENSE_MAX_DIM = 12 + 3 * DENSE_MAX };
+
+typedef struct dense_ekf {
+    plr_config config;
+    plr_calibration camera;
+    double T_CB[16], Ad_CB[36];
+
+    double T_WB[16];
+    double bias[6];
+    unsigned count;
+    uint32_t id[DENSE_MAX];
+    double x[DENSE_MAX][3];
+    double P[DENSE_MAX_DIM * DENSE_MAX_DIM]; /* dim x dim, row by row */
+    double walked_s;                         /* for the bias walk */
+} dense_ekf;
+
+/* What a frame came to. */
+typedef struct dense_report {
+    unsigned matched, used, gated;
+    double nis;
+} dense_report;
+
+/* Rows of P: 6 (+ 6) + 3 count. */
+unsigned dense_dim(const dense_ekf *e);
+
+/* The first row of a landmark. */
+unsigned dense_row(const dense_ekf *e, unsigned landmark);
+
+/* At identity, with start_sigma^2 I and the bias prior. */
+void dense_init(dense_ekf *e, const plr_calibration *calibration, const plr_config *config);
+
+/* Sets pose and pose covariance; drops the landmarks. */
+void dense_set_pose(dense_ekf *e, const plr_pose *T_WB, const double P_xi[36]);
+
+/* T <- T Exp(seconds (u - b)), with the whole of P. `interval` is the reading's own, of which
+ * `seconds` may be a part. */
+void dense_hold(dense_ekf *e, const plr_twist *twist, double seconds, double interval);
+
+/* T <- T_WB without noise. */
+void dense_move_to(dense_ekf *e, const plr_pose *T_WB);
+
+/* Match, gate, update, retract, by the observations of landmarks that it holds. */
+dense_report dense_update(dense_ekf *e, const plr_frame *frame);
+
+/* New landmarks from the others, in the frame's order and while there is room. Returns how many. */
+unsigned dense_create(dense_ekf *e, const plr_frame *frame);
+
+/* A landmark of known place and covariance in the world. */
+void dense_insert_known(dense_ekf *e, const plr_landmark *known);
+
+/* Drops the landmark of that id, if there is one. */
+void dense_remove(dense_ekf *e, uint32_t id);
+
+/* Landmark in the world: position and covariance. */
+void dense_landmark(const dense_ekf *e, unsigned landmark, double p_W[3], double P_W[9]);
+
+/* The largest differences between oracle and filter. */
+typedef struct dense_gap {
+    double position_m, rotation_rad, bias;
+    double landmark;   /* |x - x'| over its distance */
+    double covariance; /* |P_ij - P'_ij| / sqrt(P_ii P_jj), in the oracle's errors */
+} dense_gap;
+
+/* Compares; applies the filter's accumulated motion first. False if they do not hold the same
+ * landmarks. */
+bool dense_compare(const dense_ekf *e, plr_filter *f, dense_gap *gap);
+
+#endif
