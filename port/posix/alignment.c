@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "posix/rigid.h"
+#include "posix/pose_math.h"
 
 static void mean3(double mean[3], const double *points, size_t n) {
     mean[0] = mean[1] = mean[2] = 0;
@@ -72,7 +72,7 @@ void alignment_fit(plr_pose *A, const double *a, const double *b, size_t n) {
                 S[i][j] += (b[3 * k + i] - mean_b[i]) * (a[3 * k + j] - mean_a[j]);
     horn(N, S);
     largest_eigenvector(q, N);
-    rigid_from_quaternion(A->R, q);
+    rotation_from_quaternion(A->R, q);
     for (int i = 0; i < 3; i++) {
         A->p[i] = mean_a[i];
         for (int j = 0; j < 3; j++)

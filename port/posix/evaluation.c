@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "posix/alignment.h"
-#include "posix/rigid.h"
+#include "posix/pose_math.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
 
@@ -120,18 +120,18 @@ static void compare_from_start(evaluation_figures *figures, const pair *pairs, s
     plr_pose A, inverse, error;
     double position = 0, angle = 0, nees = 0;
     size_t counted = 0;
-    rigid_inverse(&inverse, &pairs[0].truth->T_WB);
-    rigid_compose(&A, &pairs[0].estimate->T_WB, &inverse);
+    pose_inverse(&inverse, &pairs[0].truth->T_WB);
+    pose_compose(&A, &pairs[0].estimate->T_WB, &inverse);
     for (size_t k = 0; k < n; k++) {
         const estimate *estimated = pairs[k].estimate;
         plr_pose moved;
         double xi[6];
-        rigid_compose(&moved, &A, &pairs[k].truth->T_WB);
-        rigid_inverse(&inverse, &estimated->T_WB);
-        rigid_compose(&error, &inverse, &moved);
+        pose_compose(&moved, &A, &pairs[k].truth->T_WB);
+        pose_inverse(&inverse, &estimated->T_WB);
+        pose_compose(&error, &inverse, &moved);
         position += squared_distance(estimated->T_WB.p, moved.p);
-        angle += pow(rigid_angle(error.R), 2);
-        rigid_log(xi, &error);
+        angle += pow(rotation_angle(error.R), 2);
+        pose_log(xi, &error);
         const double d2 = k > 0 ? mahalanobis(estimated->P_xi, xi) : 0;
         if (isnan(d2)) {
             figures->not_positive++;
@@ -158,7 +158,7 @@ static double trajectory_error(const pair *pairs, size_t n) {
     alignment_fit(&A, estimated, true_ones, n);
     for (size_t k = 0; k < n; k++) {
         plr_pose moved;
-        rigid_compose(&moved, &A, &pairs[k].truth->T_WB);
+        pose_compose(&moved, &A, &pairs[k].truth->T_WB);
         sum += squared_distance(estimated + 3 * k, moved.p);
     }
     free(points);

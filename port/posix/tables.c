@@ -4,7 +4,7 @@
 #include <inttypes.h>
 #include <math.h>
 
-#include "posix/rigid.h"
+#include "posix/pose_math.h"
 
 /* Seconds without a rounding: a double holds no nanoseconds of this century. */
 static void put_time(FILE *file, plr_time_ns t_ns) {
@@ -15,7 +15,7 @@ void trajectory_put(FILE *file, const plr_pose_message *pose) {
     double q[4];
     if (file == NULL)
         return;
-    rigid_quaternion(q, pose->T_WB.R);
+    rotation_quaternion(q, pose->T_WB.R);
     put_time(file, pose->t_ns);
     for (int i = 0; i < 3; i++)
         fprintf(file, " %.9g", pose->T_WB.p[i]);
@@ -47,7 +47,7 @@ enum { ESTIMATE_COLUMNS = 32 };
 static void put_estimate(FILE *file, const plr_pose_message *pose, double trace,
                          const double *bias_variance) {
     double q[4], variances[6];
-    rigid_quaternion(q, pose->T_WB.R);
+    rotation_quaternion(q, pose->T_WB.R);
     for (int i = 0; i < 6; i++)
         variances[i] = pose->P_xi[i * (i + 3) / 2];
     put_numbers(file, pose->T_WB.p, 3);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "posix/rigid.h"
+#include "posix/pose_math.h"
 
 #include <math.h>
 
-void rigid_compose(plr_pose *C, const plr_pose *A, const plr_pose *B) {
+void pose_compose(plr_pose *C, const plr_pose *A, const plr_pose *B) {
     plr_pose product;
     for (int i = 0; i < 3; i++) {
         product.p[i] = A->p[i];
@@ -17,7 +17,7 @@ void rigid_compose(plr_pose *C, const plr_pose *A, const plr_pose *B) {
     *C = product;
 }
 
-void rigid_inverse(plr_pose *inverse, const plr_pose *A) {
+void pose_inverse(plr_pose *inverse, const plr_pose *A) {
     for (int i = 0; i < 3; i++) {
         inverse->p[i] = 0;
         for (int j = 0; j < 3; j++) {
@@ -38,7 +38,7 @@ static double norm3(const double x[3]) {
     return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
 }
 
-double rigid_angle(const double R[9]) {
+double rotation_angle(const double R[9]) {
     double s[3];
     skew_part(s, R);
     return atan2(norm3(s), 0.5 * (R[0] + R[4] + R[8] - 1));
@@ -46,7 +46,7 @@ double rigid_angle(const double R[9]) {
 
 /* The four squared components of the quaternion times four; the largest is taken as the pivot, so
  * that nothing is divided by a small number (Shepperd 1978). */
-void rigid_quaternion(double q[4], const double R[9]) {
+void rotation_quaternion(double q[4], const double R[9]) {
     const double trace = R[0] + R[4] + R[8];
     const double squares[4] = {1 + 2 * R[0] - trace, 1 + 2 * R[4] - trace, 1 + 2 * R[8] - trace,
                                1 + trace};
@@ -68,7 +68,7 @@ void rigid_quaternion(double q[4], const double R[9]) {
         q[i] = rows[pivot][i] * scale;
 }
 
-void rigid_from_quaternion(double R[9], const double q[4]) {
+void rotation_from_quaternion(double R[9], const double q[4]) {
     const double x = q[0], y = q[1], z = q[2], w = q[3];
     const double rotation[9] = {
         1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
@@ -82,7 +82,7 @@ void rigid_from_quaternion(double R[9], const double q[4]) {
 /* The rotation vector, by way of the quaternion: good up to pi. */
 static void rotation_vector(double theta[3], const double R[9]) {
     double q[4];
-    rigid_quaternion(q, R);
+    rotation_quaternion(q, R);
     const double sine = norm3(q); /* of half the angle */
     const double scale = sine > 1e-12 ? 2 * atan2(sine, q[3]) / sine : 2;
     for (int i = 0; i < 3; i++)
@@ -96,7 +96,7 @@ static void cross(double c[3], const double a[3], const double b[3]) {
 }
 
 /* V^-1 = I - [theta]x / 2 + (1/a^2 - (1 + cos a) / (2 a sin a)) [theta]x^2, a = |theta|. */
-void rigid_log(double xi[6], const plr_pose *A) {
+void pose_log(double xi[6], const plr_pose *A) {
     double *theta = xi + 3, once[3], twice[3];
     rotation_vector(theta, A->R);
     const double a = norm3(theta);

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+/* The queue of twists that wait for a late camera. */
+#include <unity.h>
+
+#include "session/held.h"
+
+static plr_held_twists held;
+
+void setUp(void) {
+    plr_held_init(&held);
+}
+
+void tearDown(void) {
+}
+
+static void push(plr_time_ns t_ns) {
+    const plr_twist_message twist = {.t_ns = t_ns};
+    plr_held_push(&held, &twist);
+}
+
+static void test_twists_come_out_in_the_order_they_went_in(void) {
+    plr_twist_message twist;
+    for (plr_time_ns t = 1; t <= 3; t++)
+        push(t);
+    for (plr_time_ns t = 1; t <= 3; t++) {
+        TEST_ASSERT_TRUE(plr_held_pop(&held, &twist));
+        TEST_ASSERT_EQUAL_UINT64(t, twist.t_ns);
+    }
+    TEST_ASSERT_FALSE(plr_held_pop(&held, &twist));
+}
+
+static void test_the_ring_goes_round_many_times(void) {
+    plr_twist_message twist;
+    for (plr_time_ns t = 1; t <= 5 * PLR_SESSION_HELD_TWISTS; t++) {
+        push(t);
+        if (t > 10) {
+            TEST_ASSERT_TRUE(plr_held_pop(&held, &twist));
+            TEST_ASSERT_EQUAL_UINT64(t - 10, twist.t_ns);
+        }
+    }
+}
+
+static void test_it_is_full_at_its_capacity_and_not_before(void) {
+    for (unsigned i = 0; i < PLR_SESSION_HELD_TWISTS; i++) {
+        TEST_ASSERT_FALSE(plr_held_full(&held));
+        push(i);
+    }
+    TEST_ASSERT_TRUE(plr_held_full(&held));
+}
+
+static void test_a_twist_is_due_when_the_newest_is_the_delay_ahead(void) {
+    plr_twist_message twist;
+    push(100);
+    push(149);
+    TEST_ASSERT_FALSE(plr_held_pop_due(&held, 50, &twist));
+    push(150);
+    TEST_ASSERT_TRUE(plr_held_pop_due(&held, 50, &twist));
+    TEST_ASSERT_EQUAL_UINT64(100, twist.t_ns);
+    TEST_ASSERT_FALSE(plr_held_pop_due(&held, 50, &twist));
+}
+
+static void test_a_frame_takes_the_twists_up_to_its_time(void) {
+    plr_twist_message twist;
+    push(10);
+    push(20);
+    push(30);
+    TEST_ASSERT_TRUE(plr_held_pop_until(&held, 20, &twist));
+    TEST_ASSERT_TRUE(plr_held_pop_until(&held, 20, &twist));
+    TEST_ASSERT_EQUAL_UINT64(20, twist.t_ns);
+    TEST_ASSERT_FALSE(plr_held_pop_until(&held, 20, &twist));
+    TEST_ASSERT_EQUAL_UINT(1, held.count);
+}
+
+static void test_time_that_repeats_or_goes_back_contradicts(void) {
+    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 0));
+    push(10);
+    TEST_ASSERT_TRUE(plr_held_contradicts(&held, 9));
+    TEST_ASSERT_TRUE(plr_held_contradicts(&held, 10));
+    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 11));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_twists_come_out_in_the_order_they_went_in);
+    RUN_TEST(test_the_ring_goes_round_many_times);
+    RUN_TEST(test_it_is_full_at_its_capacity_and_not_before);
+    RUN_TEST(test_a_twist_is_due_when_the_newest_is_the_delay_ahead);
+    RUN_TEST(test_a_frame_takes_the_twists_up_to_its_time);
+    RUN_TEST(test_time_that_repeats_or_goes_back_contradicts);
+    return UNITY_END();
+}

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+/* Settings in force: override over CONFIG over HEADER over default. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "session/layers.h"
+#include "support/session_drive.h"
+
+static plr_header header;
+static plr_config_message wanted;
+static plr_wire_setting overrides[8];
+static unsigned override_count;
+static plr_config config;
+static const plr_setting *culprit;
+
+void setUp(void) {
+    header = drive_header().as.header;
+    memset(&wanted, 0, sizeof wanted);
+    override_count = 0;
+}
+
+void tearDown(void) {
+}
+
+static plr_status compose(void) {
+    const plr_layers layers = {&header, &wanted, overrides, override_count};
+    return plr_layers_compose(&config, &layers, &culprit);
+}
+
+static plr_wire_setting value(const char *name, double x) {
+    return (plr_wire_setting){plr_setting_by_name(name)->id, x};
+}
+
+static void want(const char *name, double x) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_layers_want(&wanted, value(name, x)));
+}
+
+static void override(const char *name, double x) {
+    overrides[override_count++] = value(name, x);
+}
+
+static void test_with_nothing_said_everything_is_at_its_default(void) {
+    plr_config standard;
+    plr_config_default(&standard);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    for (unsigned i = 0; i < plr_setting_count(); i++) {
+        const plr_setting *s = plr_setting_at(i);
+        TEST_ASSERT_EQUAL_DOUBLE(plr_config_get(&standard, s), plr_config_get(&config, s));
+    }
+}
+
+static void test_each_layer_wins_over_those_below(void) {
+    header.pixel_sigma_px = 3;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(3, config.pixel_sigma_px);
+    want("pixel-sigma", 4);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(4, config.pixel_sigma_px);
+    override("pixel-sigma", 5);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(5, config.pixel_sigma_px);
+    override("pixel-sigma", 6);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(6, config.pixel_sigma_px);
+}
+
+static void test_the_header_says_twist_timing_and_all_seven_noises(void) {
+    header.twist_timing = PLR_TWIST_MID;
+    header.pixel_sigma_px = 1.5;
+    header.velocity_sigma_mps = 0.25;
+    header.gyro_sigma_radps = 0.125;
+    header.bias_velocity_sigma_mps = 0.5;
+    header.bias_gyro_sigma_radps = 0.0625;
+    header.bias_velocity_walk = 1e-3;
+    header.bias_gyro_walk = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(PLR_TWIST_MID, config.twist_timing);
+    TEST_ASSERT_EQUAL_DOUBLE(1.5, config.pixel_sigma_px);
+    TEST_ASSERT_EQUAL_DOUBLE(0.25, config.velocity_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE(0.125, config.gyro_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE(0.5, config.bias_velocity_sigma_mps);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0625, config.bias_gyro_sigma_radps);
+    TEST_ASSERT_EQUAL_DOUBLE(1e-3, config.bias_velocity_walk);
+    TEST_ASSERT_EQUAL_DOUBLE(0, config.bias_gyro_walk);
+}
+
+static void test_suggestions_that_make_no_sense_are_left_out(void) {
+    plr_config standard;
+    plr_config_default(&standard);
+    header.pixel_sigma_px = (double)NAN;
+    header.velocity_sigma_mps = (double)INFINITY;
+    header.gyro_sigma_radps = -1e300;
+    header.bias_gyro_sigma_radps = 1e300;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(standard.pixel_sigma_px, config.pixel_sigma_px);
+    TEST_ASSERT_EQUAL_DOUBLE(standard.velocity_sigma, config.velocity_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE(standard.gyro_sigma, config.gyro_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE(standard.bias_gyro_sigma_radps, config.bias_gyro_sigma_radps);
+}
+
+/* 0.5 m/s of a reading is not 0.5 m of a step. */
+static void test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out(void) {
+    plr_config standard;
+    plr_config_default(&standard);
+    header.velocity_sigma_mps = 0.5;
+    header.gyro_sigma_radps = 0.5;
+    header.pixel_sigma_px = 7;
+    override("noise", PLR_NOISE_STEP);
+    override("velocity-sigma", 0.03);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(0.03, config.velocity_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE(standard.gyro_sigma, config.gyro_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE(7, config.pixel_sigma_px);
+}
+
+static void test_an_impossible_override_names_its_setting(void) {
+    override("pixel-sigma", -1);
+    TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, compose());
+    TEST_ASSERT_EQUAL_STRING("pixel-sigma", culprit->name);
+}
+
+static void test_settings_that_contradict_each_other_name_the_one_to_change(void) {
+    override("landmark-sigma", 1); /* body takes it from the pixels */
+    TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, compose());
+    TEST_ASSERT_NOT_NULL(culprit);
+}
+
+static void test_wanted_values_replace_each_other_and_bad_ones_change_nothing(void) {
+    want("slots", 5);
+    want("pixel-sigma", 2);
+    want("slots", 7);
+    TEST_ASSERT_EQUAL_UINT8(2, wanted.count);
+    TEST_ASSERT_EQUAL_DOUBLE(7, wanted.settings[0].value);
+    TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_layers_want(&wanted, value("slots", 0)));
+    TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_layers_want(&wanted, value("slots", (double)NAN)));
+    TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_layers_want(&wanted, (plr_wire_setting){200, 1}));
+    TEST_ASSERT_EQUAL_UINT8(2, wanted.count);
+    TEST_ASSERT_EQUAL_DOUBLE(7, wanted.settings[0].value);
+}
+
+static void test_what_is_described_is_what_is_in_force(void) {
+    plr_config_message described;
+    plr_config again;
+    override("slots", 9);
+    override("mode", PLR_MODE_MAPPING);
+    override("gyro-sigma", 0.1234567890123);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    plr_layers_describe(&described, &config);
+    TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), described.build_fingerprint);
+    TEST_ASSERT_EQUAL_UINT8(plr_setting_count(), described.count);
+    TEST_ASSERT_TRUE(plr_layers_agree(&described, &config));
+
+    plr_config_default(&again);
+    TEST_ASSERT_FALSE(plr_layers_agree(&described, &again));
+    wanted = described;
+    override_count = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_TRUE(plr_layers_agree(&described, &config));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_with_nothing_said_everything_is_at_its_default);
+    RUN_TEST(test_each_layer_wins_over_those_below);
+    RUN_TEST(test_the_header_says_twist_timing_and_all_seven_noises);
+    RUN_TEST(test_suggestions_that_make_no_sense_are_left_out);
+    RUN_TEST(test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out);
+    RUN_TEST(test_an_impossible_override_names_its_setting);
+    RUN_TEST(test_settings_that_contradict_each_other_name_the_one_to_change);
+    RUN_TEST(test_wanted_values_replace_each_other_and_bad_ones_change_nothing);
+    RUN_TEST(test_what_is_described_is_what_is_in_force);
+    return UNITY_END();
+}
