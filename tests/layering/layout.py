@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""What a caller reserves has the size that the library expects, whatever flags either is built with:
-only the options of config.h may change it.
+"""What a caller reserves has the size that the library expects, though the two are built with other
+flags: only the options of config.h may change it.
 
 usage: layout.py PROJECT_ROOT
 
