@@ -40,7 +40,12 @@ bool setting_value_from_text(const plr_setting *setting, const char *text, doubl
     return true;
 }
 
+/* %g would write 1000 as 1e+03 where one digit is enough. */
 static void number_to_text(double value, char *text, size_t size) {
+    if (value == floor(value) && fabs(value) < 1e7) {
+        snprintf(text, size, "%.0f", value);
+        return;
+    }
     for (int digits = 1; digits <= 17; digits++) {
         snprintf(text, size, "%.*g", digits, value);
         if (strtod(text, NULL) == value)
