@@ -112,6 +112,16 @@ check_format() {
         xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
 }
 
+# fuzz_for SECONDS COMPILER: libFuzzer over the reader, from the corpus; new inputs are left in
+# build-logs/fuzz.
+fuzz_for() {
+    mkdir -p "$LOGS/fuzz"
+    "$2" -g -O1 -std=c99 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
+        -Iinclude -Isrc -Itests src/wire/*.c tests/fuzz/fuzz_reader.c -o "$LOGS/fuzz_reader" &&
+        "$LOGS/fuzz_reader" -max_len=4096 -max_total_time="$1" -print_final_stats=1 \
+            -artifact_prefix="$LOGS/fuzz/" "$LOGS/fuzz" tests/fuzz/corpus
+}
+
 # Warnings are errors, and the machine must have OpenBLAS: no test is left out in silence.
 strict=(-DPELORUS_BUILD_TESTS=ON -DPELORUS_WERROR=ON -DPELORUS_REQUIRE_ORACLE=ON)
 
@@ -153,6 +163,7 @@ if [ $extent != quick ]; then
     build_and_test o2 'less optimised' "${strict[@]}"
     step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
+    [ $extent = long ] && step 'fuzz the reader' fuzz_for 120 "$clang"
     if [ -x tests/target/run.sh ]; then
         step 'microcontroller' tests/target/run.sh
     fi
