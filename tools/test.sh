@@ -126,6 +126,7 @@ fuzz_for() {
 strict=(-DPELORUS_BUILD_TESTS=ON -DPELORUS_WERROR=ON -DPELORUS_REQUIRE_ORACLE=ON)
 
 heading 'Set-up'
+[ $extent = long ] && PACKAGES_WANTED+=(libclang-rt-14-dev) # libFuzzer
 if [ $extent = quick ]; then
     ensure_packages "${PACKAGES_BUILD[@]}" g++ libopenblas-dev liblapacke-dev
 else
