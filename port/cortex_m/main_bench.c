@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+/*
+ * Counts what the filter costs: replays a recording that is part of the image, and writes a line of
+ * text for each size, and for each predict and update the core clocks that it took. Under QEMU's
+ * `-icount shift=0` an instruction takes a nanosecond, so clocks are instructions divided by a known
+ * number, and repeat to the clock: nothing comes in over the link, and no interrupt is on.
+ */
+#include "board.h"
+#include "clock.h"
+#include "core.h"
+#include "pelorus/pelorus.h"
+#include "pelorus/session.h"
+#include "pelorus/wire.h"
+#include "serial.h"
+#include "startup.h"
+#include "text.h"
+
+/* From bench_recording.S. */
+extern const uint8_t bench_recording[], bench_recording_end[];
+
+static plr_filter filter;
+static plr_reader reader;
+static plr_message message;
+static uint8_t body[PLR_WIRE_STEREO_BODY(PLR_MAX_OBSERVATIONS) + PLR_WIRE_MIN_BUFFER];
+static plr_observation observations[PLR_MAX_OBSERVATIONS];
+static plr_report report;
+static text line;
+
+static void put_line(void) {
+    text_add(&line, "\n");
+    serial_panic((const uint8_t *)line.characters, line.length);
+    text_clear(&line);
+}
+
+static void add_field(const char *name, uint64_t number) {
+    text_add(&line, name);
+    text_add(&line, " ");
+    text_add_number(&line, number);
+    text_add(&line, " ");
+}
+
+static void begin(const plr_header *header) {
+    plr_config config;
+    plr_config_default(&config);
+    config.bias = 1;
+    config.slots = PLR_MAX_LANDMARKS;
+    config.twist_timing = header->twist_timing;
+    if (plr_filter_init(&filter, &header->calibration, &config, NULL) != PLR_OK) {
+        text_add(&line, "error: the filter refuses the recording's HEADER");
+        put_line();
+    }
+}
+
+/* The counter runs down, in 24 bits. */
+static uint32_t clocks_since(uint32_t start) {
+    return (start - SYST_CVR) & SYST_MAX;
+}
+
+static void time_predict(const plr_twist_message *twist) {
+    const uint32_t start = SYST_CVR;
+    const plr_status status = plr_filter_predict(&filter, twist->t_ns, &twist->twist);
+    const uint32_t clocks = clocks_since(start);
+    if (status == PLR_OK) {
+        add_field("predict", clocks);
+        put_line();
+    }
+}
+
+static void time_update(const plr_frame *frame) {
+    const uint32_t start = SYST_CVR;
+    const plr_status status = plr_filter_update(&filter, frame, &report);
+    const uint32_t clocks = clocks_since(start);
+    if (status == PLR_OK) {
+        add_field("update", clocks);
+        add_field("observations", report.observations);
+        add_field("matched", report.matched);
+        add_field("used", report.used);
+        add_field("created", report.created);
+        add_field("evicted", report.evicted);
+        add_field("active", report.active);
+        put_line();
+    }
+}
+
+static void take(void) {
+    switch (message.kind) {
+    case PLR_KIND_HEADER:
+        begin(&message.as.header);
+        break;
+    case PLR_KIND_TWIST:
+        time_predict(&message.as.twist);
+        break;
+    case PLR_KIND_STEREO:
+        time_update(&message.as.stereo);
+        break;
+    default:
+        break; /* TRUTH, END: of no interest here */
+    }
+}
+
+static void replay(void) {
+    const uint8_t *at = bench_recording;
+    (void)plr_reader_init(&reader, body, sizeof body, observations, PLR_MAX_OBSERVATIONS);
+    while (at < bench_recording_end) {
+        size_t taken = 0;
+        const plr_read_event event =
+            plr_reader_feed(&reader, at, (size_t)(bench_recording_end - at), &taken, &message);
+        at += taken;
+        board_watchdog_feed();
+        if (event == PLR_READ_MESSAGE) {
+            take();
+        }
+    }
+}
+
+static void put_sizes(void) {
+    add_field("size filter", sizeof(plr_filter));
+    add_field("workspace", sizeof(plr_workspace));
+    add_field("session", sizeof(plr_session));
+    add_field("hz", board_core_hz());
+    put_line();
+}
+
+int main(void) {
+    board_init();
+    SYST_RVR = SYST_MAX;
+    SYST_CVR = 0;
+    SYST_CSR = SYST_CSR_ENABLE | SYST_CSR_CORE_CLOCK; /* counts, and does not interrupt */
+    put_sizes();
+    replay();
+    add_field("done stack", stack_used());
+    put_line();
+    for (;;) {
+        board_watchdog_feed();
+    }
+}
