@@ -18,13 +18,6 @@ endif()
 set(PELORUS_ARCH "${pelorus_default_arch}" CACHE STRING
   "-march of the library: x86-64-v3, native, ...; empty: the compiler's; unused if PLR_PORTABLE")
 
-# config.h chooses the kernels' tile by what the compiler may use, and the size of a filter depends on
-# it. The library is built for PELORUS_ARCH and its users perhaps not, so it is told to both.
-set(PELORUS_TILE "")
-if(pelorus_default_arch AND PELORUS_ARCH AND NOT PLR_PORTABLE)
-  set(PELORUS_TILE PLR_TILE_COLUMNS=16)
-endif()
-
 # CMake 3.21's PROJECT_IS_TOP_LEVEL: inside another project only the library is wanted.
 option(PELORUS_BUILD_REPLAY "Build pelorus-replay" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_BUILD_TESTS "Build the tests and benches" ${PROJECT_IS_TOP_LEVEL})

@@ -58,6 +58,9 @@
 #if !defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ != 0
 #error "Pelorus needs FLT_EVAL_METHOD 0 (on 32-bit x86: -msse2 -mfpmath=sse)."
 #endif
+#if PLR_TILE_COLUMNS < 1 || PLR_TILE_COLUMNS > 16
+#error "PLR_TILE_COLUMNS must be 1 to 16."
+#endif
 #if PLR_MAX_LANDMARKS < 1 || PLR_MAX_LANDMARKS > 1024
 #error "PLR_MAX_LANDMARKS must be 1 to 1024."
 #endif
@@ -100,6 +103,8 @@ enum {
     PLR_BLOCK_ROWS = PLR_ROWS * PLR_BLOCK_OBSERVATIONS,
     PLR_WORK_ROWS = PLR_BLOCK_ROWS > 24 ? PLR_BLOCK_ROWS : 24, /* a predict needs 4 x 6 */
     PLR_MAX_STATE = PLR_POSE_DIM + PLR_BIAS_DIM + PLR_LANDMARK_DIM * PLR_MAX_LANDMARKS,
+    PLR_MAX_LD = (PLR_MAX_STATE + 15) / 16 * 16, /* whole tiles, whatever their width */
+    PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond its end */
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
 };
 

@@ -75,10 +75,11 @@ typedef struct plr_parameters {
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
      * The kernel reads a little further than it uses, hence the margin. */
-    plr_real Vt[PLR_WORK_ROWS * PLR_MAX_STATE + PLR_TILE_COLUMNS + 4];
-    plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2]; /* packed */
+    plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
+    plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2]; /* packed upper triangle */
     plr_real y[PLR_BLOCK_ROWS];
     plr_real dx[PLR_MAX_STATE];
+    plr_real diagonal[PLR_MAX_STATE];       /* of P, as a block would leave it */
     plr_real gain[PLR_MAX_OBSERVATIONS];    /* how much order[k] would tell; see gate.h */
     uint16_t order[PLR_MAX_OBSERVATIONS];   /* good observations of the frame, by id */
     uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* the slot of order[k], or PLR_NO_SLOT */

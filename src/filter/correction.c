@@ -7,13 +7,12 @@
 #include "filter/gate.h"
 #include "filter/motion.h"
 #include "linalg/dense.h"
-#include "linalg/packed.h"
 #include "linalg/small.h"
 
 /* One block of observations, stacked: S = H P H^T + R and y = r - H dx. */
 typedef struct plr_block {
     unsigned count;
-    unsigned n;                              /* dimension of the state */
+    unsigned n, ld;                          /* dimension of the state; between rows of V^T */
     unsigned row_of[PLR_BLOCK_OBSERVATIONS]; /* first row of each landmark in the state */
     plr_linearisation lin[PLR_BLOCK_OBSERVATIONS];
 } plr_block;
@@ -37,34 +36,34 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
         plr_linearisation *lin = &block->lin[a];
         (void)f->model->linearise(f, &f->slots[slot], lin); /* the gate has seen it succeed */
         block->row_of[a] = plr_covariance_row(f, slot);
-        plr_covariance_project(f, slot, lin, w->Vt + PLR_ROWS * a * block->n, block->n);
+        plr_covariance_project(f, slot, lin, w->Vt + PLR_ROWS * a * block->ld, block->ld);
 
         plr_real r[3];
         plr_gate_innovation(r, &observations[w->order[used[a]]], lin);
         for (unsigned i = 0; i < PLR_ROWS; i++)
             w->y[PLR_ROWS * a + i] = r[i] - apply_row(block, a, i, w->dx);
     }
-    for (unsigned i = 0; i < PLR_ROWS * block->count; i++) {
-        plr_real *S_row = w->S + plr_packed_row(i);
-        for (unsigned j = 0; j <= i; j++)
-            S_row[j] = apply_row(block, j / PLR_ROWS, j % PLR_ROWS, w->Vt + i * block->n);
-        S_row[i] += plr_gate_noise(f, i % PLR_ROWS);
-    }
+    const unsigned rows = PLR_ROWS * block->count;
+    plr_real *S = w->S;
+    for (unsigned i = 0; i < rows; i++)
+        for (unsigned j = i; j < rows; j++)
+            *S++ = apply_row(block, j / PLR_ROWS, j % PLR_ROWS, w->Vt + i * block->ld) +
+                   (i == j ? plr_gate_noise(f, i % PLR_ROWS) : PLR_R(0));
 }
 
-/* V^T = L^-1 (P H^T)^T, P -= V V^T, dx += V L^-1 y. False, and nothing changed but the workspace, if
+/* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but the workspace, if
  * S is not positive (*factorised = false) or a variance would be lost. */
 static bool apply_block(plr_filter *f, const plr_block *block, bool *factorised) {
     plr_workspace *w = &f->work;
     const unsigned rows = PLR_ROWS * block->count;
-    *factorised = plr_cholesky_packed(rows, w->S);
+    *factorised = plr_cholesky_upper(rows, w->S);
     if (!*factorised)
         return false;
-    plr_solve_lower_packed(rows, block->n, w->S, w->Vt, block->n);
-    plr_solve_lower_packed(rows, 1, w->S, w->y, 1);
+    plr_solve_upper_transposed(rows, block->ld, w->S, w->Vt, block->ld);
+    plr_solve_upper_transposed(rows, 1, w->S, w->y, 1);
     if (!plr_covariance_subtract(f, rows))
         return false;
-    plr_gemm_nn(1, block->n, rows, w->y, rows, w->Vt, block->n, w->dx, block->n);
+    plr_gemm_nn(1, block->n, rows, w->y, rows, w->Vt, block->ld, w->dx, block->n);
     return true;
 }
 
@@ -83,7 +82,7 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
     const unsigned n = plr_covariance_dim(f);
     memset(f->work.dx, 0, n * sizeof *f->work.dx);
     for (unsigned at = 0; at < count && !f->diverged; at += PLR_BLOCK_OBSERVATIONS) {
-        plr_block block = {.n = n, .count = count - at};
+        plr_block block = {.n = n, .ld = plr_covariance_ld(f), .count = count - at};
         if (block.count > PLR_BLOCK_OBSERVATIONS)
             block.count = PLR_BLOCK_OBSERVATIONS;
         bool factorised;

@@ -19,6 +19,10 @@ unsigned plr_covariance_dim(const plr_filter *f) {
     return plr_covariance_row(f, f->count);
 }
 
+unsigned plr_covariance_ld(const plr_filter *f) {
+    return (plr_covariance_dim(f) + PLR_TILE_COLUMNS - 1) / PLR_TILE_COLUMNS * PLR_TILE_COLUMNS;
+}
+
 /* B (rows x columns) = P[row.., column..], dense, whichever side of the diagonal. */
 static void get_block(const plr_filter *f, unsigned row, unsigned rows, unsigned column,
                       unsigned columns, plr_real *B) {
@@ -107,15 +111,21 @@ bool plr_covariance_is_positive(const plr_filter *f) {
 
 /* ---------------------------------------------------------------- motion */
 
-/* row[0..5] <- row[0..5] A^T */
-static void turn_pose_columns(plr_real *row, const plr_real A[36]) {
+/* row[0..5] <- row[0..5] A^T; At is A^T, so that the columns advance together. */
+static inline void turn_pose_columns(plr_real *row, const plr_real At[36]) {
     plr_real turned[6] = {0};
-    plr_gemm_nt(1, 6, 6, row, 6, A, 6, turned, 6);
+    plr_gemm_nn(1, 6, 6, row, 6, At, 6, turned, 6);
     memcpy(row, turned, sizeof turned);
 }
 
+static void transpose6(plr_real At[36], const plr_real A[36]) {
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned j = 0; j < 6; j++)
+            At[6 * i + j] = A[6 * j + i];
+}
+
 /* The three rows of one landmark: left by F, right by what stands at each column. */
-static void transport_landmark(plr_filter *f, unsigned slot, const plr_real A[36],
+static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[36],
                                const plr_real *F) {
     const unsigned s = plr_covariance_row(f, slot), first = first_landmark_row(f);
     plr_real *restrict r0 = f->P + plr_packed_row(s);
@@ -137,7 +147,7 @@ static void transport_landmark(plr_filter *f, unsigned slot, const plr_real A[36
 
     for (unsigned i = 0; i < 3; i++) {
         plr_real *row = f->P + plr_packed_row(s + i);
-        turn_pose_columns(row, A);
+        turn_pose_columns(row, At);
         const plr_real *G = F;
         for (plr_real *x = row + first; x < row + s; x += 3, G += 9) {
             const plr_real x0 = x[0], x1 = x[1], x2 = x[2];
@@ -149,14 +159,15 @@ static void transport_landmark(plr_filter *f, unsigned slot, const plr_real A[36
 }
 
 void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F) {
-    plr_real P_xi[36], turned[36];
+    plr_real P_xi[36], turned[36], At[36];
     get_block(f, POSE, 6, POSE, 6, P_xi);
     plr_sandwich6(turned, A, P_xi);
     set_block(f, POSE, 6, POSE, 6, turned);
+    transpose6(At, A);
     for (unsigned i = BIAS; i < first_landmark_row(f); i++)
-        turn_pose_columns(f->P + plr_packed_row(i), A);
+        turn_pose_columns(f->P + plr_packed_row(i), At);
     for (unsigned slot = 0; slot < f->count; slot++)
-        transport_landmark(f, slot, A, F);
+        transport_landmark(f, slot, At, F);
 }
 
 /* Rows of the workspace in a predict: U^T = [-Y -G]^T, W^T = [G Y]^T, six rows each part. */
@@ -229,12 +240,14 @@ void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_
     set_block(f, POSE, 6, POSE, 6, turned);
 
     /* the other rows begin with their pose columns, and the bias columns follow */
+    plr_real At[36];
+    transpose6(At, A);
     for (unsigned i = PLR_POSE_DIM; i < n; i++) {
         plr_real *row = f->P + plr_packed_row(i);
-        plr_real P_ib[6];
+        plr_real P_ib[6] = {0};
         if (f->config.bias)
             get_block(f, i, 1, BIAS, 6, P_ib);
-        turn_pose_columns(row, A);
+        turn_pose_columns(row, At);
         if (f->config.bias)
             plr_gemm_nt(1, 6, 6, P_ib, 6, motion->B, 6, row, 6);
     }
@@ -260,8 +273,8 @@ void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_lin
         plr_mat3_mul_nt(full, HP, lin->H_landmark);
     }
     for (unsigned i = 0; i < 3; i++)
-        for (unsigned j = 0; j <= i; j++)
-            S[plr_packed_row(i) + j] = full[3 * i + j];
+        for (unsigned j = i; j < 3; j++)
+            *S++ = full[3 * j + i];
 }
 
 /* out[i] += a P(i, column) for all rows i, whichever side of the diagonal. */
@@ -302,6 +315,8 @@ void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linear
                             plr_real *rows, size_t ld) {
     const unsigned n = plr_covariance_dim(f);
     project_landmark(f, n, plr_covariance_row(f, slot), lin->H_landmark, rows, ld);
+    for (unsigned r = 0; r < PLR_ROWS; r++)
+        memset(rows + r * ld + n, 0, (ld - n) * sizeof *rows);
     if (lin->uses_pose)
         for (unsigned r = 0; r < PLR_ROWS; r++)
             for (unsigned c = 0; c < PLR_POSE_DIM; c++)
@@ -309,17 +324,16 @@ void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linear
 }
 
 bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
-    const unsigned n = plr_covariance_dim(f);
+    const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
+    plr_real *after = f->work.diagonal;
+    plr_packed_subtracted_diagonal(n, depth, f->work.Vt, ld, f->P, after);
     for (unsigned i = 0; i < n; i++) {
         const plr_real before = f->P[plr_packed_row(i) + i];
-        plr_real after = before;
-        for (unsigned k = 0; k < depth; k++)
-            after = PLR_FMA(-f->work.Vt[k * n + i], f->work.Vt[k * n + i], after);
-        const bool stays_zero = before <= 0 && before >= 0 && after <= 0 && after >= 0;
-        if (!(after > 0) && !stays_zero)
+        const bool stays_zero = before <= 0 && before >= 0 && after[i] <= 0 && after[i] >= 0;
+        if (!(after[i] > 0) && !stays_zero)
             return false;
     }
-    plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, n, f->P);
+    plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, ld, f->P);
     return true;
 }
 

@@ -14,6 +14,9 @@
 /* Rows of P in use: 6 (+ 6) + 3 count. */
 unsigned plr_covariance_dim(const plr_filter *f);
 
+/* The leading dimension of V^T in the workspace: dim, rounded up to whole tiles of the kernels. */
+unsigned plr_covariance_ld(const plr_filter *f);
+
 /* The first of the three rows of a landmark. */
 unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
 
@@ -61,15 +64,16 @@ void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyr
 
 /* --- update --- */
 
-/* S = H P H^T of one observation, 3x3 packed (6 numbers). */
+/* S = H P H^T of one observation, 3x3, the upper triangle packed row by row (6 numbers). */
 void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
                                plr_real S[6]);
 
-/* Three rows of (P H^T)^T, each dim long, with leading dimension ld. */
+/* Three rows of (P H^T)^T, each dim long, and zeros up to the leading dimension ld. */
 void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
                             plr_real *rows, size_t ld);
 
-/* P -= V V^T, V^T being depth x dim in the workspace. False, and nothing changed, if a variance
+/* P -= V V^T, V^T being depth x dim in the workspace, with the leading dimension
+ * plr_covariance_ld. False, and nothing changed, if a variance
  * would cease to be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 

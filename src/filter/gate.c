@@ -3,7 +3,6 @@
 
 #include "filter/covariance.h"
 #include "linalg/dense.h"
-#include "linalg/packed.h"
 #include "linalg/small.h"
 
 void plr_gate_innovation(plr_real r[3], const plr_observation *seen, const plr_linearisation *lin) {
@@ -33,14 +32,14 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
     plr_real S[6], r[3];
     plr_covariance_innovation(f, slot, &lin, S);
     for (unsigned i = 0; i < PLR_ROWS; i++)
-        S[plr_packed_at(i, i)] += plr_gate_noise(f, i);
-    if (!plr_cholesky_packed(PLR_ROWS, S))
+        S[plr_upper_row(PLR_ROWS, i)] += plr_gate_noise(f, i);
+    if (!plr_cholesky_upper(PLR_ROWS, S))
         return verdict;
     plr_gate_innovation(r, seen, &lin);
-    plr_solve_lower_packed(PLR_ROWS, 1, S, r, 1);
+    plr_solve_upper_transposed(PLR_ROWS, 1, S, r, 1);
     const plr_real row_gap = (plr_real)seen->vL_px - (plr_real)seen->vR_px;
     verdict.d2 = plr_dot3(r, r) + row_gap * row_gap / (PLR_R(2) * f->par.pixel_variance);
-    verdict.gain = S[0] * S[0] * S[2] * S[2] * S[5] * S[5];
+    verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
 
     if (f->par.gate_residual2 > 0)
         verdict.accepted = residual_norm2(seen, &lin) <= f->par.gate_residual2;

@@ -3,29 +3,7 @@
 
 #include <string.h>
 
-#include "linalg/packed.h"
 #include "linalg/small.h"
-
-void plr_gemm_nn(unsigned m, unsigned n, unsigned k, const plr_real *A, size_t lda,
-                 const plr_real *B, size_t ldb, plr_real *C, size_t ldc) {
-    for (unsigned i = 0; i < m; i++)
-        for (unsigned l = 0; l < k; l++) {
-            const plr_real a = A[i * lda + l];
-            for (unsigned j = 0; j < n; j++)
-                C[i * ldc + j] = PLR_FMA(a, B[l * ldb + j], C[i * ldc + j]);
-        }
-}
-
-void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_real *A, size_t lda,
-                 const plr_real *B, size_t ldb, plr_real *C, size_t ldc) {
-    for (unsigned i = 0; i < m; i++)
-        for (unsigned j = 0; j < n; j++) {
-            plr_real sum = C[i * ldc + j];
-            for (unsigned l = 0; l < k; l++)
-                sum = PLR_FMA(A[i * lda + l], B[j * ldb + l], sum);
-            C[i * ldc + j] = sum;
-        }
-}
 
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
     plr_real AP[36] = {0};
@@ -38,38 +16,65 @@ void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
     }
 }
 
-bool plr_cholesky_packed(unsigned n, plr_real *S) {
-    for (unsigned i = 0; i < n; i++) {
-        plr_real *row_i = S + plr_packed_row(i);
-        for (unsigned j = 0; j < i; j++) {
-            const plr_real *row_j = S + plr_packed_row(j);
-            plr_real sum = row_i[j];
-            for (unsigned k = 0; k < j; k++)
-                sum = PLR_FMA(-row_i[k], row_j[k], sum);
-            row_i[j] = sum / row_j[j];
-        }
-        plr_real pivot = row_i[i];
-        for (unsigned k = 0; k < i; k++)
-            pivot = PLR_FMA(-row_i[k], row_i[k], pivot);
-        if (!(pivot > 0) || !plr_is_finite(pivot))
+bool plr_cholesky_upper(unsigned n, plr_real *S) {
+    for (unsigned k = 0; k < n; k++) {
+        plr_real *restrict row_k = S + plr_upper_row(n, k); /* (k, k), (k, k+1), ... */
+        if (!(row_k[0] > 0) || !plr_is_finite(row_k[0]))
             return false;
-        row_i[i] = PLR_SQRT(pivot);
+        row_k[0] = PLR_SQRT(row_k[0]);
+        const plr_real inverse = PLR_R(1) / row_k[0];
+        for (unsigned j = 1; j < n - k; j++)
+            row_k[j] *= inverse;
+        for (unsigned i = 1; i < n - k; i++) {
+            plr_real *restrict row_i = S + plr_upper_row(n, k + i);
+            const plr_real a = -row_k[i];
+            for (unsigned j = 0; j < n - k - i; j++)
+                row_i[j] = PLR_FMA(a, row_k[i + j], row_i[j]);
+        }
     }
     return true;
 }
 
-void plr_solve_lower_packed(unsigned k, unsigned n, const plr_real *L, plr_real *X, size_t ldx) {
+enum { STRIP = PLR_TILE_COLUMNS };
+
+/* The solution for STRIP columns: one row of them at a time, in registers. */
+static void solve_strip(unsigned k, const plr_real *restrict U, plr_real *restrict X, size_t ldx) {
     for (unsigned i = 0; i < k; i++) {
-        const plr_real *row = L + plr_packed_row(i);
-        plr_real *restrict x = X + i * ldx;
+        plr_real x[STRIP];
+        memcpy(x, X + i * ldx, sizeof x);
+        const plr_real *u = U + i; /* (0, i), then down the column */
         for (unsigned l = 0; l < i; l++) {
-            const plr_real a = -row[l];
+            const plr_real a = -*u;
             const plr_real *restrict y = X + l * ldx;
-            for (unsigned j = 0; j < n; j++)
-                x[j] = PLR_FMA(a, y[j], x[j]);
+            for (int c = 0; c < STRIP; c++)
+                x[c] = PLR_FMA(a, y[c], x[c]);
+            u += k - l - 1;
         }
-        const plr_real inverse = PLR_R(1) / row[i];
-        for (unsigned j = 0; j < n; j++)
-            x[j] *= inverse;
+        const plr_real inverse = PLR_R(1) / *u;
+        for (int c = 0; c < STRIP; c++)
+            x[c] *= inverse;
+        memcpy(X + i * ldx, x, sizeof x);
     }
+}
+
+/* The same for a single column. */
+static void solve_column(unsigned k, const plr_real *restrict U, plr_real *X, size_t ldx) {
+    for (unsigned i = 0; i < k; i++) {
+        plr_real x = X[i * ldx];
+        const plr_real *u = U + i;
+        for (unsigned l = 0; l < i; l++) {
+            x = PLR_FMA(-*u, X[l * ldx], x);
+            u += k - l - 1;
+        }
+        X[i * ldx] = x * (PLR_R(1) / *u);
+    }
+}
+
+void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_real *X,
+                                size_t ldx) {
+    unsigned j = 0;
+    for (; j + STRIP <= n; j += STRIP)
+        solve_strip(k, U, X + j, ldx);
+    for (; j < n; j++)
+        solve_column(k, U, X + j, ldx);
 }

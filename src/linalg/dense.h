@@ -12,22 +12,46 @@
 
 #include "pelorus/config.h"
 
-/* C += A B. A is m x k, B is k x n, C is m x n and overlaps neither. */
-void plr_gemm_nn(unsigned m, unsigned n, unsigned k, const plr_real *A, size_t lda,
-                 const plr_real *B, size_t ldb, plr_real *C, size_t ldc);
+/* C += A B. A is m x k, B is k x n, C is m x n and overlaps neither. Inlined, since nearly all uses
+ * have small sizes that the compiler knows. */
+static inline void plr_gemm_nn(unsigned m, unsigned n, unsigned k, const plr_real *restrict A,
+                               size_t lda, const plr_real *restrict B, size_t ldb,
+                               plr_real *restrict C, size_t ldc) {
+    for (unsigned i = 0; i < m; i++)
+        for (unsigned l = 0; l < k; l++) {
+            const plr_real a = A[i * lda + l];
+            for (unsigned j = 0; j < n; j++)
+                C[i * ldc + j] = PLR_FMA(a, B[l * ldb + j], C[i * ldc + j]);
+        }
+}
 
 /* C += A B^T. A is m x k, B is n x k, C is m x n and overlaps neither. */
-void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_real *A, size_t lda,
-                 const plr_real *B, size_t ldb, plr_real *C, size_t ldc);
+static inline void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_real *restrict A,
+                               size_t lda, const plr_real *restrict B, size_t ldb,
+                               plr_real *restrict C, size_t ldc) {
+    for (unsigned i = 0; i < m; i++)
+        for (unsigned j = 0; j < n; j++) {
+            plr_real sum = C[i * ldc + j];
+            for (unsigned l = 0; l < k; l++)
+                sum = PLR_FMA(A[i * lda + l], B[j * ldb + l], sum);
+            C[i * ldc + j] = sum;
+        }
+}
 
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 
-/* L L^T = S in place: S is n x n packed lower (row by row), and so is L. False, with S spoiled, if
- * a pivot is not a positive finite number. */
-bool plr_cholesky_packed(unsigned n, plr_real *S);
+/* Where (i, i) of an n x n matrix stands whose upper triangle is packed row by row: (0,0) (0,1) ...
+ * (0,n-1) (1,1) ... */
+static inline size_t plr_upper_row(unsigned n, unsigned i) {
+    return (size_t)i * n - (size_t)i * (i - 1U) / 2;
+}
 
-/* X <- L^-1 X: L is k x k packed lower, X is k x n with leading dimension ldx. */
-void plr_solve_lower_packed(unsigned k, unsigned n, const plr_real *L, plr_real *X, size_t ldx);
+/* U^T U = S in place: the upper triangle of S, n x n, packed row by row. False, with S spoiled, if a
+ * pivot is not a positive finite number. */
+bool plr_cholesky_upper(unsigned n, plr_real *S);
+
+/* X <- U^-T X: U is k x k, packed upper; X is k x n with leading dimension ldx. */
+void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_real *X, size_t ldx);
 
 #endif

@@ -20,14 +20,16 @@ static inline size_t plr_packed_at(size_t i, size_t j) {
     return i >= j ? plr_packed_row(i) + j : plr_packed_row(j) + i;
 }
 
-/* Elements behind the last of U^T and W^T that plr_packed_subtract may read (and ignore). */
-enum { PLR_PACKED_OVERREAD = PLR_TILE_COLUMNS + 4 };
-
 /* P -= U W^T, lower triangle: P is n x n packed, U^T and W^T are depth x n with leading dimension
- * ld. U W^T must be symmetric. The memory behind both must be readable for PLR_PACKED_OVERREAD
- * elements. */
+ * ld. U W^T must be symmetric, and depth at most PLR_WORK_ROWS. The memory behind both must be
+ * readable for PLR_KERNEL_MARGIN elements. */
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P);
+
+/* d[i] = P_ii - sum_k Ut[k][i]^2 for i = 0 .. n-1, in the same steps: what plr_packed_subtract with
+ * W = U would leave on the diagonal. d holds n numbers. */
+void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *Ut, size_t ld,
+                                    const plr_real *P, plr_real *d);
 
 /* The plain twin: the same bits, element by element. */
 void plr_packed_subtract_plain(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,

@@ -97,17 +97,30 @@ static void test_sandwich_agrees_with_openblas_and_is_symmetric_to_the_bit(void)
     }
 }
 
+/* The upper triangle of a symmetric matrix, or of the transpose of a lower one, row by row. */
+static void pack_upper(plr_real *packed, const double *a, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = i; j < n; j++)
+            *packed++ = (plr_real)a[j * n + i];
+}
+
+static void unpack_upper(double *a, const plr_real *packed, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = i; j < n; j++)
+            a[i * n + j] = a[j * n + i] = (double)*packed++;
+}
+
 static void test_cholesky_agrees_with_lapack(void) {
     static double a[BIGGEST * BIGGEST], result[BIGGEST * BIGGEST];
     plr_real packed[BIGGEST * (BIGGEST + 1) / 2];
     rng r = rng_seeded(23);
     for (unsigned n = 1; n <= BIGGEST; n++) {
         random_spd(&r, n, 0.5, a);
-        pack_lower(packed, a, n);
-        unpack_symmetric(a, packed, n);
-        TEST_ASSERT_TRUE(plr_cholesky_packed(n, packed));
+        pack_upper(packed, a, n);
+        unpack_upper(a, packed, n);
+        TEST_ASSERT_TRUE(plr_cholesky_upper(n, packed));
         TEST_ASSERT_TRUE(oracle_cholesky(n, a));
-        unpack_symmetric(result, packed, n);
+        unpack_upper(result, packed, n);
         for (unsigned i = 0; i < n; i++)
             TEST_ASSERT_DOUBLE_WITHIN(
                 40 * n * eps, 0,
@@ -123,24 +136,24 @@ static void test_cholesky_refuses_what_is_not_positive_definite(void) {
         const double bad[] = {0, -1, (double)NAN, (double)INFINITY};
         for (unsigned kind = 0; kind < 4; kind++) {
             random_spd(&r, 8, 1, a);
-            pack_lower(packed, a, 8);
-            packed[plr_packed_at(pivot, pivot)] = (plr_real)bad[kind];
-            TEST_ASSERT_FALSE(plr_cholesky_packed(8, packed));
+            pack_upper(packed, a, 8);
+            packed[plr_upper_row(8, pivot)] = (plr_real)bad[kind];
+            TEST_ASSERT_FALSE(plr_cholesky_upper(8, packed));
         }
     }
 }
 
 static void test_cholesky_refuses_a_nan_off_the_diagonal(void) {
-    plr_real packed[6] = {4, (plr_real)NAN, 4, 0, 0, 4};
-    TEST_ASSERT_FALSE(plr_cholesky_packed(3, packed));
+    plr_real packed[6] = {4, (plr_real)NAN, 0, 4, 0, 4};
+    TEST_ASSERT_FALSE(plr_cholesky_upper(3, packed));
 }
 
 static void test_cholesky_refuses_a_singular_matrix(void) {
     plr_real packed[3] = {1, 2, 4};
-    TEST_ASSERT_FALSE(plr_cholesky_packed(2, packed));
+    TEST_ASSERT_FALSE(plr_cholesky_upper(2, packed));
 }
 
-static void test_solve_lower_agrees_with_openblas(void) {
+static void test_solve_upper_transposed_agrees_with_openblas(void) {
     static double a[BIGGEST * BIGGEST], x[BIGGEST * MOST];
     static plr_real X[BIGGEST * STRIDE];
     plr_real packed[BIGGEST * (BIGGEST + 1) / 2];
@@ -153,9 +166,9 @@ static void test_solve_lower_agrees_with_openblas(void) {
         random_spd(&r, k, 0.5, a);
         TEST_ASSERT_TRUE(oracle_cholesky(k, a));
         round_to_real(a, (size_t)k * k);
-        pack_lower(packed, a, k);
+        pack_upper(packed, a, k);
         random_strided(&r, k, n, ld, X, x);
-        plr_solve_lower_packed(k, n, packed, X, ld);
+        plr_solve_upper_transposed(k, n, packed, X, ld);
         oracle_solve_lower(k, n, a, x);
         const double size = largest(x, (size_t)k * n);
         assert_strided(20 * k * eps * (1 + size), x, X, k, n, ld, message);
@@ -170,6 +183,6 @@ int main(void) {
     RUN_TEST(test_cholesky_refuses_what_is_not_positive_definite);
     RUN_TEST(test_cholesky_refuses_a_nan_off_the_diagonal);
     RUN_TEST(test_cholesky_refuses_a_singular_matrix);
-    RUN_TEST(test_solve_lower_agrees_with_openblas);
+    RUN_TEST(test_solve_upper_transposed_agrees_with_openblas);
     return UNITY_END();
 }

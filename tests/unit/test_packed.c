@@ -21,7 +21,7 @@ void tearDown(void) {
 /* Normal numbers, depth x n with leading dimension ld, and behind them as many NaN as the kernel may
  * read. Gaps between rows are NaN too. */
 static plr_real *operand(rng *r, unsigned depth, unsigned n, size_t ld) {
-    const size_t size = (depth > 0 ? depth - 1 : 0) * ld + n + PLR_PACKED_OVERREAD;
+    const size_t size = (depth > 0 ? depth - 1 : 0) * ld + n + PLR_KERNEL_MARGIN;
     plr_real *x = malloc(size * sizeof *x);
     TEST_ASSERT_NOT_NULL(x);
     for (size_t i = 0; i < size; i++)
@@ -103,6 +103,24 @@ static void test_subtract_agrees_with_openblas(void) {
     }
 }
 
+static void test_foretold_diagonal_has_the_bits_of_the_subtraction(void) {
+    rng r = rng_seeded(15);
+    for (unsigned n = 1; n <= MOST; n++) {
+        const unsigned depth = 1 + n % DEEPEST;
+        const size_t ld = n + rng_below(&r, 6);
+        plr_real *Ut = operand(&r, depth, n, ld);
+        plr_real P[MOST * (MOST + 1) / 2], foretold[MOST], diagonal[MOST];
+        for (size_t i = 0; i < plr_packed_row(n); i++)
+            P[i] = (plr_real)rng_normal(&r);
+        plr_packed_subtracted_diagonal(n, depth, Ut, ld, P, foretold);
+        plr_packed_subtract(n, depth, Ut, Ut, ld, P);
+        for (unsigned i = 0; i < n; i++)
+            diagonal[i] = P[plr_packed_at(i, i)];
+        TEST_ASSERT_TRUE(same_bits(diagonal, foretold, n));
+        free(Ut);
+    }
+}
+
 static void test_subtracting_nothing_changes_nothing(void) {
     rng r = rng_seeded(14);
     plr_real *Ut = operand(&r, 0, 9, 9);
@@ -120,6 +138,7 @@ int main(void) {
     RUN_TEST(test_tiled_subtract_has_the_bits_of_its_plain_twin);
     RUN_TEST(test_tiled_subtract_writes_nothing_behind_the_triangle);
     RUN_TEST(test_subtract_agrees_with_openblas);
+    RUN_TEST(test_foretold_diagonal_has_the_bits_of_the_subtraction);
     RUN_TEST(test_subtracting_nothing_changes_nothing);
     return UNITY_END();
 }
