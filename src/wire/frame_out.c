@@ -14,7 +14,6 @@ void plr_frame_out_begin(plr_writer *w) {
     w->status = PLR_OK;
     if (w->torn)
         send(w, &delimiter, 1);
-    w->torn = true; /* until it is whole */
     w->crc = 0;
     plr_cobs_begin(&w->cobs);
 }

@@ -321,6 +321,13 @@ static void test_bits_and_bytes_without_a_meaning_are_ignored(void) {
     }
 }
 
+static void test_a_text_s_length_ends_at_its_zero_or_at_its_size(void) {
+    static const char text[] = "abcdefg";
+    TEST_ASSERT_EQUAL_size_t(7, plr_pass_text_length(text, sizeof text));
+    TEST_ASSERT_EQUAL_size_t(4, plr_pass_text_length(text, 4));
+    TEST_ASSERT_EQUAL_size_t(0, plr_pass_text_length(text, 0));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_header_fields_lie_where_the_page_says);
@@ -340,5 +347,6 @@ int main(void) {
     RUN_TEST(test_values_that_the_page_does_not_list_are_malformed);
     RUN_TEST(test_a_status_of_a_later_version_is_let_through);
     RUN_TEST(test_bits_and_bytes_without_a_meaning_are_ignored);
+    RUN_TEST(test_a_text_s_length_ends_at_its_zero_or_at_its_size);
     return UNITY_END();
 }
