@@ -8,6 +8,7 @@
 #include "session/known_map.h"
 #include "session/layers.h"
 #include "session/line.h"
+#include "session/plausible.h"
 #include "session/reanchor.h"
 #include "session/send.h"
 
@@ -73,8 +74,9 @@ static plr_status start_filter(plr_session *s, const plr_setting **culprit) {
 static void apply_bias_prior(plr_session *s) {
     if (!s->start.has_bias || plr_filter_config(&s->filter)->bias == 0)
         return;
-    const plr_status status =
-        plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance);
+    plr_status status = PLR_E_RANGE;
+    if (plr_plausible_bias(&s->start))
+        status = plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance);
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
 }
@@ -107,7 +109,9 @@ bool plr_begin_running(plr_session *s) {
 
 void plr_begin_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, const plr_pose *T_WB,
                         const double *P_xi) {
-    const plr_status status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
+    plr_status status = PLR_E_RANGE;
+    if (plr_plausible_pose(T_WB))
+        status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
     if (status != PLR_OK) {
         plr_send_refusal(s, subject, t_ns, status, NULL);
         return;

@@ -7,6 +7,7 @@
 #include "session/held.h"
 #include "session/inputs.h"
 #include "session/line.h"
+#include "session/plausible.h"
 #include "session/reanchor.h"
 #include "session/send.h"
 
@@ -83,6 +84,10 @@ void plr_take_twist(plr_session *s) {
     plr_send_echo(s);
     if (!running) {
         plr_send_refusal(s, PLR_KIND_TWIST, twist->t_ns, PLR_E_NOT_READY, NULL);
+        return;
+    }
+    if (!plr_plausible_twist(&twist->twist)) {
+        plr_send_refusal(s, PLR_KIND_TWIST, twist->t_ns, PLR_E_RANGE, NULL);
         return;
     }
     const plr_time_ns delay_ns = to_ns(plr_filter_config(&s->filter)->twist_delay_s);
@@ -185,7 +190,9 @@ void plr_take_stereo(plr_session *s) {
 
 /* mapping: the pose is taken as it is. */
 static void move_to(plr_session *s, const plr_truth *truth) {
-    plr_status status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);
+    plr_status status = PLR_E_RANGE;
+    if (plr_plausible_pose(&truth->T_WB))
+        status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);
     if (follow_jump(s, truth->t_ns, status))
         status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);
     if (status != PLR_OK)

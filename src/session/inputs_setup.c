@@ -8,6 +8,7 @@
 #include "session/known_map.h"
 #include "session/layers.h"
 #include "session/line.h"
+#include "session/plausible.h"
 #include "session/send.h"
 
 /* Everything that an estimate depends on; the name and the image size are not that. */
@@ -99,6 +100,10 @@ void plr_take_start(plr_session *s) {
         plr_send_refusal(s, PLR_KIND_START, start->t_ns, PLR_E_NOT_READY, NULL);
         return;
     }
+    if (!plr_plausible_start(start)) {
+        plr_send_refusal(s, PLR_KIND_START, start->t_ns, PLR_E_RANGE, NULL);
+        return;
+    }
     const bool wanted =
         s->started || s->options.start == PLR_START_AUTO || s->options.start == PLR_START_RECORDED;
     s->start = *start;
@@ -116,7 +121,9 @@ void plr_take_landmark(plr_session *s) {
         return; /* what another filter computed */
     plr_send_echo(s);
     plr_status status = PLR_E_NOT_READY;
-    if (s->phase != PLR_PHASE_WAITING)
+    if (!plr_plausible_landmark(&message->landmark))
+        status = PLR_E_RANGE;
+    else if (s->phase != PLR_PHASE_WAITING)
         status = plr_known_map_add(&s->known, &message->landmark);
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_LANDMARK, message->landmark.last_seen_ns, status, NULL);

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#include "session/plausible.h"
+
+static const double SPEED_MPS = 1e4, RATE_RADPS = 1e3, POSITION_M = 1e9, VARIANCE = 1e12;
+
+static bool is_finite(double x) {
+    return x - x == 0;
+}
+
+static bool all_within(const double *x, unsigned n, double limit) {
+    for (unsigned i = 0; i < n; i++)
+        if (is_finite(x[i]) && (x[i] > limit || x[i] < -limit))
+            return false;
+    return true;
+}
+
+bool plr_plausible_twist(const plr_twist *twist) {
+    return all_within(twist->v_B_mps, 3, SPEED_MPS) && all_within(twist->w_B_radps, 3, RATE_RADPS);
+}
+
+bool plr_plausible_pose(const plr_pose *pose) {
+    return all_within(pose->p, 3, POSITION_M);
+}
+
+bool plr_plausible_start(const plr_start *start) {
+    return plr_plausible_pose(&start->T_WB) &&
+           (!start->has_covariance || all_within(start->P_xi, 21, VARIANCE));
+}
+
+bool plr_plausible_bias(const plr_start *start) {
+    return all_within(start->bias, 3, SPEED_MPS) && all_within(start->bias + 3, 3, RATE_RADPS) &&
+           all_within(start->bias_variance, 6, VARIANCE);
+}
+
+bool plr_plausible_landmark(const plr_landmark *landmark) {
+    return all_within(landmark->p_W_m, 3, POSITION_M) && all_within(landmark->P_W_m2, 9, VARIANCE);
+}
