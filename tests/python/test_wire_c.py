@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: MIT
-# ruff: noqa: D103  (the names are sentences)
 """The frame format in C against the one in Python, both ways.
 
 tests/support/wire_echo.c reads a stream with the C reader and writes what it read with the C

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import se3
+from pelorus.console import progress
 from pelorus.frames import Camera
 from pelorus.se3 import Floats, Poses
 from pelorus.tracks import Indices, Tracks, project, triangulate
@@ -84,7 +85,7 @@ def seen_pairs(tracks: Tracks, camera: Camera, lag: int) -> SeenPairs:
 def estimate(seen: SeenPairs, camera: Camera) -> Poses:
     """For each k the motion that brings coordinates in camera k to camera k + lag."""
     motion = Poses(np.tile(np.eye(3), (seen.frame_count, 1, 1)), np.zeros((seen.frame_count, 3)))
-    for iteration in range(ITERATIONS):
+    for iteration in progress(range(ITERATIONS), "camera motion", ITERATIONS):
         scale_px = WIDE_PX if iteration < WIDE_ITERATIONS else NARROW_PX
         step = se3.exp(*_gauss_newton(seen, camera, motion, scale_px))
         motion = se3.compose(step, motion)
@@ -94,18 +95,39 @@ def estimate(seen: SeenPairs, camera: Camera) -> Poses:
 def _gauss_newton(
     seen: SeenPairs, camera: Camera, motion: Poses, scale_px: float
 ) -> tuple[Floats, Floats]:
-    """One robust step (rho, theta) on the left of each motion."""
-    q = np.einsum("nij,nj->ni", motion.R[seen.frame], seen.q_C) + motion.p[seen.frame]
+    """One robust step (rho, theta) on the left of each motion.
+
+    A residual has the noise of the second pixels and of the point, which the first pixels gave:
+    W is its inverse covariance for pixels of unit noise. Without the second part far points, whose
+    depth is hardly known, bend the motion.
+    """
+    R = motion.R[seen.frame]
+    q = np.einsum("nij,nj->ni", R, seen.q_C) + motion.p[seen.frame]
     ahead = q[:, 2] > DEPTH_MIN_M
     q[:, 2] = np.maximum(q[:, 2], DEPTH_MIN_M)
     residual = seen.pixels - project(camera, q)
-    weight = ahead / (1 + np.sum(residual**2, axis=1) / scale_px**2) ** 2
     D = point_jacobian(camera, q)
+    from_first = D @ R @ triangulation_jacobian(camera, seen.first_pixels, seen.q_C)
+    W = np.linalg.inv(np.eye(4) + from_first @ np.swapaxes(from_first, 1, 2))
+    weight = ahead / (1 + np.einsum("na,nab,nb->n", residual, W, residual) / scale_px**2) ** 2
     J = np.concatenate((D, -D @ se3.skew(q)), axis=-1)
-    H = _sum_by_frame(seen, np.einsum("nai,naj,n->nij", J, J, weight)) + RIDGE * np.eye(6)
-    g = _sum_by_frame(seen, np.einsum("nai,na,n->ni", J, residual, weight))
+    WJ = (W @ J) * weight[:, None, None]
+    H = _sum_by_frame(seen, np.swapaxes(J, 1, 2) @ WJ) + RIDGE * np.eye(6)
+    g = _sum_by_frame(seen, np.einsum("nai,na->ni", WJ, residual))
     step = np.clip(np.linalg.solve(H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
     return step[:, :3], step[:, 3:]
+
+
+def triangulation_jacobian(camera: Camera, pixels: Floats, q_C: Floats) -> Floats:
+    """d triangulate / d pixels, (n, 3, 4)."""
+    disparity = pixels[:, 0] - pixels[:, 2]
+    scale = camera.baseline_m / disparity
+    J = np.zeros((len(pixels), 3, 4))
+    J[:, :, 0] = -q_C / disparity[:, None]
+    J[:, :, 2] = q_C / disparity[:, None]
+    J[:, 0, 0] += scale
+    J[:, 1, 1] = J[:, 1, 3] = 0.5 * scale * camera.fx_px / camera.fy_px
+    return J
 
 
 def point_jacobian(camera: Camera, q: Floats) -> Floats:

@@ -23,7 +23,7 @@ from pelorus.visual_motion import SeenPairs, seen_pairs
 LAG = 5
 RATIO_MAX = 0.6  # the error must fall below this share of the given one
 SHARE_MIN = 0.75  # in at least so many frames
-Z_MIN = 4.0  # and with this significance
+Z_MIN = 3.0  # and with this significance
 
 LETTERS = (("forward", "backward"), ("left", "right"), ("up", "down"))
 FORWARD_LEFT_UP_IN_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])

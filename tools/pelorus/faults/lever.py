@@ -7,8 +7,9 @@ and the way p_C of the camera over some frames, and the way of the body from the
     p_C = (I - R_C) t_CB + R_CB p_back          (coordinates in camera k -> camera k + lag)
 
 R_C and p_C come from the images alone, since a gyro may be noisy or biased. Along the line from
-t (s = 0) to -R t (s = 1), s is the one unknown of a robust regression. Remedy where s is
-nearer to 1 beyond doubt: t_CB = -R t.
+t (s = 0) to -R t (s = 1), s is the first unknown of a robust regression over all frames; five more
+take up what else moves p_C in a turn: twists that come late, a scale of the way, and three small
+angles of the mounting. Remedy where s is nearer to 1 beyond doubt: t_CB = -R t.
 """
 
 from __future__ import annotations
@@ -18,14 +19,17 @@ from numpy.typing import NDArray
 
 from pelorus import se3, visual_motion
 from pelorus.faults.finding import Finding
+from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
 from pelorus.se3 import Floats, Poses
 from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
 
-LAG = 5
-SIGMAS_MIN = 4.0  # s must exceed one half by so many of its own standard deviations
-SEPARATED_MIN_M = 0.1  # hypotheses that never part farther cannot be told apart
+LAG = 3
+SIGMAS_MIN = 3.0  # s must exceed one half by so many of its own standard deviations
+MARGIN_MIN = 0.08  # and by so much: cars' velocities are not quite those of the point they name
+SEPARATED_MIN_M = 0.03  # hypotheses that never part farther cannot be told apart
 REWEIGHTINGS = 20
+RIDGE = 1e-9  # keeps a column that the drive does not excite solvable
 
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:
@@ -44,7 +48,8 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         evidence = f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are due"
         return recording, Finding(subject, False, evidence, "left as given")
     way = _way(recording, seen_motion.R, given)
-    s, sigma = _regress(seen_motion.p[usable] - way[usable], apart[usable])
+    columns = _columns(recording, seen_motion.R, way, apart)
+    s, sigma = _regress(seen_motion.p[usable] - way[usable], columns[usable])
     errors = [
         _reprojection(recording, seen, Poses(seen_motion.R, way_), turning)
         for way_ in (way, way + apart)
@@ -54,7 +59,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"reprojection in {int(turning.sum())} turning frames is {errors[0]:.1f} and "
         f"{errors[1]:.1f} px"
     )
-    if s - 0.5 < SIGMAS_MIN * sigma:
+    if s - 0.5 < max(SIGMAS_MIN * sigma, MARGIN_MIN):
         return recording, Finding(subject, False, evidence, "nothing to mend")
     action = f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"
     return recording.with_extrinsic(other), Finding(subject, True, evidence, action)
@@ -68,24 +73,36 @@ def _way(recording: Recording, R_C: Floats, T_CB: Poses) -> Floats:
     return np.asarray(T_CB.p - R_C @ T_CB.p + back.p @ T_CB.R.T)
 
 
-def _regress(offset: Floats, apart: Floats) -> tuple[float, float]:
-    """offset = s apart + noise, by rows of metres: s and its standard deviation.
+def _columns(recording: Recording, R_C: Floats, way: Floats, apart: Floats) -> Floats:
+    """(frames, 3, 6): how p_C changes with s and with what else may be amiss."""
+    T_CB = recording.T_CB
+    early, late = (
+        _way(recording.with_header(twist_timing=timing), R_C, T_CB)
+        for timing in (TwistTiming.START, TwistTiming.END)
+    )
+    driven = way - (T_CB.p - R_C @ T_CB.p)
+    tilts = [np.cross(axis, driven) for axis in np.eye(3)]
+    return np.stack((apart, late - early, driven, *tilts), axis=-1)
+
+
+def _regress(offset: Floats, columns: Floats) -> tuple[float, float]:
+    """offset = columns x + noise, by rows of metres: x_0 and its standard deviation.
 
     Weights as of Geman and McClure; the windows overlap LAG-fold, so the variance is LAG times
     that of independent ones.
     """
-    along, leverage = np.sum(offset * apart, axis=1), np.sum(apart**2, axis=1)
-    weight = np.ones(len(offset))
+    leverage = np.sum(columns[:, :, 0] ** 2, axis=1)
     strong = leverage >= np.median(leverage)
-    s = 0.0
+    weight = np.ones(len(offset))
     for _ in range(REWEIGHTINGS):
-        s = float(np.sum(weight * along) / np.sum(weight * leverage))
-        residual = offset - s * apart
+        H = np.einsum("nai,naj,n->ij", columns, columns, weight) + RIDGE * np.eye(6)
+        x = np.linalg.solve(H, np.einsum("nai,na,n->i", columns, offset, weight))
+        residual = offset - columns @ x
         squared = np.sum(residual**2, axis=1)
         weight = 1 / (1 + squared / (np.median(squared[strong]) + 1e-12)) ** 2
-    score = weight * np.sum(residual * apart, axis=1)
-    variance = LAG * np.sum(score**2) / np.sum(weight * leverage) ** 2
-    return s, float(np.sqrt(variance))
+    score = np.einsum("nai,na,n->ni", columns, residual, weight)
+    covariance = LAG * np.linalg.solve(H, np.linalg.solve(H, score.T @ score).T)
+    return float(x[0]), float(np.sqrt(covariance[0, 0]))
 
 
 def _reprojection(

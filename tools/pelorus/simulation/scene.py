@@ -15,7 +15,7 @@ from pelorus.simulation.drive import rotate
 CAMERA = Camera(fx_px=420.0, fy_px=420.0, cx_px=320.0, cy_px=240.0, baseline_m=0.2)
 IMAGE_PX = (640, 480)
 R_CB = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])  # body forward-left-up
-CAMERA_IN_BODY_M = np.array([0.3, 0.1, 0.2])
+CAMERA_IN_BODY_M = np.array([1.0, 0.3, 0.6])  # a car's: turns move the camera sideways
 T_CB = Poses(R_CB, -rotate(R_CB, CAMERA_IN_BODY_M))
 
 DEPTH_MIN_M = 0.8

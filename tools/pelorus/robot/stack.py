@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""The most stack that an image can need, from what the compiler wrote down.
+
+gcc's -fcallgraph-info=su gives the functions of each source with their frames and calls (.ci files,
+in VCG form). Functions of the C library come without; their frames are read from the machine code.
+What a call through a pointer may reach cannot be seen by a machine: INDIRECT says it, by hand, and a
+call that it does not cover is an error. So are recursion and frames without a bound.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pelorus.errors import PelorusError
+
+# Who calls through a pointer, and what it may reach: patterns of function names. The firmware sets
+# no observer, so those calls reach nothing.
+MODEL = r"(body|world)_\w+"
+MAP = r"(take_evicted|find_known)"
+PORT = r"(receive|transmit|now_ns|idle|feed_watchdog)"
+SESSION = r"plr_session_step|apply_twist|predict|update|plr_take_\w+|refuse_frame"
+FILTER = r"plr_(filter|correct|gate|motion|slots)\w*"
+INDIRECT = (
+    (r"plr_order_sort|sink", r"\w+_before"),
+    (r"plr_frame_out_\w+", r"write_to_port|send"),
+    (r"write_to_port", PORT),
+    (SESSION, PORT),
+    (r"plr_begin_running|plr_send_\w+", r"(?!)"),
+    (FILTER, f"{MODEL}|{MAP}"),
+    (r"obey", r"(say|fault_by)_\w+|hang"),
+)
+
+NODE = re.compile(r'node: \{ title: "([^"]+)" label: "([^"]*)"')
+EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+BYTES = re.compile(r"(\d+) bytes \(([^)]+)\)")
+FUNCTION = re.compile(r"^[0-9a-f]+ <([^>]+)>:$")
+PUSHES = re.compile(r"\t(push|stmdb|vpush)\S*\t(?:sp!, )?\{([^}]*)\}")
+LOWERS = re.compile(r"\tsub(?:\.w|w)?\tsp, (?:sp, )?#(\d+)")
+CALLS = re.compile(r"\tb[a-z.]*\t[0-9a-f]+ <([^>+]+)>")
+INDIRECT_CALL = "__indirect_call"
+# gcc notes the signed function's name where it calls the unsigned one.
+SAME_AS = {"__aeabi_ldivmod": "__aeabi_uldivmod"}
+
+EXCEPTION_FRAME_BYTES = 26 * 4 + 4  # eight words, eighteen of the FPU, alignment
+
+
+@dataclass
+class Function:
+    """A frame and the functions that are called from it."""
+
+    frame_bytes: int = 0
+    calls: set[str] = field(default_factory=set)
+    from_compiler: bool = False
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A depth, and the calls that make it."""
+
+    stack_bytes: int
+    path: tuple[str, ...]
+
+
+def short(title: str) -> str:
+    """A static function's title is file:name."""
+    return title.rpartition(":")[2]
+
+
+def read_call_graphs(folders: Iterable[Path]) -> dict[str, Function]:
+    """Every function of the .ci files below the folders."""
+    functions: dict[str, Function] = {}
+    for path in sorted(file for folder in folders for file in folder.rglob("*.ci")):
+        text = path.read_text()
+        for title, label in NODE.findall(text):
+            measured = BYTES.search(label)
+            if measured is None:
+                continue  # declared here, defined elsewhere
+            if measured[2] != "static" and "bounded" not in measured[2]:
+                raise PelorusError(f"{path}: {title} has a frame without a bound")
+            function = functions.setdefault(title, Function())
+            function.frame_bytes = int(measured[1])
+            function.from_compiler = True
+        for source, target in EDGE.findall(text):
+            functions.setdefault(source, Function()).calls.add(target)
+    if not functions:
+        raise PelorusError("no .ci files: the images are built with -fcallgraph-info=su")
+    return functions
+
+
+def _register_count(names: str) -> int:
+    count = 0
+    for name in names.split(","):
+        first, _, last = name.strip().partition("-")
+        width = 2 if first.startswith("d") else 1
+        count += width * (1 if not last else int(last[1:]) - int(first[1:]) + 1)
+    return count
+
+
+def add_machine_code(functions: dict[str, Function], image: Path) -> None:
+    """Add the functions of the image that the compiler told nothing of: libc and libgcc."""
+    listing = subprocess.run(
+        ["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", str(image)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    current: Function | None = None
+    name = ""
+    known = {short(title) for title in functions}
+    for line in listing.splitlines():
+        if begins := FUNCTION.match(line):
+            name = begins[1]
+            current = None if name in known else functions.setdefault(name, Function())
+        elif current is not None:
+            if pushed := PUSHES.search(line):
+                current.frame_bytes += 4 * _register_count(pushed[2])
+            elif lowered := LOWERS.search(line):
+                current.frame_bytes += int(lowered[1])
+            elif (called := CALLS.search(line)) and called[1] != name:
+                current.calls.add(called[1])
+
+
+def add_aliases(functions: dict[str, Function], image: Path) -> None:
+    """Give every name of an address what is known by one of them."""
+    symbols = subprocess.run(
+        ["arm-none-eabi-nm", str(image)], capture_output=True, text=True, check=True
+    ).stdout
+    names: dict[str, list[str]] = {}
+    for address, kind, name in (line.split() for line in symbols.splitlines()):
+        if kind in "tTwW":
+            names.setdefault(address, []).append(name)
+    for group in names.values():
+        known = next((functions[name] for name in group if name in functions), None)
+        if known is not None:
+            for name in group:
+                functions.setdefault(name, known)
+    for name, same in SAME_AS.items():
+        if same in functions:
+            functions.setdefault(name, functions[same])
+
+
+class Analysis:
+    """Depths over a call graph, without recursion."""
+
+    def __init__(self, functions: dict[str, Function]) -> None:
+        self._functions = functions
+        self._by_name: dict[str, list[str]] = {}
+        for title in functions:
+            self._by_name.setdefault(short(title), []).append(title)
+        self._known: dict[str, Bound] = {}
+
+    def bound(self, name: str, above: tuple[str, ...] = ()) -> Bound:
+        """The deepest stack below a call of this function, itself included."""
+        if name in above:
+            raise PelorusError(f"recursion: {' -> '.join((*map(short, above), short(name)))}")
+        if name not in self._known:
+            self._known[name] = self._deepest(name, above)
+        return self._known[name]
+
+    def _deepest(self, name: str, above: tuple[str, ...]) -> Bound:
+        function = self._functions.get(name)
+        if function is None:
+            raise PelorusError(f"nothing is known of {name}, called by {short(above[-1])}")
+        deepest = Bound(0, ())
+        for callee in sorted(self._callees(name, function)):
+            found = self.bound(callee, (*above, name))
+            if found.stack_bytes > deepest.stack_bytes:
+                deepest = found
+        return Bound(function.frame_bytes + deepest.stack_bytes, (short(name), *deepest.path))
+
+    def _callees(self, name: str, function: Function) -> set[str]:
+        callees = set()
+        for target in function.calls:
+            if target == INDIRECT_CALL:
+                callees |= self._reachable_from(short(name))
+            else:
+                callees.add(target)
+        return callees
+
+    def _named(self, pattern: str) -> set[str]:
+        return {
+            title
+            for name, titles in self._by_name.items()
+            if re.fullmatch(pattern, name.split(".")[0])
+            for title in titles
+            if self._functions[title].from_compiler
+        }
+
+    def _reachable_from(self, caller: str) -> set[str]:
+        base = caller.split(".")[0]  # gcc's clones: name.isra.0
+        for callers, targets in INDIRECT:
+            if re.fullmatch(callers, base):
+                return self._named(targets)
+        raise PelorusError(f"{caller} calls through a pointer, and INDIRECT does not say what")
+
+
+def image_bound(image: Path, folders: Iterable[Path]) -> Bound:
+    """The most that main can need, with one interrupt on top (they do not nest)."""
+    functions = read_call_graphs(folders)
+    add_machine_code(functions, image)
+    add_aliases(functions, image)
+    analysis = Analysis(functions)
+    start = functions["startup_reset"].frame_bytes + functions["startup_main"].frame_bytes
+    main = analysis.bound("main")
+    handlers = [analysis.bound(name) for name in ("serial_isr", "clock_isr")]
+    interrupt = max(handler.stack_bytes for handler in handlers) + EXCEPTION_FRAME_BYTES
+    return Bound(start + main.stack_bytes + interrupt, main.path)
