@@ -127,4 +127,5 @@ void dense_move_to(dense_ekf *e, const plr_pose *T_WB) {
     dense_motion(there, T_WB);
     square_multiply(4, inverse, there, D);
     move(e, D, NULL, exact);
+    memcpy(e->T_WB, there, sizeof there); /* T D is there, but for rounding that would grow */
 }

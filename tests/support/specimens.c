@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+#include "support/specimens.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "filter/covariance.h"
+#include "filter/model.h"
+#include "filter/polar.h"
+#include "support/dense_parts.h"
+#include "support/matrices.h"
+#include "support/rigid.h"
+#include "support/scene.h"
+
+void specimen_config(plr_config *config, plr_model_kind model, bool bias) {
+    plr_config_default(config);
+    config->model = (uint8_t)model;
+    config->bias = bias;
+    config->slots = PLR_MAX_LANDMARKS;
+    config->gate_d2 = 0;
+}
+
+double *specimen_zeros(unsigned n, unsigned m) {
+    double *A = calloc((size_t)n * m + 1, sizeof *A);
+    if (!A)
+        abort();
+    return A;
+}
+
+void specimen_put(double *A, unsigned ld, unsigned row, unsigned column, unsigned rows,
+                  unsigned columns, const double *B) {
+    for (unsigned i = 0; i < rows; i++)
+        for (unsigned j = 0; j < columns; j++)
+            A[(row + i) * ld + column + j] = B[i * columns + j];
+}
+
+/* A point 2 to 30 m in front of the camera. */
+static void random_point(rng *r, double q[3]) {
+    q[2] = exp(rng_uniform(r, log(2), log(30)));
+    q[0] = q[2] * rng_uniform(r, -0.6, 0.6);
+    q[1] = q[2] * rng_uniform(r, -0.4, 0.4);
+}
+
+/* A landmark of that camera point: itself, or its place in the world. */
+static void put_point(const plr_filter *f, const double q[3], plr_slot *slot) {
+    const plr_camera *c = &f->par.camera;
+    double s[3] = {0}, m[3];
+    memcpy(m, q, sizeof m);
+    if (f->config.model == PLR_MODEL_WORLD) {
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                s[i] += (double)c->R_CB[3 * j + i] * (q[j] - (double)c->t_CB[j]);
+        for (int i = 0; i < 3; i++) {
+            m[i] = f->p_WB[i];
+            for (int j = 0; j < 3; j++)
+                m[i] += (double)f->R_WB[3 * i + j] * s[j];
+        }
+    }
+    to_reals(slot->x, m, 3);
+}
+
+/* Standard deviation of a row of the state: of a filter that knows itself fairly well. */
+static double sigma_of(const plr_filter *f, unsigned row) {
+    static const double bearing_rad = 2e-3, inverse_range = 2e-3, place_m = 0.1;
+    const unsigned first = plr_covariance_row(f, 0);
+    if (row < 6)
+        return row < 3 ? 0.05 : 0.005;
+    if (row < first)
+        return row < 9 ? 0.03 : 0.003;
+    if (f->config.model == PLR_MODEL_WORLD)
+        return place_m;
+    return (row - first) % 3 < 2 ? bearing_rad : inverse_range;
+}
+
+static void random_covariance(plr_filter *f, rng *r) {
+    const unsigned n = plr_covariance_dim(f);
+    double *A = specimen_zeros(n, n);
+    random_spd(r, n, 0.1, A);
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j < n; j++)
+            A[i * n + j] *= sigma_of(f, i) * sigma_of(f, j);
+    pack_lower(f->P, A, n);
+    free(A);
+}
+
+void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, unsigned landmarks) {
+    plr_config config;
+    plr_calibration calibration;
+    plr_pose T_WB;
+    specimen_config(&config, model, bias);
+    scene_calibration(&calibration);
+    random_rotation(r, T_WB.R);
+    rng_normals(r, 5, T_WB.p, 3);
+    if (plr_filter_init(f, &calibration, &config, NULL) != PLR_OK ||
+        plr_filter_set_pose(f, UINT64_C(1000000000), &T_WB, NULL) != PLR_OK)
+        abort();
+    f->totals.resets = 0;
+    for (int i = 0; bias && i < 6; i++)
+        f->bias[i] = (plr_real)(0.01 * rng_normal(r));
+    f->frame_number = 1;
+    for (f->count = 0; f->count < landmarks; f->count++) {
+        plr_slot *slot = &f->slots[f->count];
+        double q[3];
+        random_point(r, q);
+        memset(slot, 0, sizeof *slot);
+        put_point(f, q, slot);
+        slot->id = f->count + 1;
+        slot->times_seen = 1;
+        slot->last_frame = f->frame_number;
+        slot->last_seen_ns = f->t_ns;
+    }
+    random_covariance(f, r);
+}
+
+double *specimen_covariance(const plr_filter *f) {
+    const unsigned n = plr_covariance_dim(f);
+    double *P = specimen_zeros(n, n);
+    unpack_symmetric(P, f->P, n);
+    return P;
+}
+
+void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion) {
+    double xi[6], D[16], Q[36];
+    memset(motion, 0, sizeof *motion);
+    rng_normals(r, 0.2, xi, 3);
+    rng_normals(r, 0.05, xi + 3, 3);
+    rigid_exp(D, xi);
+    for (int i = 0; i < 3; i++) {
+        motion->p[i] = (plr_real)D[4 * i + 3];
+        for (int j = 0; j < 3; j++)
+            motion->R[3 * i + j] = (plr_real)D[4 * i + j];
+    }
+    random_spd(r, 6, 0.1, Q);
+    for (int i = 0; i < 36; i++)
+        motion->Q[i] = (plr_real)(Q[i] * 1e-4);
+    for (int i = 0; f->config.bias && i < 36; i++)
+        motion->B[i] = (plr_real)(0.05 * rng_normal(r));
+    motion->seconds = PLR_R(0.1);
+    motion->pending = motion->noisy = 1;
+}
+
+plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
+    plr_linearisation lin;
+    if (!f->model->linearise(f, &f->slots[slot], &lin))
+        abort();
+    return (plr_observation){f->slots[slot].id, (float)lin.z[0] + shift_px[0],
+                             (float)lin.z[2] + shift_px[1], (float)lin.z[1] + shift_px[2],
+                             (float)lin.z[2] + shift_px[3]};
+}
+
+void specimen_twin(const plr_filter *f, dense_ekf *e) {
+    const plr_camera *camera = &f->par.camera;
+    plr_calibration calibration = {.fx_px = (double)camera->fx,
+                                   .fy_px = (double)camera->fy,
+                                   .cx_px = (double)camera->cx,
+                                   .cy_px = (double)camera->cy,
+                                   .baseline_m = (double)camera->baseline};
+    plr_pose T_WB;
+    to_doubles(calibration.T_CB.R, camera->R_CB, 9);
+    to_doubles(calibration.T_CB.p, camera->t_CB, 3);
+    dense_init(e, &calibration, &f->config);
+    if (plr_filter_pose(f, &T_WB) != PLR_OK)
+        abort();
+    dense_motion(e->T_WB, &T_WB);
+}
+
+void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]) {
+    plr_polar chart;
+    plr_real J[9];
+    plr_polar_at(&chart, x);
+    plr_polar_from_point(J, &chart);
+    to_doubles(Jw, J, 9);
+    plr_polar_to_point(J, &chart);
+    to_doubles(Ji, J, 9);
+}
+
+double specimen_gap(unsigned n, const double *A, const double *B) {
+    double most = 0;
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j < n; j++) {
+            const double gap = fabs(A[i * n + j] - B[i * n + j]) /
+                               sqrt(fabs(A[i * n + i] * A[j * n + j]) + 1e-300);
+            if (!(gap <= most))
+                most = gap;
+            if (isnan(most))
+                return most;
+        }
+    return most;
+}

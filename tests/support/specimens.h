@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+/* Filters in the middle of their life, for unit tests: a random pose, landmarks, biases and a random
+ * full covariance, without having driven there. */
+#ifndef PELORUS_TEST_SPECIMENS_H
+#define PELORUS_TEST_SPECIMENS_H
+
+#include <stdbool.h>
+
+#include "pelorus/filter.h"
+#include "support/dense_ekf.h"
+#include "support/random.h"
+
+/* Settings of a specimen: default, with that model and bias, and no gate. */
+void specimen_config(plr_config *config, plr_model_kind model, bool bias);
+
+/* A filter at a random pose a few metres from the origin, 1 s on its clock, with landmarks of ids 1,
+ * 2, ... 2 to 30 m in front of the camera, and a positive covariance in which all is correlated.
+ * Camera: support/scene.h's. */
+void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, unsigned landmarks);
+
+/* P, dim x dim in double; to be freed. */
+double *specimen_covariance(const plr_filter *f);
+
+/* A random twist in `motion`: what 0.1 s of driving accumulates, with Q and, if the filter has
+ * biases, B. The pose is not moved. */
+void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion);
+
+/* The observation that a slot predicts, moved by so many pixels in uL, vL, uR, vR. */
+plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]);
+
+/* The specimen's pose and camera in double, in a textbook filter without landmarks. */
+void specimen_twin(const plr_filter *f, dense_ekf *e);
+
+/* Jw and Ji of the chart at a point, as the filter has them. */
+void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]);
+
+/* n x m zeros in double; to be freed. */
+double *specimen_zeros(unsigned n, unsigned m);
+
+/* A[row.., column..] = B, of rows x columns; ld is A's. */
+void specimen_put(double *A, unsigned ld, unsigned row, unsigned column, unsigned rows,
+                  unsigned columns, const double *B);
+
+/* max |A_ij - B_ij| / sqrt(A_ii A_jj) over n x n. */
+double specimen_gap(unsigned n, const double *A, const double *B);
+
+#endif

@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: MIT
+/* The `body` model in motion: propagation against differences of the true map (DESIGN 2.1), the
+ * retraction and its transport against their formulas in double (2.4). */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+#include "filter/covariance.h"
+#include "filter/model.h"
+#include "filter/motion.h"
+#include "linalg/packed.h"
+#include "support/dense_parts.h"
+#include "support/matrices.h"
+#include "support/oracle.h"
+#include "support/rigid.h"
+#include "support/specimens.h"
+
+enum { RUNS = 20, LANDMARKS = 6, STEPS = 5 };
+
+static const double eps = REAL_EPSILON;
+static plr_filter filter;
+static dense_ekf truth; /* of which only the poses are used here: T_WB, T_CB and Ad_CB in double */
+static rng chance;
+
+void setUp(void) {
+    chance = rng_seeded(44);
+}
+
+void tearDown(void) {
+}
+
+static void take_specimen(bool bias, unsigned landmarks) {
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, bias, landmarks);
+    specimen_twin(&filter, &truth);
+}
+
+static void point_of(unsigned slot, double q[3]) {
+    to_doubles(q, filter.slots[slot].x, 3);
+}
+
+/* ---------------------------------------------------------------- propagate */
+
+/* The twists of a few steps, and what the filter's estimate makes of them. */
+static struct {
+    double seconds[STEPS];
+    double twist[STEPS][6];
+    double bias[6];
+    double estimate[16]; /* D */
+} drive;
+
+/* D = prod Exp(tau (u - b - db)) */
+static void displacement(const double db[6], double D[16]) {
+    rigid_exp(D, (const double[6]){0});
+    for (int k = 0; k < STEPS; k++) {
+        double xi[6], step[16], next[16];
+        for (int i = 0; i < 6; i++)
+            xi[i] = drive.seconds[k] * (drive.twist[k][i] - drive.bias[i] - db[i]);
+        rigid_exp(step, xi);
+        square_multiply(4, D, step, next);
+        memcpy(D, next, sizeof next);
+    }
+}
+
+static void drive_filter(void) {
+    for (int k = 0; k < STEPS; k++) {
+        plr_real reading[6];
+        rng_normals(&chance, 1.5, drive.twist[k], 3);
+        rng_normals(&chance, 0.5, drive.twist[k] + 3, 3);
+        to_reals(reading, drive.twist[k], 6);
+        to_doubles(drive.twist[k], reading, 6);
+        drive.seconds[k] = (double)PLR_R(0.02);
+        plr_motion_step(&filter, filter.t_ns + 20000000, reading, PLR_R(0.02), PLR_R(0.02));
+    }
+    to_doubles(drive.bias, filter.bias, 6);
+    displacement((const double[6]){0}, drive.estimate);
+}
+
+/* Errors after the drive of errors before it: (xi, db, e_1, e_2, ...), e the error of q. */
+static void carry(const double *before, double (*q)[3], unsigned landmarks, double *after) {
+    static const double none[6] = {0};
+    const double *db = filter.config.bias ? before + 6 : none;
+    double D[16], back[16], E[16], ED[16], difference[16];
+    displacement(db, D);
+    rigid_inverse(back, drive.estimate);
+    rigid_exp(E, before);
+    square_multiply(4, E, D, ED);
+    square_multiply(4, back, ED, difference);
+    rigid_vee(after, difference);
+    if (filter.config.bias)
+        memcpy(after + 6, before + 6, 6 * sizeof *after);
+
+    double T_BC[16], CD[16], D_C[16], inverse[16], CD_hat[16], D_hat[16], inverse_hat[16];
+    rigid_inverse(T_BC, truth.T_CB);
+    square_multiply(4, truth.T_CB, D, CD);
+    square_multiply(4, CD, T_BC, D_C);
+    rigid_inverse(inverse, D_C);
+    square_multiply(4, truth.T_CB, drive.estimate, CD_hat);
+    square_multiply(4, CD_hat, T_BC, D_hat);
+    rigid_inverse(inverse_hat, D_hat);
+    const unsigned first = dense_row(&truth, 0);
+    for (unsigned s = 0; s < landmarks; s++) {
+        double q_true[3], q_hat[3];
+        for (int i = 0; i < 3; i++)
+            q_true[i] = q[s][i] + before[first + 3 * s + (unsigned)i];
+        dense_apply(q_true, inverse, q_true);
+        dense_apply(q_hat, inverse_hat, q[s]);
+        for (int i = 0; i < 3; i++)
+            after[first + 3 * s + (unsigned)i] = q_true[i] - q_hat[i];
+    }
+}
+
+/* F = d carry / d errors by central differences, n x n; to be freed. */
+static double *carry_jacobian(double (*q)[3], unsigned landmarks) {
+    const unsigned n = plr_covariance_dim(&filter);
+    const double h = 1e-5;
+    double *F = specimen_zeros(n, n), *x = specimen_zeros(n, 1);
+    double *ahead = specimen_zeros(n, 1), *behind = specimen_zeros(n, 1);
+    for (unsigned j = 0; j < n; j++) {
+        x[j] = h;
+        carry(x, q, landmarks, ahead);
+        x[j] = -h;
+        carry(x, q, landmarks, behind);
+        x[j] = 0;
+        for (unsigned i = 0; i < n; i++)
+            F[i * n + j] = (ahead[i] - behind[i]) / (2 * h);
+    }
+    free(behind);
+    free(ahead);
+    free(x);
+    return F;
+}
+
+/* diag(I, J_0, J_1, ...), n x n, J = Jw or Ji of each slot's chart; to be freed. */
+static double *charts(bool from_point) {
+    const unsigned n = plr_covariance_dim(&filter);
+    double *J = specimen_zeros(n, n);
+    for (unsigned i = 0; i < plr_covariance_row(&filter, 0); i++)
+        J[i * n + i] = 1;
+    for (unsigned slot = 0; slot < filter.count; slot++) {
+        const unsigned row = plr_covariance_row(&filter, slot);
+        double Jw[9], Ji[9];
+        specimen_chart(filter.slots[slot].x, Jw, Ji);
+        specimen_put(J, n, row, row, 3, 3, from_point ? Jw : Ji);
+    }
+    return J;
+}
+
+static void check_propagate(bool bias) {
+    take_specimen(bias, LANDMARKS);
+    filter.par.velocity_variance = filter.par.gyro_variance = 0; /* noise: tests of motion.c */
+    filter.par.bias_velocity_walk = filter.par.bias_gyro_walk = 0;
+    const unsigned n = plr_covariance_dim(&filter);
+    double q[LANDMARKS][3];
+    for (unsigned slot = 0; slot < LANDMARKS; slot++)
+        point_of(slot, q[slot]);
+    double *P = specimen_covariance(&filter), *Ji = charts(false);
+    drive_filter();
+    plr_motion_settle(&filter);
+    TEST_ASSERT_EQUAL_UINT(LANDMARKS, filter.count);
+
+    double *F = carry_jacobian(q, LANDMARKS), *Jw = charts(true);
+    double *point = specimen_zeros(n, n), *moved = specimen_zeros(n, n);
+    double *expected = specimen_zeros(n, n), *got = specimen_covariance(&filter);
+    oracle_sandwich(n, n, Ji, P, point);
+    oracle_sandwich(n, n, F, point, moved);
+    oracle_sandwich(n, n, Jw, moved, expected);
+    /* 1e-8: differences; in units of eps: five accumulated steps and the charts at both ends */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 1000 * eps, 0, specimen_gap(n, expected, got));
+    free(got);
+    free(expected);
+    free(moved);
+    free(point);
+    free(Jw);
+    free(F);
+    free(Ji);
+    free(P);
+}
+
+static void test_propagation_agrees_with_differences(void) {
+    for (int run = 0; run < RUNS; run++)
+        check_propagate(run % 2);
+}
+
+static void test_propagation_moves_the_points_rigidly(void) {
+    for (int run = 0; run < RUNS; run++) {
+        double q[LANDMARKS][3], after[12 + 3 * LANDMARKS], zero[12 + 3 * LANDMARKS] = {0};
+        take_specimen(true, LANDMARKS);
+        for (unsigned slot = 0; slot < LANDMARKS; slot++)
+            point_of(slot, q[slot]);
+        drive_filter();
+        plr_motion_settle(&filter);
+        carry(zero, q, LANDMARKS, after);
+        double T_BC[16], CD[16], D_C[16], inverse[16];
+        rigid_inverse(T_BC, truth.T_CB);
+        square_multiply(4, truth.T_CB, drive.estimate, CD);
+        square_multiply(4, CD, T_BC, D_C);
+        rigid_inverse(inverse, D_C);
+        for (unsigned slot = 0; slot < LANDMARKS; slot++) {
+            double expected[3], got[3];
+            dense_apply(expected, inverse, q[slot]);
+            point_of(slot, got);
+            TEST_ASSERT_DOUBLE_WITHIN(300 * eps, 0, largest_difference(expected, got, 3));
+        }
+    }
+}
+
+/* A landmark that the camera runs into has no bearing: it goes, and the others do not notice. */
+static void test_a_landmark_that_the_camera_meets_is_dropped(void) {
+    static plr_filter without;
+    take_specimen(true, LANDMARKS);
+    without = filter;
+    plr_covariance_remove(&without, 2);
+    without.slots[2] = without.slots[--without.count];
+
+    plr_filter before = filter;
+    drive_filter();
+    const plr_motion motion = filter.motion;
+    filter = before;
+    filter.motion = without.motion = motion;
+    double T_BC[16], CD[16], D_C[16];
+    rigid_inverse(T_BC, truth.T_CB);
+    square_multiply(4, truth.T_CB, drive.estimate, CD);
+    square_multiply(4, CD, T_BC, D_C);
+    for (int i = 0; i < 3; i++) /* where the camera will be */
+        filter.slots[2].x[i] = (plr_real)D_C[4 * i + 3];
+    plr_motion_settle(&filter);
+    plr_motion_settle(&without);
+    TEST_ASSERT_EQUAL_UINT(LANDMARKS - 1, filter.count);
+    TEST_ASSERT_EQUAL_UINT32(LANDMARKS, filter.slots[2].id); /* the last one took the place */
+    const unsigned n = plr_covariance_dim(&filter);
+    TEST_ASSERT_TRUE(same_bits(without.P, filter.P, n * (n + 1) / 2));
+}
+
+/* ---------------------------------------------------------------- retract */
+
+/* A correction of a size that an update makes: centimetres, milliradians, a tenth of the range. */
+static void random_correction(plr_real *dx, double *same) {
+    const unsigned n = plr_covariance_dim(&filter), first = plr_covariance_row(&filter, 0);
+    rng_normals(&chance, 0.05, same, 3);
+    rng_normals(&chance, 0.02, same + 3, 3);
+    for (unsigned i = 6; i < n; i++)
+        same[i] = i < first || (i - first) % 3 < 2 ? 0.01 * rng_normal(&chance)
+                                                   : 0.003 * rng_normal(&chance);
+    to_reals(dx, same, n);
+    to_doubles(same, dx, n);
+}
+
+/* Points and transport of the retraction in double, in point errors (support/dense_parts.h):
+ * q[i] becomes q+, and T (n x n) what P is multiplied by. */
+static void retract_twin(const double *dx, double (*q)[3], double *T) {
+    const unsigned n = plr_covariance_dim(&filter);
+    double xi_C[6], E[16], back[16], R_back[9], pose[16], pose_back[16], A[36];
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, truth.Ad_CB, dx, 0, xi_C);
+    rigid_exp(E, xi_C);
+    rigid_inverse(back, E);
+    dense_rotation(R_back, back);
+    rigid_exp(pose, dx);
+    rigid_inverse(pose_back, pose);
+    dense_adjoint(A, pose_back);
+    for (unsigned i = 0; i < plr_covariance_row(&filter, 0); i++)
+        T[i * n + i] = 1;
+    specimen_put(T, n, 0, 0, 6, 6, A);
+    for (unsigned slot = 0; slot < filter.count; slot++) {
+        const unsigned row = plr_covariance_row(&filter, slot);
+        double Jw[9], Ji[9], K[18], e[3], moved[3], J[9], RJ[9];
+        specimen_chart(filter.slots[slot].x, Jw, Ji);
+        dense_camera_by_pose(&truth, q[slot], K);
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, Ji, dx + row, 0, e);
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, dx, 1, e);
+        dense_polar_step(q[slot], e, moved, J);
+        square_multiply(3, R_back, J, RJ);
+        specimen_put(T, n, row, row, 3, 3, RJ);
+        dense_apply(q[slot], back, moved);
+    }
+}
+
+static void check_retract(bool bias) {
+    take_specimen(bias, LANDMARKS);
+    const unsigned n = plr_covariance_dim(&filter);
+    plr_real dx[12 + 3 * LANDMARKS];
+    double same[12 + 3 * LANDMARKS], q[LANDMARKS][3];
+    double *T = specimen_zeros(n, n), *P = specimen_covariance(&filter), *Ji = charts(false);
+    double *point = specimen_zeros(n, n), *moved = specimen_zeros(n, n);
+    double *expected = specimen_zeros(n, n);
+    for (unsigned slot = 0; slot < LANDMARKS; slot++)
+        point_of(slot, q[slot]);
+    random_correction(dx, same);
+    retract_twin(same, q, T);
+    TEST_ASSERT_EQUAL_UINT(0, filter.model->retract(&filter, dx));
+    for (unsigned slot = 0; slot < LANDMARKS; slot++) {
+        double got[3];
+        point_of(slot, got);
+        TEST_ASSERT_DOUBLE_WITHIN(500 * eps, 0, largest_difference(q[slot], got, 3));
+    }
+    double *Jw = charts(true), *got = specimen_covariance(&filter);
+    oracle_sandwich(n, n, Ji, P, point);
+    oracle_sandwich(n, n, T, point, moved);
+    oracle_sandwich(n, n, Jw, moved, expected);
+    TEST_ASSERT_DOUBLE_WITHIN(500 * eps, 0, specimen_gap(n, expected, got));
+    free(got);
+    free(Jw);
+    free(expected);
+    free(moved);
+    free(point);
+    free(Ji);
+    free(P);
+    free(T);
+}
+
+static void test_retraction_and_its_transport_agree(void) {
+    for (int run = 0; run < RUNS; run++)
+        check_retract(run % 2);
+}
+
+/* If every landmark's correction is what the pose's correction does to it, nothing has moved in the
+ * world: the directions that no camera can see are kept exactly. */
+static void test_a_rigid_correction_moves_no_landmark_in_the_world(void) {
+    for (int run = 0; run < RUNS; run++) {
+        plr_real dx[12 + 3 * LANDMARKS];
+        double same[12 + 3 * LANDMARKS];
+        plr_world_point before[LANDMARKS], after;
+        take_specimen(run % 2, LANDMARKS);
+        random_correction(dx, same);
+        for (unsigned slot = 0; slot < LANDMARKS; slot++) {
+            double q[3], K[18], e[3], w[3], Jw[9], Ji[9];
+            filter.model->in_world(&filter, &filter.slots[slot], &before[slot]);
+            point_of(slot, q);
+            dense_camera_by_pose(&truth, q, K);
+            oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, 1, K, same, 0, e);
+            specimen_chart(filter.slots[slot].x, Jw, Ji);
+            oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, Jw, e, 0, w);
+            to_reals(dx + plr_covariance_row(&filter, slot), w, 3);
+        }
+        (void)filter.model->retract(&filter, dx);
+        plr_motion_correct_pose(&filter, dx);
+        for (unsigned slot = 0; slot < LANDMARKS; slot++) {
+            filter.model->in_world(&filter, &filter.slots[slot], &after);
+            /* w_3 is rounded as a part of 1/r: r^2 times that, with r up to 35 m */
+            TEST_ASSERT_DOUBLE_WITHIN(3000 * eps, 0,
+                                      largest_difference(before[slot].p_W, after.p_W, 3));
+        }
+    }
+}
+
+static void test_corrections_that_are_cut_are_counted(void) {
+    plr_real dx[12 + 3 * LANDMARKS] = {0};
+    take_specimen(false, LANDMARKS);
+    dx[plr_covariance_row(&filter, 1) + 2] = -10;
+    dx[plr_covariance_row(&filter, 4)] = PLR_R(1.5);
+    TEST_ASSERT_EQUAL_UINT(2, filter.model->retract(&filter, dx));
+    for (unsigned slot = 0; slot < LANDMARKS; slot++)
+        for (int i = 0; i < 3; i++)
+            TEST_ASSERT_TRUE(isfinite((double)filter.slots[slot].x[i]));
+    double far[3];
+    point_of(1, far);
+    TEST_ASSERT_DOUBLE_WITHIN(1, 1e5, sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2]));
+}
+
+/* ---------------------------------------------------------------- far points */
+
+/* Turning the camera on the spot mixes no range into a bearing, not even that of a point 3 km away
+ * whose range is all but unknown. A product of Jw and Ji would: r times the rounding. */
+static void test_far_points_keep_the_variance_of_their_bearing(void) {
+    const plr_real far[3] = {PLR_R(1200), PLR_R(-300), PLR_R(2700)};
+    const double bearing = 1e-10, inverse_range = 1e-4, turn[6] = {0, 0, 0, 0.1, -0.2, 0.15};
+    double T_BC[16], D_C[16], D[16], T[16];
+    take_specimen(false, 1);
+    memcpy(filter.slots[0].x, far, sizeof far);
+    memset(filter.P, 0, 45 * sizeof *filter.P);
+    filter.P[plr_packed_at(6, 6)] = filter.P[plr_packed_at(7, 7)] = (plr_real)bearing;
+    filter.P[plr_packed_at(8, 8)] = (plr_real)inverse_range;
+    rigid_exp(D_C, turn);
+    rigid_inverse(T_BC, truth.T_CB);
+    square_multiply(4, T_BC, D_C, T);
+    square_multiply(4, T, truth.T_CB, D);
+    for (int i = 0; i < 3; i++) {
+        filter.motion.p[i] = (plr_real)D[4 * i + 3];
+        for (int j = 0; j < 3; j++)
+            filter.motion.R[3 * i + j] = (plr_real)D[4 * i + j];
+    }
+    filter.motion.pending = 1;
+    plr_motion_settle(&filter);
+    TEST_ASSERT_EQUAL_UINT(1, filter.count);
+    double *P = specimen_covariance(&filter);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, (P[6 * 9 + 6] + P[7 * 9 + 7]) / (2 * bearing));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, P[8 * 9 + 8] / inverse_range);
+    free(P);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_propagation_agrees_with_differences);
+    RUN_TEST(test_propagation_moves_the_points_rigidly);
+    RUN_TEST(test_a_landmark_that_the_camera_meets_is_dropped);
+    RUN_TEST(test_retraction_and_its_transport_agree);
+    RUN_TEST(test_a_rigid_correction_moves_no_landmark_in_the_world);
+    RUN_TEST(test_corrections_that_are_cut_are_counted);
+    RUN_TEST(test_far_points_keep_the_variance_of_their_bearing);
+    return UNITY_END();
+}
