@@ -153,8 +153,8 @@ typedef enum plr_session_phase {
     PLR_PHASE_RUNNING = 2
 } plr_session_phase;
 
-/* `filter`, `reader.counts`, `reader.skipped_*`, `totals`, `phase` and `header` are for the caller
- * to read; the rest is the session's own. */
+/* `filter`, `totals`, `phase`, `header`, `init_failed`, `in` (the last message), `reader.counts` and
+ * `reader.skipped_*` are for the caller to read; the rest is the session's own. */
 typedef struct plr_session {
     plr_filter filter;
     plr_session_totals totals;
@@ -178,7 +178,7 @@ typedef struct plr_session {
     plr_config_message wanted; /* the CONFIG, as far as it made sense */
     bool is_log;               /* the input holds a filter's outputs too */
     bool start_known, started; /* a START was given; the pose has been set */
-    bool init_failed;
+    bool init_failed; /* settings or calibration were refused: data waits for better ones */
     plr_start start;
     uint32_t start_resets;
     plr_held_twists held;

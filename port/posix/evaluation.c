@@ -103,7 +103,7 @@ static double mahalanobis(const double P[21], const double e[6]) {
             for (int k = 0; k < j; k++)
                 value -= row[k] * other[k];
             if (i == j && !(value > 0))
-                return NAN;
+                return nan("");
             row[j] = i == j ? sqrt(value) : value / other[j];
         }
         y[i] = e[i];
@@ -142,13 +142,13 @@ static void compare_from_start(evaluation_figures *figures, const pair *pairs, s
     }
     figures->err0_m = sqrt(position / (double)n);
     figures->rot_deg = sqrt(angle / (double)n) * DEGREES;
-    figures->nees_per_dof = counted > 0 ? nees / (double)counted : (double)NAN;
+    figures->nees_per_dof = counted > 0 ? nees / (double)counted : nan("");
 }
 
 static double trajectory_error(const pair *pairs, size_t n) {
     double *points = malloc(6 * n * sizeof *points);
     if (points == NULL)
-        return NAN;
+        return nan("");
     double *estimated = points, *true_ones = points + 3 * n, sum = 0;
     plr_pose A;
     for (size_t k = 0; k < n; k++) {
@@ -169,8 +169,11 @@ void evaluation_figures_of(evaluation *e, evaluation_figures *figures) {
     samples pairs;
     samples_init(&pairs, sizeof(pair));
     find_pairs(e, &pairs);
-    *figures = (evaluation_figures){
-        .frames = pairs.count, .err0_m = NAN, .ate_m = NAN, .rot_deg = NAN, .nees_per_dof = NAN};
+    *figures = (evaluation_figures){.frames = pairs.count,
+                                    .err0_m = nan(""),
+                                    .ate_m = nan(""),
+                                    .rot_deg = nan(""),
+                                    .nees_per_dof = nan("")};
     if (pairs.count > 0) {
         compare_from_start(figures, pairs.items, pairs.count);
         figures->ate_m = trajectory_error(pairs.items, pairs.count);

@@ -15,6 +15,7 @@
 #include "posix/result_file.h"
 #include "posix/summary.h"
 #include "posix/tables.h"
+#include "posix/verdict.h"
 
 enum {
     KNOWN_LANDMARKS = 1 << 16,
@@ -32,16 +33,14 @@ typedef struct replay {
     summary summary;
     complaints complaints;
     progress progress;
-    bool started, future, failed, foreign;
-    plr_status init_status; /* why the filter did not start */
-    char culprit[64];       /* setting to change, "" where it is not one */
+    outcome outcome;
 } replay;
 
 /* --- what the session shows --- */
 
 static void on_started(void *context) {
     replay *run = context;
-    run->started = true;
+    run->outcome.started = true;
 }
 
 /* Trace of the whole covariance. In dead reckoning it is put together from parts that leave the
@@ -114,10 +113,10 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
 static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                        const plr_setting *culprit) {
     replay *run = context;
-    if (run->session.init_failed && run->init_status == PLR_OK) {
-        run->init_status = status; /* told at the end */
+    if (run->session.init_failed && run->outcome.init_status == PLR_OK) {
+        run->outcome.init_status = status; /* told at the end */
         if (culprit != NULL)
-            snprintf(run->culprit, sizeof run->culprit, "%s", culprit->name);
+            snprintf(run->outcome.culprit, sizeof run->outcome.culprit, "%s", culprit->name);
         return;
     }
     progress_clear(&run->progress);
@@ -174,11 +173,11 @@ static bool take_step(replay *run) {
     case PLR_STEP_CLOSED:
         return false;
     case PLR_STEP_FAILED:
-        run->failed = true;
+        run->outcome.read_error = run->port.read_error;
         return false;
     case PLR_STEP_FUTURE:
-        run->future = true;
-        return run->started; /* in the midst of a recording it is just refused */
+        run->outcome.future = true;
+        return run->outcome.started; /* in the midst of a recording it is just refused */
     case PLR_STEP_ENDED:
         run->summary.ended = true;
         return false;
@@ -191,10 +190,10 @@ static bool take_step(replay *run) {
     case PLR_STEP_MESSAGE:
         break;
     }
-    run->foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
+    const bool foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
     progress_show(&run->progress, counts->bytes, run->summary.frames);
-    return !run->foreign && run->init_status == PLR_OK &&
-           !(run->started && run->options.print_config);
+    return !foreign && run->outcome.init_status == PLR_OK &&
+           !(run->outcome.started && run->options.print_config);
 }
 
 static void tell_ending(replay *run) {
@@ -225,75 +224,13 @@ static void read_recording(replay *run) {
     while (take_step(run))
         continue;
     run->summary.cut_in_frame = plr_reader_mid_frame(&run->session.reader);
-    if (!run->summary.ended && run->started && !run->options.print_config)
+    if (!run->summary.ended && run->outcome.started && !run->options.print_config)
         plr_session_finish(&run->session);
     run->summary.wall_s = (double)(monotonic_ns() - begin) * 1e-9;
     progress_clear(&run->progress);
 }
 
 /* --- what it came to --- */
-
-static int complain(const replay *run, int status, const char *words) {
-    fprintf(stderr, PELORUS_NAME ": %s: %s\n", run->options.input, words);
-    return status;
-}
-
-static int explain_no_start(const replay *run) {
-    char words[256];
-    if (run->init_status == PLR_E_CONFIG) {
-        snprintf(words, sizeof words,
-                 "the settings in force make no sense together: change %.64s (--print-config shows "
-                 "them, --help their limits)",
-                 run->culprit[0] != '\0' ? run->culprit : "one of them");
-        return complain(run, REPLAY_EXIT_USAGE, words);
-    }
-    snprintf(words, sizeof words, "HEADER: %.200s", plr_status_text(run->init_status));
-    return complain(run, REPLAY_EXIT_RECORDING, words);
-}
-
-/* Why nothing useful was done; REPLAY_EXIT_OK if something was. */
-static int judge_recording(const replay *run) {
-    const plr_session *s = &run->session;
-    const plr_reader_counts *counts = &s->reader.counts;
-    char words[256];
-    if (run->failed)
-        return complain(run, REPLAY_EXIT_RECORDING, strerror(run->port.read_error));
-    if (run->future && !run->started) {
-        snprintf(words, sizeof words,
-                 "is written in version %u of the format, and this program reads version %u: take "
-                 "a later one",
-                 (unsigned)s->in.as.header.version_major, (unsigned)PLR_WIRE_VERSION_MAJOR);
-        return complain(run, REPLAY_EXIT_RECORDING, words);
-    }
-    if (counts->bytes == 0)
-        return complain(run, REPLAY_EXIT_RECORDING, "is empty");
-    if (counts->frames == 0) {
-        snprintf(words, sizeof words,
-                 "is not a Pelorus recording: not one good frame in its first %" PRIu64 " bytes",
-                 counts->bytes);
-        return complain(run, REPLAY_EXIT_RECORDING, words);
-    }
-    if (run->init_status != PLR_OK)
-        return explain_no_start(run);
-    if (s->header.version_major == 0) {
-        snprintf(words, sizeof words,
-                 "has no HEADER among its %" PRIu32 " good frames, so the camera is not known",
-                 counts->frames);
-        return complain(run, REPLAY_EXIT_RECORDING, words);
-    }
-    if (!run->started)
-        return complain(run, REPLAY_EXIT_RECORDING, "holds no data: neither TWIST nor STEREO");
-    return REPLAY_EXIT_OK;
-}
-
-static int judge_frames(const replay *run) {
-    char words[128];
-    if (run->summary.frames > 0)
-        return REPLAY_EXIT_OK;
-    snprintf(words, sizeof words, "no frame could be used: %" PRIu32 " STEREO, %" PRIu64 " refused",
-             run->session.totals.stereos, run->summary.frames_refused);
-    return complain(run, REPLAY_EXIT_RECORDING, words);
-}
 
 static bool print_results(replay *run) {
     const replay_options *o = &run->options;
@@ -321,14 +258,14 @@ static bool memory_sufficed(const replay *run) {
 
 static int run_recording(replay *run) {
     read_recording(run);
-    int status = judge_recording(run);
+    int status = verdict_on_recording(run->options.input, &run->session, &run->outcome);
     if (status == REPLAY_EXIT_OK && run->options.print_config) {
         config_file_print(plr_filter_config(&run->session.filter));
         return fflush(stdout) == 0 ? REPLAY_EXIT_OK : REPLAY_EXIT_OUTPUT;
     }
     if (status == REPLAY_EXIT_OK) {
         tell_ending(run);
-        status = judge_frames(run);
+        status = verdict_on_frames(run->options.input, &run->session, &run->summary);
     }
     const bool printed = status != REPLAY_EXIT_OK || print_results(run);
     const bool written = close_outputs(run);
@@ -363,7 +300,7 @@ static int open_and_run(replay *run) {
     const replay_options *o = &run->options;
     int status = REPLAY_EXIT_OUTPUT;
     if (!file_port_open(&run->port, o->input))
-        return complain(run, REPLAY_EXIT_RECORDING, strerror(errno));
+        return verdict_say(o->input, REPLAY_EXIT_RECORDING, strerror(errno));
     samples_init(&run->landmarks, sizeof(plr_landmark_message));
     summary_init(&run->summary);
     complaints_init(&run->complaints, o->input, o->quiet);

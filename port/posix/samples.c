@@ -47,7 +47,7 @@ void samples_sort_doubles(samples *list) {
 
 double samples_quantile(const samples *list, double share) {
     if (list->count == 0)
-        return NAN;
+        return nan("");
     const double rank = ceil(share * (double)list->count);
     const size_t at = rank < 1 ? 0 : (size_t)rank - 1;
     return ((const double *)list->items)[at < list->count ? at : list->count - 1];

@@ -72,7 +72,7 @@ void summary_figures_of(summary *s, summary_figures *figures) {
     figures->update_us_max = samples_quantile(&s->compute_us, 1);
     figures->duration_s = s->last_ns > s->first_ns ? (double)(s->last_ns - s->first_ns) * 1e-9 : 0;
     figures->realtime_factor =
-        s->compute_ns > 0 ? figures->duration_s * 1e9 / (double)s->compute_ns : (double)NAN;
+        s->compute_ns > 0 ? figures->duration_s * 1e9 / (double)s->compute_ns : nan("");
 }
 
 static void print_filter(const plr_session *session) {

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+/* Was anything useful done with the recording? If not: why, on stderr, and which exit status. */
+#ifndef PELORUS_POSIX_VERDICT_H
+#define PELORUS_POSIX_VERDICT_H
+
+#include "posix/summary.h"
+
+/* What the run met, besides what the session and the summary tell. */
+typedef struct outcome {
+    bool started;           /* the filter took data */
+    bool future;            /* a HEADER of a later version */
+    int read_error;         /* errno; 0 where all was read */
+    plr_status init_status; /* why the filter did not start */
+    char culprit[64];       /* setting to change, "" where it is not one */
+} outcome;
+
+/* Says what is wrong with the file, and gives the status back. */
+int verdict_say(const char *path, int status, const char *words);
+
+/* REPLAY_EXIT_OK if the filter was started. */
+int verdict_on_recording(const char *path, const plr_session *s, const outcome *run);
+
+/* REPLAY_EXIT_OK if at least one frame was used. */
+int verdict_on_frames(const char *path, const plr_session *s, const summary *summed);
+
+#endif
