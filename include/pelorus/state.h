@@ -74,9 +74,10 @@ typedef struct plr_parameters {
 /* Workspace of one call; nothing in it lives longer. */
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
-     * The kernel reads a little further than it uses, hence the margin. */
+     * The kernels read a little further than they use, hence the margins. */
     plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
-    plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2]; /* packed upper triangle */
+    plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
+               PLR_KERNEL_MARGIN]; /* packed upper triangle */
     plr_real y[PLR_BLOCK_ROWS];
     plr_real dx[PLR_MAX_STATE];
     plr_real diagonal[PLR_MAX_STATE];       /* of P, as a block would leave it */

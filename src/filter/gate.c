@@ -29,7 +29,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
     if (!f->model->linearise(f, &f->slots[slot], &lin))
         return verdict;
 
-    plr_real S[6], r[3];
+    plr_real S[6 + PLR_KERNEL_MARGIN] = {0}, r[3];
     plr_covariance_innovation(f, slot, &lin, S);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         S[plr_upper_row(PLR_ROWS, i)] += plr_gate_noise(f, i);

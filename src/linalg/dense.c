@@ -16,26 +16,44 @@ void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
     }
 }
 
+enum { STRIP = PLR_TILE_COLUMNS };
+
+/* What the rows above leave of the STRIP elements from (i, j) on, in x: a strip in registers. Those
+ * beyond the row's end mean nothing. */
+static void reduce_strip(unsigned n, const plr_real *restrict S, unsigned i, unsigned j,
+                         plr_real x[STRIP]) {
+    plr_real sum[STRIP];
+    memcpy(sum, S + plr_upper_row(n, i) + (j - i), sizeof sum);
+    const plr_real *above = S;
+    for (unsigned l = 0; l < i; l++) {
+        const plr_real a = -above[i];
+        const plr_real *restrict y = above + j;
+        for (int c = 0; c < STRIP; c++)
+            sum[c] = PLR_FMA(a, y[c], sum[c]);
+        above += n - l - 1;
+    }
+    memcpy(x, sum, sizeof sum);
+}
+
 bool plr_cholesky_upper(unsigned n, plr_real *S) {
-    for (unsigned k = 0; k < n; k++) {
-        plr_real *restrict row_k = S + plr_upper_row(n, k); /* (k, k), (k, k+1), ... */
-        if (!(row_k[0] > 0) || !plr_is_finite(row_k[0]))
-            return false;
-        row_k[0] = PLR_SQRT(row_k[0]);
-        const plr_real inverse = PLR_R(1) / row_k[0];
-        for (unsigned j = 1; j < n - k; j++)
-            row_k[j] *= inverse;
-        for (unsigned i = 1; i < n - k; i++) {
-            plr_real *restrict row_i = S + plr_upper_row(n, k + i);
-            const plr_real a = -row_k[i];
-            for (unsigned j = 0; j < n - k - i; j++)
-                row_i[j] = PLR_FMA(a, row_k[i + j], row_i[j]);
+    for (unsigned i = 0; i < n; i++) {
+        plr_real *row = S + plr_upper_row(n, i);
+        plr_real inverse = 1;
+        for (unsigned j = i; j < n; j += STRIP) {
+            plr_real x[STRIP];
+            reduce_strip(n, S, i, j, x);
+            if (j == i) {
+                if (!(x[0] > 0) || !plr_is_finite(x[0]))
+                    return false;
+                inverse = PLR_R(1) / PLR_SQRT(x[0]);
+            }
+            for (int c = 0; c < STRIP; c++)
+                x[c] *= inverse;
+            memcpy(row + (j - i), x, (n - j < STRIP ? n - j : STRIP) * sizeof *x);
         }
     }
     return true;
 }
-
-enum { STRIP = PLR_TILE_COLUMNS };
 
 /* The solution for STRIP columns: one row of them at a time, in registers. */
 static void solve_strip(unsigned k, const plr_real *restrict U, plr_real *restrict X, size_t ldx) {
@@ -43,12 +61,13 @@ static void solve_strip(unsigned k, const plr_real *restrict U, plr_real *restri
         plr_real x[STRIP];
         memcpy(x, X + i * ldx, sizeof x);
         const plr_real *u = U + i; /* (0, i), then down the column */
-        for (unsigned l = 0; l < i; l++) {
+        const plr_real *restrict y = X;
+        for (size_t step = k - 1; step > k - 1 - i; step--) {
             const plr_real a = -*u;
-            const plr_real *restrict y = X + l * ldx;
             for (int c = 0; c < STRIP; c++)
                 x[c] = PLR_FMA(a, y[c], x[c]);
-            u += k - l - 1;
+            u += step;
+            y += ldx;
         }
         const plr_real inverse = PLR_R(1) / *u;
         for (int c = 0; c < STRIP; c++)

@@ -48,7 +48,8 @@ static inline size_t plr_upper_row(unsigned n, unsigned i) {
 }
 
 /* U^T U = S in place: the upper triangle of S, n x n, packed row by row. False, with S spoiled, if a
- * pivot is not a positive finite number. */
+ * pivot is not a positive finite number. The memory behind S must be readable for PLR_KERNEL_MARGIN
+ * elements. */
 bool plr_cholesky_upper(unsigned n, plr_real *S);
 
 /* X <- U^-T X: U is k x k, packed upper; X is k x n with leading dimension ldx. */

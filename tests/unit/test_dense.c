@@ -112,7 +112,7 @@ static void unpack_upper(double *a, const plr_real *packed, unsigned n) {
 
 static void test_cholesky_agrees_with_lapack(void) {
     static double a[BIGGEST * BIGGEST], result[BIGGEST * BIGGEST];
-    plr_real packed[BIGGEST * (BIGGEST + 1) / 2];
+    plr_real packed[BIGGEST * (BIGGEST + 1) / 2 + PLR_KERNEL_MARGIN];
     rng r = rng_seeded(23);
     for (unsigned n = 1; n <= BIGGEST; n++) {
         random_spd(&r, n, 0.5, a);
@@ -130,7 +130,7 @@ static void test_cholesky_agrees_with_lapack(void) {
 
 static void test_cholesky_refuses_what_is_not_positive_definite(void) {
     double a[64];
-    plr_real packed[36];
+    plr_real packed[36 + PLR_KERNEL_MARGIN];
     rng r = rng_seeded(24);
     for (unsigned pivot = 0; pivot < 8; pivot++) {
         const double bad[] = {0, -1, (double)NAN, (double)INFINITY};
@@ -144,19 +144,19 @@ static void test_cholesky_refuses_what_is_not_positive_definite(void) {
 }
 
 static void test_cholesky_refuses_a_nan_off_the_diagonal(void) {
-    plr_real packed[6] = {4, (plr_real)NAN, 0, 4, 0, 4};
+    plr_real packed[6 + PLR_KERNEL_MARGIN] = {4, (plr_real)NAN, 0, 4, 0, 4};
     TEST_ASSERT_FALSE(plr_cholesky_upper(3, packed));
 }
 
 static void test_cholesky_refuses_a_singular_matrix(void) {
-    plr_real packed[3] = {1, 2, 4};
+    plr_real packed[3 + PLR_KERNEL_MARGIN] = {1, 2, 4};
     TEST_ASSERT_FALSE(plr_cholesky_upper(2, packed));
 }
 
 static void test_solve_upper_transposed_agrees_with_openblas(void) {
     static double a[BIGGEST * BIGGEST], x[BIGGEST * MOST];
     static plr_real X[BIGGEST * STRIDE];
-    plr_real packed[BIGGEST * (BIGGEST + 1) / 2];
+    plr_real packed[BIGGEST * (BIGGEST + 1) / 2 + PLR_KERNEL_MARGIN];
     rng r = rng_seeded(25);
     for (unsigned k = 1; k <= BIGGEST; k++) {
         const unsigned n = 1 + rng_below(&r, MOST);
