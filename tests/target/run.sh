@@ -5,6 +5,7 @@
 #
 # usage: tests/target/run.sh [BOARD...]
 #
+# Without a BOARD it takes all of them, and holds docs/SIZES.md against what is measured now.
 # PELORUS_LONG=1 adds whole real recordings. Everything is left in build/robot; each board's output
 # in build-logs/target-BOARD.log.
 set -uo pipefail
@@ -92,7 +93,19 @@ while [ $running -gt 0 ]; do
 done
 
 for board in "${BOARDS[@]}"; do
-    grep -hE '^(SKIPPED|FAILED|ERROR)' "$LOGS/target-$board.log" | sed "s/^/&/"
+    grep -hE '^(SKIPPED|FAILED|ERROR)' "$LOGS/target-$board.log"
 done | sort -u
-echo "$(total passed) passed, $(total failed) failed, $(total skipped) skipped in $SECONDS.0s"
+passes=$(total passed) failures=$(total failed)
+
+if [ $# -eq 0 ]; then
+    heading 'What it costs, against docs/SIZES.md'
+    if "$ROOT/tools/sizes.sh" --check >"$LOGS/target-sizes.log" 2>&1; then
+        passes=$((passes + 1))
+        tail -1 "$LOGS/target-sizes.log"
+    else
+        failures=$((failures + 1)) failed=1
+        tail -20 "$LOGS/target-sizes.log"
+    fi
+fi
+echo "$passes passed, $failures failed, $(total skipped) skipped in $SECONDS.0s"
 exit $failed

@@ -186,7 +186,9 @@ def test_a_calibration_that_changes_in_mid_flight_is_refused(
     assert refusals(answers_to(link, encode(other, 0), Kind.HEADER), Kind.HEADER) == {MODE}
 
 
-def test_an_overlong_frame_is_refused_and_the_next_one_taken(link: Link, messages: list[Message]) -> None:
+def test_an_overlong_frame_is_refused_and_the_next_one_taken(
+    link: Link, messages: list[Message]
+) -> None:
     streamer = Streamer(link)
     streamer.greet()
     for message in messages[:-1]:

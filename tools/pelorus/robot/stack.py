@@ -3,8 +3,8 @@
 
 gcc's -fcallgraph-info=su gives the functions of each source with their frames and calls (.ci files,
 in VCG form). Functions of the C library come without; their frames are read from the machine code.
-What a call through a pointer may reach cannot be seen by a machine: INDIRECT says it, by hand, and a
-call that it does not cover is an error. So are recursion and frames without a bound.
+What a call through a pointer may reach cannot be seen by a machine: INDIRECT says it, by hand, and
+a call that it does not cover is an error. So are recursion and frames without a bound.
 """
 
 from __future__ import annotations
@@ -19,19 +19,18 @@ from pelorus.errors import PelorusError
 
 # Who calls through a pointer, and what it may reach: patterns of function names. The firmware sets
 # no observer, so those calls reach nothing.
-MODEL = r"(body|world)_\w+"
-MAP = r"(take_evicted|find_known)"
-PORT = r"(receive|transmit|now_ns|idle|feed_watchdog)"
+MODEL = (r"body_\w+", r"world_\w+")
+MAP = ("take_evicted", "ask_known")
+PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
 SESSION = r"plr_session_step|apply_twist|predict|update|plr_take_\w+|refuse_frame"
 FILTER = r"plr_(filter|correct|gate|motion|slots)\w*"
-INDIRECT = (
-    (r"plr_order_sort|sink", r"\w+_before"),
-    (r"plr_frame_out_\w+", r"write_to_port|send"),
+INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (r"plr_order_sort|sink", (r"\w+_before",)),
+    (r"plr_frame_out_\w+", ("write_to_port", "send")),
     (r"write_to_port", PORT),
     (SESSION, PORT),
-    (r"plr_begin_running|plr_send_\w+", r"(?!)"),
-    (FILTER, f"{MODEL}|{MAP}"),
-    (r"obey", r"(say|fault_by)_\w+|hang"),
+    (r"plr_begin_running|plr_send_\w+", ()),
+    (FILTER, MODEL + MAP),
 )
 
 NODE = re.compile(r'node: \{ title: "([^"]+)" label: "([^"]*)"')
@@ -182,19 +181,22 @@ class Analysis:
         return callees
 
     def _named(self, pattern: str) -> set[str]:
-        return {
+        titles = {
             title
             for name, titles in self._by_name.items()
-            if re.fullmatch(pattern, name.split(".")[0])
+            if re.fullmatch(pattern, name.partition(".")[0])
             for title in titles
             if self._functions[title].from_compiler
         }
+        if not titles:
+            raise PelorusError(f"INDIRECT names {pattern}, and there is no such function")
+        return titles
 
     def _reachable_from(self, caller: str) -> set[str]:
-        base = caller.split(".")[0]  # gcc's clones: name.isra.0
+        base = caller.partition(".")[0]  # gcc's clones: name.isra.0
         for callers, targets in INDIRECT:
             if re.fullmatch(callers, base):
-                return self._named(targets)
+                return set().union(*(self._named(target) for target in targets))
         raise PelorusError(f"{caller} calls through a pointer, and INDIRECT does not say what")
 
 

@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: MIT
+"""What the filter costs on each board: docs/SIZES.md, made and compared.
+
+usage: python -m pelorus.robot.sizes recording OUT.plr
+       python -m pelorus.robot.sizes write|check BUILD_FOLDER DOCUMENT
+
+`recording` makes what the bench images carry. `write` measures all images of a build folder and
+writes the document; `check` measures, and compares with the document's numbers. tools/sizes.sh
+calls them in order.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from scipy.optimize import nnls
+
+from pelorus.console import err, out, progress
+from pelorus.errors import PelorusError
+from pelorus.frames import Kind, Message, Stereo
+from pelorus.robot.emulator import MACHINES, Emulator
+from pelorus.robot.stack import image_bound
+from pelorus.wire import Writer, read_file
+
+FRAME_OBSERVATIONS = 20
+BUSY_OBSERVATIONS = 60
+SEED = "31"
+DURATION_S = "12"
+BENCH_S = 600.0
+TOLERANCE = 0.03
+PROCESSORS = {"mps2_an386": "m4f", "mps2_an500": "m7", "mps3_an547": "m55", "stm32f405": "m4f"}
+# What QEMU's SysTick really counts, where the part's clock tree is not modelled.
+EMULATED_HZ = {"stm32f405": 168_000_000}
+INSTRUCTIONS_PER_SECOND = 1_000_000_000  # -icount shift=0: one a nanosecond
+
+
+# --- the recording -------------------------------------------------------------------------------
+
+
+def write_recording(target: Path) -> None:
+    """Two drives one after the other: every frame of 20 observations, then the busiest possible."""
+    parts = []
+    for observations in (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS):
+        part = target.with_suffix(f".{observations}.plr")
+        command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--seed", SEED]
+        command += ["--duration", DURATION_S, "--observations", str(2 * BUSY_OBSERVATIONS)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        messages = [frame.message for frame in read_file(part)[0]]
+        with part.open("wb") as stream:
+            writer = Writer(stream)
+            for message in thinned(messages, observations):
+                writer.write(message)
+            writer.end()
+        parts.append(part)
+    target.write_bytes(b"".join(part.read_bytes() for part in parts))
+    for part in parts:
+        part.unlink()
+
+
+def thinned(messages: list[Message], observations: int) -> list[Message]:
+    """Keep so many observations a frame, those of tracks that go on before those that begin."""
+    kept: set[int] = set()
+    result: list[Message] = []
+    for message in messages:
+        if message.kind in (Kind.END, Kind.TRUTH):
+            continue
+        if isinstance(message, Stereo):
+            goes_on = np.array([int(i) in kept for i in message.ids], bool)
+            chosen = np.sort(np.argsort(~goes_on, kind="stable")[:observations])
+            kept = {int(i) for i in message.ids[chosen]}
+            result.append(Stereo(message.t_ns, message.ids[chosen], message.pixels[chosen]))
+        else:
+            result.append(message)
+    return result
+
+
+# --- one image -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Update:
+    """One frame: what was in it, and what it took."""
+
+    instructions: float
+    observations: int
+    matched: int
+    used: int
+    created: int
+    active: int
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a bench image told."""
+
+    filter_bytes: int
+    workspace_bytes: int
+    session_bytes: int
+    stack_bytes: int
+    predicts: list[float]
+    updates: list[Update]
+
+
+def fields(line: str) -> dict[str, int]:
+    """`name number name number ...`."""
+    words = line.split()
+    return {name: int(number) for name, number in zip(words[::2], words[1::2], strict=True)}
+
+
+def run_bench(board: str, image: Path) -> Bench:
+    """Run the image with one instruction a nanosecond, and read its lines."""
+    with Emulator(board, image, ("-icount", "shift=0")) as emulator:
+        link = emulator.connect()
+        text = b""
+        while not re.search(rb"done stack \d+ \n", text):
+            piece = link.exchange(b"", BENCH_S)
+            if not piece:
+                raise PelorusError(f"{image}: silent for {BENCH_S:.0f} s. {emulator.trouble()}")
+            text += piece
+        link.close()
+    first, *lines, last = text.decode().splitlines()
+    sizes = fields(first.removeprefix("size "))
+    per_clock = INSTRUCTIONS_PER_SECOND / EMULATED_HZ.get(board, sizes["hz"])
+    predicts, updates = [], []
+    for line in lines:
+        found = fields(line)
+        if "predict" in found:
+            predicts.append(found["predict"] * per_clock)
+        else:
+            instructions = found.pop("update") * per_clock
+            found.pop("evicted")
+            updates.append(Update(instructions, **found))
+    stack = fields(last.removeprefix("done "))["stack"]
+    return Bench(sizes["filter"], sizes["workspace"], sizes["session"], stack, predicts, updates)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A row of the document."""
+
+    board: str
+    capacity: int
+    flash: int
+    ram: int
+    filter: int
+    session: int
+    stack_bound: int
+    stack_seen: int
+    predict: float
+    predict_worst: float
+    frame: float
+    frame_worst: float
+    spread: float  # worst over median of frames with the same counts
+    busiest: float
+    bench: Bench
+
+
+def section_sizes(image: Path) -> tuple[int, int]:
+    """Flash and RAM of an image, in bytes; RAM with its stack."""
+    table = subprocess.run(
+        ["arm-none-eabi-size", str(image)], capture_output=True, text=True, check=True
+    ).stdout
+    text, data, bss = map(int, table.splitlines()[1].split()[:3])
+    return text + data, data + bss
+
+
+def spread_of(updates: list[Update]) -> float:
+    """Worst over median, among frames of which everything counted is the same."""
+    groups: dict[tuple[int, ...], list[float]] = {}
+    for update in updates:
+        key = (update.observations, update.matched, update.used, update.created, update.active)
+        groups.setdefault(key, []).append(update.instructions)
+    return max((max(group) / median(group) for group in groups.values()), default=1.0)
+
+
+def measure(build: Path, board: str, capacity: int) -> Cost:
+    """Everything about one board and capacity."""
+    firmware = build / "images" / f"pelorus-{board}-n{capacity}.elf"
+    flash, ram = section_sizes(firmware)
+    library = f"pelorus-{PROCESSORS[board]}-n{capacity}-f32.dir"
+    folders = [build / "CMakeFiles" / library, build / "CMakeFiles" / f"{firmware.stem}.dir"]
+    bench = run_bench(board, build / "images" / f"bench-{board}-n{capacity}.elf")
+    full = [u.instructions for u in bench.updates if u.observations == FRAME_OBSERVATIONS]
+    return Cost(
+        board=board,
+        capacity=capacity,
+        flash=flash,
+        ram=ram,
+        filter=bench.filter_bytes,
+        session=bench.session_bytes - bench.filter_bytes,
+        stack_bound=image_bound(firmware, folders).stack_bytes,
+        stack_seen=bench.stack_bytes,
+        predict=median(bench.predicts),
+        predict_worst=max(bench.predicts),
+        frame=median(full),
+        frame_worst=max(full),
+        spread=spread_of(bench.updates),
+        busiest=max(u.instructions for u in bench.updates),
+        bench=bench,
+    )
+
+
+# --- the bound -----------------------------------------------------------------------------------
+
+TERMS = ("1", "m", "m n", "n^2", "b n", "b n^2")
+
+
+def terms(capacity: int, observations: int) -> list[float]:
+    """n is the state's dimension, b the number of blocks."""
+    n = 12 + 3 * capacity
+    blocks = -(-min(observations, capacity) // 8)
+    return [1.0, observations, observations * n, n * n, blocks * n, blocks * n * n]
+
+
+def fit_bound(costs: list[Cost]) -> list[float]:
+    """Coefficients as large as the worst frame of any board asks for, and little larger."""
+    worst: dict[tuple[int, int], float] = {}
+    for cost in costs:
+        for update in cost.bench.updates:
+            key = (cost.capacity, update.observations)
+            worst[key] = max(worst.get(key, 0.0), update.instructions)
+    rows = np.array([terms(*key) for key in worst])
+    values = np.array(list(worst.values()))
+    coefficients, _ = nnls(rows / values[:, None], np.ones(len(values)))
+    short_by = max(values / (rows @ coefficients))
+    return [float(np.ceil(c * max(1.0, short_by) * 10)) / 10 for c in coefficients]
+
+
+# --- the document --------------------------------------------------------------------------------
+
+TITLES = (
+    "board | N | flash | RAM | filter | session | stack, bound | stack, seen",
+    "board | N | predict, median | worst | frame of 20, median | worst | worst / median at the "
+    "same counts | busiest frame | its bound",
+)
+
+
+def document(costs: list[Cost]) -> str:
+    """docs/SIZES.md."""
+    bound = fit_bound(costs)
+    formula = " + ".join(
+        f"{c:g} {name}" if name != "1" else f"{c:g}"
+        for c, name in zip(bound, TERMS, strict=True)
+        if c
+    )
+    memory, time = [], []
+    for cost in costs:
+        limit = sum(
+            c * t for c, t in zip(bound, terms(cost.capacity, BUSY_OBSERVATIONS), strict=True)
+        )
+        memory.append(
+            f"| {cost.board} | {cost.capacity} | {cost.flash} | {cost.ram} | {cost.filter} | "
+            f"{cost.session} | {cost.stack_bound} | {cost.stack_seen} |"
+        )
+        time.append(
+            f"| {cost.board} | {cost.capacity} | {cost.predict:.0f} | {cost.predict_worst:.0f} | "
+            f"{cost.frame:.0f} | {cost.frame_worst:.0f} | {cost.spread:.3f} | {cost.busiest:.0f} | "
+            f"{limit:.0f} |"
+        )
+    return TEMPLATE.format(
+        memory_title=_title(TITLES[0]),
+        memory="\n".join(memory),
+        time_title=_title(TITLES[1]),
+        time="\n".join(time),
+        formula=formula,
+        tolerance=f"{TOLERANCE:.0%}",
+        busy=BUSY_OBSERVATIONS,
+    )
+
+
+def _title(names: str) -> str:
+    count = names.count("|") + 1
+    return f"| {names} |\n|---|{'---:|' * (count - 1)}"
+
+
+TEMPLATE = """# What it costs
+
+Made by `tools/sizes.sh`; `tools/sizes.sh --check` measures again and fails where a number has moved
+by more than {tolerance} (stack seen: 64 bytes; worst / median: never above 1.1). The images are
+float32, bias on, blocks of 8, at most 128 observations a frame; compiler `arm-none-eabi-gcc` 12.2,
+library at -O3.
+
+## Memory
+
+In bytes. *Flash*: code, constants and initial values. *RAM*: everything static, with the stack of
+8 KB, its guard, both rings of the link (4 KB each) and 64 known landmarks. *Filter* is
+`sizeof(plr_filter)`, the state with its workspace; *session* is what the loop adds to it: wire
+buffers, messages, held twists. *Stack, bound* is the deepest chain of calls that there can be, from
+the compiler's own account (`-fstack-usage`, call graph; calls through pointers are resolved by the
+table in `tools/pelorus/robot/stack.py`; no recursion, no frame without a bound) with one interrupt
+on top. *Stack, seen* is what the bench image used, without interrupts and session.
+
+{memory_title}
+{memory}
+
+There is no heap and no stdio: the linker refuses `malloc`, `printf` and their like, and the library
+has no writable globals (`tests/layering`).
+
+## Instructions
+
+Instructions, **not cycles**: QEMU counts them (`-icount shift=0`) and knows neither caches nor wait
+states nor dual issue. They repeat exactly; the resolution is one tick of SysTick, 40 instructions
+on MPS2. A recording is part of the image: a simulated drive with a twist every 10 ms and a frame
+every 100 ms, first with exactly 20 observations in each frame, then with up to {busy}.
+
+{time_title}
+{time}
+
+A predict costs the same for every N. A frame costs at most
+
+    {formula}
+
+instructions, with m observations in the frame, n = 12 + 3 N, and b = min(m, N) / 8 blocks, rounded
+up. The coefficients are fitted to the worst frames of all boards and scaled until none is above;
+*its bound* is the formula at m = {busy}, beside the busiest frame that was met. Every loop has a
+count that N and m bound, and a library function that is not of constant time for such a count does
+not exist in it; so the worst case is no other than that of these counts.
+"""
+
+
+def numbers(text: str) -> dict[tuple[str, str], list[float]]:
+    """(board, capacity, which table) -> the numbers of a row."""
+    rows: dict[tuple[str, str], list[float]] = {}
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) > 2 and cells[0] in MACHINES:
+            rows[f"{cells[0]} N={cells[1]}", f"{len(cells)}"] = [float(cell) for cell in cells[2:]]
+    return rows
+
+
+def differences(old: str, new: str) -> list[str]:
+    """What moved by more than the tolerance, or is no longer there."""
+    before, now = numbers(old), numbers(new)
+    found = [f"{row}: in the document, and not measured" for row, _ in before.keys() - now.keys()]
+    found += [f"{row}: measured, and not in the document" for row, _ in now.keys() - before.keys()]
+    for key in before.keys() & now.keys():
+        titles = next(title for title in TITLES if str(title.count("|") + 1) == key[1])
+        names = [name.strip() for name in titles.split("|")][2:]
+        for name, was, is_now in zip(names, before[key], now[key], strict=True):
+            allowed = {"stack, seen": 64.0}.get(name, TOLERANCE * was)
+            if abs(is_now - was) > allowed:
+                found.append(f"{key[0]}: {name}: {was:g} in the document, {is_now:g} now")
+    return sorted(found)
+
+
+def measure_all(build: Path) -> list[Cost]:
+    """Every firmware image that has its bench beside it."""
+    found = []
+    for path in (build / "images").glob("bench-*-n*.elf"):
+        _, board, capacity = path.stem.split("-")
+        found.append((list(MACHINES).index(board), int(capacity[1:]), board))
+    if not found:
+        raise PelorusError(f"{build}/images: no bench images; tools/sizes.sh builds them")
+    return [measure(build, board, n) for _, n, board in progress(sorted(found), "measuring")]
+
+
+def main(arguments: list[str]) -> int:
+    """See the module's text."""
+    match arguments:
+        case ["recording", target]:
+            write_recording(Path(target))
+        case ["write", build, path]:
+            Path(path).write_text(document(measure_all(Path(build))))
+        case ["check", build, path]:
+            costs = measure_all(Path(build))
+            wrong = differences(Path(path).read_text(), document(costs))
+            wrong += [
+                f"{cost.board} N={cost.capacity}: worst / median {cost.spread:.3f} is above 1.1"
+                for cost in costs
+                if cost.spread > 1.1
+            ]
+            for line in wrong:
+                err.print(line)
+            if wrong:
+                err.print(f"{path} is out of date, or something got dearer: tools/sizes.sh")
+                return 1
+            out.print(f"{path}: {len(costs)} images, every number within its tolerance")
+        case _:
+            err.print(__doc__)
+            return 2
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except PelorusError as error:
+        err.print(f"error: {error}")
+        sys.exit(1)
