@@ -11,7 +11,7 @@
 #include "support/oracle.h"
 #include "support/random.h"
 
-enum { MOST = 9, STRIDE = 13, BIGGEST = 40 };
+enum { MOST = 9, STRIDE = 13, BIGGEST = 40, WIDEST = 50 };
 
 static const double eps = REAL_EPSILON;
 
@@ -110,14 +110,23 @@ static void unpack_upper(double *a, const plr_real *packed, unsigned n) {
             a[i * n + j] = a[j * n + i] = (double)*packed++;
 }
 
+/* A random positive definite matrix, packed, and its double twin. The margin behind it, which the
+ * kernel may read, is NaN. */
+static void random_packed(rng *r, unsigned n, plr_real *packed, double *twin) {
+    const size_t size = plr_upper_row(n, n);
+    random_spd(r, n, 0.5, twin);
+    pack_upper(packed, twin, n);
+    unpack_upper(twin, packed, n);
+    for (size_t i = 0; i < PLR_KERNEL_MARGIN; i++)
+        packed[size + i] = (plr_real)NAN;
+}
+
 static void test_cholesky_agrees_with_lapack(void) {
     static double a[BIGGEST * BIGGEST], result[BIGGEST * BIGGEST];
     plr_real packed[BIGGEST * (BIGGEST + 1) / 2 + PLR_KERNEL_MARGIN];
     rng r = rng_seeded(23);
     for (unsigned n = 1; n <= BIGGEST; n++) {
-        random_spd(&r, n, 0.5, a);
-        pack_upper(packed, a, n);
-        unpack_upper(a, packed, n);
+        random_packed(&r, n, packed, a);
         TEST_ASSERT_TRUE(plr_cholesky_upper(n, packed));
         TEST_ASSERT_TRUE(oracle_cholesky(n, a));
         unpack_upper(result, packed, n);
@@ -125,6 +134,38 @@ static void test_cholesky_agrees_with_lapack(void) {
             TEST_ASSERT_DOUBLE_WITHIN(
                 40 * n * eps, 0,
                 largest_difference(a + (size_t)i * n, result + (size_t)i * n, i + 1));
+    }
+}
+
+/* The factor element by element, each accumulator from its own element with k ascending. */
+static void plain_cholesky(unsigned n, plr_real *S) {
+    for (unsigned i = 0; i < n; i++) {
+        plr_real *row = S + plr_upper_row(n, i) - i;
+        plr_real inverse = 0;
+        for (unsigned j = i; j < n; j++) {
+            plr_real x = row[j];
+            for (unsigned k = 0; k < i; k++) {
+                const plr_real *above = S + plr_upper_row(n, k) - k;
+                x = PLR_FMA(-above[i], above[j], x);
+            }
+            if (j == i)
+                inverse = PLR_R(1) / PLR_SQRT(x);
+            row[j] = x * inverse;
+        }
+    }
+}
+
+static void test_cholesky_has_the_bits_of_plain_loops_and_stays_inside(void) {
+    static double a[BIGGEST * BIGGEST];
+    enum { SIZE = BIGGEST * (BIGGEST + 1) / 2 + PLR_KERNEL_MARGIN };
+    plr_real packed[SIZE], plain[SIZE];
+    rng r = rng_seeded(26);
+    for (unsigned n = 1; n <= BIGGEST; n++) {
+        random_packed(&r, n, packed, a);
+        memcpy(plain, packed, sizeof plain);
+        plain_cholesky(n, plain);
+        TEST_ASSERT_TRUE(plr_cholesky_upper(n, packed));
+        TEST_ASSERT_TRUE(same_bits(plain, packed, plr_upper_row(n, n) + PLR_KERNEL_MARGIN));
     }
 }
 
@@ -153,26 +194,44 @@ static void test_cholesky_refuses_a_singular_matrix(void) {
     TEST_ASSERT_FALSE(plr_cholesky_upper(2, packed));
 }
 
-static void test_solve_upper_transposed_agrees_with_openblas(void) {
-    static double a[BIGGEST * BIGGEST], x[BIGGEST * MOST];
-    static plr_real X[BIGGEST * STRIDE];
+/* X <- U^-T X column by column, k ascending. */
+static void plain_solve(unsigned k, unsigned n, const plr_real *U, plr_real *X, size_t ldx) {
+    for (unsigned j = 0; j < n; j++)
+        for (unsigned i = 0; i < k; i++) {
+            plr_real x = X[i * ldx + j];
+            for (unsigned l = 0; l < i; l++)
+                x = PLR_FMA(-U[plr_upper_row(k, l) + i - l], X[l * ldx + j], x);
+            X[i * ldx + j] = x * (PLR_R(1) / U[plr_upper_row(k, i)]);
+        }
+}
+
+static void solve_against_oracle(rng *r, unsigned k, unsigned n) {
+    static double a[BIGGEST * BIGGEST], x[BIGGEST * WIDEST];
+    static plr_real X[BIGGEST * (WIDEST + 4)], plain[BIGGEST * (WIDEST + 4)];
     plr_real packed[BIGGEST * (BIGGEST + 1) / 2 + PLR_KERNEL_MARGIN];
+    const size_t ld = n + rng_below(r, 4);
+    char message[64];
+    snprintf(message, sizeof message, "k %u, n %u, ld %u", k, n, (unsigned)ld);
+    random_spd(r, k, 0.5, a);
+    TEST_ASSERT_TRUE(oracle_cholesky(k, a));
+    round_to_real(a, (size_t)k * k);
+    pack_upper(packed, a, k);
+    random_strided(r, k, n, ld, X, x);
+    memcpy(plain, X, sizeof plain);
+    plr_solve_upper_transposed(k, n, packed, X, ld);
+    plain_solve(k, n, packed, plain, ld);
+    TEST_ASSERT_TRUE_MESSAGE(same_bits(plain, X, k * ld), message);
+    oracle_solve_lower(k, n, a, x);
+    const double size = largest(x, (size_t)k * n);
+    assert_strided(20 * k * eps * (1 + size), x, X, k, n, ld, message);
+}
+
+/* Widths below, at and above the strips that the kernel holds in registers. */
+static void test_solve_agrees_with_openblas_and_has_the_bits_of_plain_loops(void) {
     rng r = rng_seeded(25);
-    for (unsigned k = 1; k <= BIGGEST; k++) {
-        const unsigned n = 1 + rng_below(&r, MOST);
-        const size_t ld = n + rng_below(&r, 4);
-        char message[64];
-        snprintf(message, sizeof message, "k %u, n %u, ld %u", k, n, (unsigned)ld);
-        random_spd(&r, k, 0.5, a);
-        TEST_ASSERT_TRUE(oracle_cholesky(k, a));
-        round_to_real(a, (size_t)k * k);
-        pack_upper(packed, a, k);
-        random_strided(&r, k, n, ld, X, x);
-        plr_solve_upper_transposed(k, n, packed, X, ld);
-        oracle_solve_lower(k, n, a, x);
-        const double size = largest(x, (size_t)k * n);
-        assert_strided(20 * k * eps * (1 + size), x, X, k, n, ld, message);
-    }
+    for (unsigned k = 1; k <= BIGGEST; k += 1 + k / 8)
+        for (unsigned n = 1; n <= WIDEST; n++)
+            solve_against_oracle(&r, k, n);
 }
 
 int main(void) {
@@ -183,6 +242,7 @@ int main(void) {
     RUN_TEST(test_cholesky_refuses_what_is_not_positive_definite);
     RUN_TEST(test_cholesky_refuses_a_nan_off_the_diagonal);
     RUN_TEST(test_cholesky_refuses_a_singular_matrix);
-    RUN_TEST(test_solve_upper_transposed_agrees_with_openblas);
+    RUN_TEST(test_cholesky_has_the_bits_of_plain_loops_and_stays_inside);
+    RUN_TEST(test_solve_agrees_with_openblas_and_has_the_bits_of_plain_loops);
     return UNITY_END();
 }
