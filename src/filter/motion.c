@@ -30,7 +30,8 @@ plr_status plr_motion_check(const plr_filter *f, const plr_real reading[6], plr_
     return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
 }
 
-/* p <- p + R d, in double; R <- R dR */
+/* p <- p + R d, in double; R <- R dR, once more a rotation to rounding: an hour of steps without
+ * that leaves it by a hundredth in float32. */
 static void move_pose(plr_filter *f, const plr_real dR[9], const plr_real d[3]) {
     plr_real step[3], R[9];
     plr_mat3_vec(step, f->R_WB, d);
@@ -38,6 +39,7 @@ static void move_pose(plr_filter *f, const plr_real dR[9], const plr_real d[3]) 
     for (int i = 0; i < 3; i++)
         f->p_WB[i] += (double)step[i];
     memcpy(f->R_WB, R, sizeof R);
+    plr_so3_orthonormalise(f->R_WB);
 }
 
 /* Variance of a step's displacement, for rho (first) and theta. */
@@ -60,6 +62,7 @@ void plr_motion_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
     f->t_ns = t_ns;
     move_pose(f, R, p);
     plr_se3_append(m->R, m->p, R, p);
+    plr_so3_orthonormalise(m->R);
 
     plr_sandwich6(next, A, m->Q);
     step_variance(f, seconds, interval, variance);
@@ -98,7 +101,6 @@ void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]) {
     plr_real R[9], p[3];
     plr_se3_exp(R, p, xi);
     move_pose(f, R, p);
-    plr_so3_orthonormalise(f->R_WB);
 }
 
 void plr_motion_settle(plr_filter *f) {

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+/* The gate against the dense Mahalanobis distance, and its limits (DESIGN 2.3). */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+#include "filter/covariance.h"
+#include "filter/gate.h"
+#include "linalg/packed.h"
+#include "support/matrices.h"
+#include "support/oracle.h"
+#include "support/specimens.h"
+
+enum { RUNS = 20, LANDMARKS = 5 };
+
+static const double eps = REAL_EPSILON;
+static plr_filter filter;
+static rng chance;
+
+void setUp(void) {
+    chance = rng_seeded(49);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
+}
+
+void tearDown(void) {
+}
+
+static void test_innovation_is_seen_minus_predicted(void) {
+    const plr_linearisation lin = {.z = {PLR_R(100), PLR_R(80), PLR_R(50)}};
+    const plr_observation seen = {1, 103.5F, 51.0F, 78.25F, 54.0F};
+    plr_real r[3];
+    plr_gate_innovation(r, &seen, &lin);
+    TEST_ASSERT_EQUAL_DOUBLE(3.5, (double)r[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(-1.75, (double)r[1]);
+    TEST_ASSERT_EQUAL_DOUBLE(2.5, (double)r[2]);
+}
+
+static void test_the_vertical_row_is_a_mean_of_two(void) {
+    filter.par.pixel_variance = PLR_R(9);
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_gate_noise(&filter, 0));
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_gate_noise(&filter, 1));
+    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_gate_noise(&filter, 2));
+}
+
+/* S = H P H^T + R of a slot, 3x3, and r, in double. */
+static void dense_innovation(unsigned slot, const plr_observation *seen, double S[9], double r[3]) {
+    const unsigned n = plr_covariance_dim(&filter);
+    plr_linearisation lin;
+    plr_real r_real[3];
+    double pose[18], landmark[9], *H = specimen_zeros(3, n), *P = specimen_covariance(&filter);
+    TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[slot], &lin));
+    to_doubles(landmark, lin.H_landmark, 9);
+    specimen_put(H, n, 0, plr_covariance_row(&filter, slot), 3, 3, landmark);
+    if (lin.uses_pose) {
+        to_doubles(pose, lin.H_pose, 18);
+        specimen_put(H, n, 0, 0, 3, 6, pose);
+    }
+    oracle_sandwich(3, n, H, P, S);
+    for (unsigned i = 0; i < 3; i++)
+        S[4 * i] += (double)plr_gate_noise(&filter, i);
+    plr_gate_innovation(r_real, seen, &lin);
+    to_doubles(r, r_real, 3);
+    free(P);
+    free(H);
+}
+
+static double determinant(const double S[9]) {
+    return S[0] * (S[4] * S[8] - S[5] * S[7]) - S[1] * (S[3] * S[8] - S[5] * S[6]) +
+           S[2] * (S[3] * S[7] - S[4] * S[6]);
+}
+
+static void check_model(plr_model_kind model) {
+    for (int run = 0; run < RUNS; run++) {
+        specimen_filter(&filter, &chance, model, run % 2, LANDMARKS);
+        for (unsigned slot = 0; slot < LANDMARKS; slot++) {
+            const float shift[4] = {(float)rng_normal(&chance), (float)rng_normal(&chance),
+                                    (float)rng_normal(&chance), (float)rng_normal(&chance)};
+            const plr_observation seen = specimen_observation(&filter, slot, shift);
+            double S[9], r[3], y[3];
+            dense_innovation(slot, &seen, S, r);
+            const double gain = determinant(S);
+            memcpy(y, r, sizeof y);
+            TEST_ASSERT_TRUE(oracle_solve_spd(3, 1, S, y));
+            const double gap = (double)seen.vL_px - (double)seen.vR_px;
+            const double d2 = r[0] * y[0] + r[1] * y[1] + r[2] * y[2] +
+                              gap * gap / (2 * (double)filter.par.pixel_variance);
+            const plr_verdict verdict = plr_gate_judge(&filter, slot, &seen);
+            /* S holds variances of up to 1000 px^2 beside 2: a thousand roundings */
+            TEST_ASSERT_DOUBLE_WITHIN(d2 * 3000 * eps, d2, (double)verdict.d2);
+            TEST_ASSERT_DOUBLE_WITHIN(gain * 3000 * eps, gain, (double)verdict.gain);
+            TEST_ASSERT_TRUE(verdict.accepted); /* the specimen's gate is off */
+        }
+    }
+}
+
+static void test_distance_and_gain_agree_with_the_dense_ones(void) {
+    check_model(PLR_MODEL_BODY);
+    check_model(PLR_MODEL_WORLD);
+}
+
+static void test_the_threshold_itself_is_accepted(void) {
+    const float shift[4] = {1, 2, 3, 4};
+    const plr_observation seen = specimen_observation(&filter, 2, shift);
+    const plr_real d2 = plr_gate_judge(&filter, 2, &seen).d2;
+    filter.par.gate_d2 = d2;
+    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 2, &seen).accepted);
+    filter.par.gate_d2 = d2 * PLR_R(0.999);
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 2, &seen).accepted);
+}
+
+static void test_a_row_gap_counts_even_where_the_three_rows_fit(void) {
+    const float shift[4] = {0, 20, 0, -20};
+    const plr_observation seen = specimen_observation(&filter, 0, shift);
+    const plr_verdict verdict = plr_gate_judge(&filter, 0, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 40 * 40 / (2 * 4.0), (double)verdict.d2);
+    filter.par.gate_d2 = PLR_R(13.3);
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 0, &seen).accepted);
+}
+
+static void test_the_course_gate_looks_at_the_norm_of_four_residuals(void) {
+    const float shift[4] = {8, 8, 8, 8}; /* norm 16, whatever the covariance says */
+    const plr_observation seen = specimen_observation(&filter, 1, shift);
+    filter.par.gate_residual2 = PLR_R(16.01 * 16.01);
+    filter.par.gate_d2 = PLR_R(1e-6); /* not looked at */
+    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 1, &seen).accepted);
+    filter.par.gate_residual2 = PLR_R(15.99 * 15.99);
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &seen).accepted);
+}
+
+static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
+    const float shift[4] = {0};
+    const plr_observation seen = specimen_observation(&filter, 3, shift);
+    filter.slots[3].x[2] = PLR_R(0.2);
+    const plr_verdict verdict = plr_gate_judge(&filter, 3, &seen);
+    TEST_ASSERT_FALSE(verdict.accepted);
+    TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.gain));
+}
+
+static void test_an_innovation_covariance_that_is_not_positive_is_rejected(void) {
+    const float shift[4] = {0};
+    const plr_observation seen = specimen_observation(&filter, 3, shift);
+    const unsigned row = plr_covariance_row(&filter, 3);
+    for (unsigned i = row; i < row + 3; i++)
+        filter.P[plr_packed_at(i, i)] = PLR_R(-1);
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 3, &seen).accepted);
+    filter.P[plr_packed_at(row, row)] = (plr_real)NAN;
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 3, &seen).accepted);
+}
+
+static void test_judging_changes_nothing_but_workspace(void) {
+    const float shift[4] = {1, 0, 0, 0};
+    const plr_observation seen = specimen_observation(&filter, 3, shift);
+    static plr_filter before;
+    before = filter;
+    (void)plr_gate_judge(&filter, 3, &seen);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_innovation_is_seen_minus_predicted);
+    RUN_TEST(test_the_vertical_row_is_a_mean_of_two);
+    RUN_TEST(test_distance_and_gain_agree_with_the_dense_ones);
+    RUN_TEST(test_the_threshold_itself_is_accepted);
+    RUN_TEST(test_a_row_gap_counts_even_where_the_three_rows_fit);
+    RUN_TEST(test_the_course_gate_looks_at_the_norm_of_four_residuals);
+    RUN_TEST(test_a_point_too_near_is_rejected_even_by_an_open_gate);
+    RUN_TEST(test_an_innovation_covariance_that_is_not_positive_is_rejected);
+    RUN_TEST(test_judging_changes_nothing_but_workspace);
+    return UNITY_END();
+}
