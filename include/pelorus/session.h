@@ -93,7 +93,8 @@ typedef struct plr_session_options {
     unsigned override_count;
     plr_start_choice start;
     uint32_t output;      /* bits of plr_output */
-    uint32_t deadline_us; /* time that a frame may take; 0: no limit. See docs/NUMERICS.md */
+    uint32_t deadline_us; /* time that an update may take; 0: no limit. The rule:
+                             src/session/budget.h */
     plr_landmark *known;  /* memory for LANDMARK (known); must outlive the session */
     unsigned known_capacity;
     plr_session_observer observer;
@@ -144,7 +145,8 @@ typedef struct plr_clock_watch {
 /* What an observation costs. See src/session/budget.h. */
 typedef struct plr_budget {
     uint64_t deadline_ns;
-    uint64_t cost_ns; /* per observation; 0: not known yet */
+    uint64_t cost_ns;      /* per observation; 0: not known yet */
+    uint64_t recent_ns[2]; /* what it was in the last two frames; 0: none yet */
 } plr_budget;
 
 typedef enum plr_session_phase {

@@ -55,7 +55,10 @@ static void value_hint(const plr_setting *setting, char *text, size_t size) {
 static void print_setting(const plr_setting *setting) {
     char hint[128], standard[64];
     value_hint(setting, hint, sizeof hint);
-    setting_value_to_text(setting, setting->standard, standard, sizeof standard);
+    if (setting->kind == PLR_SETTING_NUMBER)
+        snprintf(standard, sizeof standard, "%g", setting->standard); /* six digits will do */
+    else
+        setting_value_to_text(setting, setting->standard, standard, sizeof standard);
     print_row(setting->name, hint, setting->about);
     printf(" [%s]\n", standard);
 }

@@ -118,7 +118,7 @@ static void print_truth(const evaluation_figures *truth) {
     if (!isnan(truth->nees_per_dof))
         printf(", NEES/6 %.2f", truth->nees_per_dof);
     printf(" (%zu frames with truth)\n", truth->frames);
-    if (truth->not_positive > 0)
+    if (truth->not_positive > 0 && !isnan(truth->nees_per_dof))
         printf("              NEES leaves out %zu frames whose covariance has no inverse\n",
                truth->not_positive);
 }
