@@ -18,21 +18,27 @@ void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
 
 enum { STRIP = PLR_TILE_COLUMNS };
 
-/* What the rows above leave of the STRIP elements from (i, j) on, in x: a strip in registers. Those
- * beyond the row's end mean nothing. */
-static void reduce_strip(unsigned n, const plr_real *restrict S, unsigned i, unsigned j,
-                         plr_real x[STRIP]) {
+/* x[c] = from[c] - sum_l U(l, i) y_l[c] for a strip of columns, l = 0 .. i-1, y_l = y + sum of the
+ * steps before: STRIP numbers that stay in registers. The first step reads `from`, for a copy would
+ * cost as much as a few steps. U is k x k, packed upper; i > 0. `down` is what brings y_l to y_l+1:
+ * ldx for a dense matrix; 0 where the rows are those of U itself, k - 1, k - 2, ... */
+static inline void reduce_strip(unsigned k, const plr_real *restrict U, unsigned i,
+                                const plr_real *restrict y, size_t down,
+                                const plr_real *restrict from, plr_real *restrict x) {
+    const plr_real *u = U + i; /* (0, i), then down the column */
+    const plr_real first = -*u;
     plr_real sum[STRIP];
-    memcpy(sum, S + plr_upper_row(n, i) + (j - i), sizeof sum);
-    const plr_real *above = S;
-    for (unsigned l = 0; l < i; l++) {
-        const plr_real a = -above[i];
-        const plr_real *restrict y = above + j;
+    for (int c = 0; c < STRIP; c++)
+        sum[c] = PLR_FMA(first, y[c], from[c]);
+    for (size_t step = k - 1; step > k - i; step--) {
+        u += step;
+        y += down ? down : step;
+        const plr_real a = -*u;
         for (int c = 0; c < STRIP; c++)
             sum[c] = PLR_FMA(a, y[c], sum[c]);
-        above += n - l - 1;
     }
-    memcpy(x, sum, sizeof sum);
+    for (int c = 0; c < STRIP; c++)
+        x[c] = sum[c];
 }
 
 bool plr_cholesky_upper(unsigned n, plr_real *S) {
@@ -41,7 +47,10 @@ bool plr_cholesky_upper(unsigned n, plr_real *S) {
         plr_real inverse = 1;
         for (unsigned j = i; j < n; j += STRIP) {
             plr_real x[STRIP];
-            reduce_strip(n, S, i, j, x);
+            if (i > 0)
+                reduce_strip(n, S, i, S + j, 0, row + (j - i), x);
+            else
+                memcpy(x, row + (j - i), sizeof x);
             if (j == i) {
                 if (!(x[0] > 0) || !plr_is_finite(x[0]))
                     return false;
@@ -55,24 +64,18 @@ bool plr_cholesky_upper(unsigned n, plr_real *S) {
     return true;
 }
 
-/* The solution for STRIP columns: one row of them at a time, in registers. */
-static void solve_strip(unsigned k, const plr_real *restrict U, plr_real *restrict X, size_t ldx) {
+/* The solution for STRIP columns, one row of them at a time. */
+static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
     for (unsigned i = 0; i < k; i++) {
+        plr_real *row = X + i * ldx;
         plr_real x[STRIP];
-        memcpy(x, X + i * ldx, sizeof x);
-        const plr_real *u = U + i; /* (0, i), then down the column */
-        const plr_real *restrict y = X;
-        for (size_t step = k - 1; step > k - 1 - i; step--) {
-            const plr_real a = -*u;
-            for (int c = 0; c < STRIP; c++)
-                x[c] = PLR_FMA(a, y[c], x[c]);
-            u += step;
-            y += ldx;
-        }
-        const plr_real inverse = PLR_R(1) / *u;
+        if (i > 0)
+            reduce_strip(k, U, i, X, ldx, row, x);
+        else
+            memcpy(x, row, sizeof x);
+        const plr_real inverse = PLR_R(1) / U[plr_upper_row(k, i)];
         for (int c = 0; c < STRIP; c++)
-            x[c] *= inverse;
-        memcpy(X + i * ldx, x, sizeof x);
+            row[c] = x[c] * inverse;
     }
 }
 

@@ -14,32 +14,43 @@ static void pack_negated(panel negated, unsigned depth, const plr_real *Ut, size
             negated[k][r] = -Ut[k * ld + r];
 }
 
-/* row[r][c] += sum_k negated[k][r] Wt[k][c], for a tile of ROWS x COLUMNS that stays in registers.
- */
+/* to[c] = u Wt[c] + from[c] for a row of the tile. */
+static inline void add_row(plr_real *restrict to, plr_real u, const plr_real *restrict Wt,
+                           const plr_real *restrict from) {
+    for (int c = 0; c < COLUMNS; c++)
+        to[c] = PLR_FMA(u, Wt[c], from[c]);
+}
+
+/* to[c] += u Wt[c] */
+static inline void accumulate_row(plr_real *restrict to, plr_real u, const plr_real *restrict Wt) {
+    for (int c = 0; c < COLUMNS; c++)
+        to[c] = PLR_FMA(u, Wt[c], to[c]);
+}
+
+/* row[r][c] += sum_k negated[k][r] Wt[k][c], for a tile of ROWS x COLUMNS that stays in registers:
+ * the first step reads P, the last one writes it, for a copy in and out would cost as much as a few
+ * steps. depth >= 2. */
 static inline void add_tile(unsigned depth, panel negated, const plr_real *restrict Wt, size_t ld,
                             plr_real *row[ROWS]) {
     plr_real a0[COLUMNS], a1[COLUMNS], a2[COLUMNS], a3[COLUMNS];
-    memcpy(a0, row[0], sizeof a0);
-    memcpy(a1, row[1], sizeof a1);
-    memcpy(a2, row[2], sizeof a2);
-    memcpy(a3, row[3], sizeof a3);
-    for (unsigned k = 0; k < depth; k++) {
-        const plr_real u0 = negated[k][0], u1 = negated[k][1], u2 = negated[k][2],
-                       u3 = negated[k][3];
-        for (int c = 0; c < COLUMNS; c++)
-            a0[c] = PLR_FMA(u0, Wt[c], a0[c]);
-        for (int c = 0; c < COLUMNS; c++)
-            a1[c] = PLR_FMA(u1, Wt[c], a1[c]);
-        for (int c = 0; c < COLUMNS; c++)
-            a2[c] = PLR_FMA(u2, Wt[c], a2[c]);
-        for (int c = 0; c < COLUMNS; c++)
-            a3[c] = PLR_FMA(u3, Wt[c], a3[c]);
+    add_row(a0, negated[0][0], Wt, row[0]);
+    add_row(a1, negated[0][1], Wt, row[1]);
+    add_row(a2, negated[0][2], Wt, row[2]);
+    add_row(a3, negated[0][3], Wt, row[3]);
+    for (unsigned k = 1; k + 1 < depth; k++) {
         Wt += ld;
+        const plr_real u0 = negated[k][0], u1 = negated[k][1];
+        const plr_real u2 = negated[k][2], u3 = negated[k][3];
+        accumulate_row(a0, u0, Wt);
+        accumulate_row(a1, u1, Wt);
+        accumulate_row(a2, u2, Wt);
+        accumulate_row(a3, u3, Wt);
     }
-    memcpy(row[0], a0, sizeof a0);
-    memcpy(row[1], a1, sizeof a1);
-    memcpy(row[2], a2, sizeof a2);
-    memcpy(row[3], a3, sizeof a3);
+    Wt += ld;
+    add_row(row[0], negated[depth - 1][0], Wt, a0);
+    add_row(row[1], negated[depth - 1][1], Wt, a1);
+    add_row(row[2], negated[depth - 1][2], Wt, a2);
+    add_row(row[3], negated[depth - 1][3], Wt, a3);
 }
 
 /* Elements of row i that lie in the tile's columns from j on, inside the lower triangle. */
@@ -66,6 +77,10 @@ static void add_cut_tile(unsigned n, unsigned i, unsigned j, unsigned depth, pan
 
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P) {
+    if (depth < 2) {
+        plr_packed_subtract_plain(n, depth, Ut, Wt, ld, P);
+        return;
+    }
     panel negated;
     for (unsigned i = 0; i < n; i += ROWS) {
         pack_negated(negated, depth, Ut + i, ld);
