@@ -35,7 +35,8 @@ heading "Building: firmware for $board, and this machine's replay"
 mkdir -p "$LOGS" "$ROOT/out"
 build() {
     cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" \
-        --toolchain "$ROOT/port/cortex_m/toolchain.cmake" -DCMAKE_BUILD_TYPE=None &&
+        --toolchain "$ROOT/port/cortex_m/toolchain.cmake" -DCMAKE_BUILD_TYPE=None \
+        -DPELORUS_MAVLINK=ON -DPython3_EXECUTABLE="$VENV/bin/python" &&
         cmake --build "$ROBOT" -j "$JOBS" --target "pelorus-$board-n32" &&
         build_preset release -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=OFF
 }

@@ -31,6 +31,7 @@ heading 'Building every board with every capacity (build/robot-sizes)'
 build() {
     cmake -S "$ROOT/port/cortex_m" -B "$BENCH" -DCMAKE_BUILD_TYPE=None \
         --toolchain "$ROOT/port/cortex_m/toolchain.cmake" \
+        -DPELORUS_MAVLINK=ON -DPython3_EXECUTABLE="$VENV/bin/python" \
         '-DPELORUS_CAPACITIES=8;16;32;64' -DPELORUS_BENCH_RECORDING="$BENCH/bench.plr" &&
         cmake --build "$BENCH" -j "$JOBS" --target boards bench
 }

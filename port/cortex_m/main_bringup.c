@@ -19,7 +19,7 @@ static text answer;
 
 static void send_answer(void) {
     text_add(&answer, "\n");
-    while (!serial_write((const uint8_t *)answer.characters, answer.length)) {
+    while (!serial_write(&serial_link, (const uint8_t *)answer.characters, answer.length)) {
         serial_sleep();
     }
 }
@@ -103,14 +103,14 @@ int main(void) {
     size_t length = 0;
     board_init();
     clock_start(board_core_hz());
-    serial_start();
+    serial_start(&serial_link);
     board_watchdog_start();
     core_irq_on();
     obey("hello");
     for (;;) {
         uint8_t byte;
         board_watchdog_feed();
-        if (serial_read(&byte, 1) == 0) {
+        if (serial_read(&serial_link, &byte, 1) == 0) {
             serial_sleep();
         } else if (byte == '\n') {
             line[length] = '\0';

@@ -11,6 +11,7 @@
 #include "port_serial.h"
 #include "serial.h"
 #include "startup.h"
+#include "telemetry.h"
 #include "text.h"
 
 /* Landmarks of known position that the board can be given: a map for mode localization. */
@@ -25,7 +26,7 @@ static void announce(void) {
     static plr_message message;
     static text words;
     const uint8_t delimiter = 0; /* ends what the last life may have left open */
-    (void)serial_write(&delimiter, 1);
+    (void)serial_write(&serial_link, &delimiter, 1);
     text_clear(&words);
     text_add(&words, "pelorus ");
     text_add(&words, plr_version());
@@ -44,7 +45,7 @@ static void announce(void) {
 int main(void) {
     board_init();
     clock_start(board_core_hz());
-    serial_start();
+    serial_start(&serial_link);
     board_watchdog_start();
     core_irq_on();
     const plr_port port = port_serial();
@@ -52,6 +53,7 @@ int main(void) {
     plr_session_options_default(&options);
     options.known = known;
     options.known_capacity = KNOWN_LANDMARKS;
+    options.observer = telemetry_observer(&session);
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1; /* startup resets the board: only a broken build comes here */
     }

@@ -16,18 +16,18 @@ static bool stalled;
 
 static int receive(void *context, uint8_t *bytes, size_t n) {
     (void)context;
-    return (int)serial_read(bytes, n);
+    return (int)serial_read(&serial_link, bytes, n);
 }
 
 static int transmit(void *context, const uint8_t *bytes, size_t n) {
     (void)context;
     const uint64_t start_ns = clock_ns();
-    while (!serial_write(bytes, n)) {
+    while (!serial_write(&serial_link, bytes, n)) {
         if (stalled || clock_ns() - start_ns > STALL_NS) {
             stalled = true;
             return 1;
         }
-        serial_pump();
+        serial_pump(&serial_link);
     }
     stalled = false;
     return 0;

@@ -2,108 +2,128 @@
 #include "serial.h"
 
 #include "core.h"
-#include "uart.h"
 
-/* One side writes `head`, the other `tail`; both count bytes since start and wrap by themselves. */
-static volatile uint8_t receive_ring[SERIAL_RECEIVE_SIZE];
-static volatile uint32_t receive_head, receive_tail;
-static volatile uint8_t transmit_ring[SERIAL_TRANSMIT_SIZE];
-static volatile uint32_t transmit_head, transmit_tail;
-static volatile bool receive_held;       /* the receive interrupt is off for want of room */
-static volatile bool transmit_irq_works; /* it has fired at least once */
+static volatile uint8_t link_in[SERIAL_LINK_SIZE], link_out[SERIAL_LINK_SIZE];
+static volatile uint8_t telemetry_out[SERIAL_TELEMETRY_SIZE];
+
+serial serial_link = {.in = {.bytes = link_in, .size = SERIAL_LINK_SIZE},
+                      .out = {.bytes = link_out, .size = SERIAL_LINK_SIZE}};
+serial serial_telemetry = {.out = {.bytes = telemetry_out, .size = SERIAL_TELEMETRY_SIZE}};
 
 /* A transmitter that is stuck for so many polls will not come back: at 9600 baud and 400 MHz a byte
  * takes about 4e5 cycles. */
 enum { PANIC_POLLS = 2000000 };
 
-static void receive_all(void) {
-    while (receive_head - receive_tail < SERIAL_RECEIVE_SIZE) {
+static bool is_empty(const serial_ring *ring) {
+    return ring->head == ring->tail;
+}
+
+static uint32_t room(const serial_ring *ring) {
+    return ring->size - (ring->head - ring->tail);
+}
+
+static void push(serial_ring *ring, uint8_t byte) {
+    ring->bytes[ring->head & (ring->size - 1)] = byte;
+    ++ring->head;
+}
+
+static uint8_t oldest(const serial_ring *ring) {
+    return ring->bytes[ring->tail & (ring->size - 1)];
+}
+
+static void receive_all(serial *s) {
+    while (room(&s->in) > 0) {
         uint8_t byte;
-        if (!uart_take(&byte)) {
+        if (!uart_take(&s->uart, &byte)) {
             return;
         }
-        receive_ring[receive_head % SERIAL_RECEIVE_SIZE] = byte;
-        ++receive_head;
+        push(&s->in, byte);
     }
-    receive_held = true;
-    uart_receive_irq(false);
+    s->receive_held = true;
+    uart_receive_irq(&s->uart, false);
 }
 
-static void transmit_some(void) {
-    while (transmit_tail != transmit_head &&
-           uart_give(transmit_ring[transmit_tail % SERIAL_TRANSMIT_SIZE])) {
-        ++transmit_tail;
+static void transmit_some(serial *s) {
+    while (!is_empty(&s->out) && uart_give(&s->uart, oldest(&s->out))) {
+        ++s->out.tail;
     }
-    uart_transmit_irq(transmit_tail != transmit_head);
+    uart_transmit_irq(&s->uart, !is_empty(&s->out));
 }
 
-void serial_isr(void) {
-    uart_acknowledge();
-    receive_all();
-    if (transmit_tail != transmit_head) {
-        transmit_irq_works = true;
+static void serve(serial *s) {
+    uart_acknowledge(&s->uart);
+    receive_all(s);
+    if (!is_empty(&s->out)) {
+        s->transmit_irq_works = true;
     }
-    transmit_some();
+    transmit_some(s);
+}
+
+void serial_link_isr(void) {
+    serve(&serial_link);
+}
+
+void serial_telemetry_isr(void) {
+    serve(&serial_telemetry);
 }
 
 /* With room again: the interrupt first, then a look by hand, so that a byte which came in between
  * is not left lying. */
-static void resume_reception(void) {
+static void resume_reception(serial *s) {
     const uint32_t primask = core_irq_save();
-    if (receive_held) {
-        receive_held = false;
-        uart_receive_irq(true);
-        receive_all();
+    if (s->receive_held && room(&s->in) > 0) {
+        s->receive_held = false;
+        uart_receive_irq(&s->uart, true);
+        receive_all(s);
     }
     core_irq_restore(primask);
 }
 
-void serial_start(void) {
-    receive_head = receive_tail = 0;
-    transmit_head = transmit_tail = 0;
-    receive_held = true;
-    resume_reception();
+void serial_start(serial *s) {
+    s->in.head = s->in.tail = 0;
+    s->out.head = s->out.tail = 0;
+    s->receive_held = true;
+    resume_reception(s);
 }
 
-size_t serial_read(uint8_t *bytes, size_t n) {
+size_t serial_read(serial *s, uint8_t *bytes, size_t n) {
     size_t count = 0;
-    while (count < n && receive_tail != receive_head) {
-        bytes[count++] = receive_ring[receive_tail % SERIAL_RECEIVE_SIZE];
-        ++receive_tail;
+    while (count < n && !is_empty(&s->in)) {
+        bytes[count++] = oldest(&s->in);
+        ++s->in.tail;
     }
-    if (receive_held) {
-        resume_reception();
+    if (s->receive_held) {
+        resume_reception(s);
     }
     return count;
 }
 
-size_t serial_room(void) {
-    return SERIAL_TRANSMIT_SIZE - (transmit_head - transmit_tail);
-}
-
-bool serial_write(const uint8_t *bytes, size_t n) {
-    if (n > serial_room()) {
+bool serial_write(serial *s, const uint8_t *bytes, size_t n) {
+    if (n > room(&s->out)) {
         return false;
     }
     for (size_t i = 0; i < n; ++i) {
-        transmit_ring[(transmit_head + i) % SERIAL_TRANSMIT_SIZE] = bytes[i];
+        push(&s->out, bytes[i]);
     }
-    transmit_head += n;
-    serial_pump();
+    serial_pump(s);
     return true;
 }
 
-void serial_pump(void) {
+void serial_pump(serial *s) {
     const uint32_t primask = core_irq_save();
-    transmit_some();
+    transmit_some(s);
     core_irq_restore(primask);
 }
 
+static bool must_pump(const serial *s) {
+    return !is_empty(&s->out) && !s->transmit_irq_works;
+}
+
 void serial_sleep(void) {
-    serial_pump();
+    serial_pump(&serial_link);
+    serial_pump(&serial_telemetry);
     core_irq_off();
-    const bool to_pump = transmit_tail != transmit_head && !transmit_irq_works;
-    if (receive_tail == receive_head && !to_pump) {
+    if (is_empty(&serial_link.in) && !must_pump(&serial_link) && !must_pump(&serial_telemetry)) {
         core_wait_for_interrupt();
     }
     core_irq_on();
@@ -111,7 +131,7 @@ void serial_sleep(void) {
 
 static void panic_byte(uint8_t byte) {
     for (uint32_t polls = 0; polls < PANIC_POLLS; ++polls) {
-        if (uart_give(byte)) {
+        if (uart_give(&serial_link.uart, byte)) {
             return;
         }
     }
@@ -119,8 +139,11 @@ static void panic_byte(uint8_t byte) {
 
 void serial_panic(const uint8_t *bytes, size_t n) {
     core_irq_off();
-    for (; transmit_tail != transmit_head; ++transmit_tail) {
-        panic_byte(transmit_ring[transmit_tail % SERIAL_TRANSMIT_SIZE]);
+    if (serial_link.uart.base == 0) {
+        return; /* a fault before board_init: there is nobody to tell */
+    }
+    for (; !is_empty(&serial_link.out); ++serial_link.out.tail) {
+        panic_byte(oldest(&serial_link.out));
     }
     for (size_t i = 0; i < n; ++i) {
         panic_byte(bytes[i]);

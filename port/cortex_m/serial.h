@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 /*
- * The link's byte stream: a ring buffer each way, filled and emptied by interrupt. Nothing here
- * waits, except serial_panic.
+ * Serial ports: a ring buffer each way, filled and emptied by interrupt. Nothing here waits, except
+ * serial_panic. There are two: the link, which the session talks over, and telemetry, which only
+ * sends.
  *
- * When the receive ring is full, its interrupt is switched off until there is room: nothing is
- * thrown away that the sender's side could still hold back. docs/PORTING.md, "Flow control".
+ * When the link's receive ring is full, its interrupt is switched off until there is room: nothing
+ * is thrown away that the sender's side could still hold back. docs/PORTING.md, "Flow control".
  */
 #ifndef PELORUS_CORTEX_M_SERIAL_H
 #define PELORUS_CORTEX_M_SERIAL_H
@@ -13,35 +14,52 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "uart.h"
+
 enum {
-    SERIAL_RECEIVE_SIZE = 4096, /* powers of two */
-    SERIAL_TRANSMIT_SIZE = 4096
+    SERIAL_LINK_SIZE = 4096, /* bytes each way; powers of two */
+    SERIAL_TELEMETRY_SIZE = 1024
 };
 
+/* One side moves `head`, the other `tail`; both count bytes since start and wrap by themselves. */
+typedef struct serial_ring {
+    volatile uint8_t *bytes;
+    uint32_t size; /* a power of two; 0: this way is closed */
+    volatile uint32_t head, tail;
+} serial_ring;
+
+typedef struct serial {
+    uart uart;
+    serial_ring in, out;
+    volatile bool receive_held;       /* the receive interrupt is off for want of room */
+    volatile bool transmit_irq_works; /* it has fired at least once */
+} serial;
+
+extern serial serial_link, serial_telemetry;
+
 /* Empties both rings and switches reception on. */
-void serial_start(void);
+void serial_start(serial *s);
 
 /* Takes up to n received bytes; returns how many. */
-size_t serial_read(uint8_t *bytes, size_t n);
+size_t serial_read(serial *s, uint8_t *bytes, size_t n);
 
 /* Queues all n bytes, or none and returns false. */
-bool serial_write(const uint8_t *bytes, size_t n);
-
-/* Room in the transmit ring, in bytes. */
-size_t serial_room(void);
+bool serial_write(serial *s, const uint8_t *bytes, size_t n);
 
 /* Sends by polling what the transmitter takes at once. Where the transmit interrupt works this is
  * a byte or two; where an emulator does not model it, this is the transmission. */
-void serial_pump(void);
+void serial_pump(serial *s);
 
 /* Sleeps until the next interrupt, unless a received byte waits or bytes must be pumped. */
 void serial_sleep(void);
 
-/* Sends by polling alone, with interrupts masked, for a fault handler: first what was queued, then
- * these bytes. Bounded: gives up when the transmitter takes nothing for a long time. */
+/* Sends over the link by polling alone, with interrupts masked, for a fault handler: first what was
+ * queued, then these bytes. Bounded: gives up a byte that the transmitter does not take for a long
+ * time. */
 void serial_panic(const uint8_t *bytes, size_t n);
 
 /* The board's vector table points its UART interrupts here. */
-void serial_isr(void);
+void serial_link_isr(void);
+void serial_telemetry_isr(void);
 
 #endif

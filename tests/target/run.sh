@@ -21,7 +21,8 @@ export PELORUS_DATA=${PELORUS_DATA:-$ROOT/../shared/data}
 
 build_robot() {
     cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" \
-        --toolchain "$ROOT/port/cortex_m/toolchain.cmake" -DCMAKE_BUILD_TYPE=None &&
+        --toolchain "$ROOT/port/cortex_m/toolchain.cmake" -DCMAKE_BUILD_TYPE=None \
+        -DPELORUS_MAVLINK=ON -DPython3_EXECUTABLE="$VENV/bin/python" &&
         cmake --build "$ROBOT" -j "$JOBS" --target boards bringup
 }
 

@@ -7,7 +7,7 @@ import random
 import time
 
 import pytest
-from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo, Twist
+from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo, Text, Twist
 from pelorus.robot.compare import digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
@@ -19,6 +19,7 @@ FRAMES = 40
 NOT_READY, MODE = -13, -9  # plr_status
 SHORT_S = 1.0
 PATIENCE_S = 20.0
+BOOT_S = 3.0
 
 
 @pytest.fixture
@@ -167,6 +168,8 @@ def test_a_host_that_does_not_read_for_a_while_deadlocks_nothing(
 
 
 def test_data_before_a_header_is_refused(link: Link, messages: list[Message]) -> None:
+    boot = answers_to(link, b"", patience_s=BOOT_S)
+    assert [type(message) for message in boot] == [Text]
     stereo = messages[stereo_indices(messages)[0]]
     twist = next(message for message in messages if isinstance(message, Twist))
     answers = answers_to(link, b"\0" + encode(twist, 0) + encode(stereo, 1), Kind.STEREO)

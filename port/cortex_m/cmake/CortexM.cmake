@@ -10,6 +10,12 @@ file(MAKE_DIRECTORY "${IMAGES}")
 set(PORT_SOURCES startup.c serial.c clock.c fault.c panic.c text.c)
 list(TRANSFORM PORT_SOURCES PREPEND "${PORT}/")
 
+set(telemetry_sources "${PORT}/telemetry_none.c")
+if(PELORUS_MAVLINK)
+  set(telemetry_sources "${PORT}/telemetry_mavlink.c" "${PELORUS_ROOT}/port/mavlink/odometry.c"
+    "${mavlink_encoder}")
+endif()
+
 # No function of these may be linked: the library and the firmware have neither heap nor stdio, and
 # newlib's fma is not fused. --wrap turns every reference into one that nobody defines.
 set(FORBIDDEN malloc calloc realloc free _malloc_r _free_r _sbrk printf snprintf vsnprintf fprintf
@@ -77,7 +83,10 @@ function(cortexm_firmware board capacity bits)
     string(APPEND suffix -f64)
   endif()
   cortexm_image(pelorus-${suffix} ${board} ${library}
-    "${PORT}/main_firmware.c" "${PORT}/port_serial.c")
+    "${PORT}/main_firmware.c" "${PORT}/port_serial.c" ${telemetry_sources})
+  if(PELORUS_MAVLINK)
+    add_dependencies(pelorus-${suffix} pelorus_mavlink_headers)
+  endif()
   add_dependencies(boards pelorus-${suffix})
 endfunction()
 

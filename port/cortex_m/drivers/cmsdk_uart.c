@@ -3,9 +3,6 @@
  * CMSDK Technical Reference Manual (DDI 0479), section 4.3. */
 #include "cmsdk_uart.h"
 
-#include "../core.h"
-#include "../uart.h"
-
 enum {
     DATA = 0x00,
     STATE = 0x04,
@@ -28,58 +25,52 @@ enum {
     BAUDDIV_LEAST = 16 /* the hardware ignores less */
 };
 
-static uintptr_t base;
-static uint32_t overruns;
-
-static volatile uint32_t *at(unsigned offset) {
-    return (volatile uint32_t *)(base + offset);
+static volatile uint32_t *at(const uart *u, unsigned offset) {
+    return (volatile uint32_t *)(u->base + offset);
 }
 
-void cmsdk_uart_start(uintptr_t address, uint32_t clock_hz, uint32_t baud) {
-    base = address;
+void cmsdk_uart_start(uart *u, uintptr_t address, uint32_t clock_hz, uint32_t baud) {
+    u->base = address;
+    u->overruns = 0;
     const uint32_t divider = (clock_hz + baud / 2) / baud;
-    *at(BAUDDIV) = divider < BAUDDIV_LEAST ? BAUDDIV_LEAST : divider;
-    *at(CTRL) = CTRL_TX_ENABLE | CTRL_RX_ENABLE;
-    *at(INTCLEAR) = INT_TX | INT_RX;
+    *at(u, BAUDDIV) = divider < BAUDDIV_LEAST ? BAUDDIV_LEAST : divider;
+    *at(u, CTRL) = CTRL_TX_ENABLE | CTRL_RX_ENABLE;
+    *at(u, INTCLEAR) = INT_TX | INT_RX;
 }
 
-bool uart_take(uint8_t *byte) {
-    const uint32_t state = *at(STATE);
+bool uart_take(uart *u, uint8_t *byte) {
+    const uint32_t state = *at(u, STATE);
     if ((state & STATE_RX_OVERRUN) != 0) {
-        ++overruns;
-        *at(STATE) = STATE_RX_OVERRUN;
+        ++u->overruns;
+        *at(u, STATE) = STATE_RX_OVERRUN;
     }
     if ((state & STATE_RX_FULL) == 0) {
         return false;
     }
-    *byte = (uint8_t)*at(DATA);
+    *byte = (uint8_t)*at(u, DATA);
     return true;
 }
 
-bool uart_give(uint8_t byte) {
-    if ((*at(STATE) & STATE_TX_FULL) != 0) {
+bool uart_give(uart *u, uint8_t byte) {
+    if ((*at(u, STATE) & STATE_TX_FULL) != 0) {
         return false;
     }
-    *at(DATA) = byte;
+    *at(u, DATA) = byte;
     return true;
 }
 
-static void switch_irq(uint32_t bit, bool on) {
-    *at(CTRL) = on ? *at(CTRL) | bit : *at(CTRL) & ~bit;
+static void switch_irq(uart *u, uint32_t bit, bool on) {
+    *at(u, CTRL) = on ? *at(u, CTRL) | bit : *at(u, CTRL) & ~bit;
 }
 
-void uart_receive_irq(bool on) {
-    switch_irq(CTRL_RX_IRQ, on);
+void uart_receive_irq(uart *u, bool on) {
+    switch_irq(u, CTRL_RX_IRQ, on);
 }
 
-void uart_transmit_irq(bool on) {
-    switch_irq(CTRL_TX_IRQ, on);
+void uart_transmit_irq(uart *u, bool on) {
+    switch_irq(u, CTRL_TX_IRQ, on);
 }
 
-void uart_acknowledge(void) {
-    *at(INTCLEAR) = INT_TX | INT_RX;
-}
-
-uint32_t uart_overruns(void) {
-    return overruns;
+void uart_acknowledge(uart *u) {
+    *at(u, INTCLEAR) = INT_TX | INT_RX;
 }

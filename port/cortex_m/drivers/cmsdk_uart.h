@@ -2,9 +2,9 @@
 #ifndef PELORUS_CORTEX_M_CMSDK_UART_H
 #define PELORUS_CORTEX_M_CMSDK_UART_H
 
-#include <stdint.h>
+#include "../uart.h"
 
 /* Sets the UART at an address up for uart.h. One UART an image. */
-void cmsdk_uart_start(uintptr_t address, uint32_t clock_hz, uint32_t baud);
+void cmsdk_uart_start(uart *u, uintptr_t address, uint32_t clock_hz, uint32_t baud);
 
 #endif

@@ -2,9 +2,6 @@
 /* The USART of the STM32F2 and F4 families. Registers: RM0090, section 30.6. */
 #include "stm32_usart.h"
 
-#include "../core.h"
-#include "../uart.h"
-
 enum {
     SR = 0x00,
     DR = 0x04,
@@ -22,56 +19,50 @@ enum {
     CR1_UE = 1 << 13
 };
 
-static uintptr_t base;
-static uint32_t overruns;
-
-static volatile uint32_t *at(unsigned offset) {
-    return (volatile uint32_t *)(base + offset);
+static volatile uint32_t *at(const uart *u, unsigned offset) {
+    return (volatile uint32_t *)(u->base + offset);
 }
 
-void stm32_usart_start(uintptr_t address, uint32_t clock_hz, uint32_t baud) {
-    base = address;
-    *at(CR1) = 0;
-    *at(BRR) = (clock_hz + baud / 2) / baud; /* oversampling by 16: mantissa and fraction in one */
-    *at(CR1) = CR1_UE | CR1_TE | CR1_RE;
+void stm32_usart_start(uart *u, uintptr_t address, uint32_t clock_hz, uint32_t baud) {
+    u->base = address;
+    u->overruns = 0;
+    *at(u, CR1) = 0;
+    *at(u, BRR) = (clock_hz + baud / 2) / baud; /* 12 bits of mantissa and 4 of fraction in one */
+    *at(u, CR1) = CR1_UE | CR1_TE | CR1_RE;
 }
 
-bool uart_take(uint8_t *byte) {
-    const uint32_t status = *at(SR);
+bool uart_take(uart *u, uint8_t *byte) {
+    const uint32_t status = *at(u, SR);
     if ((status & (SR_RXNE | SR_ORE)) == 0) {
         return false;
     }
     if ((status & SR_ORE) != 0) {
-        ++overruns;
+        ++u->overruns;
     }
-    *byte = (uint8_t)*at(DR);
+    *byte = (uint8_t)*at(u, DR);
     return (status & SR_RXNE) != 0;
 }
 
-bool uart_give(uint8_t byte) {
-    if ((*at(SR) & SR_TXE) == 0) {
+bool uart_give(uart *u, uint8_t byte) {
+    if ((*at(u, SR) & SR_TXE) == 0) {
         return false;
     }
-    *at(DR) = byte;
+    *at(u, DR) = byte;
     return true;
 }
 
-static void switch_irq(uint32_t bit, bool on) {
-    *at(CR1) = on ? *at(CR1) | bit : *at(CR1) & ~bit;
+static void switch_irq(uart *u, uint32_t bit, bool on) {
+    *at(u, CR1) = on ? *at(u, CR1) | bit : *at(u, CR1) & ~bit;
 }
 
-void uart_receive_irq(bool on) {
-    switch_irq(CR1_RXNEIE, on);
+void uart_receive_irq(uart *u, bool on) {
+    switch_irq(u, CR1_RXNEIE, on);
 }
 
-void uart_transmit_irq(bool on) {
-    switch_irq(CR1_TXEIE, on);
+void uart_transmit_irq(uart *u, bool on) {
+    switch_irq(u, CR1_TXEIE, on);
 }
 
-void uart_acknowledge(void) {
-    /* Both requests go with their cause: reading or writing DR. */
-}
-
-uint32_t uart_overruns(void) {
-    return overruns;
+void uart_acknowledge(uart *u) {
+    (void)u; /* both requests go with their cause: reading or writing DR. */
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A board in QEMU: its machine, its image, and the socket that is its UART."""
+"""A board in QEMU: its machine, its image, and the sockets that are its UARTs."""
 
 from __future__ import annotations
 
@@ -55,12 +55,14 @@ class Emulator:
             raise PelorusError("qemu-system-arm is not installed (Debian: qemu-system-arm)")
         self._folder = tempfile.TemporaryDirectory(prefix="pelorus-")
         self._uart = Path(self._folder.name) / "uart"
+        self._telemetry = Path(self._folder.name) / "telemetry"
         self._control = Path(self._folder.name) / "control"
         self._log = (Path(self._folder.name) / "log").open("w+")
         command = [program, "-M", MACHINES[self.board], "-kernel", str(self._image)]
         command += ["-display", "none", "-monitor", "none", *self._options]
+        command += ["-chardev", f"socket,id=second,path={self._telemetry},server=on,wait=off"]
         command += ["-chardev", f"socket,id=link,path={self._uart},server=on,wait=on"]
-        command += ["-serial", "chardev:link"]
+        command += ["-serial", "chardev:link", "-serial", "chardev:second"]
         command += ["-qmp", f"unix:{self._control},server=on,wait=off"]
         self._process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log
@@ -84,8 +86,15 @@ class Emulator:
 
     def connect(self) -> Link:
         """The board's UART. The board starts with the first connection."""
+        return self._connect(self._uart)
+
+    def connect_telemetry(self) -> Link:
+        """Its second UART; to miss nothing, connect it first."""
+        return self._connect(self._telemetry)
+
+    def _connect(self, path: Path) -> Link:
         try:
-            return link.unix(self._uart)
+            return link.unix(path)
         except PelorusError as error:
             raise PelorusError(f"{self.board}: {self.trouble() or error}") from error
 

@@ -289,12 +289,13 @@ library at -O3.
 ## Memory
 
 In bytes. *Flash*: code, constants and initial values. *RAM*: everything static, with the stack of
-8 KB, its guard, both rings of the link (4 KB each) and 64 known landmarks. *Filter* is
-`sizeof(plr_filter)`, the state with its workspace; *session* is what the loop adds to it: wire
-buffers, messages, held twists. *Stack, bound* is the deepest chain of calls that there can be, from
-the compiler's own account (`-fstack-usage`, call graph; calls through pointers are resolved by the
-table in `tools/pelorus/robot/stack.py`; no recursion, no frame without a bound) with one interrupt
-on top. *Stack, seen* is what the bench image used, without interrupts and session.
+8 KB, its guard, both rings of the link (4 KB each), telemetry (MAVLink) and 64 known landmarks.
+*Filter* is `sizeof(plr_filter)`, the state with its workspace; *session* is what the loop adds to
+it: wire buffers, messages, held twists. *Stack, bound* is the deepest chain of calls that there can
+be, from the compiler's own account (`-fstack-usage`, call graph; calls through pointers are
+resolved by the table in `tools/pelorus/robot/stack.py`; no recursion, no frame without a
+bound) with one interrupt on top. *Stack, seen* is what the bench image used,
+without interrupts and session.
 
 {memory_title}
 {memory}

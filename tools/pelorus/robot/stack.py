@@ -17,18 +17,19 @@ from pathlib import Path
 
 from pelorus.errors import PelorusError
 
-# Who calls through a pointer, and what it may reach: patterns of function names. The firmware sets
-# no observer, so those calls reach nothing.
+# Who calls through a pointer, and what it may reach: patterns of function names. Of the session's
+# observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
 MAP = ("take_evicted", "ask_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
+TELEMETRY = "send_odometry"
 SESSION = r"plr_session_step|apply_twist|predict|update|plr_take_\w+|refuse_frame"
 FILTER = r"plr_(filter|correct|gate|motion|slots)\w*"
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
     (r"plr_frame_out_\w+", ("write_to_port", "send")),
     (r"write_to_port", PORT),
-    (SESSION, PORT),
+    (SESSION, (*PORT, TELEMETRY)),
     (r"plr_begin_running|plr_send_\w+", ()),
     (FILTER, MODEL + MAP),
 )
@@ -188,7 +189,7 @@ class Analysis:
             for title in titles
             if self._functions[title].from_compiler
         }
-        if not titles:
+        if not titles and pattern != TELEMETRY:
             raise PelorusError(f"INDIRECT names {pattern}, and there is no such function")
         return titles
 

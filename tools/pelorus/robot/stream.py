@@ -37,6 +37,7 @@ from pelorus.wire import DELIMITER, Counts, Reader, Writer, encode
 BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
 QUIET_S = 0.3
+END_AGAIN_S = 1.0
 UNANSWERED_MAX = 5  # in a row: then nobody is there
 WINDOW_BYTES = 2048  # half of the board's receive ring
 SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
@@ -98,17 +99,28 @@ class Streamer:
         return self.outcome
 
     def greet(self) -> None:
-        """End whatever the board was in the middle of, and let it finish talking."""
-        self._exchange(DELIMITER + encode(End(0, 0, 0, 0, 0), 0), 0.0)
-        self._sequence = 1
-        quiet_since = time.monotonic()
-        while time.monotonic() - quiet_since < QUIET_S:
-            if self._exchange(b"", QUIET_S):
-                quiet_since = time.monotonic()
+        """End whatever the board was in the middle of, and let it finish talking.
+
+        END is answered with END. It is said again while no answer comes: what arrives while a board
+        boots is lost.
+        """
+        deadline = time.monotonic() + self._answer_s
+        while not self._ended and time.monotonic() < deadline:
+            self._exchange(DELIMITER + encode(End(0, 0, 0, 0, 0), 0), 0.0)
+            self._wait(lambda: self._ended, min(END_AGAIN_S, deadline - time.monotonic()))
+        while self._exchange(b"", QUIET_S):
+            pass
         self.outcome = Outcome(texts=self.outcome.texts)
         self.reader.counts = Counts()  # what came before is not this drive's
+        self._sequence = 1
         self._ended = False
         self._under_way = True
+
+    def _wait(self, done: Callable[[], bool], patience_s: float) -> None:
+        """Take in what comes, until it is done or the time is up."""
+        deadline = time.monotonic() + patience_s
+        while not done() and (left := deadline - time.monotonic()) > 0:
+            self._exchange(b"", left)
 
     def send(self, message: Message) -> None:
         """Send one message; for a STEREO, wait for the answer."""
@@ -126,9 +138,7 @@ class Streamer:
     def finish(self) -> None:
         """Say END, and hear the board's."""
         self._put(self._end(), logged=False)
-        deadline = time.monotonic() + self._answer_s
-        while not self._ended and time.monotonic() < deadline:
-            self._exchange(b"", 0.1)
+        self._wait(lambda: self._ended, self._answer_s)
         if self._log is not None:
             self._log.end()
 
@@ -152,13 +162,11 @@ class Streamer:
         self._unread_bytes = 0
 
     def _await_answer(self, t_ns: int) -> None:
-        deadline = time.monotonic() + self._answer_s
-        while time.monotonic() < deadline and not self._board_is_new:
-            self._exchange(b"", deadline - time.monotonic())
-            if self._answered == t_ns:
-                self._unread_bytes = 0
-                self._unanswered_in_a_row = 0
-                return
+        self._wait(lambda: self._answered == t_ns or self._board_is_new, self._answer_s)
+        if self._answered == t_ns:
+            self._unread_bytes = 0
+            self._unanswered_in_a_row = 0
+            return
         self.outcome.unanswered += 1  # lost on the way, or with the board
         self._unanswered_in_a_row += 1
         if self._unanswered_in_a_row >= UNANSWERED_MAX:

@@ -13,9 +13,11 @@ enum {
     PERIPHERAL_HZ = 25000000,
     SLOW_HZ = 32768,
     UART0 = 0x59303000,
+    UART1 = 0x59304000,
     WATCHDOG = 0x5802E000,
     IRQ_UART0_RX = 33,
     IRQ_UART0_TX = 34,
+    IRQ_UART1_TX = 36,
     INTERRUPTS = 96
 };
 
@@ -25,14 +27,17 @@ const char board_name[] = "mps3_an547";
 __attribute__((section(".vectors"), used))
 const vector board_vectors[CORE_EXCEPTIONS + INTERRUPTS] = {
     SYSTEM_VECTORS,
-    [CORE_EXCEPTIONS + IRQ_UART0_RX] = serial_isr,
-    [CORE_EXCEPTIONS + IRQ_UART0_TX] = serial_isr,
+    [CORE_EXCEPTIONS + IRQ_UART0_RX] = serial_link_isr,
+    [CORE_EXCEPTIONS + IRQ_UART0_TX] = serial_link_isr,
+    [CORE_EXCEPTIONS + IRQ_UART1_TX] = serial_telemetry_isr,
 };
 
 void board_init(void) {
-    cmsdk_uart_start(UART0, PERIPHERAL_HZ, BOARD_BAUD);
+    cmsdk_uart_start(&serial_link.uart, UART0, PERIPHERAL_HZ, BOARD_BAUD);
+    cmsdk_uart_start(&serial_telemetry.uart, UART1, PERIPHERAL_HZ, BOARD_BAUD);
     core_enable_irq(IRQ_UART0_RX);
     core_enable_irq(IRQ_UART0_TX);
+    core_enable_irq(IRQ_UART1_TX);
 }
 
 uint32_t board_core_hz(void) {
