@@ -57,12 +57,16 @@ class Recording:
             self.frame_t_ns, self.twist_t_ns, self.v_B_mps, self.w_B_radps, timing
         )
 
-    def camera_motion(self, lag: int) -> Poses:
-        """(T - lag) motions: coordinates in camera k -> camera k + lag, from the twists alone."""
+    def body_motion(self, lag: int) -> Poses:
+        """(T - lag) motions: coordinates in body k -> body k + lag, from the twists alone."""
         path = self.dead_reckoning()
-        later, earlier = path.at(slice(lag, None)), path.at(slice(None, len(path.p) - lag))
-        body = se3.compose(se3.inverse(later), earlier)
-        return se3.compose(se3.compose(self.T_CB, body), se3.inverse(self.T_CB))
+        later, earlier = path.at(slice(lag, None)), path.at(slice(None, max(len(path.p) - lag, 0)))
+        return se3.compose(se3.inverse(later), earlier)
+
+    def camera_motion(self, lag: int) -> Poses:
+        """The same between cameras: T_CB D T_CB^-1."""
+        motion_B = self.body_motion(lag)
+        return se3.compose(se3.compose(self.T_CB, motion_B), se3.inverse(self.T_CB))
 
     def messages(self) -> Iterator[Message]:
         """In the order that docs/REPLAY-FORMAT.md asks for."""

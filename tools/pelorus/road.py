@@ -8,6 +8,7 @@ road on the map may begin later.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +39,9 @@ class RoadFigures:
 def read_road(path: Path) -> Floats:
     """(n, 2), m: the last two columns of a CSV; lines with # in front are comments."""
     try:
-        rows = np.loadtxt(path, delimiter=",", comments="#", ndmin=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an empty file is our error, not numpy's warning
+            rows = np.loadtxt(path, delimiter=",", comments="#", ndmin=2)
     except OSError as error:
         raise PelorusError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, UnicodeDecodeError) as error:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3, visual_motion
+from pelorus import visual_motion
 from pelorus.faults.finding import Finding
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
@@ -67,10 +67,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
 
 def _way(recording: Recording, R_C: Floats, T_CB: Poses) -> Floats:
     """p_C of each k from the images' turn, the twists' way and this lever."""
-    path = recording.dead_reckoning()
-    later, earlier = path.at(slice(LAG, None)), path.at(slice(None, len(path.p) - LAG))
-    back = se3.compose(se3.inverse(later), earlier)
-    return np.asarray(T_CB.p - R_C @ T_CB.p + back.p @ T_CB.R.T)
+    return np.asarray(T_CB.p - R_C @ T_CB.p + recording.body_motion(LAG).p @ T_CB.R.T)
 
 
 def _columns(recording: Recording, R_C: Floats, way: Floats, apart: Floats) -> Floats:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pelorus.faults.finding import Finding
 from pelorus.recording import Recording
-from pelorus.tracks import Pairs, Tracks
+from pelorus.tracks import Pairs, Tracks, project
 from pelorus.visual_motion import seen_pairs
 
 MOVED_MIN_PX = 0.1  # median image motion that the twists must predict for a repeat to be false
@@ -65,11 +65,11 @@ def _stale_frames(
 def _predicted_px(recording: Recording) -> NDArray[np.float64]:
     """(T,): how far the twists say the image moved since the previous frame, median, px.
 
-    Where a point was and where the motion brings it: the pixels of the later frame are not used.
+    Where a point is seen and where the motion brings it: no noise of the pixels enters.
     """
     camera = recording.header.camera
     seen = seen_pairs(recording.tracks, camera, 1)
-    first = replace(seen, pixels=seen.first_pixels)
+    first = replace(seen, pixels=project(camera, seen.q_C))
     moved = first.reproject(camera, recording.camera_motion(1))
     return np.concatenate(([np.nan], first.median_by_frame(moved, at_least=LIVE_MIN)))
 

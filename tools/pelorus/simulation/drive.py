@@ -27,6 +27,13 @@ class Drive(NamedTuple):
     w_B_radps: Floats
     poses: Poses
 
+    def until(self, count: int) -> Drive:
+        """The first so many readings and poses."""
+        first = slice(0, count)
+        return Drive(
+            self.t_ns[first], self.v_B_mps[first], self.w_B_radps[first], self.poses.at(first)
+        )
+
 
 def drive(t_ns: Times, timing: TwistTiming, speed_mps: float, lap_s: float) -> Drive:
     """Laps of an uneven oval, rolling and pitching a little.

@@ -82,6 +82,11 @@ class Options:
     def twists_per_frame(self) -> int:
         return round(self.twist_rate_hz / self.frame_rate_hz)
 
+    @property
+    def lookahead_s(self) -> float:
+        """So far beyond its end the drive must have landmarks, for there it looks."""
+        return min(self.range_m / self.speed_mps, self.lap_s) if self.speed_mps else 0.0
+
     def _require(self, name: str, good: bool, due: str) -> None:
         if not good:
             option = name
@@ -119,9 +124,15 @@ def simulate(options: Options) -> Simulation:
     """Drive, look, and measure."""
     options.check()
     chances = _Chances(options.seed)
+    beyond = drive(
+        _node_times(options, options.lookahead_s),
+        options.twist_timing,
+        options.speed_mps,
+        options.lap_s,
+    )
+    points = scene.landmarks(beyond.poses, options.landmarks, chances["scene"])
     t_ns = _node_times(options)
-    way = drive(t_ns, options.twist_timing, options.speed_mps, options.lap_s)
-    points = scene.landmarks(way.poses, options.landmarks, chances["scene"])
+    way = beyond.until(len(t_ns))
     v, w, bias_v, bias_w = _readings(options, way, chances)
     at_frames = np.arange(options.frames) * options.twists_per_frame
     truth = way.poses.at(at_frames)
@@ -142,8 +153,9 @@ def simulate(options: Options) -> Simulation:
     return Simulation(recording, points, bias_v, bias_w, outlier)
 
 
-def _node_times(options: Options) -> Times:
-    nodes = np.arange((options.frames - 1) * options.twists_per_frame + 1)
+def _node_times(options: Options, more_s: float = 0.0) -> Times:
+    count = (options.frames - 1) * options.twists_per_frame + 1
+    nodes = np.arange(count + int(more_s * options.twist_rate_hz))
     return np.round(nodes * (1e9 / options.twist_rate_hz)).astype(np.int64)
 
 

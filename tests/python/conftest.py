@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""Fixtures: the real recordings where they are, and the command line as a user meets it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from pelorus.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
+
+
+class Said(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def real() -> Callable[[str], Path]:
+    def find(name: str) -> Path:
+        path = DATA / name
+        if not path.is_file():
+            pytest.skip(f"the real recording {name} is not in {DATA} (set PELORUS_DATA)")
+        return path
+
+    return find
+
+
+@pytest.fixture
+def pelorus(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
+    def run(*arguments: object) -> Said:
+        capsys.readouterr()
+        status = main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return Said(status, captured.out, captured.err)
+
+    return run

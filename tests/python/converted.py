@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: MIT
+"""What the tests of the converters share: how to run one and look at what it wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pelorus import wire
+from pelorus.frames import Message
+
+Run = Callable[..., Any]  # the fixture `pelorus`
+SHORT = {"duration_s": 6.0}
+COUNT = 61  # frames of such a drive
+
+
+def messages_of(path: Path, kind: type[Message]) -> list[Any]:
+    """The messages of one kind in a whole, undamaged recording."""
+    received, counts = wire.read_file(path)
+    assert counts.clean
+    assert counts.ended
+    return [frame.message for frame in received if isinstance(frame.message, kind)]

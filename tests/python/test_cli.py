@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""The command line itself: its help, its version, the order of what it writes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from converted import Run
+from drives import clean
+from pelorus import __version__, wire
+from pelorus.cli import COMMANDS
+from pelorus.frames import End, Header, Stereo, Truth, Twist
+
+SUBCOMMANDS = [
+    ("convert",),
+    ("convert", "ece276a"),
+    ("convert", "starry-night"),
+    ("convert", "klt"),
+    ("convert", "csv"),
+    ("info",),
+    ("evaluate",),
+    ("simulate",),
+]
+
+
+@pytest.mark.parametrize("command", SUBCOMMANDS, ids=" ".join)
+def test_every_help_shows_an_example(pelorus: Run, command: tuple[str, ...]) -> None:
+    outcome = pelorus(*command, "--help")
+    assert outcome.status == 0
+    assert f"Example:  pelorus {' '.join(command)}" in outcome.out
+
+
+def test_the_commands_and_the_version_are_there(pelorus: Run) -> None:
+    text = pelorus("--help").out
+    for module in COMMANDS:
+        assert module.__name__.rsplit(".", 1)[1] in text
+    assert pelorus("--version").out.strip() == f"pelorus {__version__}"
+    assert pelorus("no-such-command").status == 2
+    assert pelorus("info").status == 2
+
+
+def test_the_package_runs_as_a_module_and_errors_go_to_stderr(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pelorus", "info", str(tmp_path / "absent.plr")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+    assert "absent.plr: cannot be read" in done.stderr
+
+
+def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> None:
+    path = tmp_path / "x.plr"
+    clean(duration_s=3.0).write(path)
+    received, counts = wire.read_file(path)
+    messages = [frame.message for frame in received]
+    assert isinstance(messages[0], Header)
+    assert isinstance(messages[-1], End)
+    rank = {Twist: 0, Truth: 1, Stereo: 2}
+    keys = [(m.t_ns, rank[type(m)]) for m in messages if isinstance(m, (Twist, Truth, Stereo))]
+    assert keys == sorted(keys)
+    assert len(keys) == 3 * 31
+    assert counts.clean
+    assert not list(tmp_path.glob("*.part"))
+    ids = [m.ids for m in messages if isinstance(m, Stereo)]
+    assert all((np.diff(x.astype(np.int64)) > 0).all() for x in ids)

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""A user's own CSV files: what arrives, what is mended, what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from converted import SHORT, Run, messages_of
+from drives import clean, with_turned_axes
+from pelorus import se3
+from pelorus.converters import csv as csv_converter
+from pelorus.frames import BodyAxes, Header, Stereo, Truth, Twist, TwistTiming
+from pelorus.recording import Recording
+
+
+def write_csv(path: Path, columns: dict[str, Any]) -> Path:
+    with path.open("w", newline="") as stream:
+        table = csv.writer(stream)
+        table.writerow(columns)
+        table.writerows(zip(*columns.values(), strict=True))
+    return path
+
+
+def csv_files(folder: Path, recording: Recording) -> list[Any]:
+    """The options of `convert csv` for this recording."""
+    v, w = recording.v_B_mps.T.tolist(), recording.w_B_radps.T.tolist()
+    names = ("vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps")
+    twists = {"t_ns": recording.twist_t_ns.tolist(), **dict(zip(names, v + w, strict=True))}
+    tracks = recording.tracks
+    shuffled = np.random.default_rng(1).permutation(len(tracks))
+    pixels = dict(
+        zip(("uL_px", "vL_px", "uR_px", "vR_px"), tracks.pixels[shuffled].T.tolist(), strict=True)
+    )
+    stereo = {
+        **pixels,
+        "id": tracks.id[shuffled].tolist(),
+        "t_ns": recording.frame_t_ns[tracks.frame[shuffled]].tolist(),
+    }
+    p, q = recording.truth.p.T.tolist(), se3.quaternion(recording.truth.R).T.tolist()
+    poses = dict(zip(("px_m", "py_m", "pz_m", "qx", "qy", "qz", "qw"), p + q, strict=True))
+    truth = {"t_s": [f"{t / 1e9:.9f}" for t in recording.truth_t_ns], **poses}
+    T_BC = se3.inverse(recording.T_CB)
+    calibration = vars(recording.header.camera) | {
+        "R_BC": T_BC.R.tolist(),
+        "t_BC_m": T_BC.p.tolist(),
+        "image_width_px": 640,
+        "image_height_px": 480,
+        "twist_timing": "end",
+        "noise": {"pixel_sigma_px": 0.5},
+        "name": "mine",
+    }
+    (folder / "camera.json").write_text(json.dumps(calibration))
+    return [
+        *("--twists", write_csv(folder / "twists.csv", twists)),
+        *("--stereo", write_csv(folder / "stereo.csv", stereo)),
+        *("--calibration", folder / "camera.json"),
+        *("--truth", write_csv(folder / "truth.csv", truth)),
+    ]
+
+
+def test_a_users_own_csv_arrives_whole(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(twist_rate_hz=50.0, **SHORT)
+    target = tmp_path / "mine.plr"
+    outcome = pelorus("convert", "csv", *csv_files(tmp_path, drive), target)
+    assert outcome.status == 0, outcome.err
+    header = messages_of(target, Header)[0]
+    assert np.allclose(header.R_CB, drive.T_CB.R)
+    assert np.allclose(header.t_CB_m, drive.T_CB.p)
+    assert header.name == "mine"
+    assert header.twist_timing is TwistTiming.END
+    assert header.body_axes is BodyAxes.FORWARD_LEFT_UP
+    assert (header.image_width_px, header.image_height_px) == (640, 480)
+    assert header.noise.pixel_sigma_px == 0.5
+    assert header.noise.gyro_sigma_radps < 0
+    twists, stereos = messages_of(target, Twist), messages_of(target, Stereo)
+    assert [m.t_ns for m in twists] == drive.twist_t_ns.tolist()
+    assert np.array_equal([m.w_B_radps for m in twists], drive.w_B_radps)
+    assert np.array_equal(np.concatenate([m.ids for m in stereos]), drive.tracks.id)
+    pixels = np.concatenate([m.pixels for m in stereos])
+    assert np.array_equal(pixels, drive.tracks.pixels.astype(np.float32))
+    truth = messages_of(target, Truth)
+    assert [m.t_ns for m in truth] == drive.truth_t_ns.tolist()
+    assert np.allclose([m.R_WB for m in truth], drive.truth.R)
+
+
+def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
+    drive = clean(3)
+    csv_files(tmp_path, with_turned_axes(drive))
+    names = ("twists.csv", "stereo.csv", "camera.json")
+    sources = csv_converter.Sources(*(tmp_path / name for name in names))
+    mended, findings = csv_converter.convert(sources)
+    assert [finding.found for finding in findings] == [False, True, False]
+    assert np.allclose(mended.T_CB.R, drive.T_CB.R)
+    left, findings = csv_converter.convert(sources, fix=False)
+    assert findings == []
+    assert np.allclose(left.T_CB.R, with_turned_axes(drive).T_CB.R)
+
+
+def edited(name: str, old: str, new: str) -> tuple[str, str, str]:
+    return name, old, new
+
+
+BAD_CSV = [
+    (edited("twists.csv", "vx_mps", "v_x"), "lacks the column vx_mps; there are"),
+    (edited("twists.csv", "t_ns", "time"), "lacks the column t_s"),
+    (edited("twists.csv", "\n100000000,", "\n0,"), "row 3: time does not ascend"),
+    (edited("twists.csv", "\n100000000,", "\nsoon,"), "row 3: t_ns is 'soon'"),
+    (edited("twists.csv", "\n100000000,", "\n100000000,1,"), "row 3 has 8 cells"),
+    (edited("stereo.csv", "uL_px", "u"), "lacks the column uL_px"),
+    (edited("truth.csv", "\n0.000000000,", "\n-1.0,"), "seconds from 0"),
+    (edited("truth.csv", "\n0.000000000,", "\nnan,"), "is not finite"),
+    (edited("truth.csv", "qw", "q0"), "lacks the column qw"),
+    (edited("truth.csv", "qx,qy,qz,qw", "px_m,qy,qz,qw"), "lacks the column qx"),
+    (edited("camera.json", '"fx_px"', '"fx"'), "unknown name fx"),
+    (edited("camera.json", '"R_BC"', '"R_CB"'), "lacks t_CB_m"),
+    (edited("camera.json", '"twist_timing": "end"', '"twist_timing": "late"'), "start or end"),
+    (edited("camera.json", '"pixel_sigma_px": 0.5', '"pixel_sigma": 1'), "unknown name pixel_"),
+    (edited("camera.json", '"baseline_m": 0.2', '"baseline_m": -1'), "must be positive"),
+    (edited("camera.json", '"baseline_m": 0.2', '"baseline_m": "wide"'), "a finite number"),
+    (edited("camera.json", '"image_width_px": 640', '"image_width_px": 1e9'), "0 to 65535"),
+    (edited("camera.json", "{", "["), "is no JSON"),
+]
+
+
+@pytest.mark.parametrize(("edit", "said"), BAD_CSV, ids=[said[:30] for _, said in BAD_CSV])
+def test_a_mistake_in_a_users_file_is_told_by_file_row_and_name(
+    tmp_path: Path, pelorus: Run, edit: tuple[str, str, str], said: str
+) -> None:
+    options = csv_files(tmp_path, clean(**SHORT))
+    name, old, new = edit
+    text = (tmp_path / name).read_bytes().decode().replace("\r\n", "\n")
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new, 1))
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert name in outcome.err
+    assert said in outcome.err, outcome.err
+
+
+def test_csv_observations_must_be_one_an_id_and_frame(tmp_path: Path, pelorus: Run) -> None:
+    options = csv_files(tmp_path, clean(**SHORT))
+    path = tmp_path / "stereo.csv"
+    rows = path.read_text().splitlines()
+    path.write_text("\n".join([*rows, rows[1]]) + "\n")
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert "stands twice in the frame" in outcome.err
+    path.write_text(rows[0] + "\n")
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert "no row" in outcome.err
+    path.write_text("")
+    assert "is empty" in pelorus("convert", "csv", *options, tmp_path / "out.plr").err
+
+
+def test_twists_and_frames_of_different_clocks_are_refused(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(**SHORT)
+    options = csv_files(tmp_path, drive)
+    rows = (tmp_path / "twists.csv").read_text().splitlines()
+    late = [
+        rows[0],
+        *(f"{int(row.split(',')[0]) + 10**15},{row.split(',', 1)[1]}" for row in rows[1:]),
+    ]
+    (tmp_path / "twists.csv").write_text("\n".join(late) + "\n")
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert "do not overlap" in outcome.err

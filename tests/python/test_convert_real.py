@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""The real recordings, where they are: which faults they have, and their dead reckoning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drives import with_turned_axes
+from pelorus import figures, kitti, road
+from pelorus.converters import ece276a, matlab
+from pelorus.faults.mend import mend
+from pelorus.frames import BodyAxes, TwistTiming
+from pelorus.recording import Recording
+
+
+def test_0027_has_stale_tracks_and_a_malformed_lever(real: Callable[[str], Path]) -> None:
+    source = real("ece276a/0027.npz")
+    recording, findings = ece276a.convert(source, real("truth/kitti-odometry-07.txt"))
+    assert [finding.found for finding in findings[:3]] == [True, False, True]
+    assert "in 91 of 1106 frames" in findings[0].evidence
+    assert "4196 observations" in findings[0].evidence
+    given = ece276a.read(source).T_CB
+    assert np.allclose(recording.T_CB.R, given.R)
+    assert np.allclose(recording.T_CB.p, -given.R @ given.p)
+    assert recording.header.body_axes is BodyAxes.FORWARD_LEFT_UP
+    assert len(recording.truth_t_ns) == 1101
+    again = recording.with_extrinsic(recording.T_CB)
+    assert not any(finding.found for finding in mend(again)[1])
+
+
+def test_03_has_stale_tracks_and_turned_axes(real: Callable[[str], Path]) -> None:
+    source = real("ece276a/03.npz")
+    recording, findings = ece276a.convert(source)
+    assert [finding.found for finding in findings[:3]] == [True, True, False]
+    given = ece276a.read(source).T_CB
+    assert np.allclose(recording.T_CB.R, given.R @ np.diag([1, -1, -1]))
+    assert np.allclose(recording.T_CB.p, given.p)
+    assert recording.header.body_axes is BodyAxes.FORWARD_LEFT_UP
+    assert recording.header.twist_timing is TwistTiming.END
+    assert not any(finding.found for finding in mend(recording)[1])
+
+
+@pytest.mark.parametrize("drive", ["09_26_drive_0001", "09_26_drive_0036", "09_30_drive_0020"])
+def test_the_klt_drives_have_none_of_the_faults(real: Callable[[str], Path], drive: str) -> None:
+    recording = matlab.klt(real(f"klt/2011_{drive}_sync_KLT.mat"))
+    assert not any(finding.found for finding in mend(recording)[1])
+    turned = with_turned_axes(recording)
+    assert [finding.found for finding in mend(turned)[1]] == [False, True, False]
+
+
+def test_starry_night_has_none_of_the_faults(real: Callable[[str], Path]) -> None:
+    recording = matlab.starry_night(real("starry-night/dataset3.mat"))
+    assert len(recording.known) == 20
+    assert not any(finding.found for finding in mend(recording)[1])
+
+
+def test_a_kitti_pose_file_reads_as_rigid_poses(real: Callable[[str], Path]) -> None:
+    poses = kitti.read_poses(real("truth/kitti-odometry-07.txt"))
+    assert len(poses.p) == 1101
+    assert np.allclose(poses.R @ np.swapaxes(poses.R, 1, 2), np.eye(3), atol=1e-12)
+
+
+def dead_reckoning(recording: Recording) -> figures.Figures:
+    count = len(recording.truth_t_ns)
+    return figures.figures(recording.dead_reckoning().at(slice(0, count)), recording.truth)
+
+
+def test_dead_reckoning_of_starry_night_is_the_designs(real: Callable[[str], Path]) -> None:
+    found = dead_reckoning(matlab.starry_night(real("starry-night/dataset3.mat")))
+    assert found.err0_m == pytest.approx(1.28, abs=0.005)
+
+
+def test_dead_reckoning_of_0027_is_the_designs(real: Callable[[str], Path]) -> None:
+    source, truth = real("ece276a/0027.npz"), real("truth/kitti-odometry-07.txt")
+    recording, _ = ece276a.convert(source, truth, twist_timing=TwistTiming.START)
+    found = dead_reckoning(recording)
+    assert found.err0_m == pytest.approx(39.9, abs=0.05)
+    assert found.ate_m == pytest.approx(15.8, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("drive", "err0_m"),
+    [("09_26_drive_0001", 1.52), ("09_26_drive_0036", 1.18), ("09_30_drive_0020", 9.2)],
+)
+def test_dead_reckoning_of_the_klt_drives_is_the_designs(
+    real: Callable[[str], Path], drive: str, err0_m: float
+) -> None:
+    found = dead_reckoning(matlab.klt(real(f"klt/2011_{drive}_sync_KLT.mat")))
+    assert found.err0_m == pytest.approx(err0_m, rel=0.005)
+
+
+def test_dead_reckoning_of_03_leaves_the_road_as_the_design_says(
+    real: Callable[[str], Path],
+) -> None:
+    recording, _ = ece276a.convert(real("ece276a/03.npz"), twist_timing=TwistTiming.START)
+    digitised = road.read_road(real("truth/kitti360-0003-path.csv"))
+    found = road.compare(recording.dead_reckoning().p, digitised, 45.0)
+    assert found.road_m == pytest.approx(25.8, abs=0.05)

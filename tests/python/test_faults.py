@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""The faults of the course's files: found where they were put in, not found where they were not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drives import (
+    FORWARD_RIGHT_DOWN,
+    at_rest,
+    clean,
+    with_camera_position,
+    with_stale_tracks,
+    with_turned_axes,
+)
+from pelorus.faults import axes, lever, stale, timing
+from pelorus.faults.mend import mend
+from pelorus.frames import BodyAxes, TwistTiming
+from pelorus.recording import Recording
+from pelorus.se3 import Floats
+
+SEEDS = [1, 2]
+STALE = range(7, 590, 9)
+
+
+def same_extrinsic(one: Recording, other: Recording) -> bool:
+    return np.allclose(one.T_CB.R, other.T_CB.R) and np.allclose(one.T_CB.p, other.T_CB.p)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"velocity_sigma_mps": 0.5, "gyro_sigma_radps": 0.05},
+        {"bias_velocity_sigma_mps": 0.2, "bias_gyro_sigma_radps": 0.02},
+        {"pixel_sigma_px": 0.0, "velocity_sigma_mps": 0.0, "gyro_sigma_radps": 0.0},
+        {"outliers": 0.2},
+        {"lap_s": 1e9},
+        {"duration_s": 8.0},
+        {"duration_s": 0.3},
+    ],
+    ids=["plain", "noisy", "biased", "perfect", "outliers", "straight", "short", "four frames"],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_clean_drive_is_left_alone(seed: int, changes: dict[str, float]) -> None:
+    recording = clean(seed, **changes)
+    mended, findings = mend(recording)
+    assert [finding.found for finding in findings] == [False, False, False], findings
+    assert mended is recording
+
+
+def test_a_camera_at_rest_may_repeat_its_pixels() -> None:
+    recording = at_rest()
+    mended, findings = mend(recording)
+    assert not any(finding.found for finding in findings), findings
+    assert mended is recording
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_stale_tracks_get_new_ids_where_they_repeat_and_only_there(seed: int) -> None:
+    broken, repeated = with_stale_tracks(clean(seed), STALE)
+    mended, finding = stale.mend(broken)
+    assert finding.found
+    assert f"in {len(STALE)} of" in finding.evidence
+    assert f"{repeated} observations" in finding.evidence
+    before, after = broken.tracks, mended.tracks
+    assert len(before) == len(after)
+    old = {(f, tuple(p)): i for f, p, i in zip(before.frame, before.pixels, before.id, strict=True)}
+    pieces: dict[int, set[tuple[int, int]]] = {}
+    for f, p, i in zip(after.frame, after.pixels, after.id, strict=True):
+        breaks = sum(1 for k in STALE if k <= f)  # every live track breaks there
+        pieces.setdefault(int(i), set()).add((int(old[f, tuple(p)]), breaks))
+    live_at_break = sum(len(piece) - 1 for piece in pieces.values())
+    assert live_at_break == 0, "a new id joins two points"
+    assert len(pieces) == len(np.unique(before.id)) + repeated
+
+
+def test_a_track_that_repeats_alone_is_no_stale_frame() -> None:
+    recording = clean()
+    tracks = recording.tracks
+    pairs = tracks.pairs(1)
+    half = pairs.second[::2]
+    pixels = tracks.pixels.copy()
+    pixels[half] = pixels[pairs.first[::2]]
+    _, finding = stale.mend(replace(recording, tracks=tracks.with_pixels(pixels)))
+    assert not finding.found
+    assert "single repeats" in finding.evidence
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("F", axes.turns()[1::5], ids=str)
+def test_turned_axes_are_found_and_turned_back(seed: int, F: Floats) -> None:
+    recording = clean(seed)
+    mended, finding = axes.mend(with_turned_axes(recording, F))
+    assert finding.found, finding
+    assert same_extrinsic(mended, recording)
+    assert "forward-left-up" in finding.action
+
+
+def test_turned_axes_are_found_under_a_gyro_bias_and_noise() -> None:
+    recording = clean(4, bias_gyro_sigma_radps=0.02, gyro_sigma_radps=0.05, velocity_sigma_mps=0.5)
+    mended, finding = axes.mend(with_turned_axes(recording))
+    assert finding.found
+    assert same_extrinsic(mended, recording)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("changes", [{}, {"velocity_sigma_mps": 0.2, "gyro_sigma_radps": 0.03}])
+def test_a_cameras_position_as_translation_is_found_and_mended(
+    seed: int, changes: dict[str, float]
+) -> None:
+    recording = clean(seed, **changes)
+    mended, finding = lever.mend(with_camera_position(recording))
+    assert finding.found, finding
+    assert same_extrinsic(mended, recording)
+
+
+def test_without_a_turn_the_lever_is_left_and_that_is_said() -> None:
+    recording = with_camera_position(clean(1, lap_s=1e9))
+    mended, finding = lever.mend(recording)
+    assert not finding.found
+    assert mended is recording
+    assert finding.action in ("left as given", "nothing to mend")
+
+
+def test_all_faults_at_once_are_mended_in_turn() -> None:
+    recording = clean(2)
+    broken, repeated = with_stale_tracks(recording, STALE)
+    broken = with_turned_axes(with_camera_position(broken))
+    mended, findings = mend(broken)
+    assert [finding.found for finding in findings] == [True, True, True], findings
+    assert same_extrinsic(mended, recording)
+    again, findings = mend(mended)
+    assert not any(finding.found for finding in findings), "a mended recording is clean"
+    assert again is mended
+    assert repeated > 0
+
+
+@pytest.mark.parametrize("given", [TwistTiming.START, TwistTiming.END])
+def test_the_twist_timing_of_the_drive_is_found(given: TwistTiming) -> None:
+    recording = clean(1, twist_timing=given, lap_s=8.0, pixel_sigma_px=0.2)
+    unsaid = recording.with_header(twist_timing=TwistTiming.MID)
+    chosen, finding = timing.choose(unsaid)
+    assert chosen.header.twist_timing is given, finding
+
+
+def test_axes_have_names() -> None:
+    R = axes.FORWARD_LEFT_UP_IN_CAMERA
+    assert axes.body_axes(R) is BodyAxes.FORWARD_LEFT_UP
+    assert axes.body_axes(R @ FORWARD_RIGHT_DOWN) is BodyAxes.FORWARD_RIGHT_DOWN
+    backward = R @ np.diag([-1.0, -1.0, 1.0])
+    assert axes.body_axes(backward) is BodyAxes.OTHER
+    assert axes.name(backward) == "backward-right-up"
+    turns = axes.turns()
+    assert len({tuple(F.ravel()) for F in turns}) == 24
+    assert np.array_equal(turns[0], np.eye(3))
+    assert all(np.linalg.det(F) > 0 for F in turns)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Rigid motions, dead reckoning, the camera, and the motion that images give."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from drives import clean
+from pelorus import motion, se3, visual_motion
+from pelorus.frames import Camera, TwistTiming
+from pelorus.se3 import Poses
+from pelorus.tracks import Tracks, project, triangulate
+from scipy.linalg import expm
+
+CAMERA = Camera(500.0, 480.0, 320.0, 240.0, 0.3)
+CHANCE = np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.0099, 0.0101, 0.5, 3.0])
+def test_exp_is_the_matrix_exponential_and_log_undoes_it(angle: float) -> None:
+    axis = CHANCE.normal(size=3)
+    theta = angle * axis / np.linalg.norm(axis)
+    rho = CHANCE.normal(size=3)
+    generator = np.zeros((4, 4))
+    generator[:3, :3], generator[:3, 3] = se3.skew(theta), rho
+    expected = expm(generator)
+    T = se3.exp(rho, theta)
+    assert np.allclose(T.R, expected[:3, :3], atol=1e-14)
+    assert np.allclose(T.p, expected[:3, 3], atol=1e-13)
+    assert np.allclose(se3.log(T), np.concatenate((rho, theta)), atol=1e-7)
+
+
+def test_inverse_compose_and_apply_are_those_of_matrices() -> None:
+    A = se3.exp(CHANCE.normal(size=(6, 3)), CHANCE.normal(size=(6, 3)))
+    B = se3.exp(CHANCE.normal(size=(6, 3)), CHANCE.normal(size=(6, 3)))
+    x = CHANCE.normal(size=(6, 3))
+    through = se3.apply(se3.compose(A, B), x)
+    assert np.allclose(through, se3.apply(A, se3.apply(B, x)))
+    assert np.allclose(se3.apply(se3.inverse(A), se3.apply(A, x)), x)
+
+
+@pytest.mark.parametrize(
+    ("timing", "expected"),
+    [(TwistTiming.START, [1.0, 2.0]), (TwistTiming.END, [2.0, 4.0]), (TwistTiming.MID, [1.5, 3.0])],
+)
+def test_timing_says_which_reading_holds(timing: TwistTiming, expected: list[float]) -> None:
+    assert motion.held(np.array([[1.0], [2.0], [4.0]]), timing).ravel().tolist() == expected
+
+
+def test_a_constant_twist_drives_a_circle() -> None:
+    t_ns = np.arange(0, 10_000_000_001, 100_000_000)
+    v, w = np.tile([2.0, 0, 0], (101, 1)), np.tile([0, 0, 0.5], (101, 1))
+    path = motion.dead_reckoning(t_ns, v, w, TwistTiming.START)
+    angle = 0.5 * t_ns * 1e-9
+    circle = 4.0 * np.stack((np.sin(angle), 1 - np.cos(angle), np.zeros(101)), axis=-1)
+    assert np.allclose(path.p, circle, atol=1e-12)
+
+
+def test_between_readings_the_latest_one_holds_and_before_the_first_the_body_rests() -> None:
+    t_ns = np.array([1_000_000_000, 2_000_000_000])
+    v, w = np.array([[1.0, 0, 0], [0, 3.0, 0]]), np.zeros((2, 3))
+    at = np.array([0, 1_000_000_000, 1_250_000_000, 2_500_000_000])
+    path = motion.path_at(at, t_ns, v, w, TwistTiming.START)
+    assert np.allclose(path.p[:, 0], [0, 0, 0.25, 1])
+    assert np.allclose(path.p[:, 1], [0, 0, 0, 1.5])
+
+
+def test_triangulation_undoes_projection_and_its_jacobian_is_the_difference() -> None:
+    q = np.stack((CHANCE.normal(size=50), CHANCE.normal(size=50), CHANCE.uniform(2, 30, 50)), -1)
+    pixels = project(CAMERA, q)
+    assert np.allclose(triangulate(CAMERA, pixels), q)
+    J = visual_motion.triangulation_jacobian(CAMERA, pixels, q)
+    for column in range(4):
+        step = np.zeros(4)
+        step[column] = 1e-5
+        slope = (triangulate(CAMERA, pixels + step) - triangulate(CAMERA, pixels - step)) / 2e-5
+        assert np.allclose(J[:, :, column], slope, rtol=1e-5, atol=1e-6)
+    D = visual_motion.point_jacobian(CAMERA, q)
+    for column in range(3):
+        step3 = np.zeros(3)
+        step3[column] = 1e-6
+        slope = (project(CAMERA, q + step3) - project(CAMERA, q - step3)) / 2e-6
+        assert np.allclose(D[:, :, column], slope, rtol=1e-5, atol=1e-4)
+
+
+def test_pairs_join_the_same_id_in_frames_k_and_k_plus_lag() -> None:
+    frame = np.array([0, 0, 1, 1, 2, 3])
+    id = np.array([7, 3, 7, 5, 3, 7])
+    tracks = Tracks.from_rows(4, frame, id, np.ones((6, 4)))
+    for lag in (1, 2, 3):
+        pairs = tracks.pairs(lag)
+        ids, later = tracks.id[pairs.first], tracks.frame[pairs.second]
+        told = set(zip(pairs.frame.tolist(), ids.tolist(), later.tolist(), strict=True))
+        there = set(zip(frame.tolist(), id.tolist(), strict=True))
+        assert told == {(k, i, k + lag) for k, i in there if (k + lag, i) in there}
+
+
+def test_images_alone_give_the_motion_of_the_camera() -> None:
+    recording = clean(pixel_sigma_px=0.05, outliers=0.1)
+    seen = visual_motion.seen_pairs(recording.tracks, recording.header.camera, 3)
+    found = visual_motion.estimate(seen, recording.header.camera)
+    T_CW = se3.compose(recording.T_CB, se3.inverse(recording.truth))
+    true = se3.compose(T_CW.at(slice(3, None)), se3.inverse(T_CW.at(slice(None, -3))))
+    error = np.linalg.norm(se3.log(se3.compose(se3.inverse(Poses(*found)), true)), axis=1)
+    assert np.median(error) < 0.01
+    assert np.percentile(error, 95) < 0.05
