@@ -13,6 +13,7 @@ static void suggest(plr_config *config, const char *name, double value) {
 }
 
 static void apply_header(plr_config *config, const plr_header *header, bool sigmas_of_a_reading) {
+    const bool has_bias = header->bias_velocity_sigma_mps > 0 || header->bias_gyro_sigma_radps > 0;
     const plr_suggestion suggestions[] = {
         {"twist-timing", header->twist_timing},
         {"pixel-sigma", header->pixel_sigma_px},
@@ -20,6 +21,9 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
         {"bias-gyro-sigma", header->bias_gyro_sigma_radps},
         {"bias-velocity-walk", header->bias_velocity_walk},
         {"bias-gyro-walk", header->bias_gyro_walk},
+        /* a sensor that is said to have a bias gets it estimated: without, the filter would believe
+         * more than it knows */
+        {"bias", has_bias ? 1 : -1},
     };
     for (unsigned i = 0; i < sizeof suggestions / sizeof suggestions[0]; i++)
         suggest(config, suggestions[i].name, suggestions[i].value);

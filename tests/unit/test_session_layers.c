@@ -85,6 +85,18 @@ static void test_the_header_says_twist_timing_and_all_seven_noises(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0, config.bias_gyro_walk);
 }
 
+static void test_a_header_that_tells_of_a_bias_switches_its_estimation_on(void) {
+    header.bias_velocity_sigma_mps = header.bias_gyro_sigma_radps = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(0, config.bias);
+    header.bias_gyro_sigma_radps = 0.01;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(1, config.bias);
+    override("bias", 0);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(0, config.bias);
+}
+
 static void test_suggestions_that_make_no_sense_are_left_out(void) {
     plr_config standard;
     plr_config_default(&standard);
@@ -164,6 +176,7 @@ int main(void) {
     RUN_TEST(test_with_nothing_said_everything_is_at_its_default);
     RUN_TEST(test_each_layer_wins_over_those_below);
     RUN_TEST(test_the_header_says_twist_timing_and_all_seven_noises);
+    RUN_TEST(test_a_header_that_tells_of_a_bias_switches_its_estimation_on);
     RUN_TEST(test_suggestions_that_make_no_sense_are_left_out);
     RUN_TEST(test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out);
     RUN_TEST(test_an_impossible_override_names_its_setting);
