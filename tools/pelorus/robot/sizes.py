@@ -369,6 +369,8 @@ def main(arguments: list[str]) -> int:
         case ["write", build, path]:
             Path(path).write_text(document(measure_all(Path(build))))
         case ["check", build, path]:
+            if not Path(path).exists():
+                raise PelorusError(f"{path}: no such file; tools/sizes.sh makes it")
             costs = measure_all(Path(build))
             wrong = differences(Path(path).read_text(), document(costs))
             wrong += [
