@@ -22,13 +22,14 @@ static bool keeps_subnormals(void) {
 }
 
 static bool is_calibration(const plr_calibration *c) {
+    static const double smallest = 1e-6, largest = 1e6; /* px and m, of any camera */
     const double positive[3] = {c->fx_px, c->fy_px, c->baseline_m};
     const double centre[2] = {c->cx_px, c->cy_px};
     for (int i = 0; i < 3; i++)
-        if (!(positive[i] > 0))
+        if (!(positive[i] >= smallest))
             return false;
-    return plr_all_finite(positive, 3) && plr_all_finite(centre, 2) &&
-           plr_all_finite(c->T_CB.p, 3) && plr_is_rotation(c->T_CB.R);
+    return plr_all_within(positive, 3, largest) && plr_all_within(centre, 2, largest) &&
+           plr_all_within(c->T_CB.p, 3, largest) && plr_is_rotation(c->T_CB.R);
 }
 
 static void set_camera(plr_camera *camera, const plr_calibration *c) {
@@ -156,7 +157,9 @@ static plr_status refuse(plr_filter *f, plr_status status) {
 static plr_status check_pose(const plr_pose *T_WB) {
     if (!plr_all_finite(T_WB->R, 9) || !plr_all_finite(T_WB->p, 3))
         return PLR_E_NOT_FINITE;
-    return plr_is_rotation(T_WB->R) ? PLR_OK : PLR_E_ARGUMENT;
+    if (!plr_is_rotation(T_WB->R))
+        return PLR_E_ARGUMENT;
+    return plr_all_within(T_WB->p, 3, PLR_MAX_POSITION) ? PLR_OK : PLR_E_RANGE;
 }
 
 static void get_rotation(plr_real R[9], const plr_pose *T_WB) {
@@ -185,6 +188,8 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
         return refuse(f, status);
     if (P_xi && !plr_all_finite(P_xi, 36))
         return refuse(f, PLR_E_NOT_FINITE);
+    if (P_xi && !plr_all_within(P_xi, 36, PLR_MAX_VARIANCE))
+        return refuse(f, PLR_E_RANGE);
     if (P_xi && !plr_is_covariance(P_xi, 6))
         return refuse(f, PLR_E_ARGUMENT);
 
@@ -200,8 +205,11 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     f->diverged = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
     /* a reading of another clock says nothing any more */
-    if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
+    if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns) {
         f->reading_valid = 0;
+        f->interval_s = 0;
+        memset(f->reading, 0, sizeof f->reading);
+    }
     if (!plr_covariance_is_positive(f) && f->config.bias)
         start_bias(f);
     return PLR_OK;
@@ -212,10 +220,13 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
         return PLR_E_ARGUMENT;
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
-    if (!f->config.bias || f->totals.twists > 0 || f->config.mode == PLR_MODE_MAPPING)
+    if (!f->config.bias || f->totals.twists > 0 || f->totals.frames > 0 ||
+        f->config.mode == PLR_MODE_MAPPING)
         return refuse(f, PLR_E_MODE);
     if (!plr_all_finite(mean, 6) || !plr_all_finite(variance, 6))
         return refuse(f, PLR_E_NOT_FINITE);
+    if (!plr_all_within(mean, 6, PLR_MAX_BIAS) || !plr_all_within(variance, 6, PLR_MAX_VARIANCE))
+        return refuse(f, PLR_E_RANGE);
     for (int i = 0; i < 6; i++)
         if (variance[i] < 0)
             return refuse(f, PLR_E_ARGUMENT);
@@ -266,6 +277,16 @@ static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
     return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
 }
 
+/* Could the reading itself be held for as long as readings are? With timing start it is not before
+ * the next one comes, and by then it would block that one and all that follow. */
+static plr_status check_reading(const plr_filter *f, const plr_real reading[6], plr_real interval) {
+    const plr_real first = PLR_R(1e-3); /* there is no interval yet */
+    plr_real seconds = interval > 0 ? interval : first;
+    if (f->interval_s > 0 && f->interval_s < seconds) /* a pause says nothing about the next one */
+        seconds = f->interval_s;
+    return plr_motion_check(f, reading, seconds);
+}
+
 static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
                          plr_real interval) {
     memcpy(f->reading, reading, sizeof f->reading);
@@ -297,18 +318,16 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     const plr_status in_time = check_time(f, t_ns);
     if (in_time != PLR_OK)
         return refuse(f, in_time);
-    if (!f->clock_started) {
-        f->t_ns = t_ns;
-        f->clock_started = 1;
-    }
     twist_of_step(f, reading, held);
-    const plr_real seconds = plr_seconds(t_ns - f->t_ns);
+    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
     const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
-    const plr_status in_range = plr_motion_check(f, held, seconds);
-    if (in_range != PLR_OK)
-        return refuse(f, in_range);
-    if (t_ns > f->t_ns)
+    if (plr_motion_check(f, held, seconds) != PLR_OK ||
+        check_reading(f, reading, interval) != PLR_OK)
+        return refuse(f, PLR_E_RANGE);
+    if (seconds > 0)
         plr_motion_step(f, t_ns, held, seconds, interval);
+    f->t_ns = t_ns;
+    f->clock_started = 1;
     take_reading(f, t_ns, reading, interval);
     return PLR_OK;
 }

@@ -15,10 +15,12 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
         return PLR_E_ARGUMENT;
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
+    if (slot >= f->count)
+        return PLR_E_ARGUMENT;
     plr_motion_settle(f);
     if (f->diverged)
         return PLR_E_DIVERGED;
-    if (slot >= f->count)
+    if (slot >= f->count) /* the camera has run into some */
         return PLR_E_ARGUMENT;
     plr_slots_export(f, slot, landmark);
     return PLR_OK;
@@ -31,9 +33,11 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
         return PLR_E_NOT_READY;
     if (!plr_all_finite(landmark->p_W_m, 3) || !plr_all_finite(landmark->P_W_m2, 9))
         return PLR_E_NOT_FINITE;
+    if (!plr_all_within(landmark->p_W_m, 3, PLR_MAX_POSITION) ||
+        !plr_all_within(landmark->P_W_m2, 9, PLR_MAX_VARIANCE))
+        return PLR_E_RANGE;
     if (!plr_landmark_is_valid(landmark))
         return PLR_E_ARGUMENT;
-    plr_motion_settle(f);
     if (f->diverged)
         return PLR_E_DIVERGED;
     if (plr_slots_find(f, landmark->id) != PLR_NO_SLOT)
@@ -43,6 +47,9 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
     plr_new_landmark entering;
     if (!f->model->adopt(f, landmark, &entering))
         return PLR_E_RANGE;
+    plr_motion_settle(f); /* not before the refusals, which change nothing */
+    if (f->diverged)
+        return PLR_E_DIVERGED;
     plr_slots_append(f, landmark->id, true, &entering);
     return PLR_OK;
 }

@@ -9,6 +9,13 @@ bool plr_all_finite(const double *x, unsigned n) {
     return true;
 }
 
+bool plr_all_within(const double *x, unsigned n, double limit) {
+    for (unsigned i = 0; i < n; i++)
+        if (!(x[i] <= limit && x[i] >= -limit))
+            return false;
+    return true;
+}
+
 bool plr_is_rotation(const double R[9]) {
     const double tolerance = 1e-3;
     if (!plr_all_finite(R, 9))
@@ -62,5 +69,7 @@ bool plr_is_covariance(const double *P, unsigned n) {
 }
 
 bool plr_landmark_is_valid(const plr_landmark *landmark) {
-    return plr_all_finite(landmark->p_W_m, 3) && plr_is_covariance(landmark->P_W_m2, 3);
+    return plr_all_within(landmark->p_W_m, 3, PLR_MAX_POSITION) &&
+           plr_all_within(landmark->P_W_m2, 9, PLR_MAX_VARIANCE) &&
+           plr_is_covariance(landmark->P_W_m2, 3);
 }

@@ -34,6 +34,14 @@ void specimen_twin(const plr_filter *f, dense_ekf *e);
 /* Jw and Ji of the chart at a point, as the filter has them. */
 void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]);
 
+/* Is the state the same to the bit? Workspace is not looked at, and of the totals only what tells
+ * when the filter diverged: a refused call may count itself. */
+bool specimen_same_state(const plr_filter *a, const plr_filter *b);
+
+/* Is every number finite that the filter gives, and every status one that its header promises?
+ * Applies the accumulated motion. */
+bool specimen_gives_finite_numbers(plr_filter *f);
+
 /* n x m zeros in double; to be freed. */
 double *specimen_zeros(unsigned n, unsigned m);
 

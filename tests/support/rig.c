@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#include "support/rig.h"
+
+#include <string.h>
+#include <unity.h>
+
+#include "support/specimens.h"
+
+rig_state rig;
+
+const plr_pose rig_identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+
+void rig_set_up(void) {
+    scene_options_default(&rig.options);
+    scene_calibration(&rig.calibration);
+    plr_config_default(&rig.config);
+    memset(&rig.map, 0, sizeof rig.map);
+    rig_begin();
+}
+
+void rig_begin(void) {
+    scene_start(&rig.world, &rig.options);
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_filter_init(&rig.filter, &rig.calibration, &rig.config, &rig.map));
+}
+
+void rig_twist(void) {
+    const plr_twist twist = scene_read(&rig.world);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+    scene_move(&rig.world, RIG_STEP_NS);
+}
+
+void rig_frame(void) {
+    const plr_frame frame = scene_look(&rig.world);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
+}
+
+void rig_drive(unsigned frames) {
+    for (unsigned k = 0; k < frames; k++) {
+        for (unsigned i = 0; i < RIG_TWISTS; i++)
+            rig_twist();
+        rig_frame();
+    }
+}
+
+void rig_remember(void) {
+    memcpy(&rig.before, &rig.filter, sizeof rig.before);
+}
+
+void rig_demand_untouched(plr_status expected, plr_status got) {
+    TEST_ASSERT_EQUAL_INT(expected, got);
+    TEST_ASSERT_TRUE_MESSAGE(specimen_same_state(&rig.before, &rig.filter),
+                             "a refused call changed the state");
+    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.resets, rig.filter.totals.resets);
+    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.frames, rig.filter.totals.frames);
+    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.twists, rig.filter.totals.twists);
+}
+
+void rig_demand_refusal(plr_status expected, plr_status got) {
+    rig_demand_untouched(expected, got);
+    const bool late = expected == PLR_E_LATE;
+    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.late + late, rig.filter.totals.late);
+    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.refused + !late, rig.filter.totals.refused);
+    rig_remember();
+}

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+/* A filter on a simulated drive: what the tests of the interface have in common. */
+#ifndef PELORUS_TEST_RIG_H
+#define PELORUS_TEST_RIG_H
+
+#include "pelorus/filter.h"
+#include "support/scene.h"
+
+enum { RIG_STEP_NS = 10000000, RIG_TWISTS = 10 }; /* twists at 100 Hz, frames at 10 Hz */
+
+typedef struct rig_state {
+    plr_filter filter, before; /* `before`: the state that a refused call must leave */
+    plr_calibration calibration;
+    plr_config config;
+    plr_map map;
+    scene_options options;
+    scene world;
+    plr_report report; /* of the last frame */
+} rig_state;
+
+extern rig_state rig;
+
+extern const plr_pose rig_identity;
+
+/* Default settings and scene, no map, and a new filter. */
+void rig_set_up(void);
+
+/* A new filter and a new drive with the settings as they stand in `rig`. Demands PLR_OK. */
+void rig_begin(void);
+
+/* A reading now, and 10 ms of driving. Demands PLR_OK. */
+void rig_twist(void);
+
+/* A frame now. Demands PLR_OK. */
+void rig_frame(void);
+
+/* So many frames, each after ten readings. */
+void rig_drive(unsigned frames);
+
+/* Keeps the state, against which rig_demand_refusal compares. */
+void rig_remember(void);
+
+/* The call was refused with that status and changed nothing; a refusal more is counted in totals as
+ * `late` or `refused`. */
+void rig_demand_refusal(plr_status expected, plr_status got);
+
+/* The same for calls whose refusals are not counted. */
+void rig_demand_untouched(plr_status expected, plr_status got);
+
+#endif

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+/* The correction by a frame, in blocks, against one dense gain (DESIGN 2.4); a block is all or
+ * nothing. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+#include "filter/correction.h"
+#include "filter/covariance.h"
+#include "filter/gate.h"
+#include "linalg/packed.h"
+#include "support/matrices.h"
+#include "support/oracle.h"
+#include "support/specimens.h"
+
+/* `MANY` is two whole blocks and a part of one. */
+enum { MANY = 2 * PLR_BLOCK_OBSERVATIONS + 3, BIAS = 6 };
+
+static const double eps = REAL_EPSILON;
+static plr_filter filter, before;
+static rng chance;
+static plr_observation seen[MANY];
+
+void setUp(void) {
+    chance = rng_seeded(52);
+}
+
+void tearDown(void) {
+}
+
+/* A specimen whose every landmark is seen, a pixel or so beside the prediction. */
+static void take_specimen(plr_model_kind model, bool bias) {
+    specimen_filter(&filter, &chance, model, bias, MANY);
+    for (unsigned slot = 0; slot < MANY; slot++) {
+        const float u = (float)rng_normal(&chance), v = (float)rng_normal(&chance);
+        const float shift[4] = {u, v, (float)(0.9 * (double)u), v};
+        seen[slot] = specimen_observation(&filter, slot, shift);
+        filter.work.order[slot] = (uint16_t)slot;
+        filter.work.slot_of[slot] = (uint16_t)slot;
+        filter.work.used[slot] = (uint16_t)slot;
+    }
+}
+
+/* dx = K r and P - K S K^T of the first `count` observations, by one gain in double. */
+static void dense_correction(unsigned count, double *dx, double *P) {
+    const unsigned n = plr_covariance_dim(&filter), m = 3 * count;
+    double *H = specimen_zeros(m, n), *r = specimen_zeros(m, 1), *S = specimen_zeros(m, m);
+    double *HP = specimen_zeros(m, n), *K = specimen_zeros(m, n),
+           *prior = specimen_covariance(&filter);
+    for (unsigned a = 0; a < count; a++) {
+        plr_linearisation lin;
+        plr_real r_real[3];
+        double pose[18], landmark[9];
+        TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[a], &lin));
+        to_doubles(landmark, lin.H_landmark, 9);
+        specimen_put(H, n, 3 * a, plr_covariance_row(&filter, a), 3, 3, landmark);
+        if (lin.uses_pose) {
+            to_doubles(pose, lin.H_pose, 18);
+            specimen_put(H, n, 3 * a, 0, 3, 6, pose);
+        }
+        plr_gate_innovation(r_real, &seen[a], &lin);
+        to_doubles(r + 3 * a, r_real, 3);
+    }
+    oracle_sandwich(m, n, H, prior, S);
+    for (unsigned i = 0; i < m; i++)
+        S[i * m + i] += (double)plr_gate_noise(&filter, i % 3);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, H, prior, 0, HP);
+    memcpy(K, HP, (size_t)m * n * sizeof *K);
+    TEST_ASSERT_TRUE(oracle_solve_spd(m, n, S, K)); /* K^T = S^-1 H P */
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, 1, m, 1, K, r, 0, dx);
+    memcpy(P, prior, (size_t)n * n * sizeof *P);
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, n, m, -1, K, HP, 1, P);
+    free(prior);
+    free(K);
+    free(HP);
+    free(S);
+    free(r);
+    free(H);
+}
+
+static void check_against_dense(plr_model_kind model, bool bias, unsigned count) {
+    take_specimen(model, bias);
+    const unsigned n = plr_covariance_dim(&filter), first = plr_covariance_row(&filter, 0);
+    double *dx = specimen_zeros(n, 1), *P = specimen_zeros(n, n),
+           *prior = specimen_covariance(&filter);
+    dense_correction(count, dx, P);
+    double bias_before[6];
+    to_doubles(bias_before, filter.bias, 6);
+    const plr_correction correction = plr_correct(&filter, seen, count);
+    TEST_ASSERT_EQUAL_UINT(count, correction.applied);
+    TEST_ASSERT_EQUAL_UINT(0, correction.failed_blocks);
+    TEST_ASSERT_EQUAL_UINT(0, correction.cut);
+    TEST_ASSERT_EQUAL_UINT8(0, filter.diverged);
+
+    /* dx stays in the workspace: against each row's standard deviation before */
+    for (unsigned i = 0; i < n; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 2e4 * eps, 0,
+                                  (dx[i] - (double)filter.work.dx[i]) / sqrt(prior[i * n + i]));
+    for (unsigned i = BIAS; i < first; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e3 * eps, bias_before[i - BIAS] + dx[i],
+                                  (double)filter.bias[i - BIAS]);
+    /* the block of the biases is what no retraction transports */
+    double *after = specimen_covariance(&filter);
+    for (unsigned i = BIAS; i < first; i++)
+        for (unsigned j = BIAS; j < first; j++)
+            TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 2e4 * eps) *
+                                          sqrt(prior[i * n + i] * prior[j * n + j]),
+                                      P[i * n + j], after[i * n + j]);
+    free(after);
+    free(prior);
+    free(P);
+    free(dx);
+}
+
+static void test_blocks_give_the_correction_of_one_gain(void) {
+    for (int bias = 0; bias < 2; bias++)
+        for (unsigned count = 1; count <= MANY; count += count < 3 ? 1 : 4) {
+            check_against_dense(PLR_MODEL_BODY, bias, count);
+            check_against_dense(PLR_MODEL_WORLD, bias, count);
+        }
+}
+
+static void test_no_observations_change_nothing(void) {
+    take_specimen(PLR_MODEL_BODY, true);
+    before = filter;
+    const plr_correction correction = plr_correct(&filter, seen, 0);
+    TEST_ASSERT_EQUAL_UINT(0, correction.applied);
+    TEST_ASSERT_EQUAL_MEMORY(filter.P, before.P, sizeof filter.P);
+    TEST_ASSERT_EQUAL_MEMORY(filter.slots, before.slots, sizeof filter.slots);
+    TEST_ASSERT_EQUAL_MEMORY(filter.R_WB, before.R_WB, sizeof filter.R_WB);
+    TEST_ASSERT_EQUAL_MEMORY(filter.p_WB, before.p_WB, sizeof filter.p_WB);
+}
+
+/* Correlates two errors of a landmark beyond 1: its variances look healthy, S cannot be factorised.
+ * Nothing else is tied to it, so that other blocks cannot notice. */
+static void spoil(unsigned slot) {
+    const unsigned row = plr_covariance_row(&filter, slot);
+    for (unsigned i = 0; i < plr_covariance_dim(&filter); i++)
+        for (unsigned k = row; k < row + 3; k++)
+            if (i != k)
+                filter.P[plr_packed_at(i, k)] = 0;
+    filter.P[plr_packed_at(row, row)] = filter.P[plr_packed_at(row + 1, row + 1)] = PLR_R(1e-3);
+    filter.P[plr_packed_at(row, row + 1)] = PLR_R(0.1);
+}
+
+static bool estimate_is_as_before(void) {
+    return memcmp(filter.R_WB, before.R_WB, sizeof filter.R_WB) == 0 &&
+           memcmp(filter.p_WB, before.p_WB, sizeof filter.p_WB) == 0 &&
+           memcmp(filter.bias, before.bias, sizeof filter.bias) == 0 &&
+           memcmp(filter.slots, before.slots, sizeof filter.slots) == 0 &&
+           memcmp(filter.P, before.P, sizeof filter.P) == 0;
+}
+
+static void test_a_block_that_cannot_be_factorised_leaves_the_estimate(void) {
+    take_specimen(PLR_MODEL_BODY, true);
+    spoil(1);
+    before = filter;
+    const plr_correction correction = plr_correct(&filter, seen, 2);
+    if (PLR_BLOCK_OBSERVATIONS == 1) {
+        TEST_ASSERT_EQUAL_UINT(1, correction.applied);
+        TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
+        return;
+    }
+    TEST_ASSERT_EQUAL_UINT(0, correction.applied);
+    TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
+    TEST_ASSERT_TRUE(estimate_is_as_before());
+}
+
+/* The spoilt landmark is in the second block: the first is a valid posterior and stays. */
+static void test_blocks_beside_a_failed_one_are_applied(void) {
+    take_specimen(PLR_MODEL_BODY, false);
+    spoil(PLR_BLOCK_OBSERVATIONS);
+    const plr_correction correction = plr_correct(&filter, seen, MANY);
+    TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
+    TEST_ASSERT_EQUAL_UINT(MANY - PLR_BLOCK_OBSERVATIONS, correction.applied);
+}
+
+/* An indefinite P whose diagonal looks healthy: the subtraction takes more than there is. */
+static void test_a_variance_that_would_be_lost_stops_the_correction(void) {
+    take_specimen(PLR_MODEL_BODY, false);
+    const unsigned row = plr_covariance_row(&filter, 0);
+    const plr_real own = filter.P[plr_packed_at(row, row)];
+    /* correlated with the pose beyond 1 */
+    filter.P[plr_packed_at(0, 0)] = PLR_R(1e-4);
+    filter.P[plr_packed_at(row, 0)] = (plr_real)(20 * sqrt((double)own * 1e-4));
+    before = filter;
+    const plr_correction correction = plr_correct(&filter, seen, 1);
+    TEST_ASSERT_EQUAL_UINT(0, correction.applied);
+    TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
+    TEST_ASSERT_EQUAL_UINT64(filter.t_ns, filter.totals.diverged_ns);
+    TEST_ASSERT_TRUE(estimate_is_as_before());
+}
+
+/* A correction of kilometres or of more than 3 rad is no correction. */
+static void test_a_senseless_correction_marks_the_filter_diverged(void) {
+    take_specimen(PLR_MODEL_BODY, false);
+    for (unsigned i = 0; i < plr_covariance_dim(&filter); i++) /* the pose: ten kilometres */
+        for (unsigned k = 0; k < 3; k++)
+            filter.P[plr_packed_at(i, k)] *= i < 3 ? PLR_R(4e10) : PLR_R(2e5);
+    seen[0].uL_px += 30;
+    const plr_pose pose = {{0}, {filter.p_WB[0], filter.p_WB[1], filter.p_WB[2]}};
+    (void)plr_correct(&filter, seen, 1);
+    TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
+    TEST_ASSERT_EQUAL_MEMORY(pose.p, filter.p_WB, sizeof pose.p);
+}
+
+static void test_corrections_at_the_limits_of_range_are_counted(void) {
+    take_specimen(PLR_MODEL_BODY, false);
+    filter.par.min_inverse_range = PLR_R(1) / PLR_R(40); /* 40 m, and all lie within 30 or so */
+    filter.par.pixel_variance = PLR_R(1e-6);
+    for (unsigned slot = 0; slot < 3; slot++)
+        seen[slot].uR_px = seen[slot].uL_px + 30; /* beyond infinity */
+    const plr_correction correction = plr_correct(&filter, seen, 3);
+    TEST_ASSERT_GREATER_THAN_UINT(0, correction.cut);
+    TEST_ASSERT_EQUAL_UINT(3, correction.applied);
+    for (unsigned slot = 0; slot < MANY; slot++)
+        TEST_ASSERT_TRUE(isfinite((double)filter.slots[slot].x[2]));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_blocks_give_the_correction_of_one_gain);
+    RUN_TEST(test_no_observations_change_nothing);
+    RUN_TEST(test_a_block_that_cannot_be_factorised_leaves_the_estimate);
+    RUN_TEST(test_blocks_beside_a_failed_one_are_applied);
+    RUN_TEST(test_a_variance_that_would_be_lost_stops_the_correction);
+    RUN_TEST(test_a_senseless_correction_marks_the_filter_diverged);
+    RUN_TEST(test_corrections_at_the_limits_of_range_are_counted);
+    return UNITY_END();
+}
