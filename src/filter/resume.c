@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+/* Going on after an interruption: another clock, and perhaps another place. */
+#include "filter/filter_internal.h"
+
+static plr_status refuse(plr_filter *f, plr_status status) {
+    plr_filter_count_refusal(f, status);
+    return status;
+}
+
+static plr_status check_moved(const plr_filter *f, const double *P_moved) {
+    if (!f->clock_started || (P_moved && f->config.mode == PLR_MODE_MAPPING))
+        return PLR_E_MODE;
+    if (!P_moved)
+        return PLR_OK;
+    if (!plr_all_finite(P_moved, 36))
+        return PLR_E_NOT_FINITE;
+    if (!plr_all_within(P_moved, 36, PLR_MAX_VARIANCE))
+        return PLR_E_RANGE;
+    return plr_is_covariance(P_moved, 6) ? PLR_OK : PLR_E_ARGUMENT;
+}
+
+plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved) {
+    if (!f)
+        return PLR_E_ARGUMENT;
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    const plr_status status = check_moved(f, P_moved);
+    if (status != PLR_OK)
+        return refuse(f, status);
+    f->t_ns = t_ns;
+    f->reading_valid = 0; /* a reading of before says nothing of now */
+    if (!P_moved)
+        return PLR_OK;
+    /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned j = 0; j < 6; j++)
+            f->motion.Q[6 * i + j] += (plr_real)(0.5 * (P_moved[6 * i + j] + P_moved[6 * j + i]));
+    f->motion.pending = f->motion.noisy = 1;
+    return PLR_OK;
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include "support/state_bytes.h"
+
+#include <string.h>
+#include <unity.h>
+
+#include "filter/covariance.h"
+#include "linalg/packed.h"
+
+static bool call_fails(state_bytes *state, uint32_t n) {
+    if (n > state->most_at_once)
+        state->most_at_once = n;
+    return ++state->calls == state->fails_at;
+}
+
+int state_bytes_take(void *context, const uint8_t *bytes, uint32_t n) {
+    state_bytes *state = context;
+    if (call_fails(state, n) || n > STATE_BYTES_MAX - state->length)
+        return -1;
+    memcpy(state->bytes + state->length, bytes, n);
+    state->length += n;
+    return 0;
+}
+
+int state_bytes_give(void *context, uint32_t offset, uint8_t *bytes, uint32_t n) {
+    state_bytes *state = context;
+    if (call_fails(state, n) || offset > state->length || n > state->length - offset)
+        return -1;
+    memcpy(bytes, state->bytes + offset, n);
+    if (state->calls == state->flips_at)
+        bytes[0] ^= 1;
+    state->out_of_order |= offset != state->next && offset != 0;
+    state->next = offset + n;
+    return 0;
+}
+
+void state_bytes_save(state_bytes *state, const plr_filter *f) {
+    memset(state, 0, sizeof *state);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(f, state_bytes_take, state));
+}
+
+plr_status state_bytes_restore(state_bytes *state, plr_filter *f) {
+    state->calls = 0;
+    state->next = 0;
+    return plr_filter_restore(f, state->length, state_bytes_give, state);
+}
+
+bool state_bytes_same(const state_bytes *a, const state_bytes *b) {
+    return a->length == b->length && memcmp(a->bytes, b->bytes, a->length) == 0;
+}
+
+bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
+    static plr_filter copy;
+    const size_t P = plr_packed_row(plr_covariance_dim(a));
+    if (a->count != b->count)
+        return false;
+    memcpy(&copy, a, sizeof copy);
+    memcpy(&copy.work, &b->work, sizeof copy.work);
+    memcpy(copy.slots + a->count, b->slots + a->count,
+           (PLR_MAX_LANDMARKS - a->count) * sizeof *copy.slots);
+    memcpy(copy.P + P, b->P + P, (PLR_PACKED_SIZE - P) * sizeof *copy.P);
+    return memcmp(&copy, b, sizeof copy) == 0;
+}

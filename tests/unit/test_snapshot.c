@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: MIT
+/* A filter that is saved and restored is the same filter, to the bit. */
+#include <string.h>
+#include <unity.h>
+
+#include "support/scene.h"
+#include "support/specimens.h"
+#include "support/state_bytes.h"
+
+enum { SLOTS = 8, TWISTS_PER_FRAME = 5 };
+
+static plr_filter driven, restored;
+static state_bytes state, other;
+static scene world;
+static plr_config config;
+
+static bool know_all(void *context, uint32_t id, plr_landmark *landmark) {
+    memset(landmark, 0, sizeof *landmark);
+    landmark->id = id;
+    for (unsigned i = 0; i < 3; i++) {
+        landmark->p_W_m[i] = scene_landmark(context, id)[i];
+        landmark->P_W_m2[4 * i] = 1e-4;
+    }
+    return true;
+}
+
+static void start(plr_filter *f) {
+    const plr_map map = {&world, NULL, know_all};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(f, &world.calibration, &config, &map));
+}
+
+void setUp(void) {
+    scene_options options;
+    scene_options_default(&options);
+    options.most_seen = SLOTS + 2; /* some find no room: slots are given up and taken anew */
+    options.outliers = 0.1;
+    scene_start(&world, &options);
+    plr_config_default(&config);
+    config.slots = SLOTS;
+    config.bias = 1;
+    memset(&driven, 0, sizeof driven);
+    memset(&restored, 0, sizeof restored);
+}
+
+void tearDown(void) {
+}
+
+/* Both filters get the same; `b` may be NULL. */
+static void twist(plr_filter *a, plr_filter *b) {
+    const plr_twist reading = scene_read(&world);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(a, world.t_ns, &reading));
+    if (b)
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(b, world.t_ns, &reading));
+    scene_move(&world, 20000000);
+}
+
+static void frame(plr_filter *a, plr_filter *b) {
+    plr_report reports[2];
+    plr_pose pose;
+    const plr_frame seen = scene_look(&world);
+    if (config.mode == PLR_MODE_MAPPING) {
+        scene_pose(&world, &pose);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(a, world.t_ns, &pose));
+        if (b)
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(b, world.t_ns, &pose));
+    }
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(a, &seen, &reports[0]));
+    if (!b)
+        return;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(b, &seen, &reports[1]));
+    TEST_ASSERT_EQUAL_MEMORY(&reports[0], &reports[1], sizeof reports[0]);
+}
+
+static void drive(plr_filter *a, plr_filter *b, unsigned frames) {
+    for (unsigned i = 0; i < frames; i++) {
+        for (unsigned k = 0; k < TWISTS_PER_FRAME; k++)
+            twist(a, b);
+        frame(a, b);
+    }
+}
+
+/* Drives, saves with a twist or two on top of the last frame, restores, and drives both on. */
+static void save_restore_and_go_on(unsigned twists_behind) {
+    start(&driven);
+    drive(&driven, NULL, 6);
+    for (unsigned i = 0; i < twists_behind; i++)
+        twist(&driven, NULL);
+    state_bytes_save(&state, &driven);
+    start(&restored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));
+    TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
+    drive(&driven, &restored, 12);
+    TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
+}
+
+static void test_a_restored_filter_goes_on_with_the_same_bits(void) {
+    save_restore_and_go_on(0);
+    TEST_ASSERT_GREATER_THAN_UINT64(0, driven.totals.evicted);
+    TEST_ASSERT_GREATER_THAN_UINT64(0, driven.totals.gated);
+}
+
+static void test_motion_that_is_not_applied_yet_is_carried_too(void) {
+    save_restore_and_go_on(2);
+}
+
+static void test_the_world_model_and_a_filter_without_bias_go_on_with_the_same_bits(void) {
+    config.model = PLR_MODEL_WORLD;
+    config.bias = 0;
+    config.max_depth_m = 20;
+    save_restore_and_go_on(1);
+}
+
+static void test_known_landmarks_stay_known(void) {
+    config.mode = PLR_MODE_LOCALIZATION;
+    save_restore_and_go_on(1);
+    TEST_ASSERT_GREATER_THAN_UINT(0, restored.count);
+    for (unsigned slot = 0; slot < restored.count; slot++)
+        TEST_ASSERT_EQUAL_UINT8(1, restored.slots[slot].known);
+}
+
+static void test_a_map_in_the_making_goes_on_with_the_same_bits(void) {
+    config.mode = PLR_MODE_MAPPING;
+    save_restore_and_go_on(1);
+}
+
+static void test_twists_alone_go_on_with_the_same_bits(void) {
+    config.mode = PLR_MODE_DEAD_RECKONING;
+    save_restore_and_go_on(3);
+    TEST_ASSERT_EQUAL_UINT(0, restored.count);
+}
+
+static void test_a_filter_that_has_seen_nothing_can_be_saved(void) {
+    start(&driven);
+    state_bytes_save(&state, &driven);
+    start(&restored);
+    drive(&restored, NULL, 1);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));
+    TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
+}
+
+/* A field that a later version adds to the filter, and forgets here, is found by this. */
+static void test_every_field_is_carried(void) {
+    plr_totals *t = &driven.totals;
+    uint32_t *const counts[] = {&t->twists, &t->frames, &t->late,          &t->refused,
+                                &t->resets, &t->locks,  &t->range_limited, &t->blocks_failed};
+    uint64_t *const sums[] = {&t->observations, &t->matched, &t->used,       &t->gated,
+                              &t->created,      &t->evicted, &t->diverged_ns};
+    rng chance = rng_seeded(7);
+    start(&driven);
+    drive(&driven, NULL, 6);
+    twist(&driven, NULL);
+    for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
+        *counts[i] = (uint32_t)rng_bits(&chance);
+    for (unsigned i = 0; i < sizeof sums / sizeof *sums; i++)
+        *sums[i] = rng_bits(&chance);
+    for (unsigned i = 0; i < 36; i++)
+        driven.motion.B[i] = (plr_real)rng_normal(&chance);
+    for (unsigned i = 0; i < 6; i++)
+        driven.bias[i] = (plr_real)rng_normal(&chance);
+    driven.frame_number = (uint32_t)rng_bits(&chance);
+    driven.frames_without_use = 0xA1B2;
+    driven.frames_mostly_gated = 0xC3D4;
+    driven.matches_since_gated = 0xE5F60718;
+    driven.slots[1].times_gated = 0x12345678;
+    state_bytes_save(&state, &driven);
+    start(&restored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));
+    TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
+}
+
+static void test_negative_zeros_and_subnormals_keep_their_bits(void) {
+    start(&driven);
+    drive(&driven, NULL, 3);
+    driven.p_WB[0] = -0.0;
+    driven.p_WB[1] = 4.9406564584124654e-324;
+    driven.motion.p[2] = -PLR_SMALLEST_NORMAL / 2;
+    state_bytes_save(&state, &driven);
+    start(&restored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));
+    TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
+}
+
+static void test_saving_changes_nothing(void) {
+    static plr_filter before;
+    start(&driven);
+    drive(&driven, NULL, 4);
+    twist(&driven, NULL);
+    memcpy(&before, &driven, sizeof before);
+    state_bytes_save(&state, &driven);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(&driven, NULL, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &driven, sizeof before);
+}
+
+static void test_what_is_restored_is_saved_as_the_same_bytes(void) {
+    start(&driven);
+    drive(&driven, NULL, 5);
+    state_bytes_save(&state, &driven);
+    start(&restored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));
+    state_bytes_save(&other, &restored);
+    TEST_ASSERT_TRUE(state_bytes_same(&state, &other));
+}
+
+static void test_bytes_are_handed_over_in_order_and_in_small_pieces(void) {
+    start(&driven);
+    drive(&driven, NULL, 5);
+    state_bytes_save(&state, &driven);
+    TEST_ASSERT_EQUAL_UINT(PLR_STATE_CHUNK, state.most_at_once);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &driven));
+    TEST_ASSERT_EQUAL_UINT(PLR_STATE_CHUNK, state.most_at_once);
+    TEST_ASSERT_FALSE(state.out_of_order);
+    TEST_ASSERT_EQUAL_UINT(2 * ((state.length + PLR_STATE_CHUNK - 1) / PLR_STATE_CHUNK),
+                           state.calls);
+}
+
+static uint64_t number_at(uint32_t offset, unsigned bytes) {
+    uint64_t number = 0;
+    for (unsigned i = 0; i < bytes; i++)
+        number |= (uint64_t)state.bytes[offset + i] << (8 * i);
+    return number;
+}
+
+/* docs/STATE-FORMAT.md, by its own figures. */
+static void test_the_layout_is_the_documented_one(void) {
+    const uint32_t real = sizeof(plr_real);
+    const uint32_t count_at = 13 + 9 * 25 + 17 * real;
+    const uint32_t slots_at = count_at + 4 + 16 + 24 + 4 + 12 + 32 + 56 + 107 * real;
+    const uint32_t slot = 3 * real + 25;
+    start(&driven);
+    drive(&driven, NULL, 5);
+    const uint32_t dim = 12 + 3 * driven.count;
+    state_bytes_save(&state, &driven);
+    TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
+    TEST_ASSERT_EQUAL_UINT32(1, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
+    TEST_ASSERT_EQUAL_UINT(25, state.bytes[12]);
+    TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
+    TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
+    TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(slots_at + 3 * real, 4));
+    TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(slots_at + slot + 3 * real, 4));
+    TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
+                             state.length);
+}
+
+static void test_the_size_is_known_beforehand(void) {
+    start(&driven);
+    for (unsigned i = 0; i < 4; i++) {
+        state_bytes_save(&state, &driven);
+        TEST_ASSERT_EQUAL_UINT32(state.length, plr_filter_saved_size(&driven, driven.count));
+        drive(&driven, NULL, 1);
+    }
+    TEST_ASSERT_EQUAL_UINT(SLOTS, driven.count);
+    TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(&driven, SLOTS + 1));
+    TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(NULL, 0));
+    driven.magic = 0;
+    TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(&driven, 0));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_restored_filter_goes_on_with_the_same_bits);
+    RUN_TEST(test_motion_that_is_not_applied_yet_is_carried_too);
+    RUN_TEST(test_the_world_model_and_a_filter_without_bias_go_on_with_the_same_bits);
+    RUN_TEST(test_known_landmarks_stay_known);
+    RUN_TEST(test_a_map_in_the_making_goes_on_with_the_same_bits);
+    RUN_TEST(test_twists_alone_go_on_with_the_same_bits);
+    RUN_TEST(test_a_filter_that_has_seen_nothing_can_be_saved);
+    RUN_TEST(test_every_field_is_carried);
+    RUN_TEST(test_negative_zeros_and_subnormals_keep_their_bits);
+    RUN_TEST(test_saving_changes_nothing);
+    RUN_TEST(test_what_is_restored_is_saved_as_the_same_bytes);
+    RUN_TEST(test_bytes_are_handed_over_in_order_and_in_small_pieces);
+    RUN_TEST(test_the_layout_is_the_documented_one);
+    RUN_TEST(test_the_size_is_known_beforehand);
+    return UNITY_END();
+}
