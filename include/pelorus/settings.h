@@ -104,7 +104,8 @@ void plr_config_default(plr_config *config);
 
 /* The course report's hyperparameters (III-F): world model, bias off, start timing, landmark
  * variance 2 m^2, pose variance 5e-4, pixel variance 5 px^2, motion variance 1e-3 a step, and a
- * gate on the norm of the four residuals. The report names no limit for it; 30 px is ours. */
+ * gate on the norm of the four residuals. The report leaves out far landmarks and large residuals
+ * without naming a limit; 60 m and 30 px are ours. */
 void plr_config_course(plr_config *config);
 
 /* PLR_OK, or PLR_E_CONFIG with the offending row in *culprit (which may be NULL). Also refuses
