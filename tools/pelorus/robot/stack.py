@@ -45,6 +45,7 @@ INDIRECT_CALL = "__indirect_call"
 # gcc notes the signed function's name where it calls the unsigned one.
 SAME_AS = {"__aeabi_ldivmod": "__aeabi_uldivmod"}
 
+INTERRUPTS = ("serial_link_isr", "serial_telemetry_isr", "clock_isr")
 EXCEPTION_FRAME_BYTES = 26 * 4 + 4  # eight words, eighteen of the FPU, alignment
 
 
@@ -164,7 +165,8 @@ class Analysis:
     def _deepest(self, name: str, above: tuple[str, ...]) -> Bound:
         function = self._functions.get(name)
         if function is None:
-            raise PelorusError(f"nothing is known of {name}, called by {short(above[-1])}")
+            caller = short(above[-1]) if above else "the vector table"
+            raise PelorusError(f"nothing is known of {name}, called by {caller}")
         deepest = Bound(0, ())
         for callee in sorted(self._callees(name, function)):
             found = self.bound(callee, (*above, name))
@@ -209,6 +211,6 @@ def image_bound(image: Path, folders: Iterable[Path]) -> Bound:
     analysis = Analysis(functions)
     start = functions["startup_reset"].frame_bytes + functions["startup_main"].frame_bytes
     main = analysis.bound("main")
-    handlers = [analysis.bound(name) for name in ("serial_isr", "clock_isr")]
+    handlers = [analysis.bound(name) for name in INTERRUPTS]
     interrupt = max(handler.stack_bytes for handler in handlers) + EXCEPTION_FRAME_BYTES
     return Bound(start + main.stack_bytes + interrupt, main.path)
