@@ -68,7 +68,7 @@ static void test_series_agree_with_closed_forms(void) {
 static void test_series_begin_at_their_limits(void) {
     const double lengths[] = {0, 1e-12, 1e-6, 1e-4, 1e-3};
     for (int i = 0; i < 5; i++) {
-        const double x = lengths[i] * lengths[i];
+        const long double x = (long double)lengths[i] * (long double)lengths[i];
         plr_so3_series got;
         plr_so3_series_at(&got, (plr_real)x);
         assert_coefficient(1, 1 - x / 6 + x * x / 120, got.a);
