@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus report IN.plr --out DIR`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from pelorus.console import out, progress
+from pelorus.errors import PelorusError
+from pelorus.report import overview
+from pelorus.report.replay import find_programs
+from pelorus.report.results import Run, carry_out
+from pelorus.report.runs import plan_runs
+from pelorus.report.subject import read_subject
+
+if TYPE_CHECKING:
+    from pelorus.report.comparison import Comparison
+
+PAGE = "report.html"
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `report` to the command line."""
+    parent.command(
+        epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on",
+    )(report)
+
+
+def report(
+    recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to replay."),
+    folder: Path = typer.Option(
+        ..., "--out", metavar="DIR", help="Where report.html, the pictures and runs/ go."
+    ),
+    config: Path | None = typer.Option(
+        None, metavar="FILE", help="Settings of all runs but course, as pelorus-replay takes them."
+    ),
+    settings: list[str] = typer.Option(
+        [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
+    ),
+    programs: Path | None = typer.Option(
+        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
+    ),
+) -> None:
+    """Replay a recording four ways, and draw what came out.
+
+    Dead reckoning and body in float32, the course's preset and world in float64. Without a depth
+    limit in the settings, world has one of 60 m, for it cannot use far points.
+    """
+    subject = read_subject(recording)
+    plans = plan_runs(find_programs(programs), recording, _options(config, settings))
+    runs_folder = _made(folder / "runs")
+    runs = [carry_out(plan, recording, runs_folder) for plan in progress(plans, "replaying")]
+
+    from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
+
+    _publish(Comparison(subject, runs), folder)
+
+
+def _options(config: Path | None, settings: list[str]) -> list[str]:
+    out_options = [] if config is None else ["--config", str(config)]
+    for setting in settings:
+        name, equals, value = setting.partition("=")
+        if not (name and equals and value):
+            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="--set")
+        out_options += [f"--{name}", value]
+    return out_options
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PelorusError(f"{folder}: cannot be made: {error.strerror}") from error
+    return folder
+
+
+def _publish(compared: Comparison, folder: Path) -> None:
+    from pelorus.report import gallery, page, style, verdict  # noqa: PLC0415 - as above
+
+    drawn = []
+    for picture in progress(gallery.pictures(compared), "drawing"):
+        path = folder / f"{picture.name}.png"
+        style.save(picture.draw, path)
+        drawn.append((picture, path))
+    lines = verdict.verdicts(compared)
+    page.write(folder / PAGE, compared, lines, drawn)
+    _tell(compared.runs, lines, folder / PAGE)
+
+
+def _tell(runs: list[Run], lines: list[str], page: Path) -> None:
+    table = Table(box=None, pad_edge=False)
+    for title in overview.TITLES:
+        table.add_column(title, justify="left" if title == "run" else "right")
+    for run in runs:
+        table.add_row(*overview.row(run))
+    out.print(table)
+    for line in lines:
+        out.print(f"[yellow]-[/] {escape(line)}")
+    out.print(f"report: {escape(str(page))}")

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""All runs over one recording, beside the truth where there is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from pelorus.motion import Times
+from pelorus.report import style
+from pelorus.report.accuracy import Accuracy, assess
+from pelorus.report.results import Run
+from pelorus.report.subject import Subject
+from pelorus.se3 import Floats
+
+MAIN = "body"  # the default model: what the report is about
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """`runs` in the order of the table."""
+
+    subject: Subject
+    runs: list[Run]
+
+    @cached_property
+    def accuracy(self) -> dict[str, Accuracy]:
+        """By the run's name; empty without truth."""
+        truth = self.subject.truth
+        if truth is None:
+            return {}
+        found = {run.name: assess(run.trajectory, run.covariance, truth) for run in self.runs}
+        return {name: accuracy for name, accuracy in found.items() if accuracy is not None}
+
+    @cached_property
+    def main(self) -> Run:
+        return self.run(MAIN)
+
+    def run(self, name: str) -> Run:
+        return next(run for run in self.runs if run.name == name)
+
+    @cached_property
+    def origin_ns(self) -> int:
+        return min(int(run.frames.t_ns[0]) for run in self.runs)
+
+    def seconds(self, t_ns: Times) -> Floats:
+        """Time since the first frame."""
+        return style.seconds(t_ns, self.origin_ns)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""From where the trajectories are looked at."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pelorus.frames import BodyAxes
+from pelorus.se3 import Floats, Poses
+
+AXES = "xyz"
+# The axes to the right and up of a picture whose viewer looks down on the axis named: right x up
+# points at the viewer.
+SEEN_FROM = {"x": "yz", "y": "zx", "z": "xy"}
+
+
+class Axis(NamedTuple):
+    """A signed axis of the world."""
+
+    number: int
+    sign: int
+
+    def of(self, points: Floats) -> Floats:
+        return np.asarray(self.sign * points[..., self.number])
+
+    @property
+    def label(self) -> str:
+        return f"{'-' if self.sign < 0 else ''}{AXES[self.number]} (m)"
+
+
+class Plane(NamedTuple):
+    """`why` names the choice in words."""
+
+    right: Axis
+    up: Axis
+    why: str
+
+
+def choose(axes: BodyAxes, poses: Poses) -> Plane:
+    """From above, where the body's axes tell what is up; else the plane of largest extent."""
+    if axes == BodyAxes.OTHER:
+        return _largest(poses.p)
+    up_B = np.array([0.0, 0.0, 1.0 if axes == BodyAxes.FORWARD_LEFT_UP else -1.0])
+    up_W = np.mean(poses.R @ up_B, axis=0)
+    vertical = int(np.argmax(np.abs(up_W)))
+    right, up = (AXES.index(name) for name in SEEN_FROM[AXES[vertical]])
+    if up_W[vertical] > 0:
+        return Plane(Axis(right, 1), Axis(up, 1), "from above")
+    # Seen from the other side: mirror the second axis, or start with x where there is one.
+    if AXES[vertical] == "y":
+        return Plane(Axis(up, 1), Axis(right, 1), "from above")
+    return Plane(Axis(right, 1), Axis(up, -1), "from above")
+
+
+def _largest(points: Floats) -> Plane:
+    extent = np.ptp(points, axis=0)
+    right, up = sorted(np.argsort(extent, kind="stable")[1:].tolist())
+    why = f"{AXES[right]}-{AXES[up]}, the plane of largest extent"
+    return Plane(Axis(right, 1), Axis(up, 1), why)

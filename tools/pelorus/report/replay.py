@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""The replay programs: where they are, and one run of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pelorus.errors import PelorusError
+
+SOURCE_ROOT = Path(__file__).resolve().parents[3]
+USUAL_FOLDER = Path("build/bin")
+SETTINGS_MAX_DEPTH = "max-depth"
+
+
+@dataclass(frozen=True)
+class Programs:
+    """The two precisions of the filter."""
+
+    float32: Path
+    float64: Path
+
+
+def find_programs(folder: Path | None) -> Programs:
+    """From the folder given, else from $PELORUS_BIN, else from build/bin."""
+    chosen = folder or _environment()
+    candidates = [chosen] if chosen else [USUAL_FOLDER, SOURCE_ROOT / USUAL_FOLDER]
+    for candidate in candidates:
+        programs = Programs(candidate / "pelorus-replay", candidate / "pelorus-replay-f64")
+        if programs.float32.is_file() and programs.float64.is_file():
+            return programs
+    raise PelorusError(
+        f"{candidates[0]}: holds no pelorus-replay and pelorus-replay-f64; "
+        "build them, or name their folder with --bin or PELORUS_BIN"
+    )
+
+
+def _environment() -> Path | None:
+    value = os.environ.get("PELORUS_BIN")
+    return Path(value) if value else None
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What one run writes: runs/NAME.tum, .csv, .ply, .plr, .json."""
+
+    trajectory: Path
+    frames: Path
+    map: Path
+    log: Path
+    summary: Path
+
+    @classmethod
+    def named(cls, folder: Path, name: str) -> Outputs:
+        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "ply", "plr", "json")))
+
+
+def replay(
+    program: Path, recording: Path, options: Sequence[str], outputs: Outputs
+) -> tuple[dict[str, Any], list[str]]:
+    """Run the filter; its summary, and what it had to say on the way."""
+    wanted = [
+        *("--trajectory", str(outputs.trajectory), "--frames", str(outputs.frames)),
+        *("--map", str(outputs.map), "--out", str(outputs.log), "--json"),
+    ]
+    stdout, stderr = _call(program, recording, [*options, *wanted])
+    try:
+        summary = json.loads(stdout)
+        outputs.summary.write_text(stdout, encoding="utf-8")
+    except json.JSONDecodeError as error:
+        raise PelorusError(f"{program}: its summary is no JSON: {error}") from error
+    except OSError as error:
+        raise PelorusError(f"{outputs.summary}: cannot be written: {error.strerror}") from error
+    return summary, [line for line in stderr.splitlines() if line.strip()]
+
+
+def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> float:
+    """The max-depth that would be in force, 0 for none: the program knows its own config files."""
+    stdout, _ = _call(program, recording, [*options, "--print-config"])
+    for line in stdout.splitlines():
+        name, _, value = line.partition("=")
+        if name.strip() == SETTINGS_MAX_DEPTH:
+            return float(value.partition("#")[0])
+    raise PelorusError(f"{program}: --print-config names no {SETTINGS_MAX_DEPTH}")
+
+
+def _call(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, str]:
+    command = [str(program), str(recording), *options]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, check=False, encoding="utf-8", errors="replace"
+        )
+    except OSError as error:
+        raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
+    if done.returncode != 0:
+        said = done.stderr.strip().removeprefix("pelorus-replay: ") or "without a word"
+        how = f"status {done.returncode}" if done.returncode > 0 else f"signal {-done.returncode}"
+        raise PelorusError(f"{program.name} {' '.join(options)}\nended with {how}: {said}")
+    return done.stdout, done.stderr

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""What is off, in plain words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from pelorus.frames import Header
+from pelorus.report.comparison import Comparison
+from pelorus.report.results import Run
+
+# Bits of plr_reason (types.h).
+GATE_LOCKED, GATE_INERT, NIS_HIGH, NOT_POSITIVE = 1 << 2, 1 << 3, 1 << 8, 1 << 10
+NEES_HIGH, NEES_LOW = 2.0, 0.3
+GATED_MANY = 0.2  # of the matched observations
+LOST_MANY = 0.02  # of the frames
+INERT_MANY = 0.05  # of the frames
+NO_ROOM_MANY = 0.05  # of the observations
+NIS_HIGH_MANY = 0.2  # of the frames
+
+
+def verdicts(compared: Comparison) -> list[str]:
+    """A line for each thing that is off; one that says so where there is none."""
+    dead_reckoning = compared.run("dead-reckoning")
+    lines = [line for run in compared.runs for line in _of_run(run, dead_reckoning, compared)]
+    lines += _of_recording(compared)
+    return lines or ["Nothing is off."]
+
+
+def _of_recording(compared: Comparison) -> Iterator[str]:
+    if not compared.accuracy:
+        yield "The recording has no truth at its frames: errors and NEES cannot be given."
+    if compared.main.summary["bias"] == "off" and _suggests_bias(compared.subject.header):
+        yield (
+            "The recording's header tells of biases of the twist, and the settings turn their "
+            "estimation off: try --set bias=on."
+        )
+    said = {line.partition(": ")[2] or line: None for run in compared.runs for line in run.said}
+    yield from (f"The replay says: {line}." for line in said)
+
+
+def _suggests_bias(header: Header) -> bool:
+    return max(header.noise.bias_velocity_sigma_mps, header.noise.bias_gyro_sigma_radps) > 0
+
+
+def _of_run(run: Run, dead_reckoning: Run, compared: Comparison) -> Iterator[str]:
+    checks = (
+        _health(run, compared.origin_ns),
+        _frames(run),
+        _consistency(run),
+        _gate(run),
+        _room(run),
+        _use(run, dead_reckoning),
+    )
+    for check in checks:
+        yield from (f"{run.name}: {line}" for line in check)
+
+
+def _health(run: Run, origin_ns: int) -> Iterator[str]:
+    diverged = np.nonzero(run.frames.reasons & NOT_POSITIVE)[0]
+    if len(diverged):
+        t_s = (int(run.frames.t_ns[diverged[0]]) - origin_ns) * 1e-9
+        yield (
+            f"diverged at t = {t_s:.1f} s: a variance ceased to be "
+            "positive; from there on the pose is predicted from the twists alone."
+        )
+    lost, frames = run.summary["frames_lost"], run.summary["frames"]
+    if lost > LOST_MANY * frames:
+        yield f"lost in {lost} of {frames} frames: nothing was used in the ten before each."
+
+
+def _frames(run: Run) -> Iterator[str]:
+    refused = run.summary["frames_refused"]
+    if refused:
+        yield f"{refused} of {refused + run.summary['frames']} frames were refused."
+    factor = run.summary["realtime_factor"]
+    if factor is not None and factor < 1:
+        yield f"slower than real time on this machine: {factor:.2g} times."
+
+
+def _consistency(run: Run) -> Iterator[str]:
+    nees = run.summary["nees_per_dof"]
+    left_out = run.summary["nees_left_out"]
+    if left_out:
+        yield f"{left_out} frames have a covariance that is not positive; NEES leaves them out."
+    if nees is not None and nees > NEES_HIGH:
+        yield (
+            f"believes more than it knows: NEES/6 is {nees:.3g} where 1 is due, so its errors are "
+            f"about {math.sqrt(nees):.2g} times as large as it says."
+        )
+    if nees is not None and nees < NEES_LOW:
+        yield f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due."
+
+
+def _gate(run: Run) -> Iterator[str]:
+    reasons = run.frames.reasons
+    inert = int(np.count_nonzero(reasons & GATE_INERT))
+    locked = int(np.count_nonzero(reasons & GATE_LOCKED))
+    if inert > INERT_MANY * len(reasons):
+        yield f"gate inert in {inert} frames: it rejected none of the last 1000 matches. Too wide?"
+    if locked:
+        yield f"gate locked in {locked} frames: most matches were rejected, the landmarks dropped."
+    gated, matched = run.summary["gated"], run.summary["matched"]
+    if matched and gated > GATED_MANY * matched:
+        yield (
+            f"the gate rejects {gated / matched:.0%} of the matches: noise set too small, wrong "
+            "tracks, or a wrong estimate."
+        )
+    high = int(np.count_nonzero(reasons & NIS_HIGH))
+    if high > NIS_HIGH_MANY * len(reasons):
+        yield f"innovations larger than the noise explains in {high} of {len(reasons)} frames."
+
+
+def _room(run: Run) -> Iterator[str]:
+    no_room, observations = run.summary["no_room"], run.summary["observations"]
+    if no_room > NO_ROOM_MANY * observations:
+        yield (
+            f"{no_room} of {observations} observations found no slot: raise --set slots=N "
+            f"(now {run.summary['slots']})."
+        )
+
+
+def _use(run: Run, dead_reckoning: Run) -> Iterator[str]:
+    """A filter that does no better than the twists alone is of no use."""
+    ate, without = run.summary["ate_m"], dead_reckoning.summary["ate_m"]
+    if run is not dead_reckoning and ate is not None and without is not None and ate > without:
+        yield f"no better than dead reckoning: ATE {ate:.3g} m against {without:.3g} m."
