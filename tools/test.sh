@@ -149,7 +149,9 @@ fi
 step 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
 step 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
 step 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tests/python tests/layering tests/golden tests/target
+    tools/pelorus tests/python tests/layering tests/golden
+step 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
+    --config-file tools/pyproject.toml tests/target
 
 # --- the desktop ---------------------------------------------------------------------------------
 

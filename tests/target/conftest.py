@@ -6,6 +6,7 @@ replay, built in the ways whose bits must agree).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -36,7 +37,7 @@ def firmware(robot: Path, board: str) -> Path:
 
 
 @pytest.fixture
-def emulator(board: str, firmware: Path):
+def emulator(board: str, firmware: Path) -> Iterator[Emulator]:
     with Emulator(board, firmware) as running:
         yield running
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pelorus.frames import Kind
+from pelorus.frames import Kind, Pose
 from pelorus.robot.compare import Comparison, desktop_poses, digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.stream import Streamer
@@ -16,7 +16,7 @@ SLOTS = 32
 FLOAT64_BOARD = "mps2_an500"
 
 
-def board_poses(board: str, image: Path, recording: Path):
+def board_poses(board: str, image: Path, recording: Path) -> list[Pose]:
     messages = [frame.message for frame in read_file(recording)[0]]
     with Emulator(board, image) as emulator:
         link = emulator.connect()
@@ -27,7 +27,7 @@ def board_poses(board: str, image: Path, recording: Path):
     return outcome.poses
 
 
-def desktop_all_equal(request: pytest.FixtureRequest, recording: Path, program: str):
+def desktop_all_equal(request: pytest.FixtureRequest, recording: Path, program: str) -> list[Pose]:
     """The poses on which every build of the desktop's replay agrees."""
     folders = request.config.getoption("--desktops")
     assert folders, "run.sh names the desktop builds"
@@ -37,7 +37,7 @@ def desktop_all_equal(request: pytest.FixtureRequest, recording: Path, program: 
     return poses[0]
 
 
-def same_bits(desktop, board_answer) -> None:
+def same_bits(desktop: list[Pose], board_answer: list[Pose]) -> None:
     comparison = Comparison(desktop, board_answer)
     assert comparison.first_difference is None
     assert comparison.equal

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -53,7 +54,7 @@ class Console:
 
 
 @pytest.fixture
-def console(board: str, robot: Path):
+def console(board: str, robot: Path) -> Iterator[Console]:
     with Emulator(board, robot / "images" / f"bringup-{board}.elf") as emulator:
         link = emulator.connect()
         console = Console(link)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import random
 import time
+from collections.abc import Iterator
 
 import pytest
 from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo, Text, Twist
@@ -23,7 +24,7 @@ BOOT_S = 3.0
 
 
 @pytest.fixture
-def link(emulator: Emulator):
+def link(emulator: Emulator) -> Iterator[Link]:
     connected = emulator.connect()
     yield connected
     connected.close()

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from pelorus.frames import BodyAxes, Header, Message, Pose
 from pelorus.robot.emulator import Emulator
@@ -14,6 +17,8 @@ from recordings import first_frames
 from scipy.spatial.transform import Rotation
 
 common = pytest.importorskip("pymavlink.dialects.v20.common", reason="pymavlink is not installed")
+
+Matrix = npt.NDArray[np.float64]
 
 FRAMES = 30
 TURNS = {
@@ -24,7 +29,9 @@ FLOAT32 = 2e-6
 EULER_STEP = 1e-6
 
 
-def fly(emulator: Emulator, messages: list[Message], axes: BodyAxes):
+def fly(
+    emulator: Emulator, messages: list[Message], axes: BodyAxes
+) -> tuple[list[Pose], list[Any]]:
     """Poses from the link, and what an autopilot makes of the second UART's bytes."""
     second = emulator.connect_telemetry()
     link = emulator.connect()
@@ -45,21 +52,21 @@ def fly(emulator: Emulator, messages: list[Message], axes: BodyAxes):
     return streamer.outcome.poses, odometries
 
 
-def symmetric(upper: list[float]):
+def symmetric(upper: list[float]) -> Matrix:
     """A 6x6 from its upper triangle, row by row."""
     full = np.zeros((6, 6))
     full[np.triu_indices(6)] = upper
     return full + np.triu(full, 1).T
 
 
-def symmetric_from_lower(packed):
+def symmetric_from_lower(packed: Sequence[float]) -> Matrix:
     """A 6x6 from its lower triangle, row by row."""
     full = np.zeros((6, 6))
     full[np.tril_indices(6)] = packed
     return full + np.tril(full, -1).T
 
 
-def euler_jacobian(R):
+def euler_jacobian(R: Matrix) -> Matrix:
     """d(roll, pitch, yaw) / d theta for R Exp(theta), by differences."""
     columns = []
     for axis in np.eye(3):
@@ -71,7 +78,7 @@ def euler_jacobian(R):
     return np.array(columns).T
 
 
-def close(found, expected) -> None:
+def close(found: Any, expected: Matrix) -> None:
     """Equal to float32, measured by the largest element."""
     scale = max(1e-12, float(np.abs(expected).max()))
     np.testing.assert_allclose(found, expected, rtol=0, atol=FLOAT32 * scale)
