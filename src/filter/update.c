@@ -91,11 +91,12 @@ static void count_seen(plr_filter *f, unsigned n) {
         }
 }
 
-/* Asks the map source for the ids that the state does not hold. */
+/* Asks the map source for the ids that the state does not hold. What it does not know is for
+ * initialise_new to count, and in slam what finds no slot is too. */
 static void adopt_known(plr_filter *f, const plr_observation *seen, unsigned n,
                         plr_frame_events *events, plr_report *report) {
-    const bool asks = f->config.mode == PLR_MODE_LOCALIZATION ||
-                      (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
+    const bool alone = f->config.mode == PLR_MODE_LOCALIZATION;
+    const bool asks = alone || (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
     if (!asks || !f->map.source)
         return;
     bool moved = false;
@@ -105,12 +106,10 @@ static void adopt_known(plr_filter *f, const plr_observation *seen, unsigned n,
         plr_new_landmark landmark;
         if (f->work.slot_of[k] != PLR_NO_SLOT || !f->map.source(f->map.context, id, &known))
             continue;
-        if (!plr_landmark_is_valid(&known) || !f->model->adopt(f, &known, &landmark)) {
-            report->poor++;
+        if (!plr_landmark_is_valid(&known) || !f->model->adopt(f, &known, &landmark))
             continue;
-        }
         if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
-            report->no_room++;
+            report->no_room = (uint16_t)(report->no_room + alone);
             continue;
         }
         plr_slots_append(f, id, true, &landmark);
@@ -133,6 +132,9 @@ static bool position_before(const void *context, uint16_t a, uint16_t b) {
     return a < b;
 }
 
+/* In work.gain, where an accepted observation has a positive number. */
+#define REJECTED PLR_R(-1)
+
 /* work.used: the positions in order that pass the gate, at most `budget` of them: those with the
  * largest gain, ties to the lower id. */
 static unsigned gate_all(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
@@ -147,6 +149,7 @@ static unsigned gate_all(plr_filter *f, const plr_frame *frame, unsigned n, plr_
         if (!verdict.accepted) {
             report->gated++;
             f->slots[slot].times_gated++;
+            w->gain[k] = REJECTED;
             continue;
         }
         w->gain[k] = verdict.gain;
@@ -208,19 +211,19 @@ static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
         plr_slots_append(f, o->id, false, &landmark);
         report->created++;
     }
+    if (!makes) /* those that found no slot are counted as such already */
+        report->poor = (uint16_t)(report->poor - report->no_room);
 }
 
 /* ---------------------------------------------------------------- the frame */
 
 /* Drops the landmarks that the gate rejected in this frame: it has been wrong about them for too
  * long. Their observations count as new ones. */
-static void unlock(plr_filter *f, const plr_frame *frame, unsigned n, unsigned used) {
+static void unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_workspace *w = &f->work;
-    for (unsigned k = 0, next = 0; k < n; k++) {
-        const bool was_used = next < used && w->used[next] == k;
-        if (was_used)
-            next++;
-        else if (w->slot_of[k] != PLR_NO_SLOT)
+    for (unsigned k = 0; k < n; k++) {
+        const bool was_rejected = w->slot_of[k] != PLR_NO_SLOT && w->gain[k] < 0;
+        if (was_rejected)
             plr_slots_remove(f, plr_slots_find(f, frame->observations[w->order[k]].id));
     }
     for (unsigned k = 0; k < n; k++)
@@ -243,7 +246,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     if (!f->diverged) {
         events.locked = plr_health_gate_is_locked(f, report);
         if (events.locked)
-            unlock(f, frame, n, used);
+            unlock(f, frame, n);
         initialise_new(f, frame, n, &events, report);
     }
     plr_health_judge(f, &events, report);

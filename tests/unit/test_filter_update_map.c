@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: MIT
+/* Which landmarks a frame makes, evicts, drops and takes from a map. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "support/matrices.h"
+#include "support/rig.h"
+#include "support/specimens.h"
+
+enum { MOST = 64 };
+
+static plr_observation seen[MOST];
+static plr_landmark handed[MOST];
+static unsigned handed_over, asked;
+static int answer;         /* of the sink */
+static double known_sigma; /* of the source */
+
+static int sink(void *context, const plr_landmark *landmark) {
+    (void)context;
+    handed[handed_over++ % MOST] = *landmark;
+    return answer;
+}
+
+/* A map of every landmark with an even id. */
+static bool source(void *context, uint32_t id, plr_landmark *landmark) {
+    const scene *world = context;
+    asked++;
+    if (id % 2)
+        return false;
+    memset(landmark, 0, sizeof *landmark);
+    landmark->id = id;
+    memcpy(landmark->p_W_m, scene_landmark(world, id), sizeof landmark->p_W_m);
+    for (int i = 0; i < 3; i++)
+        landmark->P_W_m2[4 * i] = known_sigma * known_sigma;
+    return true;
+}
+
+void setUp(void) {
+    handed_over = asked = 0;
+    answer = 0;
+    known_sigma = 0.05;
+    rig_set_up();
+    rig.map = (plr_map){.context = &rig.world, .sink = sink};
+    rig_begin();
+}
+
+void tearDown(void) {
+}
+
+static plr_frame look(void) {
+    plr_frame frame = scene_look(&rig.world);
+    memcpy(seen, frame.observations, frame.count * sizeof *seen);
+    frame.observations = seen;
+    return frame;
+}
+
+static plr_status update(const plr_frame *frame) {
+    return plr_filter_update(&rig.filter, frame, &rig.report);
+}
+
+static bool holds(uint32_t id) {
+    for (unsigned slot = 0; slot < rig.filter.count; slot++)
+        if (rig.filter.slots[slot].id == id)
+            return true;
+    return false;
+}
+
+/* ---------------------------------------------------------------- worth a landmark */
+
+/* Whether an observation of that disparity and row gap makes a landmark: fx b = 120 px m. */
+static bool makes(double disparity_px, double row_gap_px) {
+    seen[0] =
+        (plr_observation){7, 400, 300, (float)(400 - disparity_px), (float)(300 + row_gap_px)};
+    const plr_frame frame = {1000000000, PLR_NO_BUDGET, 1, seen};
+    rig_begin();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(1, rig.report.created + rig.report.poor);
+    TEST_ASSERT_TRUE(specimen_gives_finite_numbers(&rig.filter));
+    return rig.report.created == 1;
+}
+
+static void test_without_disparity_there_is_no_landmark(void) {
+    TEST_ASSERT_TRUE(makes(10, 0));
+    TEST_ASSERT_FALSE(makes(0, 0));
+    TEST_ASSERT_FALSE(makes(-5, 0));
+    TEST_ASSERT_FALSE(makes(-300, 0));
+    rig.config.min_disparity_px = 0; /* even then */
+    TEST_ASSERT_FALSE(makes(0, 0));
+    TEST_ASSERT_FALSE(makes(-1, 0));
+}
+
+static void test_each_limit_of_a_new_landmark_holds(void) {
+    rig.config.min_disparity_px = 3;
+    TEST_ASSERT_TRUE(makes(3, 0));
+    TEST_ASSERT_FALSE(makes(2.9, 0));
+    rig.config.min_disparity_px = 0;
+    rig.config.max_depth_m = 20;
+    TEST_ASSERT_TRUE(makes(6.01, 0));
+    TEST_ASSERT_FALSE(makes(5.99, 0));
+    rig.config.max_depth_m = 0;
+    TEST_ASSERT_TRUE(makes(0.5, 0)); /* 240 m */
+    rig.config.min_depth_m = 0.5;
+    TEST_ASSERT_TRUE(makes(239, 0));
+    TEST_ASSERT_FALSE(makes(241, 0));
+    rig.config.max_range_m = 100;
+    TEST_ASSERT_FALSE(makes(1.19, 0));
+    TEST_ASSERT_TRUE(makes(1.21, 0));
+    rig.config.max_row_gap_px = 1.5;
+    TEST_ASSERT_TRUE(makes(10, 1.5));
+    TEST_ASSERT_FALSE(makes(10, -1.6));
+    rig.config.max_row_gap_px = 0; /* no limit */
+    TEST_ASSERT_TRUE(makes(10, 50));
+}
+
+static void test_a_new_landmark_lies_where_its_pixels_say(void) {
+    plr_landmark landmark;
+    TEST_ASSERT_TRUE(makes(12, 0)); /* 10 m */
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&rig.filter, 0, &landmark));
+    const plr_calibration *c = &rig.calibration;
+    const double q[3] = {(400 - c->cx_px) / c->fx_px * 10, (300 - c->cy_px) / c->fy_px * 10, 10};
+    for (int i = 0; i < 3; i++) {
+        double expected = 0;
+        for (int j = 0; j < 3; j++)
+            expected += c->T_CB.R[3 * j + i] * (q[j] - c->T_CB.p[j]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, expected, landmark.p_W_m[i]);
+    }
+    TEST_ASSERT_EQUAL_UINT32(7, landmark.id);
+    TEST_ASSERT_EQUAL_UINT32(1, landmark.times_seen);
+    TEST_ASSERT_FALSE(landmark.known);
+    /* depth: sigma = z^2 / (fx b) sqrt(2) s, forward in the body */
+    const double sigma = 100 / 120.0 * sqrt(2) * rig.config.pixel_sigma_px;
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * sigma, sigma, sqrt(landmark.P_W_m2[0]));
+}
+
+/* ---------------------------------------------------------------- room */
+
+static void test_new_ids_beyond_the_slots_are_taken_from_the_lowest(void) {
+    rig.config.slots = 6;
+    rig_begin();
+    plr_frame frame = look();
+    TEST_ASSERT_GREATER_THAN_UINT(9, frame.count);
+    for (unsigned i = 0; i < frame.count; i++) { /* the ids descend */
+        seen[i].id = 1000 - i;
+        seen[i].vR_px = seen[i].vL_px;
+    }
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(6, rig.report.created);
+    TEST_ASSERT_EQUAL_UINT(frame.count - 6, rig.report.no_room);
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_NO_ROOM);
+    for (uint32_t i = 0; i < 6; i++)
+        TEST_ASSERT_TRUE(holds(1001U - frame.count + i));
+    TEST_ASSERT_EQUAL_UINT(0, handed_over); /* what this frame has seen is never evicted */
+}
+
+static void test_a_full_ring_hands_the_oldest_to_the_sink(void) {
+    rig.config.slots = 10;
+    rig_begin();
+    for (unsigned k = 0; k < 60 && handed_over == 0; k++) {
+        (void)plr_filter_trace(&rig.filter);
+        rig_remember();
+        rig_drive(1);
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(0, handed_over);
+    TEST_ASSERT_EQUAL_UINT(handed_over, rig.report.evicted);
+    TEST_ASSERT_EQUAL_UINT(10, rig.filter.count);
+    /* none in the ring was unseen for longer than the one that left */
+    const plr_time_ns left = handed[0].last_seen_ns;
+    TEST_ASSERT_FALSE(holds(handed[0].id));
+    for (unsigned slot = 0; slot < rig.filter.count; slot++)
+        TEST_ASSERT_TRUE(rig.filter.slots[slot].last_seen_ns >= left);
+    /* and it left with its place in the world, which `body` keeps by the camera */
+    const double *truth = scene_landmark(&rig.world, handed[0].id);
+    for (int i = 0; i < 3; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(5 * sqrt(handed[0].P_W_m2[4 * i]) + 0.01, truth[i],
+                                  handed[0].p_W_m[i]);
+}
+
+static void test_a_sink_that_fails_keeps_the_landmark_and_is_reported(void) {
+    unsigned failures = 0;
+    rig.config.slots = 10;
+    rig_begin();
+    answer = 1;
+    for (unsigned k = 0; k < 40; k++) {
+        handed_over = 0;
+        rig_drive(1);
+        TEST_ASSERT_EQUAL_UINT(0, rig.report.evicted);
+        TEST_ASSERT_EQUAL(handed_over > 0, (rig.report.reasons & PLR_REASON_SINK_FAILED) != 0);
+        failures += handed_over;
+        for (unsigned i = 0; i < handed_over && i < MOST; i++)
+            TEST_ASSERT_TRUE(holds(handed[i].id));
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(0, failures);
+}
+
+static void test_an_id_that_returns_is_a_new_landmark(void) {
+    rig.config.slots = 1;
+    rig_begin();
+    seen[0] = (plr_observation){1, 400, 300, 390, 300};
+    plr_frame frame = {1000000000, PLR_NO_BUDGET, 1, seen};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    seen[0].id = 2;
+    frame.t_ns += 1000000;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(1, rig.report.evicted);
+    seen[0].id = 1;
+    frame.t_ns += 1000000;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(0, rig.report.matched);
+    TEST_ASSERT_EQUAL_UINT(1, rig.report.created);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.filter.slots[0].times_seen);
+}
+
+/* ---------------------------------------------------------------- the locked gate */
+
+/* Frames in which eight of ten landmarks stand far from where they were. */
+static void lock_gate(unsigned frames, uint16_t budget) {
+    for (unsigned k = 0; k < frames; k++) {
+        rig.world.t_ns += 10000000;
+        plr_frame frame = look();
+        frame.count = 10;
+        frame.budget = budget;
+        for (unsigned i = 2; i < 10; i++)
+            seen[i].uL_px -= 60;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    }
+}
+
+static void begin_with_ten_landmarks(void) {
+    rig.options.pixel_sigma_px = 0;
+    rig.config.max_row_gap_px = 0;
+    rig.config.min_disparity_px = 0;
+    rig_begin();
+    plr_frame frame = look();
+    frame.count = 10;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(10, rig.report.created);
+}
+
+static void test_a_locked_gate_drops_what_it_rejects_and_keeps_the_pose(void) {
+    begin_with_ten_landmarks();
+    lock_gate(9, PLR_NO_BUDGET);
+    TEST_ASSERT_EQUAL_UINT(8, rig.report.gated);
+    TEST_ASSERT_EQUAL_UINT(10, rig.filter.count);
+    TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_GATE_LOCKED);
+    lock_gate(1, PLR_NO_BUDGET);
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_GATE_LOCKED);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST, rig.report.health);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.filter.totals.locks);
+    TEST_ASSERT_EQUAL_UINT(0, handed_over); /* they were wrong: the map does not want them */
+    TEST_ASSERT_TRUE(holds(seen[0].id) && holds(seen[1].id));
+    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+        const bool kept =
+            rig.filter.slots[slot].id == seen[0].id || rig.filter.slots[slot].id == seen[1].id;
+        TEST_ASSERT_EQUAL_UINT32(kept ? 11 : 1, rig.filter.slots[slot].times_seen);
+    }
+    TEST_ASSERT_EQUAL_UINT(rig.report.created + 2, rig.filter.count); /* anew, where they can be */
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, P[0]);
+}
+
+static void test_a_locked_gate_keeps_what_the_budget_left_out(void) {
+    begin_with_ten_landmarks();
+    lock_gate(10, 1);
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_GATE_LOCKED);
+    TEST_ASSERT_EQUAL_UINT(1, rig.report.left_out);
+    TEST_ASSERT_TRUE(holds(seen[0].id) && holds(seen[1].id));
+    for (unsigned slot = 0; slot < rig.filter.count; slot++)
+        if (rig.filter.slots[slot].id == seen[0].id || rig.filter.slots[slot].id == seen[1].id)
+            TEST_ASSERT_EQUAL_UINT32(11, rig.filter.slots[slot].times_seen);
+}
+
+static void test_an_open_gate_is_reported_as_inert_after_a_thousand_matches(void) {
+    rig.config.gate_d2 = 1e6;
+    rig.options.landmarks = 400;
+    rig_begin();
+    bool inert = false;
+    while (rig.filter.totals.matched < 1000) {
+        TEST_ASSERT_FALSE(inert);
+        rig_drive(1);
+        inert = rig.report.reasons & PLR_REASON_GATE_INERT;
+    }
+    TEST_ASSERT_TRUE(inert);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health); /* nothing is worse for it */
+}
+
+/* ---------------------------------------------------------------- known landmarks */
+
+static void begin_with_map(plr_mode mode, bool known_map) {
+    rig.config.mode = (uint8_t)mode;
+    rig.config.known_map = known_map;
+    rig.map.source = source;
+    rig_begin();
+}
+
+static unsigned even_ids(const plr_frame *frame) {
+    unsigned count = 0;
+    for (unsigned i = 0; i < frame->count; i++)
+        count += frame->observations[i].id % 2 == 0;
+    return count;
+}
+
+static void test_localization_takes_its_landmarks_from_the_map_alone(void) {
+    begin_with_map(PLR_MODE_LOCALIZATION, false);
+    plr_frame frame = look();
+    const unsigned even = even_ids(&frame);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(even, rig.report.created);
+    TEST_ASSERT_EQUAL_UINT(even, rig.report.matched); /* and used at once */
+    TEST_ASSERT_EQUAL_UINT(frame.count - even, rig.report.poor);
+    TEST_ASSERT_EQUAL_UINT(0, rig.report.no_room);
+    for (unsigned slot = 0; slot < rig.filter.count; slot++) {
+        plr_landmark landmark;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&rig.filter, slot, &landmark));
+        TEST_ASSERT_TRUE(landmark.known);
+        TEST_ASSERT_EQUAL_UINT32(1, landmark.times_seen);
+        TEST_ASSERT_EQUAL_UINT32(0, landmark.id % 2);
+    }
+    asked = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(frame.count - even, asked); /* those in the state are not asked for */
+}
+
+static void test_a_map_holds_the_pose_where_it_is(void) {
+    begin_with_map(PLR_MODE_LOCALIZATION, false);
+    rig_drive(100);
+    plr_pose pose;
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    for (int i = 0; i < 3; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(0.2, rig.world.T_WB[4 * i + 3], pose.p[i]);
+    TEST_ASSERT_TRUE(P[0] + P[7] + P[14] < 0.05 * 0.05); /* bounded by the map's own */
+}
+
+static void test_slam_asks_the_map_only_if_told_to(void) {
+    begin_with_map(PLR_MODE_SLAM, false);
+    rig_drive(3);
+    TEST_ASSERT_EQUAL_UINT(0, asked);
+    begin_with_map(PLR_MODE_SLAM, true);
+    plr_frame frame = look();
+    for (unsigned i = 0; i < frame.count; i++)
+        seen[i].vR_px = seen[i].vL_px; /* so that none is poor */
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(frame.count, rig.report.created); /* both kinds, side by side */
+    TEST_ASSERT_EQUAL_UINT(even_ids(&frame), rig.report.matched);
+    for (unsigned slot = 0; slot < rig.filter.count; slot++)
+        TEST_ASSERT_EQUAL_UINT8(rig.filter.slots[slot].id % 2 == 0, rig.filter.slots[slot].known);
+}
+
+/* Each observation stands in one count: a new id either found a slot, or had no room, or is unknown. */
+static void test_counts_add_up_where_the_map_is_larger_than_the_ring(void) {
+    rig.config.slots = 4;
+    begin_with_map(PLR_MODE_LOCALIZATION, false);
+    plr_frame frame = look();
+    const unsigned even = even_ids(&frame);
+    TEST_ASSERT_GREATER_THAN_UINT(4, even);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(4, rig.report.matched);
+    TEST_ASSERT_EQUAL_UINT(even - 4, rig.report.no_room);
+    TEST_ASSERT_EQUAL_UINT(frame.count - even, rig.report.poor);
+
+    begin_with_map(PLR_MODE_SLAM, true);
+    for (unsigned i = 0; i < frame.count; i++)
+        seen[i].vR_px = seen[i].vL_px;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(4, rig.report.matched);
+    TEST_ASSERT_EQUAL_UINT(frame.count - 4, rig.report.no_room);
+    TEST_ASSERT_EQUAL_UINT(0, rig.report.poor);
+}
+
+static void test_a_map_entry_that_is_none_is_not_taken(void) {
+    known_sigma = (double)NAN;
+    begin_with_map(PLR_MODE_LOCALIZATION, false);
+    plr_frame frame = look();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(0, rig.filter.count);
+    TEST_ASSERT_EQUAL_UINT(frame.count, rig.report.poor);
+
+    begin_with_map(PLR_MODE_SLAM, true); /* where the pixels do instead */
+    for (unsigned i = 0; i < frame.count; i++)
+        seen[i].vR_px = seen[i].vL_px;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(frame.count, rig.report.created);
+    TEST_ASSERT_EQUAL_UINT(0, rig.report.poor);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_without_disparity_there_is_no_landmark);
+    RUN_TEST(test_each_limit_of_a_new_landmark_holds);
+    RUN_TEST(test_a_new_landmark_lies_where_its_pixels_say);
+    RUN_TEST(test_new_ids_beyond_the_slots_are_taken_from_the_lowest);
+    RUN_TEST(test_a_full_ring_hands_the_oldest_to_the_sink);
+    RUN_TEST(test_a_sink_that_fails_keeps_the_landmark_and_is_reported);
+    RUN_TEST(test_an_id_that_returns_is_a_new_landmark);
+    RUN_TEST(test_a_locked_gate_drops_what_it_rejects_and_keeps_the_pose);
+    RUN_TEST(test_a_locked_gate_keeps_what_the_budget_left_out);
+    RUN_TEST(test_an_open_gate_is_reported_as_inert_after_a_thousand_matches);
+    RUN_TEST(test_localization_takes_its_landmarks_from_the_map_alone);
+    RUN_TEST(test_a_map_holds_the_pose_where_it_is);
+    RUN_TEST(test_slam_asks_the_map_only_if_told_to);
+    RUN_TEST(test_counts_add_up_where_the_map_is_larger_than_the_ring);
+    RUN_TEST(test_a_map_entry_that_is_none_is_not_taken);
+    return UNITY_END();
+}
