@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -59,7 +58,7 @@ def symmetric(upper: list[float]) -> Matrix:
     return full + np.triu(full, 1).T
 
 
-def symmetric_from_lower(packed: Sequence[float]) -> Matrix:
+def symmetric_from_lower(packed: Matrix) -> Matrix:
     """A 6x6 from its lower triangle, row by row."""
     full = np.zeros((6, 6))
     full[np.tril_indices(6)] = packed
