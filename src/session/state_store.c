@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: MIT
+/* Two slots on a block device. A slot: header, padded to whole program units; the state, padded
+ * likewise. The header is programmed last: it is what makes a save one. */
+#include "pelorus/state_store.h"
+
+#include <string.h>
+
+#include "session/state_header.h"
+
+/* ---------------------------------------------------------------- geometry */
+
+static uint32_t rounded_up(uint32_t n, uint32_t unit) {
+    return (n + unit - 1) / unit * unit;
+}
+
+/* Bytes of the header with its padding: at most one buffer. */
+static uint32_t header_space(const plr_state_store *store) {
+    return rounded_up(PLR_STORE_HEADER, store->device.program_size);
+}
+
+/* Bytes of a slot that must be erased for a state of that length. */
+static uint32_t occupied(const plr_state_store *store, uint32_t length) {
+    return rounded_up(header_space(store) + length, store->device.erase_size);
+}
+
+static uint32_t slot_start(const plr_state_store *store, unsigned slot) {
+    return slot * store->slot_size;
+}
+
+plr_status plr_state_store_init(plr_state_store *store, const plr_block_device *device) {
+    if (!store || !device || !device->read || !device->program || !device->erase)
+        return PLR_E_ARGUMENT;
+    const uint32_t unit = device->program_size, block = device->erase_size;
+    if (unit < 1 || unit > PLR_STORE_BUFFER || block < 1 || block % unit != 0 ||
+        device->size % block != 0)
+        return PLR_E_ARGUMENT;
+    memset(store, 0, sizeof *store);
+    store->device = *device;
+    store->slot_size = device->size / block / PLR_STORE_SLOTS * block;
+    return store->slot_size > header_space(store) ? PLR_OK : PLR_E_FULL;
+}
+
+uint32_t plr_state_store_needs(const plr_state_store *store, const plr_filter *f) {
+    const plr_config *config = plr_filter_config(f);
+    const uint32_t length = config ? plr_filter_saved_size(f, config->slots) : 0;
+    return store && length > 0 ? PLR_STORE_SLOTS * occupied(store, length) : 0;
+}
+
+/* ---------------------------------------------------------------- looking */
+
+static bool reads(const plr_state_store *store, uint32_t offset, uint8_t *bytes, uint32_t n) {
+    return store->device.read(store->device.context, offset, bytes, n) == 0;
+}
+
+/* CRC of n bytes at an offset of the device; false if they cannot be read. */
+static bool reads_crc(plr_state_store *store, uint32_t offset, uint32_t n, uint32_t *crc) {
+    *crc = 0;
+    while (n > 0) {
+        const uint32_t piece = n < PLR_STORE_BUFFER ? n : PLR_STORE_BUFFER;
+        if (!reads(store, offset, store->buffer, piece))
+            return false;
+        *crc = plr_crc32(*crc, store->buffer, piece);
+        offset += piece;
+        n -= piece;
+    }
+    return true;
+}
+
+/* What one slot holds. PLR_OK a whole state; PLR_E_FOREIGN a whole header of another version, of
+ * which only the generation is known; PLR_E_NOT_READY nothing; PLR_E_CORRUPT; PLR_E_IO. */
+static plr_status look_into(plr_state_store *store, unsigned slot, plr_state_header *header) {
+    uint8_t bytes[PLR_STORE_HEADER];
+    uint32_t crc;
+    if (!reads(store, slot_start(store, slot), bytes, sizeof bytes))
+        return PLR_E_IO;
+    const plr_status status = plr_state_header_read(bytes, header);
+    if (status != PLR_OK)
+        return status;
+    if (header->length == 0 || header->length > store->slot_size - header_space(store))
+        return PLR_E_CORRUPT;
+    if (!reads_crc(store, slot_start(store, slot) + header_space(store), header->length, &crc))
+        return PLR_E_IO;
+    return crc == header->crc ? PLR_OK : PLR_E_CORRUPT;
+}
+
+/* Both slots, and which of them is the newest whole one. */
+typedef struct plr_store_view {
+    plr_status status[PLR_STORE_SLOTS];
+    plr_state_header header[PLR_STORE_SLOTS];
+    int newest; /* slot, or -1 */
+} plr_store_view;
+
+static bool is_whole(plr_status status) {
+    return status == PLR_OK || status == PLR_E_FOREIGN;
+}
+
+static void look_around(plr_state_store *store, plr_store_view *view) {
+    view->newest = -1;
+    for (int slot = 0; slot < PLR_STORE_SLOTS; slot++) {
+        view->status[slot] = look_into(store, (unsigned)slot, &view->header[slot]);
+        if (is_whole(view->status[slot]) &&
+            (view->newest < 0 ||
+             view->header[slot].generation > view->header[view->newest].generation))
+            view->newest = slot;
+    }
+}
+
+/* ---------------------------------------------------------------- save */
+
+/* A save in progress. */
+typedef struct plr_store_writer {
+    plr_state_store *store;
+    uint32_t at; /* offset of the device at which the buffer will be programmed */
+    uint32_t fill;
+    uint32_t room; /* bytes of the buffer that are whole program units */
+    uint32_t length, crc;
+} plr_store_writer;
+
+static bool programs(const plr_state_store *store, uint32_t offset, uint32_t n) {
+    return store->device.program(store->device.context, offset, store->buffer, n) == 0;
+}
+
+/* Programs the buffer, padded with zeros to whole units. */
+static bool flushes(plr_store_writer *writer) {
+    plr_state_store *store = writer->store;
+    const uint32_t n = rounded_up(writer->fill, store->device.program_size);
+    memset(store->buffer + writer->fill, 0, n - writer->fill);
+    if (n > 0 && !programs(store, writer->at, n))
+        return false;
+    writer->at += n;
+    writer->fill = 0;
+    return true;
+}
+
+/* A plr_state_sink. */
+static int take(void *context, const uint8_t *bytes, uint32_t n) {
+    plr_store_writer *writer = context;
+    writer->crc = plr_crc32(writer->crc, bytes, n);
+    writer->length += n;
+    while (n > 0) {
+        const uint32_t room = writer->room - writer->fill;
+        const uint32_t piece = n < room ? n : room;
+        memcpy(writer->store->buffer + writer->fill, bytes, piece);
+        writer->fill += piece;
+        bytes += piece;
+        n -= piece;
+        if (writer->fill == writer->room && !flushes(writer))
+            return -1;
+    }
+    return 0;
+}
+
+/* Block by block from the start: the old header goes first. */
+static bool erases(const plr_state_store *store, uint32_t offset, uint32_t n) {
+    const uint32_t block = store->device.erase_size;
+    for (uint32_t done = 0; done < n; done += block)
+        if (store->device.erase(store->device.context, offset + done, block) != 0)
+            return false;
+    return true;
+}
+
+static bool programs_header(plr_state_store *store, unsigned slot, const plr_state_header *header) {
+    uint8_t back[PLR_STORE_HEADER];
+    memset(store->buffer, 0, header_space(store));
+    plr_state_header_write(store->buffer, header);
+    return programs(store, slot_start(store, slot), header_space(store)) &&
+           reads(store, slot_start(store, slot), back, sizeof back) &&
+           memcmp(back, store->buffer, sizeof back) == 0;
+}
+
+static plr_status write_slot(plr_state_store *store, unsigned slot, uint64_t generation,
+                             const plr_filter *f) {
+    const uint32_t unit = store->device.program_size;
+    const uint32_t start = slot_start(store, slot), state = start + header_space(store);
+    plr_store_writer writer = {.store = store, .at = state, .room = PLR_STORE_BUFFER / unit * unit};
+    uint32_t crc;
+    if (!erases(store, start, occupied(store, plr_filter_saved_size(f, f->count))))
+        return PLR_E_IO;
+    const plr_status status = plr_filter_save(f, take, &writer);
+    if (status != PLR_OK)
+        return status;
+    if (!flushes(&writer) || !reads_crc(store, state, writer.length, &crc) || crc != writer.crc)
+        return PLR_E_IO;
+    const plr_state_header header = {generation, writer.length, writer.crc};
+    return programs_header(store, slot, &header) ? PLR_OK : PLR_E_IO;
+}
+
+plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f) {
+    plr_store_view view;
+    if (!store)
+        return PLR_E_ARGUMENT;
+    const plr_status status = plr_filter_save(f, NULL, NULL);
+    if (status != PLR_OK)
+        return status;
+    if (plr_state_store_needs(store, f) > PLR_STORE_SLOTS * store->slot_size)
+        return PLR_E_FULL;
+    look_around(store, &view);
+    if (view.newest < 0)
+        return write_slot(store, view.status[0] == PLR_E_IO ? 1 : 0, 1, f);
+    return write_slot(store, view.newest == 0 ? 1 : 0, view.header[view.newest].generation + 1, f);
+}
+
+/* ---------------------------------------------------------------- restore */
+
+/* A restore in progress: the CRC is taken once more, of the very bytes that the filter takes. */
+typedef struct plr_store_reader {
+    const plr_state_store *store;
+    uint32_t state; /* where the state begins on the device */
+    uint32_t crc;
+} plr_store_reader;
+
+/* A plr_state_source. */
+static int give(void *context, uint32_t offset, uint8_t *bytes, uint32_t n) {
+    plr_store_reader *reader = context;
+    if (!reads(reader->store, reader->state + offset, bytes, n))
+        return -1;
+    reader->crc = plr_crc32(offset == 0 ? 0 : reader->crc, bytes, n);
+    return 0;
+}
+
+static plr_status read_slot(plr_state_store *store, unsigned slot, const plr_state_header *header,
+                            plr_filter *f) {
+    plr_store_reader reader = {.store = store,
+                               .state = slot_start(store, slot) + header_space(store)};
+    const plr_status status = plr_filter_restore(f, header->length, give, &reader);
+    if (status != PLR_OK || reader.crc == header->crc)
+        return status;
+    (void)plr_filter_reset(f);
+    return PLR_E_CORRUPT;
+}
+
+/* Why there is no whole state: the worst that was found. */
+static plr_status nothing_found(const plr_store_view *view) {
+    plr_status worst = PLR_E_NOT_READY;
+    for (unsigned slot = 0; slot < PLR_STORE_SLOTS; slot++)
+        if (view->status[slot] == PLR_E_IO || worst == PLR_E_NOT_READY)
+            worst = view->status[slot];
+    return worst;
+}
+
+plr_status plr_state_store_restore(plr_state_store *store, plr_filter *f, plr_stored_state *found) {
+    plr_store_view view;
+    if (found)
+        memset(found, 0, sizeof *found);
+    if (!store || !f)
+        return PLR_E_ARGUMENT;
+    look_around(store, &view);
+    for (unsigned slot = 0; found && slot < PLR_STORE_SLOTS; slot++)
+        if (view.status[slot] == PLR_E_CORRUPT || view.status[slot] == PLR_E_IO)
+            found->damaged++;
+    if (view.newest < 0)
+        return nothing_found(&view);
+    const unsigned slot = (unsigned)view.newest;
+    if (view.status[slot] != PLR_OK)
+        return view.status[slot];
+    const plr_status status = read_slot(store, slot, &view.header[slot], f);
+    if (status == PLR_OK && found) {
+        found->generation = view.header[slot].generation;
+        found->slot = (uint8_t)slot;
+    }
+    return status;
+}

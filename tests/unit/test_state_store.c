@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+/* Two slots, a power cut, and what is there after the restart: the old state or the new one. */
+#include <string.h>
+#include <unity.h>
+
+#include "pelorus/state_store.h"
+#include "support/faulty_flash.h"
+#include "support/specimens.h"
+#include "support/state_bytes.h"
+
+enum { STATES = 4, LANDMARKS = 2, ERASE = 512, PROGRAM = 8 };
+
+static plr_filter filter, restored;
+static plr_state_store store;
+static faulty_flash flash, worn;
+static state_bytes states[STATES], back;
+static plr_stored_state found;
+
+/* The filter a moment later: state k of the test. */
+static void become(unsigned k) {
+    filter.t_ns = 1000000000u * (k + 1);
+    filter.p_WB[0] = k;
+    filter.slots[0].times_seen = 10 * k;
+    filter.P[0] = PLR_R(0.5) + (plr_real)k;
+}
+
+static void start_store(uint32_t size, uint32_t erase_size, uint32_t program_size) {
+    faulty_flash_init(&flash, 11, size, erase_size, program_size);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_init(&store, &flash.device));
+}
+
+void setUp(void) {
+    rng chance = rng_seeded(3);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
+    filter.config.slots = LANDMARKS;
+    memcpy(&restored, &filter, sizeof restored);
+    for (unsigned k = 0; k < STATES; k++) {
+        become(k);
+        state_bytes_save(&states[k], &filter);
+    }
+    start_store(FAULTY_FLASH_BYTES, ERASE, PROGRAM);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, flash.violations, "the device was used against port.h");
+}
+
+static plr_status save(unsigned k) {
+    become(k);
+    return plr_state_store_save(&store, &filter);
+}
+
+static void saves(unsigned k) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, save(k));
+}
+
+/* What a restart finds. */
+static plr_status restart(void) {
+    faulty_flash_restart(&flash);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_init(&store, &flash.device));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&restored));
+    return plr_state_store_restore(&store, &restored, &found);
+}
+
+/* The number of the state that the restored filter is, to the byte; STATES if it is none. */
+static unsigned restored_state(void) {
+    state_bytes_save(&back, &restored);
+    for (unsigned k = 0; k < STATES; k++)
+        if (state_bytes_same(&back, &states[k]))
+            return k;
+    return STATES;
+}
+
+static void restart_finds(unsigned k) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, restart());
+    TEST_ASSERT_EQUAL_UINT(k, restored_state());
+}
+
+/* ---------------------------------------------------------------- without faults */
+
+static void test_the_newest_state_comes_back(void) {
+    for (unsigned k = 0; k < STATES; k++) {
+        saves(k);
+        restart_finds(k);
+        TEST_ASSERT_EQUAL_UINT64(k + 1, found.generation);
+        TEST_ASSERT_EQUAL_UINT(k % 2, found.slot);
+        TEST_ASSERT_EQUAL_UINT(0, found.damaged);
+    }
+}
+
+static void test_a_new_device_holds_nothing(void) {
+    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, restart());
+    TEST_ASSERT_EQUAL_UINT64(0, found.generation);
+}
+
+static void test_the_slots_are_worn_alike(void) {
+    const unsigned second = store.slot_size / ERASE;
+    const unsigned before = flash.erases[0] + flash.erases[second];
+    for (unsigned i = 0; i < 10; i++)
+        saves(i % STATES);
+    TEST_ASSERT_EQUAL_UINT(0, before);
+    TEST_ASSERT_EQUAL_UINT(5, flash.erases[0]);
+    TEST_ASSERT_EQUAL_UINT(5, flash.erases[second]);
+}
+
+static void test_any_program_and_erase_size_will_do(void) {
+    const uint32_t programs[] = {1, 2, 3, 4, 8, 16, 28, 29, 64, 100, 255, 256};
+    for (unsigned i = 0; i < sizeof programs / sizeof *programs; i++)
+        for (unsigned blocks = 1; blocks <= 2; blocks++) {
+            const uint32_t erase_size = programs[i] * (blocks == 1 ? 1 : 32);
+            start_store(FAULTY_FLASH_BYTES / erase_size * erase_size, erase_size, programs[i]);
+            for (unsigned k = 0; k < STATES; k++)
+                saves(k);
+            restart_finds(STATES - 1);
+            TEST_ASSERT_EQUAL_UINT(0, flash.violations);
+        }
+}
+
+static void test_the_erased_value_does_not_matter(void) {
+    flash.erased_value = 0;
+    for (unsigned k = 0; k < STATES; k++) {
+        saves(k);
+        restart_finds(k);
+    }
+}
+
+static void test_saving_changes_no_bit_of_the_filter(void) {
+    become(1);
+    static plr_filter before;
+    memcpy(&before, &filter, sizeof before);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_save(&store, &filter));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof before);
+}
+
+/* ---------------------------------------------------------------- cuts */
+
+/* Cuts the power at every byte of the save of state k, after `saved` earlier ones, and restarts. */
+static void cut_everywhere(unsigned saved, faulty_flash_tear tear) {
+    unsigned olds = 0, news = 0;
+    for (unsigned k = 0; k < saved; k++)
+        saves(k);
+    memcpy(&worn, &flash, sizeof worn);
+    saves(saved);
+    const uint64_t work = flash.work - worn.work;
+    for (uint64_t cut = 0; cut <= work; cut++) {
+        memcpy(&flash, &worn, sizeof flash);
+        flash.random = rng_seeded(cut);
+        flash.tear = tear;
+        flash.power_left = (long)cut;
+        const plr_status status = save(saved);
+        TEST_ASSERT_EQUAL_INT(cut < work ? PLR_E_IO : PLR_OK, status);
+        const plr_status after = restart();
+        if (saved == 0 && after != PLR_OK) {
+            TEST_ASSERT_TRUE(after == PLR_E_NOT_READY || after == PLR_E_CORRUPT);
+            olds++;
+            continue;
+        }
+        TEST_ASSERT_EQUAL_INT(PLR_OK, after);
+        const unsigned state = restored_state();
+        TEST_ASSERT_TRUE(state == saved || (saved > 0 && state + 1 == saved));
+        TEST_ASSERT_TRUE(status != PLR_OK || state == saved);
+        olds += state != saved;
+        news += state == saved;
+        /* and the next save is as good as any */
+        if (cut % 64 == 0) {
+            saves(STATES - 1);
+            restart_finds(STATES - 1);
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(0, news);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(work - PROGRAM, olds);
+    TEST_ASSERT_EQUAL_UINT(0, flash.violations);
+}
+
+static void test_a_cut_in_the_first_save_leaves_nothing_or_the_whole(void) {
+    cut_everywhere(0, FAULTY_FLASH_HALF);
+}
+
+static void test_a_cut_in_the_second_save_leaves_the_first_or_the_second(void) {
+    cut_everywhere(1, FAULTY_FLASH_HALF);
+}
+
+static void test_a_cut_in_the_third_save_leaves_the_second_or_the_third(void) {
+    cut_everywhere(2, FAULTY_FLASH_HALF);
+}
+
+static void test_a_cut_that_leaves_the_byte_as_it_was_does_no_harm_either(void) {
+    cut_everywhere(2, FAULTY_FLASH_UNTOUCHED);
+}
+
+static void test_a_cut_that_leaves_noise_in_the_whole_unit_does_no_harm_either(void) {
+    cut_everywhere(2, FAULTY_FLASH_NOISE);
+}
+
+static void test_cut_after_cut_the_last_whole_state_stays(void) {
+    rng chance = rng_seeded(5);
+    saves(0);
+    for (unsigned i = 0; i < 300; i++) {
+        flash.tear = (faulty_flash_tear)rng_below(&chance, 3);
+        flash.power_left = (long)rng_below(&chance, 3 * ERASE);
+        TEST_ASSERT_EQUAL_INT(PLR_E_IO, save(1));
+        restart_finds(0);
+        TEST_ASSERT_EQUAL_UINT64(1, found.generation);
+    }
+    saves(2);
+    restart_finds(2);
+    TEST_ASSERT_EQUAL_UINT64(2, found.generation);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_the_newest_state_comes_back);
+    RUN_TEST(test_a_new_device_holds_nothing);
+    RUN_TEST(test_the_slots_are_worn_alike);
+    RUN_TEST(test_any_program_and_erase_size_will_do);
+    RUN_TEST(test_the_erased_value_does_not_matter);
+    RUN_TEST(test_saving_changes_no_bit_of_the_filter);
+    RUN_TEST(test_a_cut_in_the_first_save_leaves_nothing_or_the_whole);
+    RUN_TEST(test_a_cut_in_the_second_save_leaves_the_first_or_the_second);
+    RUN_TEST(test_a_cut_in_the_third_save_leaves_the_second_or_the_third);
+    RUN_TEST(test_a_cut_that_leaves_the_byte_as_it_was_does_no_harm_either);
+    RUN_TEST(test_a_cut_that_leaves_noise_in_the_whole_unit_does_no_harm_either);
+    RUN_TEST(test_cut_after_cut_the_last_whole_state_stays);
+    return UNITY_END();
+}
