@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+/* Going on after an interruption: on another clock, and perhaps from another place. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "support/scene.h"
+#include "support/specimens.h"
+
+static plr_filter filter, before;
+static scene world;
+static plr_config config;
+static plr_report report;
+
+void setUp(void) {
+    scene_options options;
+    scene_options_default(&options);
+    scene_start(&world, &options);
+    plr_config_default(&config);
+    config.pixel_sigma_px = 1;
+    config.velocity_sigma = 0.05;
+}
+
+void tearDown(void) {
+}
+
+static void start(void) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, NULL));
+}
+
+/* Drives; the filter's clock is `ahead_ns` ahead of the world's. */
+static void drive(unsigned frames, plr_time_ns ahead_ns) {
+    for (unsigned i = 0; i < frames; i++) {
+        for (unsigned k = 0; k < 5; k++) {
+            const plr_twist reading = scene_read(&world);
+            TEST_ASSERT_EQUAL_INT(PLR_OK,
+                                  plr_filter_predict(&filter, world.t_ns + ahead_ns, &reading));
+            scene_move(&world, 20000000);
+        }
+        plr_frame seen = scene_look(&world);
+        seen.t_ns += ahead_ns;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &seen, &report));
+    }
+}
+
+static double error_m(void) {
+    plr_pose estimate, truth;
+    scene_pose(&world, &truth);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &estimate));
+    return hypot(hypot(estimate.p[0] - truth.p[0], estimate.p[1] - truth.p[1]),
+                 estimate.p[2] - truth.p[2]);
+}
+
+static void diagonal(double P[36], double position, double rotation) {
+    memset(P, 0, 36 * sizeof *P);
+    for (unsigned i = 0; i < 6; i++)
+        P[7 * i] = i < 3 ? position : rotation;
+}
+
+static void test_a_clock_that_begins_anew_is_followed(void) {
+    const plr_twist reading = {{0}, {0}};
+    start();
+    drive(5, 3600000000000u);
+    const unsigned held = plr_filter_landmark_count(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_predict(&filter, world.t_ns, &reading));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, world.t_ns, NULL));
+    TEST_ASSERT_EQUAL_UINT64(world.t_ns, plr_filter_time(&filter));
+    TEST_ASSERT_EQUAL_UINT(held, plr_filter_landmark_count(&filter));
+    drive(5, 0);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, report.health);
+    TEST_ASSERT_TRUE(error_m() < 0.1);
+}
+
+static void test_a_long_pause_is_bridged(void) {
+    start();
+    drive(5, 0);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, world.t_ns + 86400000000000u, NULL));
+    drive(5, 86400000000000u);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, report.health);
+    TEST_ASSERT_TRUE(error_m() < 0.1);
+}
+
+static void test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks(void) {
+    double P_moved[36];
+    diagonal(P_moved, 0.1, 1e-3);
+    start();
+    drive(10, 0);
+    world.T_WB[3] += 0.4;
+    world.T_WB[7] -= 0.3;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, world.t_ns, P_moved));
+    TEST_ASSERT_TRUE(error_m() > 0.4);
+    drive(2, 0);
+    TEST_ASSERT_TRUE(error_m() < 0.1);
+    drive(10, 0);
+    TEST_ASSERT_TRUE(error_m() < 0.1);
+}
+
+static void test_without_an_allowance_a_moved_body_contradicts_its_landmarks(void) {
+    start();
+    drive(10, 0);
+    world.T_WB[3] += 0.4;
+    world.T_WB[7] -= 0.3;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, world.t_ns, NULL));
+    drive(2, 0);
+    TEST_ASSERT_TRUE(error_m() > 0.3);
+}
+
+static void test_the_pose_gains_what_was_allowed_and_nothing_else_changes(void) {
+    double P[36], more[36], P_moved[36];
+    rng chance = rng_seeded(21);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, 4);
+    diagonal(P_moved, 0.04, 0.01);
+    P_moved[1] = P_moved[6] = 0.01;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, P));
+    memcpy(&before, &filter, sizeof before);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 77, P_moved));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, more));
+    for (unsigned i = 0; i < 36; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5 * (fabs(P[i]) + 0.04), P[i] + P_moved[i], more[i]);
+    TEST_ASSERT_EQUAL_MEMORY(before.R_WB, filter.R_WB, sizeof filter.R_WB);
+    TEST_ASSERT_EQUAL_MEMORY(before.p_WB, filter.p_WB, sizeof filter.p_WB);
+    TEST_ASSERT_EQUAL_MEMORY(before.slots, filter.slots, sizeof filter.slots);
+    TEST_ASSERT_EQUAL_MEMORY(before.P, filter.P, sizeof filter.P);
+    TEST_ASSERT_EQUAL_MEMORY(&before.totals, &filter.totals, sizeof filter.totals);
+}
+
+static void test_a_reading_of_before_says_nothing_afterwards(void) {
+    const plr_twist still = {{0}, {0}}, fast = {{5, 0, 0}, {0}};
+    plr_pose pose;
+    config.twist_timing = PLR_TWIST_START;
+    start();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 1000000000, &fast));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 500000000, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 600000000, &still));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
+    TEST_ASSERT_EQUAL_DOUBLE(0, pose.p[0]);
+}
+
+static void refuses(plr_status expected, const double *P_moved) {
+    memcpy(&before, &filter, sizeof before);
+    TEST_ASSERT_EQUAL_INT(expected, plr_filter_resume(&filter, 5, P_moved));
+    TEST_ASSERT_TRUE(specimen_same_state(&before, &filter));
+    TEST_ASSERT_EQUAL_UINT32(before.totals.refused + 1, filter.totals.refused);
+}
+
+static void test_an_impossible_allowance_is_refused(void) {
+    double P_moved[36];
+    start();
+    drive(1, 0);
+    diagonal(P_moved, 1, (double)NAN);
+    refuses(PLR_E_NOT_FINITE, P_moved);
+    diagonal(P_moved, 1e15, 1);
+    refuses(PLR_E_RANGE, P_moved);
+    diagonal(P_moved, -1, 1);
+    refuses(PLR_E_ARGUMENT, P_moved);
+    diagonal(P_moved, 1, 1);
+    P_moved[1] = 0.5;
+    refuses(PLR_E_ARGUMENT, P_moved);
+}
+
+static void test_a_filter_that_has_not_begun_has_nothing_to_go_on_with(void) {
+    start();
+    refuses(PLR_E_MODE, NULL);
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_resume(NULL, 5, NULL));
+    filter.magic = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, plr_filter_resume(&filter, 5, NULL));
+}
+
+static void test_mapping_resumes_its_clock_and_takes_no_allowance(void) {
+    double P_moved[36];
+    plr_pose pose;
+    config.mode = PLR_MODE_MAPPING;
+    start();
+    scene_pose(&world, &pose);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, 900, &pose));
+    diagonal(P_moved, 1, 1);
+    refuses(PLR_E_MODE, P_moved);
+    TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_move_to(&filter, 100, &pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 50, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, 100, &pose));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_clock_that_begins_anew_is_followed);
+    RUN_TEST(test_a_long_pause_is_bridged);
+    RUN_TEST(test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks);
+    RUN_TEST(test_without_an_allowance_a_moved_body_contradicts_its_landmarks);
+    RUN_TEST(test_the_pose_gains_what_was_allowed_and_nothing_else_changes);
+    RUN_TEST(test_a_reading_of_before_says_nothing_afterwards);
+    RUN_TEST(test_an_impossible_allowance_is_refused);
+    RUN_TEST(test_a_filter_that_has_not_begun_has_nothing_to_go_on_with);
+    RUN_TEST(test_mapping_resumes_its_clock_and_takes_no_allowance);
+    return UNITY_END();
+}
