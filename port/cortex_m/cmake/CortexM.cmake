@@ -44,8 +44,17 @@ function(cortexm_library result cpu capacity bits)
     target_compile_options(${name} PRIVATE -O3) # half the instructions of -O2, for 15 KB of flash
     target_include_directories(${name}
       PUBLIC "${PELORUS_ROOT}/include" PRIVATE "${PELORUS_ROOT}/src")
+    # Few landmarks come with few observations: they may make up four times as many, 64 at least.
+    math(EXPR observations "4 * ${capacity}")
+    if(observations LESS 64)
+      set(observations 64)
+    elseif(observations GREATER PLR_MAX_OBSERVATIONS)
+      set(observations ${PLR_MAX_OBSERVATIONS})
+    endif()
+    # A tile of 4 x 6 fills the FPU's 32 registers; the width changes no bit.
     target_compile_definitions(${name} PUBLIC PLR_REAL=${bits} PLR_MAX_LANDMARKS=${capacity}
-      PLR_MAX_OBSERVATIONS=${PLR_MAX_OBSERVATIONS} PLR_BLOCK_OBSERVATIONS=8 PLR_PORTABLE=0)
+      PLR_MAX_OBSERVATIONS=${observations} PLR_BLOCK_OBSERVATIONS=8 PLR_PORTABLE=0
+      PLR_TILE_COLUMNS=6)
   endif()
   set(${result} ${name} PARENT_SCOPE)
 endfunction()
