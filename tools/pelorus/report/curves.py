@@ -22,13 +22,13 @@ from pelorus.report.style import (
     VERMILLION,
     WIDTH_IN,
     legend_above,
+    limit_decades,
     new_figure,
 )
 from pelorus.se3 import Floats
 
 TIME = "time (s)"
 BAND = 0.95
-DECADES_MAX = 8  # of a logarithmic axis; beyond, the few values at its foot squeeze the rest
 POSITION = ("var_rho_x", "var_rho_y", "var_rho_z")
 BIASES = ("bias_vx", "bias_vy", "bias_vz", "bias_wx", "bias_wy", "bias_wz")
 
@@ -45,8 +45,7 @@ def covariance(compared: Comparison) -> Figure:
     position.set_ylabel("trace of position block (m²)")
     position.set_xlabel(TIME)
     for axes in (whole, position):
-        axes.set_yscale("log")
-        _limit_decades(axes)
+        limit_decades(axes)
     legend_above(figure, whole)
     return figure
 
@@ -58,11 +57,6 @@ def _in_layers(compared: Comparison) -> list[Run]:
 def _positive(axes: Axes, t: Floats, values: Floats, run: Run) -> None:
     """A logarithm shows no value of a broken covariance: the line has a gap there."""
     axes.plot(t, np.where(values > 0, values, np.nan), **PENS[run.name].line)
-
-
-def _limit_decades(axes: Axes) -> None:
-    low, high = axes.get_ylim()
-    axes.set_ylim(max(low, high / 10**DECADES_MAX), high)
 
 
 def nees(compared: Comparison) -> Figure:
@@ -77,8 +71,7 @@ def nees(compared: Comparison) -> Figure:
         accuracy = compared.accuracy[run.name]
         _positive(axes, compared.seconds(accuracy.t_ns), accuracy.nees, run)
     axes.axhline(1.0, color=GREY, linewidth=1, zorder=2)
-    axes.set_yscale("log")
-    _limit_decades(axes)
+    limit_decades(axes)
     axes.set_xlabel(TIME)
     axes.set_ylabel("NEES / 6")
     legend_above(figure, axes)
@@ -146,5 +139,5 @@ def times(compared: Comparison) -> Figure:
     axes.set_yscale("log")
     axes.set_xlabel(TIME)
     axes.set_ylabel("time a frame (ms)")
-    legend_above(figure, axes, columns=2)
+    legend_above(figure, axes, columns=2, markers=4)
     return figure

@@ -43,8 +43,8 @@ def _top_view(compared: Comparison) -> Picture:
     words = f"Seen {seen.plane.why}." if seen.plane.why.startswith("from") else (
         f"Seen in {seen.plane.why}, for the recording does not say which way is up."
     )  # fmt: skip
-    words += f" {len(seen.landmarks)} landmarks of body are drawn"
-    words += f"; {seen.hidden} lie beyond the picture or are too uncertain." if seen.hidden else "."
+    if seen.uncertain:
+        words += f" {seen.uncertain} landmarks of body are too uncertain to be drawn."
     if seen.truth is not None:
         words += " The truth is brought to the estimate's start."
     return Picture("top-view", "Trajectories", words, partial(top_view.draw, compared))

@@ -29,7 +29,8 @@ figcaption { color: #444; } code { font-size: .9em; overflow-wrap: anywhere; }
 MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
     "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
-    "and gated: observations. Dead reckoning and body run in float32, course and world in float64.  The last column: time of the recording over time of the computing."
+    "and gated: observations. The last column: time of the recording over time of the computing. "
+    "Dead reckoning and body run in float32, course and world in float64."
 )
 
 

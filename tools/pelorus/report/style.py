@@ -22,7 +22,7 @@ SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 
 DPI = 100
 WIDTH_IN = 10.0
-PALETTE_COLOURS = 128  # of a stored picture: an eighth of the bytes, and no eye sees it
+FOOT_PERCENT = 2.0
 
 BLACK, GREY, BLUE, SKY = "#000000", "#808080", "#0072B2", "#56B4E9"
 GREEN, ORANGE, VERMILLION, PURPLE = "#009E73", "#E69F00", "#D55E00", "#CC79A7"
@@ -75,10 +75,25 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
 
 
-def legend_above(figure: Figure, axes: Axes, columns: int = 6) -> None:
+def panel(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Axes at a place in inches, where a picture needs its shape to be known."""
+    across, up = figure.get_size_inches()
+    return figure.add_axes((left / across, bottom / up, width / across, height / up))
+
+
+def limit_decades(axes: Axes) -> None:
+    """A logarithmic scale whose foot is not given away to the few smallest values of a curve."""
+    curves = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
+    feet = [np.percentile(y[y > 0], FOOT_PERCENT) for y in curves if (y > 0).any()]
+    axes.set_yscale("log")
+    if feet:
+        axes.set_ylim(bottom=min(feet) / 2)
+
+
+def legend_above(figure: Figure, axes: Axes, columns: int = 6, markers: float = 1.0) -> None:
     """One row over the panels, where it covers no data."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=columns)
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, markerscale=markers)
 
 
 def seconds(t_ns: Times, origin_ns: int) -> Floats:
@@ -87,14 +102,9 @@ def seconds(t_ns: Times, origin_ns: int) -> Floats:
 
 
 def save(draw: Callable[[], Figure], path: Path) -> None:
-    """Draw and write a PNG with few colours: a report is to be sent around."""
-    from PIL import Image  # noqa: PLC0415 - comes with matplotlib, needed here alone
-
+    """Draw and write a PNG."""
     try:
         with rc_context(LOOK):
-            draw().savefig(path, format="png")
-        with Image.open(path) as image:
-            few = image.convert("RGB").quantize(PALETTE_COLOURS, dither=Image.Dither.NONE)
-        few.save(path, optimize=True)
+            draw().savefig(path, format="png", pil_kwargs={"optimize": True})
     except OSError as error:
         raise PelorusError(f"{path}: cannot be written: {error.strerror or error}") from error

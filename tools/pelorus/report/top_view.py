@@ -13,15 +13,17 @@ from pelorus import se3
 from pelorus.report import plane
 from pelorus.report.comparison import MAIN, Comparison
 from pelorus.report.plane import Plane
-from pelorus.report.results import Points
-from pelorus.report.style import BLACK, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, new_figure
+from pelorus.report.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 from pelorus.se3 import Floats
 
-MARGIN = 0.06  # of the larger side
+MARGIN = 0.08  # of the larger side
 STRAY = 0.75  # a run may widen the picture by so much of the larger side, then it leaves it
 SIGMA_MAX = 0.05  # of the larger side: a landmark less certain than that is no point in the picture
 EXTENT_MIN_M = 1e-3  # a recording at rest needs axes too
-HEIGHT_IN = (4.5, 10.0)
+LEFT_IN, BOTTOM_IN, TOP_IN = 0.9, 0.7, 0.4  # room for labels and title
+PANEL_IN = 6.7  # the legend stands to the right of it
+PANEL_HEIGHT_IN = (3.5, 8.0)
+FEW = 200  # so many landmarks and fewer get larger dots
 
 
 class Box(NamedTuple):
@@ -34,11 +36,17 @@ class Box(NamedTuple):
     def side(self) -> float:
         return max(float((self.high - self.low).max()), EXTENT_MIN_M)
 
-    def holds(self, points: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        return np.asarray(((points >= self.low) & (points <= self.high)).all(axis=-1))
-
     def grown(self, by: float) -> Box:
         return Box(self.low - by, self.high + by)
+
+    def shaped(self, width_to_height: float) -> Box:
+        """Widened in one direction, so that a panel of that shape shows it without distortion."""
+        width, height = self.high - self.low
+        half = np.array(
+            [max(width, height * width_to_height), max(height, width / width_to_height)]
+        )
+        middle = (self.low + self.high) / 2
+        return Box(middle - half / 2, middle + half / 2)
 
 
 class View(NamedTuple):
@@ -49,7 +57,7 @@ class View(NamedTuple):
     truth: Floats | None
     known: Floats
     landmarks: Floats
-    hidden: int  # landmarks beyond the picture or too uncertain for it
+    uncertain: int  # landmarks that are not drawn
     box: Box
 
 
@@ -65,16 +73,12 @@ def view(compared: Comparison) -> View:
     truth = flat(main.truth.p) if main else None
     box = _limits(paths, truth)
     points = compared.main.landmarks
-    shown = _certain(points, box) & box.holds(flat(points.p_W_m))
+    shown = points.sigma_m <= SIGMA_MAX * box.side
     known = compared.subject.known_W_m
     if main:  # they lie in the truth's world, and the picture is in the estimate's
         known = se3.apply(main.A, known)
     landmarks = flat(points.p_W_m[shown])
     return View(looked_at, paths, truth, flat(known), landmarks, int((~shown).sum()), box)
-
-
-def _certain(points: Points, box: Box) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    return np.asarray(points.sigma_m <= SIGMA_MAX * box.side)
 
 
 def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
@@ -90,29 +94,24 @@ def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
 
 
 def draw(compared: Comparison) -> Figure:
-    """The picture, its caption as the title, its legend beside the data."""
+    """The picture, its plane in the title, its legend beside the data."""
     seen = view(compared)
     width, height = seen.box.high - seen.box.low
-    panel_in = WIDTH_IN - 3.2  # the legend stands to the right
-    figure = new_figure(WIDTH_IN, float(np.clip(panel_in * height / width + 1.0, *HEIGHT_IN)))
-    axes = figure.subplots()
-    fill(axes, seen)
+    panel_height_in = float(np.clip(PANEL_IN * height / width, *PANEL_HEIGHT_IN))
+    figure = Figure(figsize=(WIDTH_IN, BOTTOM_IN + panel_height_in + TOP_IN), dpi=DPI)
+    axes = panel(figure, LEFT_IN, BOTTOM_IN, PANEL_IN, panel_height_in)
+    fill(axes, seen, PANEL_IN / panel_height_in)
     axes.set_title(f"{compared.subject.title}: {seen.plane.why}", loc="left")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0)
     return figure
 
 
-def fill(axes: Axes, seen: View) -> None:
-    """Draw into axes that are already there."""
-    axes.scatter(
-        seen.landmarks[:, 0],
-        seen.landmarks[:, 1],
-        s=5,
-        color=GREEN,
-        alpha=0.55,
-        linewidths=0,
-        label="landmarks (body)",
-    )
+def fill(axes: Axes, seen: View, width_to_height: float) -> None:
+    """Draw into a panel of the given shape."""
+    dots: dict[str, Any] = {"color": GREEN, "marker": ".", "linestyle": "none"}
+    size = 3 if len(seen.landmarks) > FEW else 7
+    axes.plot(*seen.landmarks.T, markersize=size, alpha=0.6, markeredgewidth=0, **dots)
+    axes.plot([], [], markersize=8, label="landmarks (body)", **dots)
     if len(seen.known):
         axes.scatter(
             seen.known[:, 0],
@@ -127,8 +126,9 @@ def fill(axes: Axes, seen: View) -> None:
     if seen.truth is not None:
         axes.plot(*seen.truth.T, **TRUTH.line)
     _mark_ends(axes, seen)
-    axes.set_xlim(seen.box.low[0], seen.box.high[0])
-    axes.set_ylim(seen.box.low[1], seen.box.high[1])
+    box = seen.box.shaped(width_to_height)
+    axes.set_xlim(box.low[0], box.high[0])
+    axes.set_ylim(box.low[1], box.high[1])
     axes.set_aspect("equal")
     axes.set_xlabel(seen.plane.right.label)
     axes.set_ylabel(seen.plane.up.label)
