@@ -48,8 +48,8 @@ def report(
 ) -> None:
     """Replay a recording four ways, and draw what came out.
 
-    Dead reckoning and body in float32, the course's preset and world in float64. Without a depth
-    limit in the settings, world has one of 60 m, for it cannot use far points.
+    Dead reckoning and body in float32, the course's preset and world in float64.
+    Without a depth limit in the settings, world gets one of 60 m.
     """
     subject = read_subject(recording)
     plans = plan_runs(find_programs(programs), recording, _options(config, settings))

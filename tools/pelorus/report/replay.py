@@ -98,7 +98,7 @@ def _call(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, 
     except OSError as error:
         raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
     if done.returncode != 0:
-        said = done.stderr.strip().removeprefix("pelorus-replay: ") or "without a word"
         how = f"status {done.returncode}" if done.returncode > 0 else f"signal {-done.returncode}"
-        raise PelorusError(f"{program.name} {' '.join(options)}\nended with {how}: {said}")
+        said = done.stderr.replace(f"{program.name}: ", "").strip() or "it said nothing"
+        raise PelorusError(f"{recording}: {program.name} ended with {how}:\n{said}")
     return done.stdout, done.stderr

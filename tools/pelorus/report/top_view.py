@@ -16,7 +16,7 @@ from pelorus.report.plane import Plane
 from pelorus.report.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 from pelorus.se3 import Floats
 
-MARGIN = 0.08  # of the larger side
+MARGIN = 0.15  # of the larger side
 STRAY = 0.75  # a run may widen the picture by so much of the larger side, then it leaves it
 SIGMA_MAX = 0.05  # of the larger side: a landmark less certain than that is no point in the picture
 EXTENT_MIN_M = 1e-3  # a recording at rest needs axes too

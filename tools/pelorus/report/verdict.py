@@ -15,6 +15,7 @@ from pelorus.report.results import Run
 # Bits of plr_reason (types.h).
 GATE_LOCKED, GATE_INERT, NIS_HIGH, NOT_POSITIVE = 1 << 2, 1 << 3, 1 << 8, 1 << 10
 NEES_HIGH, NEES_LOW = 2.0, 0.3
+FRAMES_ENOUGH = 20  # below, a mean NEES says nothing
 GATED_MANY = 0.2  # of the matched observations
 LOST_MANY = 0.02  # of the frames
 INERT_MANY = 0.05  # of the frames
@@ -77,11 +78,13 @@ def _frames(run: Run) -> Iterator[str]:
     if refused:
         yield f"{refused} of {refused + run.summary['frames']} frames were refused."
     factor = run.summary["realtime_factor"]
-    if factor is not None and factor < 1:
+    if factor is not None and 0 < factor < 1:
         yield f"slower than real time on this machine: {factor:.2g} times."
 
 
 def _consistency(run: Run) -> Iterator[str]:
+    if run.summary["truth_frames"] < FRAMES_ENOUGH:
+        return
     nees = run.summary["nees_per_dof"]
     left_out = run.summary["nees_left_out"]
     if left_out:
@@ -126,5 +129,7 @@ def _room(run: Run) -> Iterator[str]:
 def _use(run: Run, dead_reckoning: Run) -> Iterator[str]:
     """A filter that does no better than the twists alone is of no use."""
     ate, without = run.summary["ate_m"], dead_reckoning.summary["ate_m"]
-    if run is not dead_reckoning and ate is not None and without is not None and ate > without:
+    if run is dead_reckoning or run.summary["truth_frames"] < FRAMES_ENOUGH:
+        return
+    if ate is not None and without is not None and ate > without:
         yield f"no better than dead reckoning: ATE {ate:.3g} m against {without:.3g} m."

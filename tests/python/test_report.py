@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus report`: what it computes against the replay's own figures, what it draws and says."""
+
+from __future__ import annotations
+
+import math
+import re
+import stat
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from converted import Run as Command
+from pelorus import se3
+from pelorus.errors import PelorusError
+from pelorus.frames import BodyAxes, Message, Stereo, Truth
+from pelorus.report import bands, gallery, plane, style, top_view, verdict
+from pelorus.report.accuracy import assess, nees_per_dof
+from pelorus.report.comparison import Comparison
+from pelorus.report.replay import Outputs, Programs, find_programs
+from pelorus.report.results import carry_out, read_frames, read_map, unpack_symmetric
+from pelorus.report.runs import plan_runs
+from pelorus.report.subject import read_subject
+from pelorus.se3 import Poses
+from pelorus.trajectory import Trajectory, read_tum
+from PIL import Image
+from replay_drive import BIN, FRAMES, drive, encode, header, known, t_ns
+
+ALWAYS = {"top-view", "covariance", "observations", "time"}
+WITH_TRUTH = ALWAYS | {"error-body", "error-world", "error-course", "nees", "hero"}
+RUNS = ("dead-reckoning", "body", "course", "world")
+SETTINGS = ("--pixel-sigma", "0.5")
+
+
+@pytest.fixture
+def programs() -> Programs:
+    try:
+        return find_programs(BIN)
+    except PelorusError as error:
+        pytest.skip(str(error))
+
+
+def recorded(folder: Path, messages: list[Message]) -> Path:
+    path = folder / "drive.plr"
+    path.write_bytes(encode(messages))
+    return path
+
+
+def compared(path: Path, programs: Programs, *settings: str) -> Comparison:
+    folder = path.parent / "runs"
+    folder.mkdir()
+    plans = plan_runs(programs, path, settings or SETTINGS)
+    return Comparison(read_subject(path), [carry_out(plan, path, folder) for plan in plans])
+
+
+def pictures_in(folder: Path) -> set[str]:
+    return {path.stem for path in folder.glob("*.png")}
+
+
+# --- numbers --------------------------------------------------------------------------------------
+
+
+def test_mean_NEES_is_the_one_that_the_replay_reports(tmp_path: Path, programs: Programs) -> None:
+    found = compared(recorded(tmp_path, drive()), programs)
+    for run in found.runs:
+        accuracy = found.accuracy[run.name]
+        assert len(accuracy.nees) == FRAMES
+        assert math.isnan(accuracy.nees[0])
+        mean = float(np.nanmean(accuracy.nees))
+        assert mean == pytest.approx(run.summary["nees_per_dof"], rel=1e-3, abs=1e-9)
+
+
+def test_error_is_the_one_of_the_summary(tmp_path: Path, programs: Programs) -> None:
+    found = compared(recorded(tmp_path, drive()), programs)
+    body = found.accuracy["body"]
+    rotation = np.degrees(np.sqrt(np.mean(np.sum(body.error[:, 3:] ** 2, axis=1))))
+    assert rotation == pytest.approx(found.main.summary["rot_deg"], rel=1e-4)
+    assert np.all(body.sigma > 0)
+
+
+def test_poses_of_the_log_are_those_of_the_trajectory_file(
+    tmp_path: Path, programs: Programs
+) -> None:
+    found = compared(recorded(tmp_path, drive()), programs)
+    written = read_tum(Outputs.named(tmp_path / "runs", "body").trajectory)
+    assert np.array_equal(written.t_ns, found.main.trajectory.t_ns)
+    assert np.allclose(written.poses.p, found.main.trajectory.poses.p, atol=1e-7)
+
+
+def test_truth_in_another_world_changes_no_error() -> None:
+    chance = np.random.default_rng(3)
+    path = se3.exp(chance.normal(size=(30, 3)), chance.normal(scale=0.3, size=(30, 3)))
+    off = se3.exp(chance.normal(scale=0.01, size=(30, 3)), chance.normal(scale=0.01, size=(30, 3)))
+    estimate = Trajectory(np.arange(30), se3.compose(path, off))
+    P = np.tile(1e-4 * np.eye(6), (30, 1, 1))
+    by = se3.exp([5.0, -3.0, 1.0], [0.2, 1.0, -0.4])
+    here = assess(estimate, P, Trajectory(estimate.t_ns, path))
+    there = assess(estimate, P, Trajectory(estimate.t_ns, se3.compose(by, path)))
+    assert here is not None
+    assert there is not None
+    assert np.allclose(here.error, there.error, atol=1e-12)
+    assert np.allclose(here.error[0], 0, atol=1e-12)
+    assert np.allclose(there.truth.p, here.truth.p, atol=1e-12)
+
+
+def test_NEES_of_drawn_errors_is_one_and_knows_correlations() -> None:
+    chance = np.random.default_rng(4)
+    root = np.tril(chance.normal(size=(6, 6))) + 3 * np.eye(6)
+    error = chance.normal(size=(4000, 6)) @ root.T
+    P = np.tile(root @ root.T, (4000, 1, 1))
+    assert np.nanmean(nees_per_dof(error, P)) == pytest.approx(1, abs=0.04)
+    assert np.nanmean(nees_per_dof(3 * error, P)) == pytest.approx(9, abs=0.4)
+
+
+def test_NEES_leaves_out_what_is_no_covariance() -> None:
+    P = np.tile(np.eye(6), (4, 1, 1))
+    P[1, 2, 2], P[2, 0, 0] = -1, np.nan
+    found = nees_per_dof(np.ones((4, 6)), P)
+    assert np.isnan(found[:3]).all()
+    assert found[3] == pytest.approx(1)
+
+
+def test_packed_covariances_are_lower_triangles_row_by_row() -> None:
+    whole = unpack_symmetric(np.arange(6.0)[None], 3)[0]
+    assert whole.tolist() == [[0, 1, 3], [1, 2, 4], [3, 4, 5]]
+
+
+def test_a_refused_frame_has_no_estimate_but_its_counts(tmp_path: Path) -> None:
+    path = tmp_path / "frames.csv"
+    path.write_text("t_s,trace,health,used\n1699999999.000000001,2.5,good,4\n2.5,,lost,7\n")
+    table = read_frames(path)
+    assert table.t_ns[0] == 1_699_999_999_000_000_001
+    assert table["trace"][0] == 2.5
+    assert math.isnan(table["trace"][1])
+    assert table["used"].tolist() == [4, 7]
+
+
+def test_a_map_without_landmarks_is_empty(tmp_path: Path) -> None:
+    path = tmp_path / "map.ply"
+    path.write_text("ply\nformat ascii 1.0\nend_header\n")
+    assert read_map(path).p_W_m.shape == (0, 3)
+    path.write_text("ply\nend_header\n1 2 3 7 1 9 0.5\n")
+    assert read_map(path).p_W_m.tolist() == [[1, 2, 3]]
+    assert read_map(path).sigma_m.tolist() == [0.5]
+
+
+# --- the runs -------------------------------------------------------------------------------------
+
+
+def test_settings_hold_for_all_runs_but_the_course(tmp_path: Path, programs: Programs) -> None:
+    found = compared(recorded(tmp_path, drive()), programs, "--pixel-sigma", "0.625")
+    sigmas = {run.name: run.summary["pixel_sigma"] for run in found.runs}
+    assert tuple(sigmas) == RUNS
+    assert sigmas["body"] == sigmas["world"] == sigmas["dead-reckoning"] == 0.625
+    assert sigmas["course"] == pytest.approx(math.sqrt(5))
+    precisions = [run.summary["precision"] for run in found.runs]
+    assert precisions == ["float32", "float32", "float64", "float64"]
+    models = [found.run(name).summary["model"] for name in ("body", "course", "world")]
+    assert models == ["body", "world", "world"]
+    assert found.run("dead-reckoning").summary["used"] == 0
+
+
+@pytest.mark.parametrize(("given", "due"), [("0", 60.0), ("15", 15.0)])
+def test_world_has_a_depth_limit(
+    tmp_path: Path, programs: Programs, given: str, due: float
+) -> None:
+    config = tmp_path / "robot.conf"
+    config.write_text(f"max-depth = {given}  # m\n")
+    found = compared(recorded(tmp_path, drive()), programs, "--config", str(config))
+    assert found.run("world").summary["max_depth"] == due
+    assert found.main.summary["max_depth"] == float(given)
+
+
+# --- what is drawn --------------------------------------------------------------------------------
+
+
+def turned(axes: str) -> Poses:
+    """At rest, with the body's z along the named axis of the world; `-` turns it round."""
+    z = np.zeros(3)
+    z["xyz".index(axes[-1])] = -1 if axes.startswith("-") else 1
+    x = np.roll(z, 1)
+    R = np.stack((x, np.cross(z, x), z), axis=-1)
+    return Poses(np.tile(R, (5, 1, 1)), np.zeros((5, 3)))
+
+
+@pytest.mark.parametrize("towards", ["x", "y", "z", "-x", "-y", "-z"])
+@pytest.mark.parametrize("axes", [BodyAxes.FORWARD_LEFT_UP, BodyAxes.FORWARD_RIGHT_DOWN])
+def test_the_viewer_stands_above_the_body(axes: BodyAxes, towards: str) -> None:
+    poses = turned(towards)
+    chosen = plane.choose(axes, poses)
+    right, up = (axis.sign * np.eye(3)[axis.number] for axis in chosen[:2])
+    above = poses.R[0][:, 2] * (1 if axes == BodyAxes.FORWARD_LEFT_UP else -1)
+    assert np.cross(right, up).tolist() == above.tolist()
+
+
+def test_car_axes_are_shown_as_usual() -> None:
+    upright = Poses(np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)))
+    up = plane.choose(BodyAxes.FORWARD_LEFT_UP, upright)
+    down = plane.choose(BodyAxes.FORWARD_RIGHT_DOWN, upright)
+    assert (up.right.label, up.up.label) == ("x (m)", "y (m)")
+    assert (down.right.label, down.up.label) == ("x (m)", "-y (m)")
+
+
+def test_other_bodies_are_shown_in_the_plane_of_largest_extent() -> None:
+    p = np.array([[0.0, 0, 0], [3, 0.1, 9], [-3, 0.2, 4]])
+    chosen = plane.choose(BodyAxes.OTHER, Poses(np.tile(np.eye(3), (3, 1, 1)), p))
+    assert (chosen.right.label, chosen.up.label) == ("x (m)", "z (m)")
+    assert "x-z" in chosen.why
+
+
+def test_a_run_that_strays_does_not_blow_up_the_picture(tmp_path: Path, programs: Programs) -> None:
+    found = compared(recorded(tmp_path, drive()), programs)
+    calm = top_view.view(found)
+    course = found.run("course")
+    course.trajectory.poses.p[-1] += 1e6
+    wild = top_view.view(found)
+    assert wild.box.side < 3 * calm.box.side
+    for path in (wild.paths["body"], wild.truth):
+        assert path is not None
+        assert (path >= wild.box.low).all()
+        assert (path <= wild.box.high).all()
+
+
+def test_a_shaped_box_holds_the_old_one_and_has_the_shape() -> None:
+    box = top_view.Box(np.array([1.0, 2.0]), np.array([4.0, 3.0]))
+    for ratio in (0.2, 1.0, 3.0, 7.0):
+        shaped = box.shaped(ratio)
+        width, height = shaped.high - shaped.low
+        assert width / height == pytest.approx(ratio)
+        assert (shaped.low <= box.low + 1e-12).all()
+        assert (shaped.high >= box.high - 1e-12).all()
+
+
+def test_equal_metres_are_equal_pixels(tmp_path: Path, programs: Programs) -> None:
+    figure = top_view.draw(compared(recorded(tmp_path, drive() + known()), programs))
+    axes = figure.axes[0]
+    figure.draw_without_rendering()
+    origin, there = axes.transData.transform([[0, 0], [1, 1]])
+    across, up = there - origin
+    assert across == pytest.approx(up)
+    width, height = axes.get_position().size * figure.get_size_inches()
+    assert width == pytest.approx(top_view.PANEL_IN)  # the equal aspect has not shrunk the panel
+    assert height >= top_view.PANEL_HEIGHT_IN[0] - 1e-9
+
+
+def test_every_picture_has_labelled_axes(tmp_path: Path, programs: Programs) -> None:
+    found = compared(recorded(tmp_path, drive()), programs, "--bias", "on")
+    for picture in gallery.pictures(found):
+        figure = picture.draw()
+        labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
+        labels += [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
+        assert len(labels) >= 2, picture.name
+        for label in labels:
+            assert "(" in label or label == "NEES / 6", f"{picture.name}: {label} has no unit"
+    assert "bias" in {picture.name for picture in gallery.pictures(found)}
+
+
+def test_limits_show_every_error_and_as_much_of_the_band_as_lets_it_be_seen() -> None:
+    assert bands.limits(np.array([0.0, -2.0]), np.array([1.0, 1.0])) == pytest.approx((-2.2, 2.2))
+    wide = bands.limits(np.array([0.01]), np.array([1e6]))
+    assert wide[1] == pytest.approx(0.01 * bands.BAND_MAX * bands.HEADROOM)
+    assert bands.limits(np.zeros(3), np.zeros(3)) == (-1.0, 1.0)
+
+
+def test_a_logarithmic_axis_ignores_the_few_smallest_values() -> None:
+    axes = style.new_figure(4, 3).subplots()
+    axes.plot(np.concatenate(([1e-30], np.full(200, 5.0))))
+    style.limit_decades(axes)
+    assert axes.get_ylim()[0] == pytest.approx(2.5)
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+
+def test_report_leaves_page_pictures_and_runs(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path, out = recorded(tmp_path, drive()), tmp_path / "a" / "out"
+    said = pelorus("report", path, "--out", out, "--bin", programs.float32.parent)
+    assert said.status == 0, said.err
+    assert pictures_in(out) == WITH_TRUTH
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == len(WITH_TRUTH) - 1  # hero is for a README
+    assert not re.search(r"(src|href)=\"(?!data:)", page)
+    for name in RUNS:
+        assert name in said.out
+        assert f"<td>{name}</td>" in page
+        for end in ("tum", "csv", "ply", "plr", "json"):
+            assert (out / "runs" / f"{name}.{end}").stat().st_size > 0
+    with Image.open(out / "hero.png") as hero:
+        assert hero.width == 1200
+
+
+def test_without_truth_no_error_is_claimed(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path = recorded(tmp_path, [m for m in drive() if not isinstance(m, Truth)])
+    said = pelorus("report", path, "--out", tmp_path, "--bin", programs.float32.parent)
+    assert said.status == 0, said.err
+    assert pictures_in(tmp_path) == ALWAYS
+    row = next(line for line in said.out.splitlines() if line.startswith("body"))
+    assert row.split()[1:5] == ["-"] * 4
+    assert "no truth" in said.out
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_a_handful_of_frames_is_enough(
+    pelorus: Command, tmp_path: Path, programs: Programs, frames: int
+) -> None:
+    path = recorded(tmp_path, drive(frames))
+    said = pelorus("report", path, "--out", tmp_path, "--bin", programs.float32.parent)
+    assert said.status == 0, said.err
+    assert pictures_in(tmp_path) == WITH_TRUTH
+    assert "NEES/6 is" not in said.out
+
+
+def test_a_replay_that_fails_ends_the_report_with_its_words(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path = recorded(tmp_path, [m for m in drive() if not isinstance(m, Stereo)])
+    said = pelorus("report", path, "--out", tmp_path, "--bin", programs.float32.parent)
+    assert said.status == 1
+    assert "drive.plr: pelorus-replay ended with status 1" in said.err
+    assert "no frame could be used" in said.err
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_crash_of_the_replay_is_told(pelorus: Command, tmp_path: Path) -> None:
+    for name in ("pelorus-replay", "pelorus-replay-f64"):
+        program = tmp_path / name
+        program.write_text("#!/bin/sh\nkill -SEGV $$\n")
+        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    path = recorded(tmp_path, drive(3))
+    said = pelorus("report", path, "--out", tmp_path / "out", "--bin", tmp_path)
+    assert said.status == 1
+    assert "ended with signal 11" in said.err
+
+
+def test_an_unknown_setting_is_the_replays_to_refuse(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path, bin_ = recorded(tmp_path, drive(3)), programs.float32.parent
+    said = pelorus("report", path, "--out", tmp_path, "--bin", bin_, "--set", "nonsense=1")
+    assert said.status == 1
+    assert "--nonsense: unknown option" in said.err
+    said = pelorus("report", path, "--out", tmp_path, "--bin", bin_, "--set", "nonsense")
+    assert said.status == 2
+
+
+def test_lacking_programs_and_places_are_named(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path, empty = recorded(tmp_path, drive(3)), tmp_path / "empty"
+    said = pelorus("report", path, "--out", tmp_path, "--bin", empty)
+    assert said.status == 1
+    assert "PELORUS_BIN" in said.err
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    said = pelorus("report", path, "--out", blocked, "--bin", programs.float32.parent)
+    assert said.status == 1
+    assert "cannot be made" in said.err
+    said = pelorus("report", tmp_path / "nothing.plr", "--out", tmp_path)
+    assert said.status == 1
+    assert "there is no such file" in said.err
+
+
+# --- verdicts -------------------------------------------------------------------------------------
+
+
+def lines_with(found: Comparison, **changes: Any) -> str:
+    """The verdicts, were body's summary another."""
+    body = found.main
+    other = replace(body, summary=body.summary | changes)
+    runs = [other if run is body else run for run in found.runs]
+    return "\n".join(line for line in verdict.verdicts(Comparison(found.subject, runs)))
+
+
+def test_verdicts_name_what_is_off(tmp_path: Path, programs: Programs) -> None:
+    found = compared(recorded(tmp_path, drive()), programs)
+    assert "body:" not in lines_with(found, nees_per_dof=1.0, ate_m=0.0)
+    assert "body: believes more than it knows" in lines_with(found, nees_per_dof=16.0)
+    assert "4 times as large" in lines_with(found, nees_per_dof=16.0)
+    assert "body: knows more than it believes" in lines_with(found, nees_per_dof=0.01)
+    assert "body: slower than real time" in lines_with(found, realtime_factor=0.5)
+    assert "body: the gate rejects 50%" in lines_with(found, gated=500, matched=1000)
+    assert "body: lost in 9 of 40 frames" in lines_with(found, frames_lost=9)
+    assert "body: 7 of 47 frames were refused" in lines_with(found, frames_refused=7)
+    assert "body: no better than dead reckoning" in lines_with(found, ate_m=99.0)
+    assert "found no slot" in lines_with(found, no_room=found.main.summary["observations"])
+
+
+def test_verdicts_say_when_a_run_diverged_and_whether_its_gate_is_inert(
+    tmp_path: Path, programs: Programs
+) -> None:
+    found = compared(recorded(tmp_path, drive()), programs)
+    reasons = found.main.frames["reasons"]
+    reasons[12:] = verdict.NOT_POSITIVE
+    assert found.main.frames.t_ns[12] - t_ns(0) == 1_200_000_000
+    assert "body: diverged at t = 1.2 s" in lines_with(found)
+    reasons[:] = verdict.GATE_INERT
+    assert "body: gate inert in 40 frames" in lines_with(found)
+    reasons[:] = verdict.GATE_LOCKED
+    assert "body: gate locked in 40 frames" in lines_with(found)
+
+
+def test_a_bias_that_is_suggested_and_not_estimated_is_told(
+    tmp_path: Path, programs: Programs
+) -> None:
+    noise = replace(header().noise, bias_gyro_sigma_radps=0.01)
+    messages = [header(noise=noise), *drive()[1:]]
+    found = compared(recorded(tmp_path, messages), programs, "--bias", "off")
+    assert "try --set bias=on" in lines_with(found)
