@@ -47,6 +47,6 @@ heading 'Drawing the report'
 "$VENV/bin/pelorus" report "$recording" --out out
 
 heading 'Done'
-echo 'Pictures:'
+echo 'Report: out/report.html. Its pictures:'
 find out -maxdepth 1 -name '*.png' -newer "$LOGS/demo-build.log" | sort | sed 's/^/  /'
 echo 'Estimated path and map: out/trajectory.tum, out/map.ply'
