@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+/* An hour of standing still, noise on every reading and pixel: the pose stays where it is, P stays
+ * positive. The filter learns nothing new for 36000 frames, and must not talk itself into anything. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unity.h>
+
+#include "filter/covariance.h"
+#include "support/matrices.h"
+#include "support/oracle.h"
+#include "support/rig.h"
+#include "support/specimens.h"
+
+enum { FRAMES = 36000, LANDMARKS = 12, EVERY = 1000 };
+
+void setUp(void) {
+    rig_set_up();
+    rig.options.speed_mps = rig.options.turn_radps = rig.options.sway = 0;
+    rig.options.most_seen = LANDMARKS;
+}
+
+void tearDown(void) {
+}
+
+/* Smallest eigenvalue of the matrix of correlations. */
+static double smallest_correlation(void) {
+    const unsigned n = plr_covariance_dim(&rig.filter);
+    double *P = specimen_covariance(&rig.filter), *C = specimen_zeros(n, n);
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j < n; j++)
+            C[i * n + j] = P[i * n + j] / sqrt(P[i * n + i] * P[j * n + j]);
+    const double smallest = oracle_smallest_eigenvalue(n, C);
+    free(C);
+    free(P);
+    return smallest;
+}
+
+static void stand(unsigned frames) {
+    for (unsigned k = 0; k < frames; k++) {
+        for (unsigned i = 0; i < RIG_TWISTS; i++) {
+            const plr_twist twist = scene_read(&rig.world);
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+            rig.world.t_ns += RIG_STEP_NS; /* and nothing moves */
+        }
+        rig_frame();
+    }
+}
+
+static void demand_still_there(void) {
+    plr_pose pose;
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, oracle_smallest_eigenvalue(6, P));
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(0.05, 0, pose.p[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(4 * sqrt(P[7 * i]), 0, pose.p[i]);
+        TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sqrt(P[7 * i]));
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.005, 0, largest_difference(rig_identity.R, pose.R, 9));
+}
+
+static void check_hour(bool bias) {
+    rig.config.bias = bias;
+    rig_begin();
+    for (unsigned k = 0; k < FRAMES; k += EVERY) {
+        stand(EVERY);
+        demand_still_there();
+        TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
+        /* all that is left uncertain is common to all landmarks, so their correlations are near 1,
+         * and every frame leaves one rounding there */
+        TEST_ASSERT_GREATER_THAN_DOUBLE(-(double)(k + EVERY) * REAL_EPSILON,
+                                        smallest_correlation());
+    }
+    TEST_ASSERT_EQUAL_UINT(rig.report.matched, LANDMARKS - rig.report.poor);
+    TEST_ASSERT_EQUAL_UINT64(0, rig.filter.totals.evicted);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.filter.totals.locks);
+}
+
+static void test_an_hour_of_standing_still_moves_nothing(void) {
+    check_hour(false);
+}
+
+static void test_an_hour_of_standing_still_with_biases_moves_nothing(void) {
+    check_hour(true);
+}
+
+/* The same hour without any noise: certainty may grow, and never beyond what floats can hold. */
+static void test_an_hour_without_noise_stays_exact(void) {
+    rig.options.pixel_sigma_px = rig.options.velocity_sigma_mps = rig.options.gyro_sigma_radps = 0;
+    rig.config.velocity_sigma = rig.config.gyro_sigma = 0;
+    rig_begin();
+    stand(FRAMES);
+    TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, smallest_correlation());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.p_WB[0]);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_an_hour_of_standing_still_moves_nothing);
+    RUN_TEST(test_an_hour_of_standing_still_with_biases_moves_nothing);
+    RUN_TEST(test_an_hour_without_noise_stays_exact);
+    return UNITY_END();
+}
