@@ -3,8 +3,6 @@
  * The filter's state as bytes and back: docs/STATE-FORMAT.md. What init derives from settings and
  * calibration is not carried, but compared: a state belongs to the filter that it was taken from.
  */
-#include <string.h>
-
 #include "filter/covariance.h"
 #include "filter/fields.h"
 #include "filter/filter_internal.h"
@@ -190,7 +188,7 @@ static plr_status read_count(plr_fields_in *in, const plr_filter *f, unsigned *l
     plr_fields_get(in, &count, u32_fields, 1);
     if (in->status != PLR_OK)
         return in->status;
-    if (count > f->config.slots || in->length != plr_filter_saved_size(f, count))
+    if (in->length != plr_filter_saved_size(f, count)) /* which is 0 if these are too many */
         return PLR_E_CORRUPT;
     *landmarks = count;
     return PLR_OK;
@@ -217,7 +215,6 @@ static plr_status load_rest(plr_fields_in *in, plr_filter *f, unsigned landmarks
     plr_fields_get(in, f, filter_fields, LENGTH(filter_fields));
     f->count = landmarks;
     f->diverged = 0;
-    memset(f->slots, 0, landmarks * sizeof *f->slots);
     for (unsigned slot = 0; slot < landmarks; slot++)
         plr_fields_get(in, &f->slots[slot], slot_fields, LENGTH(slot_fields));
     const plr_field P = reals((uint32_t)plr_packed_row(plr_covariance_dim(f)));
@@ -243,13 +240,12 @@ plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source s
     if (status != PLR_OK)
         return status;
 
-    unsigned again = 0;
     in = start;
     status = read_belonging(&in, f);
     if (status == PLR_OK)
-        status = read_count(&in, f, &again);
+        status = read_count(&in, f, &landmarks); /* of the length, so the same as before */
     if (status == PLR_OK)
-        status = again == landmarks ? load_rest(&in, f, landmarks) : PLR_E_CORRUPT;
+        status = load_rest(&in, f, landmarks);
     if (status != PLR_OK)
         (void)plr_filter_reset(f);
     return status;

@@ -124,6 +124,15 @@ static void test_the_erased_value_does_not_matter(void) {
     }
 }
 
+static void test_what_fills_the_last_units_is_zero(void) {
+    start_store(2 * 6400, 6400, 100);
+    saves(0);
+    for (uint32_t at = PLR_STORE_HEADER; at < 100; at++)
+        TEST_ASSERT_EQUAL_UINT8(0, flash.bytes[at]);
+    for (uint32_t at = 100 + states[0].length; at % 100 != 0; at++)
+        TEST_ASSERT_EQUAL_UINT8(0, flash.bytes[at]);
+}
+
 static void test_saving_changes_no_bit_of_the_filter(void) {
     become(1);
     static plr_filter before;
@@ -214,6 +223,7 @@ int main(void) {
     RUN_TEST(test_the_slots_are_worn_alike);
     RUN_TEST(test_any_program_and_erase_size_will_do);
     RUN_TEST(test_the_erased_value_does_not_matter);
+    RUN_TEST(test_what_fills_the_last_units_is_zero);
     RUN_TEST(test_saving_changes_no_bit_of_the_filter);
     RUN_TEST(test_a_cut_in_the_first_save_leaves_nothing_or_the_whole);
     RUN_TEST(test_a_cut_in_the_second_save_leaves_the_first_or_the_second);

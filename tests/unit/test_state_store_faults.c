@@ -236,17 +236,34 @@ static void test_an_old_state_of_ours_is_not_taken_for_a_newer_foreign_one(void)
     TEST_ASSERT_EQUAL_UINT(0, found.slot);
 }
 
+static void test_an_old_state_of_ours_is_not_taken_for_a_newer_slot_of_another_version(void) {
+    saves(0);
+    saves(1);
+    slot(1)[4]++;
+    make_whole(1);
+    refuses(PLR_E_FOREIGN);
+    TEST_ASSERT_EQUAL_UINT(0, found.damaged);
+    saves(2);
+    restores(2);
+    TEST_ASSERT_EQUAL_UINT64(3, found.generation);
+}
+
 static void test_a_length_that_leaves_the_slot_is_damage(void) {
     const uint32_t lengths[] = {0, store.slot_size - STATE_AT + 1, store.slot_size, 0x7FFFFFFF,
                                 0xFFFFFFFF};
     saves(0);
+    saves(1);
     for (unsigned i = 0; i < sizeof lengths / sizeof *lengths; i++) {
-        put(slot(0) + 16, lengths[i]);
-        make_whole(0);
-        refuses(PLR_E_CORRUPT);
+        put(slot(1) + 16, lengths[i]);
+        if (lengths[i] == 0)
+            put(slot(1) + 20, 0); /* the CRC of nothing */
+        make_whole(1);
+        restores(0);
+        TEST_ASSERT_EQUAL_UINT(1, found.damaged);
+        TEST_ASSERT_EQUAL_UINT(0, flash.violations); /* nothing is read from beyond the device */
     }
-    put(slot(0) + 16, store.slot_size - STATE_AT);
-    make_whole(0);
+    put(slot(1) + 16, store.slot_size - STATE_AT); /* just inside, but no state is so long */
+    make_whole(1);
     refuses(PLR_E_CORRUPT);
 }
 
@@ -281,6 +298,18 @@ static void test_a_device_that_does_not_write_fails_the_save_alone(void) {
     restores(0);
     saves(1);
     restores(1);
+}
+
+static void test_damage_in_one_slot_does_not_hide_that_the_other_cannot_be_read(void) {
+    saves(0);
+    slot(0)[STATE_AT] ^= 1;
+    faulty_flash_restart(&flash);
+    TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, restore());
+    const unsigned reads = flash.reads; /* the last one was of slot 1 */
+    faulty_flash_restart(&flash);
+    flash.read_fails_at = reads;
+    refuses(PLR_E_IO);
+    TEST_ASSERT_EQUAL_UINT(2, found.damaged);
 }
 
 static void test_if_slot_0_cannot_be_read_slot_1_is_used(void) {
@@ -369,9 +398,11 @@ int main(void) {
     RUN_TEST(test_a_slot_of_another_version_is_refused);
     RUN_TEST(test_a_state_of_other_settings_is_refused);
     RUN_TEST(test_an_old_state_of_ours_is_not_taken_for_a_newer_foreign_one);
+    RUN_TEST(test_an_old_state_of_ours_is_not_taken_for_a_newer_slot_of_another_version);
     RUN_TEST(test_a_length_that_leaves_the_slot_is_damage);
     RUN_TEST(test_a_device_that_does_not_read_is_said_to_fail);
     RUN_TEST(test_a_device_that_does_not_write_fails_the_save_alone);
+    RUN_TEST(test_damage_in_one_slot_does_not_hide_that_the_other_cannot_be_read);
     RUN_TEST(test_if_slot_0_cannot_be_read_slot_1_is_used);
     RUN_TEST(test_a_device_that_contradicts_itself_is_refused);
     RUN_TEST(test_a_device_that_could_not_hold_a_full_map_is_refused_at_the_first_save);
