@@ -267,11 +267,22 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     return plr_motion_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
+/* The interval by which a held reading's noise is charged from h0 to h1 seconds after it came. Its
+ * error stays the same, so after h seconds it has cost sigma^2 max(tau, h) h: within its interval tau
+ * the usual share, beyond it, when twists fail to come, what a constant error does. */
+static plr_real held_interval(const plr_filter *f, plr_real h0, plr_real h1) {
+    const plr_real tau = f->interval_s;
+    if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
+        return tau > 0 ? tau : h1 - h0;
+    return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
+}
+
 static void predict_to(plr_filter *f, plr_time_ns t_ns) {
     if (f->clock_started && t_ns > f->t_ns) {
-        const plr_real seconds = plr_seconds(t_ns - f->t_ns);
-        const plr_real interval = f->interval_s > 0 ? f->interval_s : seconds;
-        plr_motion_step(f, t_ns, f->reading, seconds, interval);
+        const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
+        const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
+        const plr_real interval = held_interval(f, h0, h1);
+        plr_motion_step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
     }
     f->t_ns = t_ns;
     f->clock_started = 1;
@@ -297,11 +308,9 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
-    if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
-        plr_motion_settle(f);
-        if (!f->diverged)
-            process(f, frame, r);
-    }
+    plr_motion_settle(f);
+    if (f->config.mode != PLR_MODE_DEAD_RECKONING && !f->diverged)
+        process(f, frame, r);
     if (f->diverged) {
         r->status = PLR_E_DIVERGED;
         r->health = PLR_HEALTH_DIVERGED;
