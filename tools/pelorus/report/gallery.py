@@ -13,6 +13,8 @@ from pelorus.report import bands, curves, hero, top_view
 from pelorus.report.comparison import Comparison
 from pelorus.report.style import RHO, THETA
 
+CURVE_MIN = 2
+
 
 class Picture(NamedTuple):
     """A file `name`.png; without a caption it does not stand on the page."""
@@ -24,16 +26,22 @@ class Picture(NamedTuple):
 
 
 def pictures(compared: Comparison) -> list[Picture]:
-    """In the page's order; what needs a truth or a bias is left out without one."""
+    """In the page's order; what needs a truth or a bias is left out without one, and a curve
+    needs two frames.
+    """
     out = [_top_view(compared)]
-    if compared.accuracy:
+    if len(compared.main.frames.t_ns) < CURVE_MIN:
+        return out
+    truths = [len(accuracy.t_ns) for accuracy in compared.accuracy.values()]
+    judged = min(truths, default=0) >= CURVE_MIN
+    if judged:
         out += [_errors(compared, name) for name in ("body", "world", "course")]
         out.append(_nees(compared))
     out.append(_covariance(compared))
     if compared.main.summary["bias"] == "on":
         out.append(_biases(compared))
     out += [_observations(compared), _times(compared)]
-    if compared.accuracy:
+    if judged:
         out.append(Picture("hero", "", "", partial(hero.draw, compared)))
     return out
 

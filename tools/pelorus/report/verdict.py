@@ -34,6 +34,8 @@ def verdicts(compared: Comparison) -> list[str]:
 def _of_recording(compared: Comparison) -> Iterator[str]:
     if not compared.accuracy:
         yield "The recording has no truth at its frames: errors and NEES cannot be given."
+    elif compared.main.summary["truth_frames"] < FRAMES_ENOUGH:
+        yield "Too few frames have truth to judge errors and NEES by."
     if compared.main.summary["bias"] == "off" and _suggests_bias(compared.subject.header):
         yield (
             "The recording's header tells of biases of the twist, and the settings turn their "
