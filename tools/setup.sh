@@ -43,10 +43,8 @@ any_installed() {
 as_root() {
     if [ "$(id -u)" -eq 0 ]; then
         "$@"
-    elif command -v sudo >/dev/null; then
-        sudo "$@"
     else
-        die "not root and no sudo. As root: $*"
+        sudo "$@"
     fi
 }
 
@@ -73,6 +71,8 @@ ensure_packages() {
     [ ${#wanted[@]} -eq 0 ] && { echo 'Debian packages: all present'; return 0; }
 
     echo "Debian packages missing: ${wanted[*]}"
+    [ "$(id -u)" -eq 0 ] || command -v sudo >/dev/null ||
+        die 'neither root nor sudo: ask whoever may to apt-get install these packages'
     as_root apt-get update -qq || die 'apt-get update failed: is there a network?'
     for word in "${wanted[@]}"; do
         if name=$(first_available "${word%\?}"); then
