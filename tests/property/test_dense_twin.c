@@ -116,7 +116,7 @@ static void compare(unsigned frame) {
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(5e-9 + 4000 * own, 0, gap.landmark, at);
     /* P -= V V^T leaves the rounding of the variance before in the one after, and
    * a landmark's first frames make it a thousand times smaller */
-    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8 + 4e4 * own, 0, gap.covariance, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8 + 8e4 * own, 0, gap.covariance, at);
 }
 
 static void run_frames(void) {
@@ -263,7 +263,8 @@ static void run_known(void) {
             if (status == PLR_OK)
                 dense_insert_known(&dense, &known);
             else
-                TEST_ASSERT_EQUAL_INT(PLR_E_EXISTS, status);
+                TEST_ASSERT_TRUE(status == PLR_E_EXISTS ||
+                                 (status == PLR_E_FULL && dense.count == config.slots));
         }
         compare(frame);
     }

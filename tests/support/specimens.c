@@ -8,7 +8,6 @@
 #include "filter/covariance.h"
 #include "filter/model.h"
 #include "filter/polar.h"
-#include "support/dense_parts.h"
 #include "support/matrices.h"
 #include "support/rigid.h"
 #include "support/scene.h"
@@ -147,22 +146,6 @@ plr_observation specimen_observation(const plr_filter *f, unsigned slot, const f
     return (plr_observation){f->slots[slot].id, (float)lin.z[0] + shift_px[0],
                              (float)lin.z[2] + shift_px[1], (float)lin.z[1] + shift_px[2],
                              (float)lin.z[2] + shift_px[3]};
-}
-
-void specimen_twin(const plr_filter *f, dense_ekf *e) {
-    const plr_camera *camera = &f->par.camera;
-    plr_calibration calibration = {.fx_px = (double)camera->fx,
-                                   .fy_px = (double)camera->fy,
-                                   .cx_px = (double)camera->cx,
-                                   .cy_px = (double)camera->cy,
-                                   .baseline_m = (double)camera->baseline};
-    plr_pose T_WB;
-    to_doubles(calibration.T_CB.R, camera->R_CB, 9);
-    to_doubles(calibration.T_CB.p, camera->t_CB, 3);
-    dense_init(e, &calibration, &f->config);
-    if (plr_filter_pose(f, &T_WB) != PLR_OK)
-        abort();
-    dense_motion(e->T_WB, &T_WB);
 }
 
 void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]) {

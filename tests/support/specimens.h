@@ -7,7 +7,6 @@
 #include <stdbool.h>
 
 #include "pelorus/filter.h"
-#include "support/dense_ekf.h"
 #include "support/random.h"
 
 /* Settings of a specimen: default, with that model and bias, and no gate. */
@@ -27,9 +26,6 @@ void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion);
 
 /* The observation that a slot predicts, moved by so many pixels in uL, vL, uR, vR. */
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]);
-
-/* The specimen's pose and camera in double, in a textbook filter without landmarks. */
-void specimen_twin(const plr_filter *f, dense_ekf *e);
 
 /* Jw and Ji of the chart at a point, as the filter has them. */
 void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]);

@@ -13,6 +13,7 @@
 #include "filter/gate.h"
 #include "filter/model.h"
 #include "support/dense_parts.h"
+#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"

@@ -7,6 +7,7 @@
 
 #include "filter/model.h"
 #include "support/dense_parts.h"
+#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"

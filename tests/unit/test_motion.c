@@ -10,6 +10,7 @@
 #include "filter/motion.h"
 #include "linalg/packed.h"
 #include "support/dense_parts.h"
+#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
