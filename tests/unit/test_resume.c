@@ -124,6 +124,36 @@ static void test_the_pose_gains_what_was_allowed_and_nothing_else_changes(void) 
     TEST_ASSERT_EQUAL_MEMORY(&before.totals, &filter.totals, sizeof filter.totals);
 }
 
+static void test_allowances_add_up_and_outlast_their_application(void) {
+    double P[36], more[36], P_moved[36];
+    rng chance = rng_seeded(22);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, 4);
+    diagonal(P_moved, 0.04, 0.01);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, P));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 77, P_moved));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 78, P_moved));
+    (void)plr_filter_trace(&filter); /* applies it */
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.motion.Q[0]);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, more));
+    for (unsigned i = 0; i < 36; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5 * (fabs(P[i]) + 0.04), P[i] + 2 * P_moved[i], more[i]);
+}
+
+/* Where the landmarks are in the world does not depend on who carried the body away. */
+static void test_a_body_that_was_moved_leaves_the_map_as_it_was(void) {
+    double P_moved[36];
+    plr_landmark known, now;
+    rng chance = rng_seeded(23);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, 4);
+    diagonal(P_moved, 0.04, 0.01);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&filter, 2, &known));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 77, P_moved));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&filter, 2, &now));
+    const double scale = known.P_W_m2[0] + known.P_W_m2[4] + known.P_W_m2[8];
+    for (unsigned i = 0; i < 9; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3 * scale, known.P_W_m2[i], now.P_W_m2[i]);
+}
+
 static void test_a_reading_of_before_says_nothing_afterwards(void) {
     const plr_twist still = {{0}, {0}}, fast = {{5, 0, 0}, {0}};
     plr_pose pose;
@@ -134,6 +164,19 @@ static void test_a_reading_of_before_says_nothing_afterwards(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 600000000, &still));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
     TEST_ASSERT_EQUAL_DOUBLE(0, pose.p[0]);
+}
+
+static void test_a_frame_that_comes_before_any_twist_finds_the_body_where_it_stood(void) {
+    plr_pose here, later;
+    start();
+    drive(5, 0);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 1000, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &here));
+    const plr_frame nothing = {.t_ns = 500001000, .budget = PLR_NO_BUDGET};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &nothing, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &later));
+    for (unsigned i = 0; i < 3; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, here.p[i], later.p[i]);
 }
 
 static void refuses(plr_status expected, const double *P_moved) {
@@ -187,7 +230,10 @@ int main(void) {
     RUN_TEST(test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks);
     RUN_TEST(test_without_an_allowance_a_moved_body_contradicts_its_landmarks);
     RUN_TEST(test_the_pose_gains_what_was_allowed_and_nothing_else_changes);
+    RUN_TEST(test_allowances_add_up_and_outlast_their_application);
+    RUN_TEST(test_a_body_that_was_moved_leaves_the_map_as_it_was);
     RUN_TEST(test_a_reading_of_before_says_nothing_afterwards);
+    RUN_TEST(test_a_frame_that_comes_before_any_twist_finds_the_body_where_it_stood);
     RUN_TEST(test_an_impossible_allowance_is_refused);
     RUN_TEST(test_a_filter_that_has_not_begun_has_nothing_to_go_on_with);
     RUN_TEST(test_mapping_resumes_its_clock_and_takes_no_allowance);
