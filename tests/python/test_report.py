@@ -15,18 +15,18 @@ import pytest
 from converted import Run as Command
 from pelorus import se3
 from pelorus.errors import PelorusError
-from pelorus.frames import BodyAxes, Message, Stereo, Truth
+from pelorus.frames import BodyAxes, Message, Pose, Stereo, Truth
 from pelorus.report import bands, gallery, plane, style, top_view, verdict
 from pelorus.report.accuracy import assess, nees_per_dof
 from pelorus.report.comparison import Comparison
 from pelorus.report.replay import Outputs, Programs, find_programs
-from pelorus.report.results import carry_out, read_frames, read_map, unpack_symmetric
+from pelorus.report.results import carry_out, read_frames, read_map, read_poses, unpack_symmetric
 from pelorus.report.runs import plan_runs
 from pelorus.report.subject import read_subject
 from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory, read_tum
 from PIL import Image
-from replay_drive import BIN, FRAMES, drive, encode, header, known, t_ns
+from replay_drive import BIN, FRAMES, ROOT, drive, encode, header, known, t_ns
 
 ALWAYS = {"top-view", "covariance", "observations", "time"}
 WITH_TRUTH = ALWAYS | {"error-body", "error-world", "error-course", "nees", "hero"}
@@ -125,6 +125,16 @@ def test_NEES_leaves_out_what_is_no_covariance() -> None:
 def test_packed_covariances_are_lower_triangles_row_by_row() -> None:
     whole = unpack_symmetric(np.arange(6.0)[None], 3)[0]
     assert whole.tolist() == [[0, 1, 3], [1, 2, 4], [3, 4, 5]]
+
+
+def test_poses_between_the_frames_are_left_out(tmp_path: Path) -> None:
+    poses = [Pose(k, p_WB_m=np.array([k, 0.0, 0.0]), after_stereo=k % 2 == 1) for k in range(6)]
+    trajectory, covariance = read_poses(recorded(tmp_path, [header(), *poses]))
+    assert trajectory.t_ns.tolist() == [1, 3, 5]
+    assert trajectory.poses.p[:, 0].tolist() == [1, 3, 5]
+    assert covariance.shape == (3, 6, 6)
+    with pytest.raises(PelorusError, match="no pose after a stereo frame"):
+        read_poses(recorded(tmp_path, [header(), *poses[::2]]))
 
 
 def test_a_refused_frame_has_no_estimate_but_its_counts(tmp_path: Path) -> None:
@@ -404,6 +414,14 @@ def test_verdicts_say_when_a_run_diverged_and_whether_its_gate_is_inert(
     assert "body: gate inert in 40 frames" in lines_with(found)
     reasons[:] = verdict.GATE_LOCKED
     assert "body: gate locked in 40 frames" in lines_with(found)
+
+
+@pytest.mark.parametrize("name", ["GATE_LOCKED", "GATE_INERT", "NIS_HIGH", "NOT_POSITIVE"])
+def test_reasons_are_those_of_the_library(name: str) -> None:
+    types = (ROOT / "include" / "pelorus" / "types.h").read_text(encoding="utf-8")
+    bit = re.search(rf"PLR_REASON_{name} = 1 << (\d+)", types)
+    assert bit is not None
+    assert getattr(verdict, name) == 1 << int(bit.group(1))
 
 
 def test_a_bias_that_is_suggested_and_not_estimated_is_told(
