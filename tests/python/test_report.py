@@ -15,44 +15,25 @@ import pytest
 from converted import Run as Command
 from pelorus import se3
 from pelorus.errors import PelorusError
-from pelorus.frames import BodyAxes, Message, Pose, Stereo, Truth
-from pelorus.report import bands, gallery, plane, style, top_view, verdict
+from pelorus.frames import Pose, Stereo, Truth
+from pelorus.report import verdict
 from pelorus.report.accuracy import assess, nees_per_dof
 from pelorus.report.comparison import Comparison
-from pelorus.report.replay import Outputs, Programs, find_programs
-from pelorus.report.results import carry_out, read_frames, read_map, read_poses, unpack_symmetric
-from pelorus.report.runs import plan_runs
-from pelorus.report.subject import read_subject
-from pelorus.se3 import Poses
+from pelorus.report.replay import Outputs, Programs
+from pelorus.report.results import read_frames, read_map, read_poses, unpack_symmetric
 from pelorus.trajectory import Trajectory, read_tum
 from PIL import Image
-from replay_drive import BIN, FRAMES, ROOT, drive, encode, header, known, t_ns
+from replay_drive import FRAMES, ROOT, drive, header, t_ns
+from report_runs import built_programs, compared, recorded
 
 ALWAYS = {"top-view", "covariance", "observations", "time"}
 WITH_TRUTH = ALWAYS | {"error-body", "error-world", "error-course", "nees", "hero"}
 RUNS = ("dead-reckoning", "body", "course", "world")
-SETTINGS = ("--pixel-sigma", "0.5")
 
 
 @pytest.fixture
 def programs() -> Programs:
-    try:
-        return find_programs(BIN)
-    except PelorusError as error:
-        pytest.skip(str(error))
-
-
-def recorded(folder: Path, messages: list[Message]) -> Path:
-    path = folder / "drive.plr"
-    path.write_bytes(encode(messages))
-    return path
-
-
-def compared(path: Path, programs: Programs, *settings: str) -> Comparison:
-    folder = path.parent / "runs"
-    folder.mkdir()
-    plans = plan_runs(programs, path, settings or SETTINGS)
-    return Comparison(read_subject(path), [carry_out(plan, path, folder) for plan in plans])
+    return built_programs()
 
 
 def pictures_in(folder: Path) -> set[str]:
@@ -181,104 +162,6 @@ def test_world_has_a_depth_limit(
     found = compared(recorded(tmp_path, drive()), programs, "--config", str(config))
     assert found.run("world").summary["max_depth"] == due
     assert found.main.summary["max_depth"] == float(given)
-
-
-# --- what is drawn --------------------------------------------------------------------------------
-
-
-def turned(axes: str) -> Poses:
-    """At rest, with the body's z along the named axis of the world; `-` turns it round."""
-    z = np.zeros(3)
-    z["xyz".index(axes[-1])] = -1 if axes.startswith("-") else 1
-    x = np.roll(z, 1)
-    R = np.stack((x, np.cross(z, x), z), axis=-1)
-    return Poses(np.tile(R, (5, 1, 1)), np.zeros((5, 3)))
-
-
-@pytest.mark.parametrize("towards", ["x", "y", "z", "-x", "-y", "-z"])
-@pytest.mark.parametrize("axes", [BodyAxes.FORWARD_LEFT_UP, BodyAxes.FORWARD_RIGHT_DOWN])
-def test_the_viewer_stands_above_the_body(axes: BodyAxes, towards: str) -> None:
-    poses = turned(towards)
-    chosen = plane.choose(axes, poses)
-    right, up = (axis.sign * np.eye(3)[axis.number] for axis in chosen[:2])
-    above = poses.R[0][:, 2] * (1 if axes == BodyAxes.FORWARD_LEFT_UP else -1)
-    assert np.cross(right, up).tolist() == above.tolist()
-
-
-def test_car_axes_are_shown_as_usual() -> None:
-    upright = Poses(np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)))
-    up = plane.choose(BodyAxes.FORWARD_LEFT_UP, upright)
-    down = plane.choose(BodyAxes.FORWARD_RIGHT_DOWN, upright)
-    assert (up.right.label, up.up.label) == ("x (m)", "y (m)")
-    assert (down.right.label, down.up.label) == ("x (m)", "-y (m)")
-
-
-def test_other_bodies_are_shown_in_the_plane_of_largest_extent() -> None:
-    p = np.array([[0.0, 0, 0], [3, 0.1, 9], [-3, 0.2, 4]])
-    chosen = plane.choose(BodyAxes.OTHER, Poses(np.tile(np.eye(3), (3, 1, 1)), p))
-    assert (chosen.right.label, chosen.up.label) == ("x (m)", "z (m)")
-    assert "x-z" in chosen.why
-
-
-def test_a_run_that_strays_does_not_blow_up_the_picture(tmp_path: Path, programs: Programs) -> None:
-    found = compared(recorded(tmp_path, drive()), programs)
-    calm = top_view.view(found)
-    course = found.run("course")
-    course.trajectory.poses.p[-1] += 1e6
-    wild = top_view.view(found)
-    assert wild.box.side < 3 * calm.box.side
-    for path in (wild.paths["body"], wild.truth):
-        assert path is not None
-        assert (path >= wild.box.low).all()
-        assert (path <= wild.box.high).all()
-
-
-def test_a_shaped_box_holds_the_old_one_and_has_the_shape() -> None:
-    box = top_view.Box(np.array([1.0, 2.0]), np.array([4.0, 3.0]))
-    for ratio in (0.2, 1.0, 3.0, 7.0):
-        shaped = box.shaped(ratio)
-        width, height = shaped.high - shaped.low
-        assert width / height == pytest.approx(ratio)
-        assert (shaped.low <= box.low + 1e-12).all()
-        assert (shaped.high >= box.high - 1e-12).all()
-
-
-def test_equal_metres_are_equal_pixels(tmp_path: Path, programs: Programs) -> None:
-    figure = top_view.draw(compared(recorded(tmp_path, drive() + known()), programs))
-    axes = figure.axes[0]
-    figure.draw_without_rendering()
-    origin, there = axes.transData.transform([[0, 0], [1, 1]])
-    across, up = there - origin
-    assert across == pytest.approx(up)
-    width, height = axes.get_position().size * figure.get_size_inches()
-    assert width == pytest.approx(top_view.PANEL_IN)  # the equal aspect has not shrunk the panel
-    assert height >= top_view.PANEL_HEIGHT_IN[0] - 1e-9
-
-
-def test_every_picture_has_labelled_axes(tmp_path: Path, programs: Programs) -> None:
-    found = compared(recorded(tmp_path, drive()), programs, "--bias", "on")
-    for picture in gallery.pictures(found):
-        figure = picture.draw()
-        labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
-        labels += [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
-        assert len(labels) >= 2, picture.name
-        for label in labels:
-            assert "(" in label or label == "NEES / 6", f"{picture.name}: {label} has no unit"
-    assert "bias" in {picture.name for picture in gallery.pictures(found)}
-
-
-def test_limits_show_every_error_and_as_much_of_the_band_as_lets_it_be_seen() -> None:
-    assert bands.limits(np.array([0.0, -2.0]), np.array([1.0, 1.0])) == pytest.approx((-2.2, 2.2))
-    wide = bands.limits(np.array([0.01]), np.array([1e6]))
-    assert wide[1] == pytest.approx(0.01 * bands.BAND_MAX * bands.HEADROOM)
-    assert bands.limits(np.zeros(3), np.zeros(3)) == (-1.0, 1.0)
-
-
-def test_a_logarithmic_axis_ignores_the_few_smallest_values() -> None:
-    axes = style.new_figure(4, 3).subplots()
-    axes.plot(np.concatenate(([1e-30], np.full(200, 5.0))))
-    style.limit_decades(axes)
-    assert axes.get_ylim()[0] == pytest.approx(2.5)
 
 
 # --- the command ----------------------------------------------------------------------------------

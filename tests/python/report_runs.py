@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""What the tests of the report share: a recording, and the runs over it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from pelorus.errors import PelorusError
+from pelorus.frames import Message
+from pelorus.report.comparison import Comparison
+from pelorus.report.replay import Programs, find_programs
+from pelorus.report.results import carry_out
+from pelorus.report.runs import plan_runs
+from pelorus.report.subject import read_subject
+from replay_drive import BIN, encode
+
+SETTINGS = ("--pixel-sigma", "0.5")
+
+
+def built_programs() -> Programs:
+    """Those of $PELORUS_BIN or build/bin; without them the test is skipped."""
+    try:
+        return find_programs(BIN)
+    except PelorusError as error:
+        pytest.skip(str(error))
+
+
+def recorded(folder: Path, messages: list[Message]) -> Path:
+    """Write a recording into the folder."""
+    path = folder / "drive.plr"
+    path.write_bytes(encode(messages))
+    return path
+
+
+def compared(path: Path, programs: Programs, *settings: str) -> Comparison:
+    """Carry out the runs of a report."""
+    folder = path.parent / "runs"
+    folder.mkdir()
+    plans = plan_runs(programs, path, settings or SETTINGS)
+    return Comparison(read_subject(path), [carry_out(plan, path, folder) for plan in plans])
