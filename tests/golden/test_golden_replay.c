@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The committed recording drive.plr through the filter, against the committed results: the same bits
+ * from every compiler, level of optimisation and processor. docs/TESTING.md says how they are
+ * renewed when a change is meant.
+ *
+ * A line of the results is a frame: counts and position in full, everything else as a CRC-32 of its
+ * bytes.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+#include "filter/covariance.h"
+#include "pelorus/filter.h"
+#include "pelorus/wire.h"
+
+enum { BUFFER = PLR_WIRE_STEREO_BODY(256), LINE = 320, MOST_KNOWN = 200 };
+
+typedef struct scenario {
+    const char *name;
+    plr_model_kind model;
+    plr_mode mode;
+    bool bias;
+    unsigned slots;
+    double max_depth_m;
+} scenario;
+
+static const scenario scenarios[] = {
+    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0},
+    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20},
+    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0},
+    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0},
+};
+
+static plr_filter filter;
+static plr_landmark known[MOST_KNOWN];
+static unsigned known_count;
+static FILE *expected; /* NULL while results are renewed */
+static FILE *renewed;
+static unsigned line_number;
+
+void setUp(void) {
+    known_count = line_number = 0;
+    expected = renewed = NULL;
+}
+
+void tearDown(void) {
+    if (expected)
+        fclose(expected);
+    if (renewed)
+        fclose(renewed);
+}
+
+/* ---------------------------------------------------------------- a line a frame */
+
+static uint32_t crc(const void *bytes, size_t n) {
+    return plr_crc32(0, bytes, n);
+}
+
+static uint32_t crc_of_landmarks(void) {
+    uint32_t sum = 0;
+    for (unsigned slot = 0; slot < filter.count; slot++) {
+        sum = plr_crc32(sum, (const uint8_t *)&filter.slots[slot].id, sizeof(uint32_t));
+        sum = plr_crc32(sum, (const uint8_t *)filter.slots[slot].x, sizeof filter.slots[slot].x);
+    }
+    return sum;
+}
+
+static void describe(char line[LINE], const plr_report *r) {
+    plr_real P_xi[36];
+    const unsigned n = plr_covariance_dim(&filter);
+    plr_covariance_pose(&filter, P_xi);
+    snprintf(line, LINE,
+             "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x "
+             "used %u gated %u new %u evicted %u active %u status %d",
+             (double)r->t_ns * 1e-9, filter.p_WB[0], filter.p_WB[1], filter.p_WB[2],
+             crc(filter.R_WB, sizeof filter.R_WB), crc(P_xi, sizeof P_xi),
+             crc(filter.bias, sizeof filter.bias), crc_of_landmarks(),
+             crc(filter.P, n * (n + 1) / 2 * sizeof *filter.P), r->used, r->gated, r->created,
+             r->evicted, r->active, r->status);
+}
+
+static void compare(const char *line) {
+    char due[LINE], message[2 * LINE + 160];
+    line_number++;
+    if (renewed) {
+        fprintf(renewed, "%s\n", line);
+        return;
+    }
+    if (!fgets(due, sizeof due, expected))
+        due[0] = '\0';
+    due[strcspn(due, "\n")] = '\0';
+    if (strcmp(line, due) == 0)
+        return;
+    snprintf(
+        message, sizeof message,
+        "the first frame that differs is that of line %u.\n  due: %s\n  got: %s\n  R got: %.9g "
+        "%.9g %.9g / %.9g %.9g %.9g / %.9g %.9g %.9g",
+        line_number, due, line, (double)filter.R_WB[0], (double)filter.R_WB[1],
+        (double)filter.R_WB[2], (double)filter.R_WB[3], (double)filter.R_WB[4],
+        (double)filter.R_WB[5], (double)filter.R_WB[6], (double)filter.R_WB[7],
+        (double)filter.R_WB[8]);
+    TEST_FAIL_MESSAGE(message);
+}
+
+/* ---------------------------------------------------------------- the recording */
+
+static bool source(void *context, uint32_t id, plr_landmark *landmark) {
+    (void)context;
+    for (unsigned i = 0; i < known_count; i++)
+        if (known[i].id == id) {
+            *landmark = known[i];
+            return true;
+        }
+    return false;
+}
+
+static void begin(const scenario *s, const plr_header *header) {
+    const plr_map map = {.source = source};
+    plr_config config;
+    plr_config_default(&config);
+    config.model = (uint8_t)s->model;
+    config.mode = (uint8_t)s->mode;
+    config.bias = s->bias;
+    config.slots = (uint16_t)s->slots;
+    config.max_depth_m = s->max_depth_m;
+    config.twist_timing = header->twist_timing;
+    config.pixel_sigma_px = header->pixel_sigma_px;
+    config.velocity_sigma = header->velocity_sigma_mps;
+    config.gyro_sigma = header->gyro_sigma_radps;
+    config.bias_velocity_sigma_mps = header->bias_velocity_sigma_mps;
+    config.bias_gyro_sigma_radps = header->bias_gyro_sigma_radps;
+    config.bias_velocity_walk = header->bias_velocity_walk;
+    config.bias_gyro_walk = header->bias_gyro_walk;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &header->calibration, &config, &map));
+}
+
+static void take_truth(const scenario *s, const plr_truth *truth) {
+    double P[36] = {0};
+    for (int i = 0; i < 6; i++)
+        P[7 * i] = 1e-8;
+    if (s->mode == PLR_MODE_MAPPING)
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, truth->t_ns, &truth->T_WB));
+    else if (filter.totals.frames == 0)
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, truth->t_ns, &truth->T_WB, P));
+}
+
+static void take(const scenario *s, const plr_message *message) {
+    char line[LINE];
+    plr_report report;
+    switch (message->kind) {
+    case PLR_KIND_HEADER:
+        begin(s, &message->as.header);
+        break;
+    case PLR_KIND_LANDMARK:
+        TEST_ASSERT_LESS_THAN_UINT(MOST_KNOWN, known_count);
+        known[known_count++] = message->as.landmark.landmark;
+        break;
+    case PLR_KIND_TRUTH:
+        take_truth(s, &message->as.truth);
+        break;
+    case PLR_KIND_TWIST:
+        TEST_ASSERT_EQUAL_INT(
+            PLR_OK, plr_filter_predict(&filter, message->as.twist.t_ns, &message->as.twist.twist));
+        break;
+    case PLR_KIND_STEREO:
+        (void)plr_filter_update(&filter, &message->as.stereo, &report);
+        describe(line, &report);
+        compare(line);
+        break;
+    default:
+        break;
+    }
+}
+
+static void replay(const scenario *s) {
+    static uint8_t buffer[BUFFER];
+    static plr_observation observations[256];
+    plr_reader reader;
+    uint8_t bytes[512];
+    size_t n;
+    FILE *recording = fopen(PELORUS_SOURCE_DIR "/tests/golden/drive.plr", "rb");
+    TEST_ASSERT_NOT_NULL_MESSAGE(recording, "tests/golden/drive.plr is missing");
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_reader_init(&reader, buffer, sizeof buffer, observations, 256));
+    while ((n = fread(bytes, 1, sizeof bytes, recording)) > 0)
+        for (size_t at = 0, taken; at < n; at += taken) {
+            plr_message message;
+            if (plr_reader_feed(&reader, bytes + at, n - at, &taken, &message) == PLR_READ_MESSAGE)
+                take(s, &message);
+        }
+    fclose(recording);
+    TEST_ASSERT_EQUAL_UINT32(0, reader.counts.damaged + reader.counts.missing);
+}
+
+/* ---------------------------------------------------------------- tests */
+
+/* Where results are written to, if they are to be renewed. */
+static const char *renewal_folder(void) {
+    return getenv("PELORUS_GOLDEN_RENEW");
+}
+
+static void check(const scenario *s) {
+    char path[1024], line[LINE];
+    const char *folder = renewal_folder();
+    if (PLR_BLOCK_OBSERVATIONS != 8 || PLR_MAX_LANDMARKS < 25)
+        TEST_IGNORE_MESSAGE("the bits of this build's blocks or capacity are others");
+    snprintf(path, sizeof path, "%s/%s.f%d.txt",
+             folder ? folder : PELORUS_SOURCE_DIR "/tests/golden", s->name, PLR_REAL);
+    FILE *file = fopen(path, folder ? "w" : "r");
+    TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
+    if (folder)
+        renewed = file;
+    else
+        expected = file;
+    replay(s);
+    TEST_ASSERT_GREATER_THAN_UINT(50, line_number);
+    if (expected)
+        TEST_ASSERT_NULL_MESSAGE(fgets(line, sizeof line, expected), "more frames were due");
+    if (renewed)
+        TEST_IGNORE_MESSAGE("the results were renewed, not compared");
+}
+
+static void test_body_computes_the_committed_bits(void) {
+    check(&scenarios[0]);
+}
+
+static void test_world_computes_the_committed_bits(void) {
+    check(&scenarios[1]);
+}
+
+static void test_localization_computes_the_committed_bits(void) {
+    check(&scenarios[2]);
+}
+
+static void test_mapping_computes_the_committed_bits(void) {
+    check(&scenarios[3]);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_body_computes_the_committed_bits);
+    RUN_TEST(test_world_computes_the_committed_bits);
+    RUN_TEST(test_localization_computes_the_committed_bits);
+    RUN_TEST(test_mapping_computes_the_committed_bits);
+    return UNITY_END();
+}
