@@ -82,8 +82,23 @@ static void describe(char line[LINE], const plr_report *r) {
              r->evicted, r->active, r->status);
 }
 
+/* Says which words of two lines differ, each behind the name that stands before it. */
+static void print_differences(const char *due, const char *got) {
+    char name[32] = "";
+    while (*due || *got) {
+        const int due_length = (int)strcspn(due, " "), got_length = (int)strcspn(got, " ");
+        const bool same = due_length == got_length && memcmp(due, got, (size_t)due_length) == 0;
+        if (same && (*due >= 'A'))
+            snprintf(name, sizeof name, "%.*s", due_length, due);
+        if (!same)
+            printf("  %-9s due %.*s, got %.*s\n", name, due_length, due, got_length, got);
+        due += due_length + (due[due_length] == ' ');
+        got += got_length + (got[got_length] == ' ');
+    }
+}
+
 static void compare(const char *line) {
-    char due[LINE], message[2 * LINE + 160];
+    char due[LINE];
     line_number++;
     if (renewed) {
         fprintf(renewed, "%s\n", line);
@@ -94,15 +109,13 @@ static void compare(const char *line) {
     due[strcspn(due, "\n")] = '\0';
     if (strcmp(line, due) == 0)
         return;
-    snprintf(
-        message, sizeof message,
-        "the first frame that differs is that of line %u.\n  due: %s\n  got: %s\n  R got: %.9g "
-        "%.9g %.9g / %.9g %.9g %.9g / %.9g %.9g %.9g",
-        line_number, due, line, (double)filter.R_WB[0], (double)filter.R_WB[1],
-        (double)filter.R_WB[2], (double)filter.R_WB[3], (double)filter.R_WB[4],
-        (double)filter.R_WB[5], (double)filter.R_WB[6], (double)filter.R_WB[7],
-        (double)filter.R_WB[8]);
-    TEST_FAIL_MESSAGE(message);
+    printf("frame %u, t %.9f s, is the first that differs:\n", line_number,
+           (double)plr_filter_time(&filter) * 1e-9);
+    print_differences(due, line);
+    printf("  R is now ");
+    for (int i = 0; i < 9; i++)
+        printf("%.9g%s", (double)filter.R_WB[i], i < 8 ? " " : "\n");
+    TEST_FAIL_MESSAGE("other bits; if the change is meant: docs/TESTING.md, \"The golden replay\"");
 }
 
 /* ---------------------------------------------------------------- the recording */
