@@ -79,7 +79,8 @@ step() {
 # words of the scripts in tests/layering. Shown, and counted.
 count_skips() {
     local said
-    said=$(grep -hE ':IGNORE|^SKIPPED |^skipped: ' "$1" | sed 's/^skipped: //' | sort -u)
+    said=$(grep -hE ':IGNORE|^SKIPPED |^skipped: ' "$1" |
+        sed -E 's/^(skipped: |SKIPPED \[[0-9]+\] )//' | sort -u)
     [ -z "$said" ] && return 0
     sed 's/^/skipped: /' <<<"$said"
     skipped=$((skipped + $(wc -l <<<"$said")))
