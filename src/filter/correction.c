@@ -63,7 +63,7 @@ static bool apply_block(plr_filter *f, const plr_block *block, bool *factorised)
     plr_solve_upper_transposed(rows, 1, w->S, w->y, 1);
     if (!plr_covariance_subtract(f, rows))
         return false;
-    plr_gemm_nn(1, block->n, rows, w->y, rows, w->Vt, block->ld, w->dx, block->n);
+    plr_combine_rows(block->n, rows, w->y, w->Vt, block->ld, w->dx);
     return true;
 }
 

@@ -64,18 +64,58 @@ bool plr_cholesky_upper(unsigned n, plr_real *S) {
     return true;
 }
 
-/* The solution for STRIP columns, one row of them at a time. */
+/* to[c] = a y[c] + from[c] over a strip */
+static inline void add_row(plr_real *restrict to, plr_real a, const plr_real *restrict y,
+                           const plr_real *restrict from) {
+    for (int c = 0; c < STRIP; c++)
+        to[c] = PLR_FMA(a, y[c], from[c]);
+}
+
+/* to[c] += a y[c] over a strip */
+static inline void accumulate_row(plr_real *restrict to, plr_real a, const plr_real *restrict y) {
+    for (int c = 0; c < STRIP; c++)
+        to[c] = PLR_FMA(a, y[c], to[c]);
+}
+
+/* to[c] = a from[c] over a strip */
+static inline void scale_row(plr_real *restrict to, plr_real a, const plr_real *restrict from) {
+    for (int c = 0; c < STRIP; c++)
+        to[c] = a * from[c];
+}
+
+/* Rows i > 0 and i + 1 of the solution for STRIP columns: both take the rows above from one reading.
+ */
+static inline void solve_two_rows(unsigned k, const plr_real *restrict U, unsigned i, plr_real *X,
+                                  size_t ldx) {
+    plr_real *row0 = X + i * ldx, *row1 = row0 + ldx;
+    plr_real x0[STRIP], x1[STRIP];
+    const plr_real *u = U + i; /* (0, i) and (0, i + 1), then down both columns */
+    const plr_real *y = X;
+    add_row(x0, -u[0], y, row0);
+    add_row(x1, -u[1], y, row1);
+    u += k - 1;
+    for (size_t step = k - 2; step > k - 1 - i; step--) {
+        y += ldx;
+        const plr_real a0 = -u[0], a1 = -u[1];
+        accumulate_row(x0, a0, y);
+        accumulate_row(x1, a1, y);
+        u += step;
+    }
+    scale_row(row0, PLR_R(1) / u[0], x0);
+    accumulate_row(x1, -u[1], row0);
+    scale_row(row1, PLR_R(1) / U[plr_upper_row(k, i + 1)], x1);
+}
+
 static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
-    for (unsigned i = 0; i < k; i++) {
-        plr_real *row = X + i * ldx;
-        plr_real x[STRIP];
-        if (i > 0)
-            reduce_strip(k, U, i, X, ldx, row, x);
-        else
-            memcpy(x, row, sizeof x);
-        const plr_real inverse = PLR_R(1) / U[plr_upper_row(k, i)];
-        for (int c = 0; c < STRIP; c++)
-            row[c] = x[c] * inverse;
+    plr_real x[STRIP];
+    memcpy(x, X, sizeof x);
+    scale_row(X, PLR_R(1) / U[0], x);
+    unsigned i = 1;
+    for (; i + 1 < k; i += 2)
+        solve_two_rows(k, U, i, X, ldx);
+    if (i < k) {
+        reduce_strip(k, U, i, X, ldx, X + i * ldx, x);
+        scale_row(X + i * ldx, PLR_R(1) / U[plr_upper_row(k, i)], x);
     }
 }
 
@@ -99,4 +139,25 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
         solve_strip(k, U, X + j, ldx);
     for (; j < n; j++)
         solve_column(k, U, X + j, ldx);
+}
+
+void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
+                      const plr_real *restrict X, size_t ldx, plr_real *restrict x) {
+    unsigned j = 0;
+    for (; j + STRIP <= n; j += STRIP) {
+        plr_real sum[STRIP];
+        for (int c = 0; c < STRIP; c++)
+            sum[c] = x[j + (unsigned)c];
+        const plr_real *restrict row = X + j;
+        for (unsigned k = 0; k < depth; k++) {
+            for (int c = 0; c < STRIP; c++)
+                sum[c] = PLR_FMA(a[k], row[c], sum[c]);
+            row += ldx;
+        }
+        for (int c = 0; c < STRIP; c++)
+            x[j + (unsigned)c] = sum[c];
+    }
+    for (; j < n; j++)
+        for (unsigned k = 0; k < depth; k++)
+            x[j] = PLR_FMA(a[k], X[k * ldx + j], x[j]);
 }

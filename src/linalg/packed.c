@@ -100,11 +100,19 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
 
 void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *restrict Ut,
                                     size_t ld, const plr_real *restrict P, plr_real *restrict d) {
-    for (unsigned i = 0; i < n; i++)
-        d[i] = P[plr_packed_row(i) + i];
-    for (unsigned k = 0; k < depth; k++)
-        for (unsigned i = 0; i < n; i++)
-            d[i] = PLR_FMA(-Ut[k * ld + i], Ut[k * ld + i], d[i]);
+    for (unsigned j = 0; j < n; j += COLUMNS) {
+        const unsigned width = n - j < COLUMNS ? n - j : COLUMNS;
+        plr_real sum[COLUMNS] = {0};
+        for (unsigned c = 0; c < width; c++)
+            sum[c] = P[plr_packed_row(j + c) + j + c];
+        const plr_real *restrict row = Ut + j;
+        for (unsigned k = 0; k < depth; k++) {
+            for (int c = 0; c < COLUMNS; c++)
+                sum[c] = PLR_FMA(-row[c], row[c], sum[c]);
+            row += ld;
+        }
+        memcpy(d + j, sum, width * sizeof *d);
+    }
 }
 
 void plr_packed_subtract_plain(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
