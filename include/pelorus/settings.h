@@ -59,7 +59,7 @@ typedef struct plr_config {
     double min_depth_m;      /* predicted depth below which an observation is rejected */
     double start_sigma;      /* m and rad: initial pose, where no covariance is given */
     double landmark_sigma_m; /* of a new landmark's position per axis; 0: from the pixels */
-    double max_range_m;      /* a landmark's distance never exceeds it */
+    double max_range_m;      /* no correction takes a landmark further */
     double max_gap_s;        /* a longer pause in the data is refused with PLR_E_GAP */
     double twist_delay_s;    /* the session holds twists back so long for a late camera */
 } plr_config;

@@ -130,7 +130,7 @@ typedef struct plr_report {
     uint16_t blocks_failed; /* blocks whose innovation covariance could not be factorised */
     uint16_t active;        /* landmarks in the state afterwards */
     uint16_t nis_dof;       /* degrees of freedom of nis */
-    float nis;              /* sum of the used observations' gate distances d^2 */
+    float nis;              /* sum of the gate distances d^2 of those accepted, left out or not */
 } plr_report;
 
 #endif

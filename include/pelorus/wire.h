@@ -42,6 +42,9 @@ enum {
     PLR_WIRE_MAX_TEXT = 240
 };
 
+/* On the diagonal of a POSE's covariances: the filter has diverged and knows none. */
+#define PLR_WIRE_UNKNOWN_VARIANCE 1e12
+
 /* Bytes of a body that holds n observations: the buffer that a reader needs for them. */
 #define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))
 

@@ -132,7 +132,8 @@ static void compare_from_start(evaluation_figures *figures, const pair *pairs, s
         position += squared_distance(estimated->T_WB.p, moved.p);
         angle += pow(rotation_angle(error.R), 2);
         pose_log(xi, &error);
-        const double d2 = k > 0 ? mahalanobis(estimated->P_xi, xi) : 0;
+        const bool unknown = estimated->P_xi[0] >= PLR_WIRE_UNKNOWN_VARIANCE; /* diverged */
+        const double d2 = unknown ? nan("") : k > 0 ? mahalanobis(estimated->P_xi, xi) : 0;
         if (isnan(d2)) {
             figures->not_positive++;
         } else if (k > 0) {

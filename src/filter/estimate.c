@@ -104,7 +104,7 @@ double plr_filter_trace(plr_filter *f) {
     if (!ready(f))
         return 0;
     plr_motion_settle(f);
-    return plr_covariance_trace(f);
+    return f->diverged ? 0 : plr_covariance_trace(f);
 }
 
 plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals) {

@@ -210,8 +210,10 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
         f->interval_s = 0;
         memset(f->reading, 0, sizeof f->reading);
     }
-    if (!plr_covariance_is_positive(f) && f->config.bias)
+    if (!plr_covariance_is_positive(f) && f->config.bias) { /* the bias is lost too: its prior */
+        memset(f->bias, 0, sizeof f->bias);
         start_bias(f);
+    }
     return PLR_OK;
 }
 

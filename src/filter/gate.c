@@ -25,7 +25,8 @@ static plr_real residual_norm2(const plr_observation *seen, const plr_linearisat
 
 /* A prediction that may be off by a focal length, one radian, says nothing about where to linearise:
  * such a landmark stands beside the camera or was never well known. Its variance would besides
- * shrink by more digits than float32 has. */
+ * shrink by more digits than float32 has. Known landmarks are let through: in localization from a
+ * rough start it is the pose that is not known, and nothing else could tell it. */
 static bool is_basis_for_linearisation(const plr_filter *f, const plr_real S[6]) {
     const plr_real limit = f->par.camera.fx * f->par.camera.fx;
     for (unsigned i = 0; i < PLR_ROWS; i++)
@@ -42,7 +43,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
 
     plr_real S[6 + PLR_KERNEL_MARGIN] = {0}, r[3];
     plr_covariance_innovation(f, slot, &lin, S);
-    if (!is_basis_for_linearisation(f, S))
+    if (!f->slots[slot].known && !is_basis_for_linearisation(f, S))
         return verdict;
     for (unsigned i = 0; i < PLR_ROWS; i++)
         S[plr_upper_row(PLR_ROWS, i)] += plr_gate_noise(f, i);

@@ -22,7 +22,7 @@ void plr_gate_innovation(plr_real r[3], const plr_observation *seen, const plr_l
 plr_real plr_gate_noise(const plr_filter *f, unsigned row);
 
 /* Judges an observation of a slot at the current estimate. Rejected whatever its residual: a point
- * nearer than min-depth, and one whose predicted pixels have a sigma of more than a focal length. */
+ * nearer than min-depth, and one whose predicted pixels have a sigma of more than a focal length (but for known ones). */
 plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observation *seen);
 
 #endif

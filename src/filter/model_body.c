@@ -157,6 +157,26 @@ static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_
     landmark->uses_pose = false;
 }
 
+/* P = J P_W J^T, 3x3, in double: a far point's bearing variance is what is left of its range variance,
+ * more digits below than float32 has. False if a variance comes out negative. */
+static bool carry_covariance(plr_real P[9], const plr_real J[9], const double P_W[9]) {
+    double JP[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            JP[3 * i + j] = 0;
+            for (int k = 0; k < 3; k++)
+                JP[3 * i + j] += (double)J[3 * i + k] * P_W[3 * k + j];
+        }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = 0;
+            for (int k = 0; k < 3; k++)
+                sum += JP[3 * i + k] * (double)J[3 * j + k];
+            P[3 * i + j] = P[3 * j + i] = (plr_real)sum;
+        }
+    return P[0] >= 0 && P[4] >= 0 && P[8] >= 0;
+}
+
 static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark) {
     plr_real offset_W[3], s_B[3], R_CW[9];
     for (int i = 0; i < 3; i++)
@@ -169,18 +189,14 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
         return false;
 
     plr_polar chart;
-    plr_real Jw[9], J_W[9], P_W[9], JP[9];
+    plr_real Jw[9], J_W[9];
     plr_polar_at(&chart, landmark->x);
     chart_by_body_twist(f, &chart, landmark->J_pose);
     landmark->uses_pose = true;
     plr_polar_from_point(Jw, &chart);
     plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, f->R_WB);
     plr_mat3_mul(J_W, Jw, R_CW);
-    for (int i = 0; i < 9; i++)
-        P_W[i] = (plr_real)known->P_W_m2[i];
-    plr_mat3_mul(JP, J_W, P_W);
-    plr_mat3_mul_nt(landmark->P, JP, J_W);
-    return true;
+    return carry_covariance(landmark->P, J_W, known->P_W_m2);
 }
 
 /*

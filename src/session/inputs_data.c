@@ -149,7 +149,18 @@ static void learn(plr_session *s, uint64_t update_ns) {
         s->totals.over_deadline++;
 }
 
+/* A frame that a link has doubled: used twice, its pixels would count for more than they know. */
+static bool is_repeated(const plr_session *s, const plr_frame *frame) {
+    plr_totals totals;
+    return plr_filter_totals(&s->filter, &totals) == PLR_OK && totals.frames > 0 &&
+           s->last.t_ns == frame->t_ns;
+}
+
 static void process(plr_session *s, const plr_frame *frame) {
+    if (is_repeated(s, frame)) {
+        refuse_frame(s, frame, PLR_E_TIME);
+        return;
+    }
     const plr_health before = s->last.health;
     uint64_t update_ns;
     plr_report report;

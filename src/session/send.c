@@ -29,15 +29,27 @@ static void pack6(double packed[21], const double full[36]) {
             packed[k++] = full[6 * i + j];
 }
 
+/* A covariance as the filter gives it; where it has diverged and gives none, one that says so. */
+static bool describe_covariance(double packed[21], double P[36], plr_status status) {
+    if (status == PLR_E_DIVERGED) {
+        memset(P, 0, 36 * sizeof *P);
+        for (unsigned i = 0; i < 36; i += 7)
+            P[i] = PLR_WIRE_UNKNOWN_VARIANCE;
+    } else if (status != PLR_OK) {
+        return false;
+    }
+    pack6(packed, P);
+    return true;
+}
+
 static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
     double P[36];
-    if (plr_filter_pose(f, &pose->T_WB) != PLR_OK || plr_filter_pose_covariance(f, P) != PLR_OK)
+    if (plr_filter_pose(f, &pose->T_WB) != PLR_OK ||
+        plr_filter_velocity(f, &pose->velocity) != PLR_OK)
         return false;
-    pack6(pose->P_xi, P);
-    if (plr_filter_velocity(f, &pose->velocity) != PLR_OK ||
-        plr_filter_velocity_covariance(f, P) != PLR_OK)
+    if (!describe_covariance(pose->P_xi, P, plr_filter_pose_covariance(f, P)) ||
+        !describe_covariance(pose->P_u, P, plr_filter_velocity_covariance(f, P)))
         return false;
-    pack6(pose->P_u, P);
     return plr_filter_bias(f, pose->bias, NULL) == PLR_OK;
 }
 
