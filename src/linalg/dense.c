@@ -144,18 +144,17 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
                       const plr_real *restrict X, size_t ldx, plr_real *restrict x) {
     unsigned j = 0;
-    for (; j + STRIP <= n; j += STRIP) {
-        plr_real sum[STRIP];
-        for (int c = 0; c < STRIP; c++)
-            sum[c] = x[j + (unsigned)c];
+    for (; depth > 0 && j + STRIP <= n; j += STRIP) {
         const plr_real *restrict row = X + j;
-        for (unsigned k = 0; k < depth; k++) {
-            for (int c = 0; c < STRIP; c++)
-                sum[c] = PLR_FMA(a[k], row[c], sum[c]);
+        plr_real *restrict to = x + j;
+        plr_real sum[STRIP];
+        add_row(sum, a[0], row, to);
+        for (unsigned k = 1; k < depth; k++) {
             row += ldx;
+            accumulate_row(sum, a[k], row);
         }
         for (int c = 0; c < STRIP; c++)
-            x[j + (unsigned)c] = sum[c];
+            to[c] = sum[c];
     }
     for (; j < n; j++)
         for (unsigned k = 0; k < depth; k++)

@@ -104,7 +104,7 @@ def test_NEES_leaves_out_what_is_no_covariance() -> None:
 
 
 def test_packed_covariances_are_lower_triangles_row_by_row() -> None:
-    whole = unpack_symmetric(np.arange(6.0)[None], 3)[0]
+    whole = unpack_symmetric(np.arange(6, dtype=np.float64)[None], 3)[0]
     assert whole.tolist() == [[0, 1, 3], [1, 2, 4], [3, 4, 5]]
 
 
