@@ -240,6 +240,7 @@ static void test_a_diverged_filter_gives_means_and_no_covariance(void) {
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_bias(&rig.filter, x, P));
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_pose_covariance(&rig.filter, P));
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_velocity_covariance(&rig.filter, P));
+    TEST_ASSERT_EQUAL_DOUBLE(0, plr_filter_trace(&rig.filter));
 }
 
 int main(void) {

@@ -137,6 +137,19 @@ static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
     TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.gain));
 }
 
+/* A sigma of more than a focal length in the image is no basis for a linearisation, unless the place
+ * is known and it is the pose that is not. */
+static void test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmarks(void) {
+    const float shift[4] = {0};
+    const plr_observation seen = specimen_observation(&filter, 3, shift);
+    const unsigned row = plr_covariance_row(&filter, 3);
+    for (unsigned i = row; i < row + 2; i++)
+        filter.P[plr_packed_at(i, i)] = PLR_R(9); /* 3 rad of bearing */
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 3, &seen).accepted);
+    filter.slots[3].known = 1;
+    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 3, &seen).accepted);
+}
+
 static void test_an_innovation_covariance_that_is_not_positive_is_rejected(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
@@ -166,6 +179,7 @@ int main(void) {
     RUN_TEST(test_a_row_gap_counts_even_where_the_three_rows_fit);
     RUN_TEST(test_the_course_gate_looks_at_the_norm_of_four_residuals);
     RUN_TEST(test_a_point_too_near_is_rejected_even_by_an_open_gate);
+    RUN_TEST(test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmarks);
     RUN_TEST(test_an_innovation_covariance_that_is_not_positive_is_rejected);
     RUN_TEST(test_judging_changes_nothing_but_workspace);
     return UNITY_END();
