@@ -51,8 +51,8 @@ static void warn_about(plr_session *s, const plr_config *config) {
     const bool asks = config->mode == PLR_MODE_LOCALIZATION || config->known_map != 0;
     if (config->model == PLR_MODEL_WORLD && sizeof(plr_real) == sizeof(float) &&
         config->mode != PLR_MODE_DEAD_RECKONING && config->mode != PLR_MODE_MAPPING)
-        warn(s, "model = world breaks down in float32 within some hundred frames: take the float64 "
-                "build, or model = body");
+        warn(s, "model = world breaks down in float32 if points are far (max-depth helps), the "
+                "start is uncertain or the drive is long: take the float64 build, or model = body");
     if (asks && s->known.count == 0)
         warn(s, "known landmarks are asked for, and none was given: LANDMARK (known) must come "
                 "before the data");
