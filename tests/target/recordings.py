@@ -3,8 +3,8 @@
 
 usage: recordings.py FOLDER [--long]
 
-The simulated one always; Starry Night and sequence 03 where $PELORUS_DATA has them: 200 steps and
-30 frames of them, with --long the whole of both. What is there already is kept.
+The simulated one always; Starry Night, 0027 and 03 where $PELORUS_DATA has them: 200 steps, 30 and
+30 frames of them, with --long the whole of all three. What is there already is kept.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ REAL = {
         "starry-night/dataset3.mat",
         200,
     ),
+    "0027": (("convert", "ece276a", "{in}", "{out}"), "ece276a/0027.npz", 30),
     "03": (("convert", "ece276a", "{in}", "{out}"), "ece276a/03.npz", 30),
 }
 

@@ -6,13 +6,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pelorus.frames import Kind, Pose
+from pelorus.frames import Pose, Stereo
 from pelorus.robot.compare import Comparison, desktop_poses, digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.stream import Streamer
 from pelorus.wire import read_file
 
-SLOTS = 32
+SLOTS, OBSERVATIONS = 32, 128  # of the images and of the desktop's builds
+FULL = -10  # plr_status
 FLOAT64_BOARD = "mps2_an500"
 
 
@@ -22,8 +23,12 @@ def board_poses(board: str, image: Path, recording: Path) -> list[Pose]:
         link = emulator.connect()
         outcome = Streamer(link).run(messages)
         link.close()
+    frames = [message for message in messages if isinstance(message, Stereo)]
+    too_long = sum(len(frame.ids) > OBSERVATIONS for frame in frames)  # sequence 03 has one
     assert outcome.unanswered == 0
-    assert outcome.frames == sum(message.kind == Kind.STEREO for message in messages)
+    assert outcome.frames == len(frames)
+    assert outcome.reports[FULL] == too_long
+    assert outcome.reports[0] == len(outcome.poses) == len(frames) - too_long
     return outcome.poses
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,8 +16,9 @@ from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.compare import Comparison, desktop_poses, digest, replay_program
+from pelorus.robot.status import refusal
 from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
-from pelorus.robot.target import FORMS, open_target
+from pelorus.robot.target import BAUD, FORMS, open_target
 from pelorus.wire import header_of, read_file
 
 
@@ -28,7 +29,9 @@ def register(app: typer.Typer) -> None:
 
 def stream(
     source: Path = typer.Argument(..., metavar="IN.plr", help="The recording to send."),
-    to: str = typer.Option(..., metavar="TARGET", help=f"Where to: {FORMS}."),
+    to: str = typer.Option(
+        ..., metavar="TARGET", help=f"Where to: {FORMS}; {BAUD} baud if not said."
+    ),
     record: Path | None = typer.Option(
         None, metavar="OUT.plr", help="Keep what both sides said: the flight recorder."
     ),
@@ -56,9 +59,18 @@ def stream(
     messages = _first_frames([frame.message for frame in received], frames)
     if compare and frames is not None:
         raise PelorusError("--compare replays the whole recording: leave --frames out")
-    with _log_file(record) as log, open_target(to, image) as link, _display(messages) as show:
-        streamer = Streamer(link, log, show, answer)
-        outcome = streamer.run(messages)
+    if record is not None and record.exists() and record.samefile(source):
+        raise PelorusError(f"{record}: is the recording to send; --record needs another file")
+    streamer: Streamer | None = None
+    try:
+        with open_target(to, image) as link, _log_file(record) as log, _display(messages) as show:
+            streamer = Streamer(link, log, show, answer)
+            outcome = streamer.run(messages)
+    except PelorusError as error:
+        if streamer is None:
+            raise
+        _tell(streamer.outcome, record)
+        raise PelorusError(f"{error} ({_how_far(streamer.outcome, messages)})") from error
     _tell(outcome, record)
     if compare:
         _compare(source, outcome, replay)
@@ -74,16 +86,28 @@ def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:
     return messages[: stereos[frames - 1] + 1]
 
 
+def _stereos(messages: list[Message]) -> int:
+    return sum(message.kind == Kind.STEREO for message in messages)
+
+
+def _how_far(outcome: Outcome, messages: list[Message]) -> str:
+    return f"after {outcome.frames} of {_stereos(messages)} frames"
+
+
 @contextmanager
 def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
     if path is None:
         yield None
         return
     try:
-        with path.open("wb") as stream:
-            yield stream
+        stream = path.open("wb")
     except OSError as error:
         raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
+    try:
+        yield stream
+    finally:
+        with suppress(OSError):  # what could not be written has been told
+            stream.close()
 
 
 class _Display:
@@ -91,26 +115,29 @@ class _Display:
 
     def __init__(self, progress: Progress, total: int) -> None:
         self._progress = progress
-        self._task = progress.add_task("streaming", total=total, where="")
+        self._start_ns: int | None = None  # a clock may count from 1970
+        self._task = progress.add_task("streaming", total=total, where="waiting for the board")
 
     def __call__(self, pose: Pose) -> None:
+        if self._start_ns is None:
+            self._start_ns = pose.t_ns
         x, y, z = pose.p_WB_m
-        where = f"{pose.t_ns * 1e-9:.2f} s   x {x:.2f}  y {y:.2f}  z {z:.2f} m"
+        seconds = (pose.t_ns - self._start_ns) * 1e-9
+        where = f"{seconds:.2f} s   x {x:.2f}  y {y:.2f}  z {z:.2f} m"
         self._progress.update(self._task, advance=1, where=where)
 
 
 @contextmanager
 def _display(messages: list[Message]) -> Iterator[_Display]:
-    total = sum(message.kind == Kind.STEREO for message in messages)
     columns = (
         TextColumn("{task.description}"),
-        BarColumn(),
+        BarColumn(bar_width=20),
         TaskProgressColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.fields[where]}"),
     )
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
-        yield _Display(progress, total)
+        yield _Display(progress, _stereos(messages))
 
 
 def _tell(outcome: Outcome, record: Path | None) -> None:
@@ -126,12 +153,10 @@ def _tell(outcome: Outcome, record: Path | None) -> None:
         )
     table.add_row("frames", f"{outcome.frames} sent, {len(outcome.poses)} answered with a pose")
     lost = outcome.unanswered
-    table.add_row("lost", f"{lost} without an answer, {outcome.restarts} restarts of the board")
-    refused = {status: n for status, n in outcome.reports.items() if status != 0}
-    for status, count in sorted(refused.items()):
-        table.add_row("refused", f"{count} frames with status {status}")
-    for (subject, status), count in sorted(outcome.refused.items()):
-        table.add_row("refused", f"{count} messages of kind {subject} with status {status}")
+    table.add_row("lost", f"{lost} without an answer; {outcome.restarts} restarts of the board")
+    frames = {(Kind.STEREO, status): n for status, n in outcome.reports.items() if status != 0}
+    for (subject, status), count in sorted((frames | outcome.refused).items()):
+        table.add_row("refused", refusal(subject, status, count))
     if outcome.worst_update_us:
         table.add_row("slowest", f"{outcome.worst_update_us} us for a frame, by the board's clock")
     if record is not None:
@@ -142,11 +167,17 @@ def _tell(outcome: Outcome, record: Path | None) -> None:
 def _compare(source: Path, outcome: Outcome, replay: Path | None) -> None:
     if outcome.config is None:
         raise PelorusError("the board told no settings: nothing to compare with")
-    program = replay_program(outcome.config.real_bytes, replay)
-    slots = outcome.config.max_landmarks
-    result = Comparison(desktop_poses(source, program, slots), outcome.poses)
+    board = outcome.config
+    program = replay_program(board.real_bytes, replay)
+    ours = desktop_poses(source, program, board.max_landmarks, board.max_observations)
+    result = Comparison(ours, outcome.poses)
     out.print(f"desktop {digest(result.desktop)}  {len(result.desktop)} poses")
     out.print(f"board   {digest(result.board)}  {len(result.board)} poses")
+    if not result.equal and outcome.unanswered:
+        raise PelorusError(
+            f"they differ from pose {result.first_difference} on, and so they should: "
+            f"{outcome.unanswered} frames or their answers were lost on the way"
+        )
     if not result.equal:
         raise PelorusError(f"they differ from pose {result.first_difference} on")
     out.print("[bold green]the same bits[/]")

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Pose
+from pelorus.frames import OBSERVATIONS_MAX, Kind, Pose, Stereo
 from pelorus.robot.emulator import SOURCE_ROOT
-from pelorus.wire import read_file
+from pelorus.wire import Writer, read_file
 
 REPLAYS = {4: Path("build/bin/pelorus-replay"), 8: Path("build/bin/pelorus-replay-f64")}
 
@@ -57,11 +57,17 @@ def replay_program(real_bytes: int, program: Path | None) -> Path:
     raise PelorusError(f"{candidates[0]}: no such program; build it, or give --replay")
 
 
-def desktop_poses(recording: Path, program: Path, slots: int) -> list[Pose]:
-    """Replay a recording on this machine, with as many landmark slots as the board has."""
+def desktop_poses(
+    recording: Path, program: Path, slots: int, observations: int = OBSERVATIONS_MAX
+) -> list[Pose]:
+    """Replay a recording on this machine, with a board's capacities.
+
+    As many landmark slots, and without the frames that it refuses: of more observations than fit.
+    """
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         answers = Path(folder) / "answers.plr"
-        command = [str(program), str(recording), "--quiet", "--slots", str(slots)]
+        taken = _without_long_frames(recording, observations, Path(folder))
+        command = [str(program), str(taken), "--quiet", "--slots", str(slots)]
         command += ["--out", str(answers)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -72,3 +78,19 @@ def desktop_poses(recording: Path, program: Path, slots: int) -> list[Pose]:
         received, _ = read_file(answers)
     messages = (frame.message for frame in received)
     return [message for message in messages if isinstance(message, Pose) and message.after_stereo]
+
+
+def _without_long_frames(recording: Path, most: int, folder: Path) -> Path:
+    """The recording, or a copy without STEREO of more than `most` observations."""
+    messages = [frame.message for frame in read_file(recording)[0]]
+    short = [m for m in messages if not (isinstance(m, Stereo) and len(m.ids) > most)]
+    if len(short) == len(messages):
+        return recording
+    copy = folder / "short.plr"
+    with copy.open("wb") as stream:
+        writer = Writer(stream)
+        for message in short:
+            if message.kind != Kind.END:
+                writer.write(message)
+        writer.end()
+    return copy

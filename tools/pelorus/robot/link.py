@@ -13,6 +13,7 @@ import socket
 import termios
 import time
 import tty
+from collections.abc import Callable
 from pathlib import Path
 
 from pelorus.errors import PelorusError
@@ -20,6 +21,7 @@ from pelorus.errors import PelorusError
 READ_BYTES = 65536
 WRITE_BYTES = 4096
 CONNECT_S = 10.0
+CONNECT_AGAIN_S = 0.05
 
 
 class LinkClosed(PelorusError):
@@ -37,7 +39,8 @@ class Link:
     def exchange(self, outgoing: bytes, wait_s: float = 0.0) -> bytes:
         """Send everything, and return what came meanwhile.
 
-        With nothing (left) to send, wait up to `wait_s` for the first bytes to come.
+        With nothing (left) to send, wait up to `wait_s` for the first bytes to come. What came
+        before the link closed is still returned; the next call raises LinkClosed.
         """
         deadline = time.monotonic() + wait_s
         incoming = bytearray()
@@ -47,10 +50,15 @@ class Link:
             readable, writable, _ = select.select(
                 [self._fd], [self._fd] if left else [], [], patience
             )
-            if readable:
-                incoming += self._read()
-            if writable:
-                left = left[self._write(left[:WRITE_BYTES]) :]
+            try:
+                if readable:
+                    incoming += self._read()
+                if writable:
+                    left = left[self._write(left[:WRITE_BYTES]) :]
+            except LinkClosed:
+                if incoming:
+                    return bytes(incoming)
+                raise
             if not left and (incoming or time.monotonic() >= deadline):
                 return bytes(incoming)
 
@@ -63,9 +71,9 @@ class Link:
         except BlockingIOError:
             return b""
         except OSError as error:
-            raise LinkClosed(f"{self.what}: {error.strerror}") from error
+            raise self._closed(str(error.strerror)) from error
         if not piece:
-            raise LinkClosed(f"{self.what}: the other side closed the connection")
+            raise self._closed("the other side ended it")
         return piece
 
     def _write(self, piece: memoryview) -> int:
@@ -74,51 +82,88 @@ class Link:
         except BlockingIOError:
             return 0
         except OSError as error:
-            raise LinkClosed(f"{self.what}: {error.strerror}") from error
+            raise self._closed(str(error.strerror)) from error
+
+    def _closed(self, why: str) -> LinkClosed:
+        return LinkClosed(
+            f"{self.what}: the connection is lost: {why}; "
+            "is the board still powered and connected, its emulator or terminal server running?"
+        )
 
 
-def _socket_link(family: int, address: tuple[str, int] | str, what: str) -> Link:
+def _reached(connect: Callable[[], socket.socket], what: str) -> Link:
     """Connect; the other side may need a moment until it listens."""
     deadline = time.monotonic() + CONNECT_S
     while True:
-        connection = socket.socket(family, socket.SOCK_STREAM)
         try:
-            connection.connect(address)
+            return Link(connect().detach(), what)
+        except (socket.gaierror, UnicodeError) as error:
+            raise PelorusError(f"{what}: no host of this name can be found: {error}") from error
         except OSError as error:
-            connection.close()
             if time.monotonic() > deadline:
-                raise PelorusError(f"{what}: cannot be reached: {error.strerror}") from error
-            time.sleep(0.05)
-        else:
-            return Link(connection.detach(), what)
+                raise PelorusError(
+                    f"{what}: cannot be reached: {error.strerror or error}; "
+                    "does something listen on this port?"
+                ) from error
+            time.sleep(CONNECT_AGAIN_S)
 
 
 def tcp(host: str, port: int) -> Link:
     """A TCP connection, for example to an emulator's or a terminal server's serial port."""
-    return _socket_link(socket.AF_INET, (host, port), f"{host}:{port}")
+
+    def connect() -> socket.socket:
+        connection = socket.create_connection((host, port), timeout=CONNECT_S)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # twists do not wait
+        return connection
+
+    return _reached(connect, f"{host}:{port}")
 
 
 def unix(path: Path) -> Link:
     """A local socket."""
-    return _socket_link(socket.AF_UNIX, str(path), str(path))
+
+    def connect() -> socket.socket:
+        connection = socket.socket(socket.AF_UNIX)
+        try:
+            connection.connect(str(path))
+        except OSError:
+            connection.close()
+            raise
+        return connection
+
+    return _reached(connect, str(path))
 
 
 def serial(device: Path, baud: int) -> Link:
     """A serial device, raw: 8 data bits, no parity, 1 stop bit, no flow control of its own."""
-    speed = getattr(termios, f"B{baud}", None)
+    speed = getattr(termios, f"B{baud}", None) if baud else None  # B0 would hang up
     if speed is None:
         raise PelorusError(f"{device}: this system knows no {baud} baud; the boards run at 921600")
     try:
         fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        tty.setraw(fd)
-        settings = termios.tcgetattr(fd)
-        settings[2] |= termios.CLOCAL | termios.CREAD
-        settings[2] &= ~(termios.CRTSCTS | termios.CSTOPB | termios.PARENB)
-        settings[4] = settings[5] = speed
-        termios.tcsetattr(fd, termios.TCSANOW, settings)
-        termios.tcflush(fd, termios.TCIOFLUSH)
     except OSError as error:
-        raise PelorusError(f"{device}: cannot be opened: {error.strerror}") from error
+        raise PelorusError(
+            f"{device}: cannot be opened: {error.strerror}; "
+            "is it plugged in, and may you use it (group dialout)?"
+        ) from error
+    try:
+        _set_raw(fd, speed)
+        if termios.tcgetattr(fd)[4:6] != [speed, speed]:
+            raise PelorusError(f"{device}: cannot do {baud} baud")
     except termios.error as error:
+        os.close(fd)
         raise PelorusError(f"{device}: is no serial device: {error.args[-1]}") from error
+    except PelorusError:
+        os.close(fd)
+        raise
     return Link(fd, str(device))
+
+
+def _set_raw(fd: int, speed: int) -> None:
+    tty.setraw(fd)
+    settings = termios.tcgetattr(fd)
+    settings[2] |= termios.CLOCAL | termios.CREAD
+    settings[2] &= ~(termios.CRTSCTS | termios.CSTOPB | termios.PARENB)
+    settings[4] = settings[5] = speed
+    termios.tcsetattr(fd, termios.TCSANOW, settings)
+    termios.tcflush(fd, termios.TCIOFLUSH)

@@ -31,16 +31,17 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
+from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
 from pelorus.robot.link import Link
-from pelorus.wire import DELIMITER, Counts, Reader, Writer, encode
+from pelorus.wire import DELIMITER, Counts, Reader, encode
 
 BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
 QUIET_S = 0.3
+WARNING = 1  # severity of a TEXT
 END_AGAIN_S = 1.0
 UNANSWERED_MAX = 5  # in a row: then nobody is there
 WINDOW_BYTES = 2048  # half of the board's receive ring
-SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
 
 
 @dataclass
@@ -73,14 +74,14 @@ class Streamer:
         self.outcome = Outcome()
         self.reader = Reader()
         self._link = link
-        self._log = None if log is None else Writer(log)
+        self._log = None if log is None else FlightLog(log)
         self._on_pose = on_pose
         self._answer_s = answer_s
         self._sequence = 0
         self._sent: Counter[Kind] = Counter()
         self._setup: list[Message] = []
         self._unread_bytes = 0
-        self._answered: int | None = None  # time of the last STEREO that was answered
+        self._awaited: int | None = None  # time of the STEREO that is to be answered
         self._unanswered_in_a_row = 0
         self._ended = False
         self._under_way = False
@@ -88,14 +89,18 @@ class Streamer:
 
     def run(self, messages: Iterable[Message]) -> Outcome:
         """Send everything; END goes last, whether it is among the messages or not."""
-        self.greet()
-        for message in messages:
-            if message.kind == Kind.END:
-                continue
-            if message.kind in (Kind.POSE, Kind.REPORT, Kind.TEXT):
-                continue  # another filter's answers, in a log
-            self.send(message)
-        self.finish()
+        try:
+            self.greet()
+            for message in messages:
+                if message.kind == Kind.END:
+                    continue
+                if message.kind in (Kind.POSE, Kind.REPORT, Kind.TEXT):
+                    continue  # another filter's answers, in a log
+                self.send(message)
+            self.finish()
+        finally:
+            if self._log is not None:
+                self._log.release()
         return self.outcome
 
     def greet(self) -> None:
@@ -128,6 +133,7 @@ class Streamer:
             self._start_over()
         if message.kind in SETUP_KINDS and not self.outcome.frames:
             self._setup.append(message)
+        self._awaited = message.t_ns if isinstance(message, Stereo) else None
         self._put(message)
         if isinstance(message, Stereo):
             self.outcome.frames += 1
@@ -149,7 +155,7 @@ class Streamer:
 
     def _put(self, message: Message, logged: bool = True) -> None:
         if logged and self._log is not None:
-            self._log.write(message)
+            self._log.keep(message)
         frame = encode(message, self._sequence)
         self._sequence += 1
         self._sent[message.kind] += 1
@@ -162,12 +168,13 @@ class Streamer:
         self._unread_bytes = 0
 
     def _await_answer(self, t_ns: int) -> None:
-        self._wait(lambda: self._answered == t_ns or self._board_is_new, self._answer_s)
-        if self._answered == t_ns:
+        self._wait(lambda: self._awaited is None or self._board_is_new, self._answer_s)
+        if self._awaited is None:
             self._unread_bytes = 0
             self._unanswered_in_a_row = 0
             return
-        self.outcome.unanswered += 1  # lost on the way, or with the board
+        self._note(f"no answer to the frame of {t_ns} ns: it, or the answer, was lost")
+        self.outcome.unanswered += 1
         self._unanswered_in_a_row += 1
         if self._unanswered_in_a_row >= UNANSWERED_MAX:
             raise PelorusError(
@@ -184,7 +191,7 @@ class Streamer:
 
     def _take(self, message: Message) -> None:
         if self._under_way and self._log is not None and message.kind != Kind.END:
-            self._log.write(message)
+            self._log.keep(message)
         match message:
             case Pose() if message.after_stereo:
                 self.outcome.poses.append(message)
@@ -208,10 +215,12 @@ class Streamer:
             return
         self.outcome.reports[report.status] += 1
         self.outcome.worst_update_us = max(self.outcome.worst_update_us, report.update_us)
-        self._answered = report.t_ns
+        if report.t_ns == self._awaited or (report.status and not report.t_ns):
+            self._awaited = None  # a frame too long for the board is refused unread: at no time
 
     def _start_over(self) -> None:
         """The board has lost its state: give it the set-up, and the pose that it last told."""
+        self._note("the board started anew: it is given its set-up again, and its last pose")
         self._board_is_new = False
         self.outcome.restarts += 1
         for message in self._setup:
@@ -219,6 +228,11 @@ class Streamer:
                 self._put(message)
         if self.outcome.poses:
             self._put(start_from(self.outcome.poses[-1]))
+
+    def _note(self, remark: str) -> None:
+        """The host's own word on what went wrong, for who reads the log."""
+        if self._log is not None:
+            self._log.keep(Text(remark, WARNING))
 
 
 def start_from(pose: Pose) -> Start:

@@ -10,7 +10,7 @@ from pathlib import Path
 from pelorus.errors import PelorusError
 from pelorus.robot import link
 from pelorus.robot.emulator import Emulator, image_of
-from pelorus.robot.link import Link
+from pelorus.robot.link import Link, LinkClosed
 
 BAUD = 921600
 FORMS = "qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]"
@@ -22,7 +22,10 @@ def open_target(target: str, image: Path | None) -> Iterator[Link]:
     scheme, _, rest = target.partition(":")
     if scheme == "qemu" and rest:
         with Emulator(rest, image or image_of(rest)) as emulator:
-            yield from _closing(emulator.connect())
+            try:
+                yield from _closing(emulator.connect())
+            except LinkClosed as error:
+                raise LinkClosed(f"{target}: {emulator.trouble() or error}") from error
         return
     if image is not None:
         raise PelorusError(f"{target}: --image is for qemu:BOARD alone")

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""Why a robot refuses a message: `plr_status` of include/pelorus/types.h in words."""
+
+from __future__ import annotations
+
+from pelorus.frames import Kind
+
+STATUSES = {
+    -1: "its payload is too short or impossible",
+    -2: "a setting makes no sense",
+    -3: "the calibration makes no sense",
+    -4: "a number is NaN or infinite",
+    -5: "a value is out of range",
+    -6: "time repeats or goes back",
+    -7: "older than the last twist",
+    -8: "time jumps forward by more than max-gap",
+    -9: "it may not change in mid-flight, or is not of this mode",
+    -10: "more than the board has room for",
+    -11: "known already",
+    -12: "the filter has diverged",
+    -13: "nothing is known yet: no HEADER, or no pose, came before",
+    -14: "the processor flushes subnormals to zero",
+    -15: "damaged on the way",
+    -16: "of a kind, version or build that it does not know",
+    -17: "the port or the store reports a failure",
+}
+
+
+def refusal(subject: int, status: int, count: int) -> str:
+    """One line of a summary."""
+    known = subject in list(Kind)
+    what = Kind(subject).name if known else f"kind {subject}"
+    if subject == 0:
+        what = "frames"
+    why = STATUSES.get(status, "no status of this version")
+    return f"{count} {what}: {why} (status {status})"
