@@ -9,8 +9,8 @@
  *     for (;;)
  *         plr_session_step(&session);                   // at most one message, bounded time
  *
- * A session takes HEADER, CONFIG, LANDMARK (known) and START, then TWIST, TRUTH and STEREO, then
- * END (docs/REPLAY-FORMAT.md). It answers with the CONFIG in force, after each frame POSE and
+ * A session takes HEADER, CONFIG, LANDMARK (known) and START, or STATE (restore) in its place, then
+ * TWIST, TRUTH and STEREO, and among them STATE (save), then END (docs/REPLAY-FORMAT.md). It answers with the CONFIG in force, after each frame POSE and
  * REPORT, LANDMARK for what leaves the state, TEXT for what a human should know, END. Nothing that
  * arrives stops it: what it cannot use is answered with a REPORT that says what was refused
  * (subject) and why (status), and counted. After END it waits for the next HEADER.
@@ -19,6 +19,12 @@
  * arrived neither HEADER nor CONFIG can change anything: the same ones again are ignored, others
  * are refused with PLR_E_MODE. A START then sets the pose anew.
  *
+ * With a store the filter's state survives a power cut: STATE (save) keeps it, and STATE (restore)
+ * before the data brings it back. That is then the start: a START or TRUTH before the data, and
+ * option `start`, change nothing of it. Refused, it leaves the session ready for a START. Both are
+ * answered with a TEXT and a REPORT of subject STATE, whose statuses stand in src/session/saving.h.
+ * A save takes as long as the device does (seconds, on flash), and no data is taken meanwhile.
+ *
  * Two sessions can live side by side; one is not thread-safe. No heap, no stdio.
  */
 #ifndef PELORUS_SESSION_H
@@ -26,6 +32,7 @@
 
 #include "pelorus/filter.h"
 #include "pelorus/port.h"
+#include "pelorus/state_store.h"
 #include "pelorus/wire.h"
 
 #ifdef __cplusplus
@@ -37,7 +44,9 @@ typedef enum plr_start_choice {
     PLR_START_AUTO = 0,     /* START if there is one, else the first TRUTH, else identity */
     PLR_START_TRUTH = 1,    /* the first TRUTH; frames before it are refused */
     PLR_START_IDENTITY = 2, /* identity, whatever the recording says */
-    PLR_START_RECORDED = 3  /* START; frames before it are refused */
+    PLR_START_RECORDED = 3, /* START; frames before it are refused */
+    PLR_START_SAVED = 4 /* the state in the store, as by STATE (restore) at the first data; if it
+                               is refused: as PLR_START_RECORDED */
 } plr_start_choice;
 
 /* What is sent: bits of plr_session_options.output. */
@@ -49,8 +58,9 @@ typedef enum plr_output {
     PLR_OUTPUT_LANDMARK = 1 << 4,   /* evicted ones, and at the end those that are left */
     PLR_OUTPUT_TEXT = 1 << 5,       /* warnings */
     PLR_OUTPUT_END = 1 << 6,        /* counts, at the end */
-    PLR_OUTPUT_ECHO = 1 << 7        /* the inputs too: the output is then a flight log, which can
+    PLR_OUTPUT_ECHO = 1 << 7,       /* the inputs too: the output is then a flight log, which can
                                        be replayed to the same bits */
+    PLR_OUTPUT_STATE = 1 << 8       /* the state into the store, at the end of every drive */
 } plr_output;
 
 enum {
@@ -97,6 +107,7 @@ typedef struct plr_session_options {
                              src/session/budget.h */
     plr_landmark *known;  /* memory for LANDMARK (known); must outlive the session */
     unsigned known_capacity;
+    plr_state_store *store; /* initialised; NULL: there is no storage. Must outlive the session */
     plr_session_observer observer;
 } plr_session_options;
 
@@ -180,6 +191,7 @@ typedef struct plr_session {
     plr_config_message wanted; /* the CONFIG, as far as it made sense */
     bool is_log;               /* the input holds a filter's outputs too */
     bool start_known, started; /* a START was given; the pose has been set */
+    bool restored;             /* by a STATE, and no data has come since */
     bool init_failed; /* settings or calibration were refused: data waits for better ones */
     plr_start start;
     uint32_t start_resets;
@@ -194,7 +206,7 @@ typedef struct plr_session {
 /* --- use --- */
 
 /* Start automatically, send all but twist poses and echoes, no deadline, no overrides, no memory
- * for known landmarks, no observer. */
+ * for known landmarks, no storage, no observer. */
 void plr_session_options_default(plr_session_options *options);
 
 /* Prepares a session. Port and options are copied; what they point to is not. PLR_E_ARGUMENT a null

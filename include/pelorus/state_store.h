@@ -6,7 +6,7 @@
  *     static plr_state_store store;
  *     plr_state_store_init(&store, &device);
  *     plr_state_store_restore(&store, &filter, NULL);  // after plr_filter_init
- *     plr_state_store_save(&store, &filter);           // between two frames, now and then
+ *     plr_state_store_save(&store, &filter, NULL);     // between two frames, now and then
  *
  * A save goes into the slot that does not hold the newest state: erase, state, read back, and last
  * of all the header, without which a slot counts for nothing. The bytes: docs/STATE-FORMAT.md.
@@ -37,10 +37,11 @@ typedef struct plr_state_store {
     uint8_t buffer[PLR_STORE_BUFFER];
 } plr_state_store;
 
-/* What was found on the device. */
+/* What was found on the device, or put there. */
 typedef struct plr_stored_state {
-    uint64_t generation; /* counts the saves, from 1; 0: nothing was restored */
-    uint8_t slot;        /* 0 or 1: where the restored state stands */
+    uint64_t generation; /* counts the saves, from 1; 0: nothing was saved or restored */
+    uint32_t length;     /* bytes of the state */
+    uint8_t slot;        /* 0 or 1: where the state stands */
     uint8_t damaged;     /* slots that hold something, but not what was saved */
 } plr_stored_state;
 
@@ -54,11 +55,12 @@ plr_status plr_state_store_init(plr_state_store *store, const plr_block_device *
 uint32_t plr_state_store_needs(const plr_state_store *store, const plr_filter *f);
 
 /* Saves the filter, which is not changed. After an error the state that was saved before is still
- * there, and the newest.
+ * there, and the newest. `saved` may be NULL; it is filled in any case.
  * PLR_E_FULL a slot could not hold this filter with all its landmarks: nothing is written, and it is
  * said at the first save, not when the map has grown; PLR_E_IO the device fails, or does not give
  * back what was programmed; else what plr_filter_save says. */
-plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f);
+plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f,
+                                plr_stored_state *saved);
 
 /* Brings back the newest state that is whole. The filter must have been initialised as it was when
  * the state was saved; on an error it is as it was before, but as after plr_filter_reset if the

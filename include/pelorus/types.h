@@ -27,14 +27,14 @@ typedef enum plr_status {
     PLR_E_LATE = -7,        /* a frame is older than the last predict */
     PLR_E_GAP = -8,         /* time jumps forward by more than the setting max-gap */
     PLR_E_MODE = -9,        /* the call does not belong to the mode in force */
-    PLR_E_FULL = -10,       /* no slot is free */
+    PLR_E_FULL = -10,       /* no slot is free, or a device is too small for the state */
     PLR_E_EXISTS = -11,     /* a landmark of this id is in the state already */
     PLR_E_DIVERGED = -12,   /* a variance is not positive: no update until a reset */
     PLR_E_NOT_READY = -13,  /* the filter was never initialised, or the session saw no HEADER yet */
     PLR_E_CPU = -14,        /* the processor flushes subnormals to zero */
     PLR_E_CORRUPT = -15,    /* stored bytes fail their check */
-    PLR_E_FOREIGN = -16,    /* stored bytes come from another version or build */
-    PLR_E_IO = -17          /* the port reports a failure */
+    PLR_E_FOREIGN = -16, /* of another version or build; a saved state: or calibration, setting */
+    PLR_E_IO = -17       /* the port reports a failure */
 } plr_status;
 
 /* How far the estimate may be trusted. */

@@ -29,12 +29,14 @@ typedef enum plr_kind {
     PLR_KIND_POSE = 8,
     PLR_KIND_REPORT = 9,
     PLR_KIND_TEXT = 10,
-    PLR_KIND_END = 11
+    PLR_KIND_END = 11,
+    PLR_KIND_STATE = 12
 } plr_kind;
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 0,
+    PLR_WIRE_VERSION_MINOR = 1,
+    PLR_WIRE_KINDS = 12,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
     PLR_WIRE_MAX_SETTINGS = 64,
@@ -147,6 +149,16 @@ typedef struct plr_end {
     uint32_t twists, stereos, truths, landmarks, frames;
 } plr_end;
 
+typedef enum plr_state_action { PLR_STATE_SAVE = 1, PLR_STATE_RESTORE = 2 } plr_state_action;
+
+/* Asks for the filter's state to be kept, or to be brought back after a power cut. */
+typedef struct plr_state_message {
+    plr_time_ns t_ns; /* RESTORE: when the drive goes on; SAVE: the sender's, for the answer */
+    uint8_t action;   /* plr_state_action */
+    double moved_variance[6]; /* RESTORE: how far the body may have moved meanwhile: variances of
+                                 (rho, theta), m^2 and rad^2; zeros: it stood still */
+} plr_state_message;
+
 /* One message. A frame's observations point into the reader's array: they hold until the next
  * call on the reader. */
 typedef struct plr_message {
@@ -164,6 +176,7 @@ typedef struct plr_message {
         plr_report_message report;
         plr_text text;
         plr_end end;
+        plr_state_message state;
     } as;
 } plr_message;
 

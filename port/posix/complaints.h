@@ -7,7 +7,7 @@
 #include "pelorus/session.h"
 
 enum {
-    COMPLAINT_KINDS = PLR_KIND_END + 1,
+    COMPLAINT_KINDS = PLR_WIRE_KINDS + 1,
     COMPLAINT_STATUSES = 32, /* status numbers are 0 to -31 */
     COMPLAINT_SKIPS = PLR_SKIP_TOO_LONG + 1
 };

@@ -28,7 +28,7 @@ const char *plr_status_text(plr_status status) {
     case PLR_E_MODE:
         return "the call does not belong to the mode in force";
     case PLR_E_FULL:
-        return "no slot is free";
+        return "no slot is free, or a device is too small for the state";
     case PLR_E_EXISTS:
         return "the state holds a landmark of this id already";
     case PLR_E_DIVERGED:
@@ -40,9 +40,10 @@ const char *plr_status_text(plr_status status) {
     case PLR_E_CORRUPT:
         return "stored bytes fail their check";
     case PLR_E_FOREIGN:
-        return "stored bytes come from another version or build";
+        return "it comes from another version or build; a saved state fits one calibration and one "
+               "set of settings, too";
     case PLR_E_IO:
-        return "the port, or the map sink, reports a failure";
+        return "the port, the map sink or the storage reports a failure";
     }
     return "no status of this version";
 }

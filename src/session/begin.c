@@ -10,6 +10,7 @@
 #include "session/line.h"
 #include "session/plausible.h"
 #include "session/reanchor.h"
+#include "session/saving.h"
 #include "session/send.h"
 
 void plr_begin_anew(plr_session *s) {
@@ -18,7 +19,7 @@ void plr_begin_anew(plr_session *s) {
     s->totals.not_sent = not_sent;
     memset(&s->wanted, 0, sizeof s->wanted);
     memset(&s->last, 0, sizeof s->last);
-    s->is_log = s->start_known = s->started = s->init_failed = false;
+    s->is_log = s->start_known = s->started = s->restored = s->init_failed = false;
     s->start.has_bias = false;
     s->start_resets = 0;
     s->predict_ns = 0;
@@ -81,9 +82,7 @@ static void apply_bias_prior(plr_session *s) {
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
 }
 
-bool plr_begin_running(plr_session *s) {
-    if (s->phase == PLR_PHASE_RUNNING)
-        return true;
+bool plr_begin_filter(plr_session *s) {
     if (s->phase == PLR_PHASE_WAITING || s->init_failed)
         return false;
     const plr_setting *culprit = NULL;
@@ -94,12 +93,35 @@ bool plr_begin_running(plr_session *s) {
                          culprit);
         return false;
     }
+    return true;
+}
+
+void plr_begin_announce(plr_session *s) {
     s->phase = PLR_PHASE_RUNNING;
     plr_send_config(s);
     if (s->options.observer.started != NULL)
         s->options.observer.started(s->options.observer.context);
     warn_about(s, plr_filter_config(&s->filter));
+}
+
+/* Of the data that just came in. */
+static plr_time_ns time_of(const plr_message *in) {
+    if (in->kind == PLR_KIND_TWIST)
+        return in->as.twist.t_ns;
+    return in->kind == PLR_KIND_STEREO ? in->as.stereo.t_ns : in->as.truth.t_ns;
+}
+
+bool plr_begin_running(plr_session *s) {
+    if (s->phase == PLR_PHASE_RUNNING) {
+        s->restored = false; /* data has come: a START sets the pose anew */
+        return true;
+    }
+    if (!plr_begin_filter(s))
+        return false;
+    plr_begin_announce(s);
     apply_bias_prior(s);
+    if (s->options.start == PLR_START_SAVED)
+        plr_saving_load(s, time_of(&s->in));
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
         s->start_known = false; /* every pose is given there */
         s->started = true;

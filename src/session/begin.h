@@ -8,9 +8,15 @@
 /* Forgets everything that came before: counts, settings, START, known landmarks, held twists. */
 void plr_begin_anew(plr_session *s);
 
-/* Makes sure that the filter runs: at the first data after a HEADER it composes the settings,
- * initialises the filter, and sends the CONFIG in force. False if there is no HEADER, or if what it
- * says makes no sense, which is refused once. */
+/* Composes the settings and initialises the filter. False if there is no HEADER, or if what it says
+ * makes no sense, which is refused once. */
+bool plr_begin_filter(plr_session *s);
+
+/* From here on the filter takes data: sends the CONFIG in force. */
+void plr_begin_announce(plr_session *s);
+
+/* Makes sure that the filter runs: at the first data after a HEADER it does both. False where
+ * plr_begin_filter says so. */
 bool plr_begin_running(plr_session *s);
 
 /* Sets the start pose from START if its time has come. Called before data of time t_ns. */

@@ -77,6 +77,9 @@ bool plr_take_message(plr_session *s) {
     case PLR_KIND_TEXT:
         plr_take_text(s);
         break;
+    case PLR_KIND_STATE:
+        plr_take_state(s);
+        break;
     case PLR_KIND_END:
         compare_counts(s);
         return true;

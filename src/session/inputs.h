@@ -15,6 +15,9 @@ void plr_take_start(plr_session *s);
 void plr_take_landmark(plr_session *s);
 void plr_take_text(plr_session *s);
 
+/* saving.c */
+void plr_take_state(plr_session *s);
+
 /* The data: inputs_data.c. */
 void plr_take_twist(plr_session *s);
 void plr_take_stereo(plr_session *s);

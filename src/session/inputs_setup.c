@@ -104,8 +104,11 @@ void plr_take_start(plr_session *s) {
         plr_send_refusal(s, PLR_KIND_START, start->t_ns, PLR_E_RANGE, NULL);
         return;
     }
-    const bool wanted =
-        s->started || s->options.start == PLR_START_AUTO || s->options.start == PLR_START_RECORDED;
+    if (s->restored)
+        return; /* the state that was brought back is the start */
+    const bool wanted = s->started || s->options.start == PLR_START_SAVED ||
+                        s->options.start == PLR_START_AUTO ||
+                        s->options.start == PLR_START_RECORDED;
     s->start = *start;
     if (s->phase == PLR_PHASE_RUNNING && s->started) {
         plr_take_all_held(s);

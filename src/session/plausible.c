@@ -32,6 +32,10 @@ bool plr_plausible_bias(const plr_start *start) {
            all_within(start->bias_variance, 6, VARIANCE);
 }
 
+bool plr_plausible_variance(const double *variance, unsigned n) {
+    return all_within(variance, n, VARIANCE);
+}
+
 bool plr_plausible_landmark(const plr_landmark *landmark) {
     return all_within(landmark->p_W_m, 3, POSITION_M) && all_within(landmark->P_W_m2, 9, VARIANCE);
 }

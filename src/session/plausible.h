@@ -24,6 +24,8 @@ bool plr_plausible_pose(const plr_pose *pose);
 bool plr_plausible_start(const plr_start *start);
 bool plr_plausible_bias(const plr_start *start);
 
+bool plr_plausible_variance(const double *variance, unsigned n);
+
 bool plr_plausible_landmark(const plr_landmark *landmark);
 
 #endif

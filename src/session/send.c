@@ -84,8 +84,7 @@ void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_
     put_report(s, PLR_KIND_STEREO, report, compute_ns);
 }
 
-void plr_send_refusal_report(plr_session *s, plr_kind subject, plr_time_ns t_ns,
-                             plr_status status) {
+void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status) {
     plr_report report;
     memset(&report, 0, sizeof report);
     report.t_ns = t_ns;
@@ -100,7 +99,7 @@ void plr_send_refusal_report(plr_session *s, plr_kind subject, plr_time_ns t_ns,
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                       const plr_setting *culprit) {
     s->totals.refused++;
-    plr_send_refusal_report(s, subject, t_ns, status);
+    plr_send_answer(s, subject, t_ns, status);
     if (s->options.observer.refused != NULL)
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
 }

@@ -19,8 +19,8 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 /* The report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
 
-/* A REPORT that says what was refused, with the health of the last frame. */
-void plr_send_refusal_report(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status);
+/* A REPORT that says what came of a message that is no frame, with the health of the last frame. */
+void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status);
 
 /* A message was refused: counted, shown, and sent as a REPORT. `culprit` is the setting to change,
  * or NULL. */

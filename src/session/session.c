@@ -5,6 +5,7 @@
 
 #include "session/begin.h"
 #include "session/inputs.h"
+#include "session/saving.h"
 #include "session/send.h"
 
 void plr_session_options_default(plr_session_options *options) {
@@ -62,7 +63,7 @@ static void answer_skip(plr_session *s) {
     const plr_kind subject =
         why == PLR_SKIP_DAMAGED ? PLR_KIND_NONE : (plr_kind)s->reader.skipped_kind;
     if (why != (plr_skip)s->last_skip)
-        plr_send_refusal_report(s, subject, 0, statuses[why]);
+        plr_send_answer(s, subject, 0, statuses[why]);
     s->last_skip = (uint8_t)why;
 }
 
@@ -123,6 +124,8 @@ void plr_session_finish(plr_session *s) {
     if (s->phase == PLR_PHASE_RUNNING) {
         plr_landmark landmark;
         plr_take_all_held(s);
+        if ((s->options.output & PLR_OUTPUT_STATE) != 0)
+            plr_saving_save(s, plr_filter_time(&s->filter));
         for (unsigned slot = 0; slot < plr_filter_landmark_count(&s->filter); slot++)
             if (plr_filter_landmark(&s->filter, slot, &landmark) == PLR_OK)
                 plr_send_landmark(s, PLR_LANDMARK_FINAL, &landmark);

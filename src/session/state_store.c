@@ -105,6 +105,15 @@ static void look_around(plr_state_store *store, plr_store_view *view) {
     }
 }
 
+/* `stored` may be NULL. */
+static void describe(plr_stored_state *stored, unsigned slot, const plr_state_header *header) {
+    if (!stored)
+        return;
+    stored->generation = header->generation;
+    stored->length = header->length;
+    stored->slot = (uint8_t)slot;
+}
+
 /* ---------------------------------------------------------------- save */
 
 /* A save in progress. */
@@ -169,7 +178,7 @@ static bool programs_header(plr_state_store *store, unsigned slot, const plr_sta
 }
 
 static plr_status write_slot(plr_state_store *store, unsigned slot, uint64_t generation,
-                             const plr_filter *f) {
+                             const plr_filter *f, plr_stored_state *saved) {
     const uint32_t unit = store->device.program_size;
     const uint32_t start = slot_start(store, slot), state = start + header_space(store);
     plr_store_writer writer = {.store = store, .at = state, .room = PLR_STORE_BUFFER / unit * unit};
@@ -182,11 +191,17 @@ static plr_status write_slot(plr_state_store *store, unsigned slot, uint64_t gen
     if (!flushes(&writer) || !reads_crc(store, state, writer.length, &crc) || crc != writer.crc)
         return PLR_E_IO;
     const plr_state_header header = {generation, writer.length, writer.crc};
-    return programs_header(store, slot, &header) ? PLR_OK : PLR_E_IO;
+    if (!programs_header(store, slot, &header))
+        return PLR_E_IO;
+    describe(saved, slot, &header);
+    return PLR_OK;
 }
 
-plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f) {
+plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f,
+                                plr_stored_state *saved) {
     plr_store_view view;
+    if (saved)
+        memset(saved, 0, sizeof *saved);
     if (!store)
         return PLR_E_ARGUMENT;
     const plr_status status = plr_filter_save(f, NULL, NULL);
@@ -196,8 +211,9 @@ plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f) {
         return PLR_E_FULL;
     look_around(store, &view);
     if (view.newest < 0)
-        return write_slot(store, view.status[0] == PLR_E_IO ? 1 : 0, 1, f);
-    return write_slot(store, view.newest == 0 ? 1 : 0, view.header[view.newest].generation + 1, f);
+        return write_slot(store, view.status[0] == PLR_E_IO ? 1 : 0, 1, f, saved);
+    return write_slot(store, view.newest == 0 ? 1 : 0, view.header[view.newest].generation + 1, f,
+                      saved);
 }
 
 /* ---------------------------------------------------------------- restore */
@@ -254,9 +270,7 @@ plr_status plr_state_store_restore(plr_state_store *store, plr_filter *f, plr_st
     if (view.status[slot] != PLR_OK)
         return view.status[slot];
     const plr_status status = read_slot(store, slot, &view.header[slot], f);
-    if (status == PLR_OK && found) {
-        found->generation = view.header[slot].generation;
-        found->slot = (uint8_t)slot;
-    }
+    if (status == PLR_OK)
+        describe(found, slot, &view.header[slot]);
     return status;
 }

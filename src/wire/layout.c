@@ -36,6 +36,9 @@ void plr_layout(plr_pass *p, plr_message *m) {
     case PLR_KIND_END:
         plr_layout_end(p, &m->as.end);
         return;
+    case PLR_KIND_STATE:
+        plr_layout_state(p, &m->as.state);
+        return;
     case PLR_KIND_NONE:
         break;
     }

@@ -13,6 +13,7 @@
 void plr_layout_header(plr_pass *p, plr_header *m);
 void plr_layout_config(plr_pass *p, plr_config_message *m);
 void plr_layout_start(plr_pass *p, plr_start *m);
+void plr_layout_state(plr_pass *p, plr_state_message *m);
 
 /* layout_measurement.c */
 void plr_layout_twist(plr_pass *p, plr_twist_message *m);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* HEADER, CONFIG, START: what a recording begins with. */
+/* HEADER, CONFIG, START, STATE: what a drive begins with, or goes on with. */
 #include "wire/layout.h"
 
 enum { UNITS_SI = 0, LAST_TWIST_TIMING = 2 };
@@ -74,4 +74,11 @@ void plr_layout_start(plr_pass *p, plr_start *m) {
     plr_pass_f64s(p, m->P_xi, 21);
     plr_pass_f64s(p, m->bias, 6);
     plr_pass_f64s(p, m->bias_variance, 6);
+}
+
+void plr_layout_state(plr_pass *p, plr_state_message *m) {
+    plr_pass_u64(p, &m->t_ns);
+    plr_pass_choice(p, &m->action, PLR_STATE_RESTORE);
+    plr_pass_require(p, m->action >= PLR_STATE_SAVE);
+    plr_pass_f64s(p, m->moved_variance, 6);
 }

@@ -72,7 +72,7 @@ static void require_comes_back(const plr_message *message) {
 }
 
 static void require_whole(const plr_reader *r, const plr_message *message) {
-    REQUIRE(message->kind >= PLR_KIND_HEADER && message->kind <= PLR_KIND_END);
+    REQUIRE(message->kind >= PLR_KIND_HEADER && (int)message->kind <= PLR_WIRE_KINDS);
     if (message->kind == PLR_KIND_HEADER)
         REQUIRE(memchr(message->as.header.name, 0, PLR_WIRE_NAME_SIZE) != NULL);
     if (message->kind == PLR_KIND_CONFIG)

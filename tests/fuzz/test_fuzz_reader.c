@@ -86,7 +86,7 @@ static plr_message small_sample(unsigned kind, unsigned variant) {
 
 static void test_payloads_of_every_kind_hold_under_any_change(void) {
     static input seed;
-    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_KIND_END; kind++) {
+    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
         for (unsigned variant = 0; variant < WIRE_SAMPLE_VARIANTS; variant++) {
             plr_message m = small_sample(kind, variant);
             seed.bytes[0] = AS_PAYLOAD | ROOM_BITS;
@@ -105,7 +105,7 @@ static void test_streams_of_every_kind_hold_under_any_change(void) {
         byte_sink sink = byte_sink_over(seed.bytes + 2, INPUT_SIZE - 2);
         plr_writer w;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_init(&w, byte_sink_write, &sink));
-        for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_KIND_END; kind++) {
+        for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
             plr_message m = small_sample(kind, variant);
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_put(&w, &m));
         }

@@ -55,7 +55,7 @@ SIBLINGS: dict[str, set[str]] = {
     "pelorus.h": FILTER_HEADERS - {"pelorus.h"},
     "wire.h": {"types.h"},
     "port.h": {"types.h"},
-    "session.h": FILTER_HEADERS | {"wire.h", "port.h"},
+    "session.h": FILTER_HEADERS | {"wire.h", "port.h", "state_store.h"},
     "state_store.h": {"filter.h", "port.h"},
 }
 # No heap, no stdio, no mathematics: what is left of the standard library.

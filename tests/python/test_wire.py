@@ -29,6 +29,8 @@ from pelorus.frames import (
     Role,
     Start,
     StartFlag,
+    State,
+    StateAction,
     Stereo,
     Text,
     Truth,
@@ -61,6 +63,7 @@ MESSAGES: list[Message] = [
     Report(8, 5, -7, 3, 0xFFFF, 60, *COUNTS, nis=1.5, update_us=2**32 - 1),  # type: ignore[misc]
     Text("grün", 2),
     End(1, 2, 3, 4, 5),
+    State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
 ]
 SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 settings
     Kind.HEADER: [202 + 9],
@@ -74,6 +77,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.REPORT: [52],
     Kind.TEXT: [1 + 5],
     Kind.END: [20],
+    Kind.STATE: [57],
 }
 
 
@@ -125,7 +129,7 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 0, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 1, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:] == "Straße 7".encode()
     assert struct.unpack_from("<5d", header, 10) == (700.5, 701.5, 320.1, 240.2, 0.54)
     assert np.array_equal(np.frombuffer(header, "<f8", 9, 50), R.ravel())

@@ -147,6 +147,11 @@ def a_remark(random: np.random.Generator) -> Message:
     return frames.Text(a_text(random, frames.TEXT_BYTES_MAX), int(random.integers(3)))
 
 
+def a_state(random: np.random.Generator) -> Message:
+    action = frames.StateAction(int(random.integers(1, 3)))
+    return frames.State(whole(random, 64), action, reals(random, 6))
+
+
 MAKERS = [
     a_header,
     a_config,
@@ -158,6 +163,7 @@ MAKERS = [
     a_pose,
     a_report,
     a_remark,
+    a_state,
 ]
 
 

@@ -243,6 +243,12 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         m.as.text.severity = whole8(variant, PLR_SEVERITY_ERROR, PLR_SEVERITY_WARNING);
         fill_text(m.as.text.text, sizeof m.as.text.text, variant);
         break;
+    case PLR_KIND_STATE:
+        m.as.state.t_ns = time_of(variant);
+        m.as.state.action =
+            variant == WIRE_SAMPLE_LEAST ? PLR_STATE_SAVE : (uint8_t)PLR_STATE_RESTORE;
+        fill(m.as.state.moved_variance, 6, variant, 0);
+        break;
     case PLR_KIND_END:
     case PLR_KIND_NONE:
         break;
@@ -388,6 +394,11 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         break;
     case PLR_KIND_END:
         SAME(as.end);
+        break;
+    case PLR_KIND_STATE:
+        SAME(as.state.t_ns);
+        SAME(as.state.action);
+        SAME(as.state.moved_variance);
         break;
     case PLR_KIND_NONE:
         break;

@@ -47,7 +47,7 @@ void tearDown(void) {
 
 static plr_status save(unsigned k) {
     become(k);
-    return plr_state_store_save(&store, &filter);
+    return plr_state_store_save(&store, &filter, NULL);
 }
 
 static void saves(unsigned k) {
@@ -137,7 +137,7 @@ static void test_saving_changes_no_bit_of_the_filter(void) {
     become(1);
     static plr_filter before;
     memcpy(&before, &filter, sizeof before);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_save(&store, &filter));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_save(&store, &filter, NULL));
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof before);
 }
 

@@ -49,7 +49,7 @@ void tearDown(void) {
 
 static plr_status save(unsigned k) {
     become(k);
-    return plr_state_store_save(&store, &filter);
+    return plr_state_store_save(&store, &filter, NULL);
 }
 
 static void saves(unsigned k) {
@@ -375,8 +375,8 @@ static void test_a_broken_filter_is_not_saved_over_a_good_one(void) {
 
 static void test_null_pointers_are_refused(void) {
     saves(0);
-    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_save(NULL, &filter));
-    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_save(&store, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_save(NULL, &filter, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_save(&store, NULL, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_restore(NULL, &filter, &found));
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_restore(&store, NULL, &found));
     TEST_ASSERT_EQUAL_UINT64(0, found.generation);

@@ -74,7 +74,7 @@ static void drive(plr_session *s, faulty_port *port, unsigned from, unsigned to,
 static void drive_save_and_restart(void) {
     begin(&before_cut, &first_port, false);
     drive(&before_cut, &first_port, 0, 12, 0);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_save(&store, &before_cut.filter));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_save(&store, &before_cut.filter, NULL));
     TEST_ASSERT_EQUAL_UINT(SLOTS, plr_filter_landmark_count(&before_cut.filter));
     begin(&after_restart, &second_port, true);
 }

@@ -7,7 +7,7 @@
 #include "support/wire_frames.h"
 #include "support/wire_samples.h"
 
-enum { FRAMES = PLR_KIND_END, STREAM_SIZE = 4000 };
+enum { FRAMES = PLR_WIRE_KINDS, STREAM_SIZE = 4000 };
 
 /* One frame of each kind, in the order of the kinds: sequence = kind - 1. */
 static uint8_t stream[STREAM_SIZE];
@@ -26,7 +26,7 @@ void setUp(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_put(&w, &sent[i]));
         end_of[i] = sink.length;
     }
-    sent[FRAMES - 1].as.end = (plr_end){1, 1, 1, 1, FRAMES - 1};
+    sent[PLR_KIND_END - 1].as.end = (plr_end){1, 1, 1, 1, PLR_KIND_END - 1};
     length = sink.length;
 }
 

@@ -56,7 +56,7 @@ static void test_header_fields_lie_where_the_page_says(void) {
     const plr_header m = encode(PLR_KIND_HEADER).as.header;
     TEST_ASSERT_EQUAL_size_t(202 + strlen(m.name), length);
     ASSERT_NUMBER(0, 1, 1);
-    ASSERT_NUMBER(1, 1, 0);
+    ASSERT_NUMBER(1, 1, 1);
     ASSERT_NUMBER(2, 1, m.body_axes);
     ASSERT_NUMBER(3, 1, m.twist_timing);
     ASSERT_NUMBER(4, 1, 0);
@@ -224,6 +224,14 @@ static void test_end_counts_lie_where_the_page_says(void) {
     TEST_ASSERT_EQUAL_UINT32(5, counts.frames);
 }
 
+static void test_state_fields_lie_where_the_page_says(void) {
+    const plr_state_message m = encode(PLR_KIND_STATE).as.state;
+    TEST_ASSERT_EQUAL_size_t(57, length);
+    ASSERT_NUMBER(0, 8, m.t_ns);
+    ASSERT_NUMBER(8, 1, 2); /* restore */
+    assert_f64s(9, m.moved_variance, 6);
+}
+
 /* --- lengths --- */
 
 /* Reads n bytes of payload. The bytes are copied to where a step beyond them is found out by the
@@ -243,7 +251,7 @@ static plr_fault read_payload(plr_kind kind, size_t n, plr_message *m) {
 }
 
 static void test_every_shorter_payload_is_malformed(void) {
-    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_KIND_END; kind++) {
+    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
         plr_message m;
         encode((plr_kind)kind);
         size_t least = kind == PLR_KIND_TEXT ? 1 : length;
@@ -255,8 +263,8 @@ static void test_every_shorter_payload_is_malformed(void) {
 }
 
 static void test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored(void) {
-    for (unsigned kind = PLR_KIND_HEADER; kind < PLR_KIND_END; kind++) {
-        if (kind == PLR_KIND_TEXT)
+    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
+        if (kind == PLR_KIND_TEXT || kind == PLR_KIND_END)
             continue;
         for (size_t more = 0; more < 40; more++) {
             plr_message m, expected = encode((plr_kind)kind);
@@ -280,7 +288,8 @@ static const bad_value bad_values[] = {
     {PLR_KIND_HEADER, 4, 1, 255},   {PLR_KIND_HEADER, 5, 64, 255},  {PLR_KIND_CONFIG, 10, 65, 255},
     {PLR_KIND_STEREO, 11, 17, 255}, {PLR_KIND_LANDMARK, 8, 3, 255}, {PLR_KIND_POSE, 8, 0, 3},
     {PLR_KIND_POSE, 8, 5, 7},       {PLR_KIND_POSE, 8, 9, 255},     {PLR_KIND_REPORT, 9, 1, 127},
-    {PLR_KIND_REPORT, 10, 4, 255},  {PLR_KIND_TEXT, 0, 3, 255}};
+    {PLR_KIND_REPORT, 10, 4, 255},  {PLR_KIND_TEXT, 0, 3, 255},     {PLR_KIND_STATE, 8, 0, 0},
+    {PLR_KIND_STATE, 8, 3, 255}};
 
 /* There are bytes enough behind each: it is the value that is wrong, not the length. */
 static void test_values_that_the_page_does_not_list_are_malformed(void) {
@@ -342,6 +351,7 @@ int main(void) {
     RUN_TEST(test_report_fields_lie_where_the_page_says);
     RUN_TEST(test_text_fills_the_payload_to_its_end);
     RUN_TEST(test_end_counts_lie_where_the_page_says);
+    RUN_TEST(test_state_fields_lie_where_the_page_says);
     RUN_TEST(test_every_shorter_payload_is_malformed);
     RUN_TEST(test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored);
     RUN_TEST(test_values_that_the_page_does_not_list_are_malformed);

@@ -104,7 +104,7 @@ static void test_every_unknown_kind_is_skipped_and_counted(void) {
     const uint8_t payload[] = {1, 2, 3};
     unsigned unknown = 0;
     for (unsigned kind = 0; kind < 256; kind++) {
-        if (kind >= PLR_KIND_HEADER && kind <= PLR_KIND_END)
+        if (kind >= PLR_KIND_HEADER && kind <= PLR_WIRE_KINDS)
             continue;
         uint64_t at = reader.counts.bytes;
         add(kind, unknown, payload, sizeof payload);
@@ -240,7 +240,7 @@ static size_t add_stereo(unsigned count, unsigned sequence) {
 static void test_the_least_buffer_holds_every_other_kind(void) {
     static uint8_t buffer[PLR_WIRE_MIN_BUFFER];
     plr_reader_init(&reader, buffer, sizeof buffer, NULL, 0);
-    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_KIND_END; kind++) {
+    for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
         if (kind == PLR_KIND_STEREO)
             continue;
         add_sample((plr_kind)kind, WIRE_SAMPLE_MOST, 0);

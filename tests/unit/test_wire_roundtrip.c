@@ -9,7 +9,7 @@
 enum { STREAM_SIZE = 200000 };
 
 static uint8_t stream[STREAM_SIZE];
-static plr_message sent[PLR_KIND_END * WIRE_SAMPLE_VARIANTS];
+static plr_message sent[PLR_WIRE_KINDS * WIRE_SAMPLE_VARIANTS];
 static unsigned sent_count;
 
 void setUp(void) {
@@ -31,8 +31,9 @@ static size_t write_stream(unsigned first_variant, unsigned last_variant) {
     plr_writer w;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_init(&w, byte_sink_write, &sink));
     for (unsigned variant = first_variant; variant <= last_variant; variant++)
-        for (unsigned kind = PLR_KIND_HEADER; kind < PLR_KIND_END; kind++)
-            send(&w, (plr_kind)kind, variant);
+        for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++)
+            if (kind != PLR_KIND_END)
+                send(&w, (plr_kind)kind, variant);
     unsigned each = last_variant - first_variant + 1;
     send(&w, PLR_KIND_END, WIRE_SAMPLE_LEAST);
     sent[sent_count - 1].as.end = (plr_end){each, each, each, each, sent_count - 1};

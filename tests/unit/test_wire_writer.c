@@ -50,7 +50,7 @@ static void test_a_kind_that_is_none_is_refused(void) {
     plr_message m = wire_sample(PLR_KIND_TWIST, WIRE_SAMPLE_COMMON);
     m.kind = PLR_KIND_NONE;
     assert_refused(&m);
-    m.kind = (plr_kind)(PLR_KIND_END + 1);
+    m.kind = (plr_kind)(PLR_WIRE_KINDS + 1);
     assert_refused(&m);
 }
 

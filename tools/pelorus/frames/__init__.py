@@ -19,6 +19,8 @@ from pelorus.frames.recorder import (
     Noise,
     Start,
     StartFlag,
+    State,
+    StateAction,
     Stereo,
     Text,
     Truth,
@@ -28,7 +30,20 @@ from pelorus.frames.recorder import (
 
 KINDS: dict[int, type[Message]] = {
     cls.kind: cls
-    for cls in (Header, Config, Start, Twist, Stereo, Truth, Landmark, Pose, Report, Text, End)
+    for cls in (
+        Header,
+        Config,
+        Start,
+        Twist,
+        Stereo,
+        Truth,
+        Landmark,
+        Pose,
+        Report,
+        Text,
+        End,
+        State,
+    )
 }
 
 __all__ = [
@@ -53,6 +68,8 @@ __all__ = [
     "Role",
     "Start",
     "StartFlag",
+    "State",
+    "StateAction",
     "Stereo",
     "Text",
     "Truth",

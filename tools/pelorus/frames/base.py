@@ -27,6 +27,7 @@ class Kind(IntEnum):
     REPORT = 9
     TEXT = 10
     END = 11
+    STATE = 12
 
 
 class MalformedPayload(ValueError):

@@ -53,6 +53,13 @@ class StartFlag(IntFlag):
     BIAS_PRIOR = 2
 
 
+class StateAction(IntEnum):
+    """What a STATE asks for."""
+
+    SAVE = 1
+    RESTORE = 2
+
+
 @dataclass(frozen=True, eq=False)
 class Camera:
     """A rectified stereo pair; pixels and metres."""
@@ -91,7 +98,7 @@ class Header(Message):
     noise: Noise = Noise()
     name: str = ""
     version_major: int = 1
-    version_minor: int = 0
+    version_minor: int = 1
     units: int = 0
 
     kind: ClassVar[Kind] = Kind.HEADER
@@ -310,3 +317,29 @@ class End(Message):
     def unpack(cls, payload: bytes) -> End:
         need(payload, cls._FIXED.size)
         return cls(*cls._FIXED.unpack_from(payload))
+
+
+@dataclass(frozen=True, eq=False)
+class State(Message):
+    """Keep the filter's state, or bring it back at `t_ns`.
+
+    `moved_variance` is how far the body may have moved meanwhile: variances of (rho, theta).
+    """
+
+    t_ns: int
+    action: StateAction
+    moved_variance: Floats = zeros(6)
+
+    kind: ClassVar[Kind] = Kind.STATE
+    SIZE: ClassVar[int] = 57
+    _FIXED: ClassVar[struct.Struct] = struct.Struct("<QB")
+
+    def pack(self) -> bytes:
+        return self._FIXED.pack(self.t_ns, self.action) + bytes_of(self.moved_variance, 6)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> State:
+        need(payload, cls.SIZE)
+        t_ns, action = cls._FIXED.unpack_from(payload)
+        within("action", action, min(StateAction), max(StateAction))
+        return cls(t_ns, StateAction(action), f64(payload, 9, 6))

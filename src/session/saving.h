@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The filter's state into the store and out of it: on a STATE, and where the options ask for it.
+ * Each time it is answered with a TEXT for a human, and then with a REPORT of subject STATE:
+ *
+ *     PLR_OK           done
+ *     PLR_E_MODE       there is no storage; or a restore in the midst of a drive
+ *     PLR_E_NOT_READY  save: no data yet; restore: no HEADER yet, or nothing was ever saved
+ *     PLR_E_FULL       the device is too small
+ *     PLR_E_FOREIGN, _CORRUPT, _IO, _DIVERGED   as state_store.h says
+ *     PLR_E_ARGUMENT, _NOT_FINITE, _RANGE       a restore's variances make no sense
+ *
+ * A restore that is refused leaves the session as it was before: ready for CONFIG, START and data.
+ */
+#ifndef PLR_SESSION_SAVING_H
+#define PLR_SESSION_SAVING_H
+
+#include "pelorus/session.h"
+
+/* Saves the filter as it is. Twists that are held back are not part of it. `t_ns` is what the
+ * REPORT tells. */
+void plr_saving_save(plr_session *s, plr_time_ns t_ns);
+
+/* PLR_START_SAVED, before the first data of time t_ns, with a filter that runs: brings the state
+ * back. If t_ns follows on the saved time within max-gap the drive just goes on, with the bits of
+ * one that was never interrupted; else it goes on at t_ns, and the body has stood still. */
+void plr_saving_load(plr_session *s, plr_time_ns t_ns);
+
+#endif
