@@ -110,7 +110,8 @@ typedef struct plr_filter {
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];
-    plr_real P[PLR_PACKED_SIZE]; /* packed lower triangle: pose, bias, landmarks */
+    plr_real P[PLR_PACKED_SIZE + PLR_KERNEL_MARGIN]; /* packed lower triangle: pose, bias,
+                                                        landmarks */
     plr_workspace work;
 
     uint32_t frame_number;

@@ -124,38 +124,50 @@ static void transpose6(plr_real At[36], const plr_real A[36]) {
             At[6 * i + j] = A[6 * j + i];
 }
 
-/* The three rows of one landmark: left by F, right by what stands at each column. */
+/* X <- F X G^T, 3x3, in three rows of P. */
+static inline void transport_block(const plr_real *restrict F, const plr_real *restrict G,
+                                   plr_real *restrict r0, plr_real *restrict r1,
+                                   plr_real *restrict r2) {
+    const plr_real X[9] = {r0[0], r0[1], r0[2], r1[0], r1[1], r1[2], r2[0], r2[1], r2[2]};
+    plr_real FX[9];
+    plr_mat3_mul(FX, F, X);
+    plr_mat3_vec(r0, G, FX);
+    plr_mat3_vec(r1, G, FX + 3);
+    plr_mat3_vec(r2, G, FX + 6);
+}
+
+/* X <- F X, 3xn, in three rows of P. */
+static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *restrict r0,
+                             plr_real *restrict r1, plr_real *restrict r2) {
+    for (unsigned j = 0; j < n; j++) {
+        const plr_real x[3] = {r0[j], r1[j], r2[j]};
+        r0[j] = plr_dot3(F, x);
+        r1[j] = plr_dot3(F + 3, x);
+        r2[j] = plr_dot3(F + 6, x);
+    }
+}
+
+/* The three rows of one landmark: left by its F, right by what stands at each column. */
 static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[36],
                                const plr_real *F) {
     const unsigned s = plr_covariance_row(f, slot), first = first_landmark_row(f);
-    plr_real *restrict r0 = f->P + plr_packed_row(s);
-    plr_real *restrict r1 = f->P + plr_packed_row(s + 1);
-    plr_real *restrict r2 = f->P + plr_packed_row(s + 2);
+    plr_real *r0 = f->P + plr_packed_row(s);
+    plr_real *r1 = f->P + plr_packed_row(s + 1);
+    plr_real *r2 = f->P + plr_packed_row(s + 2);
     const plr_real *own = F + 9 * slot;
 
-    for (unsigned j = 0; j < s; j++) {
-        const plr_real x0 = r0[j], x1 = r1[j], x2 = r2[j];
-        r0[j] = PLR_FMA(own[2], x2, PLR_FMA(own[1], x1, own[0] * x0));
-        r1[j] = PLR_FMA(own[5], x2, PLR_FMA(own[4], x1, own[3] * x0));
-        r2[j] = PLR_FMA(own[8], x2, PLR_FMA(own[7], x1, own[6] * x0));
-    }
+    turn_rows(first, own, r0, r1, r2);
+    turn_pose_columns(r0, At);
+    turn_pose_columns(r1, At);
+    turn_pose_columns(r2, At);
+    for (unsigned j = first; j < s; j += 3, F += 9)
+        transport_block(own, F, r0 + j, r1 + j, r2 + j);
+
     plr_real D[9], FD[9], FDFt[9];
     get_block(f, s, 3, s, 3, D);
     plr_mat3_mul(FD, own, D);
     plr_mat3_mul_nt(FDFt, FD, own);
     set_block(f, s, 3, s, 3, FDFt);
-
-    for (unsigned i = 0; i < 3; i++) {
-        plr_real *row = f->P + plr_packed_row(s + i);
-        turn_pose_columns(row, At);
-        const plr_real *G = F;
-        for (plr_real *x = row + first; x < row + s; x += 3, G += 9) {
-            const plr_real x0 = x[0], x1 = x[1], x2 = x[2];
-            x[0] = PLR_FMA(G[2], x2, PLR_FMA(G[1], x1, G[0] * x0));
-            x[1] = PLR_FMA(G[5], x2, PLR_FMA(G[4], x1, G[3] * x0));
-            x[2] = PLR_FMA(G[8], x2, PLR_FMA(G[7], x1, G[6] * x0));
-        }
-    }
 }
 
 void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F) {
@@ -290,25 +302,47 @@ static void add_column(const plr_filter *f, unsigned n, unsigned column, plr_rea
     }
 }
 
+/* out_r[i] = H_r x(i), r = 0 .. 2, i = 0 .. n-1: x(i) stands in three rows. H is taken by value, or
+ * the compiler would load it for each i. */
+static inline void project_rows(unsigned n, const plr_real H[9], const plr_real *restrict x0,
+                                const plr_real *restrict x1, const plr_real *restrict x2,
+                                plr_real *restrict out0, plr_real *restrict out1,
+                                plr_real *restrict out2) {
+    const plr_real h[9] = {H[0], H[1], H[2], H[3], H[4], H[5], H[6], H[7], H[8]};
+    for (unsigned i = 0; i < n; i++) {
+        const plr_real x[3] = {x0[i], x1[i], x2[i]};
+        out0[i] = plr_dot3(h, x);
+        out1[i] = plr_dot3(h + 3, x);
+        out2[i] = plr_dot3(h + 6, x);
+    }
+}
+
+/* The same for i = first .. n-1, where x(i) stands in row i of P, from column s on. */
+static inline void project_columns(unsigned first, unsigned n, const plr_real H[9],
+                                   const plr_real *restrict P, unsigned s, plr_real *restrict out0,
+                                   plr_real *restrict out1, plr_real *restrict out2) {
+    const plr_real h[9] = {H[0], H[1], H[2], H[3], H[4], H[5], H[6], H[7], H[8]};
+    const plr_real *at = P + plr_packed_row(first) + s;
+    for (unsigned i = first; i < n; i++) {
+        const plr_real x[3] = {at[0], at[1], at[2]};
+        out0[i] = plr_dot3(h, x);
+        out1[i] = plr_dot3(h + 3, x);
+        out2[i] = plr_dot3(h + 6, x);
+        at += i + 1;
+    }
+}
+
 /* rows[r][i] = sum_c H[r][c] P(i, s + c): one pass over P, three columns at a time. */
 static void project_landmark(const plr_filter *f, unsigned n, unsigned s, const plr_real H[9],
-                             plr_real *restrict rows, size_t ld) {
-    for (unsigned r = 0; r < PLR_ROWS; r++) {
-        const plr_real *restrict x0 = f->P + plr_packed_row(s);
-        const plr_real *restrict x1 = f->P + plr_packed_row(s + 1);
-        const plr_real *restrict x2 = f->P + plr_packed_row(s + 2);
-        const plr_real *h = H + 3 * r;
-        plr_real *restrict out = rows + r * ld;
-        for (unsigned i = 0; i < s; i++)
-            out[i] = PLR_FMA(h[2], x2[i], PLR_FMA(h[1], x1[i], h[0] * x0[i]));
-    }
+                             plr_real *rows, size_t ld) {
+    const plr_real *P = f->P;
+    plr_real *out0 = rows, *out1 = rows + ld, *out2 = rows + 2 * ld;
     plr_real own[9];
+    project_rows(s, H, P + plr_packed_row(s), P + plr_packed_row(s + 1), P + plr_packed_row(s + 2),
+                 out0, out1, out2);
     get_block(f, s, 3, s, 3, own);
-    for (unsigned i = s; i < n; i++) {
-        const plr_real *x = i < s + 3 ? own + 3 * (i - s) : f->P + plr_packed_row(i) + s;
-        for (unsigned r = 0; r < PLR_ROWS; r++)
-            rows[r * ld + i] = plr_dot3(H + 3 * r, x);
-    }
+    project_rows(3, H, own, own + 3, own + 6, out0 + s, out1 + s, out2 + s);
+    project_columns(s + 3, n, H, P, s, out0, out1, out2);
 }
 
 void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "linalg/small.h"
+#include "linalg/tile.h"
 
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
     plr_real AP[36] = {0};
@@ -64,58 +65,44 @@ bool plr_cholesky_upper(unsigned n, plr_real *S) {
     return true;
 }
 
-/* to[c] = a y[c] + from[c] over a strip */
-static inline void add_row(plr_real *restrict to, plr_real a, const plr_real *restrict y,
-                           const plr_real *restrict from) {
-    for (int c = 0; c < STRIP; c++)
-        to[c] = PLR_FMA(a, y[c], from[c]);
-}
-
-/* to[c] += a y[c] over a strip */
-static inline void accumulate_row(plr_real *restrict to, plr_real a, const plr_real *restrict y) {
-    for (int c = 0; c < STRIP; c++)
-        to[c] = PLR_FMA(a, y[c], to[c]);
-}
-
-/* to[c] = a from[c] over a strip */
-static inline void scale_row(plr_real *restrict to, plr_real a, const plr_real *restrict from) {
-    for (int c = 0; c < STRIP; c++)
-        to[c] = a * from[c];
-}
-
-/* Rows i > 0 and i + 1 of the solution for STRIP columns: both take the rows above from one reading.
- */
-static inline void solve_two_rows(unsigned k, const plr_real *restrict U, unsigned i, plr_real *X,
-                                  size_t ldx) {
-    plr_real *row0 = X + i * ldx, *row1 = row0 + ldx;
-    plr_real x0[STRIP], x1[STRIP];
-    const plr_real *u = U + i; /* (0, i) and (0, i + 1), then down both columns */
-    const plr_real *y = X;
-    add_row(x0, -u[0], y, row0);
-    add_row(x1, -u[1], y, row1);
-    u += k - 1;
-    for (size_t step = k - 2; step > k - 1 - i; step--) {
-        y += ldx;
-        const plr_real a0 = -u[0], a1 = -u[1];
-        accumulate_row(x0, a0, y);
-        accumulate_row(x1, a1, y);
-        u += step;
+/* Rows i .. i + 3 of the solution for STRIP columns, where the rows above have been solved. */
+static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, plr_real *X,
+                                   size_t ldx) {
+    plr_real *const row[PLR_TILE_ROWS] = {X + i * ldx, X + (i + 1) * ldx, X + (i + 2) * ldx,
+                                          X + (i + 3) * ldx};
+    if (i > 0) {
+        const plr_tile_factors above = {
+            .U = U + i, .W = X, .to_next_U = k - 1, .to_next_W = ldx, .shrink = 1};
+        plr_tile_subtract(i, above, row, row);
     }
-    scale_row(row0, PLR_R(1) / u[0], x0);
-    accumulate_row(x1, -u[1], row0);
-    scale_row(row1, PLR_R(1) / U[plr_upper_row(k, i + 1)], x1);
+    const plr_real *u0 = U + plr_upper_row(k, i), *u1 = u0 + (k - i);
+    const plr_real *u2 = u1 + (k - i - 1), *u3 = u2 + (k - i - 2);
+    plr_real x0[STRIP], x1[STRIP], x2[STRIP], x3[STRIP];
+    plr_tile_scale(x0, PLR_R(1) / u0[0], row[0]);
+    plr_tile_add(x1, -u0[1], x0, row[1]);
+    plr_tile_add(x2, -u0[2], x0, row[2]);
+    plr_tile_add(x3, -u0[3], x0, row[3]);
+    memcpy(row[0], x0, sizeof x0);
+    plr_tile_scale(row[1], PLR_R(1) / u1[0], x1);
+    plr_tile_accumulate(x2, -u1[1], row[1]);
+    plr_tile_accumulate(x3, -u1[2], row[1]);
+    plr_tile_scale(row[2], PLR_R(1) / u2[0], x2);
+    plr_tile_accumulate(x3, -u2[1], row[2]);
+    plr_tile_scale(row[3], PLR_R(1) / u3[0], x3);
 }
 
 static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
     plr_real x[STRIP];
-    memcpy(x, X, sizeof x);
-    scale_row(X, PLR_R(1) / U[0], x);
-    unsigned i = 1;
-    for (; i + 1 < k; i += 2)
-        solve_two_rows(k, U, i, X, ldx);
-    if (i < k) {
-        reduce_strip(k, U, i, X, ldx, X + i * ldx, x);
-        scale_row(X + i * ldx, PLR_R(1) / U[plr_upper_row(k, i)], x);
+    unsigned i = 0;
+    for (; i + PLR_TILE_ROWS <= k; i += PLR_TILE_ROWS)
+        solve_four_rows(k, U, i, X, ldx);
+    for (; i < k; i++) {
+        plr_real *row = X + i * ldx;
+        if (i > 0)
+            reduce_strip(k, U, i, X, ldx, row, x);
+        else
+            memcpy(x, row, sizeof x);
+        plr_tile_scale(row, PLR_R(1) / U[plr_upper_row(k, i)], x);
     }
 }
 
@@ -148,10 +135,10 @@ void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
         const plr_real *restrict row = X + j;
         plr_real *restrict to = x + j;
         plr_real sum[STRIP];
-        add_row(sum, a[0], row, to);
+        plr_tile_add(sum, a[0], row, to);
         for (unsigned k = 1; k < depth; k++) {
             row += ldx;
-            accumulate_row(sum, a[k], row);
+            plr_tile_accumulate(sum, a[k], row);
         }
         for (int c = 0; c < STRIP; c++)
             to[c] = sum[c];

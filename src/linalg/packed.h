@@ -21,8 +21,8 @@ static inline size_t plr_packed_at(size_t i, size_t j) {
 }
 
 /* P -= U W^T, lower triangle: P is n x n packed, U^T and W^T are depth x n with leading dimension
- * ld. U W^T must be symmetric, and depth at most PLR_WORK_ROWS. The memory behind both must be
- * readable for PLR_KERNEL_MARGIN elements. */
+ * ld. U W^T must be symmetric. The memory behind all three must be readable for PLR_KERNEL_MARGIN
+ * elements. */
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P);
 

@@ -10,7 +10,7 @@
 #include "support/oracle.h"
 #include "support/random.h"
 
-enum { MOST = 70, DEEPEST = PLR_BLOCK_ROWS, FRAME = 8 };
+enum { MOST = 70, DEEPEST = PLR_BLOCK_ROWS, FRAME = PLR_KERNEL_MARGIN };
 
 void setUp(void) {
 }
@@ -85,7 +85,7 @@ static void test_subtract_agrees_with_openblas(void) {
     for (unsigned n = 1; n <= MOST; n += 1 + n / 5) {
         const unsigned depth = DEEPEST;
         plr_real *Ut = operand(&r, depth, n, n), *Wt = operand(&r, depth, n, n);
-        plr_real packed[MOST * (MOST + 1) / 2];
+        plr_real packed[MOST * (MOST + 1) / 2 + FRAME];
         random_spd(&r, n, 1, P);
         pack_lower(packed, P, n);
         unpack_symmetric(P, packed, n);
@@ -109,7 +109,7 @@ static void test_foretold_diagonal_has_the_bits_of_the_subtraction(void) {
         const unsigned depth = 1 + n % DEEPEST;
         const size_t ld = n + rng_below(&r, 6);
         plr_real *Ut = operand(&r, depth, n, ld);
-        plr_real P[MOST * (MOST + 1) / 2], foretold[MOST], diagonal[MOST];
+        plr_real P[MOST * (MOST + 1) / 2 + FRAME], foretold[MOST], diagonal[MOST];
         for (size_t i = 0; i < plr_packed_row(n); i++)
             P[i] = (plr_real)rng_normal(&r);
         plr_packed_subtracted_diagonal(n, depth, Ut, ld, P, foretold);
@@ -124,11 +124,11 @@ static void test_foretold_diagonal_has_the_bits_of_the_subtraction(void) {
 static void test_subtracting_nothing_changes_nothing(void) {
     rng r = rng_seeded(14);
     plr_real *Ut = operand(&r, 0, 9, 9);
-    plr_real before[45], after[45];
-    for (int i = 0; i < 45; i++)
+    plr_real before[45 + FRAME], after[45 + FRAME];
+    for (int i = 0; i < 45 + FRAME; i++)
         before[i] = after[i] = (plr_real)rng_normal(&r);
     plr_packed_subtract(9, 0, Ut, Ut, 9, after);
-    TEST_ASSERT_TRUE(same_bits(before, after, 45));
+    TEST_ASSERT_TRUE(same_bits(before, after, 45 + FRAME));
     free(Ut);
 }
 
