@@ -266,6 +266,25 @@ static void test_frames_without_a_positive_covariance_are_left_out_of_nees_and_c
     TEST_ASSERT_EQUAL_DOUBLE(0, figures.nees_per_dof);
 }
 
+/* 1 m off everywhere. A covariance of 1e12 would bring the mean down to nothing. */
+static void test_frames_of_a_diverged_filter_count_for_the_error_and_not_for_nees(void) {
+    const double unknown[6] = {PLR_WIRE_UNKNOWN_VARIANCE, PLR_WIRE_UNKNOWN_VARIANCE,
+                               PLR_WIRE_UNKNOWN_VARIANCE, PLR_WIRE_UNKNOWN_VARIANCE,
+                               PLR_WIRE_UNKNOWN_VARIANCE, PLR_WIRE_UNKNOWN_VARIANCE};
+    const plr_pose identity = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    plr_pose away = identity;
+    away.p[0] = 1;
+    add(1, &identity, &identity, ONES);
+    add(2, &away, &identity, ONES);
+    for (plr_time_ns t = 3; t < 11; t++)
+        add(t, &away, &identity, unknown);
+    evaluation_figures_of(&e, &figures);
+    TEST_ASSERT_EQUAL_size_t(10, figures.frames);
+    TEST_ASSERT_EQUAL_size_t(8, figures.not_positive);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1.0 / 6, figures.nees_per_dof);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, sqrt(0.9), figures.err0_m);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_log_undoes_exp_up_to_almost_pi);
@@ -280,5 +299,6 @@ int main(void) {
     RUN_TEST(test_truth_in_any_order_and_between_frames_is_matched_by_time);
     RUN_TEST(test_what_cannot_be_had_is_not_a_number);
     RUN_TEST(test_frames_without_a_positive_covariance_are_left_out_of_nees_and_counted);
+    RUN_TEST(test_frames_of_a_diverged_filter_count_for_the_error_and_not_for_nees);
     return UNITY_END();
 }
