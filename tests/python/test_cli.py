@@ -24,6 +24,8 @@ SUBCOMMANDS = [
     ("info",),
     ("evaluate",),
     ("simulate",),
+    ("report",),
+    ("stream",),
 ]
 
 

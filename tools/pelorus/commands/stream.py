@@ -10,7 +10,6 @@ from typing import BinaryIO
 
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from pelorus.console import err, out
 from pelorus.errors import PelorusError
@@ -141,27 +140,31 @@ def _display(messages: list[Message]) -> Iterator[_Display]:
 
 
 def _tell(outcome: Outcome, record: Path | None) -> None:
-    table = Table(show_header=False, box=None)
+    """A line for each thing, never cut: a board's own words and a path may be long."""
+    for name, words in _summary(outcome, record):
+        out.print(f"{name:<8}  {words}", markup=False)
+
+
+def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]:
     for remark in outcome.texts:
-        table.add_row("board", remark.text)
+        yield "board", remark.text
     if outcome.config is not None:
         build = outcome.config
-        table.add_row(
+        yield (
             "build",
             f"{build.build_fingerprint:#010x}: {build.max_landmarks} landmarks, "
             f"{build.max_observations} observations, float{8 * build.real_bytes}",
         )
-    table.add_row("frames", f"{outcome.frames} sent, {len(outcome.poses)} answered with a pose")
+    yield "frames", f"{outcome.frames} sent, {len(outcome.poses)} answered with a pose"
     lost = outcome.unanswered
-    table.add_row("lost", f"{lost} without an answer; {outcome.restarts} restarts of the board")
+    yield "lost", f"{lost} without an answer; {outcome.restarts} restarts of the board"
     frames = {(Kind.STEREO, status): n for status, n in outcome.reports.items() if status != 0}
     for (subject, status), count in sorted((frames | outcome.refused).items()):
-        table.add_row("refused", refusal(subject, status, count))
+        yield "refused", refusal(subject, status, count)
     if outcome.worst_update_us:
-        table.add_row("slowest", f"{outcome.worst_update_us} us for a frame, by the board's clock")
+        yield "slowest", f"{outcome.worst_update_us} us for a frame, by the board's clock"
     if record is not None:
-        table.add_row("recorded", str(record))
-    out.print(table)
+        yield "recorded", str(record)
 
 
 def _compare(source: Path, outcome: Outcome, replay: Path | None) -> None:

@@ -97,8 +97,10 @@ def _reached(connect: Callable[[], socket.socket], what: str) -> Link:
     while True:
         try:
             return Link(connect().detach(), what)
-        except (socket.gaierror, UnicodeError) as error:
-            raise PelorusError(f"{what}: no host of this name can be found: {error}") from error
+        except socket.gaierror as error:
+            raise PelorusError(f"{what}: no such host: {error.strerror}") from error
+        except UnicodeError as error:
+            raise PelorusError(f"{what}: this is no name of a host") from error
         except OSError as error:
             if time.monotonic() > deadline:
                 raise PelorusError(

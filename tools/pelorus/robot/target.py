@@ -49,4 +49,4 @@ def _open(target: str, scheme: str, rest: str) -> Link:
         if device and baud.isdecimal():
             return link.serial(Path(device), int(baud))
         return link.serial(Path(rest), BAUD)
-    raise PelorusError(f"{target}: no such target; it may be {FORMS}")
+    raise PelorusError(f"--to {target!r}: no such target; it may be {FORMS}")
