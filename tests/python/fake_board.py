@@ -28,6 +28,7 @@ class Manner:
     tells_settings: bool = True
     leaves_after: int | None = None  # answers to STEREO
     most_observations: int = 128
+    slots: int = 32
     says: str = ""  # with its settings
 
 
@@ -67,7 +68,11 @@ class FakeBoard:
             return [Report(0, Kind.STEREO, FULL)]
         answers: list[Message] = []
         if self.manner.tells_settings and not self.poses:
-            answers = [Config({4: 32.0}, 0xABCD, 32, self.manner.most_observations, 8, 4)]
+            answers = [
+                Config(
+                    {4: float(self.manner.slots)}, 0xABCD, 32, self.manner.most_observations, 8, 4
+                )
+            ]
         if self.manner.says and not self.poses:
             answers.append(Text(self.manner.says))
         self.poses.append(Pose(message.t_ns, real_bytes=4, after_stereo=True))

@@ -34,7 +34,7 @@ from pelorus.robot.flight_log import FlightLog
 from pelorus.robot.link import Link, LinkClosed
 from pelorus.robot.status import STATUSES, refusal
 from pelorus.robot.stream import Streamer
-from replay_drive import FRAMES, drive, encode, log_of
+from replay_drive import FRAMES, drive, encode, log_of, run
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = Config({4: 32.0}, 0xABCD, 32, 128, 8, 4)
@@ -84,6 +84,18 @@ def test_the_log_has_the_settings_before_the_data(
     assert kinds[: len(first)] == first
     assert kinds.count(Kind.CONFIG) == 1
     assert "no damage" in pelorus("info", log).out
+
+
+def test_a_replay_of_the_log_takes_the_boards_settings(
+    recording: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    log = tmp_path / "flight.plr"
+    with TcpBoard(FakeBoard(Manner(slots=7))) as served:
+        assert pelorus("stream", recording, "--to", served.target, "--record", log).status == 0
+    result = run(log)
+    assert result.status == 0, result.stderr
+    assert "7 slots" in result.stdout
+    assert "refused" not in result.stderr
 
 
 def test_a_boards_words_are_shown_whole_and_as_they_are(recording: Path, pelorus: Run) -> None:

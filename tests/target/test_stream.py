@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus stream` as a user calls it: to a board behind a TCP port, to one behind a serial device,
+and to the emulator; what it records is replayed to the bits that the board answered.
+"""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from pelorus.frames import Message, Pose
+from pelorus.robot.compare import digest
+from pelorus.robot.emulator import MACHINES
+from pelorus.wire import Counts, Writer, read_file
+from recordings import first_frames
+
+FRAMES = 40
+PATIENCE_S = 60.0
+LOOK_AGAIN_S = 0.02
+
+
+@pytest.fixture(scope="module")
+def short_drive(drive: list[Message], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first frames of the simulated drive."""
+    path = tmp_path_factory.mktemp("stream") / "drive.plr"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        for message in first_frames(drive, FRAMES):
+            writer.write(message)
+        writer.end()
+    return path
+
+
+@pytest.fixture(scope="module")
+def program(request: pytest.FixtureRequest) -> Path:
+    """One desktop build's replay."""
+    folders = request.config.getoption("--desktops")
+    assert folders, "run.sh names the desktop builds"
+    return Path(folders[0]).resolve() / "bin" / "pelorus-replay"
+
+
+# --- boards ---------------------------------------------------------------------------------------
+
+
+class Board(NamedTuple):
+    """An emulated board, as a terminal server or a cable shows one."""
+
+    process: subprocess.Popen[str]
+    target: str
+
+
+@contextmanager
+def running(board: str, image: Path, serial: str) -> Iterator[subprocess.Popen[str]]:
+    """QEMU, with the board's first UART there."""
+    command = ["qemu-system-arm", "-M", MACHINES[board], "-kernel", str(image)]
+    command += ["-display", "none", "-monitor", "none", "-serial", serial, "-serial", "null"]
+    process = subprocess.Popen(command, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@contextmanager
+def behind_tcp(board: str, image: Path) -> Iterator[Board]:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with running(board, image, f"tcp:127.0.0.1:{port},server=on,wait=off") as process:
+        yield Board(process, f"tcp:127.0.0.1:{port}")
+
+
+@contextmanager
+def behind_a_terminal(board: str, image: Path) -> Iterator[Board]:
+    with running(board, image, "pty") as process:
+        assert process.stdout is not None
+        said = process.stdout.readline()  # char device redirected to /dev/pts/3 (label serial0)
+        device = re.search(r"/dev/pts/\d+", said)
+        assert device is not None, said
+        yield Board(process, f"serial:{device[0]}:921600")
+
+
+Behind = Callable[[str, Path], AbstractContextManager[Board]]
+BOTH = pytest.mark.parametrize("behind", [behind_tcp, behind_a_terminal], ids=["tcp", "serial"])
+
+
+def words(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "pelorus", *map(str, arguments)]
+
+
+def pelorus(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words(*arguments), capture_output=True, text=True, check=False)
+
+
+# --- what is said and recorded --------------------------------------------------------------------
+
+
+def poses_in(path: Path) -> tuple[list[Pose], Counts]:
+    received, counts = read_file(path)
+    messages = [frame.message for frame in received]
+    return [m for m in messages if isinstance(m, Pose) and m.after_stereo], counts
+
+
+def replayed(log: Path, program: Path) -> list[Pose]:
+    """What this machine computes from it, with no setting but what it says."""
+    answers = log.with_suffix(".again.plr")
+    subprocess.run([program, log, "--quiet", "--out", answers], check=True, timeout=PATIENCE_S)
+    return poses_in(answers)[0]
+
+
+def assert_same_bits(done: subprocess.CompletedProcess[str], log: Path, program: Path) -> None:
+    """The command found them equal, and a replay of the log finds them again."""
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "the same bits"
+    told = re.findall(rf"^(?:desktop|board) +([0-9a-f]{{64}})  {FRAMES} poses$", done.stdout, re.M)
+    robots, counts = poses_in(log)
+    assert counts.clean
+    assert counts.ended
+    assert len(robots) == FRAMES
+    assert told == [digest(robots)] * 2
+    assert digest(replayed(log, program)) == digest(robots)
+
+
+@BOTH
+def test_a_board_on_a_wire_computes_the_same_bits(
+    behind: Behind, board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "flight.plr"
+    with behind(board, firmware) as connected:
+        to = ("--to", connected.target, "--record", log)
+        done = pelorus("stream", short_drive, *to, "--compare", "--replay", program)
+    assert_same_bits(done, log, program)
+
+
+@BOTH
+def test_a_board_that_goes_away_leaves_a_log_that_replays_to_its_bits(
+    behind: Behind, board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "flight.plr"
+    with behind(board, firmware) as connected:
+        command = words("stream", short_drive, "--to", connected.target, "--record", log)
+        sender = subprocess.Popen(
+            command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        wait_for_poses(log, 10, sender)
+        connected.process.kill()
+        said, trouble = sender.communicate(timeout=PATIENCE_S)
+    assert sender.returncode == 1
+    where = connected.target.split(":", 1)[1].removesuffix(":921600")
+    assert f"{where}: the connection is lost: " in trouble
+    assert re.search(rf"\(after \d+ of {FRAMES} frames\)", trouble)
+    assert f"recorded  {log}" in said
+    robots, counts = poses_in(log)
+    assert counts.clean
+    assert not counts.ended
+    assert 10 <= len(robots) < FRAMES
+    assert pelorus("info", log).returncode == 0
+    ours = replayed(log, program)
+    assert digest(ours[: len(robots)]) == digest(robots)
+    assert len(ours) - len(robots) <= 1  # the frame that was under way
+
+
+def wait_for_poses(log: Path, count: int, sender: subprocess.Popen[str]) -> None:
+    """Until the log, as it is on the disk, holds so many."""
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline and sender.poll() is None:
+        if log.exists() and log.stat().st_size and len(poses_in(log)[0]) >= count:
+            return
+        time.sleep(LOOK_AGAIN_S)
+    pytest.fail("the drive did not come so far")
+
+
+def test_the_log_of_a_drive_is_taken_by_info_replay_and_report(
+    board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
+) -> None:
+    log, out = tmp_path / "flight.plr", tmp_path / "report"
+    to = ("--to", f"qemu:{board}", "--image", firmware, "--record", log)
+    done = pelorus("stream", short_drive, *to, "--compare", "--replay", program)
+    assert_same_bits(done, log, program)
+    info = pelorus("info", log)
+    assert info.returncode == 0, info.stderr
+    assert re.search(r"^POSE +40 *$", info.stdout, re.M)
+    assert "no damage" in info.stdout
+    report = pelorus("report", log, "--out", out, "--bin", program.parent)
+    assert report.returncode == 0, report.stderr
+    assert (out / "report.html").stat().st_size > 10_000
