@@ -90,7 +90,7 @@ def test_nees_is_that_of_the_frames_before_and_errors_are_those_of_all(tmp_path:
     summary = replay(tmp_path, "--json").summary
     first = unknown_from(tmp_path)
     poses = poses_of(tmp_path / "log.plr")
-    times = np.array([pose.t_ns for pose in poses], np.uint64)
+    times = np.array([pose.t_ns for pose in poses], np.int64)
     truth = [true_pose(k) for k in range(FRAMES)]
     estimate = Trajectory(
         times, Poses(np.array([p.R_WB for p in poses]), np.array([p.p_WB_m for p in poses]))
