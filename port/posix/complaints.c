@@ -47,6 +47,9 @@ void complaints_say(const complaints *c, const char *words) {
 
 /* Why, in the words of the recording; the filter's own words elsewhere. */
 static const char *cause(plr_kind kind, plr_status status) {
+    if (kind == PLR_KIND_STATE)
+        return "a state that was kept elsewhere is not here, so what follows may differ from what "
+               "was computed there; --load-state and --save-state give this replay a storage";
     if (status == PLR_E_NOT_READY)
         return "nothing can be done with it yet: there was no usable HEADER, or not the START or "
                "TRUTH that --start asks for";

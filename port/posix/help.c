@@ -101,6 +101,8 @@ void help_print(void) {
            "  " PELORUS_NAME " drive.plr --bias on --gate 0.99 --trajectory drive.tum\n"
            "  " PELORUS_NAME " drive.plr --config robot.conf --slots 120 --json\n"
            "  " PELORUS_NAME " drive.plr --preset course --print-config\n"
+           "  " PELORUS_NAME " morning.plr --save-state robot.state\n"
+           "  " PELORUS_NAME " evening.plr --load-state robot.state\n"
            "\n"
            "A setting is taken from the first that gives it: option, config file, the recording's\n"
            "CONFIG, the recording's HEADER, default.\n"
@@ -117,7 +119,7 @@ void help_print(void) {
            "Exit status\n"
            "  %d  a result was computed; what was skipped or refused is told and counted\n"
            "  %d  nothing useful could be done with the recording\n"
-           "  %d  an option, a config file or the settings in force make no sense\n"
+           "  %d  an option, a config file, a saved state or the settings in force make no sense\n"
            "  %d  an output could not be written\n"
            "  %d  the processor lacks instructions that this build needs\n",
            REPLAY_EXIT_OK, REPLAY_EXIT_RECORDING, REPLAY_EXIT_USAGE, REPLAY_EXIT_OUTPUT,

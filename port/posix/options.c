@@ -49,6 +49,12 @@ static const option table[] = {
     {{"out", "OUT.plr", "flight log: inputs and outputs; can itself be replayed"},
      OPTION_PATH,
      AT(out)},
+    {{"load-state", "FILE", "go on from the state saved there; START and TRUTH are not looked at"},
+     OPTION_PATH,
+     AT(load_state)},
+    {{"save-state", "FILE", "save the filter's state there at the end; FILE keeps the last two"},
+     OPTION_PATH,
+     AT(save_state)},
     {{"json", NULL, "the summary as one JSON object"}, OPTION_FLAG, AT(json)},
     {{"quiet", NULL, "no summary, no progress, no warnings"}, OPTION_FLAG, AT(quiet)},
     {{"help", NULL, "this text"}, OPTION_FLAG, AT(help)},
@@ -233,5 +239,10 @@ bool options_parse(replay_options *options, int argc, char *const *argv,
         return false;
     merge(options, &from_file);
     merge(options, &from_line);
+    if (options->load_state != NULL && options->start != PLR_START_AUTO) {
+        snprintf(problem, PROBLEM_SIZE,
+                 "--load-state and --start: the pose can start from one of them alone");
+        return false;
+    }
     return true;
 }

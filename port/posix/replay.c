@@ -13,6 +13,7 @@
 #include "posix/options.h"
 #include "posix/progress.h"
 #include "posix/result_file.h"
+#include "posix/storage.h"
 #include "posix/summary.h"
 #include "posix/tables.h"
 #include "posix/verdict.h"
@@ -29,6 +30,8 @@ typedef struct replay {
     plr_landmark known[KNOWN_LANDMARKS];
     file_port port;
     result_file trajectory, map, frames, out;
+    storage storage;
+    bool finishing;    /* the end is the replay's own doing, not a message's */
     samples landmarks; /* plr_landmark_message */
     summary summary;
     complaints complaints;
@@ -110,6 +113,17 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
     }
 }
 
+/* A state was not brought back or kept: for the options, or for a STATE of the recording? */
+static void on_refused_state(replay *run, plr_time_ns t_ns, plr_status status) {
+    const bool asked = run->session.in.kind != PLR_KIND_STATE || run->finishing;
+    if (!asked)
+        complaints_refused(&run->complaints, PLR_KIND_STATE, 0, t_ns, status, NULL);
+    else if (run->options.load_state != NULL && !run->storage.begun)
+        run->storage.load_status = status; /* told at the end */
+    else
+        run->storage.save_status = status;
+}
+
 static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                        const plr_setting *culprit) {
     replay *run = context;
@@ -120,6 +134,10 @@ static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_st
         return;
     }
     progress_clear(&run->progress);
+    if (subject == PLR_KIND_STATE) {
+        on_refused_state(run, t_ns, status);
+        return;
+    }
     complaints_refused(&run->complaints, subject, number_of(&run->session.totals, subject), t_ns,
                        status, culprit);
 }
@@ -156,6 +174,7 @@ static plr_status start_session(replay *run) {
     options.output |= PLR_OUTPUT_ECHO;
     options.known = run->known;
     options.known_capacity = KNOWN_LANDMARKS;
+    storage_lend(&run->storage, &run->options, &options);
     options.observer = (plr_session_observer){.context = run,
                                               .started = on_started,
                                               .frame = on_frame,
@@ -190,9 +209,11 @@ static bool take_step(replay *run) {
     case PLR_STEP_MESSAGE:
         break;
     }
+    if (run->outcome.started)
+        storage_begin(&run->storage);
     const bool foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
     progress_show(&run->progress, counts->bytes, run->summary.frames);
-    return !foreign && run->outcome.init_status == PLR_OK &&
+    return !foreign && run->outcome.init_status == PLR_OK && run->storage.load_status == PLR_OK &&
            !(run->outcome.started && run->options.print_config);
 }
 
@@ -224,7 +245,9 @@ static void read_recording(replay *run) {
     while (take_step(run))
         continue;
     run->summary.cut_in_frame = plr_reader_mid_frame(&run->session.reader);
-    if (!run->summary.ended && run->outcome.started && !run->options.print_config)
+    run->finishing = true;
+    if (!run->summary.ended && run->outcome.started && run->storage.load_status == PLR_OK &&
+        !run->options.print_config)
         plr_session_finish(&run->session);
     run->summary.wall_s = (double)(monotonic_ns() - begin) * 1e-9;
     progress_clear(&run->progress);
@@ -259,6 +282,8 @@ static bool memory_sufficed(const replay *run) {
 static int run_recording(replay *run) {
     read_recording(run);
     int status = verdict_on_recording(run->options.input, &run->session, &run->outcome);
+    if (status == REPLAY_EXIT_OK)
+        status = storage_verdict_on_load(&run->storage, &run->options);
     if (status == REPLAY_EXIT_OK && run->options.print_config) {
         config_file_print(plr_filter_config(&run->session.filter));
         return fflush(stdout) == 0 ? REPLAY_EXIT_OK : REPLAY_EXIT_OUTPUT;
@@ -270,8 +295,10 @@ static int run_recording(replay *run) {
     const bool printed = status != REPLAY_EXIT_OK || print_results(run);
     const bool written = close_outputs(run);
     const bool complete = memory_sufficed(run);
-    return status == REPLAY_EXIT_OK && !(printed && written && complete) ? REPLAY_EXIT_OUTPUT
-                                                                         : status;
+    const int kept = storage_verdict_on_save(&run->storage, &run->options);
+    if (status == REPLAY_EXIT_OK && !(printed && written && complete))
+        status = REPLAY_EXIT_OUTPUT;
+    return status == REPLAY_EXIT_OK ? kept : status;
 }
 
 /* --print-config without a recording: what options and file alone give. */
@@ -298,13 +325,15 @@ static int usage_error(const char *problem) {
 
 static int open_and_run(replay *run) {
     const replay_options *o = &run->options;
-    int status = REPLAY_EXIT_OUTPUT;
     if (!file_port_open(&run->port, o->input))
         return verdict_say(o->input, REPLAY_EXIT_RECORDING, strerror(errno));
+    int status = storage_open(&run->storage, o);
     samples_init(&run->landmarks, sizeof(plr_landmark_message));
     summary_init(&run->summary);
     complaints_init(&run->complaints, o->input, o->quiet);
-    if (open_outputs(run)) {
+    if (status == REPLAY_EXIT_OK && !open_outputs(run))
+        status = REPLAY_EXIT_OUTPUT;
+    if (status == REPLAY_EXIT_OK) {
         run->port.output = run->out.file;
         status = start_session(run) == PLR_OK
                      ? run_recording(run)
@@ -312,6 +341,7 @@ static int open_and_run(replay *run) {
     }
     summary_free(&run->summary);
     samples_free(&run->landmarks);
+    storage_close(&run->storage);
     file_port_close(&run->port);
     return status;
 }
