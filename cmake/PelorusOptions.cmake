@@ -25,6 +25,7 @@ option(PELORUS_INSTALL "Make install rules" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_WERROR "Take warnings as errors (the project's own tests do)" OFF)
 option(PELORUS_REQUIRE_ORACLE "Stop if OpenBLAS or LAPACKE is missing, instead of leaving tests out"
   OFF)
+option(PELORUS_FUZZ "Build the libFuzzer programs (clang only)" OFF)
 set(PELORUS_DEPS_DIR "${PROJECT_BINARY_DIR}/deps" CACHE PATH
   "Where the test framework is kept once fetched; share it between build folders")
 

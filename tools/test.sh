@@ -113,14 +113,18 @@ check_format() {
         xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
 }
 
-# fuzz_for SECONDS COMPILER: libFuzzer over the reader, from the corpus; new inputs are left in
-# build-logs/fuzz.
-fuzz_for() {
-    mkdir -p "$LOGS/fuzz"
-    "$2" -g -O1 -std=c99 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
-        -Iinclude -Isrc -Itests src/wire/*.c tests/fuzz/fuzz_reader.c -o "$LOGS/fuzz_reader" &&
-        "$LOGS/fuzz_reader" -max_len=4096 -max_total_time="$1" -print_final_stats=1 \
-            -artifact_prefix="$LOGS/fuzz/" "$LOGS/fuzz" tests/fuzz/corpus
+# fuzz SECONDS PROGRAM CORPUS LENGTH: libFuzzer, from the corpus; new inputs are left in
+# build-logs/PROGRAM, and so is one that fails.
+fuzz() {
+    mkdir -p "$LOGS/$2"
+    "build-fuzz/bin/$2" -max_len="$4" -max_total_time="$1" -print_final_stats=1 \
+        -artifact_prefix="$LOGS/$2/" "$LOGS/$2" "$3"
+}
+
+build_fuzz() {
+    cmake -S . -B build-fuzz -DPELORUS_FUZZ=ON -DPELORUS_WERROR=ON -DCMAKE_C_COMPILER="$1" \
+        -DPELORUS_BUILD_TESTS=OFF -DPELORUS_BUILD_REPLAY=OFF &&
+        cmake --build build-fuzz -j "$JOBS"
 }
 
 # Warnings are errors, and the machine must have OpenBLAS: no test is left out in silence.
@@ -150,7 +154,7 @@ fi
 step 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
 step 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
 step 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tests/python tests/layering tests/golden
+    tools/pelorus tests/python tests/layering tests/golden tests/fuzz
 step 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml tests/target
 
@@ -167,7 +171,10 @@ if [ $extent != quick ]; then
     step 'build: less optimised' build_preset o2 -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON
     step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
-    [ $extent = long ] && step 'fuzz the reader' fuzz_for 120 "$clang"
+    if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then
+        step 'fuzz the reader' fuzz 120 fuzz_reader tests/fuzz/corpus 4096
+        step 'fuzz the session' fuzz 300 fuzz_session tests/fuzz/corpus_session 8192
+    fi
     if [ -x tests/target/run.sh ]; then
         step 'microcontroller' tests/target/run.sh
     fi

@@ -2,9 +2,9 @@
 /*
  * Fuzz harness of the frame format, for libFuzzer:
  *
- *     clang -g -O1 -std=c99 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
- *         -Iinclude -Isrc -Itests src/wire/[a-z]*.c tests/fuzz/fuzz_reader.c -o fuzz_reader
- *     ./fuzz_reader -max_len=4096 found tests/fuzz/corpus    # `found`: a folder for new inputs
+ *     cmake -S . -B build-fuzz -DPELORUS_FUZZ=ON -DCMAKE_C_COMPILER=clang-14
+ *     cmake --build build-fuzz -j2
+ *     build-fuzz/bin/fuzz_reader -max_len=4096 found tests/fuzz/corpus # `found`: for new inputs
  *
  * test_fuzz_reader.c runs the same harness under CTest without it.
  *
