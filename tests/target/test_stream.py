@@ -6,6 +6,7 @@ and to the emulator; what it records is replayed to the bits that the board answ
 from __future__ import annotations
 
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -166,6 +167,26 @@ def test_a_board_that_goes_away_leaves_a_log_that_replays_to_its_bits(
     ours = replayed(log, program)
     assert digest(ours[: len(robots)]) == digest(robots)
     assert len(ours) - len(robots) <= 1  # the frame that was under way
+
+
+@pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "terminate"])
+def test_a_drive_that_is_ended_by_hand_says_how_far_it_came_and_leaves_no_emulator(
+    board: str, firmware: Path, short_drive: Path, tmp_path: Path, asked: signal.Signals
+) -> None:
+    log = tmp_path / "flight.plr"
+    to = ("--to", f"qemu:{board}", "--image", firmware, "--record", log)
+    sender = subprocess.Popen(
+        words("stream", short_drive, *to), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    wait_for_poses(log, 5, sender)
+    (child,) = Path(f"/proc/{sender.pid}/task/{sender.pid}/children").read_text().split()
+    sender.send_signal(asked)
+    said, _ = sender.communicate(timeout=PATIENCE_S)
+    assert sender.returncode == 130
+    assert re.search(r"^frames    \d+ sent, \d+ answered with a pose$", said, re.M)
+    assert f"recorded  {log}" in said
+    assert not Path(f"/proc/{child}").exists()
+    assert poses_in(log)[1].clean
 
 
 def wait_for_poses(log: Path, count: int, sender: subprocess.Popen[str]) -> None:

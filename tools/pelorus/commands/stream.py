@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -62,13 +63,19 @@ def stream(
         raise PelorusError(f"{record}: is the recording to send; --record needs another file")
     streamer: Streamer | None = None
     try:
-        with open_target(to, image) as link, _log_file(record) as log, _display(messages) as show:
+        with (
+            _ended_in_order(),
+            open_target(to, image) as link,
+            _log_file(record) as log,
+            _display(messages) as show,
+        ):
             streamer = Streamer(link, log, show, answer)
             outcome = streamer.run(messages)
-    except PelorusError as error:
-        if streamer is None:
+    except (PelorusError, KeyboardInterrupt) as error:
+        if streamer is not None:
+            _tell(streamer.outcome, record)
+        if streamer is None or isinstance(error, KeyboardInterrupt):
             raise
-        _tell(streamer.outcome, record)
         raise PelorusError(f"{error} ({_how_far(streamer.outcome, messages)})") from error
     _tell(outcome, record)
     if compare:
@@ -91,6 +98,16 @@ def _stereos(messages: list[Message]) -> int:
 
 def _how_far(outcome: Outcome, messages: list[Message]) -> str:
     return f"after {outcome.frames} of {_stereos(messages)} frames"
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """A request to terminate ends the drive as Ctrl-C does: with it goes the emulator."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager
