@@ -95,6 +95,42 @@ static void test_lost_doubled_and_damaged_bytes_cost_frames_and_nothing_else(voi
     }
 }
 
+/* END, a HEADER, and a drive; what is known at its end. */
+static void drive_anew(plr_pose *pose, double P[36]) {
+    send((plr_message){.kind = PLR_KIND_END});
+    send(drive_header());
+    send(drive_truth(0));
+    send_frames(0, FRAMES);
+    run();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P));
+}
+
+static void test_the_drive_after_a_bad_one_has_the_bits_of_any_other(void) {
+    plr_pose expected, pose;
+    double P_expected[36], P[36];
+    begin(1);
+    drive_anew(&expected, P_expected);
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        begin(seed);
+        port.most_at_once = 7;
+        port.nothing_share = 0.1;
+        port.lost_share = seed % 4 == 0 || seed % 4 == 1 ? 0.0005 : 0;
+        port.doubled_share = seed % 4 == 0 || seed % 4 == 2 ? 0.0005 : 0;
+        port.damaged_share = seed % 4 == 0 || seed % 4 == 3 ? 0.0005 : 0;
+        send(drive_header());
+        send_frames(0, FRAMES);
+        run();
+        TEST_ASSERT_TRUE(session.reader.counts.damaged > 0);
+        port.lost_share = port.doubled_share = port.damaged_share = 0;
+        const uint8_t delimiter = 0; /* ends what the noise may have left open */
+        faulty_port_send_bytes(&port, &delimiter, 1);
+        drive_anew(&pose, P);
+        TEST_ASSERT_EQUAL_MEMORY(&expected, &pose, sizeof pose);
+        TEST_ASSERT_EQUAL_MEMORY(P_expected, P, sizeof P);
+    }
+}
+
 static void test_a_header_lost_in_noise_is_waited_for(void) {
     begin(3);
     port.damaged_share = 0.05;
@@ -210,6 +246,7 @@ static void test_a_cut_at_any_byte_is_no_more_than_a_cut(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_lost_doubled_and_damaged_bytes_cost_frames_and_nothing_else);
+    RUN_TEST(test_the_drive_after_a_bad_one_has_the_bits_of_any_other);
     RUN_TEST(test_a_header_lost_in_noise_is_waited_for);
     RUN_TEST(test_noise_alone_is_survived_and_hardly_answered);
     RUN_TEST(test_writes_that_fail_lose_messages_and_change_no_estimate);
