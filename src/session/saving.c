@@ -97,6 +97,12 @@ static plr_status check_moved(const double variance[6]) {
     return plr_plausible_variance(variance, 6) ? PLR_OK : PLR_E_RANGE;
 }
 
+/* True if t_ns is later than the estimate by at most max-gap. */
+static bool follows(const plr_filter *f, plr_time_ns t_ns) {
+    const double max_gap_ns = plr_filter_config(f)->max_gap_s * 1e9;
+    return t_ns >= plr_filter_time(f) && (double)(t_ns - plr_filter_time(f)) <= max_gap_ns;
+}
+
 /* Sets the clock to t_ns, and allows for what may have moved. Where nothing lies between, the last
  * reading still holds, and the next bits are those of a drive that was never interrupted. */
 static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6]) {
@@ -106,7 +112,7 @@ static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6
         P[7 * i] = variance[i];
         moved = moved || variance[i] > 0;
     }
-    if (!moved && t_ns == plr_filter_time(f))
+    if (!moved && follows(f, t_ns))
         return PLR_OK;
     return plr_filter_resume(f, t_ns, moved ? P : NULL);
 }
@@ -174,12 +180,6 @@ void plr_take_state(plr_session *s) {
     plr_saving_save(s, s->in.as.state.t_ns);
 }
 
-/* True if t_ns is later than the estimate by at most max-gap. */
-static bool follows(const plr_filter *f, plr_time_ns t_ns) {
-    const double max_gap_ns = plr_filter_config(f)->max_gap_s * 1e9;
-    return t_ns >= plr_filter_time(f) && (double)(t_ns - plr_filter_time(f)) <= max_gap_ns;
-}
-
 void plr_saving_load(plr_session *s, plr_time_ns t_ns) {
     static const double stood_still[6];
     plr_filter *f = &s->filter;
@@ -189,7 +189,7 @@ void plr_saving_load(plr_session *s, plr_time_ns t_ns) {
         status = plr_state_store_restore(s->options.store, f, &r.stored);
     if (status == PLR_OK) {
         r.of_ns = plr_filter_time(f);
-        status = go_on(f, follows(f, t_ns) ? r.of_ns : t_ns, stood_still);
+        status = go_on(f, t_ns, stood_still);
         if (status != PLR_OK)
             (void)plr_filter_reset(f);
     }

@@ -10,6 +10,10 @@
  *     PLR_E_FOREIGN, _CORRUPT, _IO, _DIVERGED   as state_store.h says
  *     PLR_E_ARGUMENT, _NOT_FINITE, _RANGE       a restore's variances make no sense
  *
+ * After a restore the drive goes on at the message's t_ns, and the body may have moved as it says. If
+ * it has not moved, and t_ns follows on the saved time within max-gap, nothing lies between: the last
+ * reading holds, and the bits are those of a drive that was never interrupted.
+ *
  * A restore that is refused leaves the session as it was before: ready for CONFIG, START and data.
  */
 #ifndef PLR_SESSION_SAVING_H
@@ -22,8 +26,7 @@
 void plr_saving_save(plr_session *s, plr_time_ns t_ns);
 
 /* PLR_START_SAVED, before the first data of time t_ns, with a filter that runs: brings the state
- * back. If t_ns follows on the saved time within max-gap the drive just goes on, with the bits of
- * one that was never interrupted; else it goes on at t_ns, and the body has stood still. */
+ * back, with a body that has not moved. */
 void plr_saving_load(plr_session *s, plr_time_ns t_ns);
 
 #endif

@@ -240,7 +240,7 @@ static void test_with_nothing_between_the_poses_are_those_of_a_drive_without_a_c
     drive(&first_port, CUT, LAST);
     run(&before_cut);
     begin(&after_restart, &second_port);
-    send(&second_port, state(PLR_STATE_RESTORE, frame_time(CUT - 1)));
+    send(&second_port, state(PLR_STATE_RESTORE, drive_time_ns(0.1 * CUT))); /* the first twist's */
     drive(&second_port, CUT, LAST);
     run(&after_restart);
     TEST_ASSERT_EQUAL_UINT32(0, after_restart.totals.refused);
