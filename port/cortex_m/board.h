@@ -6,7 +6,10 @@
 #ifndef PELORUS_CORTEX_M_BOARD_H
 #define PELORUS_CORTEX_M_BOARD_H
 
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "pelorus/port.h"
 
 /* The name of its folder: it stands in the boot message. */
 extern const char board_name[];
@@ -17,9 +20,14 @@ void board_init(void);
 /* What the core runs at, after board_init. */
 uint32_t board_core_hz(void);
 
-/* Starts the hardware watchdog (about two seconds), and tells it that the loop is alive. */
+/* Starts the hardware watchdog (about two seconds; longer than the longest erase of the storage, if
+ * that stops the core), and tells it that the loop is alive. */
 void board_watchdog_start(void);
 void board_watchdog_feed(void);
+
+/* Where the filter's state survives a power cut: fills in the device. False: there is no such place.
+ * Its functions are bounded, and feed the watchdog if they take long. */
+bool board_storage(plr_block_device *device);
 
 /* How the link runs: 8 data bits, no parity, 1 stop bit. */
 enum { BOARD_BAUD = 921600 };

@@ -66,6 +66,11 @@ static inline void core_wait_for_interrupt(void) {
     __asm volatile("dsb\n\twfi" ::: "memory");
 }
 
+/* What was written is there before what follows. */
+static inline void core_write_barrier(void) {
+    __asm volatile("dsb" ::: "memory");
+}
+
 static inline void core_enable_irq(unsigned number) {
     NVIC_ISER[number / 32] = 1U << (number % 32);
 }

@@ -8,6 +8,7 @@
 #include "fault.h"
 #include "pelorus/pelorus.h"
 #include "pelorus/session.h"
+#include "pelorus/state_store.h"
 #include "port_serial.h"
 #include "serial.h"
 #include "startup.h"
@@ -19,6 +20,7 @@ enum { KNOWN_LANDMARKS = 64 };
 
 static plr_session session;
 static plr_landmark known[KNOWN_LANDMARKS];
+static plr_state_store store;
 
 /* The first frame of a life: who speaks, which build, and why it started. A host that meets it in
  * mid-flight knows that the board has lost its state. */
@@ -42,6 +44,13 @@ static void announce(void) {
     (void)plr_writer_put(&session.writer, &message);
 }
 
+/* Where a state is kept, or NULL where the board has no such place. */
+static plr_state_store *storage(void) {
+    plr_block_device device;
+    return board_storage(&device) && plr_state_store_init(&store, &device) == PLR_OK ? &store
+                                                                                     : NULL;
+}
+
 int main(void) {
     board_init();
     clock_start(board_core_hz());
@@ -53,6 +62,7 @@ int main(void) {
     plr_session_options_default(&options);
     options.known = known;
     options.known_capacity = KNOWN_LANDMARKS;
+    options.store = storage();
     options.observer = telemetry_observer(&session);
     if (plr_session_init(&session, &port, &options) != PLR_OK) {
         return 1; /* startup resets the board: only a broken build comes here */

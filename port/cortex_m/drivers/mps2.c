@@ -7,6 +7,7 @@
 #include "../startup.h"
 #include "cmsdk_uart.h"
 #include "cmsdk_watchdog.h"
+#include "retained_ram.h"
 
 enum {
     CORE_HZ = 25000000,
@@ -46,4 +47,9 @@ void board_watchdog_start(void) {
 
 void board_watchdog_feed(void) {
     cmsdk_watchdog_feed(WATCHDOG);
+}
+
+bool board_storage(plr_block_device *device) {
+    *device = retained_ram();
+    return true;
 }

@@ -5,6 +5,7 @@
 #include "../../core.h"
 #include "../../drivers/cmsdk_uart.h"
 #include "../../drivers/cmsdk_watchdog.h"
+#include "../../drivers/retained_ram.h"
 #include "../../serial.h"
 #include "../../startup.h"
 
@@ -50,4 +51,9 @@ void board_watchdog_start(void) {
 
 void board_watchdog_feed(void) {
     cmsdk_watchdog_feed(WATCHDOG);
+}
+
+bool board_storage(plr_block_device *device) {
+    *device = retained_ram();
+    return true;
 }

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 
 #include "../../core.h"
+#include "../../drivers/stm32_flash.h"
 #include "../../drivers/stm32_usart.h"
 #include "../../serial.h"
 #include "../../startup.h"
@@ -119,15 +120,22 @@ uint32_t board_core_hz(void) {
     return core_hz;
 }
 
-/* The independent watchdog runs from its own oscillator of about 32 kHz: 64 * 1000 of its clocks
- * are 1.4 to 3.8 s. It resets at once; it has no interrupt to report from. */
+/* The independent watchdog runs from its own oscillator of 17 to 47 kHz, 32 as a rule (DS8626):
+ * 64 * 2250 of its clocks are 3.1 s at least, 4.5 s as a rule and 8.5 s at most. The least must be
+ * more than the 2 s for which an erase of the storage may stop the core. It resets at once; it has no
+ * interrupt to report from. */
 void board_watchdog_start(void) {
     IWDG_KR = 0x5555;
     IWDG_PR = 4;
-    IWDG_RLR = 1000;
+    IWDG_RLR = 2250 - 1;
     IWDG_KR = 0xCCCC;
 }
 
 void board_watchdog_feed(void) {
     IWDG_KR = 0xAAAA;
+}
+
+bool board_storage(plr_block_device *device) {
+    *device = stm32_flash();
+    return true;
 }
