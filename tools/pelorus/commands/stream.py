@@ -16,6 +16,7 @@ from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.compare import Comparison, desktop_poses, digest, replay_program
+from pelorus.robot.state import restored, saved
 from pelorus.robot.status import refusal
 from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
 from pelorus.robot.target import BAUD, FORMS, open_target
@@ -52,6 +53,19 @@ def stream(
     answer: float = typer.Option(
         ANSWER_S, min=0.01, metavar="S", help="How long to wait for the answer to a frame."
     ),
+    save_state: bool = typer.Option(
+        False, "--save-state", help="Have the board keep its state at the end, over a power cut."
+    ),
+    restore_state: bool = typer.Option(
+        False,
+        "--restore-state",
+        help="Have it go on from the state that it kept; no START is sent.",
+    ),
+    moved: tuple[float, float] = typer.Option(
+        (0.0, 0.0),
+        metavar="M RAD",
+        help="With --restore-state: how far it may have moved meanwhile, one sigma.",
+    ),
 ) -> None:
     """Send a recording to a robot controller, real or emulated, as its sensors would."""
     received, _ = read_file(source)
@@ -59,6 +73,14 @@ def stream(
     messages = _first_frames([frame.message for frame in received], frames)
     if compare and frames is not None:
         raise PelorusError("--compare replays the whole recording: leave --frames out")
+    if compare and restore_state:
+        raise PelorusError("--compare knows no state that a board kept: leave --restore-state out")
+    if any(moved) and not restore_state:
+        raise PelorusError("--moved is of the time between two drives: it needs --restore-state")
+    if restore_state:
+        messages = restored(messages, moved)
+    if save_state:
+        messages = saved(messages)
     if record is not None and record.exists() and record.samefile(source):
         raise PelorusError(f"{record}: is the recording to send; --record needs another file")
     streamer: Streamer | None = None
@@ -80,6 +102,8 @@ def stream(
     _tell(outcome, record)
     if compare:
         _compare(source, outcome, replay)
+    if save_state and outcome.state_trouble:
+        raise PelorusError(f"{to}: {outcome.state_trouble}")
     if not outcome.poses:
         raise PelorusError(f"{to}: took {outcome.frames} frames and gave no pose")
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Sends a recording to a board, frame by frame, and keeps what both sides said.
 
-The rule of docs/PORTING.md, "Flow control": after each STEREO the sender waits for the REPORT that
-answers it, or for a time-out; it never waits without reading. A board that starts anew announces
-itself with a TEXT; it is then given HEADER, settings and its own last pose, and the drive goes on.
+The rule of docs/PORTING.md, "Flow control": after each STEREO and each STATE the sender waits for
+the REPORT that answers it, or for a time-out; it never waits without reading. A board that starts
+anew announces itself with a TEXT; it is then given HEADER, settings and its own last pose, and the
+drive goes on.
 """
 
 from __future__ import annotations
@@ -28,11 +29,14 @@ from pelorus.frames import (
     Report,
     Start,
     StartFlag,
+    State,
+    StateAction,
     Stereo,
     Text,
 )
 from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
 from pelorus.robot.link import Link
+from pelorus.robot.status import refusal
 from pelorus.wire import DELIMITER, Counts, Reader, encode
 
 BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
@@ -40,6 +44,7 @@ ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
 QUIET_S = 0.3
 WARNING = 1  # severity of a TEXT
 END_AGAIN_S = 1.0
+STATE_S = 15.0  # a save takes as long as the flash: seconds
 UNANSWERED_MAX = 5  # in a row: then nobody is there
 WINDOW_BYTES = 2048  # half of the board's receive ring
 
@@ -59,6 +64,8 @@ class Outcome:
     unanswered: int = 0
     restarts: int = 0
     worst_update_us: int = 0
+    states: list[Report] = field(default_factory=list)  # the answers to STATE
+    state_trouble: str = ""  # why the last STATE was not done
 
 
 class Streamer:
@@ -128,16 +135,18 @@ class Streamer:
             self._exchange(b"", left)
 
     def send(self, message: Message) -> None:
-        """Send one message; for a STEREO, wait for the answer."""
+        """Send one message; for a STEREO or a STATE, wait for the answer."""
         if self._board_is_new:
             self._start_over()
-        if message.kind in SETUP_KINDS and not self.outcome.frames:
+        if (message.kind in SETUP_KINDS or is_restore(message)) and not self.outcome.frames:
             self._setup.append(message)
         self._awaited = message.t_ns if isinstance(message, Stereo) else None
         self._put(message)
         if isinstance(message, Stereo):
             self.outcome.frames += 1
             self._await_answer(message.t_ns)
+        elif isinstance(message, State):
+            self._await_state(message)
         elif self._unread_bytes > WINDOW_BYTES:
             self._link_pause()
 
@@ -182,6 +191,30 @@ class Streamer:
                 "is the board running the firmware, at this baud rate?"
             )
 
+    def _await_state(self, state: State) -> None:
+        """A board that saves takes nothing meanwhile: what is sent before it is done may be lost.
+
+        Without the state that it was to go on from, a drive would be another one: it ends there.
+        """
+        answers = len(self.outcome.states)
+        patience_s = max(STATE_S, self._answer_s)
+        self._wait(lambda: len(self.outcome.states) > answers or self._board_is_new, patience_s)
+        self._unread_bytes = 0
+        if len(self.outcome.states) > answers:
+            self.outcome.state_trouble = self._why_not(self.outcome.states[-1])
+        else:
+            self.outcome.state_trouble = "the board did not answer when asked about its state"
+            self._note(self.outcome.state_trouble)
+        if self.outcome.state_trouble and is_restore(state):
+            raise PelorusError(self.outcome.state_trouble)
+
+    def _why_not(self, answer: Report) -> str:
+        """The board's own words before it, if it has said any; nothing if all is well."""
+        if answer.status == 0:
+            return ""
+        words = [text.text for text in self.outcome.texts if text.text.startswith("state not ")]
+        return words[-1] if words else refusal(Kind.STATE, answer.status, 1)
+
     def _exchange(self, outgoing: bytes, wait_s: float) -> bool:
         """Send and take in; whether anything came."""
         incoming = self._link.exchange(outgoing, wait_s)
@@ -210,7 +243,11 @@ class Streamer:
                 pass  # landmarks: they are in the log
 
     def _take_report(self, report: Report) -> None:
+        if report.subject == Kind.STATE:
+            self.outcome.states.append(report)
         if report.subject != Kind.STEREO:
+            if report.status == 0:
+                return
             self.outcome.refused[report.subject, report.status] += 1
             return
         self.outcome.reports[report.status] += 1
@@ -226,6 +263,8 @@ class Streamer:
         for message in self._setup:
             if isinstance(message, Header | Config | Landmark) or not self.outcome.poses:
                 self._put(message)
+            if isinstance(message, State) and not self.outcome.poses:
+                self._await_state(message)
         if self.outcome.poses:
             self._put(start_from(self.outcome.poses[-1]))
 
@@ -233,6 +272,11 @@ class Streamer:
         """The host's own word on what went wrong, for who reads the log."""
         if self._log is not None:
             self._log.keep(Text(remark, WARNING))
+
+
+def is_restore(message: Message) -> bool:
+    """Whether a drive begins with it as with a START."""
+    return isinstance(message, State) and message.action == StateAction.RESTORE
 
 
 def start_from(pose: Pose) -> Start:
