@@ -23,14 +23,20 @@ MODEL = (r"body_\w+", r"world_\w+")
 MAP = ("take_evicted", "ask_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
 TELEMETRY = "send_odometry"
+DEVICE = r"(ram|flash)_(read|program|erase)"
+STORE = (
+    r"plr_state_store_\w+|look_\w+|reads\w*|(write|read)_slot|erases|programs\w*|flushes|take|give"
+)
 SESSION = r"plr_session_step|apply_twist|predict|update|plr_take_\w+|refuse_frame"
 FILTER = r"plr_(filter|correct|gate|motion|slots)\w*"
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
     (r"plr_frame_out_\w+", ("write_to_port", "send")),
+    (STORE, (DEVICE,)),
+    (r"plr_fields_\w+", ("take", "give")),
     (r"write_to_port", PORT),
     (SESSION, (*PORT, TELEMETRY)),
-    (r"plr_begin_running|plr_send_\w+", ()),
+    (r"plr_begin_\w+|plr_send_\w+", ()),
     (FILTER, MODEL + MAP),
 )
 
