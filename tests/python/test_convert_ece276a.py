@@ -18,7 +18,7 @@ from drives import (
     with_turned_axes,
 )
 from pelorus import se3
-from pelorus.converters import ece276a
+from pelorus.converters import ece276a, twist_noise
 from pelorus.frames import BodyAxes, Header, Start, Stereo, Text, Truth, Twist, TwistTiming
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
@@ -49,7 +49,7 @@ def test_everything_of_an_npz_arrives(tmp_path: Path, pelorus: Run, edition: int
     source, target = save_npz(tmp_path / "drive.npz", drive, edition), tmp_path / "drive.plr"
     said = pelorus("convert", "ece276a", source, target)
     assert said.status == 0, said.err
-    assert said.out.count("good") == 4
+    assert said.out.count("good") == 5
     header = messages_of(target, Header)[0]
     assert np.allclose(header.R_CB, drive.T_CB.R)
     assert np.allclose(header.t_CB_m, drive.T_CB.p)
@@ -57,6 +57,7 @@ def test_everything_of_an_npz_arrives(tmp_path: Path, pelorus: Run, edition: int
     assert header.body_axes is BodyAxes.FORWARD_LEFT_UP
     assert header.name == "drive"
     assert header.noise.pixel_sigma_px < 0
+    assert header.noise.velocity_sigma_mps < 0, "61 frames are too few to tell"
     twists, stereos = messages_of(target, Twist), messages_of(target, Stereo)
     assert np.array_equal([m.v_B_mps for m in twists], drive.v_B_mps)
     assert np.array_equal([m.w_B_radps for m in twists], drive.w_B_radps)
@@ -115,6 +116,52 @@ def test_fix_none_leaves_the_file_as_it_is(tmp_path: Path, pelorus: Run) -> None
     assert header.twist_timing is TwistTiming.MID
     ids = np.concatenate([m.ids for m in messages_of(target, Stereo)])
     assert np.array_equal(ids, broken.tracks.id)
+
+
+NOISY = {"velocity_sigma_mps": 0.5, "gyro_sigma_radps": 0.05}
+
+
+@pytest.mark.parametrize("timing", [TwistTiming.START, TwistTiming.END, TwistTiming.MID])
+def test_the_noise_of_the_twists_is_measured_and_biases_are_not_taken_for_it(
+    timing: TwistTiming,
+) -> None:
+    drive = clean(
+        3, **NOISY, twist_timing=timing, bias_velocity_sigma_mps=2.0, bias_gyro_sigma_radps=0.1
+    )
+    recording, finding = twist_noise.suggest(drive)
+    assert finding.found
+    assert recording.header.noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
+    assert recording.header.noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
+    unchanged = ("pixel_sigma_px", "bias_velocity_sigma_mps", "bias_gyro_walk")
+    for name in unchanged:
+        assert getattr(recording.header.noise, name) == getattr(drive.header.noise, name)
+
+
+def test_what_the_images_cannot_tell_is_not_suggested() -> None:
+    quiet = {"velocity_sigma_mps": 0.001, "gyro_sigma_radps": 0.0002}
+    drive = clean(3, **quiet)
+    recording, finding = twist_noise.suggest(drive)
+    assert not finding.found
+    assert "no suggestion" in finding.action
+    assert recording.header.noise == drive.header.noise
+    turning = clean(3, **(quiet | {"gyro_sigma_radps": 0.05}))
+    noise = twist_noise.suggest(turning)[0].header.noise
+    assert noise.velocity_sigma_mps == turning.header.noise.velocity_sigma_mps
+    assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
+
+
+def test_the_header_suggests_the_noise_and_convert_says_so(tmp_path: Path, pelorus: Run) -> None:
+    source = save_npz(tmp_path / "n.npz", with_camera_position(clean(3, **NOISY)))
+    target = tmp_path / "n.plr"
+    said = pelorus("convert", "ece276a", source, target)
+    assert said.status == 0, said.err
+    assert "the HEADER suggests velocity-sigma 0." in " ".join(said.out.split())
+    noise = messages_of(target, Header)[0].noise
+    assert noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
+    assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
+    assert any(text.text.startswith("twist noise") for text in messages_of(target, Text))
+    pelorus("convert", "ece276a", source, target, "--fix", "none")
+    assert messages_of(target, Header)[0].noise.velocity_sigma_mps < 0
 
 
 def test_kitti_truth_comes_to_the_body_through_the_mended_extrinsic(

@@ -43,6 +43,19 @@ def test_03_has_stale_tracks_and_turned_axes(real: Callable[[str], Path]) -> Non
     assert not any(finding.found for finding in mend(recording)[1])
 
 
+def test_0027_tells_the_noise_that_was_added_to_its_twists(real: Callable[[str], Path]) -> None:
+    recording, _ = ece276a.convert(real("ece276a/0027.npz"))
+    noise = recording.header.noise
+    assert noise.velocity_sigma_mps == pytest.approx(0.50, rel=0.05)
+    assert noise.gyro_sigma_radps == pytest.approx(0.050, rel=0.1)
+
+
+def test_of_03_the_images_can_tell_the_gyro_alone(real: Callable[[str], Path]) -> None:
+    recording, _ = ece276a.convert(real("ece276a/03.npz"))
+    assert recording.header.noise.velocity_sigma_mps < 0
+    assert 0.005 < recording.header.noise.gyro_sigma_radps < 0.02
+
+
 @pytest.mark.parametrize("drive", ["09_26_drive_0001", "09_26_drive_0036", "09_30_drive_0020"])
 def test_the_klt_drives_have_none_of_the_faults(real: Callable[[str], Path], drive: str) -> None:
     recording = matlab.klt(real(f"klt/2011_{drive}_sync_KLT.mat"))

@@ -3,7 +3,8 @@
 
 `time_stamps` (1, T) s; `features` (4, M, T) px in the order uL vL uR vR, all four -1 where absent;
 `linear_velocity` (3, T) m/s; `angular_velocity` or `rotational_velocity` (3, T) rad/s; `K` (3, 3);
-`b` baseline, m; `imu_T_cam` or `cam_T_imu` (4, 4).
+`b` baseline, m; `imu_T_cam` or `cam_T_imu` (4, 4). They say nothing of their noise; what can be
+measured of it goes into the HEADER (twist_noise.py).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from pelorus import arrays, kitti, se3
 from pelorus.arrays import Arrays
+from pelorus.converters import twist_noise
 from pelorus.errors import PelorusError
 from pelorus.faults import axes, timing
 from pelorus.faults.finding import Finding
@@ -30,7 +32,10 @@ def convert(
     fix: bool = True,
     twist_timing: TwistTiming | None = None,
 ) -> tuple[Recording, list[Finding]]:
-    """Read, mend if asked, and add the truth. `twist_timing` None: let the data decide."""
+    """Read; if asked, mend and measure the twists' noise; add the truth.
+
+    `twist_timing` None: let the data decide.
+    """
     recording = read(source)
     findings: list[Finding] = []
     if fix:
@@ -40,6 +45,9 @@ def convert(
         findings.append(finding)
     else:
         recording = recording.with_header(twist_timing=twist_timing)
+    if fix:
+        recording, finding = twist_noise.suggest(recording)
+        findings.append(finding)
     recording = recording.with_header(body_axes=axes.body_axes(recording.T_CB.R))
     return (with_truth(recording, truth) if truth else recording), findings
 

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""How noisy are the twists? The camera's own motion tells, where it is the better of the two.
+
+From one frame to the next the common tracks give the camera's motion, and with the extrinsic the
+body's. The twists' differs from it by their own noise and by that of the images. How large the
+latter is, is measured too: each half of the tracks gives a motion; the two are independent, and
+their difference is twice as large as the error of the motion from all tracks. Where the twists
+differ by clearly more, that is their noise, and the HEADER suggests it as the sigma of a reading.
+Spreads are taken about the median: a bias is no noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3, visual_motion
+from pelorus.faults.finding import Finding
+from pelorus.frames import TwistTiming
+from pelorus.recording import Recording
+from pelorus.se3 import Floats, Poses
+from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
+
+PAIRS_ENOUGH = 2 * PAIRS_MIN  # so that each half has enough
+FRAMES_ENOUGH = 100  # a spread from so many is good to 10 %
+CLEARLY = 3.0  # times the images' own: then they add at most 6 %
+MAD_TO_SIGMA = 1.4826  # of a normal distribution
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Sigma of one axis, m/s and rad/s, over a frame."""
+
+    velocity_mps: float
+    gyro_radps: float
+
+
+def suggest(recording: Recording) -> tuple[Recording, Finding]:
+    """Write into the HEADER what the twists' noise is, as far as the images can tell.
+
+    Each twist holds for a whole frame here, as in the course's files.
+    """
+    subject = "twist noise"
+    camera = recording.header.camera
+    seen = seen_pairs(recording.tracks, camera, 1)
+    usable = seen.counts() >= PAIRS_ENOUGH
+    if usable.sum() < FRAMES_ENOUGH:
+        evidence = f"{int(usable.sum())} frames with tracks enough, {FRAMES_ENOUGH} are due"
+        return recording, Finding(subject, False, evidence, "no suggestion: give the sigmas")
+    tau_s = np.diff(recording.frame_t_ns)[usable] * 1e-9
+    halves = [visual_motion.estimate(half, camera) for half in _halves(seen)]
+    images = _spread(_body(recording, halves[0]), _body(recording, halves[1]), usable, tau_s, 0.5)
+    whole = _body(recording, visual_motion.estimate(seen, camera))
+    readings = np.sqrt(2) if recording.header.twist_timing is TwistTiming.MID else 1.0  # a mean
+    twists = _spread(whole, recording.body_motion(1), usable, tau_s, readings)
+    return _decide(recording, twists, images, Finding(subject, False, _words(twists, images), ""))
+
+
+def _decide(
+    recording: Recording, twists: Spread, images: Spread, finding: Finding
+) -> tuple[Recording, Finding]:
+    noise, said = recording.header.noise, []
+    if twists.velocity_mps > CLEARLY * images.velocity_mps:
+        noise = replace(noise, velocity_sigma_mps=round(twists.velocity_mps, 4))
+        said.append(f"velocity-sigma {twists.velocity_mps:.2g} m/s")
+    if twists.gyro_radps > CLEARLY * images.gyro_radps:
+        noise = replace(noise, gyro_sigma_radps=round(twists.gyro_radps, 5))
+        said.append(f"gyro-sigma {twists.gyro_radps:.2g} rad/s")
+    if not said:
+        action = "no suggestion: the filter's defaults hold, unless you give the sigmas"
+        return recording, replace(finding, action=action)
+    action = f"the HEADER suggests {' and '.join(said)}; options and a config override it"
+    return recording.with_header(noise=noise), replace(finding, found=True, action=action)
+
+
+def _words(twists: Spread, images: Spread) -> str:
+    return (
+        f"twists and images differ by {twists.velocity_mps:.2g} m/s and {twists.gyro_radps:.2g} "
+        f"rad/s per axis, of which the images' own error is {images.velocity_mps:.2g} m/s and "
+        f"{images.gyro_radps:.2g} rad/s"
+    )
+
+
+def _halves(seen: SeenPairs) -> list[SeenPairs]:
+    """Every other pair of tracks."""
+    even = np.arange(len(seen.frame)) % 2 == 0
+    return [
+        SeenPairs(
+            seen.frame_count,
+            seen.frame[half],
+            seen.first_pixels[half],
+            seen.q_C[half],
+            seen.pixels[half],
+        )
+        for half in (even, ~even)
+    ]
+
+
+def _body(recording: Recording, motion_C: Poses) -> Poses:
+    """The body's motion for that of the camera: T_CB^-1 M T_CB."""
+    return se3.compose(se3.compose(se3.inverse(recording.T_CB), motion_C), recording.T_CB)
+
+
+def _spread(a: Poses, b: Poses, usable: NDArray[np.bool_], tau_s: Floats, factor: float) -> Spread:
+    """Of a^-1 b, as a twist, times factor: the three axes taken together."""
+    difference = se3.compose(se3.inverse(a.at(usable)), b.at(usable))
+    rate = se3.log(difference) / tau_s[:, None]
+    axis = factor * MAD_TO_SIGMA * np.median(np.abs(rate - np.median(rate, axis=0)), axis=0)
+    rms = np.sqrt(np.mean(axis.reshape(2, 3) ** 2, axis=1))
+    return Spread(float(rms[0]), float(rms[1]))
