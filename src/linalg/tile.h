@@ -64,11 +64,10 @@ static inline void plr_tile_subtract(unsigned depth, plr_tile_factors at,
     plr_tile_add(a3, -at.U[3], at.W, from[3]);
     for (unsigned steps = depth - 2; steps > 0; steps--) {
         plr_tile_next(&at);
-        const plr_real u0 = -at.U[0], u1 = -at.U[1], u2 = -at.U[2], u3 = -at.U[3];
-        plr_tile_accumulate(a0, u0, at.W);
-        plr_tile_accumulate(a1, u1, at.W);
-        plr_tile_accumulate(a2, u2, at.W);
-        plr_tile_accumulate(a3, u3, at.W);
+        plr_tile_accumulate(a0, -at.U[0], at.W);
+        plr_tile_accumulate(a1, -at.U[1], at.W);
+        plr_tile_accumulate(a2, -at.U[2], at.W);
+        plr_tile_accumulate(a3, -at.U[3], at.W);
     }
     plr_tile_next(&at);
     plr_tile_add(to[0], -at.U[0], at.W, a0);
