@@ -16,18 +16,18 @@ set(cpu_m55_guard stack_guard_limit.c)
 
 #   board_<name>_cpu, _drivers, _largest (capacity N), _float64 (whether an image in double is made)
 set(board_mps2_an386_cpu m4f)
-set(board_mps2_an386_drivers mps2.c cmsdk_uart.c cmsdk_watchdog.c)
+set(board_mps2_an386_drivers mps2.c cmsdk_uart.c cmsdk_watchdog.c retained_ram.c)
 set(board_mps2_an386_largest 64)
 
 set(board_mps2_an500_cpu m7)
-set(board_mps2_an500_drivers mps2.c cmsdk_uart.c cmsdk_watchdog.c)
+set(board_mps2_an500_drivers mps2.c cmsdk_uart.c cmsdk_watchdog.c retained_ram.c)
 set(board_mps2_an500_largest 64)
 set(board_mps2_an500_float64 TRUE)
 
 set(board_mps3_an547_cpu m55)
-set(board_mps3_an547_drivers cmsdk_uart.c cmsdk_watchdog.c)
+set(board_mps3_an547_drivers cmsdk_uart.c cmsdk_watchdog.c retained_ram.c)
 set(board_mps3_an547_largest 64)
 
 set(board_stm32f405_cpu m4f)
-set(board_stm32f405_drivers stm32_usart.c)
+set(board_stm32f405_drivers stm32_usart.c stm32_flash.c)
 set(board_stm32f405_largest 48)
