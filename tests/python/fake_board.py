@@ -27,6 +27,7 @@ class Manner:
     silent: bool = False
     tells_settings: bool = True
     leaves_after: int | None = None  # answers to STEREO
+    a_frame_late: bool = False  # its reports
     most_observations: int = 128
     slots: int = 32
     says: str = ""  # with its settings
@@ -76,7 +77,8 @@ class FakeBoard:
         if self.manner.says and not self.poses:
             answers.append(Text(self.manner.says))
         self.poses.append(Pose(message.t_ns, real_bytes=4, after_stereo=True))
-        return [*answers, self.poses[-1], Report(message.t_ns, Kind.STEREO)]
+        reported = self.poses[-2:][0] if self.manner.a_frame_late else self.poses[-1]
+        return [*answers, self.poses[-1], Report(reported.t_ns, Kind.STEREO)]
 
 
 class Served:

@@ -30,11 +30,12 @@ from pelorus.frames import (
     Text,
 )
 from pelorus.robot import link
+from pelorus.robot.compare import desktop_poses
 from pelorus.robot.flight_log import FlightLog
 from pelorus.robot.link import Link, LinkClosed
 from pelorus.robot.status import STATUSES, refusal
 from pelorus.robot.stream import Streamer
-from replay_drive import FRAMES, drive, encode, log_of, run
+from replay_drive import BIN, FRAMES, drive, encode, log_of, run
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = Config({4: 32.0}, 0xABCD, 32, 128, 8, 4)
@@ -114,21 +115,39 @@ def test_only_so_many_frames_are_sent_as_asked(recording: Path, pelorus: Run) ->
     assert sum(message.kind == Kind.STEREO for message in board.heard) == 7
 
 
-def test_a_frame_too_long_for_the_board_is_answered_and_told_in_words(
-    tmp_path: Path, pelorus: Run
-) -> None:
+def with_a_long_frame() -> tuple[list[Message], int]:
+    """The drive with 129 observations or more in one frame, and its time."""
     messages = drive()
     at = next(k for k, m in enumerate(messages) if isinstance(m, Stereo) and k > 20)
     frame = messages[at]
     assert isinstance(frame, Stereo)
     more = 128 // len(frame.ids) + 1
-    messages[at] = Stereo(
-        frame.t_ns,
-        np.arange(more * len(frame.ids), dtype=np.uint32),
-        np.tile(frame.pixels, (more, 1)),
-    )
+    ids = np.arange(more * len(frame.ids), dtype=np.uint32)
+    messages[at] = Stereo(frame.t_ns, ids, np.tile(frame.pixels, (more, 1)))
+    return messages, frame.t_ns
+
+
+def test_the_desktop_is_compared_without_the_frames_that_a_board_must_refuse(
+    tmp_path: Path,
+) -> None:
+    messages, t_ns = with_a_long_frame()
     path = tmp_path / "long.plr"
     path.write_bytes(encode(messages))
+    program = BIN / "pelorus-replay"
+    if not program.exists():
+        pytest.skip(f"{program} is not built")
+    times = [pose.t_ns for pose in desktop_poses(path, program, 32)]
+    assert len(times) == FRAMES
+    assert t_ns in times
+    times.remove(t_ns)
+    assert [pose.t_ns for pose in desktop_poses(path, program, 32, 128)] == times
+
+
+def test_a_frame_too_long_for_the_board_is_answered_and_told_in_words(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    path = tmp_path / "long.plr"
+    path.write_bytes(encode(with_a_long_frame()[0]))
     with TcpBoard(FakeBoard()) as served:
         said = pelorus("stream", path, "--to", served.target)
     assert said.status == 0, said.err
@@ -304,6 +323,16 @@ def test_a_board_that_never_answers_is_given_up_and_the_log_says_when(
         assert remark.startswith(f"no answer to the frame of {t_ns} ns")
 
 
+def test_the_answer_to_an_earlier_frame_is_not_taken_for_that_to_the_last(
+    recording: Path, pelorus: Run
+) -> None:
+    with TcpBoard(FakeBoard(Manner(a_frame_late=True))) as served:
+        said = pelorus("stream", recording, "--to", served.target, "--answer", "0.02")
+    assert said.status == 1
+    assert "5 frames in a row without an answer" in said.err
+    assert f"(after 6 of {FRAMES} frames)" in said.err  # the first has no earlier one
+
+
 def test_a_log_that_cannot_be_written_is_told(
     recording: Path, tmp_path: Path, pelorus: Run
 ) -> None:
@@ -360,6 +389,15 @@ def test_the_log_holds_data_back_until_the_settings_are_told() -> None:
     assert kept(header, first, SETTINGS, second) == [header, SETTINGS, first, second]
     assert kept(header, first, third, answer) == [header, first, third, answer]
     assert kept(header, first, answer, SETTINGS, second)[-2:] == [SETTINGS, second]
+
+
+def test_each_message_is_on_the_disk_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "flight.plr"
+    with path.open("wb") as stream:
+        log = FlightLog(stream)
+        for count, message in enumerate([drive()[0], SETTINGS, *drive()[1:5]], 1):
+            log.keep(message)
+            assert len(log_of(path)) == count
 
 
 def test_wanted_settings_among_the_data_release_nothing() -> None:

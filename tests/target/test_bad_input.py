@@ -30,7 +30,8 @@ SLOTS = 32
 RATE = 0.0003  # of bytes; of a STEREO's 1200 or so, every third frame is hit
 UNKNOWN_KINDS = (0, 77, 200, 255)
 FOREIGN, NOT_READY = -16, -13  # plr_status
-CORPUS = Path(__file__).resolve().parents[1] / "fuzz" / "corpus"
+FUZZ = Path(__file__).resolve().parents[1] / "fuzz"
+STREAM = 128  # in the first byte of an input of corpus_session: see fuzz_session.c
 PATIENCE_S = 60.0
 DAY_NS = 86_400_000_000_000
 END = DELIMITER + encode(End(0, 0, 0, 0, 0), 0)
@@ -210,14 +211,28 @@ def test_data_before_a_header_is_refused_one_by_one(link: Link, messages: list[M
     assert poses(board) == []
 
 
+def session_input(path: Path) -> bytes:
+    """An input of the harness of the whole loop: a stream, or records of which it makes frames."""
+    content = path.read_bytes()
+    first, records = content[0], content[2:]
+    if first & STREAM:
+        return records
+    stream = b""
+    while len(records) >= 3:
+        kind, size = struct.unpack_from("<BH", records)
+        stream += frame_of_kind(kind, records[3 : 3 + size])
+        records = records[3 + size :]
+    return stream
+
+
 def test_what_a_fuzzer_recorded_neither_stops_nor_resets_it(
     link: Link, messages: list[Message]
 ) -> None:
     clean = digest(Streamer(link).run(messages).poses)
-    inputs = sorted(CORPUS.iterdir())
-    assert inputs
-    for path in inputs:
-        link.exchange(path.read_bytes() + DELIMITER)
+    inputs = [path.read_bytes() for path in sorted((FUZZ / "corpus").iterdir())]
+    inputs += [session_input(path) for path in sorted((FUZZ / "corpus_session").iterdir())]
+    for recorded in inputs:
+        link.exchange(recorded + DELIMITER)
     streamer = Streamer(link)
     assert digest(streamer.run(messages).poses) == clean
     assert streamer.outcome.restarts == 0

@@ -162,7 +162,7 @@ def serial(device: Path, baud: int) -> Link:
 
 
 def _set_raw(fd: int, speed: int) -> None:
-    tty.setraw(fd)
+    tty.setraw(fd, termios.TCSANOW)  # does not wait for output that no one takes
     settings = termios.tcgetattr(fd)
     settings[2] |= termios.CLOCAL | termios.CREAD
     settings[2] &= ~(termios.CRTSCTS | termios.CSTOPB | termios.PARENB)
