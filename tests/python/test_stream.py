@@ -327,10 +327,11 @@ def test_the_answer_to_an_earlier_frame_is_not_taken_for_that_to_the_last(
     recording: Path, pelorus: Run
 ) -> None:
     with TcpBoard(FakeBoard(Manner(a_frame_late=True))) as served:
-        said = pelorus("stream", recording, "--to", served.target, "--answer", "0.02")
+        said = pelorus("stream", recording, "--to", served.target, "--answer", "0.1")
     assert said.status == 1
     assert "5 frames in a row without an answer" in said.err
-    assert f"(after 6 of {FRAMES} frames)" in said.err  # the first has no earlier one
+    # The first has no earlier one: it is answered, if this machine is not too busy.
+    assert re.search(rf"\(after [56] of {FRAMES} frames\)", said.err)
 
 
 def test_a_log_that_cannot_be_written_is_told(

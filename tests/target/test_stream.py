@@ -199,6 +199,18 @@ def wait_for_poses(log: Path, count: int, sender: subprocess.Popen[str]) -> None
     pytest.fail("the drive did not come so far")
 
 
+def test_a_log_that_is_sent_to_the_board_again_gives_its_bits_again(
+    board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "first.plr", tmp_path / "second.plr"
+    to = ("--to", f"qemu:{board}", "--image", firmware)
+    assert pelorus("stream", short_drive, *to, "--record", first).returncode == 0
+    comparing = (*to, "--compare", "--replay", program)
+    done = pelorus("stream", first, *comparing, "--record", second)
+    assert_same_bits(done, second, program)
+    assert digest(poses_in(second)[0]) == digest(poses_in(first)[0])
+
+
 def test_the_log_of_a_drive_is_taken_by_info_replay_and_report(
     board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
 ) -> None:

@@ -16,11 +16,14 @@ from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.compare import Comparison, desktop_poses, digest, replay_program
+from pelorus.robot.emulator import MACHINES
 from pelorus.robot.state import restored, saved
 from pelorus.robot.status import refusal
 from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
 from pelorus.robot.target import BAUD, FORMS, open_target
 from pelorus.wire import header_of, read_file
+
+BOARDS = ", ".join(MACHINES)
 
 
 def register(app: typer.Typer) -> None:
@@ -31,10 +34,14 @@ def register(app: typer.Typer) -> None:
 def stream(
     source: Path = typer.Argument(..., metavar="IN.plr", help="The recording to send."),
     to: str = typer.Option(
-        ..., metavar="TARGET", help=f"Where to: {FORMS}; {BAUD} baud if not said."
+        ...,
+        metavar="TARGET",
+        help=f"Where to: {FORMS}. {BAUD} baud if not said; the boards of QEMU are {BOARDS}.",
     ),
     record: Path | None = typer.Option(
-        None, metavar="OUT.plr", help="Keep what both sides said: the flight recorder."
+        None,
+        metavar="OUT.plr",
+        help="Keep what both sides said, as a recording: replayed, it gives the robot's bits.",
     ),
     compare: bool = typer.Option(
         False,
