@@ -415,8 +415,8 @@ static void test_variances_without_sense_are_refused(void) {
         double value;
         plr_status status;
     } bad[] = {{-1e-9, PLR_E_ARGUMENT},
-               {NAN, PLR_E_NOT_FINITE},
-               {INFINITY, PLR_E_NOT_FINITE},
+               {(double)NAN, PLR_E_NOT_FINITE},
+               {(double)INFINITY, PLR_E_NOT_FINITE},
                {1e13, PLR_E_RANGE}};
     for (unsigned i = 0; i < sizeof bad / sizeof *bad; i++) {
         plr_message restore = state(PLR_STATE_RESTORE, 0);
