@@ -101,6 +101,21 @@ static void check_frame(void *context, const plr_frame_result *result) {
     REQUIRE((r->health == PLR_HEALTH_DIVERGED) == (r->status == PLR_E_DIVERGED));
 }
 
+static void check_text(void *context, const plr_text *text) {
+    (void)context;
+    REQUIRE(memchr(text->text, '\0', sizeof text->text) != NULL);
+    REQUIRE(text->severity <= PLR_SEVERITY_ERROR);
+}
+
+static void check_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                          const plr_setting *culprit) {
+    (void)context;
+    (void)subject;
+    (void)t_ns;
+    REQUIRE(status < PLR_OK);
+    REQUIRE(culprit == NULL || plr_setting_by_name(culprit->name) == culprit);
+}
+
 /* --- the machine around it --- */
 
 typedef struct machine {
@@ -253,6 +268,8 @@ static plr_session_options options_of(choices *c, machine *m, uint8_t first, uin
     options.observer.pose = check_pose;
     options.observer.landmark = check_landmark;
     options.observer.frame = check_frame;
+    options.observer.text = check_text;
+    options.observer.refused = check_refused;
     if (first & STORAGE) {
         const plr_block_device device = {m,           DEVICE_SIZE,    ERASE_SIZE,  16,
                                          device_read, device_program, device_erase};

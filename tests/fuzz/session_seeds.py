@@ -16,13 +16,28 @@ import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from pelorus import wire
-from pelorus.frames import Landmark, Message, Start, State, StateAction, Stereo, Truth, Twist
+from pelorus.frames import (
+    Config,
+    End,
+    Landmark,
+    Message,
+    Start,
+    StartFlag,
+    State,
+    StateAction,
+    Stereo,
+    Truth,
+    Twist,
+)
 from pelorus.simulation.simulate import Options, simulate
 
 Data = Twist | Stereo | Truth
 MOST_SEEN = 8
+SECOND = 1_000_000_000
 
 # Of the first byte: mode in the two lowest bits, then
 WORLD, BIAS, KNOWN_MAP, STORAGE, TIGHT, STREAM = 4, 8, 16, 32, 64, 128
@@ -31,7 +46,7 @@ SLAM, MAPPING, LOCALIZATION, DEAD_RECKONING = range(4)
 DELAY, DEADLINE, OPEN_GATE = 8, 16, 32
 
 
-def drive() -> list[Message]:
+def drive(**changes: Any) -> list[Message]:
     """0.6 s: seven frames of at most eight observations, two twists a frame, known landmarks."""
     options = Options(
         seed=5,
@@ -45,7 +60,7 @@ def drive() -> list[Message]:
         outliers=0.1,
         drop=0,
     )
-    messages = list(simulate(options).recording.messages())
+    messages = list(simulate(replace(options, **changes)).recording.messages())
     wanted = {int(i) for m in messages if isinstance(m, Stereo) for i in m.ids}
     return [m for m in messages if not isinstance(m, Landmark) or m.id in wanted]
 
@@ -68,37 +83,71 @@ def stream(messages: Iterable[Message]) -> bytes:
     return out.getvalue()
 
 
+def choices(first: int, second: int = 0) -> bytes:
+    """An input's first two bytes."""
+    return bytes([first, second])
+
+
 def seeds() -> dict[str, bytes]:
-    """Each mode and model, storage, the clock that jumps, a stream of bytes."""
+    """Each mode and model, a stream of bytes, and what the functions below set up."""
     recording = drive()
-    half = next(i for i, m in enumerate(recording) if isinstance(m, Stereo) and m.t_ns) + 8
     no_truth = [m for m in recording if not isinstance(m, Truth)]
-    truth = next(m for m in recording if isinstance(m, Truth))
-    start = Start(truth.t_ns, truth.R_WB, truth.p_WB_m)
-    away = [replace(m, t_ns=m.t_ns + 10**13) for m in recording[half:] if isinstance(m, Data)]
-    save = State(0, StateAction.SAVE)
-    restore = State(truth.t_ns, StateAction.RESTORE)
-
-    def choices(first: int, second: int = 0) -> bytes:
-        return bytes([first, second])
-
-    known = [m for m in recording if isinstance(m, Landmark)]
     return {
         "slam": choices(SLAM) + records(recording),
         "slam-bias-delay": choices(BIAS | SLAM, DELAY) + records(recording),
         "slam-tight-deadline": choices(TIGHT | KNOWN_MAP, DEADLINE) + records(recording),
         "world-open-gate": choices(WORLD | BIAS, OPEN_GATE) + records(recording),
         "mapping": choices(MAPPING) + records(recording),
-        "localization-start": choices(LOCALIZATION, 3)
-        + records([no_truth[0], *known, start, *no_truth[1 + len(known) :]]),
+        "localization-start": choices(LOCALIZATION, 3) + records(started(no_truth, 1e-4)),
+        "diverges": choices(LOCALIZATION, 3) + records(started(no_truth, 4.0)),
         "dead-reckoning": choices(DEAD_RECKONING, 2) + records(no_truth),
-        "saved": choices(STORAGE)
-        + records(
-            [*recording[:half], save, *recording[half:], recording[0], restore, *recording[half:]]
-        ),
-        "clock-jumps": choices(SLAM) + records([*recording[:half], *away]),
+        "saved": choices(STORAGE) + records(saved(recording)),
+        "clock-jumps": choices(SLAM) + records(jumping(recording)),
+        "evicts": choices(TIGHT) + records(drive(known=False, loss=0.5, observations=4)),
+        "gate-locks": choices(SLAM) + records(locked()),
         "stream": choices(STREAM | BIAS) + stream(recording),
     }
+
+
+def started(messages: list[Message], variance: float) -> list[Message]:
+    """With a START at identity, known to that variance, and landmarks to a millimetre.
+
+    In float32 the filter diverges if the variance is large (docs/NUMERICS.md, section 1).
+    """
+    truth = next(m for m in drive() if isinstance(m, Truth))
+    covariance = variance * np.eye(6)[np.tril_indices(6)]
+    start = Start(truth.t_ns, truth.R_WB, truth.p_WB_m, StartFlag.COVARIANCE, covariance)
+    sharp = 1e-6 * np.eye(3)[np.tril_indices(3)]
+    known = [replace(m, covariance=sharp) for m in messages if isinstance(m, Landmark)]
+    data = [m for m in messages[1:] if not isinstance(m, Landmark)]
+    return [messages[0], *known, start, *data]
+
+
+def saved(recording: list[Message]) -> list[Message]:
+    """Saved in mid-flight; the next drive goes on from there, on another clock, moved a little."""
+    half = _half(recording)
+    end = End(0, 0, 0, 0, 0)
+    save = State(0, StateAction.SAVE)
+    restore = State(SECOND, StateAction.RESTORE, np.full(6, 1e-4))
+    rest = [replace(m, t_ns=m.t_ns + SECOND) for m in recording[half:] if isinstance(m, Data)]
+    return [*recording[:half], save, end, recording[0], restore, *rest]
+
+
+def jumping(recording: list[Message]) -> list[Message]:
+    """The clock is set ahead by hours in mid-flight."""
+    half = _half(recording)
+    away = [replace(m, t_ns=m.t_ns + 10**13) for m in recording[half:] if isinstance(m, Data)]
+    return [*recording[:half], *away]
+
+
+def locked() -> list[Message]:
+    """The gate lets hardly anything pass for more than ten frames."""
+    recording = drive(known=False, duration_s=1.4, outliers=0.0, loss=0.0, observations=6)
+    return [recording[0], Config({15: 1e-3}), *recording[1:]]  # gate-d2
+
+
+def _half(recording: list[Message]) -> int:
+    return [i for i, m in enumerate(recording) if isinstance(m, Stereo)][3] + 1
 
 
 def main() -> int:
