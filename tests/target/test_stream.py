@@ -5,6 +5,7 @@ and to the emulator; what it records is replayed to the bits that the board answ
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import socket
@@ -179,14 +180,33 @@ def test_a_drive_that_is_ended_by_hand_says_how_far_it_came_and_leaves_no_emulat
         words("stream", short_drive, *to), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     wait_for_poses(log, 5, sender)
-    (child,) = Path(f"/proc/{sender.pid}/task/{sender.pid}/children").read_text().split()
+    emulator = child_of(sender)
     sender.send_signal(asked)
     said, _ = sender.communicate(timeout=PATIENCE_S)
     assert sender.returncode == 130
     assert re.search(r"^frames    \d+ sent, \d+ answered with a pose$", said, re.M)
     assert f"recorded  {log}" in said
-    assert not Path(f"/proc/{child}").exists()
+    assert not Path(f"/proc/{emulator}").exists()
     assert poses_in(log)[1].clean
+
+
+def test_an_emulator_that_dies_is_told_as_such(
+    board: str, firmware: Path, short_drive: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "flight.plr"
+    to = ("--to", f"qemu:{board}", "--image", firmware, "--record", log)
+    sender = subprocess.Popen(words("stream", short_drive, *to), text=True, stderr=subprocess.PIPE)
+    wait_for_poses(log, 5, sender)
+    os.kill(child_of(sender), signal.SIGKILL)
+    _, trouble = sender.communicate(timeout=PATIENCE_S)
+    assert sender.returncode == 1
+    assert f"qemu:{board}: QEMU stopped with status -9" in trouble
+    assert re.search(rf"\(after \d+ of {FRAMES} frames\)", trouble)
+
+
+def child_of(process: subprocess.Popen[str]) -> int:
+    (child,) = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    return int(child)
 
 
 def wait_for_poses(log: Path, count: int, sender: subprocess.Popen[str]) -> None:

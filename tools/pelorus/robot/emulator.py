@@ -98,9 +98,11 @@ class Emulator:
         except PelorusError as error:
             raise PelorusError(f"{self.board}: {self.trouble() or error}") from error
 
-    def trouble(self) -> str:
-        """What the emulator said, if it has stopped; else nothing."""
-        if self._process.poll() is None:
+    def trouble(self, patience_s: float = 0.0) -> str:
+        """What the emulator said, if it has stopped, or does so in that time; else nothing."""
+        try:
+            self._process.wait(patience_s)
+        except subprocess.TimeoutExpired:
             return ""
         self._log.seek(0)
         return f"QEMU stopped with status {self._process.returncode}: {self._log.read().strip()}"

@@ -13,6 +13,7 @@ from pelorus.robot.emulator import Emulator, image_of
 from pelorus.robot.link import Link, LinkClosed
 
 BAUD = 921600
+LAST_WORDS_S = 2.0  # from an emulator's closing its sockets to its end
 FORMS = "qemu:BOARD, tcp:HOST:PORT or serial:DEVICE[:BAUD]"
 
 
@@ -25,7 +26,8 @@ def open_target(target: str, image: Path | None) -> Iterator[Link]:
             try:
                 yield from _closing(emulator.connect())
             except LinkClosed as error:
-                raise LinkClosed(f"{target}: {emulator.trouble() or error}") from error
+                trouble = emulator.trouble(LAST_WORDS_S) or error
+                raise LinkClosed(f"{target}: {trouble}") from error
         return
     if image is not None:
         raise PelorusError(f"{target}: --image is for qemu:BOARD alone")
