@@ -88,13 +88,30 @@ def test_a_users_own_csv_arrives_whole(tmp_path: Path, pelorus: Run) -> None:
     assert np.allclose([m.R_WB for m in truth], drive.truth.R)
 
 
+def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
+    tmp_path: Path,
+) -> None:
+    csv_files(tmp_path, clean(3, velocity_sigma_mps=0.5, gyro_sigma_radps=0.05))
+    names = ("twists.csv", "stereo.csv", "camera.json")
+    sources = csv_converter.Sources(*(tmp_path / name for name in names))
+    recording, findings = csv_converter.convert(sources)
+    assert findings[-1].subject == "twist noise"
+    assert findings[-1].found
+    assert recording.header.noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
+    assert recording.header.noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
+    assert recording.header.noise.pixel_sigma_px == 0.5, "as the calibration says"
+    recording, findings = csv_converter.convert(sources, fix=False)
+    assert findings == []
+    assert recording.header.noise.velocity_sigma_mps < 0
+
+
 def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
     drive = clean(3)
     csv_files(tmp_path, with_turned_axes(drive))
     names = ("twists.csv", "stereo.csv", "camera.json")
     sources = csv_converter.Sources(*(tmp_path / name for name in names))
     mended, findings = csv_converter.convert(sources)
-    assert [finding.found for finding in findings] == [False, True, False]
+    assert [finding.found for finding in findings] == [False, True, False, False]
     assert np.allclose(mended.T_CB.R, drive.T_CB.R)
     left, findings = csv_converter.convert(sources, fix=False)
     assert findings == []

@@ -19,7 +19,7 @@ from drives import (
 )
 from pelorus import se3
 from pelorus.converters import ece276a, twist_noise
-from pelorus.frames import BodyAxes, Header, Start, Stereo, Text, Truth, Twist, TwistTiming
+from pelorus.frames import BodyAxes, Header, Noise, Start, Stereo, Text, Truth, Twist, TwistTiming
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 
@@ -121,32 +121,42 @@ def test_fix_none_leaves_the_file_as_it_is(tmp_path: Path, pelorus: Run) -> None
 NOISY = {"velocity_sigma_mps": 0.5, "gyro_sigma_radps": 0.05}
 
 
+def untold(seed: int, **changes: Any) -> Recording:
+    """A drive whose header says nothing of noise."""
+    return clean(seed, **changes).with_header(noise=Noise())
+
+
 @pytest.mark.parametrize("timing", [TwistTiming.START, TwistTiming.END, TwistTiming.MID])
+@pytest.mark.parametrize("rate_hz", [10.0, 40.0])
 def test_the_noise_of_the_twists_is_measured_and_biases_are_not_taken_for_it(
-    timing: TwistTiming,
+    timing: TwistTiming, rate_hz: float
 ) -> None:
-    drive = clean(
-        3, **NOISY, twist_timing=timing, bias_velocity_sigma_mps=2.0, bias_gyro_sigma_radps=0.1
-    )
+    biases = {"bias_velocity_sigma_mps": 2.0, "bias_gyro_sigma_radps": 0.1}
+    drive = untold(3, **NOISY, **biases, twist_timing=timing, twist_rate_hz=rate_hz)
     recording, finding = twist_noise.suggest(drive)
     assert finding.found
-    assert recording.header.noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
-    assert recording.header.noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
-    unchanged = ("pixel_sigma_px", "bias_velocity_sigma_mps", "bias_gyro_walk")
-    for name in unchanged:
-        assert getattr(recording.header.noise, name) == getattr(drive.header.noise, name)
+    noise = recording.header.noise
+    assert noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
+    assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
+    measured = ("velocity_sigma_mps", "gyro_sigma_radps")
+    assert all(sigma < 0 for name, sigma in vars(noise).items() if name not in measured)
 
 
 def test_what_the_images_cannot_tell_is_not_suggested() -> None:
     quiet = {"velocity_sigma_mps": 0.001, "gyro_sigma_radps": 0.0002}
-    drive = clean(3, **quiet)
-    recording, finding = twist_noise.suggest(drive)
+    recording, finding = twist_noise.suggest(untold(3, **quiet))
     assert not finding.found
     assert "no suggestion" in finding.action
-    assert recording.header.noise == drive.header.noise
-    turning = clean(3, **(quiet | {"gyro_sigma_radps": 0.05}))
-    noise = twist_noise.suggest(turning)[0].header.noise
-    assert noise.velocity_sigma_mps == turning.header.noise.velocity_sigma_mps
+    assert vars(recording.header.noise) == vars(Noise())
+    noise = twist_noise.suggest(untold(3, **(quiet | {"gyro_sigma_radps": 0.05})))[0].header.noise
+    assert noise.velocity_sigma_mps < 0
+    assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
+
+
+def test_a_sigma_that_is_given_stays() -> None:
+    drive = untold(3, **NOISY).with_header(noise=Noise(velocity_sigma_mps=0.2))
+    noise = twist_noise.suggest(drive)[0].header.noise
+    assert noise.velocity_sigma_mps == 0.2
     assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
 
 

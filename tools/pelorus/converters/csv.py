@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus import calibration, se3
+from pelorus.converters import twist_noise
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
@@ -40,11 +41,15 @@ class Sources(NamedTuple):
 def convert(
     sources: Sources, fix: bool = True, twist_timing: TwistTiming | None = None
 ) -> tuple[Recording, list[Finding]]:
-    """Read, and mend if asked. `twist_timing` overrides the calibration's."""
+    """Read; mend and measure the noise if asked. `twist_timing` overrides the calibration's."""
     recording = read(sources)
     if twist_timing is not None:
         recording = recording.with_header(twist_timing=twist_timing)
-    return mend(recording) if fix else (recording, [])
+    if not fix:
+        return recording, []
+    recording, findings = mend(recording)
+    recording, finding = twist_noise.suggest(recording)
+    return recording, [*findings, finding]
 
 
 def read(sources: Sources) -> Recording:

@@ -31,7 +31,7 @@ MAD_TO_SIGMA = 1.4826  # of a normal distribution
 
 @dataclass(frozen=True)
 class Spread:
-    """Sigma of one axis, m/s and rad/s, over a frame."""
+    """Sigma of one axis."""
 
     velocity_mps: float
     gyro_radps: float
@@ -40,7 +40,7 @@ class Spread:
 def suggest(recording: Recording) -> tuple[Recording, Finding]:
     """Write into the HEADER what the twists' noise is, as far as the images can tell.
 
-    Each twist holds for a whole frame here, as in the course's files.
+    Sigmas that it holds already stay.
     """
     subject = "twist noise"
     camera = recording.header.camera
@@ -53,8 +53,9 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
     halves = [visual_motion.estimate(half, camera) for half in _halves(seen)]
     images = _spread(_body(recording, halves[0]), _body(recording, halves[1]), usable, tau_s, 0.5)
     whole = _body(recording, visual_motion.estimate(seen, camera))
-    readings = np.sqrt(2) if recording.header.twist_timing is TwistTiming.MID else 1.0  # a mean
-    twists = _spread(whole, recording.body_motion(1), usable, tau_s, readings)
+    of_reading = _of_reading(recording)
+    twists = _spread(whole, recording.body_motion(1), usable, tau_s, of_reading)
+    images = Spread(of_reading * images.velocity_mps, of_reading * images.gyro_radps)
     return _decide(recording, twists, images, Finding(subject, False, _words(twists, images), ""))
 
 
@@ -62,24 +63,35 @@ def _decide(
     recording: Recording, twists: Spread, images: Spread, finding: Finding
 ) -> tuple[Recording, Finding]:
     noise, said = recording.header.noise, []
-    if twists.velocity_mps > CLEARLY * images.velocity_mps:
+    if noise.velocity_sigma_mps < 0 and twists.velocity_mps > CLEARLY * images.velocity_mps:
         noise = replace(noise, velocity_sigma_mps=round(twists.velocity_mps, 4))
         said.append(f"velocity-sigma {twists.velocity_mps:.2g} m/s")
-    if twists.gyro_radps > CLEARLY * images.gyro_radps:
+    if noise.gyro_sigma_radps < 0 and twists.gyro_radps > CLEARLY * images.gyro_radps:
         noise = replace(noise, gyro_sigma_radps=round(twists.gyro_radps, 5))
         said.append(f"gyro-sigma {twists.gyro_radps:.2g} rad/s")
     if not said:
-        action = "no suggestion: the filter's defaults hold, unless you give the sigmas"
+        action = "no suggestion beyond what is given: else the filter's defaults hold"
         return recording, replace(finding, action=action)
     action = f"the HEADER suggests {' and '.join(said)}; options and a config override it"
     return recording.with_header(noise=noise), replace(finding, found=True, action=action)
 
 
+def _of_reading(recording: Recording) -> float:
+    """Sigma of a reading for that of a frame's mean velocity, which is the mean of k readings.
+
+    With `mid` each step is the mean of two neighbours, so the k + 1 readings count as k - 1/2.
+    """
+    frame, twist = np.diff(recording.frame_t_ns), np.diff(recording.twist_t_ns)
+    k = max(float(np.median(frame) / np.median(twist)), 1.0)
+    independent = k - 0.5 if recording.header.twist_timing is TwistTiming.MID else k
+    return float(k / np.sqrt(independent))
+
+
 def _words(twists: Spread, images: Spread) -> str:
     return (
         f"twists and images differ by {twists.velocity_mps:.2g} m/s and {twists.gyro_radps:.2g} "
-        f"rad/s per axis, of which the images' own error is {images.velocity_mps:.2g} m/s and "
-        f"{images.gyro_radps:.2g} rad/s"
+        f"rad/s per axis and reading, of which the images' own error is {images.velocity_mps:.2g} "
+        f"m/s and {images.gyro_radps:.2g} rad/s"
     )
 
 
