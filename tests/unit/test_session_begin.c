@@ -4,13 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
+#include "support/session_desk.h"
 
-static plr_session session;
-static plr_session_options options;
-static faulty_port port;
 static plr_status refused_status;
 static plr_kind refused_kind;
 static const plr_setting *refused_setting;
@@ -27,8 +22,7 @@ static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_st
 }
 
 void setUp(void) {
-    faulty_port_init(&port, 1);
-    plr_session_options_default(&options);
+    desk_clear(1);
     options.observer.refused = on_refused;
     refused_status = PLR_OK;
     refused_kind = PLR_KIND_NONE;
@@ -36,20 +30,6 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-}
-
-static void begin(void) {
-    const plr_port functions = faulty_port_functions(&port);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-}
-
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
 }
 
 /* --- settings --- */
@@ -61,12 +41,12 @@ static void test_option_wins_over_config_over_header(void) {
     header.as.header.gyro_sigma_radps = 0.5;
     options.overrides = &override;
     options.override_count = 1;
-    begin();
-    send(header);
-    send(drive_config("slots", 4));
-    send(drive_config("pixel-sigma", 6));
-    send(drive_twist(0));
-    run();
+    desk_begin();
+    desk_send(header);
+    desk_send(drive_config("slots", 4));
+    desk_send(drive_config("pixel-sigma", 6));
+    desk_send(drive_twist(0));
+    desk_run();
     TEST_ASSERT_EQUAL_UINT16(5, plr_filter_config(&session.filter)->slots);
     TEST_ASSERT_EQUAL_DOUBLE(6, plr_filter_config(&session.filter)->pixel_sigma_px);
     TEST_ASSERT_EQUAL_DOUBLE(0.5, plr_filter_config(&session.filter)->gyro_sigma);
@@ -74,11 +54,11 @@ static void test_option_wins_over_config_over_header(void) {
 
 static void test_the_config_in_force_is_sent_with_the_build(void) {
     plr_message answer;
-    begin();
-    send(drive_header());
-    send(drive_config("slots", 4));
-    send(drive_twist(0));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("slots", 4));
+    desk_send(drive_twist(0));
+    desk_run();
     TEST_ASSERT_TRUE(faulty_port_answer(&port, &answer));
     TEST_ASSERT_EQUAL_INT(PLR_KIND_CONFIG, answer.kind);
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), answer.as.config.build_fingerprint);
@@ -99,11 +79,11 @@ static void test_a_config_value_out_of_limits_is_refused_by_name_and_the_rest_ta
     config.as.config.settings[1] =
         (plr_wire_setting){plr_setting_by_name("slots")->id, PLR_MAX_LANDMARKS + 1.0};
     config.as.config.settings[2] = (plr_wire_setting){201, 1};
-    begin();
-    send(drive_header());
-    send(config);
-    send(drive_twist(0));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(config);
+    desk_send(drive_twist(0));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_KIND_CONFIG, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, refused_status);
     TEST_ASSERT_EQUAL_STRING("slots", refused_setting->name);
@@ -116,34 +96,34 @@ static void test_a_config_value_out_of_limits_is_refused_by_name_and_the_rest_ta
 }
 
 static void test_settings_that_contradict_refuse_the_data_until_they_are_mended(void) {
-    begin();
-    send(drive_header());
-    send(drive_config("landmark-sigma", 1)); /* body takes it from the pixels */
-    send(drive_twist(0));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("landmark-sigma", 1)); /* body takes it from the pixels */
+    desk_send(drive_twist(0));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_KIND_CONFIG, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, refused_status);
     TEST_ASSERT_NOT_NULL(refused_setting);
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_READY, session.phase);
-    send(drive_config("landmark-sigma", 0));
-    send(drive_twist(0.1));
-    run();
+    desk_send(drive_config("landmark-sigma", 0));
+    desk_send(drive_twist(0.1));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
 }
 
 static void check_calibration_refused(plr_message header) {
     setUp();
-    begin();
-    send(header);
-    send(drive_twist(0));
-    send(drive_stereo(0));
-    run();
+    desk_begin();
+    desk_send(header);
+    desk_send(drive_twist(0));
+    desk_send(drive_stereo(0));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_KIND_HEADER, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_CALIBRATION, refused_status);
     TEST_ASSERT_EQUAL_UINT32(3, session.totals.refused);
-    send(drive_header());
-    send(drive_twist(0.1));
-    run();
+    desk_send(drive_header());
+    desk_send(drive_twist(0.1));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
 }
 
@@ -161,11 +141,11 @@ static void test_a_calibration_without_sense_is_refused_and_a_better_one_taken(v
 
 static void test_world_in_float32_is_warned_of_and_in_float64_not(void) {
     plr_message answer;
-    begin();
-    send(drive_header());
-    send(drive_config("model", PLR_MODEL_WORLD));
-    send(drive_twist(0));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("model", PLR_MODEL_WORLD));
+    desk_send(drive_twist(0));
+    desk_run();
     const bool warned = faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer);
     TEST_ASSERT_EQUAL(PLR_REAL == 32, warned);
     if (warned)

@@ -4,57 +4,13 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
-
-static plr_session session;
-static plr_session_options options;
-static faulty_port port;
+#include "support/session_desk.h"
 
 void setUp(void) {
-    faulty_port_init(&port, 1);
-    plr_session_options_default(&options);
+    desk_clear(1);
 }
 
 void tearDown(void) {
-}
-
-static void begin(void) {
-    const plr_port functions = faulty_port_functions(&port);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-}
-
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
-}
-
-/* The next REPORT that refuses something. */
-static bool next_refusal(plr_report_message *report) {
-    plr_message answer;
-    while (faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer))
-        if (answer.as.report.report.status != PLR_OK) {
-            *report = answer.as.report;
-            return true;
-        }
-    return false;
-}
-
-static void assert_refused(plr_kind subject, plr_status status) {
-    plr_report_message report;
-    TEST_ASSERT_TRUE(next_refusal(&report));
-    TEST_ASSERT_EQUAL_UINT8(subject, report.subject);
-    TEST_ASSERT_EQUAL_INT(status, report.report.status);
-}
-
-static void assert_nothing_refused(void) {
-    plr_report_message report;
-    TEST_ASSERT_FALSE(next_refusal(&report));
 }
 
 /* --- data that is refused --- */
@@ -62,53 +18,53 @@ static void assert_nothing_refused(void) {
 static void test_numbers_that_are_not_finite_are_refused_and_change_nothing(void) {
     plr_message twist = drive_twist(0.1), truth = drive_truth(0);
     plr_pose before, after;
-    begin();
-    send(drive_header());
-    send(drive_config("twist-timing", PLR_TWIST_END));
-    send(drive_twist(0));
-    send(drive_stereo(0));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("twist-timing", PLR_TWIST_END));
+    desk_send(drive_twist(0));
+    desk_send(drive_stereo(0));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &before));
     twist.as.twist.twist.v_B_mps[1] = (double)NAN;
-    send(twist);
+    desk_send(twist);
     twist.as.twist.twist.v_B_mps[1] = 1e300;
-    send(twist);
+    desk_send(twist);
     twist.as.twist.twist.v_B_mps[1] = 1e30;
-    send(twist);
+    desk_send(twist);
     truth.as.truth.T_WB.p[0] = (double)INFINITY;
-    send(truth); /* for evaluation alone by now */
-    run();
-    assert_refused(PLR_KIND_TWIST, PLR_E_NOT_FINITE);
-    assert_refused(PLR_KIND_TWIST, PLR_E_RANGE);
-    assert_refused(PLR_KIND_TWIST, PLR_E_RANGE);
-    assert_nothing_refused();
+    desk_send(truth); /* for evaluation alone by now */
+    desk_run();
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_NOT_FINITE);
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_RANGE);
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_RANGE);
+    desk_assert_nothing_refused();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &after));
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
 }
 
 static void test_a_frame_older_than_the_last_twist_is_refused_as_late(void) {
-    begin();
-    send(drive_header());
-    send(drive_stereo(0));
-    send(drive_twist(0));
-    send(drive_twist(0.1));
-    send(drive_stereo(0.05));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_stereo(0));
+    desk_send(drive_twist(0));
+    desk_send(drive_twist(0.1));
+    desk_send(drive_stereo(0.05));
+    desk_run();
     plr_report_message report;
-    TEST_ASSERT_TRUE(next_refusal(&report));
+    TEST_ASSERT_TRUE(desk_next_refusal(&report));
     TEST_ASSERT_EQUAL_INT(PLR_E_LATE, report.report.status);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0.05), report.report.t_ns);
 }
 
 static void test_time_that_repeats_or_goes_back_is_refused(void) {
-    begin();
-    send(drive_header());
-    send(drive_twist(1));
-    send(drive_twist(1));
-    send(drive_twist(0.9));
-    run();
-    assert_refused(PLR_KIND_TWIST, PLR_E_TIME);
-    assert_refused(PLR_KIND_TWIST, PLR_E_TIME);
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(1));
+    desk_send(drive_twist(1));
+    desk_send(drive_twist(0.9));
+    desk_run();
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_TIME);
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_TIME);
 }
 
 /* --- a late camera --- */
@@ -119,18 +75,18 @@ static unsigned late_frames(double delay_s, unsigned *used) {
     unsigned late = 0;
     options.overrides = &override;
     options.override_count = 1;
-    begin();
-    send(drive_header());
-    send(drive_start(0));
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_start(0));
     for (int k = 0; k < 100; k++) {
-        send(drive_twist(0.05 * k));
+        desk_send(drive_twist(0.05 * k));
         if (k % 2 == 1 && k > 5)
-            send(drive_stereo(0.05 * (k - 5)));
+            desk_send(drive_stereo(0.05 * (k - 5)));
     }
-    run();
+    desk_run();
     plr_session_finish(&session);
     plr_report_message report;
-    while (next_refusal(&report))
+    while (desk_next_refusal(&report))
         late += report.report.status == PLR_E_LATE;
     *used = session.last.used;
     return late;
@@ -155,25 +111,25 @@ static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void
     plr_wire_setting override = {plr_setting_by_name("twist-delay")->id, 5};
     options.overrides = &override;
     options.override_count = 1;
-    begin();
-    send(drive_header());
+    desk_begin();
+    desk_send(drive_header());
     for (int k = 0; k < PLR_SESSION_HELD_TWISTS + 10; k++)
-        send(drive_twist(0.01 * k));
-    run();
+        desk_send(drive_twist(0.01 * k));
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(10, session.totals.held_short);
     TEST_ASSERT_EQUAL_UINT(PLR_SESSION_HELD_TWISTS, session.held.count);
-    assert_nothing_refused();
+    desk_assert_nothing_refused();
 }
 
 static void test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back(void) {
     plr_wire_setting override = {plr_setting_by_name("twist-delay")->id, 0.2};
     options.overrides = &override;
     options.override_count = 1;
-    begin();
-    send(drive_header());
-    send(drive_twist(100));
-    send(drive_twist(50));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(100));
+    desk_send(drive_twist(50));
+    desk_run();
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(100), plr_filter_time(&session.filter));
     TEST_ASSERT_EQUAL_UINT(1, session.held.count);
 }
@@ -185,11 +141,11 @@ static void test_the_budget_in_force_is_in_the_echo_and_in_the_report(void) {
     bool limited = false;
     options.deadline_us = 5;
     options.output |= PLR_OUTPUT_ECHO;
-    begin(); /* by this clock every update takes 1 us */
-    send(drive_header());
+    desk_begin(); /* by this clock every update takes 1 us */
+    desk_send(drive_header());
     for (int k = 0; k < 20; k++)
-        send(drive_stereo(0.1 * k));
-    run();
+        desk_send(drive_stereo(0.1 * k));
+    desk_run();
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_STEREO, &answer));
     TEST_ASSERT_EQUAL_UINT16(PLR_BLOCK_OBSERVATIONS, answer.as.stereo.budget);
     while (faulty_port_answer_of(&port, PLR_KIND_STEREO, &answer)) {
@@ -204,13 +160,13 @@ static void test_the_budget_in_force_is_in_the_echo_and_in_the_report(void) {
 
 static void test_a_frames_own_budget_is_kept_where_it_is_less(void) {
     plr_message stereo, answer;
-    begin();
-    send(drive_header());
-    send(drive_stereo(0));
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_stereo(0));
     stereo = drive_stereo(0.05);
     stereo.as.stereo.budget = 3;
-    send(stereo);
-    run();
+    desk_send(stereo);
+    desk_run();
     TEST_ASSERT_EQUAL_UINT16(3, session.last.budget);
     TEST_ASSERT_EQUAL_UINT16(3, session.last.used);
     TEST_ASSERT_TRUE(session.last.left_out > 0);
@@ -221,13 +177,13 @@ static void test_a_frames_own_budget_is_kept_where_it_is_less(void) {
 static void test_frames_over_the_deadline_are_counted(void) {
     options.deadline_us = 5;
     port.clock_step_ns = 6000;
-    begin();
-    send(drive_header());
+    desk_begin();
+    desk_send(drive_header());
     for (int k = 0; k < 7; k++)
-        send(drive_stereo(0.1 * k));
-    run();
+        desk_send(drive_stereo(0.1 * k));
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(7, session.totals.over_deadline);
-    assert_nothing_refused();
+    desk_assert_nothing_refused();
 }
 
 int main(void) {

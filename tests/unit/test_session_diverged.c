@@ -3,48 +3,28 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
-
-static plr_session session;
-static plr_session_options options;
-static faulty_port port;
+#include "support/session_desk.h"
 
 void setUp(void) {
-    faulty_port_init(&port, 1);
-    plr_session_options_default(&options);
+    desk_clear(1);
 }
 
 void tearDown(void) {
 }
 
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
-}
-
-static void send_frames(int first, int end) {
-    for (int k = first; k < end; k++) {
-        send(drive_twist(0.1 * k));
-        send(drive_stereo(0.1 * k));
-    }
-    run();
+static void run_frames(int first, int end) {
+    desk_send_frames(first, end);
+    desk_run();
 }
 
 /* Five good frames; then it has diverged. Answers up to here are read. */
 static void begin_and_diverge(void) {
-    const plr_port functions = faulty_port_functions(&port);
     plr_message answer;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-    send(drive_header());
-    send(drive_config("bias", 1));
-    send(drive_truth(0));
-    send_frames(0, 5);
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("bias", 1));
+    desk_send(drive_truth(0));
+    run_frames(0, 5);
     while (faulty_port_answer(&port, &answer))
         continue;
     session.filter.diverged = 1;
@@ -62,7 +42,7 @@ static bool is_unknown(const double packed[21]) {
 static void test_its_poses_go_on_and_say_that_no_covariance_is_known(void) {
     plr_message answer;
     begin_and_diverge();
-    send_frames(5, 15);
+    run_frames(5, 15);
     for (int k = 5; k < 15; k++) {
         const plr_pose truth = drive_pose(0.1 * k);
         TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
@@ -85,8 +65,8 @@ static void test_poses_after_each_twist_say_so_too(void) {
     plr_message answer;
     options.output |= PLR_OUTPUT_TWIST_POSE;
     begin_and_diverge();
-    send(drive_twist(0.5));
-    run();
+    desk_send(drive_twist(0.5));
+    desk_run();
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
     TEST_ASSERT_FALSE(answer.as.pose.after_update);
     TEST_ASSERT_TRUE(is_unknown(answer.as.pose.P_xi));
@@ -108,7 +88,7 @@ static void test_a_human_is_told_once(void) {
     plr_message answer;
     unsigned told = 0;
     begin_and_diverge();
-    send_frames(5, 15);
+    run_frames(5, 15);
     while (faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer))
         if (strstr(answer.as.text.text, "the filter diverged at") != NULL) {
             TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_ERROR, answer.as.text.severity);
@@ -120,11 +100,11 @@ static void test_a_human_is_told_once(void) {
 static void test_a_start_makes_the_covariance_known_again(void) {
     plr_message answer;
     begin_and_diverge();
-    send_frames(5, 7);
+    run_frames(5, 7);
     while (faulty_port_answer(&port, &answer))
         continue;
-    send(drive_start(0.6));
-    send_frames(7, 9);
+    desk_send(drive_start(0.6));
+    run_frames(7, 9);
     for (int k = 7; k < 9; k++) {
         TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
         TEST_ASSERT_FALSE(is_unknown(answer.as.pose.P_xi));

@@ -5,15 +5,9 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
+#include "support/session_desk.h"
 
 enum { SEEDS = 20, FRAMES = 60 };
-
-static plr_session session;
-static plr_session_options options;
-static faulty_port port;
 
 void setUp(void) {
     plr_session_options_default(&options);
@@ -24,24 +18,7 @@ void tearDown(void) {
 
 static void begin(uint64_t seed) {
     faulty_port_init(&port, seed);
-    const plr_port functions = faulty_port_functions(&port);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-}
-
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
-static void send_frames(int from, int to) {
-    for (int k = from; k < to; k++) {
-        send(drive_twist(0.1 * k));
-        send(drive_stereo(0.1 * k));
-    }
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
+    desk_begin();
 }
 
 static bool all_finite(const double *x, int n) {
@@ -77,17 +54,17 @@ static void assert_on_the_road(double t_s, double tolerance_m) {
 static void test_lost_doubled_and_damaged_bytes_cost_frames_and_nothing_else(void) {
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         begin(seed);
-        send(drive_header());
-        send(drive_truth(0));
-        send_frames(0, 2);
-        run(); /* the start is whole */
+        desk_send(drive_header());
+        desk_send(drive_truth(0));
+        desk_send_frames(0, 2);
+        desk_run(); /* the start is whole */
         port.most_at_once = 40;
         port.lost_share = port.doubled_share = port.damaged_share = 0.0003;
-        send_frames(2, FRAMES);
-        run();
+        desk_send_frames(2, FRAMES);
+        desk_run();
         port.lost_share = port.doubled_share = port.damaged_share = 0;
-        send_frames(FRAMES, FRAMES + 5);
-        run();
+        desk_send_frames(FRAMES, FRAMES + 5);
+        desk_run();
         TEST_ASSERT_TRUE(session.reader.counts.damaged > 0);
         TEST_ASSERT_TRUE(check_poses() > FRAMES / 2);
         TEST_ASSERT_TRUE(session.last.used > 3);
@@ -97,11 +74,11 @@ static void test_lost_doubled_and_damaged_bytes_cost_frames_and_nothing_else(voi
 
 /* END, a HEADER, and a drive; what is known at its end. */
 static void drive_anew(plr_pose *pose, double P[36]) {
-    send((plr_message){.kind = PLR_KIND_END});
-    send(drive_header());
-    send(drive_truth(0));
-    send_frames(0, FRAMES);
-    run();
+    desk_send((plr_message){.kind = PLR_KIND_END});
+    desk_send(drive_header());
+    desk_send(drive_truth(0));
+    desk_send_frames(0, FRAMES);
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, pose));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P));
 }
@@ -118,9 +95,9 @@ static void test_the_drive_after_a_bad_one_has_the_bits_of_any_other(void) {
         port.lost_share = seed % 4 == 0 || seed % 4 == 1 ? 0.0005 : 0;
         port.doubled_share = seed % 4 == 0 || seed % 4 == 2 ? 0.0005 : 0;
         port.damaged_share = seed % 4 == 0 || seed % 4 == 3 ? 0.0005 : 0;
-        send(drive_header());
-        send_frames(0, FRAMES);
-        run();
+        desk_send(drive_header());
+        desk_send_frames(0, FRAMES);
+        desk_run();
         TEST_ASSERT_TRUE(session.reader.counts.damaged > 0);
         port.lost_share = port.doubled_share = port.damaged_share = 0;
         const uint8_t delimiter = 0; /* ends what the noise may have left open */
@@ -134,14 +111,14 @@ static void test_the_drive_after_a_bad_one_has_the_bits_of_any_other(void) {
 static void test_a_header_lost_in_noise_is_waited_for(void) {
     begin(3);
     port.damaged_share = 0.05;
-    send(drive_header());
-    send_frames(0, 10);
-    run();
+    desk_send(drive_header());
+    desk_send_frames(0, 10);
+    desk_run();
     port.damaged_share = 0;
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_WAITING, session.phase);
-    send(drive_header());
-    send_frames(10, 20);
-    run();
+    desk_send(drive_header());
+    desk_send_frames(10, 20);
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
     TEST_ASSERT_TRUE(session.last.used > 3);
 }
@@ -150,39 +127,39 @@ static void test_noise_alone_is_survived_and_hardly_answered(void) {
     static uint8_t noise[4096];
     begin(5);
     rng r = rng_seeded(9);
-    send(drive_header());
-    send_frames(0, 5);
-    run();
+    desk_send(drive_header());
+    desk_send_frames(0, 5);
+    desk_run();
     const size_t before = port.answer_count;
     for (int k = 0; k < 50; k++) {
         for (size_t i = 0; i < sizeof noise; i++)
             noise[i] = (uint8_t)rng_bits(&r);
         faulty_port_send_bytes(&port, noise, sizeof noise);
     }
-    run();
+    desk_run();
     TEST_ASSERT_TRUE(session.reader.counts.damaged > 100);
     TEST_ASSERT_TRUE(port.answer_count - before < 200);
     noise[0] = 0;
     faulty_port_send_bytes(&port, noise, 1); /* ends what the noise began */
-    send_frames(5, 10);
-    run();
+    desk_send_frames(5, 10);
+    desk_run();
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0.9), plr_filter_time(&session.filter));
 }
 
 static void test_writes_that_fail_lose_messages_and_change_no_estimate(void) {
     plr_pose good, bad;
     begin(1);
-    send(drive_header());
-    send_frames(0, FRAMES);
-    run();
+    desk_send(drive_header());
+    desk_send_frames(0, FRAMES);
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &good));
     const unsigned all = check_poses();
 
     begin(1);
     port.refused_share = 0.005; /* of the pieces of a frame */
-    send(drive_header());
-    send_frames(0, FRAMES);
-    run();
+    desk_send(drive_header());
+    desk_send_frames(0, FRAMES);
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &bad));
     TEST_ASSERT_EQUAL_MEMORY(&good, &bad, sizeof good);
     const unsigned some = check_poses();
@@ -193,18 +170,18 @@ static void test_writes_that_fail_lose_messages_and_change_no_estimate(void) {
 static void test_a_clock_that_stalls_or_jumps_changes_no_estimate(void) {
     plr_pose expected, pose;
     begin(1);
-    send(drive_header());
-    send_frames(0, FRAMES);
-    run();
+    desk_send(drive_header());
+    desk_send_frames(0, FRAMES);
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &expected));
     for (int kind = 0; kind < 3; kind++) {
         begin(1);
         port.clock_step_ns = kind == 0 ? 0 : 1000;
         port.clock_jump_at = 100;
         port.clock_jump_ns = kind == 1 ? UINT64_C(1) << 62 : (uint64_t)-90000;
-        send(drive_header());
-        send_frames(0, FRAMES);
-        run();
+        desk_send(drive_header());
+        desk_send_frames(0, FRAMES);
+        desk_run();
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &pose));
         TEST_ASSERT_EQUAL_MEMORY(&expected, &pose, sizeof pose);
     }
@@ -217,10 +194,10 @@ static void test_a_deadline_on_a_clock_that_stalls_or_jumps_still_lets_vision_th
         port.clock_step_ns = kind == 0 ? 0 : 1000;
         port.clock_jump_at = 60;
         port.clock_jump_ns = kind == 1 ? UINT64_C(1) << 62 : (uint64_t)-90000;
-        send(drive_header());
-        send(drive_truth(0));
-        send_frames(0, FRAMES);
-        run();
+        desk_send(drive_header());
+        desk_send(drive_truth(0));
+        desk_send_frames(0, FRAMES);
+        desk_run();
         TEST_ASSERT_TRUE(session.last.used > 0);
         assert_on_the_road(0.1 * (FRAMES - 1), 0.1);
     }
@@ -228,15 +205,15 @@ static void test_a_deadline_on_a_clock_that_stalls_or_jumps_still_lets_vision_th
 
 static void test_a_cut_at_any_byte_is_no_more_than_a_cut(void) {
     begin(1);
-    send(drive_header());
-    send_frames(0, 3);
+    desk_send(drive_header());
+    desk_send_frames(0, 3);
     const size_t whole = port.sent_count;
     for (size_t cut = 0; cut <= whole; cut += 7) {
         begin(1);
-        send(drive_header());
-        send_frames(0, 3);
+        desk_send(drive_header());
+        desk_send_frames(0, 3);
         port.sent_count = cut;
-        run();
+        desk_run();
         plr_session_finish(&session);
         check_poses();
     }

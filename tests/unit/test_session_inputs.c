@@ -4,21 +4,15 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
+#include "support/session_desk.h"
 #include "support/wire_frames.h"
 
 enum { KNOWN = 64 };
 
-static plr_session session;
-static plr_session_options options;
 static plr_landmark known[KNOWN];
-static faulty_port port;
 
 void setUp(void) {
-    faulty_port_init(&port, 1);
-    plr_session_options_default(&options);
+    desk_clear(1);
     options.known = known;
     options.known_capacity = KNOWN;
 }
@@ -26,80 +20,43 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-static void begin(void) {
-    const plr_port functions = faulty_port_functions(&port);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-}
-
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
-}
-
-/* The next REPORT that refuses something. */
-static bool next_refusal(plr_report_message *report) {
-    plr_message answer;
-    while (faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer))
-        if (answer.as.report.report.status != PLR_OK) {
-            *report = answer.as.report;
-            return true;
-        }
-    return false;
-}
-
-static void assert_refused(plr_kind subject, plr_status status) {
-    plr_report_message report;
-    TEST_ASSERT_TRUE(next_refusal(&report));
-    TEST_ASSERT_EQUAL_UINT8(subject, report.subject);
-    TEST_ASSERT_EQUAL_INT(status, report.report.status);
-}
-
-static void assert_nothing_refused(void) {
-    plr_report_message report;
-    TEST_ASSERT_FALSE(next_refusal(&report));
-}
-
 /* --- before and among the data --- */
 
 static void test_whatever_comes_before_a_header_is_refused(void) {
-    begin();
-    send(drive_config("slots", 3));
-    send(drive_start(0));
-    send(drive_known(1, 0.1));
-    send(drive_twist(0));
-    send(drive_stereo(0));
-    run();
-    assert_refused(PLR_KIND_CONFIG, PLR_E_NOT_READY);
-    assert_refused(PLR_KIND_START, PLR_E_NOT_READY);
-    assert_refused(PLR_KIND_LANDMARK, PLR_E_NOT_READY);
-    assert_refused(PLR_KIND_TWIST, PLR_E_NOT_READY);
-    assert_refused(PLR_KIND_STEREO, PLR_E_NOT_READY);
+    desk_begin();
+    desk_send(drive_config("slots", 3));
+    desk_send(drive_start(0));
+    desk_send(drive_known(1, 0.1));
+    desk_send(drive_twist(0));
+    desk_send(drive_stereo(0));
+    desk_run();
+    desk_assert_refused(PLR_KIND_CONFIG, PLR_E_NOT_READY);
+    desk_assert_refused(PLR_KIND_START, PLR_E_NOT_READY);
+    desk_assert_refused(PLR_KIND_LANDMARK, PLR_E_NOT_READY);
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_NOT_READY);
+    desk_assert_refused(PLR_KIND_STEREO, PLR_E_NOT_READY);
     TEST_ASSERT_EQUAL_UINT32(5, session.totals.refused);
-    send(drive_header());
-    send(drive_stereo(1));
-    run();
-    assert_nothing_refused();
+    desk_send(drive_header());
+    desk_send(drive_stereo(1));
+    desk_run();
+    desk_assert_nothing_refused();
 }
 
 static void test_the_same_header_again_is_ignored_and_another_refused(void) {
     plr_message changed = drive_header();
     changed.as.header.calibration.fx_px += 1;
-    begin();
-    send(drive_header());
-    send(drive_config("slots", 3));
-    send(drive_header()); /* keeps the CONFIG */
-    send(drive_twist(0));
-    send(drive_stereo(0));
-    send(drive_header());
-    send(changed);
-    send(drive_stereo(0.1));
-    run();
-    assert_refused(PLR_KIND_HEADER, PLR_E_MODE);
-    assert_nothing_refused();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("slots", 3));
+    desk_send(drive_header()); /* keeps the CONFIG */
+    desk_send(drive_twist(0));
+    desk_send(drive_stereo(0));
+    desk_send(drive_header());
+    desk_send(changed);
+    desk_send(drive_stereo(0.1));
+    desk_run();
+    desk_assert_refused(PLR_KIND_HEADER, PLR_E_MODE);
+    desk_assert_nothing_refused();
     TEST_ASSERT_EQUAL_UINT16(3, plr_filter_config(&session.filter)->slots);
     TEST_ASSERT_EQUAL_DOUBLE(drive_header().as.header.calibration.fx_px,
                              session.header.calibration.fx_px);
@@ -107,15 +64,15 @@ static void test_the_same_header_again_is_ignored_and_another_refused(void) {
 }
 
 static void test_settings_do_not_change_in_mid_flight(void) {
-    begin();
-    send(drive_header());
-    send(drive_config("slots", 3));
-    send(drive_twist(0));
-    send(drive_config("slots", 3));
-    send(drive_config("slots", 4));
-    run();
-    assert_refused(PLR_KIND_CONFIG, PLR_E_MODE);
-    assert_nothing_refused();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("slots", 3));
+    desk_send(drive_twist(0));
+    desk_send(drive_config("slots", 3));
+    desk_send(drive_config("slots", 4));
+    desk_run();
+    desk_assert_refused(PLR_KIND_CONFIG, PLR_E_MODE);
+    desk_assert_nothing_refused();
     TEST_ASSERT_EQUAL_UINT16(3, plr_filter_config(&session.filter)->slots);
 }
 
@@ -124,11 +81,11 @@ static void test_what_other_filters_computed_is_passed_over(void) {
     pose.as.pose.real_bytes = 8;
     landmark.as.landmark.role = PLR_LANDMARK_EVICTED;
     options.output |= PLR_OUTPUT_ECHO;
-    begin();
-    send(drive_header());
-    send(pose);
-    send(landmark);
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(pose);
+    desk_send(landmark);
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
     TEST_ASSERT_EQUAL_UINT32(1, session.writer.counts.frames); /* the HEADER */
     TEST_ASSERT_EQUAL_UINT(0, session.known.count);
@@ -137,17 +94,17 @@ static void test_what_other_filters_computed_is_passed_over(void) {
 /* --- known landmarks --- */
 
 static void send_known_drive(const char *setting, double value) {
-    begin();
-    send(drive_header());
-    send(drive_config(setting, value));
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config(setting, value));
     for (uint32_t id = 0; id < KNOWN; id++)
-        send(drive_known(id, 0.01));
-    send(drive_truth(0));
+        desk_send(drive_known(id, 0.01));
+    desk_send(drive_truth(0));
     for (int k = 0; k < 20; k++) {
-        send(drive_twist(0.1 * k));
-        send(drive_stereo(0.1 * k));
+        desk_send(drive_twist(0.1 * k));
+        desk_send(drive_stereo(0.1 * k));
     }
-    run();
+    desk_run();
 }
 
 static void test_localization_uses_the_known_landmarks_and_no_others(void) {
@@ -179,42 +136,42 @@ static void test_slam_ignores_known_landmarks_unless_asked(void) {
 static void test_localization_without_a_map_is_warned_of(void) {
     plr_message answer;
     options.known_capacity = 0;
-    begin();
-    send(drive_header());
-    send(drive_known(1, 0.1));
-    send(drive_config("mode", PLR_MODE_LOCALIZATION));
-    send(drive_stereo(0));
-    run();
-    assert_refused(PLR_KIND_LANDMARK, PLR_E_FULL);
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_known(1, 0.1));
+    desk_send(drive_config("mode", PLR_MODE_LOCALIZATION));
+    desk_send(drive_stereo(0));
+    desk_run();
+    desk_assert_refused(PLR_KIND_LANDMARK, PLR_E_FULL);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer));
     TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_WARNING, answer.as.text.severity);
 }
 
 static void test_a_known_landmark_twice_is_refused(void) {
-    begin();
-    send(drive_header());
-    send(drive_known(1, 0.1));
-    send(drive_known(1, 0.2));
-    run();
-    assert_refused(PLR_KIND_LANDMARK, PLR_E_EXISTS);
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_known(1, 0.1));
+    desk_send(drive_known(1, 0.2));
+    desk_run();
+    desk_assert_refused(PLR_KIND_LANDMARK, PLR_E_EXISTS);
 }
 
 /* --- mapping --- */
 
 static void test_mapping_takes_each_pose_and_leaves_out_frames_without(void) {
     plr_pose pose;
-    begin();
-    send(drive_header());
-    send(drive_config("mode", PLR_MODE_MAPPING));
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("mode", PLR_MODE_MAPPING));
     for (int k = 0; k < 10; k++) {
-        send(drive_twist(0.1 * k));
+        desk_send(drive_twist(0.1 * k));
         if (k % 3 != 1)
-            send(drive_truth(0.1 * k));
-        send(drive_stereo(0.1 * k));
+            desk_send(drive_truth(0.1 * k));
+        desk_send(drive_stereo(0.1 * k));
     }
-    run();
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(3, session.totals.without_truth);
-    assert_refused(PLR_KIND_STEREO, PLR_E_MODE);
+    desk_assert_refused(PLR_KIND_STEREO, PLR_E_MODE);
     const plr_pose truth = drive_pose(0.9);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &pose));
     for (int i = 0; i < 3; i++)
@@ -231,21 +188,21 @@ static void send_frame(unsigned kind, const uint8_t *payload, size_t n) {
 
 static void test_an_unknown_kind_a_short_payload_and_noise_are_answered_once_a_run(void) {
     static const uint8_t payload[4] = {1, 2, 3, 4}, noise[] = {5, 1, 2, 0, 9, 9, 0, 3, 3, 0};
-    begin();
-    send(drive_header());
+    desk_begin();
+    desk_send(drive_header());
     for (int i = 0; i < 5; i++)
         send_frame(77, payload, sizeof payload);
     for (int i = 0; i < 5; i++)
         send_frame(PLR_KIND_TWIST, payload, sizeof payload);
     faulty_port_send_bytes(&port, noise, sizeof noise);
-    run();
+    desk_run();
     plr_report_message report;
-    TEST_ASSERT_TRUE(next_refusal(&report));
+    TEST_ASSERT_TRUE(desk_next_refusal(&report));
     TEST_ASSERT_EQUAL_UINT8(77, report.subject);
     TEST_ASSERT_EQUAL_INT(PLR_E_FOREIGN, report.report.status);
-    assert_refused(PLR_KIND_TWIST, PLR_E_ARGUMENT);
-    assert_refused(PLR_KIND_NONE, PLR_E_CORRUPT);
-    assert_nothing_refused();
+    desk_assert_refused(PLR_KIND_TWIST, PLR_E_ARGUMENT);
+    desk_assert_refused(PLR_KIND_NONE, PLR_E_CORRUPT);
+    desk_assert_nothing_refused();
     TEST_ASSERT_EQUAL_UINT32(5, session.reader.counts.unknown);
     TEST_ASSERT_EQUAL_UINT32(5, session.reader.counts.malformed);
 }
@@ -254,29 +211,29 @@ static void test_a_frame_too_long_for_the_buffer_is_answered_and_the_next_one_ta
     static uint8_t payload[12 + 20 * (PLR_MAX_OBSERVATIONS + 1)];
     payload[10] = (uint8_t)((PLR_MAX_OBSERVATIONS + 1) & 0xff);
     payload[11] = (uint8_t)((PLR_MAX_OBSERVATIONS + 1) >> 8);
-    begin();
-    send(drive_header());
+    desk_begin();
+    desk_send(drive_header());
     send_frame(PLR_KIND_STEREO, payload, sizeof payload);
-    send(drive_stereo(0));
-    run();
-    assert_refused(PLR_KIND_STEREO, PLR_E_FULL);
-    assert_nothing_refused();
+    desk_send(drive_stereo(0));
+    desk_run();
+    desk_assert_refused(PLR_KIND_STEREO, PLR_E_FULL);
+    desk_assert_nothing_refused();
     TEST_ASSERT_TRUE(plr_filter_landmark_count(&session.filter) > 3);
 }
 
 static void test_a_header_of_a_later_version_is_refused_and_the_loop_goes_on(void) {
     uint8_t payload[202] = {PLR_WIRE_VERSION_MAJOR + 1};
     unsigned futures = 0;
-    begin();
+    desk_begin();
     send_frame(PLR_KIND_HEADER, payload, sizeof payload);
-    send(drive_header());
-    send(drive_stereo(0));
+    desk_send(drive_header());
+    desk_send(drive_stereo(0));
     for (plr_step step = PLR_STEP_BYTES; step != PLR_STEP_CLOSED;) {
         step = plr_session_step(&session);
         futures += step == PLR_STEP_FUTURE;
     }
     TEST_ASSERT_EQUAL_UINT(1, futures);
-    assert_refused(PLR_KIND_HEADER, PLR_E_FOREIGN);
+    desk_assert_refused(PLR_KIND_HEADER, PLR_E_FOREIGN);
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
 }
 

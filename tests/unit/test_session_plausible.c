@@ -4,13 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
 #include "session/plausible.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
-
-static plr_session session;
-static faulty_port port;
+#include "support/session_desk.h"
 
 void setUp(void) {
 }
@@ -59,32 +54,24 @@ static void test_what_is_not_finite_is_left_to_the_filter(void) {
     TEST_ASSERT_TRUE(plr_plausible_twist(&twist));
 }
 
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
 /* With start timing a reading works on the step behind it: taken once, an absurd one would refuse
  * every step from there on. */
 static void test_an_absurd_reading_costs_itself_alone(void) {
     static const double speeds[] = {1e5, 1e30, 1e300};
     for (unsigned n = 0; n < 3; n++) {
-        const plr_port functions = faulty_port_functions(&port);
-        plr_session_options options;
         plr_message twist = drive_twist(0.3);
         twist.as.twist.twist.v_B_mps[0] = speeds[n];
-        faulty_port_init(&port, 1);
-        plr_session_options_default(&options);
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-        send(drive_header());
+        desk_clear(1);
+        desk_begin();
+        desk_send(drive_header());
         for (int k = 0; k < 10; k++) {
             if (k == 3)
-                send(twist);
+                desk_send(twist);
             else
-                send(drive_twist(0.1 * k));
-            send(drive_stereo(0.1 * k));
+                desk_send(drive_twist(0.1 * k));
+            desk_send(drive_stereo(0.1 * k));
         }
-        while (plr_session_step(&session) != PLR_STEP_CLOSED)
-            continue;
+        desk_run();
         TEST_ASSERT_EQUAL_UINT32(1, session.totals.refused);
         TEST_ASSERT_TRUE(session.last.used > 3);
     }

@@ -4,15 +4,12 @@
 #include <unity.h>
 
 #include "session/reanchor.h"
-#include "support/faulty_port.h"
 #include "support/matrices.h"
-#include "support/session_drive.h"
+#include "support/session_desk.h"
 
 #define SECOND UINT64_C(1000000000)
 
 static plr_clock_watch watch;
-static plr_session session;
-static faulty_port port;
 
 void setUp(void) {
     plr_clock_watch_init(&watch);
@@ -74,31 +71,19 @@ static void test_refusals_for_other_reasons_neither_count_nor_break_the_count(vo
 
 /* --- in a session --- */
 
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
 static void begin(const plr_wire_setting *overrides, unsigned count) {
-    const plr_port functions = faulty_port_functions(&port);
-    plr_session_options options;
-    faulty_port_init(&port, 1);
-    plr_session_options_default(&options);
+    desk_clear(1);
     options.overrides = overrides;
     options.override_count = count;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-    send(drive_header());
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
+    desk_begin();
+    desk_send(drive_header());
 }
 
 static void send_drive(double from_s, double to_s) {
     for (int k = (int)lround(from_s * 10); k < (int)lround(to_s * 10); k++) {
-        send(drive_twist(0.1 * k));
+        desk_send(drive_twist(0.1 * k));
         if (k % 2 == 0)
-            send(drive_stereo(0.1 * k));
+            desk_send(drive_stereo(0.1 * k));
     }
 }
 
@@ -113,15 +98,15 @@ static void test_one_damaged_time_stamp_changes_nothing(void) {
     plr_pose with, without;
     begin(NULL, 0);
     send_drive(0, 3);
-    run();
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &without));
 
     begin(NULL, 0);
     send_drive(0, 2);
-    send(drive_twist(90000));
-    send(drive_stereo(1e6));
+    desk_send(drive_twist(90000));
+    desk_send(drive_stereo(1e6));
     send_drive(2, 3);
-    run();
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &with));
     TEST_ASSERT_EQUAL_MEMORY(&without, &with, sizeof with);
     TEST_ASSERT_EQUAL_UINT32(2, session.totals.refused);
@@ -134,19 +119,19 @@ static void check_jump(double to_s) {
     plr_message answer;
     begin(NULL, 0);
     send_drive(20, 22);
-    run();
+    desk_run();
     variances(before);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &last));
     TEST_ASSERT_TRUE(plr_filter_landmark_count(&session.filter) > 5);
 
     const double gap = fabs(to_s + 0.2 - 21.9);
-    send(drive_twist(to_s));
-    send(drive_stereo(to_s)); /* of the same time: says nothing new */
-    send(drive_twist(to_s + 0.1));
-    run();
+    desk_send(drive_twist(to_s));
+    desk_send(drive_stereo(to_s)); /* of the same time: says nothing new */
+    desk_send(drive_twist(to_s + 0.1));
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.reanchored);
-    send(drive_twist(to_s + 0.2));
-    run();
+    desk_send(drive_twist(to_s + 0.2));
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(1, session.totals.reanchored);
     TEST_ASSERT_EQUAL_UINT32(3, session.totals.refused);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(to_s + 0.2), plr_filter_time(&session.filter));
@@ -169,7 +154,7 @@ static void check_jump(double to_s) {
     TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_WARNING, answer.as.text.severity);
 
     send_drive(to_s + 0.3, to_s + 3);
-    run();
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(3, session.totals.refused);
     TEST_ASSERT_TRUE(plr_filter_landmark_count(&session.filter) > 5);
     TEST_ASSERT_TRUE(session.last.used > 5);
@@ -191,16 +176,16 @@ static void test_in_mapping_a_jump_back_begins_a_new_map(void) {
     const plr_wire_setting mapping = {plr_setting_by_name("mode")->id, PLR_MODE_MAPPING};
     begin(&mapping, 1);
     for (int k = 0; k < 20; k++) {
-        send(drive_truth(20 + 0.1 * k));
-        send(drive_stereo(20 + 0.1 * k));
+        desk_send(drive_truth(20 + 0.1 * k));
+        desk_send(drive_stereo(20 + 0.1 * k));
     }
-    run();
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
     for (int k = 0; k < 20; k++) {
-        send(drive_truth(0.1 * k));
-        send(drive_stereo(0.1 * k));
+        desk_send(drive_truth(0.1 * k));
+        desk_send(drive_stereo(0.1 * k));
     }
-    run();
+    desk_run();
     TEST_ASSERT_EQUAL_UINT32(1, session.totals.reanchored);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(1.9), plr_filter_time(&session.filter));
     TEST_ASSERT_TRUE(plr_filter_landmark_count(&session.filter) > 5);

@@ -4,13 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/session.h"
-#include "support/faulty_port.h"
-#include "support/session_drive.h"
+#include "support/session_desk.h"
 
-static plr_session session;
-static plr_session_options options;
-static faulty_port port;
 static plr_status refused_status;
 static plr_kind refused_kind;
 
@@ -26,28 +21,13 @@ static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_st
 }
 
 void setUp(void) {
-    faulty_port_init(&port, 1);
-    plr_session_options_default(&options);
+    desk_clear(1);
     options.observer.refused = on_refused;
     refused_status = PLR_OK;
     refused_kind = PLR_KIND_NONE;
 }
 
 void tearDown(void) {
-}
-
-static void begin(void) {
-    const plr_port functions = faulty_port_functions(&port);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
-}
-
-static void send(plr_message message) {
-    faulty_port_send(&port, &message);
-}
-
-static void run(void) {
-    while (plr_session_step(&session) != PLR_STEP_CLOSED)
-        continue;
 }
 
 static plr_pose pose_now(void) {
@@ -74,43 +54,43 @@ static const plr_pose IDENTITY = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 /* --- where the pose starts --- */
 
 static void test_start_wins_over_truth(void) {
-    begin();
-    send(drive_header());
-    send(drive_start(2)); /* says that the body stands where it will be at 2 s */
-    send(drive_twist(2));
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_start(2)); /* says that the body stands where it will be at 2 s */
+    desk_send(drive_twist(2));
     plr_message truth = drive_truth(2);
     truth.as.truth.T_WB = IDENTITY;
-    send(truth);
-    send(drive_stereo(2));
-    run();
+    desk_send(truth);
+    desk_send(drive_stereo(2));
+    desk_run();
     assert_pose_is_that_of(2);
 }
 
 static void test_the_first_truth_counts_where_there_is_no_start(void) {
-    begin();
-    send(drive_header());
-    send(drive_twist(3));
-    send(drive_truth(3));
-    send(drive_stereo(3));
-    send(drive_twist(3.1));
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(3));
+    desk_send(drive_truth(3));
+    desk_send(drive_stereo(3));
+    desk_send(drive_twist(3.1));
     plr_message later = drive_truth(3.1);
     later.as.truth.T_WB.p[0] += 50;
-    send(later);
-    send(drive_stereo(3.1));
-    run();
+    desk_send(later);
+    desk_send(drive_stereo(3.1));
+    desk_run();
     assert_pose_is_that_of(3.1);
 }
 
 /* The twist of 3.0 s carries the body from the TRUTH at 3.05 s on. */
 static void test_twists_may_precede_the_truth(void) {
     plr_message answer;
-    begin();
-    send(drive_header());
-    send(drive_twist(2.9));
-    send(drive_twist(3));
-    send(drive_truth(3.05));
-    send(drive_stereo(3.1));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(2.9));
+    desk_send(drive_twist(3));
+    desk_send(drive_truth(3.05));
+    desk_send(drive_stereo(3.1));
+    desk_run();
     assert_pose_is_that_of(3.1);
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
@@ -118,77 +98,77 @@ static void test_twists_may_precede_the_truth(void) {
 }
 
 static void test_twists_may_precede_the_start(void) {
-    begin();
-    send(drive_header());
-    send(drive_start(3.05));
-    send(drive_twist(2.9));
-    send(drive_twist(3));
-    send(drive_stereo(3.1));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_start(3.05));
+    desk_send(drive_twist(2.9));
+    desk_send(drive_twist(3));
+    desk_send(drive_stereo(3.1));
+    desk_run();
     assert_pose_is_that_of(3.1);
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
 }
 
 static void test_without_either_it_is_identity(void) {
-    begin();
-    send(drive_header());
-    send(drive_twist(5));
-    send(drive_stereo(5));
-    send(drive_truth(5.1)); /* behind the first frame: for evaluation alone */
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(5));
+    desk_send(drive_stereo(5));
+    desk_send(drive_truth(5.1)); /* behind the first frame: for evaluation alone */
+    desk_run();
     assert_pose_near(&IDENTITY, 1e-9);
 }
 
 static void test_identity_can_be_asked_for(void) {
     options.start = PLR_START_IDENTITY;
-    begin();
-    send(drive_header());
-    send(drive_start(5));
-    send(drive_truth(5));
-    send(drive_twist(5));
-    send(drive_stereo(5));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_start(5));
+    desk_send(drive_truth(5));
+    desk_send(drive_twist(5));
+    desk_send(drive_stereo(5));
+    desk_run();
     assert_pose_near(&IDENTITY, 1e-9);
 }
 
 static void test_who_asks_for_truth_gets_no_frame_before_it(void) {
     options.start = PLR_START_TRUTH;
-    begin();
-    send(drive_header());
-    send(drive_start(5));
-    send(drive_twist(5));
-    send(drive_stereo(5));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_start(5));
+    desk_send(drive_twist(5));
+    desk_send(drive_stereo(5));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_KIND_STEREO, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, refused_status);
-    send(drive_truth(5.05));
-    send(drive_stereo(5.1));
-    run();
+    desk_send(drive_truth(5.05));
+    desk_send(drive_stereo(5.1));
+    desk_run();
     assert_pose_is_that_of(5.1);
 }
 
 static void test_who_asks_for_a_start_gets_no_frame_before_it(void) {
     options.start = PLR_START_RECORDED;
-    begin();
-    send(drive_header());
-    send(drive_twist(5));
-    send(drive_truth(5));
-    send(drive_stereo(5));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(5));
+    desk_send(drive_truth(5));
+    desk_send(drive_stereo(5));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, refused_status);
-    send(drive_start(5.05));
-    send(drive_stereo(5.1));
-    run();
+    desk_send(drive_start(5.05));
+    desk_send(drive_stereo(5.1));
+    desk_run();
     assert_pose_is_that_of(5.1);
 }
 
 static void test_a_start_behind_the_first_frame_is_refused_and_identity_taken(void) {
-    begin();
-    send(drive_header());
-    send(drive_start(7));
-    send(drive_twist(5));
-    send(drive_stereo(5));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_start(7));
+    desk_send(drive_twist(5));
+    desk_send(drive_stereo(5));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_KIND_START, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_TIME, refused_status);
     assert_pose_near(&IDENTITY, 1e-9);
@@ -197,13 +177,13 @@ static void test_a_start_behind_the_first_frame_is_refused_and_identity_taken(vo
 static void test_a_start_that_is_no_pose_is_refused_and_truth_taken(void) {
     plr_message start = drive_start(5);
     start.as.start.T_WB.R[4] = 3;
-    begin();
-    send(drive_header());
-    send(start);
-    send(drive_twist(5));
-    send(drive_truth(5));
-    send(drive_stereo(5));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(start);
+    desk_send(drive_twist(5));
+    desk_send(drive_truth(5));
+    desk_send(drive_stereo(5));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_KIND_START, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, refused_status);
     assert_pose_is_that_of(5);
@@ -216,13 +196,13 @@ static void test_the_start_covariance_is_taken_packed_row_by_row(void) {
     for (int i = 0, k = 0; i < 6; i++)
         for (int j = 0; j <= i; j++, k++)
             start.as.start.P_xi[k] = i == j ? 1.0 + i : 0.03125 * (i + 2 * j);
-    begin();
-    send(drive_header());
-    send(start);
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(start);
     plr_message stereo = drive_stereo(5);
     stereo.as.stereo.count = 0;
-    send(stereo);
-    run();
+    desk_send(stereo);
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P));
     for (int i = 0, k = 0; i < 6; i++)
         for (int j = 0; j <= i; j++, k++)
@@ -238,12 +218,12 @@ static void test_a_bias_prior_is_taken_whatever_the_pose_starts_from(void) {
         start.as.start.bias_variance[i] = 1e-4 * (1 + i);
     }
     options.start = PLR_START_IDENTITY;
-    begin();
-    send(drive_header());
-    send(drive_config("bias", 1));
-    send(start);
-    send(drive_twist(5));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_config("bias", 1));
+    desk_send(start);
+    desk_send(drive_twist(5));
+    desk_run();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&session.filter, b, P_b));
     for (int i = 0; i < 6; i++) {
         TEST_ASSERT_EQUAL_DOUBLE(0.25 * i, b[i]);
@@ -254,13 +234,13 @@ static void test_a_bias_prior_is_taken_whatever_the_pose_starts_from(void) {
 static void test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted(void) {
     plr_message answer, start = drive_start(6);
     start.as.start.T_WB.p[2] = 40;
-    begin();
-    send(drive_header());
-    send(drive_twist(5));
-    send(drive_stereo(5));
-    send(start);
-    send(drive_stereo(6));
-    run();
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(5));
+    desk_send(drive_stereo(5));
+    desk_send(start);
+    desk_send(drive_stereo(6));
+    desk_run();
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 40, pose_now().p[2]);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
     TEST_ASSERT_EQUAL_UINT16(0, answer.as.pose.reset_count);

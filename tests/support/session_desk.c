@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#include "support/session_desk.h"
+
+#include <unity.h>
+
+plr_session session;
+plr_session_options options;
+faulty_port port;
+
+void desk_clear(uint64_t seed) {
+    faulty_port_init(&port, seed);
+    plr_session_options_default(&options);
+}
+
+void desk_begin(void) {
+    const plr_port functions = faulty_port_functions(&port);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
+}
+
+void desk_send(plr_message message) {
+    faulty_port_send(&port, &message);
+}
+
+void desk_send_frames(int first, int end) {
+    for (int k = first; k < end; k++) {
+        desk_send(drive_twist(0.1 * k));
+        desk_send(drive_stereo(0.1 * k));
+    }
+}
+
+void desk_run(void) {
+    while (plr_session_step(&session) != PLR_STEP_CLOSED)
+        continue;
+}
+
+bool desk_next_refusal(plr_report_message *report) {
+    plr_message answer;
+    while (faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer))
+        if (answer.as.report.report.status != PLR_OK) {
+            *report = answer.as.report;
+            return true;
+        }
+    return false;
+}
+
+void desk_assert_refused(plr_kind subject, plr_status status) {
+    plr_report_message report;
+    TEST_ASSERT_TRUE(desk_next_refusal(&report));
+    TEST_ASSERT_EQUAL_UINT8(subject, report.subject);
+    TEST_ASSERT_EQUAL_INT(status, report.report.status);
+}
+
+void desk_assert_nothing_refused(void) {
+    plr_report_message report;
+    TEST_ASSERT_FALSE(desk_next_refusal(&report));
+}
