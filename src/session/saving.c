@@ -21,6 +21,8 @@ static const char *words(const plr_session *s, plr_state_action action, plr_stat
         return "a drive is under way; END ends it";
     if (status == PLR_E_NOT_READY && action == PLR_STATE_SAVE)
         return "no data has come yet, so there is nothing to save";
+    if (status == PLR_E_FULL)
+        return "the storage is too small";
     if (status == PLR_E_NOT_READY)
         return s->phase == PLR_PHASE_WAITING ? "a HEADER must come first"
                                              : "nothing was ever saved here";

@@ -209,7 +209,7 @@ static void test_a_device_that_is_too_small_is_told_with_both_sizes(void) {
     drive(&first_port, 0, 1);
     send(&first_port, state(PLR_STATE_SAVE, 0));
     run(&before_cut);
-    assert_answered(&first_port, PLR_E_FULL, "too small for the state: it has 2048 bytes, and ");
+    assert_answered(&first_port, PLR_E_FULL, "the storage is too small: it has 2048 bytes, and ");
 }
 
 static void test_an_option_saves_at_the_end_of_every_drive(void) {

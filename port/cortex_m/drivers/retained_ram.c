@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "../board.h"
+
 enum { BLOCK = 1024, UNIT = 4, ERASED = 0xFF };
 
 /* The region, from the linker script. */
@@ -21,6 +23,7 @@ static int ram_read(void *context, uint32_t offset, uint8_t *bytes, uint32_t n) 
     if (is_outside(offset, n)) {
         return -1;
     }
+    board_watchdog_feed(); /* with many landmarks a save is half a second of checksums */
     memcpy(bytes, _retained_start + offset, n);
     return 0;
 }
