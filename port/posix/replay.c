@@ -116,12 +116,14 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
 /* A state was not brought back or kept: for the options, or for a STATE of the recording? */
 static void on_refused_state(replay *run, plr_time_ns t_ns, plr_status status) {
     const bool asked = run->session.in.kind != PLR_KIND_STATE || run->finishing;
-    if (!asked)
-        complaints_refused(&run->complaints, PLR_KIND_STATE, 0, t_ns, status, NULL);
-    else if (run->options.load_state != NULL && !run->storage.begun)
+    if (!asked) { /* a save that fails changes nothing of the drive: its TEXT will do */
+        if (run->session.in.as.state.action == PLR_STATE_RESTORE)
+            complaints_refused(&run->complaints, PLR_KIND_STATE, 0, t_ns, status, NULL);
+    } else if (run->options.load_state != NULL && !run->storage.begun) {
         run->storage.load_status = status; /* told at the end */
-    else
+    } else {
         run->storage.save_status = status;
+    }
 }
 
 static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,

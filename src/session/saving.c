@@ -23,6 +23,8 @@ static const char *words(const plr_session *s, plr_state_action action, plr_stat
         return "no data has come yet, so there is nothing to save";
     if (status == PLR_E_FULL)
         return "the storage is too small";
+    if (status == PLR_E_IO)
+        return "the storage fails, or does not give back what was written";
     if (status == PLR_E_NOT_READY)
         return s->phase == PLR_PHASE_WAITING ? "a HEADER must come first"
                                              : "nothing was ever saved here";

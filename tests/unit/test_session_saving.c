@@ -193,7 +193,7 @@ static void test_a_device_that_fails_is_told_and_the_drive_goes_on(void) {
     send(&first_port, state(PLR_STATE_SAVE, 0));
     drive(&first_port, CUT + 1, LAST);
     run(&before_cut);
-    assert_answered(&first_port, PLR_E_IO, "not saved: the port");
+    assert_answered(&first_port, PLR_E_IO, "not saved: the storage fails");
     TEST_ASSERT_EQUAL_UINT64(frame_time(LAST - 1), plr_filter_time(&before_cut.filter));
     flash.program_fails = false;
     begin(&after_restart, &second_port); /* and the old state is still there */
@@ -406,7 +406,7 @@ static void test_a_damaged_state_is_refused(void) {
 static void test_a_device_that_cannot_be_read_is_refused(void) {
     drive_and_save();
     flash.power = false;
-    goes_on_from_a_start(state(PLR_STATE_RESTORE, 0), PLR_E_IO, "storage");
+    goes_on_from_a_start(state(PLR_STATE_RESTORE, 0), PLR_E_IO, "not restored: the storage fails");
     flash.power = true;
 }
 
