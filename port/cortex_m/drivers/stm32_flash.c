@@ -77,8 +77,11 @@ static bool unlocks(uint32_t command) {
     return FLASH_CR == command;
 }
 
+/* A write to CR would wait for a controller that is still busy, without end perhaps. */
 static void lock(void) {
-    FLASH_CR = CR_LOCK;
+    if ((FLASH_SR & SR_BSY) == 0) {
+        FLASH_CR = CR_LOCK;
+    }
 }
 
 /* The caches know the old contents, or what was meant to be written, and the store wants to read what
