@@ -44,8 +44,9 @@ enum {
     PLR_WIRE_MAX_TEXT = 240
 };
 
-/* On the diagonal of a POSE's covariances: the filter has diverged and knows none. */
-#define PLR_WIRE_UNKNOWN_VARIANCE 1e12
+/* On the diagonal of a POSE's covariances: the filter has diverged and knows none. 2^40, the same
+ * in both precisions, and more than any variance that is accepted. */
+#define PLR_WIRE_UNKNOWN_VARIANCE 1099511627776.0
 
 /* Bytes of a body that holds n observations: the buffer that a reader needs for them. */
 #define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))

@@ -82,6 +82,12 @@ static void transform(float P[6][6], const float A[9], const float B[9]) {
     }
 }
 
+/* As MAVLink says that a covariance is not known. */
+static void set_unknown(float packed[21]) {
+    for (unsigned i = 0; i < 21; i++)
+        packed[i] = NAN;
+}
+
 static int8_t quality_of(plr_health health) {
     switch (health) {
     case PLR_HEALTH_GOOD:
@@ -113,15 +119,18 @@ plr_status plr_odometry_from_pose(plr_odometry *o, const plr_pose_message *pose,
     }
     turn(R, pose->T_WB.R, m);
     quaternion(o->q, R);
+    const bool known = pose->P_xi[0] < PLR_WIRE_UNKNOWN_VARIANCE; /* it has not diverged */
     unpack(P, pose->P_u, m);
-    pack_upper(o->velocity_covariance, P);
+    if (known)
+        pack_upper(o->velocity_covariance, P);
+    else
+        set_unknown(o->velocity_covariance);
     unpack(P, pose->P_xi, m);
-    if (euler_rates(E, R)) {
+    if (known && euler_rates(E, R)) {
         transform(P, R, E);
         pack_upper(o->pose_covariance, P);
     } else {
-        for (unsigned i = 0; i < 21; i++)
-            o->pose_covariance[i] = NAN;
+        set_unknown(o->pose_covariance);
     }
     return PLR_OK;
 }

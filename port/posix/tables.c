@@ -42,22 +42,35 @@ static void put_numbers(FILE *file, const double *numbers, int n) {
         fprintf(file, ",%.9g", numbers[i]);
 }
 
+static void put_nothing(FILE *file, int n) {
+    for (int i = 0; i < n; i++)
+        fputc(',', file);
+}
+
 enum { ESTIMATE_COLUMNS = 32 };
 
+/* A filter that has diverged knows no variance: those columns are empty. */
 static void put_estimate(FILE *file, const plr_pose_message *pose, double trace,
                          const double *bias_variance) {
-    double q[4], variances[6];
+    const bool known = pose->P_xi[0] < PLR_WIRE_UNKNOWN_VARIANCE;
+    double q[4], variances[7];
     rotation_quaternion(q, pose->T_WB.R);
     for (int i = 0; i < 6; i++)
         variances[i] = pose->P_xi[i * (i + 3) / 2];
+    variances[6] = trace;
     put_numbers(file, pose->T_WB.p, 3);
     put_numbers(file, q, 4);
-    put_numbers(file, variances, 6);
-    put_numbers(file, &trace, 1);
+    if (known)
+        put_numbers(file, variances, 7);
+    else
+        put_nothing(file, 7);
     put_numbers(file, pose->velocity.v_B_mps, 3);
     put_numbers(file, pose->velocity.w_B_radps, 3);
     put_numbers(file, pose->bias, 6);
-    put_numbers(file, bias_variance, 6);
+    if (known)
+        put_numbers(file, bias_variance, 6);
+    else
+        put_nothing(file, 6);
 }
 
 static void put_report(FILE *file, const plr_report *r) {
@@ -79,8 +92,7 @@ void frames_put(FILE *file, const plr_frame_result *result, double trace,
     if (result->pose != NULL)
         put_estimate(file, result->pose, trace, bias_variance);
     else
-        for (int i = 0; i < ESTIMATE_COLUMNS; i++)
-            fputc(',', file);
+        put_nothing(file, ESTIMATE_COLUMNS);
     put_report(file, result->report);
     fprintf(file, ",%.3f\n", (double)result->compute_ns / 1e3);
 }

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pelorus.frames import Report
+from pelorus.frames.filter import UNKNOWN_VARIANCE
 from pelorus.report.accuracy import assess
-from pelorus.report.results import unpack_symmetric
+from pelorus.report.results import read_frames, read_poses
 from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory
 from replay_drive import (
@@ -30,7 +31,6 @@ from replay_drive import (
 
 FRAMES = 60
 DIVERGED = 3  # plr_health
-UNKNOWN = np.float32(1e12)  # PLR_WIRE_UNKNOWN_VARIANCE, in a float32 filter's POSE
 OPTIONS = ("--model", "world", "--start-sigma", "100")
 
 
@@ -43,7 +43,7 @@ def replay(folder: Path, *options: str) -> Result:
 
 def unknown_from(folder: Path) -> int:
     """Index of the first pose without a covariance; from there on all are, before it none."""
-    unknown = [pose.covariance[0] == UNKNOWN for pose in poses_of(folder / "log.plr")]
+    unknown = [not pose.knows_covariance for pose in poses_of(folder / "log.plr")]
     assert len(unknown) == FRAMES
     first = unknown.index(True)
     assert 3 < first < FRAMES - 3
@@ -54,7 +54,7 @@ def unknown_from(folder: Path) -> int:
 def test_every_frame_has_a_pose_and_those_after_it_no_covariance(tmp_path: Path) -> None:
     replay(tmp_path)
     first = unknown_from(tmp_path)
-    nothing_known = UNKNOWN * np.eye(6)[np.tril_indices(6)]
+    nothing_known = UNKNOWN_VARIANCE * np.eye(6)[np.tril_indices(6)]
     for k, pose in enumerate(poses_of(tmp_path / "log.plr")):
         assert pose.t_ns == t_ns(k)
         assert np.isfinite(pose.p_WB_m).all()
@@ -89,19 +89,15 @@ def test_a_human_reads_the_same(tmp_path: Path) -> None:
 def test_nees_is_that_of_the_frames_before_and_errors_are_those_of_all(tmp_path: Path) -> None:
     summary = replay(tmp_path, "--json").summary
     first = unknown_from(tmp_path)
-    poses = poses_of(tmp_path / "log.plr")
-    times = np.array([pose.t_ns for pose in poses], np.int64)
     truth = [true_pose(k) for k in range(FRAMES)]
-    estimate = Trajectory(
-        times, Poses(np.array([p.R_WB for p in poses]), np.array([p.p_WB_m for p in poses]))
-    )
+    estimate, covariance = read_poses(tmp_path / "log.plr")
     real = Trajectory(
-        times, Poses(np.array([R for R, _ in truth]), np.array([p for _, p in truth]))
+        estimate.t_ns, Poses(np.array([R for R, _ in truth]), np.array([p for _, p in truth]))
     )
-    accuracy = assess(
-        estimate, unpack_symmetric(np.array([pose.covariance for pose in poses]), 6), real
-    )
+    accuracy = assess(estimate, covariance, real)
     assert accuracy is not None
+    assert np.isnan(accuracy.nees[first:]).all()
+    assert np.isnan(accuracy.sigma[first:]).all()
     before = accuracy.nees[:first]
     assert summary["nees_per_dof"] == pytest.approx(float(np.nanmean(before)), rel=1e-3)
     assert summary["nees_left_out"] == FRAMES - 1 - np.count_nonzero(~np.isnan(before))
@@ -114,3 +110,14 @@ def test_in_float64_it_does_not_diverge(tmp_path: Path) -> None:
     summary = run(path, *OPTIONS, "--json", program="pelorus-replay-f64").summary
     assert summary["frames_diverged"] == 0
     assert summary["diverged_s"] is None
+
+
+def test_the_frame_table_leaves_the_variances_empty(tmp_path: Path) -> None:
+    replay(tmp_path, "--frames", str(tmp_path / "frames.csv"))
+    first = unknown_from(tmp_path)
+    table = read_frames(tmp_path / "frames.csv")
+    for name in ("var_rho_x", "var_theta_z", "trace", "var_bias_vx", "var_bias_wz"):
+        assert np.isfinite(table[name][:first]).all()
+        assert np.isnan(table[name][first:]).all()
+    for name in ("x_m", "qw", "bias_wz"):
+        assert np.isfinite(table[name]).all()

@@ -83,6 +83,20 @@ static void test_covariance_is_unknown_where_euler_angles_have_no_meaning(void) 
     TEST_ASSERT_FALSE(isnan(o.pose_covariance[0]));
 }
 
+static void test_covariances_are_unknown_once_the_filter_has_diverged(void) {
+    plr_pose_message pose = level();
+    plr_odometry o;
+    for (unsigned i = 0, k = 0; i < 6; k += ++i + 1)
+        pose.P_xi[k] = pose.P_u[k] = PLR_WIRE_UNKNOWN_VARIANCE;
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_odometry_from_pose(&o, &pose, PLR_AXES_FRD, PLR_HEALTH_DIVERGED));
+    for (unsigned i = 0; i < 21; i++) {
+        TEST_ASSERT_FLOAT_IS_NAN(o.pose_covariance[i]);
+        TEST_ASSERT_FLOAT_IS_NAN(o.velocity_covariance[i]);
+    }
+    TEST_ASSERT_EQUAL_INT8(-1, o.quality);
+}
+
 static void test_health_becomes_quality(void) {
     static const int8_t expected[] = {[PLR_HEALTH_GOOD] = 100,
                                       [PLR_HEALTH_DEGRADED] = 50,
@@ -121,6 +135,7 @@ int main(void) {
     RUN_TEST(test_quaternion_gives_the_rotation_back_for_every_largest_component);
     RUN_TEST(test_level_body_has_its_own_covariance_as_that_of_roll_pitch_and_yaw);
     RUN_TEST(test_covariance_is_unknown_where_euler_angles_have_no_meaning);
+    RUN_TEST(test_covariances_are_unknown_once_the_filter_has_diverged);
     RUN_TEST(test_health_becomes_quality);
     RUN_TEST(test_reset_count_wraps_as_a_byte);
     RUN_TEST(test_unknown_axes_and_null_pointers_are_refused);

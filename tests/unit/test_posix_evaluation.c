@@ -266,7 +266,7 @@ static void test_frames_without_a_positive_covariance_are_left_out_of_nees_and_c
     TEST_ASSERT_EQUAL_DOUBLE(0, figures.nees_per_dof);
 }
 
-/* 1 m off everywhere. A covariance of 1e12 would bring the mean down to nothing. */
+/* 1 m off everywhere. A covariance of 2^40 would bring the mean down to nothing. */
 static void test_frames_of_a_diverged_filter_count_for_the_error_and_not_for_nees(void) {
     const double unknown[6] = {PLR_WIRE_UNKNOWN_VARIANCE, PLR_WIRE_UNKNOWN_VARIANCE,
                                PLR_WIRE_UNKNOWN_VARIANCE, PLR_WIRE_UNKNOWN_VARIANCE,

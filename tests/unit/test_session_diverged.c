@@ -30,12 +30,10 @@ static void begin_and_diverge(void) {
     session.filter.diverged = 1;
 }
 
-/* As the message holds it: in the bytes of a real, and 1e12 is no float32. */
 static bool is_unknown(const double packed[21]) {
-    const double due = (double)(plr_real)PLR_WIRE_UNKNOWN_VARIANCE;
     double full[21] = {0};
     for (unsigned i = 0; i < 6; i++)
-        full[i * (i + 3) / 2] = due;
+        full[i * (i + 3) / 2] = PLR_WIRE_UNKNOWN_VARIANCE;
     return memcmp(packed, full, sizeof full) == 0;
 }
 

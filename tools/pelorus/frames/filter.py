@@ -102,6 +102,7 @@ class Landmark(Message):
 
 
 POSE_REALS = (9, 21, 3, 3, 6, 21)  # R, covariance, v, w, bias, covariance of (v, w)
+UNKNOWN_VARIANCE = 2.0**40  # of a filter that has diverged
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +123,11 @@ class Pose(Message):
 
     kind: ClassVar[Kind] = Kind.POSE
     _FIXED: ClassVar[struct.Struct] = struct.Struct("<QBBH3d")
+
+    @property
+    def knows_covariance(self) -> bool:
+        """False once the filter has diverged."""
+        return bool(self.covariance[0] < UNKNOWN_VARIANCE)
 
     def pack(self) -> bytes:
         p = np.asarray(self.p_WB_m, float)

@@ -31,7 +31,10 @@ class Points(NamedTuple):
 
 
 class FrameTable:
-    """The rows of --frames by column; NaN where a refused frame has no estimate."""
+    """The rows of --frames by column.
+
+    NaN where a refused frame has no estimate, or a diverged filter no covariance.
+    """
 
     def __init__(self, t_ns: Times, columns: dict[str, Floats]) -> None:
         self.t_ns = t_ns
@@ -77,7 +80,10 @@ def carry_out(plan: Plan, recording: Path, folder: Path) -> Run:
 
 
 def read_poses(log: Path) -> tuple[Trajectory, Floats]:
-    """The poses after STEREO with their whole covariance, which no other output has."""
+    """The poses after STEREO with their whole covariance, which no other output has.
+
+    NaN where the filter has diverged and knows none.
+    """
     received, _ = wire.read_file(log)
     poses = [
         frame.message
@@ -89,7 +95,8 @@ def read_poses(log: Path) -> tuple[Trajectory, Floats]:
     t_ns = np.array([pose.t_ns for pose in poses], np.int64)
     R = np.array([pose.R_WB for pose in poses])
     p = np.array([pose.p_WB_m for pose in poses])
-    packed = np.array([pose.covariance for pose in poses])
+    unknown = np.full(POSE_SIZE * (POSE_SIZE + 1) // 2, np.nan)
+    packed = np.array([pose.covariance if pose.knows_covariance else unknown for pose in poses])
     return Trajectory(t_ns, Poses(R, p)), unpack_symmetric(packed, POSE_SIZE)
 
 
