@@ -8,6 +8,10 @@ static double log_tail(double x) {
     return log1p(x / 2) - x / 2;
 }
 
+double gate_excess(double x) {
+    return exp(log_tail(x));
+}
+
 double gate_threshold(double probability) {
     const double wanted = log1p(-probability);
     double low = 0, high = 1;

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "posix/gate.h"
 #include "posix/settings_text.h"
 
 void summary_init(summary *s) {
@@ -92,6 +93,25 @@ static double percent(uint64_t part, uint64_t whole) {
     return whole > 0 ? 100 * (double)part / (double)whole : 0;
 }
 
+/* A sound filter loses to the gate what the gate is set to, and outliers. Much more than that is a
+ * noise setting that does not fit, and a user who does not know that looks everywhere else first. */
+static void print_gate_hint(const summary *s, const plr_config *config) {
+    enum { ENOUGH = 100 };
+    static const double suspicious = 10, times_due = 5;
+    const double share = percent(s->gated, s->matched);
+    const double due = 100 * gate_excess(config->gate_d2);
+    if (config->gate_d2 <= 0 || config->gate_residual_px > 0 || s->matched < ENOUGH ||
+        share < suspicious || share < times_due * due)
+        return;
+    printf(
+        "              hint: of sound observations this gate turns away %.2g %%. Either many are "
+        "wrong,\n"
+        "              or a setting says less noise than there is: --velocity-sigma, "
+        "--gyro-sigma,\n"
+        "              --pixel-sigma, --bias and its walks (docs/NUMERICS.md)\n",
+        due);
+}
+
 static void print_counts(const summary *s, const plr_session *session) {
     printf("frames        %" PRIu64 " used, %" PRIu64 " refused; %" PRIu32 " twists\n", s->frames,
            s->frames_refused, session->totals.twists);
@@ -99,6 +119,7 @@ static void print_counts(const summary *s, const plr_session *session) {
            "%" PRIu64 " new, %" PRIu64 " evicted\n",
            s->observations, s->used, s->gated, percent(s->gated, s->matched), s->created,
            s->evicted);
+    print_gate_hint(s, plr_filter_config(&session->filter));
     printf("not used      %" PRIu64 " without a slot, %" PRIu64 " too poor to start from, %" PRIu64
            " malformed, %" PRIu64 " doubled, %" PRIu64 " over budget\n",
            s->no_room, s->poor, s->refused_observations, s->duplicates, s->left_out);

@@ -54,6 +54,18 @@ def record(tmp_path: Path) -> Record:
 # --- results --------------------------------------------------------------------------------------
 
 
+def test_a_gate_that_turns_away_too_much_is_told_with_what_to_do(record: Record) -> None:
+    path = record(drive(sigma_px=0.5))
+    sound = run(path, "--pixel-sigma", "0.5")
+    assert "hint" not in sound.stdout
+    too_sure = run(path, "--pixel-sigma", "0.1")
+    assert too_sure.status == OK
+    assert "hint: of sound observations this gate turns away 1 %." in too_sure.stdout
+    assert "--pixel-sigma" in too_sure.stdout
+    assert "hint" not in run(path, "--pixel-sigma", "0.1", "--gate", "off").stdout
+    assert "hint" not in run(path, "--pixel-sigma", "0.1", "--gate-residual", "1e-3").stdout
+
+
 @pytest.mark.parametrize("program", ["pelorus-replay", "pelorus-replay-f64"])
 def test_a_drive_is_followed_and_summed_up(record: Record, program: str) -> None:
     result = run(record(drive()), "--json", program=program)

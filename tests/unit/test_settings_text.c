@@ -120,6 +120,7 @@ static void test_the_gate_solves_its_equation_from_near_0_to_near_1(void) {
             break;
         const double x = gate_threshold(p);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 - p), 1 - p, (1 + x / 2) * exp(-x / 2));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 - p), 1 - p, gate_excess(x));
     }
 }
 
