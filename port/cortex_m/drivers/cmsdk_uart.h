@@ -4,7 +4,7 @@
 
 #include "../uart.h"
 
-/* Sets the UART at an address up for uart.h. One UART an image. */
+/* Sets the UART at an address up for uart.h. */
 void cmsdk_uart_start(uart *u, uintptr_t address, uint32_t clock_hz, uint32_t baud);
 
 #endif
