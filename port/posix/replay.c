@@ -115,14 +115,14 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
 
 /* A state was not brought back or kept: for the options, or for a STATE of the recording? */
 static void on_refused_state(replay *run, plr_time_ns t_ns, plr_status status) {
-    const bool asked = run->session.in.kind != PLR_KIND_STATE || run->finishing;
-    if (!asked) { /* a save that fails changes nothing of the drive: its TEXT will do */
-        if (run->session.in.as.state.action == PLR_STATE_RESTORE)
-            complaints_refused(&run->complaints, PLR_KIND_STATE, 0, t_ns, status, NULL);
-    } else if (run->options.load_state != NULL && !run->storage.begun) {
-        run->storage.load_status = status; /* told at the end */
-    } else {
-        run->storage.save_status = status;
+    const plr_message *in = &run->session.in;
+    if (run->finishing || in->kind == PLR_KIND_END) {
+        run->storage.save_status = status; /* told at the end */
+    } else if (in->kind != PLR_KIND_STATE) {
+        run->storage.load_status = status; /* likewise: the first data asked for it */
+    } else if (in->as.state.action == PLR_STATE_RESTORE) {
+        /* a save that fails changes nothing of the drive: its TEXT will do */
+        complaints_refused(&run->complaints, PLR_KIND_STATE, 0, t_ns, status, NULL);
     }
 }
 
@@ -211,7 +211,7 @@ static bool take_step(replay *run) {
     case PLR_STEP_MESSAGE:
         break;
     }
-    if (run->outcome.started)
+    if (run->outcome.started && !run->session.restored) /* a STATE may ask for it once more */
         storage_begin(&run->storage);
     const bool foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
     progress_show(&run->progress, counts->bytes, run->summary.frames);
@@ -249,8 +249,10 @@ static void read_recording(replay *run) {
     run->summary.cut_in_frame = plr_reader_mid_frame(&run->session.reader);
     run->finishing = true;
     if (!run->summary.ended && run->outcome.started && run->storage.load_status == PLR_OK &&
-        !run->options.print_config)
+        !run->options.print_config) {
+        storage_begin(&run->storage);
         plr_session_finish(&run->session);
+    }
     run->summary.wall_s = (double)(monotonic_ns() - begin) * 1e-9;
     progress_clear(&run->progress);
 }

@@ -96,23 +96,39 @@ void state_file_close(state_file *file) {
 
 /* ---------------------------------------------------------------- opening */
 
-/* A slot that begins so is one: the store's own mark, or nothing yet. */
-static bool begins_a_slot(const uint8_t first[4]) {
-    static const uint8_t beginnings[][4] = {
-        {'P', 'L', 'R', 'S'}, {0, 0, 0, 0}, {ERASED, ERASED, ERASED, ERASED}};
-    for (unsigned i = 0; i < sizeof beginnings / sizeof beginnings[0]; i++)
-        if (memcmp(first, beginnings[i], 4) == 0)
-            return true;
-    return false;
+/* The store's own mark. */
+static bool is_marked(const uint8_t first[4]) {
+    return memcmp(first, "PLRS", 4) == 0;
 }
 
-/* False if it is something else, of which not a byte may be lost. A slot whose save was cut begins
- * with anything: one of the two is enough. */
+/* As a new file or an erase leaves it. */
+static bool is_blank(const uint8_t *bytes, uint32_t n) {
+    if (bytes[0] != 0 && bytes[0] != ERASED)
+        return false;
+    for (uint32_t i = 1; i < n; i++)
+        if (bytes[i] != bytes[0])
+            return false;
+    return true;
+}
+
+static bool is_blank_from(state_file *file, uint32_t offset) {
+    uint8_t bytes[BLOCK];
+    for (; offset < file->device.size; offset += BLOCK)
+        if (read_bytes(file, offset, bytes, BLOCK) != 0 || !is_blank(bytes, BLOCK))
+            return false;
+    return true;
+}
+
+/* False if it is something else, of which not a byte may be lost. Once a state was saved one of the
+ * slots has its mark, whatever is cut; before that, only the first can hold anything. Four zeros
+ * alone prove nothing: many a database has them at a page's beginning. */
 static bool holds_states(state_file *file) {
+    const uint32_t half = file->device.size / 2;
     uint8_t first[4], second[4];
-    return read_bytes(file, 0, first, 4) == 0 &&
-           read_bytes(file, file->device.size / 2, second, 4) == 0 &&
-           (begins_a_slot(first) || begins_a_slot(second));
+    if (read_bytes(file, 0, first, 4) != 0 || read_bytes(file, half, second, 4) != 0)
+        return false;
+    return is_marked(first) || is_marked(second) ||
+           (is_blank(first, 4) && is_blank_from(file, half));
 }
 
 /* What is wrong with an open file; NULL: nothing. */

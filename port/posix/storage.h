@@ -11,7 +11,7 @@
 typedef struct storage {
     state_file load, save;
     plr_state_store store;
-    bool begun;                          /* the first data was taken, and with it the saved state */
+    bool begun;                          /* no more is read from `load` */
     plr_status load_status, save_status; /* why the options' files gave or took no state */
 } storage;
 
@@ -23,7 +23,8 @@ void storage_close(storage *s);
 /* Sets store, start and output in the session's options. */
 void storage_lend(storage *s, const replay_options *wanted, plr_session_options *options);
 
-/* The first data has been taken: saves go into the other file. May be called again. */
+/* The first data has been taken, or the drive ends: saves go into the other file. May be called
+ * again. */
 void storage_begin(storage *s);
 
 /* What the files of --load-state and --save-state came to: an exit status, and why on stderr. */

@@ -215,6 +215,28 @@ def test_what_is_no_file_of_states_is_named_and_left_alone(
     refused(run(path, "--save-state", "/dev/null"), OUTPUT, "/dev/null", "no regular file")
 
 
+def test_a_file_with_zeros_where_a_slot_would_begin_is_left_alone(
+    record: Record, kept: Path
+) -> None:
+    path = record(drive())
+    pages = b"SQLite format 3\0".ljust(1 << 20, b"x")
+    for at in (0, len(pages) // 2):  # as in many a database or disk image
+        kept.write_bytes(pages[:at] + bytes(4) + pages[at + 4 :])
+        before = kept.read_bytes()
+        refused(run(path, "--save-state", kept), OUTPUT, kept, "left as it is")
+        refused(run(path, "--load-state", kept), USAGE, kept, "no file of saved states")
+        assert kept.read_bytes() == before
+
+
+def test_a_file_whose_first_save_was_cut_is_saved_into(record: Record, kept: Path) -> None:
+    saved(record, kept)
+    content = bytearray(kept.read_bytes())
+    content[:4096] = b"\xff" * 4096  # erased, and of the state only what lies behind came to disk
+    kept.write_bytes(content)
+    refused(run(record(drive()), "--load-state", kept), USAGE, kept, "nothing was saved in it")
+    assert "state saved: generation 1, " in saved(record, kept).stderr
+
+
 def test_a_blank_file_holds_no_state(record: Record, kept: Path) -> None:
     kept.write_bytes(bytes(2 * 4096))
     refused(run(record(drive()), "--load-state", kept), USAGE, kept, "nothing was saved in it")
@@ -271,6 +293,22 @@ def test_with_the_state_it_gives_the_same_bits(record: Record, kept: Path, tmp_p
     again = run(rest, "--load-state", kept, "--out", tmp_path / "again.plr")
     assert again.status == OK
     assert bits(tmp_path / "again.plr") == bits(whole, CUT)
+
+
+def test_a_restore_that_was_said_twice_is_replayed_twice(
+    record: Record, kept: Path, tmp_path: Path
+) -> None:
+    whole, rest = tmp_path / "whole.plr", tmp_path / "rest.plr"
+    assert run(record(drive()), "--out", whole).status == OK
+    saved(record, kept)
+    messages = logged()
+    messages[1:1] = [messages[1]]  # its answer was lost, say
+    other = tmp_path / "other.state"
+    result = run(record(messages), "--load-state", kept, "--save-state", other, "--out", rest)
+    assert result.status == OK
+    assert bits(rest) == bits(whole, CUT)
+    assert statuses(rest) == [0, 0, 0, 0]  # restored twice, saved by STATE and at the end
+    assert "state saved: generation 2" in result.stderr
 
 
 def test_a_state_to_save_into_is_no_state_to_go_on_from(record: Record, kept: Path) -> None:
