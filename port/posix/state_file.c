@@ -20,14 +20,18 @@ static int failed(state_file *file) {
     return -1;
 }
 
-/* What was written must be on the disk before anything is concluded from reading it back. */
+/* What was written must be on the disk before anything is concluded from reading it back. After a
+ * failed fsync a system may forget what it could not write, and call the next one a success. */
 static bool synced(state_file *file) {
     if (!file->unsynced)
         return true;
-    if (fsync(file->fd) != 0)
+    if (file->lost) {
+        errno = file->error;
         return false;
-    file->unsynced = false;
-    return true;
+    }
+    file->lost = fsync(file->fd) != 0;
+    file->unsynced = file->lost;
+    return !file->lost;
 }
 
 static int read_bytes(void *context, uint32_t offset, uint8_t *bytes, uint32_t n) {

@@ -15,6 +15,7 @@ typedef struct state_file {
     plr_block_device device; /* to hand to a store */
     int fd;                  /* -1: none is open. Then it reads as blank and takes nothing */
     bool unsynced;           /* something was written since the last fsync */
+    bool lost;               /* an fsync failed: what the disk holds is not known any more */
     int error;               /* errno of the first failure; 0: none */
 } state_file;
 

@@ -52,14 +52,15 @@ void storage_begin(storage *s) {
     (void)plr_state_store_init(&s->store, &s->save.device);
 }
 
+/* `not_ready`: what that status means here. */
 static int verdict(const char *path, int exit_status, const char *what, plr_status status,
-                   const state_file *file) {
+                   const char *not_ready, const state_file *file) {
     char words[256];
     const char *why = plr_status_text(status);
     if (status == PLR_OK)
         return REPLAY_EXIT_OK;
     if (status == PLR_E_NOT_READY)
-        why = "nothing was saved in it";
+        why = not_ready;
     if (file->error != 0)
         why = strerror(file->error);
     snprintf(words, sizeof words, "%s: %.160s", what, why);
@@ -68,10 +69,10 @@ static int verdict(const char *path, int exit_status, const char *what, plr_stat
 
 int storage_verdict_on_load(const storage *s, const replay_options *wanted) {
     return verdict(wanted->load_state, REPLAY_EXIT_USAGE, "no state to go on from", s->load_status,
-                   &s->load);
+                   "nothing was saved in it", &s->load);
 }
 
 int storage_verdict_on_save(const storage *s, const replay_options *wanted) {
     return verdict(wanted->save_state, REPLAY_EXIT_OUTPUT, "the state was not saved",
-                   s->save_status, &s->save);
+                   s->save_status, "no data was taken", &s->save);
 }

@@ -20,7 +20,7 @@ static const char *words(const plr_session *s, plr_state_action action, plr_stat
     if (status == PLR_E_MODE && action == PLR_STATE_RESTORE && s->phase == PLR_PHASE_RUNNING)
         return "a drive is under way; END ends it";
     if (status == PLR_E_NOT_READY && action == PLR_STATE_SAVE)
-        return "no data has come yet, so there is nothing to save";
+        return "no data was taken yet, so there is nothing to save";
     if (status == PLR_E_FULL)
         return "the storage is too small";
     if (status == PLR_E_IO)
@@ -68,13 +68,19 @@ static void tell(plr_session *s, const char *what, const plr_stored_state *store
 
 /* ---------------------------------------------------------------- save */
 
+/* Some data was taken: without any, a save would push out a state that is worth something. */
+static bool has_data(const plr_session *s) {
+    plr_totals totals;
+    return s->phase == PLR_PHASE_RUNNING && plr_filter_totals(&s->filter, &totals) == PLR_OK &&
+           (totals.twists > 0 || totals.frames > 0);
+}
+
 void plr_saving_save(plr_session *s, plr_time_ns t_ns) {
     plr_stored_state saved;
     plr_status status = PLR_E_MODE;
     if (s->options.store != NULL)
-        status = s->phase == PLR_PHASE_RUNNING
-                     ? plr_state_store_save(s->options.store, &s->filter, &saved)
-                     : PLR_E_NOT_READY;
+        status = has_data(s) ? plr_state_store_save(s->options.store, &s->filter, &saved)
+                             : PLR_E_NOT_READY;
     if (status != PLR_OK) {
         refuse(s, PLR_STATE_SAVE, t_ns, status);
         return;

@@ -237,6 +237,15 @@ def test_a_file_whose_first_save_was_cut_is_saved_into(record: Record, kept: Pat
     assert "state saved: generation 1, " in saved(record, kept).stderr
 
 
+def test_a_drive_without_data_pushes_out_no_state(record: Record, kept: Path) -> None:
+    saved(record, kept)
+    before = kept.read_bytes()
+    result = run(record([header(), truth(0)]), "--save-state", kept)
+    assert result.status != OK
+    assert f"{kept}: the state was not saved: no data was taken" in result.stderr
+    assert kept.read_bytes() == before
+
+
 def test_a_blank_file_holds_no_state(record: Record, kept: Path) -> None:
     kept.write_bytes(bytes(2 * 4096))
     refused(run(record(drive()), "--load-state", kept), USAGE, kept, "nothing was saved in it")

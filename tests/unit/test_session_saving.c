@@ -165,9 +165,23 @@ static void test_before_the_first_data_there_is_nothing_to_save(void) {
     send(&first_port, drive_header());
     send(&first_port, state(PLR_STATE_SAVE, 0));
     run(&before_cut);
-    assert_answered(&first_port, PLR_E_NOT_READY, "not saved: no data has come yet");
-    assert_answered(&first_port, PLR_E_NOT_READY, "not saved: no data has come yet");
+    assert_answered(&first_port, PLR_E_NOT_READY, "not saved: no data was taken yet");
+    assert_answered(&first_port, PLR_E_NOT_READY, "not saved: no data was taken yet");
     TEST_ASSERT_EQUAL_UINT64(0, flash.work);
+}
+
+static void test_data_that_was_refused_leaves_nothing_to_save(void) {
+    plr_message twist = drive_twist(0);
+    twist.as.twist.twist.v_B_mps[0] = 1e9;
+    drive_and_save();
+    begin(&after_restart, &second_port);
+    send(&second_port, twist);
+    send(&second_port, state(PLR_STATE_SAVE, 0));
+    send(&second_port, drive_twist(0));
+    send(&second_port, state(PLR_STATE_SAVE, 0));
+    run(&after_restart);
+    assert_answered(&second_port, PLR_E_NOT_READY, "not saved: no data was taken yet");
+    assert_answered(&second_port, PLR_OK, "state saved: generation 2, 0 landmarks");
 }
 
 static void test_without_storage_both_are_refused_and_the_drive_goes_on(void) {
@@ -517,6 +531,7 @@ int main(void) {
     RUN_TEST(test_a_save_is_answered_with_its_own_time_and_told_to_a_human);
     RUN_TEST(test_a_save_changes_no_bit_of_the_drive);
     RUN_TEST(test_before_the_first_data_there_is_nothing_to_save);
+    RUN_TEST(test_data_that_was_refused_leaves_nothing_to_save);
     RUN_TEST(test_without_storage_both_are_refused_and_the_drive_goes_on);
     RUN_TEST(test_a_device_that_fails_is_told_and_the_drive_goes_on);
     RUN_TEST(test_a_device_that_is_too_small_is_told_with_both_sizes);
