@@ -26,6 +26,7 @@ SUBCOMMANDS = [
     ("simulate",),
     ("report",),
     ("stream",),
+    ("compare",),
 ]
 
 

@@ -17,6 +17,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 from pelorus.frames import Message, Pose
 from pelorus.robot.compare import digest
@@ -245,3 +246,27 @@ def test_the_log_of_a_drive_is_taken_by_info_replay_and_report(
     report = pelorus("report", log, "--out", out, "--bin", program.parent)
     assert report.returncode == 0, report.stderr
     assert (out / "report.html").stat().st_size > 10_000
+
+
+def test_the_log_of_a_drive_compares_equal_and_one_other_bit_does_not(
+    board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
+) -> None:
+    log, other = tmp_path / "flight.plr", tmp_path / "other.plr"
+    to = ("--to", f"qemu:{board}", "--image", firmware, "--record", log)
+    assert pelorus("stream", short_drive, *to).returncode == 0
+    same = pelorus("compare", log, "--bin", program.parent)
+    assert same.returncode == 0, same.stdout + same.stderr
+    assert f"the same bits: {FRAMES} of {FRAMES} frames" in same.stdout
+    messages = [frame.message for frame in read_file(log)[0][:-1]]
+    at = [k for k, message in enumerate(messages) if isinstance(message, Pose)][17]
+    pose = messages[at]
+    assert isinstance(pose, Pose)
+    pose.p_WB_m[0] = np.nextafter(pose.p_WB_m[0], np.inf)
+    with other.open("wb") as stream:
+        writer = Writer(stream)
+        for message in messages:
+            writer.write(message)
+        writer.end()
+    found = pelorus("compare", other, "--bin", program.parent)
+    assert found.returncode == 1, found.stdout + found.stderr
+    assert "frame 18, " in found.stdout

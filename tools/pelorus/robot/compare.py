@@ -6,12 +6,12 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pelorus.errors import PelorusError
-from pelorus.frames import OBSERVATIONS_MAX, Kind, Pose, Stereo
+from pelorus.frames import OBSERVATIONS_MAX, Kind, Message, Pose, Stereo
 from pelorus.robot.emulator import SOURCE_ROOT
 from pelorus.wire import Writer, read_file
 
@@ -65,10 +65,16 @@ def desktop_poses(
     As many landmark slots, and without the frames that it refuses: of more observations than fit.
     """
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
-        answers = Path(folder) / "answers.plr"
         taken = _without_long_frames(recording, observations, Path(folder))
-        command = [str(program), str(taken), "--quiet", "--slots", str(slots)]
-        command += ["--out", str(answers)]
+        messages = desktop_log(taken, program, ["--slots", str(slots)])
+    return [message for message in messages if isinstance(message, Pose) and message.after_stereo]
+
+
+def desktop_log(recording: Path, program: Path, options: Sequence[str] = ()) -> list[Message]:
+    """Replay a recording on this machine: its inputs and what the filter answered."""
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        answers = Path(folder) / "answers.plr"
+        command = [str(program), str(recording), "--quiet", *options, "--out", str(answers)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
         except OSError as error:
@@ -76,8 +82,7 @@ def desktop_poses(
         if done.returncode != 0:
             raise PelorusError(f"{program} failed on {recording}: {done.stderr.strip()}")
         received, _ = read_file(answers)
-    messages = (frame.message for frame in received)
-    return [message for message in messages if isinstance(message, Pose) and message.after_stereo]
+    return [frame.message for frame in received]
 
 
 def _without_long_frames(recording: Path, most: int, folder: Path) -> Path:
@@ -87,10 +92,15 @@ def _without_long_frames(recording: Path, most: int, folder: Path) -> Path:
     if len(short) == len(messages):
         return recording
     copy = folder / "short.plr"
-    with copy.open("wb") as stream:
+    write_recording(copy, short)
+    return copy
+
+
+def write_recording(path: Path, messages: Iterable[Message]) -> None:
+    """The messages as a recording, with an END of their own."""
+    with path.open("wb") as stream:
         writer = Writer(stream)
-        for message in short:
+        for message in messages:
             if message.kind != Kind.END:
                 writer.write(message)
         writer.end()
-    return copy

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Why a robot refuses a message: `plr_status` of include/pelorus/types.h in words."""
+"""What a robot says in numbers, in words: `plr_status`, `plr_health` and `plr_reason` of
+include/pelorus/types.h.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +26,29 @@ STATUSES = {
     -16: "of a kind, version or build that it does not know",
     -17: "the port or the store reports a failure",
 }
+
+HEALTH = ("good", "degraded", "lost", "diverged")
+REASONS = (
+    "fewer than 3 observations used",
+    "none used in the last 10 frames",
+    "the gate is locked",
+    "the gate is inert",
+    "a block could not be factorised",
+    "the map sink failed",
+    "no room for new landmarks",
+    "observations were malformed or doubled",
+    "innovations larger than the noise explains",
+    "a landmark beyond max-range",
+    "a variance is not positive",
+    "observations left out for want of time",
+)
+
+
+def condition(health: int, reasons: int) -> str:
+    """Health and its reasons (`plr_health`, `plr_reason`): "degraded (the gate is locked)"."""
+    words = [text for bit, text in enumerate(REASONS) if reasons >> bit & 1]
+    name = HEALTH[health] if health < len(HEALTH) else f"health {health}"
+    return f"{name} ({', '.join(words)})" if words else name
 
 
 def refusal(subject: int, status: int, count: int) -> str:

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus compare LOG.plr`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import typer
+from rich.markup import escape
+
+from pelorus.console import err, out
+from pelorus.errors import PelorusError
+from pelorus.flight.difference import Difference, Sizes
+from pelorus.flight.judge import Desk, Judgement, Verdict, judge, of_this_version, verdict_of
+from pelorus.flight.log import Frame, read_log
+from pelorus.frames import Config
+from pelorus.report.replay import find_programs
+from pelorus.robot.status import condition, refusal
+
+LOSSES_SHOWN = 5
+START_HINT = "if the pelorus-replay that wrote the log was given --start, give it here too"
+STARTS = ("truth", "identity", "recorded")
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `compare` to the command line."""
+    parent.command(
+        epilog="Example:  pelorus compare flight.plr",
+    )(compare)
+
+
+def compare(
+    log: Path = typer.Argument(
+        ...,
+        metavar="LOG.plr",
+        help="A log of inputs and outputs: of `pelorus stream --record` or `pelorus-replay --out`.",
+    ),
+    programs: Path | None = typer.Option(
+        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
+    ),
+    start: str | None = typer.Option(
+        None,
+        metavar="|".join(STARTS),
+        help="As given to the pelorus-replay that wrote the log, which does not hold it.",
+    ),
+    load_state: Path | None = typer.Option(
+        None,
+        metavar="FILE",
+        help="The state that the drive went on from, as pelorus-replay --save-state keeps it.",
+    ),
+) -> None:
+    """Replay a robot's log here, and compare every answer with the robot's, bit by bit.
+
+    POSE and REPORT after each frame, but for the time that it took. Where the robot started anew in
+    mid-drive, each of its lives is compared by itself. Where frames were lost on the way it says up
+    to where the log tells what the robot knew.
+
+    The exit status is 0 if all has the same bits, 1 if the robot computed others, 2 if they cannot
+    be compared, or not all of them.
+    """
+    if start is not None and start not in STARTS:
+        raise typer.BadParameter(f"{start!r} is none of {', '.join(STARTS)}", param_hint="--start")
+    try:
+        verdict = _compare(log, programs, start, load_state)
+    except PelorusError as error:
+        err.print(f"[bold red]error:[/] {escape(str(error))}")
+        verdict = Verdict.NOT_COMPARABLE
+    if verdict is not Verdict.SAME:
+        raise typer.Exit(verdict)
+
+
+def _compare(path: Path, programs: Path | None, start: str | None, state: Path | None) -> Verdict:
+    desk = Desk(find_programs(programs), start, state)
+    with err.status(f"reading {escape(str(path))}"):
+        log = read_log(path)
+    with err.status(f"replaying {log.frames} frames"):
+        judgements = judge(log, desk)
+    for remark in log.remarks:
+        _line("log", remark)
+    for number, judgement in enumerate(judgements, 1):
+        if len(judgements) > 1:
+            out.print(f"[bold]part {number} of {len(judgements)}[/], {_span(judgement)}")
+        _tell(judgement, desk)
+    return _conclude(judgements)
+
+
+# --- what is told ---------------------------------------------------------------------------------
+
+
+def _line(name: str, words: str) -> None:
+    out.print(f"{name:<8}  {words}", markup=False)
+
+
+def _lines(lines: Iterable[tuple[str, str]]) -> None:
+    for name, words in lines:
+        _line(name, words)
+
+
+def _span(judgement: Judgement) -> str:
+    frames = judgement.part.frames
+    began = "" if frames[0].number == 1 else ": the robot started anew"
+    return f"frames {frames[0].number} to {frames[-1].number}{began}"
+
+
+def _tell(judgement: Judgement, desk: Desk) -> None:
+    config = judgement.part.config
+    if config is not None:
+        _line("robot", _build(config))
+    if judgement.desk is not None and config is not None:
+        _line("desk", f"{_build(judgement.desk)}, {desk.program(config)}")
+    _lines(_counts(judgement))
+    if judgement.first is not None:
+        _lines(_first(judgement.first))
+        _lines(_largest(judgement.differences))
+    if judgement.why:
+        _line("but", judgement.why)
+
+
+def _build(build: Config) -> str:
+    version = "this version" if of_this_version(build) else "another version"
+    return (
+        f"build {build.build_fingerprint:#010x}, of {version}: {build.max_landmarks} landmarks, "
+        f"{build.max_observations} observations, blocks of {build.block_observations}, "
+        f"float{8 * build.real_bytes}"
+    )
+
+
+def _counts(judgement: Judgement) -> Iterator[tuple[str, str]]:
+    part = judgement.part
+    yield (
+        "frames",
+        f"{len(part.frames)}, {len(part.answered)} of them answered; "
+        f"{judgement.same} the same to the bit",
+    )
+    unread = sum(frame.unread for frame in part.frames)
+    if unread:
+        yield "refused", f"{unread} of more observations than the robot has room for"
+    if part.last_words:
+        first = part.last_words[0].number
+        yield "end", f"no answer came from frame {first} on: the robot, the link or the log ended"
+    if judgement.left_out:
+        numbers = ", ".join(str(frame.number) for frame in judgement.left_out[:LOSSES_SHOWN])
+        yield "lost", f"replayed without frames that had no answer ({numbers}): so it agrees better"
+    for loss in part.losses[:LOSSES_SHOWN]:
+        yield "lost", f"at frame {loss.at}: {loss.words}"
+    if len(part.losses) > LOSSES_SHOWN:
+        yield "lost", f"and {len(part.losses) - LOSSES_SHOWN} more"
+
+
+def _first(found: Difference) -> Iterator[tuple[str, str]]:
+    robot = found.robot
+    yield (
+        "first",
+        f"frame {robot.number}, t {_seconds(robot.stereo.t_ns)} s, is the first that differs",
+    )
+    if found.pose:
+        yield "", f"POSE in {', '.join(found.pose)}: {_sizes(found.sizes)}"
+    for name, (ours, theirs) in found.report.items():
+        yield "", f"REPORT {name}: the desk {ours:.9g}, the robot {theirs:.9g}"
+    if robot.number == 1:
+        yield "", START_HINT
+    yield "said", _said(robot)
+    for words in robot.words:
+        yield "said", words
+
+
+def _said(robot: Frame) -> str:
+    report = robot.report
+    if report is None:
+        return "the robot's REPORT on it is not in the log"
+    if report.status:
+        return f"the robot refused {refusal(report.subject, report.status, 1)}"
+    return (
+        f"health {condition(report.health, report.reasons)}; {report.used} used, "
+        f"{report.gated} gated of {report.matched} matched, {report.created} new"
+    )
+
+
+def _sizes(sizes: Sizes) -> str:
+    return (
+        f"{sizes.position_m:.3g} m, {sizes.angle_deg:.3g} deg, "
+        f"covariance {sizes.covariance:.3g} of the variances"
+    )
+
+
+def _largest(differences: Sequence[Difference]) -> Iterator[tuple[str, str]]:
+    for name, unit in (
+        ("position_m", "m"),
+        ("angle_deg", "deg"),
+        ("covariance", "of the variances"),
+    ):
+        sizes = [getattr(found.sizes, name) for found in differences]
+        most = max(sizes)
+        robot = differences[sizes.index(most)].robot
+        what = name.partition("_")[0]
+        if most > 0:
+            yield "largest", f"{what} {most:.3g} {unit}, at frame {robot.number}"
+
+
+def _seconds(t_ns: int) -> str:
+    return f"{t_ns // 10**9}.{t_ns % 10**9:09d}"
+
+
+def _conclude(judgements: Sequence[Judgement]) -> Verdict:
+    verdict = verdict_of(judgements)
+    same = sum(judgement.same for judgement in judgements)
+    frames = sum(len(judgement.part.frames) for judgement in judgements)
+    told = {
+        Verdict.SAME: "[bold green]the same bits[/]",
+        Verdict.DIFFERENT: "[bold red]different[/]",
+        Verdict.NOT_COMPARABLE: "[bold yellow]cannot be compared to the end[/]",
+    }[verdict]
+    out.print(f"{told}: {same} of {frames} frames are the same to the bit")
+    return verdict

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""Replays the parts of a log and judges each: the same bits, different, or not to be compared."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+
+from pelorus import __version__
+from pelorus.errors import PelorusError
+from pelorus.flight.difference import Difference, differ
+from pelorus.flight.log import Frame, Log, Loss, Part, frames_of
+from pelorus.frames import Config, Header, Message
+from pelorus.report.replay import Programs
+from pelorus.robot.compare import desktop_log, write_recording
+from pelorus.settings import describe
+
+FNV_OFFSET, FNV_PRIME = 2166136261, 16777619
+
+
+class Verdict(IntEnum):
+    """The exit status."""
+
+    SAME = 0
+    DIFFERENT = 1
+    NOT_COMPARABLE = 2
+
+
+@dataclass(eq=False)
+class Judgement:
+    """Of one part."""
+
+    part: Part
+    verdict: Verdict = Verdict.SAME
+    why: str = ""
+    differences: list[Difference] = field(default_factory=list)  # one a frame that was answered
+    desk: Config | None = None
+    left_out: list[Frame] = field(default_factory=list)  # they did not reach the robot, it seems
+
+    @property
+    def same(self) -> int:
+        """Frames whose whole answer has the desk's bits."""
+        return sum(d.same and not d.missing for d in self.differences)
+
+    @property
+    def first(self) -> Difference | None:
+        return next((d for d in self.differences if not d.same), None)
+
+    @property
+    def loss(self) -> Loss | None:
+        """What was lost before or at the first difference."""
+        first = self.first
+        if first is None:
+            return None
+        return next((loss for loss in self.part.losses if loss.at <= first.robot.number), None)
+
+
+@dataclass(frozen=True)
+class Desk:
+    """With what the log is replayed."""
+
+    programs: Programs
+    start: str | None = None
+    state: Path | None = None  # that the first part which restored one goes on from
+
+    def program(self, config: Config) -> Path:
+        return self.programs.float64 if config.real_bytes == 8 else self.programs.float32
+
+
+def judge(log: Log, desk: Desk) -> list[Judgement]:
+    """Every part by itself. PelorusError where not one can be compared."""
+    judgements: list[Judgement] = []
+    for part in log.parts:
+        state = desk.state if not any(j.part.restored for j in judgements) else None
+        judgements.append(_judge(part, desk, state))
+    if not any(j.differences for j in judgements):
+        raise PelorusError(f"{log.path}: {judgements[0].why}")
+    return judgements
+
+
+def verdict_of(judgements: Sequence[Judgement]) -> Verdict:
+    """Different if any part is; the same if all are."""
+    found = {judgement.verdict for judgement in judgements}
+    if Verdict.DIFFERENT in found:
+        return Verdict.DIFFERENT
+    return Verdict.NOT_COMPARABLE if Verdict.NOT_COMPARABLE in found else Verdict.SAME
+
+
+def fingerprint(version: str, build: Config) -> int:
+    """plr_build_fingerprint (src/filter/status.c): what a build of that version would say."""
+    major, minor, patch = (int(number) for number in version.split("."))
+    capacities = (build.max_landmarks, build.max_observations, build.block_observations)
+    value = FNV_OFFSET
+    for part in (major << 16 | minor << 8 | patch, 8 * build.real_bytes, *capacities):
+        for byte in part.to_bytes(4, "little"):
+            value = (value ^ byte) * FNV_PRIME & 0xFFFFFFFF
+    return value or 1
+
+
+def of_this_version(build: Config) -> bool:
+    """Whether a build is of the version that these tools belong to."""
+    return build.build_fingerprint == fingerprint(__version__, build)
+
+
+# --- one part -------------------------------------------------------------------------------------
+
+
+def _judge(part: Part, desk: Desk, state: Path | None) -> Judgement:
+    why = _obstacle(part, state)
+    if why or part.config is None:
+        return Judgement(part, Verdict.NOT_COMPARABLE, why)
+    found = _compared(part, desk, state, [])
+    if found.verdict is Verdict.NOT_COMPARABLE:
+        return found
+    if found.first is not None and part.unanswered:
+        without = _compared(part, desk, state, part.unanswered)
+        if without.same > found.same:
+            found = without
+    return _concluded(found)
+
+
+def _obstacle(part: Part, state: Path | None) -> str:
+    """Why no replay can be set up."""
+    if not any(isinstance(m, Header) for m in part.messages):
+        return "no HEADER came after the robot's restart: it had no calibration to work with"
+    if not part.answered:
+        return "not one frame was answered: there is nothing to compare"
+    if part.config is None:
+        return (
+            "the log holds no CONFIG of the robot's build: without its settings, capacity and "
+            "precision a replay is another filter; the robot tells them with its first answer"
+        )
+    if part.restored and state is None:
+        return (
+            "the robot went on from a saved state, which the log does not hold: nothing behind it "
+            "can be computed here; with that state in a file of pelorus-replay (--save-state), "
+            "give --load-state"
+        )
+    return ""
+
+
+def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame]) -> Judgement:
+    assert part.config is not None
+    options = ["--start", desk.start] if desk.start and not part.restored else []
+    options += ["--load-state", str(state)] if part.restored else []
+    messages = _replayed(part.inputs(left_out), desk.program(part.config), options)
+    here = next((m for m in messages if isinstance(m, Config) and m.build_fingerprint), None)
+    if here is None:
+        return Judgement(part, Verdict.NOT_COMPARABLE, "the replay's filter did not start")
+    found = Judgement(part, desk=here, left_out=left_out)
+    ours = frames_of(messages)
+    absent = {id(frame) for frame in left_out}
+    theirs = [f for f in part.frames if not f.unread and id(f) not in absent]
+    why = _unlike(part.config, here)
+    if not why and [f.stereo.t_ns for f in ours] != [f.stereo.t_ns for f in theirs]:
+        why = (
+            f"the replay took {len(ours)} of {len(theirs)} frames; it has room for "
+            f"{here.max_observations} observations in one"
+        )
+    if why:
+        found.verdict, found.why = Verdict.NOT_COMPARABLE, why
+        return found
+    pairs = zip(theirs, ours, strict=True)
+    found.differences = [differ(robot, mine) for robot, mine in pairs if robot.answered]
+    return found
+
+
+def _replayed(inputs: list[Message], program: Path, options: list[str]) -> list[Message]:
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        recording = Path(folder) / "inputs.plr"
+        write_recording(recording, inputs)
+        return desktop_log(recording, program, options)
+
+
+def _unlike(robot: Config, here: Config) -> str:
+    """What makes the replay another filter than the robot's."""
+    if robot.block_observations != here.block_observations:
+        return (
+            f"the robot's build takes {robot.block_observations} observations a block and the "
+            f"desk's {here.block_observations}: build the desk with "
+            f"-DPLR_BLOCK_OBSERVATIONS={robot.block_observations}, and name its folder with --bin"
+        )
+    for id, value in robot.settings.items():
+        ours = here.settings.get(id)
+        if ours != value:
+            name, theirs = describe(id, value)
+            mine = "no such setting" if ours is None else describe(id, ours)[1]
+            return (
+                f"the robot's {name} is {theirs}, the desk's {mine}: a build of the robot's "
+                "version, with its capacity, is needed (--bin)"
+            )
+    return ""
+
+
+def _concluded(found: Judgement) -> Judgement:
+    """The verdict on what was compared: behind a loss, other bits are no fault of the robot."""
+    first, loss = found.first, found.loss
+    if first is not None and loss is not None:
+        found.verdict = Verdict.NOT_COMPARABLE
+        found.why = (
+            f"from frame {loss.at} on the robot may have had other inputs than the log holds "
+            f"({loss.words}); what comes behind cannot be compared"
+        )
+    elif first is not None:
+        found.verdict = Verdict.DIFFERENT
+    elif lacking := _lacking(found):
+        found.verdict = Verdict.NOT_COMPARABLE
+        found.why = f"the log does not hold {lacking}; what it holds has the same bits"
+    return found
+
+
+def _lacking(found: Judgement) -> str:
+    absent = {id(frame) for frame in found.left_out}
+    whole = [
+        f"the answer to frame {f.number}" for f in found.part.unanswered if id(f) not in absent
+    ]
+    halves = [f"the {d.missing} of frame {d.robot.number}" for d in found.differences if d.missing]
+    lacking = whole + halves
+    more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
+    return ", ".join(lacking[:3]) + more

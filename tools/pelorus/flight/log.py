@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""A robot's log, taken apart: frames with their answers, and what is known to have been lost.
+
+A log is read as parts. A board that starts anew forgets everything but what it is then told, so
+each of its lives is a drive of its own, from its HEADER to the next boot message.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict, deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+from pelorus.errors import PelorusError
+from pelorus.frames import (
+    Config,
+    Kind,
+    Landmark,
+    Message,
+    Pose,
+    Report,
+    Role,
+    State,
+    StateAction,
+    Stereo,
+    Text,
+)
+from pelorus.robot.status import refusal
+from pelorus.robot.stream import BOOT_WORDS, is_restore
+from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
+
+DATA_KINDS = (Kind.TWIST, Kind.STEREO, Kind.TRUTH)
+NOT_ARRIVED = (-1, -15, -16)  # statuses of what was damaged on the way
+FULL = -10
+ARRIVED = re.compile(r"(\d+) of \d+ (TWIST|STEREO|TRUTH|LANDMARK)")
+INCOMPLETE_WORDS = "the recording is not complete"
+RESTORED_WORDS = "state restored"
+RIGHT = "`pelorus stream --record` and `pelorus-replay --out` write what a replay needs"
+
+
+@dataclass(eq=False)
+class Frame:
+    """A STEREO and what the filter answered to it."""
+
+    number: int  # in the log, from 1
+    stereo: Stereo
+    pose: Pose | None = None
+    report: Report | None = None
+    words: list[str] = field(default_factory=list)  # TEXT from it to the next frame
+
+    @property
+    def answered(self) -> bool:
+        return self.pose is not None or self.report is not None
+
+    @property
+    def unread(self) -> bool:
+        """It had more observations than the robot has room for, and was refused as a whole."""
+        return self.report is not None and not self.report.t_ns and self.report.status == FULL
+
+
+class Loss(NamedTuple):
+    """Something that either the robot or the log did not get."""
+
+    at: int  # number of the first frame that it may have touched
+    words: str
+
+
+@dataclass(eq=False)
+class Part:
+    """What one life of a filter took and gave."""
+
+    messages: list[Message]
+    frames: list[Frame]
+    losses: list[Loss]
+    config: Config | None  # in force
+    restored: bool  # it went on from a state that the log does not hold
+
+    @property
+    def answered(self) -> list[Frame]:
+        return [frame for frame in self.frames if frame.answered]
+
+    @property
+    def unanswered(self) -> list[Frame]:
+        """Those with an answered frame behind them."""
+        last = max((frame.number for frame in self.answered), default=0)
+        return [f for f in self.frames if not f.answered and f.number < last]
+
+    @property
+    def last_words(self) -> list[Frame]:
+        """Those at the end that nothing answered any more."""
+        last = max((frame.number for frame in self.answered), default=0)
+        return [f for f in self.frames if not f.answered and f.number > last]
+
+    def inputs(self, left_out: Iterable[Frame] = ()) -> list[Message]:
+        """What a replay is given: no answers, and the settings in force before the first data."""
+        absent = {id(f.stereo) for f in (*left_out, *(f for f in self.frames if f.unread))}
+        taken = [m for m in self.messages if _is_input(m) and id(m) not in absent]
+        first = next(at for at, m in enumerate(taken) if m.kind in DATA_KINDS or is_restore(m))
+        settings = [] if self.config is None else [self.config]
+        return [*taken[:first], *settings, *taken[first:]]
+
+
+@dataclass(frozen=True)
+class Log:
+    """The parts of a file that hold frames, and remarks on the whole."""
+
+    path: Path
+    parts: list[Part]
+    frames: int
+    remarks: list[str]
+
+
+def read_log(path: Path) -> Log:
+    """A log of inputs and outputs. PelorusError where it is none, with what would be one."""
+    received, counts = read_file(path)
+    messages = [frame.message for frame in received]
+    kinds = {message.kind for message in messages}
+    if not kinds & {Kind.POSE, Kind.REPORT}:
+        raise PelorusError(
+            f"{path}: holds no POSE and no REPORT: a recording, but no filter's log; {RIGHT}"
+        )
+    if Kind.STEREO not in kinds:
+        raise PelorusError(f"{path}: holds answers but no STEREO, so no inputs to replay; {RIGHT}")
+    header_of(received, path)
+    parts, frames = _parts(_up_to_end(received))
+    remarks = [] if counts.ended else ["there is no END: the log was cut short"]
+    if counts.ended and len(_up_to_end(received)) + 1 < len(received):
+        remarks.append("goes on behind END; that was not read")
+    if not counts.clean:
+        remarks.append(f"the log is damaged: {counts.damaged} frames, {counts.missing} missing")
+    return Log(path, parts, frames, remarks)
+
+
+def frames_of(messages: Iterable[Message]) -> list[Frame]:
+    """The STEREO frames among messages, with their answers."""
+    walk = _Walk(0)
+    for message in messages:
+        walk.take(message)
+    return walk.frames
+
+
+def _up_to_end(received: list[Received]) -> list[Received]:
+    ends = [at for at, frame in enumerate(received) if frame.message.kind == Kind.END]
+    return received[: ends[0]] if ends else received
+
+
+def _parts(received: Sequence[Received]) -> tuple[list[Part], int]:
+    boots = [
+        at
+        for at, frame in enumerate(received)
+        if isinstance(frame.message, Text) and frame.message.text.startswith(BOOT_WORDS)
+    ]
+    edges = [0, *boots, len(received)]
+    parts: list[Part] = []
+    frames, config = 0, None
+    for first, last in pairwise(edges):
+        before = received[first - 1].sequence if first else None
+        part = _part(received[first:last], before, frames)
+        config = part.config = part.config or config  # of the same board
+        frames += len(part.frames)
+        if part.frames:
+            parts.append(part)
+    return parts, frames
+
+
+def _part(received: Sequence[Received], before: int | None, frames_before: int) -> Part:
+    messages = [frame.message for frame in received]
+    walk = _Walk(frames_before)
+    expected = None if before is None else (before + 1) % SEQUENCE_MODULUS
+    for sequence, message in ((frame.sequence, frame.message) for frame in received):
+        gap = 0 if expected is None else (sequence - expected) % SEQUENCE_MODULUS
+        if 0 < gap < SEQUENCE_MODULUS // 2:
+            walk.lose(f"the log lacks {gap} of its frames there")
+        expected = (sequence + 1) % SEQUENCE_MODULUS
+        walk.take(message)
+    in_force = (m for m in messages if isinstance(m, Config) and m.build_fingerprint)
+    restored = _is_restored(messages)
+    part = Part(messages, walk.frames, walk.losses, next(in_force, None), restored)
+    part.losses += [
+        Loss(f.number, f"no answer to frame {f.number}: it, or the answer, was lost on the way")
+        for f in part.unanswered
+    ]
+    part.losses += [
+        Loss(frames_before + 1, f"the robot said at the end: {words}") for words in _arrived(part)
+    ]
+    part.losses.sort()
+    return part
+
+
+class _Walk:
+    """Goes through a part and gives each answer to its frame."""
+
+    def __init__(self, frames_before: int) -> None:
+        self.frames: list[Frame] = []
+        self.losses: list[Loss] = []
+        self._before = frames_before
+        self._waiting: defaultdict[int, deque[Frame]] = defaultdict(deque)  # by time
+
+    def lose(self, words: str) -> None:
+        """Something is missing here; it may touch the frame that is not answered yet."""
+        last = self.frames[-1] if self.frames else None
+        under_way = last is not None and not last.answered
+        number = self._before + len(self.frames) + (0 if under_way else 1)
+        self.losses.append(Loss(number, words))
+
+    def take(self, message: Message) -> None:
+        match message:
+            case Stereo():
+                self.frames.append(Frame(self._before + len(self.frames) + 1, message))
+                self._waiting[message.t_ns].append(self.frames[-1])
+            case Pose() if message.after_stereo:
+                waiting = self._waiting[message.t_ns]
+                if waiting:
+                    waiting[0].pose = message
+                else:
+                    self.lose("an answer to a frame that the log does not hold")
+            case Report() if message.subject == Kind.STEREO:
+                self._take_report(message)
+            case Report() if message.status in NOT_ARRIVED and message.subject != Kind.STATE:
+                self.lose(f"the robot refused {refusal(message.subject, message.status, 1)}")
+            case Text() if self.frames:
+                self.frames[-1].words.append(message.text)
+            case _:
+                pass
+
+    def _take_report(self, report: Report) -> None:
+        waiting = self._waiting[report.t_ns]
+        if waiting:
+            waiting.popleft().report = report
+        elif report.t_ns:
+            self.lose("an answer to a frame that the log does not hold")
+        elif self.frames and not self.frames[-1].answered:  # refused unread, so at no time
+            self.frames[-1].report = report
+
+
+def _is_input(message: Message) -> bool:
+    if isinstance(message, Config):
+        return not message.build_fingerprint
+    if isinstance(message, Landmark):
+        return message.role == Role.KNOWN
+    return is_restore(message) or message.kind in (*DATA_KINDS, Kind.HEADER, Kind.START)
+
+
+def _is_restored(messages: Sequence[Message]) -> bool:
+    """Whether the filter said so, or was asked to and did not refuse."""
+    if any(isinstance(m, Text) and m.text.startswith(RESTORED_WORDS) for m in messages):
+        return True
+    asked = [m.t_ns for m in messages if isinstance(m, State) and m.action == StateAction.RESTORE]
+    refused = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STATE]
+    return bool(asked) and not any(r.status and r.t_ns in asked for r in refused)
+
+
+def _arrived(part: Part) -> list[str]:
+    """What the robot says of its inputs, where they are fewer than the log holds."""
+    found = []
+    for message in part.messages:
+        if isinstance(message, Text) and message.text.startswith(INCOMPLETE_WORDS):
+            for count, name in ARRIVED.findall(message.text):
+                held = sum(_is_input(m) and m.kind == Kind[name] for m in part.messages)
+                if int(count) < held:
+                    found.append(f"{count} of {held} {name} arrived")
+    return found
