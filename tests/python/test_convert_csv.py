@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +160,33 @@ def test_a_mistake_in_a_users_file_is_told_by_file_row_and_name(
     assert said in outcome.err, outcome.err
 
 
+def test_files_that_were_taken_for_each_other_are_told_by_their_columns(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    options = csv_files(tmp_path, clean(**SHORT))
+    twists, stereo = options.index("--twists") + 1, options.index("--stereo") + 1
+    options[twists], options[stereo] = options[stereo], options[twists]
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert "stereo.csv: lacks the column vx_mps" in outcome.err
+
+
+def test_a_file_parted_by_semicolons_is_told_so(tmp_path: Path, pelorus: Run) -> None:
+    options = csv_files(tmp_path, clean(**SHORT))
+    path = tmp_path / "twists.csv"
+    path.write_text(path.read_text().replace(",", ";"))
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert "commas should part them" in outcome.err
+
+
+def test_what_too_few_data_cannot_tell_is_not_called_good(tmp_path: Path, pelorus: Run) -> None:
+    options = csv_files(tmp_path, clean(**SHORT))
+    said = pelorus("convert", "csv", *options, tmp_path / "out.plr")
+    assert "body axes: good" in said.out
+    assert "twist noise: cannot tell" in said.out
+
+
 def test_csv_observations_must_be_one_an_id_and_frame(tmp_path: Path, pelorus: Run) -> None:
     options = csv_files(tmp_path, clean(**SHORT))
     path = tmp_path / "stereo.csv"
@@ -166,7 +194,7 @@ def test_csv_observations_must_be_one_an_id_and_frame(tmp_path: Path, pelorus: R
     path.write_text("\n".join([*rows, rows[1]]) + "\n")
     outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
     assert outcome.status == 1
-    assert "stands twice in the frame" in outcome.err
+    assert re.search(f"stands twice in the frame at .*rows 2 and {len(rows) + 1}", outcome.err)
     path.write_text(rows[0] + "\n")
     outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
     assert "no row" in outcome.err

@@ -49,7 +49,8 @@ def test_everything_of_an_npz_arrives(tmp_path: Path, pelorus: Run, edition: int
     source, target = save_npz(tmp_path / "drive.npz", drive, edition), tmp_path / "drive.plr"
     said = pelorus("convert", "ece276a", source, target)
     assert said.status == 0, said.err
-    assert said.out.count("good") == 5
+    assert said.out.count("good") == 4
+    assert "twist noise: cannot tell" in said.out, "61 frames are too few"
     header = messages_of(target, Header)[0]
     assert np.allclose(header.R_CB, drive.T_CB.R)
     assert np.allclose(header.t_CB_m, drive.T_CB.p)
@@ -248,6 +249,16 @@ def test_a_file_that_is_none_is_refused(
     assert outcome.status == 1
     assert "bad.file" in outcome.err
     assert pelorus("convert", command, tmp_path / "no.file", tmp_path / "out.plr").status == 1
+
+
+def test_a_recording_is_no_npz_and_nobody_is_told_to_unpickle_it(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    source = tmp_path / "drive.plr"
+    source.write_bytes(b"\x00\x12 something else")
+    outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert "drive.plr: is no .npz file" in outcome.err
 
 
 def test_truth_that_does_not_fit_is_refused(tmp_path: Path, pelorus: Run) -> None:

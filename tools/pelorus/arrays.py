@@ -71,7 +71,11 @@ def read_npz(path: Path) -> Arrays:
     try:
         with np.load(path, allow_pickle=False) as file:
             return Arrays(path, {key: file[key] for key in file.files})
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+    except (ValueError, EOFError, AttributeError) as error:
+        if not zipfile.is_zipfile(path):
+            raise PelorusError(f"{path}: is no .npz file (a zip of numpy arrays)") from error
+        raise PelorusError(f"{path}: cannot be read as .npz: {error}") from error
+    except (OSError, zipfile.BadZipFile) as error:
         raise PelorusError(f"{path}: cannot be read as .npz: {error}") from error
 
 

@@ -40,20 +40,24 @@ class Table:
                 )
         return cls(path, {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)})
 
-    def numbers(self, *names: str) -> Floats:
-        """(rows, len(names)) finite float64."""
+    def require(self, *names: str) -> None:
+        """Refuse a file without these columns."""
         lacking = [name for name in names if name not in self._columns]
         if lacking:
+            there = ", ".join(self._columns)
+            hint = "; commas should part them" if len(self._columns) == 1 and ";" in there else ""
             raise PelorusError(
-                f"{self.path}: lacks the column {', '.join(lacking)}; "
-                f"there are: {', '.join(self._columns)}"
+                f"{self.path}: lacks the column {', '.join(lacking)}; there are: {there}{hint}"
             )
+
+    def numbers(self, *names: str) -> Floats:
+        """(rows, len(names)) finite float64."""
+        self.require(*names)
         return np.stack([self._column(name) for name in names], axis=-1)
 
     def integers(self, name: str, highest: int) -> NDArray[np.int64]:
         """Whole numbers from 0 to `highest`, exact beyond 2^53."""
-        if name not in self._columns:
-            self.numbers(name)
+        self.require(name)
         out = np.empty(len(self._columns[name]), np.int64)
         for row, cell in enumerate(self._columns[name]):
             text = cell.strip()

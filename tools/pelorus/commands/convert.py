@@ -106,9 +106,12 @@ def csv(
     ),
     calibration: Path = typer.Option(
         ...,
-        help="JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB with t_CB_m (body to left "
-        "camera) or R_BC with t_BC_m (the camera's pose in the body); optional image_width_px, "
-        "image_height_px, body_axes, twist_timing, noise, name.",
+        help="JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of "
+        "three, with t_CB_m (body to left camera) or R_BC with t_BC_m (the camera's pose in the "
+        "body); optional image_width_px, image_height_px, body_axes (forward-left-up, "
+        "forward-right-down, other), twist_timing (start, end, mid), name, and noise, an object "
+        "with some of pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, "
+        "bias_velocity_sigma_mps, bias_gyro_sigma_radps.",
     ),
     truth: Path | None = typer.Option(
         None, help="Columns t_s (or t_ns), px_m, py_m, pz_m, qx, qy, qz, qw: body to world."
@@ -127,11 +130,16 @@ def csv(
     _write(recording, findings, target)
 
 
+def _verdict(finding: Finding) -> str:
+    if not finding.told:
+        return "[yellow]cannot tell[/]"
+    return "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
+
+
 def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
     """Say what was found, keep it in the recording as TEXT, and write the file."""
     for finding in findings:
-        verdict = "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
-        out.print(f"{finding.subject}: {verdict}: {escape(finding.evidence)}")
+        out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
         out.print(f"    -> {escape(finding.action)}")
     remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found]
     size = replace(recording, remarks=remarks).write(target)

@@ -56,9 +56,9 @@ def read(sources: Sources) -> Recording:
     """The files as they are."""
     header = calibration.read(sources.calibration)
     twists = Table.read(sources.twists)
-    twist_t_ns = twists.ascending_times()
     v = twists.numbers("vx_mps", "vy_mps", "vz_mps")
     w = twists.numbers("wx_radps", "wy_radps", "wz_radps")
+    twist_t_ns = twists.ascending_times()
     frame_t_ns, tracks = _stereo(sources.stereo)
     if frame_t_ns[-1] < twist_t_ns[0] or twist_t_ns[-1] < frame_t_ns[0]:
         raise PelorusError(
@@ -82,10 +82,12 @@ def _stereo(path: Path) -> tuple[Times, Tracks]:
     tracks.check(str(path))
     twice = (np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)
     if twice.any():
-        row = int(np.nonzero(twice)[0][0])
+        k = int(np.nonzero(twice)[0][0])
+        t_ns = frame_t_ns[tracks.frame[k]]
+        rows = np.nonzero((row_t_ns == t_ns) & (id == tracks.id[k]))[0] + 2
         raise PelorusError(
-            f"{path}: id {tracks.id[row]} stands twice in the frame at "
-            f"{frame_t_ns[tracks.frame[row]]} ns"
+            f"{path}: id {tracks.id[k]} stands twice in the frame at {t_ns} ns: "
+            f"rows {rows[0]} and {rows[1]}"
         )
     return frame_t_ns, tracks
 

@@ -13,7 +13,7 @@ from itertools import permutations, product
 import numpy as np
 
 from pelorus import se3
-from pelorus.faults.duel import Duel, duel
+from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.frames import BodyAxes
 from pelorus.recording import Recording
@@ -50,8 +50,10 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     best = int(np.argmin(scores))
     result = duel(errors[0], errors[best], LAG)
     subject = "body axes"
+    if not result.frames:
+        return recording, Finding(subject, False, TOO_FEW, "left as given", told=False)
     if best == 0 or not result.clearly_won(RATIO_MAX, SHARE_MIN, Z_MIN):
-        return recording, Finding(subject, False, _quiet(scores, result), "nothing to mend")
+        return recording, Finding(subject, False, _quiet(scores), "nothing to mend")
     mended = _turned(recording.T_CB, candidates[best])
     evidence = (
         f"lag-{LAG} reprojection falls from {result.given:.1f} to {result.challenger:.1f} px with "
@@ -71,9 +73,7 @@ def _errors(recording: Recording, seen: SeenPairs, F: Floats) -> Floats:
     return seen.median_by_frame(seen.reproject(camera, motion))
 
 
-def _quiet(scores: list[float], result: Duel) -> str:
-    if not result.frames:
-        return "too few common tracks to judge"
+def _quiet(scores: list[float]) -> str:
     rival = min(scores[1:])
     return (
         f"lag-{LAG} reprojection is {scores[0]:.1f} px as given, "

@@ -9,6 +9,8 @@ import numpy as np
 
 from pelorus.se3 import Floats
 
+TOO_FEW = "too few common tracks to judge"
+
 
 @dataclass(frozen=True)
 class Duel:

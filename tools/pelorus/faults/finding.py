@@ -11,6 +11,7 @@ class Finding:
     """One examination."""
 
     subject: str  # what was examined
-    found: bool  # whether it is faulty
+    found: bool  # whether it is faulty, as far as the data can tell
     evidence: str  # the numbers
     action: str  # what was done, or why nothing
+    told: bool = True  # whether there was enough to judge by

@@ -46,7 +46,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     turning = usable & (distance > SEPARATED_MIN_M)
     if turning.sum() < PAIRS_MIN:
         evidence = f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are due"
-        return recording, Finding(subject, False, evidence, "left as given")
+        return recording, Finding(subject, False, evidence, "left as given", told=False)
     way = _way(recording, seen_motion.R, given)
     columns = _columns(recording, seen_motion.R, way, apart)
     s, sigma = _regress(seen_motion.p[usable] - way[usable], columns[usable])

@@ -7,7 +7,7 @@ mean of two noisy readings has less noise and would win for that alone.
 
 from __future__ import annotations
 
-from pelorus.faults.duel import duel
+from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
@@ -29,7 +29,7 @@ def choose(recording: Recording) -> tuple[Recording, Finding]:
     ]
     result = duel(errors[0], errors[1], 1)
     late = result.z > Z_MIN
-    evidence = "too few common tracks to judge"
+    evidence = TOO_FEW
     if result.frames:
         evidence = (
             f"lag-1 reprojection is {result.given:.2f} px with start and "
@@ -37,4 +37,6 @@ def choose(recording: Recording) -> tuple[Recording, Finding]:
             f"smaller in {100 * result.share:.0f} % of {result.frames} frames"
         )
     action = f"twist timing is {'end' if late else 'start'}"
-    return choices[int(late)], Finding("twist timing", bool(late), evidence, action)
+    return choices[int(late)], Finding(
+        "twist timing", bool(late), evidence, action, told=result.frames > 0
+    )
