@@ -16,7 +16,7 @@ from converted import Run as Command
 from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import Pose, Stereo, Truth
-from pelorus.report import verdict
+from pelorus.report import gallery, verdict
 from pelorus.report.accuracy import assess, nees_per_dof
 from pelorus.report.comparison import Comparison
 from pelorus.report.replay import Outputs, Programs
@@ -174,6 +174,7 @@ def test_report_leaves_page_pictures_and_runs(
     said = pelorus("report", path, "--out", out, "--bin", programs.float32.parent)
     assert said.status == 0, said.err
     assert pictures_in(out) == WITH_TRUTH
+    assert set(gallery.NAMES) == WITH_TRUTH | {"bias"}
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == len(WITH_TRUTH) - 1  # hero is for a README
     assert not re.search(r"(src|href)=\"(?!data:)", page)
@@ -190,8 +191,11 @@ def test_without_truth_no_error_is_claimed(
     pelorus: Command, tmp_path: Path, programs: Programs
 ) -> None:
     path = recorded(tmp_path, [m for m in drive() if not isinstance(m, Truth)])
+    (tmp_path / "nees.png").write_bytes(b"of an earlier report")
+    (tmp_path / "mine.png").write_bytes(b"none of ours")
     said = pelorus("report", path, "--out", tmp_path, "--bin", programs.float32.parent)
     assert said.status == 0, said.err
+    (tmp_path / "mine.png").unlink()
     assert pictures_in(tmp_path) == ALWAYS
     row = next(line for line in said.out.splitlines() if line.startswith("body"))
     assert row.split()[1:5] == ["-"] * 4

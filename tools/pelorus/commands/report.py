@@ -82,6 +82,8 @@ def _made(folder: Path) -> Path:
 def _publish(compared: Comparison, folder: Path) -> None:
     from pelorus.report import gallery, page, style, verdict  # noqa: PLC0415 - as above
 
+    for name in gallery.NAMES:  # of an earlier report: not every recording has all of them
+        (folder / f"{name}.png").unlink(missing_ok=True)
     drawn = []
     for picture in progress(gallery.pictures(compared), "drawing"):
         path = folder / f"{picture.name}.png"
@@ -95,7 +97,9 @@ def _publish(compared: Comparison, folder: Path) -> None:
 def _tell(runs: list[Run], lines: list[str], page: Path) -> None:
     table = Table(box=None, pad_edge=False)
     for title in overview.TITLES:
-        table.add_column(title, justify="left" if title == "run" else "right")
+        name = title == "run"
+        table.add_column(title, justify="left" if name else "right", no_wrap=name, overflow="fold")
+    table.columns[0].min_width = max(len(run.name) for run in runs)
     for run in runs:
         table.add_row(*overview.row(run))
     out.print(table)

@@ -16,6 +16,12 @@ from pelorus.report.style import RHO, THETA
 CURVE_MIN = 2
 
 
+NAMES = (
+    *("top-view", "error-body", "error-world", "error-course", "nees", "covariance", "bias"),
+    *("observations", "time", "hero"),
+)
+
+
 class Picture(NamedTuple):
     """A file `name`.png; without a caption it does not stand on the page."""
 

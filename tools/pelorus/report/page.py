@@ -30,7 +30,10 @@ MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
     "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
     "and gated: observations. The last column: time of the recording over time of the computing. "
-    "Dead reckoning and body run in float32, course and world in float64."
+    "Dead reckoning and body run in float32, course and world in float64. Body is the filter as it "
+    "is meant to be used; world, for comparison, is the textbook's EKF with landmarks in world "
+    "coordinates, and course the same with the settings of the course report that Pelorus grew "
+    "from, whatever settings the others have."
 )
 
 
