@@ -14,6 +14,7 @@ case ${1-} in
     sed -n '3,9s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
+-*) die "no option $1: tools/demo.sh [RECORDING.plr]" ;;
 esac
 [ $# -le 1 ] || die "one recording at most, not $#: tools/demo.sh [RECORDING.plr]"
 recording=${1-}

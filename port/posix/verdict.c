@@ -41,7 +41,8 @@ int verdict_on_recording(const char *path, const plr_session *s, const outcome *
         return verdict_say(path, REPLAY_EXIT_RECORDING, "is empty");
     if (counts->frames == 0) {
         snprintf(words, sizeof words,
-                 "is not a Pelorus recording: not one good frame in its first %" PRIu64 " bytes",
+                 "is not a Pelorus recording: not one good frame in its first %" PRIu64
+                 " bytes; pelorus convert makes one of other data",
                  counts->bytes);
         return verdict_say(path, REPLAY_EXIT_RECORDING, words);
     }

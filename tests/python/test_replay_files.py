@@ -64,6 +64,7 @@ def test_files_that_are_no_recordings_are_named_and_refused(record: Record, tmp_
     refused(tmp_path, "directory")
     refused(record(b""), "empty")
     refused(record(b"P6 640 480 255 " * 200), "not a Pelorus recording")
+    refused(record(b"PK 3 4 " * 200), "pelorus convert makes one")
     refused(record(np.random.default_rng(1).bytes(3_000_000)), "not a Pelorus recording")
     refused(record(b"\0" * 5000), "not a Pelorus recording")
     future = replace(header(), version_major=2)

@@ -34,7 +34,9 @@ def image_of(board: str) -> Path:
     for image in (name, SOURCE_ROOT / name):
         if image.exists():
             return image
-    raise PelorusError(f"{name}: no such image; build it with tools/robot-demo.sh, or give --image")
+    raise PelorusError(
+        f"{name}: no such image; tools/robot-demo.sh {board} builds it; or give --image"
+    )
 
 
 class Emulator:
