@@ -52,13 +52,14 @@ def build_with_cmake(folder: Path, example: str, cmake: str, cc: str, get_peloru
 
 
 def build_with_one_command(folder: Path, example: str, root: Path, cc: str) -> Path:
-    """The program, from one call of the compiler."""
+    """The program, from one call of the compiler, and without libm."""
     folder.mkdir()
     (folder / "example.c").write_text(example, encoding="utf-8")
     sources = sorted((root / "src").glob("*/*.c"))
     run(
-        cc, "-std=c99", "-O2", "-ffp-contract=off", f"-I{root / 'include'}", f"-I{root / 'src'}",
-        folder / "example.c", *sources, "-o", folder / "example", "-lm",
+        cc, "-std=c99", "-O2", "-DPLR_PORTABLE=1", "-ffp-contract=off", "-fno-math-errno",
+        f"-I{root / 'include'}", f"-I{root / 'src'}",
+        folder / "example.c", *sources, "-o", folder / "example",
     )  # fmt: skip
     return folder / "example"
 
