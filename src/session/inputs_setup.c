@@ -61,7 +61,7 @@ static void tell_setting(plr_session *s, plr_wire_setting given, const plr_setti
 static void tell_foreign_build(plr_session *s) {
     plr_line_begin(&s->out.as.text, PLR_SEVERITY_INFO);
     plr_line_words(&s->out.as.text, "this log comes from another build (precision, capacity or "
-                                    "version): the settings are taken, the bits will differ");
+                                    "version): the settings are taken, the bits may differ");
     plr_send_text(s);
 }
 

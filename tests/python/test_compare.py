@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run
-from fake_board import FakeBoard, TcpBoard
+from fake_board import FULL, FakeBoard, TcpBoard
 from pelorus import __version__
 from pelorus.flight.judge import fingerprint
-from pelorus.frames import Config, Kind, Message, Pose, Report, Stereo, Text, Twist
+from pelorus.frames import NO_BUDGET, Config, Kind, Message, Pose, Report, Stereo, Text, Twist
 from pelorus.robot.status import HEALTH, REASONS, condition
 from pelorus.robot.stream import start_from
-from replay_drive import BIN, FRAMES, drive, encode, header, log_of, run, t_ns
+from replay_drive import BIN, FRAMES, drive, encode, header, known, log_of, run, t_ns
 
 ROOT = Path(__file__).resolve().parents[2]
 SAME, DIFFERENT, NOT_COMPARABLE = 0, 1, 2
@@ -120,6 +120,42 @@ def test_a_log_told_late_is_replayed_with_its_settings(
     settings = next(at for at, m in enumerate(log) if isinstance(m, Config))
     late = [*log[:settings], *log[settings + 1 : settings + 4], log[settings], *log[settings + 4 :]]
     assert compare(late).status == SAME
+
+
+def test_known_landmarks_that_the_robot_had_no_room_for_are_left_out(
+    compare: Compare, tmp_path: Path
+) -> None:
+    settings = Config({2: 2})  # localization
+    some, others = known()[:64], known()[64:]
+    log = robots_log(tmp_path, [header(), settings, *some, *drive()[1:]])
+    refusals = [Report(0, Kind.LANDMARK, FULL) for _ in others]
+    at = 2 + len(some)
+    assert compare([*log[:at], *others, *log[at:]]).status == DIFFERENT
+    said = compare([*log[:at], *others, *refusals, *log[at:]])
+    assert said.status == SAME, said.out
+
+
+def test_a_budget_of_the_robots_own_clock_is_kept(compare: Compare, tmp_path: Path) -> None:
+    messages = drive()
+    at = index(messages, Stereo)
+    messages[at] = replace(messages[at], budget=5)  # type: ignore[type-var]
+    log = robots_log(tmp_path, messages)
+    sent = index(log, Stereo)
+    log[sent] = replace(log[sent], budget=NO_BUDGET)  # type: ignore[type-var]
+    assert compare(log).status == SAME
+
+
+def test_a_frame_that_the_robot_refused_unread_is_left_out(
+    compare: Compare, tmp_path: Path
+) -> None:
+    messages = drive()
+    at = index(messages, Stereo)
+    log = robots_log(tmp_path, [*messages[:at], *messages[at + 1 :]])
+    behind = index(log, Twist, AT + 1)
+    log[behind:behind] = [messages[at], Report(0, Kind.STEREO, FULL)]
+    said = compare(log)
+    assert said.status == SAME, said.out
+    assert "1 of more observations than the robot has room for" in said.out
 
 
 # --- other bits -----------------------------------------------------------------------------------

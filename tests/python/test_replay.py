@@ -156,6 +156,18 @@ def test_a_log_replays_to_the_same_bits_with_its_own_settings(
     assert [m.kind for m in log_of(first)] == [m.kind for m in log_of(second)]
 
 
+def test_a_log_of_another_build_says_that_the_bits_may_differ(
+    record: Record, tmp_path: Path
+) -> None:
+    """Of another capacity they are the same as a rule, of another precision they are not."""
+    log = tmp_path / "1.plr"
+    assert run(record(drive()), "--out", log, "--quiet").status == OK
+    assert "another build" not in run(log).stderr
+    said = run(log, program="pelorus-replay-f64").stderr
+    assert "this log comes from another build (precision, capacity or version)" in said
+    assert "the settings are taken, the bits may differ" in said
+
+
 @pytest.mark.parametrize("mode", ["slam", "dead_reckoning"])
 def test_what_is_written_changes_no_bit(record: Record, tmp_path: Path, mode: str) -> None:
     path, plain, full = record(drive()), tmp_path / "1.plr", tmp_path / "2.plr"

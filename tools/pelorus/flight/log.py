@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -61,6 +61,12 @@ class Frame:
         """It had more observations than the robot has room for, and was refused as a whole."""
         return self.report is not None and not self.report.t_ns and self.report.status == FULL
 
+    def within_budget(self) -> Stereo:
+        """As the robot took it: its clock may have allowed fewer observations than the sender."""
+        if self.report is None or self.report.budget >= self.stereo.budget:
+            return self.stereo
+        return replace(self.stereo, budget=self.report.budget)
+
 
 class Loss(NamedTuple):
     """Something that either the robot or the log did not get."""
@@ -96,12 +102,23 @@ class Part:
         return [f for f in self.frames if not f.answered and f.number > last]
 
     def inputs(self, left_out: Iterable[Frame] = ()) -> list[Message]:
-        """What a replay is given: no answers, and the settings in force before the first data."""
+        """What a replay is given: what the filter took, and its settings before the first data."""
         absent = {id(f.stereo) for f in (*left_out, *(f for f in self.frames if f.unread))}
+        absent |= {id(landmark) for landmark in self._landmarks_without_room()}
         taken = [m for m in self.messages if _is_input(m) and id(m) not in absent]
         first = next(at for at, m in enumerate(taken) if m.kind in DATA_KINDS or is_restore(m))
         settings = [] if self.config is None else [self.config]
-        return [*taken[:first], *settings, *taken[first:]]
+        limited = {id(f.stereo): f.within_budget() for f in self.frames}
+        return [*taken[:first], *settings, *(limited.get(id(m), m) for m in taken[first:])]
+
+    def _landmarks_without_room(self) -> list[Message]:
+        """Refused by a board, whose room for known landmarks is smaller than the desk's."""
+        known = [m for m in self.messages if isinstance(m, Landmark) and _is_input(m)]
+        refused = sum(
+            isinstance(m, Report) and m.subject == Kind.LANDMARK and m.status == FULL
+            for m in self.messages
+        )
+        return list(known[max(len(known) - refused, 0) :])
 
 
 @dataclass(frozen=True)
