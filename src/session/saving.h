@@ -6,6 +6,7 @@
  *     PLR_OK           done
  *     PLR_E_MODE       there is no storage; or a restore in the midst of a drive
  *     PLR_E_NOT_READY  save: no data was taken yet; restore: no HEADER yet, or nothing was ever saved
+ *     PLR_E_CONFIG     restore: settings or calibration make no filter
  *     PLR_E_FULL       the device is too small
  *     PLR_E_FOREIGN, _CORRUPT, _IO, _DIVERGED   as state_store.h says
  *     PLR_E_ARGUMENT, _NOT_FINITE, _RANGE       a restore's variances make no sense

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -219,13 +220,39 @@ def test_a_file_with_zeros_where_a_slot_would_begin_is_left_alone(
     record: Record, kept: Path
 ) -> None:
     path = record(drive())
-    pages = b"SQLite format 3\0".ljust(1 << 20, b"x")
-    for at in (0, len(pages) // 2):  # as in many a database or disk image
-        kept.write_bytes(pages[:at] + bytes(4) + pages[at + 4 :])
+    half = 1 << 19
+    pages = b"SQLite format 3\0".ljust(2 * half, b"x")
+    zeros = [(0, 4), (half, half + 4), (half, 2 * half)]  # as in many a database or disk image
+    for first, last in zeros:
+        kept.write_bytes(pages[:first] + bytes(last - first) + pages[last:])
         before = kept.read_bytes()
         refused(run(path, "--save-state", kept), OUTPUT, kept, "left as it is")
         refused(run(path, "--load-state", kept), USAGE, kept, "no file of saved states")
         assert kept.read_bytes() == before
+
+
+def test_states_with_something_behind_them_are_no_file_of_states(
+    record: Record, kept: Path
+) -> None:
+    path = record(drive())
+    saved(record, kept)
+    size = kept.stat().st_size
+    for longer in (size + 4096, (1 << 30) + 8192):
+        os.truncate(kept, longer)
+        refused(run(path, "--load-state", kept), USAGE, kept, "no file of saved states")
+        refused(run(path, "--save-state", kept), OUTPUT, kept, "left as it is")
+        assert kept.stat().st_size == longer
+
+
+def test_a_cut_in_the_first_slot_leaves_the_second(record: Record, kept: Path) -> None:
+    saved(record, kept)
+    saved(record, kept)
+    content = bytearray(kept.read_bytes())
+    content[:5000] = b"\xff" * 5000
+    kept.write_bytes(content)
+    result = run(record(part(CUT, FRAMES)), "--load-state", kept)
+    assert result.status == OK
+    assert "state restored: generation 2" in result.stderr
 
 
 def test_a_file_whose_first_save_was_cut_is_saved_into(record: Record, kept: Path) -> None:

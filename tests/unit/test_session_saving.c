@@ -131,6 +131,13 @@ static void assert_pose_x(double expected_m, double tolerance_m) {
     TEST_ASSERT_DOUBLE_WITHIN(tolerance_m, expected_m, pose.p[0]);
 }
 
+static void assert_told_damage(bool damage) {
+    char words[PLR_WIRE_MAX_TEXT + 1];
+    plr_time_ns t_ns;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, answer_to_state(&second_port, &t_ns, words));
+    TEST_ASSERT_EQUAL_INT(damage, strstr(words, "; the other slot holds a damaged one") != NULL);
+}
+
 /* --- save --- */
 
 static void test_a_save_is_answered_with_its_own_time_and_told_to_a_human(void) {
@@ -304,6 +311,39 @@ static void test_what_may_have_moved_widens_the_covariance(void) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-5, before[7 * i] + 0.5 + i, after[7 * i]);
 }
 
+static void test_the_first_frame_is_new_at_whatever_time(void) {
+    plr_message stereo = drive_stereo(0);
+    drive_and_save();
+    stereo.as.stereo.t_ns = 0;
+    begin(&after_restart, &second_port);
+    send(&second_port, state(PLR_STATE_RESTORE, 0));
+    send(&second_port, stereo);
+    run(&after_restart);
+    TEST_ASSERT_EQUAL_UINT32(0, after_restart.totals.refused);
+}
+
+/* Its poses are given, so nothing is known of how far it may have moved; its frames need no twist. */
+static void test_mapping_goes_on_where_the_map_was(void) {
+    const plr_message mapping = drive_config("mode", PLR_MODE_MAPPING);
+    plr_message moved = state(PLR_STATE_RESTORE, 5);
+    moved.as.state.moved_variance[0] = 1;
+    begin(&before_cut, &first_port);
+    send(&first_port, mapping);
+    send(&first_port, drive_truth(0.09));
+    send(&first_port, drive_stereo(0.09));
+    send(&first_port, state(PLR_STATE_SAVE, 0));
+    run(&before_cut);
+    TEST_ASSERT_EQUAL_UINT32(0, before_cut.totals.refused);
+    begin(&after_restart, &second_port);
+    send(&second_port, mapping);
+    send(&second_port, moved);
+    send(&second_port, state(PLR_STATE_RESTORE, 5));
+    run(&after_restart);
+    assert_answered(&second_port, PLR_E_MODE, "not restored");
+    assert_answered(&second_port, PLR_OK, "state restored");
+    TEST_ASSERT_EQUAL_UINT(SLOTS, plr_filter_landmark_count(&after_restart.filter));
+}
+
 /* Neither a START, before or behind it, nor a TRUTH, nor the option. */
 static void restore_among_other_starts(plr_start_choice choice) {
     plr_message start = drive_start(0.1 * CUT), truth = drive_truth(0.1 * CUT);
@@ -441,21 +481,57 @@ static void test_variances_without_sense_are_refused(void) {
     }
 }
 
+/* A session that was never asked: CONFIG counts, and the pose is not known before a START. */
 static void test_a_second_attempt_that_fails_takes_the_first_one_back(void) {
     plr_message start = drive_start(0.1 * CUT);
     drive_and_save();
+    options.start = PLR_START_RECORDED;
     begin(&after_restart, &second_port);
     send(&second_port, state(PLR_STATE_RESTORE, 0));
     run(&after_restart);
     flash.bytes[100] ^= 4;
     start.as.start.T_WB.p[0] = 500;
     send(&second_port, state(PLR_STATE_RESTORE, 0));
+    send(&second_port, drive_config("bias", 1));
+    send(&second_port, drive_stereo(0.1 * CUT - 0.01));
     send(&second_port, start);
     send(&second_port, drive_twist(0.1 * CUT));
     run(&after_restart);
     assert_answered(&second_port, PLR_OK, "restored");
     assert_answered(&second_port, PLR_E_CORRUPT, "not restored");
+    TEST_ASSERT_EQUAL_UINT32(2, after_restart.totals.refused); /* and the frame */
+    TEST_ASSERT_EQUAL_INT(1, plr_filter_config(&after_restart.filter)->bias);
     assert_pose_x(500, 1e-4);
+}
+
+static void test_settings_that_make_no_filter_are_refused(void) {
+    plr_message header = drive_header();
+    const plr_port functions = faulty_port_functions(&second_port);
+    drive_and_save();
+    header.as.header.calibration.fx_px = -1;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&after_restart, &functions, &options));
+    send(&second_port, header);
+    send(&second_port, state(PLR_STATE_RESTORE, 0));
+    run(&after_restart);
+    assert_answered(&second_port, PLR_E_CONFIG, "not restored");
+    TEST_ASSERT_EQUAL_UINT32(2, after_restart.totals.refused); /* the HEADER too */
+}
+
+static void test_of_two_states_the_damaged_one_is_told(void) {
+    drive_and_save();
+    send(&first_port, state(PLR_STATE_SAVE, 0));
+    run(&before_cut);
+    begin(&after_restart, &second_port);
+    send(&second_port, state(PLR_STATE_RESTORE, 0));
+    run(&after_restart);
+    assert_answered(&second_port, PLR_OK, "generation 2, 8 landmarks, ");
+    flash.bytes[FAULTY_FLASH_BYTES / 2 + 100] ^= 4;
+    send(&second_port, state(PLR_STATE_RESTORE, 0));
+    run(&after_restart);
+    assert_answered(&second_port, PLR_OK, "generation 1, ");
+    faulty_port_answers_again(&second_port);
+    assert_told_damage(false);
+    assert_told_damage(true);
 }
 
 /* --- by option --- */
@@ -507,6 +583,19 @@ static void collect(faulty_port *from, faulty_port *to) {
         faulty_port_send(to, &message);
 }
 
+static void test_a_log_holds_both_requests(void) {
+    plr_message message;
+    options.output |= PLR_OUTPUT_ECHO;
+    drive_and_save();
+    begin(&after_restart, &second_port);
+    send(&second_port, state(PLR_STATE_RESTORE, 5));
+    run(&after_restart);
+    TEST_ASSERT_TRUE(faulty_port_answer_of(&first_port, PLR_KIND_STATE, &message));
+    TEST_ASSERT_EQUAL_UINT8(PLR_STATE_SAVE, message.as.state.action);
+    TEST_ASSERT_TRUE(faulty_port_answer_of(&second_port, PLR_KIND_STATE, &message));
+    TEST_ASSERT_EQUAL_UINT8(PLR_STATE_RESTORE, message.as.state.action);
+}
+
 static void test_the_log_of_a_restored_drive_gives_its_bits_where_the_state_is(void) {
     static faulty_port replay_port;
     static plr_session replay;
@@ -540,6 +629,8 @@ int main(void) {
     RUN_TEST(test_the_settings_in_force_are_told_before_the_answer);
     RUN_TEST(test_on_another_clock_the_body_stands_where_it_stood);
     RUN_TEST(test_what_may_have_moved_widens_the_covariance);
+    RUN_TEST(test_the_first_frame_is_new_at_whatever_time);
+    RUN_TEST(test_mapping_goes_on_where_the_map_was);
     RUN_TEST(test_no_other_start_overrides_it);
     RUN_TEST(test_a_start_among_the_data_sets_the_pose_anew_as_ever);
     RUN_TEST(test_said_twice_it_is_done_twice);
@@ -551,9 +642,12 @@ int main(void) {
     RUN_TEST(test_a_device_that_cannot_be_read_is_refused);
     RUN_TEST(test_variances_without_sense_are_refused);
     RUN_TEST(test_a_second_attempt_that_fails_takes_the_first_one_back);
+    RUN_TEST(test_settings_that_make_no_filter_are_refused);
+    RUN_TEST(test_of_two_states_the_damaged_one_is_told);
     RUN_TEST(test_who_asks_for_the_saved_state_gets_it_at_the_first_data);
     RUN_TEST(test_who_asks_for_the_saved_state_on_another_clock_goes_on_there);
     RUN_TEST(test_who_asks_for_the_saved_state_and_has_none_needs_a_start);
+    RUN_TEST(test_a_log_holds_both_requests);
     RUN_TEST(test_the_log_of_a_restored_drive_gives_its_bits_where_the_state_is);
     return UNITY_END();
 }

@@ -75,13 +75,37 @@ static void test_a_disk_that_has_failed_once_is_not_believed_the_second_time(voi
     TEST_ASSERT_EQUAL_INT(-1, reads(0));
     TEST_ASSERT_EQUAL_INT(0, writes(0));
     TEST_ASSERT_EQUAL_INT(-1, reads(0));
-    TEST_ASSERT_EQUAL_INT(ENOSPC, file.error);
     TEST_ASSERT_EQUAL_UINT(1, fsyncs);
+    TEST_ASSERT_EQUAL_INT(0, close(file.fd));
+    TEST_ASSERT_EQUAL_INT(-1, writes(0));
+    TEST_ASSERT_EQUAL_INT(ENOSPC, file.error); /* the first failure is the one to tell */
+    file.fd = -1;
+}
+
+static void test_a_slot_has_room_for_what_was_asked_in_whole_blocks(void) {
+    char problem[PROBLEM_SIZE];
+    TEST_ASSERT_EQUAL_UINT32(2 * BLOCK, device->size);
+    state_file_close(&file);
+    TEST_ASSERT_EQUAL_INT(0, truncate(path, 0));
+    TEST_ASSERT_TRUE(state_file_open_to_save(&file, path, BLOCK + 1, problem));
+    TEST_ASSERT_EQUAL_UINT32(4 * BLOCK, device->size);
+}
+
+static void test_no_file_reads_as_blank_and_takes_nothing(void) {
+    uint8_t bytes[4] = {1, 2, 3, 4};
+    state_file_close(&file);
+    state_file_none(&file);
+    TEST_ASSERT_EQUAL_INT(0, device->read(device->context, 0, bytes, 4));
+    TEST_ASSERT_EACH_EQUAL_UINT8(0, bytes, 4);
+    TEST_ASSERT_EQUAL_INT(-1, writes(0));
+    TEST_ASSERT_EQUAL_INT(EBADF, file.error);
 }
 
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_what_was_written_or_erased_is_on_the_disk_before_it_is_read_back);
     RUN_TEST(test_a_disk_that_has_failed_once_is_not_believed_the_second_time);
+    RUN_TEST(test_a_slot_has_room_for_what_was_asked_in_whole_blocks);
+    RUN_TEST(test_no_file_reads_as_blank_and_takes_nothing);
     return UNITY_END();
 }

@@ -16,7 +16,10 @@
 
 static volatile uint32_t *model_register(uint32_t address);
 
+static unsigned barriers;
+
 static void core_write_barrier(void) {
+    barriers++;
 }
 
 #include "../../port/cortex_m/drivers/stm32_flash.c"
@@ -122,17 +125,20 @@ static void play_stores(void) {
             part.contents[i] &= _storage_start[i];
     if (programs)
         begin_operation();
-    else
+    if (programs && (part.cr & 3U << 8) != MODEL_X32)
+        part.sr |= 1U << 6; /* parallelism: words were stored */
+    if (!programs)
         part.sr |= 1U << 7; /* sequence */
 }
 
 static void play_caches(void) {
     const uint32_t acr = part.registers[0];
-    if ((acr & 0x1800) == 0)
+    if ((part.shown_acr & 0x1800) != 0)
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, acr & 0x600, "a cache is enabled in its reset");
+    if ((acr & 0x1800) == 0 || acr == part.shown_acr)
         return;
     TEST_ASSERT_EQUAL_HEX32(0, (acr | part.shown_acr) & 0x600); /* only while they are off */
     part.caches_emptied++;
-    part.registers[0] = acr & ~(uint32_t)0x1800;
 }
 
 static void show(void) {
@@ -183,6 +189,7 @@ void setUp(void) {
     part.registers[0] = 0x705;
     part.operation_ns = BUSY_NS;
     part.broken_at = -1;
+    barriers = 0;
     memset(part.contents, 0x55, STORAGE);
     show();
     device = stm32_flash();
@@ -228,6 +235,7 @@ static void test_what_is_programmed_reads_back(void) {
     TEST_ASSERT_EQUAL_HEX8(0xFF, back[0]);
     TEST_ASSERT_EQUAL_HEX8(1, back[1]);
     assert_all(0xFF, 1024 + 256, SECTOR_BYTES);
+    TEST_ASSERT_EQUAL_UINT(sizeof bytes / 4, barriers); /* each word is out before its wait */
 }
 
 static void test_what_was_not_erased_does_not_take(void) {
@@ -270,6 +278,25 @@ static void test_a_controller_that_stays_busy_is_given_up_before_the_watchdog_bi
     TEST_ASSERT_EQUAL_INT(0, erase(0, SECTOR_BYTES)); /* it recovers, and is locked again */
 }
 
+static void test_a_word_that_never_ends_is_given_up_soon(void) {
+    const uint8_t bytes[8] = {0};
+    part.stuck_busy = true; /* from the first operation on */
+    TEST_ASSERT_EQUAL_INT(-1, device.program(device.context, 0, bytes, 8));
+    TEST_ASSERT_LESS_THAN_UINT64(UINT64_C(100000000), part.now_ns);
+    assert_all(0x55, 4, STORAGE);
+    part.stuck_busy = false;
+    part.now_ns += UINT64_C(10000000000);
+    TEST_ASSERT_EQUAL_INT(0, erase(0, SECTOR_BYTES));
+}
+
+static void test_reading_and_programming_feed_the_watchdog(void) {
+    uint8_t bytes[4] = {0};
+    TEST_ASSERT_EQUAL_INT(0, device.read(device.context, 0, bytes, 4));
+    TEST_ASSERT_EQUAL_UINT(1, part.feeds);
+    TEST_ASSERT_EQUAL_INT(0, program(0, (const uint8_t[4]){0}, 4));
+    TEST_ASSERT_EQUAL_UINT(2, part.feeds);
+}
+
 static void test_the_longest_erase_is_waited_for_and_the_watchdog_fed_around_it(void) {
     part.operation_ns = UINT64_C(2000000000);
     TEST_ASSERT_EQUAL_INT(0, erase(0, SECTOR_BYTES));
@@ -310,6 +337,8 @@ int main(void) {
     RUN_TEST(test_a_cell_that_does_not_program_is_found_at_once);
     RUN_TEST(test_every_error_flag_ends_it_and_is_cleared_for_the_next);
     RUN_TEST(test_a_controller_that_stays_busy_is_given_up_before_the_watchdog_bites);
+    RUN_TEST(test_a_word_that_never_ends_is_given_up_soon);
+    RUN_TEST(test_reading_and_programming_feed_the_watchdog);
     RUN_TEST(test_the_longest_erase_is_waited_for_and_the_watchdog_fed_around_it);
     RUN_TEST(test_a_controller_that_is_not_there_fails_at_once);
     RUN_TEST(test_nothing_outside_or_out_of_step_is_touched);
