@@ -22,7 +22,7 @@ from replay_drive import BIN, FRAMES, drive, encode, header, known, log_of, run,
 
 ROOT = Path(__file__).resolve().parents[2]
 SAME, DIFFERENT, NOT_COMPARABLE = 0, 1, 2
-DAMAGED = -15  # plr_status
+DAMAGED, NOT_READY = -15, -13  # plr_status
 AT = 20  # the frame that something happens to, from 0; it is told as AT + 1
 BOOT = Text("pelorus 0.1.0 on a board, build 0x1: power-on")
 
@@ -221,7 +221,7 @@ def test_a_refusal_of_the_robot_alone_is_told_as_such(compare: Compare, log: lis
     said = compare(told)
     assert said.status == DIFFERENT
     assert "REPORT status: the desk 0, the robot -7" in said.out
-    assert "the robot refused 1 STEREO: older than the last twist (status -7)" in said.out
+    assert "the robot refused it: older than the last twist (status -7)" in said.out
 
 
 def test_a_number_that_is_none_is_infinitely_far(compare: Compare, log: list[Message]) -> None:
@@ -264,7 +264,7 @@ def lost_on_the_way(tmp_path: Path, kind: type[Message]) -> tuple[list[Message],
 def test_a_frame_that_did_not_reach_the_robot_is_left_out(compare: Compare, tmp_path: Path) -> None:
     said = compare(lost_on_the_way(tmp_path, Stereo)[0])
     assert said.status == SAME, said.out
-    assert f"replayed without frames that had no answer ({AT + 1})" in said.out
+    assert f"frame {AT + 1}: it did not reach the robot, and the replay leaves it out" in said.out
     assert f"at frame {AT + 1}: no answer to frame {AT + 1}" in said.out
     assert f"{FRAMES - 1} of {FRAMES} frames" in said.out
 
@@ -274,10 +274,11 @@ def test_a_twist_that_was_damaged_on_the_way_ends_what_can_be_compared(
 ) -> None:
     log, twist = lost_on_the_way(tmp_path, Twist)
     log.insert(log.index(twist) + 1, Report(0, 0, DAMAGED))
+    log.append(Text("the recording is not complete: not everything arrived, 39 of 40 TWIST", 1))
     said = compare(log)
     assert said.status == NOT_COMPARABLE, said.out
     assert f"from frame {AT + 1} on the robot may have had other inputs" in said.out
-    assert "the robot refused 1 frames: damaged on the way" in said.out
+    assert "the robot refused a message: damaged on the way (status -15)" in said.out
     assert f"frame {AT + 2}, t 7.100000000 s, is the first that differs" in said.out
 
 
@@ -289,7 +290,9 @@ def test_a_twist_that_the_robot_missed_is_found_in_its_last_words(
     words = "the recording is not complete: not everything arrived, 39 of 40 TWIST"
     said = compare([*log, Text(words, 1)])
     assert said.status == NOT_COMPARABLE
-    assert "the robot said at the end: 39 of 40 TWIST arrived" in said.out
+    words = "the robot's count at the end lacks messages that the log holds: 1"
+    assert f"lost      somewhere: {words}\n" in said.out
+    assert f"somewhere the robot may have had other inputs than the log holds ({words})" in said.out
 
 
 def test_a_difference_before_a_loss_is_a_difference(compare: Compare, log: list[Message]) -> None:
@@ -333,12 +336,15 @@ def restarted(tmp_path: Path) -> list[Message]:
     last = [m for m in first if isinstance(m, Pose)][-1]
     second = robots_log(tmp_path, [header(), start_from(last), *messages[cut + 3 :]])
     died = messages[cut : cut + 3]  # taken by nobody
-    return [*first, *died, BOOT, Text("the board started anew", 1), *second]
+    half = [Report(t_ns(AT + 1), Kind.STEREO, NOT_READY), Report(0, 0, DAMAGED)]
+    note = Text("the board started anew", 1)
+    return [*first, *died, BOOT, half[1], note, second[0], half[0], *second[1:]]
 
 
 def test_each_life_of_a_robot_is_compared_by_itself(compare: Compare, tmp_path: Path) -> None:
     said = compare(restarted(tmp_path))
     assert said.status == SAME, said.out
+    assert "lost" not in said.out
     assert f"part 1 of 2, frames 1 to {AT + 2}\n" in said.out
     assert f"part 2 of 2, frames {AT + 3} to {FRAMES}: the robot started anew" in said.out
     assert f"{FRAMES - 1} of {FRAMES} frames" in said.out

@@ -21,7 +21,8 @@ import numpy as np
 import pytest
 from pelorus.frames import Message, Pose
 from pelorus.robot.compare import digest
-from pelorus.robot.emulator import MACHINES
+from pelorus.robot.emulator import MACHINES, Emulator
+from pelorus.robot.stream import Streamer
 from pelorus.wire import Counts, Writer, read_file
 from recordings import first_frames
 
@@ -270,3 +271,26 @@ def test_the_log_of_a_drive_compares_equal_and_one_other_bit_does_not(
     found = pelorus("compare", other, "--bin", program.parent)
     assert found.returncode == 1, found.stdout + found.stderr
     assert "frame 18, " in found.stdout
+
+
+def test_the_log_of_a_board_that_was_reset_compares_equal_in_both_its_lives(
+    emulator: Emulator, short_drive: Path, program: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "flight.plr"
+    link = emulator.connect()
+    messages = [frame.message for frame in read_file(short_drive)[0]]
+
+    def pressed() -> Iterator[Message]:
+        for at, message in enumerate(messages):
+            if at == len(messages) // 2:
+                emulator.reset()
+            yield message
+
+    with log.open("wb") as stream:
+        outcome = Streamer(link, stream).run(pressed())
+    link.close()
+    assert outcome.restarts == 1
+    found = pelorus("compare", log, "--bin", program.parent)
+    assert found.returncode == 0, found.stdout + found.stderr
+    assert "part 2 of 2, " in found.stdout
+    assert f"the same bits: {len(outcome.poses)} of {FRAMES} frames" in found.stdout

@@ -13,10 +13,10 @@ from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, Sizes
 from pelorus.flight.judge import Desk, Judgement, Verdict, judge, of_this_version, verdict_of
-from pelorus.flight.log import Frame, read_log
+from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.frames import Config
 from pelorus.report.replay import find_programs
-from pelorus.robot.status import condition, refusal
+from pelorus.robot.status import STATUSES, condition
 
 LOSSES_SHOWN = 5
 START_HINT = "if the pelorus-replay that wrote the log was given --start, give it here too"
@@ -141,9 +141,10 @@ def _counts(judgement: Judgement) -> Iterator[tuple[str, str]]:
         yield "end", f"no answer came from frame {first} on: the robot, the link or the log ended"
     if judgement.left_out:
         numbers = ", ".join(str(frame.number) for frame in judgement.left_out[:LOSSES_SHOWN])
-        yield "lost", f"replayed without frames that had no answer ({numbers}): so it agrees better"
+        yield "lost", f"frame {numbers}: it did not reach the robot, and the replay leaves it out"
     for loss in part.losses[:LOSSES_SHOWN]:
-        yield "lost", f"at frame {loss.at}: {loss.words}"
+        where = "somewhere" if loss.at == NOWHERE else f"at frame {loss.at}"
+        yield "lost", f"{where}: {loss.words}"
     if len(part.losses) > LOSSES_SHOWN:
         yield "lost", f"and {len(part.losses) - LOSSES_SHOWN} more"
 
@@ -170,7 +171,8 @@ def _said(robot: Frame) -> str:
     if report is None:
         return "the robot's REPORT on it is not in the log"
     if report.status:
-        return f"the robot refused {refusal(report.subject, report.status, 1)}"
+        why = STATUSES.get(report.status, "no status of this version")
+        return f"the robot refused it: {why} (status {report.status})"
     return (
         f"health {condition(report.health, report.reasons)}; {report.used} used, "
         f"{report.gated} gated of {report.matched} matched, {report.created} new"

@@ -12,7 +12,7 @@ from pathlib import Path
 from pelorus import __version__
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
-from pelorus.flight.log import Frame, Log, Loss, Part, frames_of
+from pelorus.flight.log import NOWHERE, Frame, Log, Loss, Part, frames_of
 from pelorus.frames import Config, Header, Message
 from pelorus.report.replay import Programs
 from pelorus.robot.compare import desktop_log, write_recording
@@ -51,11 +51,12 @@ class Judgement:
 
     @property
     def loss(self) -> Loss | None:
-        """What was lost before or at the first difference."""
+        """What was lost last before or at the first difference."""
         first = self.first
         if first is None:
             return None
-        return next((loss for loss in self.part.losses if loss.at <= first.robot.number), None)
+        before = [loss for loss in self.part.losses if loss.at <= first.robot.number]
+        return max(before, default=None, key=lambda loss: loss.at)
 
 
 @dataclass(frozen=True)
@@ -200,9 +201,10 @@ def _concluded(found: Judgement) -> Judgement:
     first, loss = found.first, found.loss
     if first is not None and loss is not None:
         found.verdict = Verdict.NOT_COMPARABLE
+        where = "somewhere" if loss.at == NOWHERE else f"from frame {loss.at} on"
         found.why = (
-            f"from frame {loss.at} on the robot may have had other inputs than the log holds "
-            f"({loss.words}); what comes behind cannot be compared"
+            f"{where} the robot may have had other inputs than the log holds ({loss.words}); "
+            "what comes behind cannot be compared"
         )
     elif first is not None:
         found.verdict = Verdict.DIFFERENT

@@ -8,7 +8,7 @@ each of its lives is a drive of its own, from its HEADER to the next boot messag
 from __future__ import annotations
 
 import re
-from collections import defaultdict, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -18,6 +18,7 @@ from typing import NamedTuple
 from pelorus.errors import PelorusError
 from pelorus.frames import (
     Config,
+    Header,
     Kind,
     Landmark,
     Message,
@@ -29,7 +30,7 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
-from pelorus.robot.status import refusal
+from pelorus.robot.status import STATUSES
 from pelorus.robot.stream import BOOT_WORDS, is_restore
 from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
 
@@ -68,10 +69,13 @@ class Frame:
         return replace(self.stereo, budget=self.report.budget)
 
 
+NOWHERE = 0  # where nothing tells what place a loss has
+
+
 class Loss(NamedTuple):
     """Something that either the robot or the log did not get."""
 
-    at: int  # number of the first frame that it may have touched
+    at: int  # number of the first frame that it may have touched, or NOWHERE
     words: str
 
 
@@ -201,9 +205,10 @@ def _part(received: Sequence[Received], before: int | None, frames_before: int) 
         Loss(f.number, f"no answer to frame {f.number}: it, or the answer, was lost on the way")
         for f in part.unanswered
     ]
-    part.losses += [
-        Loss(frames_before + 1, f"the robot said at the end: {words}") for words in _arrived(part)
-    ]
+    absent = _not_arrived(part)
+    if absent > len(part.losses):
+        words = f"the robot's count at the end lacks messages that the log holds: {absent}"
+        part.losses.append(Loss(NOWHERE, words))
     part.losses.sort()
     return part
 
@@ -215,10 +220,16 @@ class _Walk:
         self.frames: list[Frame] = []
         self.losses: list[Loss] = []
         self._before = frames_before
+        self._begun = False  # a HEADER has come
         self._waiting: defaultdict[int, deque[Frame]] = defaultdict(deque)  # by time
 
     def lose(self, words: str) -> None:
-        """Something is missing here; it may touch the frame that is not answered yet."""
+        """Something is missing here; it may touch the frame that is not answered yet.
+
+        Before the HEADER a filter takes nothing, so nothing is lost on it.
+        """
+        if not self._begun:
+            return
         last = self.frames[-1] if self.frames else None
         under_way = last is not None and not last.answered
         number = self._before + len(self.frames) + (0 if under_way else 1)
@@ -226,6 +237,8 @@ class _Walk:
 
     def take(self, message: Message) -> None:
         match message:
+            case Header():
+                self._begun = True
             case Stereo():
                 self.frames.append(Frame(self._before + len(self.frames) + 1, message))
                 self._waiting[message.t_ns].append(self.frames[-1])
@@ -238,7 +251,8 @@ class _Walk:
             case Report() if message.subject == Kind.STEREO:
                 self._take_report(message)
             case Report() if message.status in NOT_ARRIVED and message.subject != Kind.STATE:
-                self.lose(f"the robot refused {refusal(message.subject, message.status, 1)}")
+                why = f"{STATUSES[message.status]} (status {message.status})"
+                self.lose(f"the robot refused a message: {why}")
             case Text() if self.frames:
                 self.frames[-1].words.append(message.text)
             case _:
@@ -248,7 +262,7 @@ class _Walk:
         waiting = self._waiting[report.t_ns]
         if waiting:
             waiting.popleft().report = report
-        elif report.t_ns:
+        elif report.t_ns and not report.status:
             self.lose("an answer to a frame that the log does not hold")
         elif self.frames and not self.frames[-1].answered:  # refused unread, so at no time
             self.frames[-1].report = report
@@ -271,13 +285,14 @@ def _is_restored(messages: Sequence[Message]) -> bool:
     return bool(asked) and not any(r.status and r.t_ns in asked for r in refused)
 
 
-def _arrived(part: Part) -> list[str]:
-    """What the robot says of its inputs, where they are fewer than the log holds."""
-    found = []
-    for message in part.messages:
-        if isinstance(message, Text) and message.text.startswith(INCOMPLETE_WORDS):
-            for count, name in ARRIVED.findall(message.text):
-                held = sum(_is_input(m) and m.kind == Kind[name] for m in part.messages)
-                if int(count) < held:
-                    found.append(f"{count} of {held} {name} arrived")
-    return found
+def _not_arrived(part: Part) -> int:
+    """How many inputs the log holds that the robot did not get, by its count at the end."""
+    held = Counter(m.kind for m in part.messages if _is_input(m))
+    last_words = [
+        m.text for m in part.messages if isinstance(m, Text) and m.text.startswith(INCOMPLETE_WORDS)
+    ]
+    return sum(
+        max(held[Kind[name]] - int(count), 0)
+        for text in last_words
+        for count, name in ARRIVED.findall(text)
+    )
