@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from pelorus.frames import Message
 from pelorus.robot.emulator import Emulator
+from pelorus.robot.link import Link
 from pelorus.wire import read_file
 
 
@@ -40,6 +41,13 @@ def firmware(robot: Path, board: str) -> Path:
 def emulator(board: str, firmware: Path) -> Iterator[Emulator]:
     with Emulator(board, firmware) as running:
         yield running
+
+
+@pytest.fixture
+def link(emulator: Emulator) -> Iterator[Link]:
+    connected = emulator.connect()
+    yield connected
+    connected.close()
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import struct
 import subprocess
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,13 +35,6 @@ STREAM = 128  # in the first byte of an input of corpus_session: see fuzz_sessio
 PATIENCE_S = 60.0
 DAY_NS = 86_400_000_000_000
 END = DELIMITER + encode(End(0, 0, 0, 0, 0), 0)
-
-
-@pytest.fixture
-def link(emulator: Emulator) -> Iterator[Link]:
-    connected = emulator.connect()
-    yield connected
-    connected.close()
 
 
 @pytest.fixture(scope="module")

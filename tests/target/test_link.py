@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterator
 
 import pytest
 from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo, Text, Twist
@@ -21,13 +20,6 @@ NOT_READY, MODE = -13, -9  # plr_status
 SHORT_S = 1.0
 PATIENCE_S = 20.0
 BOOT_S = 3.0
-
-
-@pytest.fixture
-def link(emulator: Emulator) -> Iterator[Link]:
-    connected = emulator.connect()
-    yield connected
-    connected.close()
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,13 +23,6 @@ RETAINED = {"mps2_an386": 0x203C0000, "mps2_an500": 0x203C0000, "mps3_an547": 0x
 SLOT = 128 * 1024  # half of the region
 INTO_THE_STATE = 100
 WITHOUT_FLASH = {"stm32f405": "QEMU does not model the STM32's flash controller"}
-
-
-@pytest.fixture
-def link(emulator: Emulator) -> Iterator[Link]:
-    connected = emulator.connect()
-    yield connected
-    connected.close()
 
 
 @pytest.fixture(scope="module")
