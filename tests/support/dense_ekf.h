@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * The textbook extended Kalman filter, as the oracle for whole frames: full matrices in double, one
- * Jacobian a step, every observation of a frame in one gain, Joseph's form. It follows DESIGN
- * section 2 and shares nothing with src/.
+ * Jacobian a step, every observation of a frame in one gain, Joseph's form. It follows
+ * docs/MATH.md and shares nothing with src/.
  *
  * Errors: pose (rho, theta) on the right, biases, and for each landmark the error of its point: of q
  * in the camera (`body`) or of m in the world (`world`). Where the filter has the polar chart, this

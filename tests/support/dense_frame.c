@@ -43,7 +43,7 @@ static bool linearise(const dense_ekf *e, unsigned landmark, const plr_observati
     return true;
 }
 
-/* d^2 of one observation (DESIGN 2.3). */
+/* d^2 of one observation (MATH 8). */
 static double distance2(const dense_ekf *e, const plr_observation *o, const double *H,
                         const double r[3]) {
     const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
@@ -191,7 +191,7 @@ void dense_insert_known(dense_ekf *e, const plr_landmark *known) {
     append(e, known->id, q, K, P_q);
 }
 
-/* May these pixels make a landmark? (DESIGN 2.3) */
+/* May these pixels make a landmark? (MATH 9) */
 static bool is_worth_it(const dense_ekf *e, const plr_observation *o) {
     const plr_config *c = &e->config;
     const double disparity = (double)o->uL_px - (double)o->uR_px;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Matrices, geometry and Jacobians of the dense filter, in double, as DESIGN section 2 has them. */
+/* Matrices, geometry and Jacobians of the dense filter, in double, as docs/MATH.md has them. */
 #ifndef PELORUS_TEST_DENSE_PARTS_H
 #define PELORUS_TEST_DENSE_PARTS_H
 
@@ -57,7 +57,7 @@ void dense_back_project(const plr_calibration *c, const double z[3], double pixe
 /* q of a landmark: stored, or brought from the world. */
 void dense_in_camera(const dense_ekf *e, unsigned landmark, double q[3]);
 
-/* A correction of a point as the chart makes it: bearing and inverse range (DESIGN 2.1), written
+/* A correction of a point as the chart makes it: bearing and inverse range (MATH 5), written
  * without a basis. q~ = retr(q, Jw e), and J the transport Ji(q~) diag(M, 1) Jw(q), 3x3. */
 void dense_polar_step(const double q[3], const double e[3], double moved[3], double J[9]);
 

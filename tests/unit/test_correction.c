@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The correction by a frame, in blocks, against one dense gain (DESIGN 2.4); a block is all or
+/* The correction by a frame, in blocks, against one dense gain (MATH 10); a block is all or
  * nothing. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The gate against the dense Mahalanobis distance, and its limits (DESIGN 2.3). */
+/* The gate against the dense Mahalanobis distance, and its limits (MATH 8). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
  * Where the two models must agree: at one linearisation point they are linearly equivalent,
- * H_world A = H_body with A the map from body errors to world errors (DESIGN 2.2), and so are their
+ * H_world A = H_body with A the map from body errors to world errors (MATH 12), and so are their
  * innovation covariances, if P_world = A P_body A^T. Also src/filter/model.c, on which A rests.
  */
 #include <math.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* The `body` model against differences of the true, nonlinear maps: observation, new and known
- * landmarks, their place in the world (DESIGN 2.2, 2.3, 2.6). */
+ * landmarks, their place in the world (MATH 7, 9, 13). */
 #include <math.h>
 #include <string.h>
 #include <unity.h>

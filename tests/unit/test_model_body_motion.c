@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The `body` model in motion: propagation against differences of the true map (DESIGN 2.1), the
- * retraction and its transport against their formulas in double (2.4). */
+/* The `body` model in motion: propagation against differences of the true map (MATH 6), the
+ * retraction and its transport against their formulas in double (11). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The pose's motion and what it accumulates for the covariance (DESIGN 2.1), against the same in
+/* The pose's motion and what it accumulates for the covariance (MATH 4), against the same in
  * double by power series. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The polar chart: two bearing angles and inverse range (DESIGN 2). */
+/* The polar chart: two bearing angles and inverse range (MATH 5). */
 #include <math.h>
 #include <string.h>
 #include <unity.h>

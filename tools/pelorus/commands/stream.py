@@ -61,7 +61,10 @@ def stream(
         ANSWER_S, min=0.01, metavar="S", help="How long to wait for the answer to a frame."
     ),
     save_state: bool = typer.Option(
-        False, "--save-state", help="Have the board keep its state at the end, over a power cut."
+        False,
+        "--save-state",
+        help="Have the board keep its state at the end, over a power cut. Under qemu:BOARD it is "
+        "gone with the emulator, so at the end of this command.",
     ),
     restore_state: bool = typer.Option(
         False,
