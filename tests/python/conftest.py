@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from flight_logs import Compare, robots_log
 from pelorus.cli import main
+from pelorus.frames import Message
+from replay_drive import BIN, drive, encode
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
@@ -41,3 +44,21 @@ def pelorus(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
         return Said(status, captured.out, captured.err)
 
     return run
+
+
+@pytest.fixture
+def compare(pelorus: Callable[..., Said], tmp_path: Path) -> Compare:
+    """`pelorus compare` on a log, given as messages or bytes."""
+
+    def call(log: Iterable[Message] | bytes, *options: object) -> Said:
+        path = tmp_path / "flight.plr"
+        path.write_bytes(log if isinstance(log, bytes) else encode(log))
+        return pelorus("compare", path, "--bin", BIN, *options)
+
+    return call
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> list[Message]:
+    """Of a robot with settings of its own."""
+    return robots_log(tmp_path, drive(), "--slots", "20", "--bias", "on")

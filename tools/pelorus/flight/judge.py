@@ -127,7 +127,7 @@ def _obstacle(part: Part, state: Path | None) -> str:
     """Why no replay can be set up."""
     if not any(isinstance(m, Header) for m in part.messages):
         return "no HEADER came after the robot's restart: it had no calibration to work with"
-    if not part.answered:
+    if all(frame.unread for frame in part.answered):
         return "not one frame was answered: there is nothing to compare"
     if part.config is None:
         return (
@@ -145,8 +145,11 @@ def _obstacle(part: Part, state: Path | None) -> str:
 
 def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame]) -> Judgement:
     assert part.config is not None
-    options = ["--start", desk.start] if desk.start and not part.restored else []
-    options += ["--load-state", str(state)] if part.restored else []
+    options: list[str] = []
+    if part.restored:
+        options = ["--load-state", str(state)]
+    elif desk.start is not None and part.frames[0].number == 1:  # a second life has a START
+        options = ["--start", desk.start]
     messages = _replayed(part.inputs(left_out), desk.program(part.config), options)
     here = next((m for m in messages if isinstance(m, Config) and m.build_fingerprint), None)
     if here is None:
@@ -172,8 +175,14 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
 def _replayed(inputs: list[Message], program: Path, options: list[str]) -> list[Message]:
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         recording = Path(folder) / "inputs.plr"
-        write_recording(recording, inputs)
-        return desktop_log(recording, program, options)
+        try:
+            write_recording(recording, inputs)
+            return desktop_log(recording, program, options)
+        except OSError as error:
+            raise PelorusError(f"{folder}: cannot be written: {error.strerror}") from error
+        except PelorusError as error:
+            words = str(error).replace(str(recording), "the inputs of the log")
+            raise PelorusError(words) from error
 
 
 def _unlike(robot: Config, here: Config) -> str:
@@ -184,6 +193,8 @@ def _unlike(robot: Config, here: Config) -> str:
             f"desk's {here.block_observations}: build the desk with "
             f"-DPLR_BLOCK_OBSERVATIONS={robot.block_observations}, and name its folder with --bin"
         )
+    if robot.real_bytes != here.real_bytes:
+        return f"the robot's reals have {robot.real_bytes} bytes, the desk's {here.real_bytes}"
     for id, value in robot.settings.items():
         ours = here.settings.get(id)
         if ours != value:
