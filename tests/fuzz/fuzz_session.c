@@ -13,8 +13,8 @@
  * no random bytes get past the checksum. Whatever comes in:
  * - the session ends, in no more steps than there are bytes;
  * - every answer can be read, and counts add up;
- * - every pose and landmark that leaves is made of numbers, no variance is negative, and a rotation
- *   is one;
+ * - every pose and landmark that leaves is made of numbers, a rotation is one, and no variance of a
+ *   pose is negative (a known landmark's may be, by what rounding left of a rough start);
  * - the same bytes give the same answers, in whatever pieces they arrive.
  */
 #include <math.h>
