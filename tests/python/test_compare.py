@@ -138,6 +138,7 @@ def test_one_bit_of_one_pose_is_found_and_measured(compare: Compare, log: list[M
     assert f"POSE in position: {step:.3g} m, 0 deg, covariance 0 of" in said.out
     assert f"largest   position {step:.3g} m, at frame {AT + 1}" in said.out
     assert "largest   angle" not in said.out
+    assert "was the robot's image built from the desk's?" in said.out
 
 
 def test_angle_and_covariance_are_measured_at_their_largest(
@@ -268,6 +269,7 @@ def test_a_recorded_stream_is_compared_frame_by_frame(tmp_path: Path, pelorus: R
     assert said.status == DIFFERENT, said.err
     assert "build 0x0000abcd, of another version: 32 landmarks, 128 observations" in said.out
     assert f"0 of {FRAMES} frames" in said.out
+    assert "a build of another version may give other bits" in said.out
 
 
 # --- the parts ------------------------------------------------------------------------------------

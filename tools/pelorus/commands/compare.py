@@ -20,6 +20,11 @@ from pelorus.robot.status import STATUSES, condition
 
 LOSSES_SHOWN = 5
 START_HINT = "if the pelorus-replay that wrote the log was given --start, give it here too"
+OTHER_VERSION = "a build of another version may give other bits: compare with one of the robot's"
+SAME_SOURCES = (
+    "a fingerprint names version, precision and sizes, not the sources: "
+    "was the robot's image built from the desk's?"
+)
 STARTS = ("truth", "identity", "recorded")
 
 
@@ -52,12 +57,9 @@ def compare(
 ) -> None:
     """Replay a robot's log here, and compare every answer with the robot's, bit by bit.
 
-    POSE and REPORT after each frame, but for the time that it took. Where the robot started anew in
-    mid-drive, each of its lives is compared by itself. Where frames were lost on the way it says up
-    to where the log tells what the robot knew.
+    POSE and REPORT of each frame; each life of a robot that started anew by itself.
 
-    The exit status is 0 if all has the same bits, 1 if the robot computed others, 2 if they cannot
-    be compared, or not all of them.
+    The exit status is 0 if all bits are the same, 1 if not, 2 if they cannot all be compared.
     """
     if start is not None and start not in STARTS:
         raise typer.BadParameter(f"{start!r} is none of {', '.join(STARTS)}", param_hint="--start")
@@ -115,6 +117,8 @@ def _tell(judgement: Judgement, desk: Desk) -> None:
         _lines(_largest(judgement.differences))
     if judgement.why:
         _line("but", judgement.why)
+    elif judgement.first is not None and config is not None:
+        _line("note", SAME_SOURCES if of_this_version(config) else OTHER_VERSION)
 
 
 def _build(build: Config) -> str:
