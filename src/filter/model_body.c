@@ -8,6 +8,7 @@
 #include "filter/covariance.h"
 #include "filter/model.h"
 #include "filter/polar.h"
+#include "filter/rigid_fit.h"
 #include "filter/slots.h"
 
 #include "camera/stereo.h"
@@ -199,18 +200,38 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     return carry_covariance(landmark->P, J_W, known->P_W_m2);
 }
 
+/* The rigid motion eta of the body that the corrections of the landmarks have in common. It is not the
+ * pose's correction xi: most of that may concern the way here, which no landmark in sight shares. A
+ * bearing counts as its angle, an inverse range as the disparity that it makes. */
+static void common_motion(const plr_filter *f, const plr_real *dx, plr_real eta[6]) {
+    const plr_real baseline = f->par.camera.baseline;
+    const plr_real W[3] = {1, 1, baseline * baseline};
+    plr_rigid_fit fit;
+    plr_rigid_fit_clear(&fit);
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        plr_polar chart;
+        plr_real J[18];
+        plr_polar_at(&chart, f->slots[slot].x);
+        chart_by_body_twist(f, &chart, J);
+        plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
+    }
+    plr_rigid_fit_solve(&fit, dx, eta);
+}
+
 /*
- * What is common to all landmarks is a rigid motion and is applied as one; only the rest of each
- * correction goes through the chart:
- *   w_rest = w - Jw(q) [-I | [q]x] xi_C,  q~ = retr(q, w_rest),  q+ = Exp(xi_C)^-1 q~.
- * P is transported by Jw(q+) Exp(-theta_C) Ji(q~) diag(M, 1), the pose by Ad(Exp(-xi)).
+ * What the landmarks' corrections have in common is a rigid motion eta and is applied as one; only the
+ * rest of each goes through the chart:
+ *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = retr(q, w_rest),  q+ = Exp(eta_C)^-1 q~.
+ * P is transported by Jw(q+) Exp(-theta_C) Ji(q~) diag(M, 1) with theta_C eta_C's rotation, the pose
+ * by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
-    plr_real R_xi[9], p_xi[3], A[36], xi_C[6] = {0}, R_C[9], p_C[3];
+    plr_real R_xi[9], p_xi[3], A[36], eta[6], eta_C[6] = {0}, R_C[9], p_C[3];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
-    plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, dx, 1, xi_C, 1);
-    plr_se3_exp(R_C, p_C, xi_C);
+    common_motion(f, dx, eta);
+    plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, eta, 1, eta_C, 1);
+    plr_se3_exp(R_C, p_C, eta_C);
 
     unsigned cut = 0;
     plr_real *F = f->work.Vt;
@@ -223,7 +244,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
-                w[i] = PLR_FMA(-J[6 * i + k], dx[k], w[i]);
+                w[i] = PLR_FMA(-J[6 * i + k], eta[k], w[i]);
         cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range);
         for (int i = 0; i < 3; i++)
             q[i] = there.r * there.mu[i];

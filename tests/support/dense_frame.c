@@ -82,13 +82,17 @@ static void gain(dense_ekf *e, const stack *s, double *dx) {
     free(HP);
 }
 
-/* The correction of `body`: a rigid motion for all, then the chart for the rest of each. */
+/* The correction of `body`: the rigid motion that the landmarks have in common, then the chart for
+ * the rest of each. */
 static void retract_body(dense_ekf *e, const double *dx) {
     const unsigned n = dense_dim(e);
-    double xi_C[6], E[16], back[16], R_back[9], pose[16], pose_back[16], A[36];
-    double *F = dense_identity(n);
-    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, e->Ad_CB, dx, 0, xi_C);
-    rigid_exp(E, xi_C);
+    double eta[6], eta_C[6], E[16], back[16], R_back[9], pose[16], pose_back[16], A[36];
+    double *F = dense_identity(n), *corrections = dense_zeros(e->count + 1, 3);
+    memcpy(corrections, dx + dense_row(e, 0), 3 * e->count * sizeof *corrections);
+    dense_common_motion(e, e->count, e->x, (double(*)[3])corrections, dx, eta);
+    free(corrections);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, e->Ad_CB, eta, 0, eta_C);
+    rigid_exp(E, eta_C);
     rigid_inverse(back, E);
     dense_rotation(R_back, back);
     rigid_exp(pose, dx);
@@ -99,7 +103,7 @@ static void retract_body(dense_ekf *e, const double *dx) {
         double K[18], rest[3], moved[3], J[9], RJ[9];
         dense_camera_by_pose(e, e->x[i], K);
         memcpy(rest, dx + dense_row(e, i), sizeof rest);
-        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, dx, 1, rest);
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, eta, 1, rest);
         dense_polar_step(e->x[i], rest, moved, J);
         square_multiply(3, R_back, J, RJ);
         dense_put(F, n, dense_row(e, i), dense_row(e, i), 3, 3, RJ);

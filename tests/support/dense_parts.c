@@ -172,6 +172,31 @@ void dense_in_camera(const dense_ekf *e, unsigned landmark, double q[3]) {
     dense_apply(q, e->T_CB, s);
 }
 
+void dense_common_motion(const dense_ekf *e, unsigned count, double (*q)[3],
+                         double (*correction)[3], const double xi[6], double eta[6]) {
+    const double baseline = e->camera.baseline_m;
+    double A[36] = {0}, b[6] = {0};
+    for (unsigned i = 0; i < count; i++) {
+        const double r2 = q[i][0] * q[i][0] + q[i][1] * q[i][1] + q[i][2] * q[i][2];
+        double K[18], W[9], WK[18];
+        for (unsigned k = 0; k < 9; k++) {
+            const double along = q[i][k / 3] * q[i][k % 3] / r2; /* mu mu^T */
+            W[k] = ((k % 4 == 0) - along) / r2 + baseline * baseline * along / (r2 * r2);
+        }
+        dense_camera_by_pose(e, q[i], K);
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, W, K, 0, WK);
+        oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 6, 3, 1, K, WK, 1, A);
+        oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 1, 3, 1, WK, correction[i], 1, b);
+    }
+    for (unsigned k = 0; k < 6; k++) {
+        const double weight = 0.1 * A[7 * k] + 1e-12;
+        eta[k] = b[k] + weight * xi[k];
+        A[7 * k] += weight;
+    }
+    if (!oracle_solve_spd(6, 1, A, eta))
+        memcpy(eta, xi, 6 * sizeof *eta);
+}
+
 void dense_polar_step(const double q[3], const double e[3], double moved[3], double J[9]) {
     const double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
     const double mu[3] = {q[0] / r, q[1] / r, q[2] / r};

@@ -57,6 +57,12 @@ void dense_back_project(const plr_calibration *c, const double z[3], double pixe
 /* q of a landmark: stored, or brought from the world. */
 void dense_in_camera(const dense_ekf *e, unsigned landmark, double q[3]);
 
+/* The rigid motion eta of the body that the corrections of points q have in common, where the pose's
+ * own, xi, weighs a tenth (docs/MATH.md 5). A point's correction counts as the angle that it makes,
+ * and along the ray as the disparity. */
+void dense_common_motion(const dense_ekf *e, unsigned count, double (*q)[3],
+                         double (*correction)[3], const double xi[6], double eta[6]);
+
 /* A correction of a point as the chart makes it: bearing and inverse range (MATH 5), written
  * without a basis. q~ = retr(q, Jw e), and J the transport Ji(q~) diag(M, 1) Jw(q), 3x3. */
 void dense_polar_step(const double q[3], const double e[3], double moved[3], double J[9]);

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include "filter/rigid_fit.h"
+
+#include <string.h>
+
+#include "linalg/dense.h"
+#include "linalg/small.h"
+
+/* How much the pose's correction says beside the landmarks'. Measured: docs/NUMERICS.md. */
+#define SHARE_OF_POSE PLR_R(0.1)
+/* A turn beyond, rad^2, is no correction but an accident. */
+#define MOST_TURN2 PLR_R(9)
+/* For directions that no landmark shows, such as the roll about the only one's ray. */
+#define TINY PLR_R(1e-12)
+
+void plr_rigid_fit_clear(plr_rigid_fit *fit) {
+    memset(fit, 0, sizeof *fit);
+}
+
+void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[18], const plr_real w[3],
+                       const plr_real W[3]) {
+    for (unsigned row = 0; row < 3; row++) {
+        const plr_real *j = J + 6 * row;
+        plr_real *A = fit->A;
+        for (unsigned k = 0; k < 6; k++) {
+            const plr_real weighted = W[row] * j[k];
+            fit->b[k] = PLR_FMA(weighted, w[row], fit->b[k]);
+            for (unsigned l = k; l < 6; l++, A++)
+                *A = PLR_FMA(weighted, j[l], *A);
+        }
+    }
+}
+
+/* x <- U^-1 x: U is 6x6, upper, packed row by row. */
+static void solve_upper(const plr_real *U, plr_real x[6]) {
+    for (unsigned k = 6; k-- > 0;) {
+        const plr_real *row = U + plr_upper_row(6, k);
+        for (unsigned l = k + 1; l < 6; l++)
+            x[k] = PLR_FMA(-row[l - k], x[l], x[k]);
+        x[k] *= PLR_R(1) / row[0];
+    }
+}
+
+void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], plr_real eta[6]) {
+    memcpy(eta, fit->b, sizeof fit->b);
+    for (unsigned k = 0; k < 6; k++) {
+        plr_real *diagonal = fit->A + plr_upper_row(6, k);
+        const plr_real weight = PLR_FMA(SHARE_OF_POSE, *diagonal, TINY);
+        eta[k] = PLR_FMA(weight, xi[k], eta[k]);
+        *diagonal += weight;
+    }
+    if (plr_cholesky_upper(6, fit->A)) {
+        plr_solve_upper_transposed(6, 1, fit->A, eta, 1);
+        solve_upper(fit->A, eta);
+        if (plr_dot3(eta + 3, eta + 3) < MOST_TURN2)
+            return;
+    }
+    memcpy(eta, xi, 6 * sizeof *eta);
+}

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+/* The rigid motion that corrections have in common. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "filter/rigid_fit.h"
+#include "support/matrices.h"
+#include "support/oracle.h"
+#include "support/random.h"
+
+enum { RUNS = 200, MOST = 12 };
+
+static const plr_real W[3] = {1, 1, PLR_R(0.04)};
+static rng chance;
+
+void setUp(void) {
+    chance = rng_seeded(61);
+}
+
+void tearDown(void) {
+}
+
+static void draw(plr_real *x, double *same, size_t n, double sigma) {
+    rng_normals(&chance, sigma, same, n);
+    to_reals(x, same, n);
+    to_doubles(same, x, n);
+}
+
+/* The normal equations in double. */
+static void solve_twin(unsigned count, double (*J)[18], double (*w)[3], const double *xi,
+                       double *eta) {
+    double A[36] = {0}, b[6] = {0};
+    for (unsigned i = 0; i < count; i++)
+        for (unsigned row = 0; row < 3; row++)
+            for (unsigned k = 0; k < 6; k++) {
+                const double weighted = (double)W[row] * J[i][6 * row + k];
+                b[k] += weighted * w[i][row];
+                for (unsigned l = 0; l < 6; l++)
+                    A[6 * k + l] += weighted * J[i][6 * row + l];
+            }
+    for (unsigned k = 0; k < 6; k++) {
+        const double weight = 0.1 * A[7 * k] + 1e-12;
+        eta[k] = b[k] + weight * xi[k];
+        A[7 * k] += weight;
+    }
+    TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, A, eta));
+}
+
+static void test_it_solves_the_normal_equations(void) {
+    for (int run = 0; run < RUNS; run++) {
+        const unsigned count = 1 + rng_below(&chance, MOST);
+        double J[MOST][18], w[MOST][3], xi[6], expected[6], got[6];
+        plr_real J_real[18], w_real[3], xi_real[6], eta[6];
+        plr_rigid_fit fit;
+        plr_rigid_fit_clear(&fit);
+        for (unsigned i = 0; i < count; i++) {
+            draw(J_real, J[i], 18, 1);
+            draw(w_real, w[i], 3, 0.1);
+            plr_rigid_fit_add(&fit, J_real, w_real, W);
+        }
+        draw(xi_real, xi, 6, 0.1);
+        plr_rigid_fit_solve(&fit, xi_real, eta);
+        solve_twin(count, J, w, xi, expected);
+        to_doubles(got, eta, 6);
+        /* A tenth of the diagonal on top keeps the condition below some hundreds. */
+        TEST_ASSERT_DOUBLE_WITHIN(3000 * REAL_EPSILON, 0, largest_difference(expected, got, 6));
+    }
+}
+
+static void test_what_all_have_in_common_with_the_pose_is_found_exactly(void) {
+    for (int run = 0; run < RUNS; run++) {
+        plr_real xi[6], eta[6];
+        double same[6], got[6];
+        plr_rigid_fit fit;
+        plr_rigid_fit_clear(&fit);
+        draw(xi, same, 6, 0.1);
+        for (unsigned i = 0; i < 5; i++) {
+            plr_real J[18], w[3] = {0};
+            double ignored[18];
+            draw(J, ignored, 18, 1);
+            for (unsigned row = 0; row < 3; row++)
+                for (unsigned k = 0; k < 6; k++)
+                    w[row] += J[6 * row + k] * xi[k];
+            plr_rigid_fit_add(&fit, J, w, W);
+        }
+        plr_rigid_fit_solve(&fit, xi, eta);
+        to_doubles(got, eta, 6);
+        TEST_ASSERT_DOUBLE_WITHIN(1000 * REAL_EPSILON, 0, largest_difference(same, got, 6));
+    }
+}
+
+/* A correction of the way here: the pose moves by metres, no landmark in the camera. */
+static void test_landmarks_that_stay_outvote_the_pose(void) {
+    const plr_real xi[6] = {3, -2, 1, PLR_R(0.1), PLR_R(-0.2), PLR_R(0.3)}, still[3] = {0};
+    plr_real eta[6];
+    plr_rigid_fit fit;
+    plr_rigid_fit_clear(&fit);
+    for (unsigned i = 0; i < 200; i++) {
+        plr_real J[18];
+        double ignored[18];
+        draw(J, ignored, 18, 1);
+        plr_rigid_fit_add(&fit, J, still, W);
+    }
+    plr_rigid_fit_solve(&fit, xi, eta);
+    /* eta = (A + 0.1 diag A)^-1 0.1 diag A xi, and A is nearly diagonal */
+    for (int k = 0; k < 6; k++)
+        TEST_ASSERT_DOUBLE_WITHIN(0.2, 0, (double)eta[k] / 3);
+}
+
+static void test_without_landmarks_and_after_an_accident_it_is_the_pose(void) {
+    const plr_real xi[6] = {1, 2, 3, PLR_R(0.1), PLR_R(0.2), PLR_R(0.3)};
+    plr_real eta[6], J[18] = {0};
+    plr_rigid_fit fit;
+    plr_rigid_fit_clear(&fit);
+    plr_rigid_fit_solve(&fit, xi, eta);
+    for (int k = 0; k < 6; k++)
+        TEST_ASSERT_DOUBLE_WITHIN(10 * REAL_EPSILON, (double)xi[k], (double)eta[k]);
+
+    const plr_real huge[3] = {PLR_R(1e6), 0, 0}, nothing[3] = {(plr_real)NAN, 0, 0};
+    J[3] = J[10] = J[17] = 1;
+    plr_rigid_fit_clear(&fit);
+    plr_rigid_fit_add(&fit, J, huge, W);
+    plr_rigid_fit_solve(&fit, xi, eta);
+    TEST_ASSERT_TRUE(same_bits(xi, eta, 6));
+    plr_rigid_fit_clear(&fit);
+    plr_rigid_fit_add(&fit, J, nothing, W);
+    plr_rigid_fit_solve(&fit, xi, eta);
+    TEST_ASSERT_TRUE(same_bits(xi, eta, 6));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_it_solves_the_normal_equations);
+    RUN_TEST(test_what_all_have_in_common_with_the_pose_is_found_exactly);
+    RUN_TEST(test_landmarks_that_stay_outvote_the_pose);
+    RUN_TEST(test_without_landmarks_and_after_an_accident_it_is_the_pose);
+    return UNITY_END();
+}
