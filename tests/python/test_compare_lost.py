@@ -18,11 +18,11 @@ from flight_logs import (
     robots_log,
     without,
 )
-from pelorus.frames import Kind, Message, Pose, Report, Stereo, Text, Twist
+from pelorus.frames import Kind, Message, Pose, Report, State, StateAction, Stereo, Text, Twist
 from pelorus.robot.stream import start_from
 from replay_drive import FRAMES, drive, encode, header, t_ns
 
-DAMAGED, NOT_READY = -15, -13  # plr_status
+DAMAGED, NOT_READY, FOREIGN = -15, -13, -16  # plr_status
 BOOT = Text("pelorus 0.1.0 on a board, build 0x1: power-on")
 
 
@@ -71,8 +71,10 @@ def test_a_twist_that_was_damaged_on_the_way_ends_what_can_be_compared(
     log, twist = lost_on_the_way(tmp_path, Twist)
     log.insert(log.index(twist) + 1, Report(0, 0, DAMAGED))
     log.append(Text("the recording is not complete: not everything arrived, 39 of 40 TWIST", 1))
+    log.insert(index(log, Twist, 3), Report(0, 0, DAMAGED))  # of noise, which cost nothing
     said = compare(log)
     assert said.status == NOT_COMPARABLE, said.out
+    assert "at frame 4: the robot refused a message: damaged on the way" in said.out
     assert f"from frame {AT + 1} on the robot may have had other inputs" in said.out
     assert "the robot refused a message: damaged on the way (status -15)" in said.out
     assert f"frame {AT + 2}, t 7.100000000 s, is the first that differs" in said.out
@@ -146,6 +148,15 @@ def test_each_life_of_a_robot_is_compared_by_itself(compare: Compare, tmp_path: 
     assert f"{FRAMES - 1} of {FRAMES} frames" in said.out
 
 
+def test_settings_that_were_told_once_hold_in_a_second_life(
+    compare: Compare, tmp_path: Path
+) -> None:
+    log = restarted(tmp_path)
+    settings = [at for at, message in enumerate(log) if message.kind == Kind.CONFIG]
+    assert len(settings) == 2
+    assert compare(log[: settings[1]] + log[settings[1] + 1 :]).status == SAME
+
+
 def test_a_difference_in_a_second_life_keeps_the_logs_numbers(
     compare: Compare, tmp_path: Path
 ) -> None:
@@ -177,6 +188,15 @@ def test_a_drive_from_a_saved_state_needs_that_state(
     assert "--load-state" in said.err
     assert compare(log, "--load-state", state).status == SAME
     assert compare(log, "--load-state", tmp_path / "absent").status == NOT_COMPARABLE
+
+
+@pytest.mark.parametrize(("answer", "verdict"), [(0, NOT_COMPARABLE), (FOREIGN, SAME)])
+def test_a_restore_that_was_refused_has_changed_nothing(
+    compare: Compare, log: list[Message], answer: int, verdict: int
+) -> None:
+    asked = [State(t_ns(0), StateAction.RESTORE), Report(t_ns(0), Kind.STATE, answer)]
+    first = index(log, Twist, 0)
+    assert compare([*log[:first], *asked, *log[first:]]).status == verdict
 
 
 def test_a_state_that_was_saved_costs_nothing(compare: Compare, tmp_path: Path) -> None:
