@@ -58,7 +58,7 @@ void dense_back_project(const plr_calibration *c, const double z[3], double pixe
 void dense_in_camera(const dense_ekf *e, unsigned landmark, double q[3]);
 
 /* The rigid motion eta of the body that the corrections of points q have in common, where the pose's
- * own, xi, weighs a tenth (docs/MATH.md 5). A point's correction counts as the angle that it makes,
+ * own, xi, weighs a tenth (docs/MATH.md 11). A point's correction counts as the angle that it makes,
  * and along the ray as the disparity. */
 void dense_common_motion(const dense_ekf *e, unsigned count, double (*q)[3],
                          double (*correction)[3], const double xi[6], double eta[6]);
