@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -163,11 +164,27 @@ bool state_file_open_to_load(state_file *file, const char *path, char problem[PR
     return why == NULL || refuse(file, problem, path, why, instead);
 }
 
+/* A file's name is on the disk when its folder is. Not every file system can be asked for that. */
+static bool sync_folder_of(const char *path) {
+    char folder[PATH_MAX] = ".";
+    const char *name = strrchr(path, '/');
+    if (name != NULL)
+        snprintf(folder, sizeof folder, "%.*s", (int)(name - path + 1), path);
+    const int fd = open(folder, O_RDONLY | O_DIRECTORY);
+    if (fd < 0)
+        return false;
+    const bool done = fsync(fd) == 0 || errno == EINVAL;
+    const int why = errno;
+    close(fd);
+    errno = why;
+    return done;
+}
+
 /* A new file: blank, and as long as it will ever be. */
-static bool make(state_file *file, uint32_t slot_bytes) {
+static bool make(state_file *file, const char *path, uint32_t slot_bytes) {
     const uint32_t slot = (slot_bytes + BLOCK - 1) / BLOCK * BLOCK;
     prepare(file, file->fd, PLR_STORE_SLOTS * slot);
-    return ftruncate(file->fd, (off_t)file->device.size) == 0;
+    return ftruncate(file->fd, (off_t)file->device.size) == 0 && sync_folder_of(path);
 }
 
 bool state_file_open_to_save(state_file *file, const char *path, uint32_t slot_bytes,
@@ -179,7 +196,7 @@ bool state_file_open_to_save(state_file *file, const char *path, uint32_t slot_b
     if (file->fd < 0 || fstat(file->fd, &about) != 0)
         return refuse(file, problem, path, strerror(errno), "give a path that can be written");
     if (S_ISREG(about.st_mode) && about.st_size == 0)
-        return make(file, slot_bytes) ||
+        return make(file, path, slot_bytes) ||
                refuse(file, problem, path, strerror(errno), "give a path that can be written");
     const char *why = trouble(file, &about);
     return why == NULL || refuse(file, problem, path, why, instead);

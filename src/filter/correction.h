@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The Kalman correction by a frame's observations, in blocks (DESIGN 2.4). */
+/* The Kalman correction by a frame's observations, in blocks (docs/MATH.md 10). */
 #ifndef PLR_FILTER_CORRECTION_H
 #define PLR_FILTER_CORRECTION_H
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The gate: is an observation believable, given the prediction? (DESIGN 2.3) */
+/* The gate: is an observation believable, given the prediction? (docs/MATH.md 8) */
 #ifndef PLR_FILTER_GATE_H
 #define PLR_FILTER_GATE_H
 

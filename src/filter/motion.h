@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* The estimate's motion: the pose moves at once, the covariance's share is accumulated in blocks of
- * fixed size and applied when it is needed (DESIGN 2.1). */
+ * fixed size and applied when it is needed (docs/MATH.md 4 and 6). */
 #ifndef PLR_FILTER_MOTION_H
 #define PLR_FILTER_MOTION_H
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /*
- * The polar chart at a point q (DESIGN 2): two bearing angles and inverse range,
+ * The polar chart at a point q (docs/MATH.md 5): two bearing angles and inverse range,
  * w = (N^T mu-change, change of 1/r), with r = |q|, mu = q / r, N(mu) a 3x2 orthonormal basis of the
  * plane orthogonal to mu. Far points are nearly Gaussian in it.
  */

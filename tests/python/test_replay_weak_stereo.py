@@ -2,7 +2,7 @@
 """A long way with weak stereo and estimated biases: what is learnt of the way here is not put upon
 the landmarks in sight (docs/NUMERICS.md, section 10).
 
-Retracted by the pose's correction instead of by what the landmarks share, the gate turned away 5.1 %
+Retracted by the pose's correction instead of by what the landmarks share, the gate turned away 5 %
 of these sound observations; 1.0 % is due, and 1.2 % was measured.
 """
 

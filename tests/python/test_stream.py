@@ -12,6 +12,7 @@ import re
 import socket
 import termios
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -379,7 +380,7 @@ def kept(*messages: Message) -> list[Message]:
     stream = io.BytesIO()
     log = FlightLog(stream)
     for message in messages:
-        log.keep(message)
+        log.keep(message, heard=message is SETTINGS or isinstance(message, Report))
     return [frame.message for frame in wire.Reader().feed(stream.getvalue())]
 
 
@@ -397,13 +398,20 @@ def test_each_message_is_on_the_disk_at_once(tmp_path: Path) -> None:
     with path.open("wb") as stream:
         log = FlightLog(stream)
         for count, message in enumerate([drive()[0], SETTINGS, *drive()[1:5]], 1):
-            log.keep(message)
+            log.keep(message, heard=message is SETTINGS)
             assert len(log_of(path)) == count
 
 
 def test_wanted_settings_among_the_data_release_nothing() -> None:
     header, first = drive()[:2]
     assert kept(header, first, Config({4: 16.0})) == [header]
+
+
+def test_a_log_that_is_sent_again_has_the_settings_of_its_time_not_of_this_board() -> None:
+    header, first = drive()[:2]
+    theirs = replace(SETTINGS, build_fingerprint=SETTINGS.build_fingerprint + 1)
+    assert kept(header, theirs, first) == [header, theirs]
+    assert kept(header, theirs, first, SETTINGS) == [header, theirs, SETTINGS, first]
 
 
 def test_a_log_that_is_ended_holds_all_and_is_whole() -> None:

@@ -6,7 +6,8 @@ body's. The twists' differs from it by their own noise and by that of the images
 latter is, is measured too: each half of the tracks gives a motion; the two are independent, and
 their difference is twice as large as the error of the motion from all tracks. Where the twists
 differ by clearly more, that is their noise, and the HEADER suggests it as the sigma of a reading.
-Spreads are taken about the median: a bias is no noise.
+Spreads are taken about the median: a bias is no noise. They are those of most frames: a robot that
+stands for half of the recording and is noisier when it moves should be given its sigmas.
 """
 
 from __future__ import annotations
@@ -60,15 +61,20 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
     return _decide(recording, twists, images, Finding(subject, False, _words(twists, images), ""))
 
 
+def _rounded(sigma: float) -> float:
+    """To three digits: it is known to no more."""
+    return float(f"{sigma:.3g}")
+
+
 def _decide(
     recording: Recording, twists: Spread, images: Spread, finding: Finding
 ) -> tuple[Recording, Finding]:
     noise, said = recording.header.noise, []
     if noise.velocity_sigma_mps < 0 and twists.velocity_mps > CLEARLY * images.velocity_mps:
-        noise = replace(noise, velocity_sigma_mps=round(twists.velocity_mps, 4))
+        noise = replace(noise, velocity_sigma_mps=_rounded(twists.velocity_mps))
         said.append(f"velocity-sigma {twists.velocity_mps:.2g} m/s")
     if noise.gyro_sigma_radps < 0 and twists.gyro_radps > CLEARLY * images.gyro_radps:
-        noise = replace(noise, gyro_sigma_radps=round(twists.gyro_radps, 5))
+        noise = replace(noise, gyro_sigma_radps=_rounded(twists.gyro_radps))
         said.append(f"gyro-sigma {twists.gyro_radps:.2g} rad/s")
     if not said:
         action = "no suggestion beyond what is given: else the filter's defaults hold"

@@ -26,9 +26,9 @@ class FlightLog:
         self._held: list[Message] = []
         self._settled = False  # the settings are in the log, or will not come
 
-    def keep(self, message: Message) -> None:
-        """Add a message."""
-        if isinstance(message, Config) and message.build_fingerprint:
+    def keep(self, message: Message, heard: bool = False) -> None:
+        """Add a message that was sent, or heard from the board: its CONFIG has the settings."""
+        if heard and isinstance(message, Config) and message.build_fingerprint:
             self._write(message)
             self.release()
         elif self._settled or (message.kind in SETUP_KINDS and not self._held):

@@ -224,7 +224,7 @@ class Streamer:
 
     def _take(self, message: Message) -> None:
         if self._under_way and self._log is not None and message.kind != Kind.END:
-            self._log.keep(message)
+            self._log.keep(message, heard=True)
         match message:
             case Pose() if message.after_stereo:
                 self.outcome.poses.append(message)
