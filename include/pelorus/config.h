@@ -15,6 +15,10 @@
 /* Version, major << 16 | minor << 8 | patch; plr_version() has it as text. */
 #define PLR_VERSION_NUMBER 0x000100
 
+/* Counts the changes after which a filter computes other bits; part of the build fingerprint, so that
+ * a log tells whether its robot computed as this source does. tests/golden asks for it. */
+#define PLR_ARITHMETIC 2
+
 /* Bits of a real: 32 (float, the main road) or 64 (double). */
 #ifndef PLR_REAL
 #define PLR_REAL 32

@@ -176,8 +176,8 @@ const char *plr_status_text(plr_status status);
 const char *plr_reason_text(plr_reason reason);
 const char *plr_health_text(plr_health health);
 
-/* "1.0.0" and a number that differs between builds whose bits may differ: version, precision,
- * capacity, block size. */
+/* "1.0.0" and a number that differs between builds whose bits may differ: version, arithmetic
+ * (PLR_ARITHMETIC), precision, capacity, block size. */
 const char *plr_version(void);
 uint32_t plr_build_fingerprint(void);
 

@@ -210,6 +210,31 @@ static void replay(const scenario *s) {
 
 /* ---------------------------------------------------------------- tests */
 
+/* The first line of the results: the arithmetic that they are of. */
+static void check_number(const char *line) {
+    int number = 0;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, sscanf(line, "arithmetic %d", &number), "first line");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(PLR_ARITHMETIC, number, "results of another PLR_ARITHMETIC");
+}
+
+/* Other results under the same number would tell a log's reader that nothing has changed. */
+static void check_renewal(const scenario *s, const char *path) {
+    char committed[1024], due[LINE] = "", got[LINE] = "";
+    snprintf(committed, sizeof committed, PELORUS_SOURCE_DIR "/tests/golden/%s.f%d.txt", s->name,
+             PLR_REAL);
+    FILE *before = fopen(committed, "r"), *after = fopen(path, "r");
+    TEST_ASSERT_TRUE(before && after);
+    const bool same_number =
+        fgets(due, LINE, before) && fgets(got, LINE, after) && strcmp(due, got) == 0;
+    bool same = true;
+    while (same && fgets(due, LINE, before) && fgets(got, LINE, after))
+        same = strcmp(due, got) == 0;
+    fclose(before);
+    fclose(after);
+    if (same_number && !same)
+        TEST_FAIL_MESSAGE("other results under the same number: raise PLR_ARITHMETIC first");
+}
+
 /* Where results are written to, if they are to be renewed. */
 static const char *renewal_folder(void) {
     return getenv("PELORUS_GOLDEN_RENEW");
@@ -228,12 +253,20 @@ static void check(const scenario *s) {
         renewed = file;
     else
         expected = file;
+    if (renewed)
+        fprintf(renewed, "arithmetic %d\n", PLR_ARITHMETIC);
+    else
+        check_number(fgets(line, sizeof line, expected) ? line : "");
     replay(s);
     TEST_ASSERT_GREATER_THAN_UINT(50, line_number);
     if (expected)
         TEST_ASSERT_NULL_MESSAGE(fgets(line, sizeof line, expected), "more frames were due");
-    if (renewed)
+    if (renewed) {
+        fclose(renewed);
+        renewed = NULL;
+        check_renewal(s, path);
         TEST_IGNORE_MESSAGE("the results were renewed, not compared");
+    }
 }
 
 static void test_body_computes_the_committed_bits(void) {

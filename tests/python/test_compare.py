@@ -25,7 +25,7 @@ from flight_logs import (
     robots_log,
     without,
 )
-from pelorus import __version__
+from pelorus import ARITHMETIC, __version__
 from pelorus.flight.judge import fingerprint
 from pelorus.frames import NO_BUDGET, Config, Kind, Message, Pose, Report, Stereo, Text, Twist
 from pelorus.robot.status import HEALTH, REASONS, condition
@@ -269,7 +269,7 @@ def test_a_recorded_stream_is_compared_frame_by_frame(tmp_path: Path, pelorus: R
     assert said.status == DIFFERENT, said.err
     assert "build 0x0000abcd, of another version: 32 landmarks, 128 observations" in said.out
     assert f"0 of {FRAMES} frames" in said.out
-    assert "a build of another version may give other bits" in said.out
+    assert "a build of another version or arithmetic gives other bits" in said.out
 
 
 # --- the parts ------------------------------------------------------------------------------------
@@ -277,9 +277,9 @@ def test_a_recorded_stream_is_compared_frame_by_frame(tmp_path: Path, pelorus: R
 
 def test_the_fingerprint_is_the_librarys(log: list[Message]) -> None:
     settings = next(m for m in log if isinstance(m, Config))
-    assert fingerprint(__version__, settings) == settings.build_fingerprint
+    assert fingerprint(__version__, ARITHMETIC, settings) == settings.build_fingerprint
     other = replace(settings, block_observations=4)
-    assert fingerprint(__version__, other) != settings.build_fingerprint
+    assert fingerprint(__version__, ARITHMETIC, other) != settings.build_fingerprint
 
 
 def test_every_health_and_reason_has_words() -> None:

@@ -17,12 +17,18 @@ static int model_fsync(int fd);
 static char path[] = "/tmp/pelorus-state-XXXXXX";
 static state_file file;
 static plr_block_device *device;
-static unsigned fsyncs;
+static unsigned fsyncs, folder_fsyncs;
 static int fsync_fails_with; /* errno; 0: it does not */
 
 static int model_fsync(int fd) {
-    TEST_ASSERT_EQUAL_INT(file.fd, fd);
-    fsyncs++;
+    struct stat about;
+    TEST_ASSERT_EQUAL_INT(0, fstat(fd, &about));
+    if (S_ISDIR(about.st_mode)) {
+        folder_fsyncs++;
+    } else {
+        TEST_ASSERT_EQUAL_INT(file.fd, fd);
+        fsyncs++;
+    }
     errno = fsync_fails_with;
     return fsync_fails_with == 0 ? 0 : -1;
 }
@@ -33,7 +39,7 @@ void setUp(void) {
     const int fd = mkstemp(path);
     TEST_ASSERT_NOT_EQUAL_INT(-1, fd);
     close(fd);
-    fsyncs = 0;
+    fsyncs = folder_fsyncs = 0;
     fsync_fails_with = 0;
     TEST_ASSERT_TRUE(state_file_open_to_save(&file, path, BLOCK, problem));
     device = &file.device;
@@ -42,6 +48,23 @@ void setUp(void) {
 void tearDown(void) {
     state_file_close(&file);
     unlink(path);
+}
+
+static void test_the_name_of_a_new_file_is_on_the_disk_too(void) {
+    char problem[PROBLEM_SIZE];
+    TEST_ASSERT_EQUAL_UINT(1, folder_fsyncs);
+    state_file_close(&file);
+    TEST_ASSERT_TRUE(state_file_open_to_save(&file, path, BLOCK, problem)); /* it is not new */
+    TEST_ASSERT_EQUAL_UINT(1, folder_fsyncs);
+    state_file_close(&file);
+    TEST_ASSERT_EQUAL_INT(0, truncate(path, 0));
+    fsync_fails_with = EINVAL; /* no folder of this file system can be asked */
+    TEST_ASSERT_TRUE(state_file_open_to_save(&file, path, BLOCK, problem));
+    state_file_close(&file);
+    TEST_ASSERT_EQUAL_INT(0, truncate(path, 0));
+    fsync_fails_with = EIO;
+    TEST_ASSERT_FALSE(state_file_open_to_save(&file, path, BLOCK, problem));
+    TEST_ASSERT_NOT_NULL(strstr(problem, "give a path that can be written"));
 }
 
 static int writes(uint32_t offset) {
@@ -103,6 +126,7 @@ static void test_no_file_reads_as_blank_and_takes_nothing(void) {
 
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_the_name_of_a_new_file_is_on_the_disk_too);
     RUN_TEST(test_what_was_written_or_erased_is_on_the_disk_before_it_is_read_back);
     RUN_TEST(test_a_disk_that_has_failed_once_is_not_believed_the_second_time);
     RUN_TEST(test_a_slot_has_room_for_what_was_asked_in_whole_blocks);

@@ -20,9 +20,11 @@ from pelorus.robot.status import STATUSES, condition
 
 LOSSES_SHOWN = 5
 START_HINT = "if the pelorus-replay that wrote the log was given --start, give it here too"
-OTHER_VERSION = "a build of another version may give other bits: compare with one of the robot's"
+OTHER_VERSION = (
+    "a build of another version or arithmetic gives other bits: compare with one of the robot's"
+)
 SAME_SOURCES = (
-    "a fingerprint names version, precision and sizes, not the sources: "
+    "a fingerprint names version, arithmetic, precision and sizes, not each change of the sources: "
     "was the robot's image built from the desk's?"
 )
 STARTS = ("truth", "identity", "recorded")

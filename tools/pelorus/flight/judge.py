@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
 
-from pelorus import __version__
+from pelorus import ARITHMETIC, __version__
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
 from pelorus.flight.log import NOWHERE, Frame, Log, Loss, Part, frames_of
@@ -90,20 +90,21 @@ def verdict_of(judgements: Sequence[Judgement]) -> Verdict:
     return Verdict.NOT_COMPARABLE if Verdict.NOT_COMPARABLE in found else Verdict.SAME
 
 
-def fingerprint(version: str, build: Config) -> int:
+def fingerprint(version: str, arithmetic: int, build: Config) -> int:
     """plr_build_fingerprint (src/filter/status.c): what a build of that version would say."""
     major, minor, patch = (int(number) for number in version.split("."))
     capacities = (build.max_landmarks, build.max_observations, build.block_observations)
     value = FNV_OFFSET
-    for part in (major << 16 | minor << 8 | patch, 8 * build.real_bytes, *capacities):
+    number = major << 16 | minor << 8 | patch
+    for part in (number, arithmetic, 8 * build.real_bytes, *capacities):
         for byte in part.to_bytes(4, "little"):
             value = (value ^ byte) * FNV_PRIME & 0xFFFFFFFF
     return value or 1
 
 
 def of_this_version(build: Config) -> bool:
-    """Whether a build is of the version that these tools belong to."""
-    return build.build_fingerprint == fingerprint(__version__, build)
+    """Whether a build is of the version, and computes as the one, that these tools belong to."""
+    return build.build_fingerprint == fingerprint(__version__, ARITHMETIC, build)
 
 
 # --- one part -------------------------------------------------------------------------------------
