@@ -62,8 +62,8 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
 
 
 def _rounded(sigma: float) -> float:
-    """To three digits: it is known to no more."""
-    return float(f"{sigma:.3g}")
+    """To four digits: it is known to fewer."""
+    return float(f"{sigma:.4g}")
 
 
 def _decide(
