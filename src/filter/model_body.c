@@ -202,7 +202,9 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
 
 /* The rigid motion eta of the body that the corrections of the landmarks have in common. It is not the
  * pose's correction xi: most of that may concern the way here, which no landmark in sight shares. A
- * bearing counts as its angle, an inverse range as the disparity that it makes. */
+ * bearing counts as its angle, an inverse range as the disparity that it makes. Known landmarks have
+ * no voice: they stand in the world, and what moves them in the camera is the pose, while what the
+ * errors of a map have in common by chance is no motion. */
 static void common_motion(const plr_filter *f, const plr_real *dx, plr_real eta[6]) {
     const plr_real baseline = f->par.camera.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
@@ -211,6 +213,8 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real eta[
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_polar chart;
         plr_real J[18];
+        if (f->slots[slot].known)
+            continue;
         plr_polar_at(&chart, f->slots[slot].x);
         chart_by_body_twist(f, &chart, J);
         plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);

@@ -4,7 +4,8 @@
  * body, that minimises
  *     sum_i |w_i - J_i eta|^2_W + |eta - xi|^2_(s diag A),   A = sum_i J_i^T W J_i, s = 0.1:
  * w_i are the corrections in their charts, J_i says how a twist enters there, and W weighs the parts
- * as the image shows them. Where the landmarks say little, the correction xi of the pose decides.
+ * as the image shows them. Where the landmarks say little, the correction xi of the pose decides, and
+ * where none has a voice, xi alone.
  * docs/MATH.md, "Retraction and transport".
  */
 #ifndef PLR_FILTER_RIGID_FIT_H

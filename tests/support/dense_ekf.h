@@ -14,6 +14,8 @@
 #ifndef PELORUS_TEST_DENSE_EKF_H
 #define PELORUS_TEST_DENSE_EKF_H
 
+#include <stdbool.h>
+
 #include "pelorus/filter.h"
 
 enum { DENSE_MAX = 64, DENSE_MAX_DIM = 12 + 3 * DENSE_MAX };
@@ -27,6 +29,7 @@ typedef struct dense_ekf {
     double bias[6];
     unsigned count;
     uint32_t id[DENSE_MAX];
+    bool known[DENSE_MAX]; /* from a map */
     double x[DENSE_MAX][3];
     double P[DENSE_MAX_DIM * DENSE_MAX_DIM]; /* dim x dim, row by row */
     double walked_s;                         /* for the bias walk */

@@ -87,10 +87,14 @@ static void gain(dense_ekf *e, const stack *s, double *dx) {
 static void retract_body(dense_ekf *e, const double *dx) {
     const unsigned n = dense_dim(e);
     double eta[6], eta_C[6], E[16], back[16], R_back[9], pose[16], pose_back[16], A[36];
-    double *F = dense_identity(n), *corrections = dense_zeros(e->count + 1, 3);
-    memcpy(corrections, dx + dense_row(e, 0), 3 * e->count * sizeof *corrections);
-    dense_common_motion(e, e->count, e->x, (double(*)[3])corrections, dx, eta);
-    free(corrections);
+    double *F = dense_identity(n), q[DENSE_MAX][3], corrections[DENSE_MAX][3];
+    unsigned voices = 0;
+    for (unsigned i = 0; i < e->count; i++)
+        if (!e->known[i]) {
+            memcpy(corrections[voices], dx + dense_row(e, i), sizeof corrections[0]);
+            memcpy(q[voices++], e->x[i], sizeof q[0]);
+        }
+    dense_common_motion(e, voices, q, corrections, dx, eta);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, e->Ad_CB, eta, 0, eta_C);
     rigid_exp(E, eta_C);
     rigid_inverse(back, E);
@@ -153,6 +157,7 @@ static void append(dense_ekf *e, uint32_t id, const double x[3], const double *J
     memcpy(e->P, grown, (size_t)N * N * sizeof *grown);
     free(grown);
     e->id[e->count] = id;
+    e->known[e->count] = false;
     memcpy(e->x[e->count++], x, 3 * sizeof *x);
 }
 
@@ -181,6 +186,7 @@ static void create(dense_ekf *e, const plr_observation *o) {
 void dense_insert_known(dense_ekf *e, const plr_landmark *known) {
     if (!dense_is_body(e)) {
         append(e, known->id, known->p_W_m, NULL, known->P_W_m2);
+        e->known[e->count - 1] = true;
         return;
     }
     double T_BW[16], q[3], K[18], R_WC[9], R_CW[9], P_q[9];
@@ -193,6 +199,7 @@ void dense_insert_known(dense_ekf *e, const plr_landmark *known) {
         R_CW[i] = R_WC[3 * (i % 3) + i / 3];
     oracle_sandwich(3, 3, R_CW, known->P_W_m2, P_q);
     append(e, known->id, q, K, P_q);
+    e->known[e->count - 1] = true;
 }
 
 /* May these pixels make a landmark? (MATH 9) */
@@ -234,6 +241,7 @@ void dense_remove(dense_ekf *e, uint32_t id) {
     e->count--;
     for (unsigned i = landmark; i < e->count; i++) {
         e->id[i] = e->id[i + 1];
+        e->known[i] = e->known[i + 1];
         memcpy(e->x[i], e->x[i + 1], sizeof e->x[i]);
     }
 }
