@@ -172,5 +172,7 @@ plr_status plr_config_check(const plr_config *config, const plr_setting **culpri
         return refuse(culprit, plr_setting_by_name("landmark-sigma"));
     if (config->min_depth_m >= config->max_range_m)
         return refuse(culprit, plr_setting_by_name("min-depth"));
+    if (config->max_depth_m > 0 && config->min_depth_m >= config->max_depth_m)
+        return refuse(culprit, plr_setting_by_name("max-depth"));
     return PLR_OK;
 }

@@ -271,6 +271,14 @@ def test_a_device_that_does_not_take_the_speed_is_refused(
     os.close(theirs)
 
 
+def test_an_image_that_is_none_is_refused_before_qemu_sees_it(
+    recording: Path, pelorus: Run
+) -> None:
+    said = pelorus("stream", recording, "--to", "qemu:mps2_an500", "--image", recording)
+    assert said.status != 0
+    assert f"{recording}: is no firmware image; give the .elf of a board" in said.err
+
+
 def test_an_image_is_for_the_emulator_alone(recording: Path, pelorus: Run) -> None:
     said = pelorus("stream", recording, "--to", "tcp:localhost:5000", "--image", recording)
     assert said.status == 1

@@ -230,6 +230,12 @@ static void test_combinations_without_sense_are_refused(void) {
     config.min_depth_m = 50;
     config.max_range_m = 50;
     demand_culprit("min-depth");
+    setUp();
+    config.min_depth_m = 10;
+    config.max_depth_m = 10; /* no landmark could be made */
+    demand_culprit("max-depth");
+    config.max_depth_m = 0; /* no limit */
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_check(&config, NULL));
 }
 
 static void test_the_check_wants_a_config(void) {

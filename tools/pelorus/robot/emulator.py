@@ -24,6 +24,7 @@ MACHINES = {
 IMAGES = Path("build/robot/images")
 SOURCE_ROOT = Path(__file__).resolve().parents[3]
 STOP_S = 5.0
+ELF = b"\x7fELF"
 
 
 def image_of(board: str) -> Path:
@@ -45,8 +46,11 @@ class Emulator:
     def __init__(self, board: str, image: Path, options: tuple[str, ...] = ()) -> None:
         if board not in MACHINES:
             raise PelorusError(f"there is no board {board}; QEMU can be {', '.join(MACHINES)}")
-        if not image.exists():
+        if not image.is_file():
             raise PelorusError(f"{image}: no such image")
+        with image.open("rb") as stream:
+            if stream.read(len(ELF)) != ELF:
+                raise PelorusError(f"{image}: is no firmware image; give the .elf of a board")
         self.board = board
         self._image = image
         self._options = options
