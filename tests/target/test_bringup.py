@@ -40,7 +40,7 @@ class Console:
         return self.line()
 
     def send(self, words: str) -> None:
-        self._link.exchange(words.encode() + b"\n")
+        self._held += self._link.exchange(words.encode() + b"\n")  # it answers while we send
 
     def fault_report(self, patience_s: float = 10.0) -> str:
         """The TEXT frame between two delimiters."""
