@@ -105,8 +105,9 @@ double plr_filter_trace(plr_filter *f);
 unsigned plr_filter_landmark_count(const plr_filter *f);
 
 /* Landmark in slot 0 to count - 1, in the world, with covariance. Applies the accumulated motion
- * first. The covariance is what is left of pose and landmark: where those are uncertain by metres and
- * it by centimetres, float32 may leave a variance below zero by rounding; the map sink's is the same. PLR_E_ARGUMENT beyond the last slot. */
+ * first. The covariance is what is left of pose and landmark: where those are uncertain by metres
+ * and it by centimetres, float32 may leave a variance below zero by rounding; the map sink's is the
+ * same. PLR_E_ARGUMENT beyond the last slot. */
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark);
 
 /* Puts a landmark of known world position and covariance into the state, at the current time. Its

@@ -6,6 +6,7 @@
 #include "filter/covariance.h"
 #include "filter/gate.h"
 #include "filter/motion.h"
+#include "filter/rigid_fit.h"
 #include "linalg/dense.h"
 #include "linalg/small.h"
 
@@ -69,12 +70,12 @@ static bool apply_block(plr_filter *f, const plr_block *block, bool *factorised)
 
 /* Is the correction one that a retraction can follow? */
 static bool is_sane(const plr_filter *f, unsigned n) {
-    static const plr_real max_turn2 = 9, max_way2 = 1e6;
+    static const plr_real max_way2 = 1e6;
     const plr_real *dx = f->work.dx;
     for (unsigned i = 0; i < n; i++)
         if (!plr_is_finite(dx[i]))
             return false;
-    return plr_dot3(dx, dx) < max_way2 && plr_dot3(dx + 3, dx + 3) < max_turn2;
+    return plr_dot3(dx, dx) < max_way2 && plr_dot3(dx + 3, dx + 3) < PLR_MAX_CORRECTION_TURN2;
 }
 
 plr_correction plr_correct(plr_filter *f, const plr_observation *observations, unsigned count) {

@@ -8,8 +8,6 @@
 
 /* How much the pose's correction says beside the landmarks'. Measured: docs/NUMERICS.md. */
 #define SHARE_OF_POSE PLR_R(0.1)
-/* A turn beyond, rad^2, is no correction but an accident. */
-#define MOST_TURN2 PLR_R(9)
 /* For directions that no landmark shows, such as the roll about the only one's ray. */
 #define TINY PLR_R(1e-12)
 
@@ -52,7 +50,7 @@ void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], plr_real eta[
     if (plr_cholesky_upper(6, fit->A)) {
         plr_solve_upper_transposed(6, 1, fit->A, eta, 1);
         solve_upper(fit->A, eta);
-        if (plr_dot3(eta + 3, eta + 3) < MOST_TURN2)
+        if (plr_dot3(eta + 3, eta + 3) < PLR_MAX_CORRECTION_TURN2)
             return;
     }
     memcpy(eta, xi, 6 * sizeof *eta);

@@ -13,6 +13,9 @@
 
 #include "pelorus/config.h"
 
+/* A correction that turns further, rad^2, is none that a retraction can follow. */
+#define PLR_MAX_CORRECTION_TURN2 PLR_R(9)
+
 typedef struct plr_rigid_fit {
     plr_real A[21 + PLR_KERNEL_MARGIN]; /* 6x6, upper triangle packed row by row */
     plr_real b[6];                      /* sum_i J_i^T W w_i */

@@ -27,8 +27,8 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
                          size_t ld, plr_real *P);
 
 /* d[i] = P_ii - sum_k Ut[k][i]^2 for i = 0 .. n-1, in the same steps: what plr_packed_subtract with
- * W = U would leave on the diagonal. d holds n numbers. Reads as
- * far behind U^T as plr_packed_subtract. */
+ * W = U would leave on the diagonal. d holds n numbers. Reads as far behind U^T as
+ * plr_packed_subtract. */
 void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *Ut, size_t ld,
                                     const plr_real *P, plr_real *d);
 
