@@ -32,6 +32,11 @@ typedef struct plr_totals {
     uint32_t locks;         /* times the gate was locked */
     uint32_t range_limited; /* landmark corrections stopped at max_range */
     uint32_t blocks_failed;
+    uint32_t widened;        /* times the covariance was widened: the pose may have jumped */
+    uint32_t recoveries;     /* landmarks dropped to go on after divergence or a lost lock */
+    uint32_t contradictions; /* times vision's word was taken against the twists */
+    uint32_t twists_refused, frames_refused; /* for any reason */
+    uint32_t damaged;                        /* calls refused with PLR_E_DAMAGED */
     uint64_t observations, matched, used, gated, created, evicted;
     plr_time_ns diverged_ns; /* when a variance ceased to be positive; 0: never */
 } plr_totals;

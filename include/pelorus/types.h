@@ -34,7 +34,9 @@ typedef enum plr_status {
     PLR_E_CPU = -14,        /* the processor flushes subnormals to zero */
     PLR_E_CORRUPT = -15,    /* stored bytes fail their check */
     PLR_E_FOREIGN = -16, /* of another version or build; a saved state: or calibration, setting */
-    PLR_E_IO = -17       /* the port reports a failure */
+    PLR_E_IO = -17,      /* the port reports a failure */
+    PLR_E_DAMAGED = -18, /* the filter's memory does not hold what it should: init again */
+    PLR_E_SIZE = -19 /* caller and library were compiled with other sizes or another precision */
 } plr_status;
 
 /* How far the estimate may be trusted. */
@@ -45,20 +47,67 @@ typedef enum plr_health {
     PLR_HEALTH_DIVERGED = 3  /* the covariance is broken: updates are refused until a reset */
 } plr_health;
 
-/* Why health is not good: bits of plr_report.reasons. */
+/* Why health is not good: bits of plr_report.reasons and plr_health_state.reasons. Beside each: what
+ * it means, what causes it; what to do. */
 typedef enum plr_reason {
-    PLR_REASON_FEW_OBSERVATIONS = 1 << 0, /* fewer than 3 observations used in this frame */
-    PLR_REASON_NO_OBSERVATIONS = 1 << 1,  /* none used in the last 10 frames */
-    PLR_REASON_GATE_LOCKED = 1 << 2,      /* most matches rejected in 10 successive frames */
-    PLR_REASON_GATE_INERT = 1 << 3,       /* 0 of the last 1000 matches rejected: gate too wide? */
-    PLR_REASON_BLOCK_FAILED = 1 << 4,     /* an innovation covariance could not be factorised */
-    PLR_REASON_SINK_FAILED = 1 << 5,      /* the map sink refused a landmark */
-    PLR_REASON_NO_ROOM = 1 << 6,          /* new landmarks found no slot */
-    PLR_REASON_REFUSED_INPUT = 1 << 7,    /* observations were malformed or ids were doubled */
-    PLR_REASON_NIS_HIGH = 1 << 8,         /* innovations are larger than the noise explains */
-    PLR_REASON_RANGE_LIMITED = 1 << 9,    /* an update pushed a landmark beyond max-range */
-    PLR_REASON_NOT_POSITIVE = 1 << 10,    /* a variance ceased to be positive: diverged */
-    PLR_REASON_BUDGET = 1 << 11           /* observations were left out for want of time */
+    /* Fewer than 3 observations used in this frame: a bare wall, darkness, a covered camera, or the
+     * gate rejects what is seen. Passes by itself; if it stays, look at the tracker. */
+    PLR_REASON_FEW_OBSERVATIONS = 1 << 0,
+    /* None used in the last 10 frames: the pose goes on by twists alone and drifts. As above. */
+    PLR_REASON_NO_OBSERVATIONS = 1 << 1,
+    /* Most matches rejected in 10 successive frames; the landmarks were dropped. The camera was moved,
+     * ids changed their meaning, or a sigma is far too small. */
+    PLR_REASON_GATE_LOCKED = 1 << 2,
+    /* 0 of the last 1000 matches rejected. The gate, or pixel-sigma, is too wide to guard. */
+    PLR_REASON_GATE_INERT = 1 << 3,
+    /* An innovation covariance could not be factorised; its observations were left out. Numbers of
+     * very different size: check pixel-sigma, start-sigma and the covariances that were given. */
+    PLR_REASON_BLOCK_FAILED = 1 << 4,
+    /* The map sink refused a landmark, which stays and holds its slot. Make room in the sink. */
+    PLR_REASON_SINK_FAILED = 1 << 5,
+    /* New landmarks found no slot. More slots, or fewer features from the tracker. */
+    PLR_REASON_NO_ROOM = 1 << 6,
+    /* Observations were malformed or ids were doubled: a fault of the tracker or of the link. */
+    PLR_REASON_REFUSED_INPUT = 1 << 7,
+    /* Innovations are larger than the noise explains: pixel-sigma, or a twist's sigma, is too small,
+     * or the calibration is off. */
+    PLR_REASON_NIS_HIGH = 1 << 8,
+    /* An update pushed a landmark beyond max-range, and was stopped there. Points that far give no
+     * position: max-depth keeps them out. */
+    PLR_REASON_RANGE_LIMITED = 1 << 9,
+    /* A variance ceased to be positive: the filter has diverged. Set the pose, or reset. */
+    PLR_REASON_NOT_POSITIVE = 1 << 10,
+    /* Observations were left out for want of time. A longer deadline, or fewer features. */
+    PLR_REASON_BUDGET = 1 << 11,
+    /* Vision contradicts the twists, and vision's word was taken: slipping wheels, a dead encoder, a
+     * push. Check the wheels if it comes again; if always, the scale of the odometry. */
+    PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
+    /* After a lost lock or a contradiction: the pose may be wrong by more than its covariance says,
+     * until what was contradicted agrees again. Drive with care, or set the pose to end it. */
+    PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,
+    /* A bias estimate is beyond 3 sigma of its prior. Stereo and odometry disagree in scale (baseline,
+     * focal length, wheel radius; which of them cannot be known), or bias-*-sigma is too small. */
+    PLR_REASON_BIAS_OFF_PRIOR = 1 << 14,
+    /* Innovations are far smaller than the noise says, over many frames: pixel-sigma is too large, or
+     * the tracker smooths what it sees. The pose is better than its covariance says. */
+    PLR_REASON_NIS_LOW = 1 << 15,
+    /* The same pixels in successive frames while the twists go on: a camera or a tracker that sends
+     * the same image again. Restart it. */
+    PLR_REASON_FROZEN_IMAGE = 1 << 16,
+    /* The matched points do not agree on one motion: much of the scene moves, or tracks are stale.
+     * The pose leans on the twists until they agree. */
+    PLR_REASON_SCENE_DISAGREES = 1 << 17,
+    /* To go on after divergence or a lost lock, the landmarks were dropped and the covariance was
+     * widened. Told once; the reset counter of POSE and ODOMETRY counts it. */
+    PLR_REASON_RECOVERED = 1 << 18,
+    /* No frame was used for too long. Camera, tracker or link are silent; plr_filter_health alone
+     * tells it, as a report needs a frame. */
+    PLR_REASON_NO_FRAMES = 1 << 19,
+    /* A guard found the filter's memory changed: a stray write, a flipped bit, a stack that grew into
+     * it. plr_filter_init anew; if it comes again, look for the writer. */
+    PLR_REASON_STATE_DAMAGED = 1 << 20,
+    /* Twists are missing, refused, or one was held for too long. Check the odometry and its link. */
+    PLR_REASON_NO_TWISTS = 1 << 21
 } plr_reason;
 
 /* A rigid motion. */
@@ -113,7 +162,7 @@ typedef struct plr_report {
     plr_time_ns t_ns;
     plr_status status;
     plr_health health;
-    uint16_t reasons;       /* bits of plr_reason */
+    uint32_t reasons;       /* bits of plr_reason */
     uint16_t budget;        /* as given */
     uint16_t observations;  /* in the frame */
     uint16_t matched;       /* of landmarks that the state holds */
@@ -132,5 +181,17 @@ typedef struct plr_report {
     uint16_t nis_dof;       /* degrees of freedom of nis */
     float nis;              /* sum of the gate distances d^2 of those accepted, left out or not */
 } plr_report;
+
+/* How it stands at some time, with or without a frame: plr_filter_health. Seconds are infinite where
+ * there never was one. */
+typedef struct plr_health_state {
+    plr_health health;
+    uint32_t reasons;             /* bits of plr_reason */
+    double seconds_without_frame; /* since the last frame that was taken */
+    double seconds_without_use;   /* since the last observation that was used */
+    double seconds_without_twist; /* since the last twist that was taken */
+    uint32_t resets; /* what the reset counter of a POSE counts: poses set from outside, and times
+                        the covariance was widened */
+} plr_health_state;
 
 #endif

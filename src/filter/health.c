@@ -32,9 +32,9 @@ static void count_up(uint16_t *count, bool more) {
         (*count)++;
 }
 
-static uint16_t find_reasons(plr_filter *f, const plr_frame_events *events,
+static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
                              const plr_report *report) {
-    unsigned reasons = 0;
+    uint32_t reasons = 0;
     count_up(&f->frames_without_use, report->used == 0);
     f->matches_since_gated = report->gated ? 0 : f->matches_since_gated + report->matched;
     if (f->matches_since_gated > INERT_MATCHES)
@@ -63,7 +63,7 @@ static uint16_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_RANGE_LIMITED;
     if (report->left_out)
         reasons |= PLR_REASON_BUDGET;
-    return (uint16_t)reasons;
+    return reasons;
 }
 
 void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report *report) {

@@ -11,7 +11,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 1 };
+enum { STATE_VERSION = 2 };
 
 #define LENGTH(table) (sizeof(table) / sizeof *(table))
 #define FIELD(type, member, kind, n)                                                               \
@@ -82,6 +82,12 @@ static const plr_field filter_fields[] = {
     OF_TOTALS(locks, PLR_FIELD_U32),
     OF_TOTALS(range_limited, PLR_FIELD_U32),
     OF_TOTALS(blocks_failed, PLR_FIELD_U32),
+    OF_TOTALS(widened, PLR_FIELD_U32),
+    OF_TOTALS(recoveries, PLR_FIELD_U32),
+    OF_TOTALS(contradictions, PLR_FIELD_U32),
+    OF_TOTALS(twists_refused, PLR_FIELD_U32),
+    OF_TOTALS(frames_refused, PLR_FIELD_U32),
+    OF_TOTALS(damaged, PLR_FIELD_U32),
     OF_TOTALS(observations, PLR_FIELD_U64),
     OF_TOTALS(matched, PLR_FIELD_U64),
     OF_TOTALS(used, PLR_FIELD_U64),

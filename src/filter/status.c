@@ -44,6 +44,11 @@ const char *plr_status_text(plr_status status) {
                "set of settings, too";
     case PLR_E_IO:
         return "the port, the map sink or the storage reports a failure";
+    case PLR_E_DAMAGED:
+        return "the filter's memory does not hold what it should: initialise it again";
+    case PLR_E_SIZE:
+        return "program and library were compiled with other sizes: PLR_REAL, PLR_MAX_LANDMARKS, "
+               "PLR_MAX_OBSERVATIONS and PLR_BLOCK_OBSERVATIONS must be the same";
     }
     return "no status of this version";
 }
@@ -75,6 +80,30 @@ const char *plr_reason_text(plr_reason reason) {
         return "a variance ceased to be positive";
     case PLR_REASON_BUDGET:
         return "observations were left out for want of time";
+    case PLR_REASON_TWIST_CONTRADICTED:
+        return "vision contradicts the twists (slipping wheels, a dead encoder?); vision's word "
+               "was "
+               "taken";
+    case PLR_REASON_POSE_MAY_BE_WRONG:
+        return "the pose may be wrong by more than its covariance says, until what was "
+               "contradicted "
+               "agrees again or the pose is set";
+    case PLR_REASON_BIAS_OFF_PRIOR:
+        return "a bias is beyond 3 sigma of its prior: do stereo and odometry disagree in scale?";
+    case PLR_REASON_NIS_LOW:
+        return "innovations are far smaller than the noise says: is pixel-sigma too large?";
+    case PLR_REASON_FROZEN_IMAGE:
+        return "the same pixels in successive frames while the twists go on: is the camera frozen?";
+    case PLR_REASON_SCENE_DISAGREES:
+        return "the matched points do not agree on one motion: does the scene move?";
+    case PLR_REASON_RECOVERED:
+        return "the landmarks were dropped and the covariance widened, to go on";
+    case PLR_REASON_NO_FRAMES:
+        return "no frame was used for too long: does the camera send?";
+    case PLR_REASON_STATE_DAMAGED:
+        return "the filter's memory was changed by something else";
+    case PLR_REASON_NO_TWISTS:
+        return "twists are missing, refused or held for too long: does the odometry send?";
     }
     return "no reason of this version";
 }

@@ -141,7 +141,7 @@ void plr_begin_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, cons
     plr_clock_watch_init(&s->watch);
     plr_totals totals;
     if (!s->started && plr_filter_totals(&s->filter, &totals) == PLR_OK)
-        s->start_resets = totals.resets;
+        s->start_resets = plr_send_resets(&totals);
     s->started = true;
 }
 

@@ -131,7 +131,7 @@ static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6
 static void take_as_start(plr_session *s) {
     plr_totals totals;
     if (plr_filter_totals(&s->filter, &totals) == PLR_OK)
-        s->start_resets = totals.resets;
+        s->start_resets = plr_send_resets(&totals);
     s->start_known = false;
     s->started = true;
     plr_clock_watch_init(&s->watch);

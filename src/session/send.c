@@ -53,6 +53,10 @@ static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
     return plr_filter_bias(f, pose->bias, NULL) == PLR_OK;
 }
 
+uint32_t plr_send_resets(const plr_totals *totals) {
+    return totals->resets + totals->widened;
+}
+
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
     plr_pose_message *pose = &s->out.as.pose;
     plr_totals totals;
@@ -63,7 +67,7 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
     pose->t_ns = plr_filter_time(&s->filter);
     pose->real_bytes = (uint8_t)sizeof(plr_real);
     pose->after_update = after_update;
-    pose->reset_count = (uint16_t)(totals.resets - s->start_resets);
+    pose->reset_count = (uint16_t)(plr_send_resets(&totals) - s->start_resets);
     put(s, after_update ? PLR_OUTPUT_POSE : PLR_OUTPUT_TWIST_POSE, &s->out);
     if (s->options.observer.pose != NULL)
         s->options.observer.pose(s->options.observer.context, pose);

@@ -62,14 +62,25 @@ static void pass_health(plr_pass *p, plr_health *health) {
     plr_pass_require(p, (unsigned)*health <= PLR_HEALTH_DIVERGED);
 }
 
+/* Reasons stand in two places: the upper half came with version 1.2, at the end, where a reader of 1.1
+ * passes over it. A payload of 1.1 ends before it. */
+static void pass_upper_reasons(plr_pass *p, plr_report *r, uint16_t lower) {
+    uint16_t upper = plr_pass_reads(p) ? 0 : (uint16_t)(r->reasons >> 16);
+    if (!plr_pass_reads(p) || p->left > 0)
+        plr_pass_u16(p, &upper);
+    if (plr_pass_reads(p))
+        r->reasons = (uint32_t)upper << 16 | lower;
+}
+
 void plr_layout_report(plr_pass *p, plr_report_message *m) {
     plr_report *r = &m->report;
+    uint16_t lower_reasons = plr_pass_reads(p) ? 0 : (uint16_t)(r->reasons & 0xFFFFU);
     plr_pass_u64(p, &r->t_ns);
     plr_pass_u8(p, &m->subject);
     pass_status(p, &r->status);
     pass_health(p, &r->health);
     plr_pass_reserved(p);
-    plr_pass_u16(p, &r->reasons);
+    plr_pass_u16(p, &lower_reasons);
     plr_pass_u16(p, &r->budget);
     plr_pass_u16(p, &r->observations);
     plr_pass_u16(p, &r->matched);
@@ -87,4 +98,5 @@ void plr_layout_report(plr_pass *p, plr_report_message *m) {
     plr_pass_u16(p, &r->nis_dof);
     plr_pass_f32(p, &r->nis);
     plr_pass_u32(p, &m->update_us);
+    pass_upper_reasons(p, r, lower_reasons);
 }

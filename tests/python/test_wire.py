@@ -8,6 +8,7 @@ import struct
 import time
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.TRUTH: [104],
     Kind.LANDMARK: [90],
     Kind.POSE: [36 + 63 * 8, 36 + 63 * 4],
-    Kind.REPORT: [52],
+    Kind.REPORT: [54],
     Kind.TEXT: [1 + 5],
     Kind.END: [20],
     Kind.STATE: [57],
@@ -129,7 +130,7 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 1, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 2, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:] == "Straße 7".encode()
     assert struct.unpack_from("<5d", header, 10) == (700.5, 701.5, 320.1, 240.2, 0.54)
     assert np.array_equal(np.frombuffer(header, "<f8", 9, 50), R.ravel())
@@ -228,6 +229,12 @@ def test_a_longer_payload_is_a_later_version_and_a_shorter_one_is_malformed(
     if not isinstance(message, Text):
         assert shorter == []
         assert (counts.malformed, counts.damaged) == (1, 0)
+
+
+def test_a_report_of_format_1_1_has_the_lower_reasons_alone() -> None:
+    report = Report(8, 5, reasons=1 << 20 | 1 << 3, update_us=7)
+    assert Report.unpack(report.pack()) == report
+    assert Report.unpack(report.pack()[:52]) == replace(report, reasons=1 << 3)
 
 
 WRONG_BYTES = [  # kind, offset in the payload, value: choices and counts that no page lists

@@ -274,7 +274,7 @@ def test_both_refuse_a_later_major_version(echo: EchoFunction) -> None:
 def test_a_later_minor_version_is_read_by_both(echo: EchoFunction) -> None:
     header = frames.Header(frames.Camera(1, 2, 3, 4, 5), name="newer")
     payload = bytearray(header.pack() + b"what a later version knows")
-    payload[1] = 2
+    payload[1] = 3
     stream = framed(Kind.HEADER, 0, bytes(payload))
     echoed = echo(stream)
     assert echoed.stream == framed(Kind.HEADER, 0, header.pack())

@@ -20,7 +20,7 @@ EXTREMES_F32 = np.array(
 
 
 REPORT_COUNTS = (
-    *("reasons", "budget", "observations", "matched", "used", "gated", "created", "evicted"),
+    *("budget", "observations", "matched", "used", "gated", "created", "evicted"),
     *("refused", "duplicates", "no_room", "poor", "left_out", "blocks_failed", "active", "nis_dof"),
 )
 
@@ -139,6 +139,7 @@ def a_report(random: np.random.Generator) -> Message:
         health=int(random.integers(4)),
         nis=float(narrow_reals(random)),
         update_us=whole(random, 32),
+        reasons=whole(random, 32),
     )
     return replace(report, **{name: whole(random, 16) for name in REPORT_COUNTS})
 

@@ -180,11 +180,11 @@ static void make_report(plr_report_message *m, unsigned variant) {
     r->t_ns = time_of(variant);
     r->status = variant == WIRE_SAMPLE_LEAST ? PLR_OK : PLR_E_LATE;
     if (variant == WIRE_SAMPLE_MOST)
-        r->status = PLR_E_IO;
+        r->status = PLR_E_SIZE;
     r->health = variant == WIRE_SAMPLE_LEAST  ? PLR_HEALTH_GOOD
                 : variant == WIRE_SAMPLE_MOST ? PLR_HEALTH_DIVERGED
                                               : PLR_HEALTH_DEGRADED;
-    r->reasons = whole16(variant, PLR_REASON_FEW_OBSERVATIONS);
+    r->reasons = whole32(variant, PLR_REASON_STATE_DAMAGED | PLR_REASON_FEW_OBSERVATIONS);
     r->budget = whole16(variant, 100);
     r->observations = whole16(variant, 101);
     r->matched = whole16(variant, 102);

@@ -32,7 +32,7 @@ static void frame(unsigned matched, unsigned gated) {
 
 static void judge(unsigned reasons, plr_health health) {
     plr_health_judge(&filter, &events, &report);
-    TEST_ASSERT_EQUAL_HEX16(reasons, report.reasons);
+    TEST_ASSERT_EQUAL_HEX32(reasons, report.reasons);
     TEST_ASSERT_EQUAL_INT(health, report.health);
 }
 
@@ -181,12 +181,12 @@ static void test_a_refused_frame_says_whether_the_filter_is_broken(void) {
     memset(&report, 0, sizeof report);
     plr_health_after_refusal(&filter, &report);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, report.health);
-    TEST_ASSERT_EQUAL_HEX16(0, report.reasons);
+    TEST_ASSERT_EQUAL_HEX32(0, report.reasons);
     TEST_ASSERT_EQUAL_UINT16(4, report.active);
     filter.diverged = 1;
     plr_health_after_refusal(&filter, &report);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DIVERGED, report.health);
-    TEST_ASSERT_EQUAL_HEX16(PLR_REASON_NOT_POSITIVE, report.reasons);
+    TEST_ASSERT_EQUAL_HEX32(PLR_REASON_NOT_POSITIVE, report.reasons);
 }
 
 static void test_totals_are_the_sums_of_the_reports(void) {

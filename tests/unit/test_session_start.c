@@ -248,6 +248,22 @@ static void test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted(void) {
     TEST_ASSERT_EQUAL_UINT16(1, answer.as.pose.reset_count);
 }
 
+static void test_a_widened_covariance_counts_as_a_reset_too(void) {
+    plr_message answer;
+    desk_begin();
+    desk_send(drive_header());
+    desk_send(drive_twist(5));
+    desk_send(drive_stereo(5));
+    desk_run();
+    session.filter.totals.widened++; /* as the filter counts it */
+    desk_send(drive_stereo(6));
+    desk_run();
+    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
+    TEST_ASSERT_EQUAL_UINT16(0, answer.as.pose.reset_count);
+    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
+    TEST_ASSERT_EQUAL_UINT16(1, answer.as.pose.reset_count);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_start_wins_over_truth);
@@ -263,5 +279,6 @@ int main(void) {
     RUN_TEST(test_the_start_covariance_is_taken_packed_row_by_row);
     RUN_TEST(test_a_bias_prior_is_taken_whatever_the_pose_starts_from);
     RUN_TEST(test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted);
+    RUN_TEST(test_a_widened_covariance_counts_as_a_reset_too);
     return UNITY_END();
 }

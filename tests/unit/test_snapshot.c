@@ -141,8 +141,10 @@ static void test_a_filter_that_has_seen_nothing_can_be_saved(void) {
 /* A field that a later version adds to the filter, and forgets here, is found by this. */
 static void test_every_field_is_carried(void) {
     plr_totals *t = &driven.totals;
-    uint32_t *const counts[] = {&t->twists, &t->frames, &t->late,          &t->refused,
-                                &t->resets, &t->locks,  &t->range_limited, &t->blocks_failed};
+    uint32_t *const counts[] = {
+        &t->twists,         &t->frames,         &t->late,           &t->refused, &t->resets,
+        &t->locks,          &t->range_limited,  &t->blocks_failed,  &t->widened, &t->recoveries,
+        &t->contradictions, &t->twists_refused, &t->frames_refused, &t->damaged};
     uint64_t *const sums[] = {&t->observations, &t->matched, &t->used,       &t->gated,
                               &t->created,      &t->evicted, &t->diverged_ns};
     rng chance = rng_seeded(7);
@@ -224,14 +226,14 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 25 + 17 * real;
-    const uint32_t slots_at = count_at + 4 + 16 + 24 + 4 + 12 + 32 + 56 + 107 * real;
+    const uint32_t slots_at = count_at + 4 + 16 + 24 + 4 + 12 + 56 + 56 + 107 * real;
     const uint32_t slot = 3 * real + 25;
     start(&driven);
     drive(&driven, NULL, 5);
     const uint32_t dim = 12 + 3 * driven.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
-    TEST_ASSERT_EQUAL_UINT32(1, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(2, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
     TEST_ASSERT_EQUAL_UINT(25, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));

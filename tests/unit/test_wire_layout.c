@@ -56,7 +56,7 @@ static void test_header_fields_lie_where_the_page_says(void) {
     const plr_header m = encode(PLR_KIND_HEADER).as.header;
     TEST_ASSERT_EQUAL_size_t(202 + strlen(m.name), length);
     ASSERT_NUMBER(0, 1, 1);
-    ASSERT_NUMBER(1, 1, 1);
+    ASSERT_NUMBER(1, 1, PLR_WIRE_VERSION_MINOR);
     ASSERT_NUMBER(2, 1, m.body_axes);
     ASSERT_NUMBER(3, 1, m.twist_timing);
     ASSERT_NUMBER(4, 1, 0);
@@ -189,17 +189,18 @@ static void test_pose_fields_of_float32_lie_where_the_page_says(void) {
 
 static void test_report_fields_lie_where_the_page_says(void) {
     const plr_report_message m = encode(PLR_KIND_REPORT).as.report;
-    TEST_ASSERT_EQUAL_size_t(52, length);
+    TEST_ASSERT_EQUAL_size_t(54, length);
     ASSERT_NUMBER(0, 8, m.report.t_ns);
     ASSERT_NUMBER(8, 1, m.subject);
     ASSERT_NUMBER(9, 1, 256 - 7); /* PLR_E_LATE */
     ASSERT_NUMBER(10, 1, m.report.health);
     ASSERT_NUMBER(11, 1, 0);
-    ASSERT_NUMBER(12, 2, m.report.reasons);
+    ASSERT_NUMBER(12, 2, PLR_REASON_FEW_OBSERVATIONS);
     for (unsigned i = 0; i < 15; i++) /* budget, observations, matched, ... nis_dof */
         ASSERT_NUMBER(14 + 2 * i, 2, 100 + i);
     ASSERT_F32(44, m.report.nis);
     ASSERT_NUMBER(48, 4, m.update_us);
+    ASSERT_NUMBER(52, 2, PLR_REASON_STATE_DAMAGED >> 16);
 }
 
 static void test_text_fills_the_payload_to_its_end(void) {
@@ -250,16 +251,29 @@ static plr_fault read_payload(plr_kind kind, size_t n, plr_message *m) {
     return pass.fault;
 }
 
+/* Of a recording of format 1.1, in which reasons are 16 bits. */
+enum { REPORT_OF_1_1 = 52 };
+
 static void test_every_shorter_payload_is_malformed(void) {
     for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
         plr_message m;
         encode((plr_kind)kind);
         size_t least = kind == PLR_KIND_TEXT ? 1 : length;
         for (size_t n = 0; n < least; n++) {
+            if (kind == PLR_KIND_REPORT && n == REPORT_OF_1_1)
+                continue;
             encode((plr_kind)kind);
             TEST_ASSERT_EQUAL_INT(PLR_FAULT_MALFORMED, read_payload((plr_kind)kind, n, &m));
         }
     }
+}
+
+static void test_a_report_of_format_1_1_has_the_lower_reasons_alone(void) {
+    plr_message m, expected = encode(PLR_KIND_REPORT);
+    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_REPORT, REPORT_OF_1_1, &m));
+    expected.as.report.report.reasons &= 0xFFFF;
+    wire_assert_same(&expected, &m);
+    TEST_ASSERT_EQUAL_HEX32(PLR_REASON_FEW_OBSERVATIONS, m.as.report.report.reasons);
 }
 
 static void test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored(void) {
@@ -353,6 +367,7 @@ int main(void) {
     RUN_TEST(test_end_counts_lie_where_the_page_says);
     RUN_TEST(test_state_fields_lie_where_the_page_says);
     RUN_TEST(test_every_shorter_payload_is_malformed);
+    RUN_TEST(test_a_report_of_format_1_1_has_the_lower_reasons_alone);
     RUN_TEST(test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored);
     RUN_TEST(test_values_that_the_page_does_not_list_are_malformed);
     RUN_TEST(test_a_status_of_a_later_version_is_let_through);

@@ -6,7 +6,7 @@ from a recorder too).
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import ClassVar
 
@@ -197,14 +197,21 @@ class Report(Message):
 
     kind: ClassVar[Kind] = Kind.REPORT
     _FIXED: ClassVar[struct.Struct] = struct.Struct("<QBbBx2H14HfI")
+    _UPPER: ClassVar[struct.Struct] = struct.Struct("<H")  # of reasons; since format 1.2
 
     def pack(self) -> bytes:
-        return self._FIXED.pack(*vars(self).values())
+        upper, lower = divmod(self.reasons, 1 << 16)
+        fixed = self._FIXED.pack(*vars(replace(self, reasons=lower)).values())
+        return fixed + self._UPPER.pack(upper)
 
     @classmethod
     def unpack(cls, payload: bytes) -> Report:
         need(payload, cls._FIXED.size)
         report = cls(*cls._FIXED.unpack_from(payload))
+        if len(payload) > cls._FIXED.size:
+            need(payload, cls._FIXED.size + cls._UPPER.size)
+            (upper,) = cls._UPPER.unpack_from(payload, cls._FIXED.size)
+            report = replace(report, reasons=upper << 16 | report.reasons)
         within("status", report.status, -128, 0)
         within("health", report.health, 0, HEALTH_MAX)
         return report

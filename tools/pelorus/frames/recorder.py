@@ -98,7 +98,7 @@ class Header(Message):
     noise: Noise = Noise()
     name: str = ""
     version_major: int = 1
-    version_minor: int = 1
+    version_minor: int = 2
     units: int = 0
 
     kind: ClassVar[Kind] = Kind.HEADER

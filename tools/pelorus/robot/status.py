@@ -25,6 +25,8 @@ STATUSES = {
     -15: "damaged on the way",
     -16: "of a kind, version or build that it does not know",
     -17: "the port or the store reports a failure",
+    -18: "the filter's memory was changed by something else",
+    -19: "program and library were compiled with other sizes",
 }
 
 HEALTH = ("good", "degraded", "lost", "diverged")
@@ -41,6 +43,16 @@ REASONS = (
     "a landmark beyond max-range",
     "a variance is not positive",
     "observations left out for want of time",
+    "vision contradicts the twists",
+    "the pose may be wrong",
+    "a bias is far off its prior",
+    "innovations far smaller than the noise says",
+    "the image is frozen",
+    "the points do not agree on one motion",
+    "landmarks dropped and covariance widened to go on",
+    "no frame used for too long",
+    "the filter's memory was changed",
+    "twists are missing or refused",
 )
 
 
