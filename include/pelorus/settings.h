@@ -32,15 +32,21 @@ typedef enum plr_noise_kind {
     PLR_NOISE_STEP = 1   /* they are the displacement's, in m and rad, for every step (III.8's W) */
 } plr_noise_kind;
 
+typedef enum plr_landmark_prior {
+    PLR_PRIOR_CORRELATED = 0, /* a new landmark's error is the pose's too: what is true */
+    PLR_PRIOR_INDEPENDENT = 1 /* it is landmark_sigma_m alone, the report's Sigma_m; `world` only */
+} plr_landmark_prior;
+
 /* Defaults and limits stand in the table of src/filter/settings.c, which plr_setting_at shows. */
 typedef struct plr_config {
-    uint8_t model;        /* plr_model_kind */
-    uint8_t mode;         /* plr_mode */
-    uint8_t twist_timing; /* plr_twist_timing */
-    uint8_t noise;        /* plr_noise_kind */
-    uint8_t bias;         /* 1: twist biases are estimated */
-    uint8_t known_map;    /* 1: slam asks the map source too when it meets an unknown id */
-    uint16_t slots;       /* landmarks in use, 1 to PLR_MAX_LANDMARKS */
+    uint8_t model;          /* plr_model_kind */
+    uint8_t mode;           /* plr_mode */
+    uint8_t twist_timing;   /* plr_twist_timing */
+    uint8_t noise;          /* plr_noise_kind */
+    uint8_t bias;           /* 1: twist biases are estimated */
+    uint8_t known_map;      /* 1: slam asks the map source too when it meets an unknown id */
+    uint8_t landmark_prior; /* plr_landmark_prior; independent needs `world` and landmark_sigma_m */
+    uint16_t slots;         /* landmarks in use, 1 to PLR_MAX_LANDMARKS */
 
     double pixel_sigma_px;          /* one coordinate of one pixel */
     double velocity_sigma;          /* m/s of one reading and axis (m with noise = step) */
@@ -103,9 +109,9 @@ plr_status plr_config_set(plr_config *config, const plr_setting *setting, double
 void plr_config_default(plr_config *config);
 
 /* The course report's hyperparameters (III-F): world model, bias off, start timing, landmark
- * variance 2 m^2, pose variance 5e-4, pixel variance 5 px^2, motion variance 1e-3 a step, and a
- * gate on the norm of the four residuals. The report leaves out far landmarks and large residuals
- * without naming a limit; 60 m and 30 px are ours. */
+ * variance 2 m^2, uncorrelated with the pose, pose variance 5e-4, pixel variance 5 px^2, motion
+ * variance 1e-3 a step, and a gate on the norm of the four residuals. The report leaves out far
+ * landmarks and large residuals without naming a limit; 30 m and 20 px are ours. */
 void plr_config_course(plr_config *config);
 
 /* PLR_OK, or PLR_E_CONFIG with the offending row in *culprit (which may be NULL). Also refuses

@@ -8,13 +8,16 @@
 #include "posix/replay.h"
 #include "posix/settings_text.h"
 
-enum { COLUMN = 34 }; /* where the meaning of an option begins */
+enum {
+    COLUMN = 34, /* where the meaning of an option begins */
+    NAMES = 12
+};
 
 /* The settings in the order in which a newcomer meets them. Those that stand in no group come
  * last. */
 static const struct {
     const char *title;
-    const char *names[10];
+    const char *names[NAMES];
 } groups[] = {
     {"What is estimated", {"model", "mode", "bias", "slots", "known-map"}},
     {"Motion",
@@ -22,11 +25,11 @@ static const struct {
       "bias-gyro-sigma", "bias-velocity-walk", "bias-gyro-walk"}},
     {"Vision",
      {"pixel-sigma", "gate-d2", "gate-residual", "min-depth", "min-disparity", "max-depth",
-      "max-row-gap", "max-range", "landmark-sigma"}},
+      "max-row-gap", "max-range", "landmark-sigma", "landmark-prior"}},
     {"Start and time", {"start-sigma", "max-gap", "twist-delay"}},
 };
 
-enum { GROUPS = sizeof groups / sizeof groups[0], NAMES = 10 };
+enum { GROUPS = sizeof groups / sizeof groups[0] };
 
 static void print_row(const char *name, const char *value, const char *about) {
     char head[128];

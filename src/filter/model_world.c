@@ -57,8 +57,9 @@ static void world_initialise(const plr_filter *f, const plr_real q[3], const plr
     plr_mat3_vec(offset, f->R_WB, s);
     for (int i = 0; i < 3; i++)
         landmark->x[i] = (plr_real)(f->p_WB[i] + (double)offset[i]);
-    plr_world_by_pose(f, s, landmark->J_pose);
-    landmark->uses_pose = true;
+    landmark->uses_pose = f->config.landmark_prior == PLR_PRIOR_CORRELATED;
+    if (landmark->uses_pose)
+        plr_world_by_pose(f, s, landmark->J_pose);
     plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
     plr_mat3_mul(RS, R_WC, S_q);
     plr_mat3_mul_nt(landmark->P, RS, RS);

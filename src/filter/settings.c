@@ -10,6 +10,7 @@ static const char *const model_words[] = {"body", "world", NULL};
 static const char *const mode_words[] = {"slam", "mapping", "localization", "dead_reckoning", NULL};
 static const char *const timing_words[] = {"start", "end", "mid", NULL};
 static const char *const noise_words[] = {"twist", "step", NULL};
+static const char *const prior_words[] = {"correlated", "independent", NULL};
 static const char *const switch_words[] = {"off", "on", NULL};
 
 /* How a field of plr_config is stored. */
@@ -49,6 +50,7 @@ static const plr_row rows[] = {
     {{23, "max-range", "m", "greatest distance of any landmark", PLR_SETTING_NUMBER, NULL, 1, 1e6, 1e5}, AT(max_range_m), STORE_DOUBLE},
     {{24, "max-gap", "s", "longest pause in the data that is bridged", PLR_SETTING_NUMBER, NULL, 1e-3, 60, 2}, AT(max_gap_s), STORE_DOUBLE},
     {{25, "twist-delay", "s", "twists wait so long for a late camera", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
+    {{26, "landmark-prior", "", "does a new landmark of world share the pose's error?", PLR_SETTING_CHOICE, prior_words, 0, 1, PLR_PRIOR_CORRELATED}, AT(landmark_prior), STORE_U8},
 };
 /* clang-format on */
 
@@ -150,8 +152,9 @@ void plr_config_course(plr_config *config) {
     config->pixel_sigma_px = 2.23606797749979;     /* variance 5 px^2 */
     config->velocity_sigma = 0.03162277660168379;  /* variance 1e-3 m^2 a step */
     config->gyro_sigma = 0.03162277660168379;      /* variance 1e-3 rad^2 a step */
-    config->gate_residual_px = 30;
-    config->max_depth_m = 60;
+    config->landmark_prior = PLR_PRIOR_INDEPENDENT;
+    config->gate_residual_px = 20; /* ours: the report names no limit */
+    config->max_depth_m = 30;      /* ours as well */
 }
 
 static plr_status refuse(const plr_setting **culprit, const plr_setting *setting) {
@@ -170,6 +173,12 @@ plr_status plr_config_check(const plr_config *config, const plr_setting **culpri
             return refuse(culprit, &rows[i].setting);
     if (config->model == PLR_MODEL_BODY && config->landmark_sigma_m > 0)
         return refuse(culprit, plr_setting_by_name("landmark-sigma"));
+    if (config->landmark_prior == PLR_PRIOR_INDEPENDENT) {
+        if (config->model == PLR_MODEL_BODY)
+            return refuse(culprit, plr_setting_by_name("landmark-prior"));
+        if (config->landmark_sigma_m <= 0)
+            return refuse(culprit, plr_setting_by_name("landmark-sigma"));
+    }
     if (config->min_depth_m >= config->max_range_m)
         return refuse(culprit, plr_setting_by_name("min-depth"));
     if (config->max_depth_m > 0 && config->min_depth_m >= config->max_depth_m)

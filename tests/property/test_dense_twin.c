@@ -170,6 +170,15 @@ static void test_noise_of_a_step_and_constant_landmarks_agree(void) {
     for_each_model(run_step_noise);
 }
 
+/* The course's new landmark: it does not share the pose's error. */
+static void test_a_prior_independent_of_the_pose_agrees(void) {
+    config.model = PLR_MODEL_WORLD;
+    config.landmark_sigma_m = 1.4;
+    config.landmark_prior = PLR_PRIOR_INDEPENDENT;
+    run_frames();
+    TEST_ASSERT_GREATER_THAN_UINT(8, report.used);
+}
+
 /* A frame that lies 4 ms behind a twist: the reading is held in two parts, 4
  * and 6 ms, of which the noise is charged once in all. */
 static void run_frames_between_twists(void) {
@@ -328,6 +337,7 @@ int main(void) {
     RUN_TEST(test_the_gate_rejects_what_the_textbook_rejects);
     RUN_TEST(test_eviction_removes_rows_and_columns);
     RUN_TEST(test_noise_of_a_step_and_constant_landmarks_agree);
+    RUN_TEST(test_a_prior_independent_of_the_pose_agrees);
     RUN_TEST(test_frames_between_twists_agree);
     RUN_TEST(test_pose_covariance_between_frames_agrees);
     RUN_TEST(test_landmarks_in_the_world_agree);

@@ -294,7 +294,8 @@ def test_the_course_preset_is_the_reports(record: Record) -> None:
     assert float(got["pixel-sigma"]) ** 2 == pytest.approx(5)
     assert float(got["velocity-sigma"]) ** 2 == pytest.approx(1e-3)
     assert float(got["gyro-sigma"]) ** 2 == pytest.approx(1e-3)
-    assert float(got["gate-residual"]) > 0
+    assert got["landmark-prior"] == "independent"
+    assert (got["gate-residual"], got["max-depth"]) == ("20", "30")
     changed = printed(record(drive()), "--pixel-sigma", "3", "--preset", "course")
     assert changed["pixel-sigma"] == "3"
 
@@ -308,6 +309,8 @@ def test_the_course_preset_is_the_reports(record: Record) -> None:
         (("--pixel-sgima", "1"), "--pixel-sigma"),
         (("--config", "no/such/file"), "no/such/file"),
         (("--landmark-sigma", "1"), "landmark-sigma"),
+        (("--landmark-prior", "independent"), "landmark-prior"),
+        (("--model", "world", "--landmark-prior", "independent"), "landmark-sigma"),
     ],
 )
 def test_options_without_sense_are_refused_by_name(

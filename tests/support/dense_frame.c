@@ -180,7 +180,8 @@ static void create(dense_ekf *e, const plr_observation *o) {
     dense_world_by_pose(e, s, J);
     dense_camera_to_world(e, R_WC);
     oracle_sandwich(3, 3, R_WC, P_q, P_m);
-    append(e, o->id, m, J, P_m);
+    const bool shares = e->config.landmark_prior == PLR_PRIOR_CORRELATED;
+    append(e, o->id, m, shares ? J : NULL, P_m);
 }
 
 void dense_insert_known(dense_ekf *e, const plr_landmark *known) {

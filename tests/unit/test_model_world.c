@@ -8,6 +8,7 @@
 #include "filter/covariance.h"
 #include "filter/model.h"
 #include "filter/motion.h"
+#include "linalg/packed.h"
 #include "support/dense_parts.h"
 #include "support/dense_specimen.h"
 #include "support/matrices.h"
@@ -150,6 +151,23 @@ static void test_a_new_landmark_copies_the_pose_through_its_jacobian(void) {
     }
 }
 
+/* The report's Sigma_m: S_q alone, turned, and no correlation with anything. */
+static void test_an_independent_landmark_shares_nothing_with_the_pose(void) {
+    const plr_real q[3] = {PLR_R(0.5), PLR_R(-0.25), PLR_R(8)};
+    const plr_real S[9] = {PLR_R(1.4), 0, 0, 0, PLR_R(1.4), 0, 0, 0, PLR_R(1.4)};
+    take_specimen(true, LANDMARKS);
+    filter.config.landmark_prior = PLR_PRIOR_INDEPENDENT;
+    plr_new_landmark landmark;
+    filter.model->initialise(&filter, q, S, &landmark);
+    TEST_ASSERT_FALSE(landmark.uses_pose);
+    plr_covariance_append(&filter, &landmark);
+    const unsigned row = plr_covariance_dim(&filter);
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j <= row + i; j++)
+            TEST_ASSERT_DOUBLE_WITHIN(16 * eps, j == row + i ? 1.96 : 0,
+                                      (double)filter.P[plr_packed_at(row + i, j)]);
+}
+
 static void test_a_known_landmark_enters_as_it_is(void) {
     plr_landmark known = {.p_W_m = {1, -2, 3}, .P_W_m2 = {4, 1, 0, 1, 5, 2, 0, 2, 6}};
     plr_new_landmark landmark;
@@ -223,6 +241,7 @@ int main(void) {
     RUN_TEST(test_observation_agrees_with_differences);
     RUN_TEST(test_a_point_nearer_than_min_depth_is_not_linearised);
     RUN_TEST(test_a_new_landmark_copies_the_pose_through_its_jacobian);
+    RUN_TEST(test_an_independent_landmark_shares_nothing_with_the_pose);
     RUN_TEST(test_a_known_landmark_enters_as_it_is);
     RUN_TEST(test_motion_moves_no_landmark_and_no_landmark_block);
     RUN_TEST(test_retraction_adds_to_landmarks_and_leaves_P_alone);

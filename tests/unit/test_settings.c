@@ -78,7 +78,8 @@ static void test_ids_are_those_of_the_frame_format(void) {
                                         "landmark-sigma",
                                         "max-range",
                                         "max-gap",
-                                        "twist-delay"};
+                                        "twist-delay",
+                                        "landmark-prior"};
     for (unsigned i = 0; i < sizeof names / sizeof *names; i++)
         TEST_ASSERT_EQUAL_UINT_MESSAGE(i + 1, by_name(names[i])->id, names[i]);
 }
@@ -97,6 +98,9 @@ static void test_words_of_choices_have_their_numbers(void) {
     TEST_ASSERT_EQUAL_STRING("mid", timing->choices[PLR_TWIST_MID]);
     TEST_ASSERT_EQUAL_STRING("twist", noise->choices[PLR_NOISE_TWIST]);
     TEST_ASSERT_EQUAL_STRING("step", noise->choices[PLR_NOISE_STEP]);
+    const plr_setting *prior = by_name("landmark-prior");
+    TEST_ASSERT_EQUAL_STRING("correlated", prior->choices[PLR_PRIOR_CORRELATED]);
+    TEST_ASSERT_EQUAL_STRING("independent", prior->choices[PLR_PRIOR_INDEPENDENT]);
     TEST_ASSERT_EQUAL_STRING("off", bias->choices[0]);
     TEST_ASSERT_EQUAL_STRING("on", bias->choices[1]);
     for (unsigned i = 0; i < plr_setting_count(); i++) {
@@ -238,6 +242,15 @@ static void test_combinations_without_sense_are_refused(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_check(&config, NULL));
 }
 
+static void test_an_independent_prior_needs_world_and_a_sigma_of_its_own(void) {
+    config.landmark_prior = PLR_PRIOR_INDEPENDENT;
+    demand_culprit("landmark-prior"); /* in `body` no landmark shares the pose's error anyway */
+    config.model = PLR_MODEL_WORLD;
+    demand_culprit("landmark-sigma"); /* from the pixels alone it would be far too sure */
+    config.landmark_sigma_m = 1;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_check(&config, NULL));
+}
+
 static void test_the_check_wants_a_config(void) {
     const plr_setting *culprit = plr_setting_at(0);
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_config_check(NULL, &culprit));
@@ -256,7 +269,9 @@ static void test_the_course_preset_has_the_numbers_of_the_report(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 5, get("pixel-sigma") * get("pixel-sigma"));
     TEST_ASSERT_DOUBLE_WITHIN(1e-18, 1e-3, get("velocity-sigma") * get("velocity-sigma"));
     TEST_ASSERT_DOUBLE_WITHIN(1e-18, 1e-3, get("gyro-sigma") * get("gyro-sigma"));
-    TEST_ASSERT_EQUAL_DOUBLE(30, get("gate-residual"));
+    TEST_ASSERT_EQUAL_DOUBLE(PLR_PRIOR_INDEPENDENT, get("landmark-prior"));
+    TEST_ASSERT_EQUAL_DOUBLE(20, get("gate-residual"));
+    TEST_ASSERT_EQUAL_DOUBLE(30, get("max-depth"));
 }
 
 int main(void) {
@@ -274,6 +289,7 @@ int main(void) {
     RUN_TEST(test_null_pointers_and_foreign_rows_are_refused);
     RUN_TEST(test_the_check_names_the_field_that_is_wrong);
     RUN_TEST(test_combinations_without_sense_are_refused);
+    RUN_TEST(test_an_independent_prior_needs_world_and_a_sigma_of_its_own);
     RUN_TEST(test_the_check_wants_a_config);
     RUN_TEST(test_the_course_preset_has_the_numbers_of_the_report);
     return UNITY_END();

@@ -42,6 +42,7 @@ SETTINGS: dict[int, Setting] = {
     23: Setting("max-range", "m"),
     24: Setting("max-gap", "s"),
     25: Setting("twist-delay", "s"),
+    26: Setting("landmark-prior", words=("correlated", "independent")),
 }
 
 

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""The course report's filter, by its preset, on the course's own recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pelorus import road
+from pelorus.trajectory import read_tum
+from replay_drive import Result, run
+
+SLOTS_MOST = ("100", "256")  # what a landmark loses by being evicted is millimetres here
+
+
+def replay(recording: Path, slots: str, *arguments: str | Path) -> Result:
+    """In float64: `world` is not meant for less."""
+    options = ("--preset", "course", "--slots", slots, *arguments)
+    return run(recording, *options, program="pelorus-replay-f64")
+
+
+@pytest.mark.parametrize("slots", SLOTS_MOST)
+def test_on_03_the_preset_stays_within_5_m_of_the_road(
+    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path, slots: str
+) -> None:
+    recording, trajectory = tmp_path / "03.plr", tmp_path / "03.tum"
+    pelorus("convert", "ece276a", real("ece276a/03.npz"), recording)
+    replay(recording, slots, "--trajectory", trajectory)
+    way = road.read_road(real("truth/kitti360-0003-path.csv"))
+    found = road.compare(read_tum(trajectory).poses.p, way, skip_m=45.0)
+    assert 4.0 < found.road_m <= 5.0  # 4.5 with the report's equations in numpy
+
+
+@pytest.mark.parametrize("slots", SLOTS_MOST)
+def test_on_0027_the_preset_has_an_ate_below_8_m(
+    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path, slots: str
+) -> None:
+    recording, truth = tmp_path / "0027.plr", real("truth/kitti-odometry-07.txt")
+    pelorus("convert", "ece276a", real("ece276a/0027.npz"), recording, "--truth", truth)
+    assert 7.0 < replay(recording, slots, "--json").summary["ate_m"] <= 8.0  # numpy: 7.4
