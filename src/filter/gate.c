@@ -2,6 +2,7 @@
 #include "filter/gate.h"
 
 #include "filter/covariance.h"
+#include "filter/health.h"
 #include "linalg/dense.h"
 #include "linalg/small.h"
 
@@ -55,10 +56,11 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
     verdict.d2 = plr_dot3(r, r) + row_gap * row_gap / (PLR_R(2) * f->par.pixel_variance);
     verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
 
-    if (f->par.gate_residual2 > 0)
+    const bool fixed = f->par.gate_residual2 > 0;
+    if (fixed)
         verdict.accepted = residual_norm2(seen, &lin) <= f->par.gate_residual2;
-    else
-        verdict.accepted =
+    if (!fixed || plr_health_fixed_gate_is_open(f))
+        verdict.accepted |=
             plr_is_finite(verdict.d2) && (f->par.gate_d2 <= 0 || verdict.d2 <= f->par.gate_d2);
     return verdict;
 }

@@ -18,11 +18,16 @@ bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report) {
     const bool rejects =
         report->matched >= LOCK_MATCHES && 5 * report->gated >= 4 * report->matched;
     f->frames_mostly_gated = rejects ? (uint16_t)(f->frames_mostly_gated + 1) : 0;
-    if (f->frames_mostly_gated < LOCK_FRAMES)
+    if (f->frames_mostly_gated >= 2 * LOCK_FRAMES) /* locked again */
+        f->frames_mostly_gated = LOCK_FRAMES;
+    if (f->frames_mostly_gated != LOCK_FRAMES)
         return false;
-    f->frames_mostly_gated = 0;
     f->totals.locks++;
     return true;
+}
+
+bool plr_health_fixed_gate_is_open(const plr_filter *f) {
+    return f->frames_mostly_gated >= LOCK_FRAMES || f->frames_without_use >= LOST_FRAMES;
 }
 
 static void count_up(uint16_t *count, bool more) {

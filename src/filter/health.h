@@ -15,8 +15,13 @@ typedef struct plr_frame_events {
 } plr_frame_events;
 
 /* Counts this frame; true if the gate rejected at least 80 % of at least 5 matches in 10 successive
- * frames. The count begins anew then. */
+ * frames, and again after each 10 more. */
 bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report);
+
+/* True from a lock, or from the tenth frame without one used observation, until a frame is seen
+ * again: a gate of fixed pixels does not know how uncertain the pose has become, and would be wrong
+ * for ever. */
+bool plr_health_fixed_gate_is_open(const plr_filter *f);
 
 /* Fills health and reasons of a frame that was processed. */
 void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report *report);

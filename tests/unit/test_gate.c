@@ -128,6 +128,20 @@ static void test_the_course_gate_looks_at_the_norm_of_four_residuals(void) {
     TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &seen).accepted);
 }
 
+static void test_the_course_gate_when_open_looks_at_the_covariance_too(void) {
+    const float near[4] = {1, 1, 1, 1}, far[4] = {8, 8, 8, 8};
+    const plr_observation seen = specimen_observation(&filter, 1, near);
+    const plr_observation wild = specimen_observation(&filter, 1, far);
+    filter.par.gate_residual2 = PLR_R(0.25);
+    filter.par.gate_d2 = plr_gate_judge(&filter, 1, &seen).d2 + 1;
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &seen).accepted);
+    filter.frames_mostly_gated = 10; /* locked */
+    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 1, &seen).accepted);
+    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &wild).accepted);
+    filter.par.gate_residual2 = PLR_R(16.01 * 16.01); /* what passes the pixels passes */
+    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 1, &wild).accepted);
+}
+
 static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
@@ -178,6 +192,7 @@ int main(void) {
     RUN_TEST(test_the_threshold_itself_is_accepted);
     RUN_TEST(test_a_row_gap_counts_even_where_the_three_rows_fit);
     RUN_TEST(test_the_course_gate_looks_at_the_norm_of_four_residuals);
+    RUN_TEST(test_the_course_gate_when_open_looks_at_the_covariance_too);
     RUN_TEST(test_a_point_too_near_is_rejected_even_by_an_open_gate);
     RUN_TEST(test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmarks);
     RUN_TEST(test_an_innovation_covariance_that_is_not_positive_is_rejected);

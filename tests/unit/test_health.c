@@ -157,10 +157,30 @@ static void test_ten_frames_of_four_fifths_rejected_lock(void) {
     TEST_ASSERT_EQUAL_UINT32(1, filter.totals.locks);
 }
 
-static void test_after_a_lock_the_count_begins_anew(void) {
-    for (int k = 0; k < 30; k++)
+static void test_after_a_lock_ten_more_lock_again(void) {
+    for (int k = 0; k < 50; k++)
         TEST_ASSERT_EQUAL(k % 10 == 9, is_locked(20, 20));
-    TEST_ASSERT_EQUAL_UINT32(3, filter.totals.locks);
+    TEST_ASSERT_EQUAL_UINT32(5, filter.totals.locks);
+}
+
+static void test_a_fixed_gate_is_open_from_a_lock_until_a_frame_is_seen(void) {
+    for (int k = 0; k < 25; k++) {
+        TEST_ASSERT_EQUAL(k >= 10, plr_health_fixed_gate_is_open(&filter));
+        (void)is_locked(20, 20);
+    }
+    (void)is_locked(20, 3);
+    TEST_ASSERT_FALSE(plr_health_fixed_gate_is_open(&filter));
+}
+
+static void test_a_fixed_gate_is_open_after_ten_frames_without_use(void) {
+    for (int k = 0; k < 12; k++) {
+        TEST_ASSERT_EQUAL(k >= 10, plr_health_fixed_gate_is_open(&filter));
+        frame(4, 4); /* too few to lock */
+        plr_health_judge(&filter, &events, &report);
+    }
+    frame(4, 3);
+    plr_health_judge(&filter, &events, &report);
+    TEST_ASSERT_FALSE(plr_health_fixed_gate_is_open(&filter));
 }
 
 static void test_a_frame_below_the_limits_breaks_the_row(void) {
@@ -220,7 +240,9 @@ int main(void) {
     RUN_TEST(test_a_gate_that_is_off_is_not_inert);
     RUN_TEST(test_the_count_of_matches_cannot_overflow);
     RUN_TEST(test_ten_frames_of_four_fifths_rejected_lock);
-    RUN_TEST(test_after_a_lock_the_count_begins_anew);
+    RUN_TEST(test_after_a_lock_ten_more_lock_again);
+    RUN_TEST(test_a_fixed_gate_is_open_from_a_lock_until_a_frame_is_seen);
+    RUN_TEST(test_a_fixed_gate_is_open_after_ten_frames_without_use);
     RUN_TEST(test_a_frame_below_the_limits_breaks_the_row);
     RUN_TEST(test_a_refused_frame_says_whether_the_filter_is_broken);
     RUN_TEST(test_totals_are_the_sums_of_the_reports);
