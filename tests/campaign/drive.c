@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+#include "campaign/drive.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "campaign/poses.h"
+#include "campaign/sensors.h"
+#include "campaign/world.h"
+#include "pelorus/pelorus.h"
+
+static const double BEYOND = 5; /* sigmas */
+
+typedef struct run {
+    const scenario *s;
+    world world;
+    sensors sensors;
+    unsigned before, during, frames;
+    unsigned k; /* frame, from 0 */
+    plr_time_ns start_ns, frame_ns;
+    int last_beyond; /* frame; -1: never */
+    outcome *result;
+} run;
+
+static plr_filter filter; /* a megabyte: not for the stack */
+
+static phase phase_of(const run *r, unsigned k) {
+    return k < r->before ? BEFORE : k < r->before + r->during ? DURING : AFTER;
+}
+
+unsigned drive_frames(const scenario *s, unsigned parked_frames) {
+    return s->is_long ? parked_frames : s->before + s->during + s->after;
+}
+
+static void begin(run *r, uint64_t seed, unsigned parked_frames) {
+    const scenario *s = r->s;
+    plr_config config;
+    plr_calibration calibration;
+    plr_config_default(&config);
+    config.pixel_sigma_px = s->pixel_px;
+    config.velocity_sigma = s->velocity_mps;
+    config.gyro_sigma = s->gyro_radps;
+    config.bias = s->bias;
+    world_calibration(s, &calibration);
+    world_begin(&r->world, s, seed);
+    sensors_begin(&r->sensors, s, &config, seed);
+    (void)plr_filter_init(&filter, &calibration, &config, NULL);
+    r->before = s->is_long ? parked_frames : s->before;
+    r->during = s->during;
+    r->frames = drive_frames(s, parked_frames);
+    r->start_ns = UINT64_C(1000000000);
+    r->frame_ns = UINT64_C(1000000000) / FRAME_HZ;
+    r->last_beyond = -1;
+    r->result->told_frames = r->result->again_s = r->result->first_diverged = -1;
+}
+
+/* Readings between two frames. Late ones come after the frame that they belong to, see
+ * LATE_TWISTS; the filter may well refuse them. */
+static void hear_twists(run *r, bool event) {
+    const unsigned n = r->s->twists_per_frame;
+    const plr_time_ns t_ns = r->start_ns + r->k * r->frame_ns;
+    const bool late = event && r->s->mishap == LATE_TWISTS;
+    const plr_time_ns back_ns = late ? (plr_time_ns)(r->s->strength * 1e9) : 0;
+    for (unsigned i = 0; i < n; i++) {
+        world_choose_twist(&r->world);
+        const plr_twist u = sensors_read(&r->sensors, &r->world, event);
+        if (plr_filter_predict(&filter, t_ns + i * r->frame_ns / n - back_ns, &u) != PLR_OK)
+            r->result->refused++;
+        world_step(&r->world, event);
+    }
+}
+
+static void judge_error(run *r, account *a, plr_health health, const plr_pose *pose,
+                        const double P[36]) {
+    double xi[6], worst = 0;
+    pose_error(pose, &r->world.T_WB, xi);
+    for (int i = 0; i < 6; i++) {
+        const double sigmas = P[7 * i] > 0 ? fabs(xi[i]) / sqrt(P[7 * i]) : HUGE_VAL;
+        worst = sigmas > worst || isnan(sigmas) ? sigmas : worst;
+    }
+    const double nees = pose_nees(xi, P);
+    if (nees >= 0) {
+        a->nees += nees;
+        a->judged++;
+    }
+    const double distance = nees >= 0 ? sqrt(nees) : HUGE_VAL;
+    a->sigmas = fmax(a->sigmas, isnan(worst) ? HUGE_VAL : worst);
+    a->mahalanobis = fmax(a->mahalanobis, distance);
+    a->error_m = sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
+    a->error_rad = sqrt(xi[3] * xi[3] + xi[4] * xi[4] + xi[5] * xi[5]);
+    a->sigma_m = sqrt(P[0] + P[7] + P[14]);
+    a->sigma_rad = sqrt(P[21] + P[28] + P[35]);
+    if (!(worst <= BEYOND)) {
+        a->beyond++;
+        a->silent += health == PLR_HEALTH_GOOD;
+        r->last_beyond = (int)r->k;
+    }
+    if (r->k == r->before + r->during + FRAME_HZ) {
+        r->result->second_later_sigmas = worst;
+        r->result->second_later_m = a->sigma_m;
+    }
+}
+
+static void judge_health(run *r, account *a, plr_health health) {
+    outcome *o = r->result;
+    const unsigned end = r->before + r->during;
+    a->frames++;
+    a->good += health == PLR_HEALTH_GOOD;
+    if (health != PLR_HEALTH_GOOD && r->k >= r->before && o->told_frames < 0)
+        o->told_frames = r->k - r->before;
+    if (r->k < end)
+        return;
+    if (r->last_beyond == (int)r->k || health != PLR_HEALTH_GOOD) {
+        if (r->last_beyond == (int)r->k)
+            o->again_s = -1;
+    } else if (o->again_s < 0) {
+        const unsigned true_since = r->last_beyond >= (int)end ? (unsigned)r->last_beyond + 1 : end;
+        o->again_s = (double)(r->k - true_since) / FRAME_HZ;
+    }
+}
+
+static void judge(run *r, const plr_report *report) {
+    account *a = &r->result->phase[phase_of(r, r->k)];
+    plr_pose pose;
+    double P[36];
+    r->result->matched += report->matched;
+    r->result->gated += report->gated;
+    if (plr_filter_pose(&filter, &pose) == PLR_OK &&
+        plr_filter_pose_covariance(&filter, P) == PLR_OK) {
+        judge_error(r, a, report->health, &pose, P);
+    } else {
+        a->diverged++;
+        if (r->result->first_diverged < 0)
+            r->result->first_diverged = r->k;
+    }
+    judge_health(r, a, report->health);
+}
+
+static void finish(run *r) {
+    double b[6], P_b[36];
+    plr_totals totals;
+    outcome *o = r->result;
+    o->has_bias = r->s->bias && plr_filter_bias(&filter, b, P_b) == PLR_OK;
+    for (int i = 0; i < 6 && o->has_bias; i++)
+        o->bias_sigmas[i] = (b[i] - r->sensors.bias[i]) / sqrt(P_b[7 * i]);
+    if (plr_filter_totals(&filter, &totals) == PLR_OK)
+        o->resets = totals.resets;
+    o->done = true;
+}
+
+void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *result) {
+    run r;
+    memset(result, 0, sizeof *result);
+    memset(&r, 0, sizeof r);
+    r.s = s;
+    r.result = result;
+    begin(&r, seed, parked_frames);
+    for (r.k = 0; r.k < r.frames; r.k++) {
+        const bool event = phase_of(&r, r.k) == DURING;
+        hear_twists(&r, event);
+        if (r.k == r.before && r.during > 0)
+            world_strike(&r.world);
+        world_renew(&r.world);
+        sensors_look(&r.sensors, &r.world, event);
+        const plr_frame frame = {r.start_ns + (r.k + 1) * r.frame_ns, PLR_NO_BUDGET,
+                                 r.sensors.count, r.sensors.seen};
+        plr_report report;
+        (void)plr_filter_update(&filter, &frame, &report);
+        judge(&r, &report);
+    }
+    finish(&r);
+}

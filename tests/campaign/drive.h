@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+/* One seed of one scenario: a filter is driven through it and compared with the truth. */
+#ifndef CAMPAIGN_DRIVE_H
+#define CAMPAIGN_DRIVE_H
+
+#include "campaign/scenario.h"
+
+#include <stdint.h>
+
+typedef enum phase { BEFORE = 0, DURING = 1, AFTER = 2, PHASES = 3 } phase;
+
+/* What happened in a phase. An error is beyond when a component of (rho, theta) exceeds 5 of the
+ * filter's own sigmas. */
+typedef struct account {
+    unsigned frames, good, beyond, silent; /* silent: beyond and GOOD */
+    unsigned diverged;                     /* no covariance to be had */
+    unsigned judged;                       /* frames that went into nees */
+    double nees;                           /* sum */
+    double sigmas, mahalanobis;            /* largest component, largest distance */
+    double error_m, error_rad;             /* at the end */
+    double sigma_m, sigma_rad;             /* the filter's own at the end: root of the trace */
+} account;
+
+typedef struct outcome {
+    bool done; /* false: the process ended before its time */
+    account phase[PHASES];
+    double bias_sigmas[6]; /* error at the end in sigmas */
+    bool has_bias;
+    unsigned matched, gated, refused;
+    unsigned resets;       /* times that the filter says it was set or widened */
+    double told_frames;    /* from the beginning of the event to the first frame not GOOD; -1 */
+    double again_s;        /* from true again to GOOD again; -1: never */
+    double first_diverged; /* frame; -1: never */
+    double second_later_sigmas, second_later_m; /* one second after the event: error, own sigma */
+} outcome;
+
+/* Frames of a phase in this run. */
+unsigned drive_frames(const scenario *s, unsigned parked_frames);
+
+/* `parked_frames` replaces the length of a scenario that is_long. */
+void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *result);
+
+#endif

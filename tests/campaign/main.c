@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT
+/* The campaign: many seeded drives of the filter through a simulated world, and what they come to
+ * beside the limits that the project sets itself. docs/TESTING.md, "The campaign". */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "campaign/pool.h"
+#include "campaign/scenario.h"
+#include "campaign/table.h"
+#include "pelorus/pelorus.h"
+
+typedef struct options {
+    const char *wanted; /* names with commas; NULL: all */
+    unsigned long seeds, first_seed, jobs, parked_frames;
+    bool list, gate;
+} options;
+
+enum { SHORT_SEEDS = 6, SEEDS = 30, LONG_SEEDS = 300 };
+enum { SHORT_PARKED = 3000, PARKED = 20000, LONG_PARKED = 100000 };
+
+static void usage(FILE *out) {
+    fputs("usage: pelorus-campaign [options]\n"
+          "  --list                what there is\n"
+          "  --scenario NAME,...   only these; a name that ends with * means all that begin so\n"
+          "  --seeds N             drives of each scenario (30)\n"
+          "  --first-seed N        (1)\n"
+          "  --jobs N              processes (as many as processors)\n"
+          "  --parked-frames N     length of the parked scenarios (20000)\n"
+          "  --short               6 seeds, 3000 parked frames\n"
+          "  --long                300 seeds, 100000 parked frames\n"
+          "  --gate                exit status 1 if a limit is not met\n"
+          "example: pelorus-campaign --scenario mc-low,'slip*' --seeds 100\n",
+          out);
+}
+
+static void refuse(const char *option, const char *value) {
+    fprintf(stderr, "pelorus-campaign: %s %s: %s\n", option, value ? value : "",
+            value ? "not what this option takes" : "needs a value, or is no option");
+    usage(stderr);
+    exit(2);
+}
+
+static unsigned long number(const char *option, const char *text) {
+    char *end = NULL;
+    errno = 0;
+    const unsigned long n = text ? strtoul(text, &end, 10) : 0;
+    if (!text || end == text || *end || errno || text[0] == '-' || n == 0 || n > 100000000)
+        refuse(option, text);
+    return n;
+}
+
+static bool take_number(options *o, const char *option, const char *value) {
+    static const char *const names[] = {"--seeds", "--first-seed", "--jobs", "--parked-frames"};
+    unsigned long *const targets[] = {&o->seeds, &o->first_seed, &o->jobs, &o->parked_frames};
+    for (unsigned i = 0; i < sizeof names / sizeof names[0]; i++)
+        if (strcmp(option, names[i]) == 0) {
+            *targets[i] = number(option, value);
+            return true;
+        }
+    return false;
+}
+
+static options parse(int argc, char **argv) {
+    options o = {NULL, SEEDS, 1, pool_processors(), PARKED, false, false};
+    for (int i = 1; i < argc; i++) {
+        const char *option = argv[i], *value = i + 1 < argc ? argv[i + 1] : NULL;
+        if (strcmp(option, "--list") == 0) {
+            o.list = true;
+        } else if (strcmp(option, "--gate") == 0) {
+            o.gate = true;
+        } else if (strcmp(option, "--short") == 0) {
+            o.seeds = SHORT_SEEDS;
+            o.parked_frames = SHORT_PARKED;
+        } else if (strcmp(option, "--long") == 0) {
+            o.seeds = LONG_SEEDS;
+            o.parked_frames = LONG_PARKED;
+        } else if (strcmp(option, "--help") == 0) {
+            usage(stdout);
+            exit(0);
+        } else if (strcmp(option, "--scenario") == 0 && value) {
+            o.wanted = argv[++i];
+        } else if (take_number(&o, option, value)) {
+            i++;
+        } else {
+            refuse(option, NULL);
+        }
+    }
+    return o;
+}
+
+/* Does a name match the pattern's first `length` characters? */
+static bool matches(const char *name, const char *pattern, size_t length) {
+    if (length > 0 && pattern[length - 1] == '*')
+        return strncmp(name, pattern, length - 1) == 0;
+    return strlen(name) == length && memcmp(name, pattern, length) == 0;
+}
+
+/* Marks the scenarios that are wanted; a name that matches none ends the program. */
+static unsigned choose(const char *wanted, bool *chosen) {
+    unsigned n = 0;
+    for (const char *name = wanted; name && *name;) {
+        const size_t length = strcspn(name, ",");
+        bool found = false;
+        for (unsigned i = 0; i < scenario_count; i++)
+            if (matches(scenarios[i].name, name, length))
+                chosen[i] = found = true;
+        if (!found) {
+            fprintf(stderr, "pelorus-campaign: no scenario %.*s; --list shows them\n", (int)length,
+                    name);
+            exit(2);
+        }
+        name += length + (name[length] == ',');
+    }
+    for (unsigned i = 0; i < scenario_count; i++)
+        n += chosen[i] |= !wanted;
+    return n;
+}
+
+static void list(void) {
+    for (unsigned i = 0; i < scenario_count; i++)
+        printf("%-18s %s\n", scenarios[i].name, scenarios[i].about);
+}
+
+/* Runs what was chosen, and prints it in the table's order. Returns how many fell short. */
+static unsigned run(const options *o, const bool *chosen, unsigned n) {
+    const unsigned seeds = (unsigned)o->seeds;
+    task *tasks = calloc((size_t)n * seeds, sizeof *tasks);
+    outcome *outcomes = pool_shared((size_t)n * seeds * sizeof *outcomes);
+    unsigned filled = 0, failed = 0;
+    if (!tasks) {
+        fprintf(stderr, "pelorus-campaign: no memory for %u drives\n", n * seeds);
+        exit(2);
+    }
+    for (unsigned i = 0; i < scenario_count; i++)
+        for (unsigned k = 0; chosen[i] && k < seeds; k++)
+            tasks[filled++] = (task){&scenarios[i], o->first_seed + k};
+    pool_run(tasks, filled, (unsigned)o->jobs, (unsigned)o->parked_frames, outcomes);
+    table_heading();
+    for (unsigned i = 0; i < filled; i += seeds)
+        failed += !table_print(tasks[i].s, outcomes + i, seeds);
+    free(tasks);
+    return failed;
+}
+
+int main(int argc, char **argv) {
+    const options o = parse(argc, argv);
+    if (o.list) {
+        list();
+        return 0;
+    }
+    bool *chosen = calloc(scenario_count, sizeof *chosen);
+    if (!chosen)
+        return 2;
+    const unsigned n = choose(o.wanted, chosen);
+    printf("# pelorus %s, float%u, %lu seeds from %lu\n", plr_version(),
+           (unsigned)(8 * sizeof(plr_real)), o.seeds, o.first_seed);
+    const unsigned failed = run(&o, chosen, n);
+    printf("\n%u of %u scenarios meet their limits\n", n - failed, n);
+    free(chosen);
+    return o.gate && failed ? 1 : 0;
+}

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+/* What is simulated, and what it must come to: a row of the campaign's table. */
+#ifndef CAMPAIGN_SCENARIO_H
+#define CAMPAIGN_SCENARIO_H
+
+#include <stdbool.h>
+
+/* What goes wrong between `before` and `before + during` frames. */
+typedef enum mishap {
+    NOTHING = 0,
+    SLIP,        /* all six numbers of a reading are multiplied by the strength */
+    DEAD_WHEELS, /* the velocity reads zero, exactly */
+    DEAD_TWISTS, /* velocity and rate read zero, exactly */
+    FROZEN,      /* the camera repeats its last frame under new times */
+    JUMP_BODY,   /* the body is set aside by the strength, m, at the first frame */
+    JUMP_CAMERA, /* the camera is, and stays there */
+    SCENE_MOVES, /* every point moves sideways at the strength, m/s */
+    CONVOY,      /* points move with the body at 0.8 of its speed; the strength: share of them */
+    LATE_TWISTS, /* readings come after the frame and are stamped so many seconds back */
+    BASELINE,    /* the true baseline is so much larger than the filter's, as a share; all along */
+    FOCAL,       /* the true focal length; all along */
+    THROWN,      /* the body is thrown by 5 m and 1 rad times the strength at the first frame */
+    BLIND        /* no point is seen, and the readings are garbage */
+} mishap;
+
+/* The limits; 0: none. */
+typedef struct bars {
+    double nees;         /* mean of NEES/6 over seeds, less two standard errors */
+    double sigmas;       /* no component of an error is ever beyond so many of its sigmas */
+    double forward_bias; /* mean of its error in sigmas over seeds, less two standard errors */
+    double good;         /* least share of frames GOOD where nothing is wrong */
+    double silent;       /* share of frames GOOD and beyond 5 sigma, during and after an event */
+    double told_frames;  /* until an event is told, in 95 % of the seeds */
+    double error_m;      /* mean position error at the end of an event */
+    double again_s;      /* from true again to GOOD again, in 95 % of the seeds */
+    bool no_divergence;
+} bars;
+
+typedef struct scenario {
+    const char *name, *about;
+    double speed_mps, turn; /* turn 1: the usual bends, 0: none */
+    double near_m, far_m;   /* depths at which points appear */
+    double baseline_m;
+    unsigned landmarks;
+    unsigned twists_per_frame;
+    double pixel_px, velocity_mps, gyro_radps; /* true, and told to the filter */
+    bool bias; /* biases drawn from the prior and estimated; else none, and off */
+    bool few;  /* 0, 1, 2 matches in turn after the first second */
+    unsigned before, during, after; /* frames */
+    mishap mishap;
+    double strength;
+    bool is_long; /* frames and seeds depend on --short and --long: parked */
+    bars bars;
+} scenario;
+
+enum { FRAME_HZ = 10 };
+
+extern const scenario scenarios[];
+extern const unsigned scenario_count;
+
+/* NULL if there is none. */
+const scenario *scenario_by_name(const char *name, unsigned length);
+
+#endif

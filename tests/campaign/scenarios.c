@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+/* The table of scenarios. Limits are those that the project holds itself to: docs/TESTING.md. */
+#include "campaign/scenario.h"
+
+#include <string.h>
+
+enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
+
+/* What most scenarios have in common; a later initialiser overrides an earlier one. */
+#define CAMERA  .near_m = 3, .far_m = 25, .baseline_m = 0.2, .landmarks = 20
+#define LOW     .pixel_px = 0.5, .velocity_mps = 0.02, .gyro_radps = 0.002
+#define DEFAULT .pixel_px = 2, .velocity_mps = 0.1, .gyro_radps = 0.01 /* plr_config's own */
+#define HIGH    .pixel_px = 3, .velocity_mps = 0.3, .gyro_radps = 0.05
+#define DRIVE   .speed_mps = 1, .turn = 1, .twists_per_frame = 5, .before = MINUTE
+#define PARKED  .twists_per_frame = 5, .before = MINUTE, .is_long = true
+
+#define NOMINAL(nees_limit) .bars = {.nees = (nees_limit), .good = 0.995, .no_divergence = true}
+
+/* An event of half a minute between two half minutes in which all is as it should be. */
+#define EVENT(title, text, kind, how, speed, told, error)                                          \
+    {                                                                                              \
+        .name = title, .about = text, CAMERA, DEFAULT, .speed_mps = speed, .turn = 1,              \
+        .twists_per_frame = 5, .bias = true, .before = HALF_MINUTE, .during = HALF_MINUTE,         \
+        .after = HALF_MINUTE, .mishap = kind, .strength = how, .bars = {                           \
+            .silent = 0.01,                                                                        \
+            .told_frames = told,                                                                   \
+            .error_m = error,                                                                      \
+            .again_s = 10,                                                                         \
+            .good = 0.995,                                                                         \
+            .no_divergence = true                                                                  \
+        }                                                                                          \
+    }
+
+/* Wrong from the first frame on. */
+#define MISFIT(title, text, kind, how)                                                             \
+    {                                                                                              \
+        .name = title, .about = text, CAMERA, DEFAULT, .speed_mps = 1, .turn = 1,                  \
+        .twists_per_frame = 5, .bias = true, .during = 3 * HALF_MINUTE, .mishap = kind,            \
+        .strength = how, .bars = {                                                                 \
+            .silent = 0.01,                                                                        \
+            .no_divergence = true                                                                  \
+        }                                                                                          \
+    }
+
+/* GCC and clang warn of the overriding that the macros above rest on; it is what C99 says. */
+#pragma GCC diagnostic ignored "-Woverride-init"
+
+/* clang-format off */
+const scenario scenarios[] = {
+    {"mc-low", "0.5 px, 0.02 m/s, 0.002 rad/s", CAMERA, LOW, DRIVE, NOMINAL(1.05)},
+    {"mc-high", "3 px, 0.3 m/s, 0.05 rad/s", CAMERA, HIGH, DRIVE, NOMINAL(1.15)},
+    {"mc-default", "2 px, 0.1 m/s, 0.01 rad/s", CAMERA, DEFAULT, DRIVE, NOMINAL(1.15)},
+    {"mc-default-bias", "the same with biases", CAMERA, DEFAULT, DRIVE, .bias = true, NOMINAL(1.15)},
+    {"mc-high-bias", "mc-high with biases", CAMERA, HIGH, DRIVE, .bias = true, NOMINAL(1.25)},
+    {"isotropic", "gyro 0.5 rad/s beside 0.3 px, creeping", CAMERA, DRIVE, .speed_mps = 0.05, .turn = 0.2,
+     .twists_per_frame = 1, .pixel_px = 0.3, .velocity_mps = 0.1, .gyro_radps = 0.5, NOMINAL(1.2)},
+    {"isotropic-0.1", "the same, gyro 0.1 rad/s, 5 points, standing", CAMERA, DRIVE, .speed_mps = 0, .turn = 0,
+     .landmarks = 5, .twists_per_frame = 1, .pixel_px = 0.3, .velocity_mps = 0.1, .gyro_radps = 0.1, NOMINAL(1.2)},
+    {"starry-20", "gyro 0.26 rad/s, 0.043 m/s, 1 px, 20 points near", CAMERA, DRIVE, .speed_mps = 0.3, .near_m = 1.5,
+     .far_m = 4, .baseline_m = 0.24, .twists_per_frame = 1, .pixel_px = 1, .velocity_mps = 0.043, .gyro_radps = 0.26, NOMINAL(1.2)},
+    {"starry-40", "the same, 40 points", CAMERA, DRIVE, .speed_mps = 0.3, .near_m = 1.5, .far_m = 4, .baseline_m = 0.24,
+     .landmarks = 40, .twists_per_frame = 1, .pixel_px = 1, .velocity_mps = 0.043, .gyro_radps = 0.26, NOMINAL(1.2)},
+    {"starry-100", "the same, 100 points", CAMERA, DRIVE, .speed_mps = 0.3, .near_m = 1.5, .far_m = 4, .baseline_m = 0.24,
+     .landmarks = 100, .twists_per_frame = 1, .pixel_px = 1, .velocity_mps = 0.043, .gyro_radps = 0.26, NOMINAL(1.2)},
+    {"fast", "15 m/s with biases", CAMERA, DEFAULT, DRIVE, .speed_mps = 15, .bias = true, .far_m = 60,
+     .bars = {.nees = 1.25, .forward_bias = 1, .good = 0.995, .no_divergence = true}},
+    {"short-baseline", "5 cm baseline with biases", CAMERA, DEFAULT, DRIVE, .baseline_m = 0.05, .bias = true,
+     .bars = {.nees = 1.5, .forward_bias = 1, .good = 0.995, .no_divergence = true}},
+    {"far", "points at 50 to 400 m with biases", CAMERA, DEFAULT, DRIVE, .near_m = 50, .far_m = 400, .bias = true,
+     .bars = {.sigmas = 5, .forward_bias = 1, .good = 0.995, .no_divergence = true}},
+    {"parked", "standing still", CAMERA, DEFAULT, PARKED, .bars = {.sigmas = 6, .no_divergence = true}},
+    {"parked-bias", "standing still with biases", CAMERA, DEFAULT, PARKED, .bias = true,
+     .bars = {.sigmas = 6, .no_divergence = true}},
+    {"alternate", "0, 1, 2 matches in turn; gyro 0.26 rad/s, 0.3 m/s, 1 px", CAMERA, DRIVE, .few = true,
+     .twists_per_frame = 1, .pixel_px = 1, .velocity_mps = 0.3, .gyro_radps = 0.26,
+     .bars = {.nees = 1.5, .no_divergence = true}},
+
+    EVENT("slip-0.25", "readings x 0.25", SLIP, 0.25, 0.8, 5, 0.5),
+    EVENT("slip-0.5", "readings x 0.5", SLIP, 0.5, 0.8, 5, 0.5),
+    EVENT("slip-0.75", "readings x 0.75", SLIP, 0.75, 0.8, 0, 0.5),
+    EVENT("slip-2", "readings x 2", SLIP, 2, 0.8, 5, 0.5),
+    EVENT("dead-wheels", "the velocity reads 0, 2 m/s", DEAD_WHEELS, 0, 2, 5, 1),
+    EVENT("dead-wheels-slow", "the velocity reads 0, 1 m/s", DEAD_WHEELS, 0, 1, 5, 1),
+    EVENT("dead-wheels-fast", "the velocity reads 0, 4 m/s", DEAD_WHEELS, 0, 4, 5, 2),
+    EVENT("dead-twists", "all readings are 0, 2 m/s", DEAD_TWISTS, 0, 2, 5, 1),
+    EVENT("dead-twists-slow", "all readings are 0, 1 m/s", DEAD_TWISTS, 0, 1, 5, 1),
+    EVENT("dead-twists-fast", "all readings are 0, 4 m/s", DEAD_TWISTS, 0, 4, 5, 2),
+    EVENT("frozen-0.1", "the same picture again and again, at 0.1 m/s", FROZEN, 1, 0.1, 5, 0),
+    EVENT("frozen-0.2", "the same, at 0.2 m/s", FROZEN, 1, 0.2, 5, 0),
+    EVENT("frozen-0.4", "the same, at 0.4 m/s", FROZEN, 1, 0.4, 5, 0),
+    EVENT("jump-body-0.5", "the body is set aside by 0.5 m", JUMP_BODY, 0.5, 1, 5, 0),
+    EVENT("jump-body-1", "the body is set aside by 1 m", JUMP_BODY, 1, 1, 5, 0),
+    EVENT("jump-body-2", "the body is set aside by 2 m", JUMP_BODY, 2, 1, 5, 0),
+    EVENT("jump-camera-0.5", "the camera is knocked aside by 0.5 m", JUMP_CAMERA, 0.5, 1, 5, 0),
+    EVENT("jump-camera-1", "the camera is knocked aside by 1 m", JUMP_CAMERA, 1, 1, 5, 0),
+    EVENT("jump-camera-2", "the camera is knocked aside by 2 m", JUMP_CAMERA, 2, 1, 5, 0),
+    EVENT("scene-0.15", "all points move sideways at 0.15 m/s", SCENE_MOVES, 0.15, 1, 0, 0),
+    EVENT("scene-0.3", "all points move sideways at 0.3 m/s", SCENE_MOVES, 0.3, 1, 5, 0),
+    EVENT("scene-0.6", "all points move sideways at 0.6 m/s", SCENE_MOVES, 0.6, 1, 5, 0),
+    EVENT("convoy-15", "15 % of the points move along at 0.8 of the speed", CONVOY, 0.15, 1, 0, 0),
+    EVENT("convoy-30", "30 % of the points move along at 0.8 of the speed", CONVOY, 0.3, 1, 0, 0),
+    EVENT("convoy-60", "60 % of the points move along at 0.8 of the speed", CONVOY, 0.6, 1, 5, 0),
+    EVENT("late-2.5ms", "readings come after the frame, stamped 2.5 ms back", LATE_TWISTS, 0.0025, 1, 0, 0),
+    EVENT("late-5ms", "readings come after the frame, stamped 5 ms back", LATE_TWISTS, 0.005, 1, 5, 0),
+    EVENT("late-10ms", "readings come after the frame, stamped 10 ms back", LATE_TWISTS, 0.01, 1, 5, 0),
+    MISFIT("baseline-1", "the baseline is 1 % longer than the filter thinks", BASELINE, 0.01),
+    MISFIT("baseline-2", "the baseline is 2 % longer than the filter thinks", BASELINE, 0.02),
+    MISFIT("baseline-4", "the baseline is 4 % longer than the filter thinks", BASELINE, 0.04),
+    MISFIT("focal-0.5", "the focal length is 0.5 % longer than the filter thinks", FOCAL, 0.005),
+    MISFIT("focal-1", "the focal length is 1 % longer than the filter thinks", FOCAL, 0.01),
+    MISFIT("focal-2", "the focal length is 2 % longer than the filter thinks", FOCAL, 0.02),
+    EVENT("wayout-thrown", "the body is thrown by 5 m and 1 rad", THROWN, 1, 1, 5, 0),
+    EVENT("wayout-blind", "no points and garbage readings", BLIND, 1, 1, 5, 0),
+};
+/* clang-format on */
+const unsigned scenario_count = sizeof scenarios / sizeof scenarios[0];
+
+const scenario *scenario_by_name(const char *name, unsigned length) {
+    for (unsigned i = 0; i < scenario_count; i++)
+        if (strlen(scenarios[i].name) == length && memcmp(scenarios[i].name, name, length) == 0)
+            return &scenarios[i];
+    return 0;
+}
