@@ -16,17 +16,18 @@ from converted import Run as Command
 from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import Pose, Stereo, Truth
+from pelorus.packed import unpack_symmetric
 from pelorus.report import gallery, verdict
 from pelorus.report.accuracy import assess, nees_per_dof
 from pelorus.report.comparison import Comparison
 from pelorus.report.replay import Outputs, Programs
-from pelorus.report.results import read_frames, read_map, read_poses, unpack_symmetric
+from pelorus.report.results import read_frames, read_map, read_poses
 from pelorus.trajectory import Trajectory, read_tum
 from PIL import Image
 from replay_drive import FRAMES, ROOT, drive, header, t_ns
 from report_runs import built_programs, compared, recorded
 
-ALWAYS = {"top-view", "covariance", "observations", "time"}
+ALWAYS = {"top-view", "map", "covariance", "observations", "time"}
 WITH_TRUTH = ALWAYS | {"error-body", "error-world", "error-course", "nees", "hero"}
 RUNS = ("dead-reckoning", "body", "course", "world")
 

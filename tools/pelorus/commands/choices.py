@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 from enum import Enum
+from pathlib import Path
+
+import typer
 
 from pelorus.frames import TwistTiming
 
@@ -38,3 +41,14 @@ class TimingOrAuto(str, Enum):
     @property
     def value_in_header(self) -> TwistTiming | None:
         return None if self is TimingOrAuto.AUTO else TwistTiming[self.name]
+
+
+def replay_options(config: Path | None, settings: list[str]) -> list[str]:
+    """What --config and --set NAME=VALUE become on the command line of pelorus-replay."""
+    options = [] if config is None else ["--config", str(config)]
+    for setting in settings:
+        name, equals, value = setting.partition("=")
+        if not (name and equals and value):
+            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="--set")
+        options += [f"--{name}", value]
+    return options

@@ -10,6 +10,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from pelorus.commands.choices import replay_options
 from pelorus.console import out, progress
 from pelorus.errors import PelorusError
 from pelorus.report import overview
@@ -52,23 +53,13 @@ def report(
     Without a depth limit in the settings, world gets one of 60 m.
     """
     subject = read_subject(recording)
-    plans = plan_runs(find_programs(programs), recording, _options(config, settings))
+    plans = plan_runs(find_programs(programs), recording, replay_options(config, settings))
     runs_folder = _made(folder / "runs")
     runs = [carry_out(plan, recording, runs_folder) for plan in progress(plans, "replaying")]
 
     from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
 
     _publish(Comparison(subject, runs), folder)
-
-
-def _options(config: Path | None, settings: list[str]) -> list[str]:
-    out_options = [] if config is None else ["--config", str(config)]
-    for setting in settings:
-        name, equals, value = setting.partition("=")
-        if not (name and equals and value):
-            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="--set")
-        out_options += [f"--{name}", value]
-    return out_options
 
 
 def _made(folder: Path) -> Path:

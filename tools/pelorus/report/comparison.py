@@ -6,6 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from pelorus.errors import PelorusError
+from pelorus.grid.occupancy import Grid, Wish, occupancy
+from pelorus.grid.sightings import messages_of, sightings
 from pelorus.motion import Times
 from pelorus.report import style
 from pelorus.report.accuracy import Accuracy, assess
@@ -38,6 +41,15 @@ class Comparison:
 
     def run(self, name: str) -> Run:
         return next(run for run in self.runs if run.name == name)
+
+    @cached_property
+    def grid(self) -> Grid | None:
+        """The map that the main run made; None where nothing stands in it."""
+        log = self.main.log
+        try:
+            return occupancy(sightings(log, messages_of(log)), Wish())
+        except PelorusError:
+            return None
 
     @cached_property
     def origin_ns(self) -> int:

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
+from pelorus.grid import picture
+from pelorus.grid.files import heights
 from pelorus.report import bands, curves, hero, top_view
 from pelorus.report.comparison import Comparison
 from pelorus.report.style import RHO, THETA
@@ -18,7 +20,7 @@ CURVE_MIN = 2
 
 NAMES = (
     *("top-view", "error-body", "error-world", "error-course", "nees", "covariance", "bias"),
-    *("observations", "time", "hero"),
+    *("observations", "time", "map", "hero"),
 )
 
 
@@ -35,7 +37,7 @@ def pictures(compared: Comparison) -> list[Picture]:
     """In the page's order; what needs a truth or a bias is left out without one, and a curve
     needs two frames.
     """
-    out = [_top_view(compared)]
+    out = [_top_view(compared), *_map(compared)]
     if len(compared.main.frames.t_ns) < CURVE_MIN:
         return out
     truths = [len(accuracy.t_ns) for accuracy in compared.accuracy.values()]
@@ -62,6 +64,19 @@ def _top_view(compared: Comparison) -> Picture:
     if seen.truth is not None:
         words += " The truth is brought to the estimate's start."
     return Picture("top-view", "Trajectories", words, partial(top_view.draw, compared))
+
+
+def _map(compared: Comparison) -> list[Picture]:
+    grid = compared.grid
+    if grid is None:
+        return []
+    words = (
+        f"Cells of {grid.resolution_m:g} m, {heights(grid.band)}, from the rays between the camera "
+        "and the landmarks of body, weighted by the landmarks' covariance. `pelorus map` draws it "
+        "with other settings, and writes it for nav2's map_server."
+    )
+    title = f"{compared.subject.title}: {grid.plane.why}"
+    return [Picture("map", "Free and occupied", words, partial(picture.draw, grid, title))]
 
 
 def _errors(compared: Comparison, name: str) -> Picture:

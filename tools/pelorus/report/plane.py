@@ -45,13 +45,29 @@ def choose(axes: BodyAxes, poses: Poses) -> Plane:
     up_B = np.array([0.0, 0.0, 1.0 if axes == BodyAxes.FORWARD_LEFT_UP else -1.0])
     up_W = np.mean(poses.R @ up_B, axis=0)
     vertical = int(np.argmax(np.abs(up_W)))
+    return _along(vertical, bool(up_W[vertical] > 0), "from above")
+
+
+def choose_for_map(axes: BodyAxes, poses: Poses, landmarks_W: Floats) -> Plane:
+    """As `choose`; but where no axes tell what is up, the plane in which the landmarks lie most
+    nearly, seen from the positive end of its normal.
+    """
+    if axes != BodyAxes.OTHER:
+        return choose(axes, poses)
+    vertical = int(np.argmin(np.ptp(landmarks_W, axis=0)))
+    flat = "".join(name for name in AXES if name != AXES[vertical])
+    return _along(vertical, True, f"{flat[0]}-{flat[1]}, where the landmarks spread most")
+
+
+def _along(vertical: int, positive: bool, why: str) -> Plane:
+    """Seen along an axis of the world, from its positive end or from the other one."""
     right, up = (AXES.index(name) for name in SEEN_FROM[AXES[vertical]])
-    if up_W[vertical] > 0:
-        return Plane(Axis(right, 1), Axis(up, 1), "from above")
+    if positive:
+        return Plane(Axis(right, 1), Axis(up, 1), why)
     # Seen from the other side: mirror the second axis, or start with x where there is one.
     if AXES[vertical] == "y":
-        return Plane(Axis(up, 1), Axis(right, 1), "from above")
-    return Plane(Axis(right, 1), Axis(up, -1), "from above")
+        return Plane(Axis(up, 1), Axis(right, 1), why)
+    return Plane(Axis(right, 1), Axis(up, -1), why)
 
 
 def _largest(points: Floats) -> Plane:

@@ -14,6 +14,7 @@ from pelorus import wire
 from pelorus.errors import PelorusError
 from pelorus.frames import Pose
 from pelorus.motion import Times
+from pelorus.packed import unpack_symmetric
 from pelorus.report.replay import Outputs, replay
 from pelorus.report.runs import Plan
 from pelorus.se3 import Floats, Poses
@@ -64,6 +65,7 @@ class Run:
     trajectory: Trajectory
     covariance: Floats
     landmarks: Points
+    log: Path
 
     @property
     def name(self) -> str:
@@ -76,7 +78,7 @@ def carry_out(plan: Plan, recording: Path, folder: Path) -> Run:
     summary, said = replay(plan.program, recording, plan.options, outputs)
     trajectory, covariance = read_poses(outputs.log)
     table, landmarks = read_frames(outputs.frames), read_map(outputs.map)
-    return Run(plan, summary, said, table, trajectory, covariance, landmarks)
+    return Run(plan, summary, said, table, trajectory, covariance, landmarks, outputs.log)
 
 
 def read_poses(log: Path) -> tuple[Trajectory, Floats]:
@@ -98,15 +100,6 @@ def read_poses(log: Path) -> tuple[Trajectory, Floats]:
     unknown = np.full(POSE_SIZE * (POSE_SIZE + 1) // 2, np.nan)
     packed = np.array([pose.covariance if pose.knows_covariance else unknown for pose in poses])
     return Trajectory(t_ns, Poses(R, p)), unpack_symmetric(packed, POSE_SIZE)
-
-
-def unpack_symmetric(packed: Floats, size: int) -> Floats:
-    """(n, size (size + 1) / 2), lower triangles row by row -> (n, size, size)."""
-    out = np.zeros((len(packed), size, size))
-    rows, columns = np.tril_indices(size)
-    out[:, rows, columns] = packed
-    out[:, columns, rows] = packed
-    return out
 
 
 def read_frames(path: Path) -> FrameTable:

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus map RECORDING|RESULT --out DIR`."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import typer
+from rich.markup import escape
+
+from pelorus.commands.choices import replay_options
+from pelorus.console import err, out
+from pelorus.errors import PelorusError
+from pelorus.grid import files, occupancy
+from pelorus.grid.occupancy import Band, Grid, Wish
+from pelorus.grid.sightings import Sightings, is_result, messages_of, sightings
+from pelorus.report.replay import Outputs, find_programs, replay
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `map` to the command line."""
+    parent.command(
+        "map",
+        epilog="Example:  pelorus map drive.plr --config robot.conf --out out/map --height -0.3 3",
+    )(map_)
+
+
+def map_(
+    source: Path = typer.Argument(
+        ..., metavar="RECORDING|RESULT", help="A recording, or what a filter left of it."
+    ),
+    folder: Path = typer.Option(
+        ..., "--out", metavar="DIR", help="Where map.pgm, map.yaml and map.png go."
+    ),
+    resolution: float | None = typer.Option(
+        None, metavar="M", help="Side of a cell; else as fine as the landmarks are certain."
+    ),
+    height: tuple[float, float] | None = typer.Option(
+        None,
+        metavar="LOW HIGH",
+        help="Heights about the body that count, m; else -0.3 to 4, or all where the body's axes "
+        "do not say what is up.",
+    ),
+    range_: float = typer.Option(
+        Wish.range_m, "--range", metavar="M", help="Greatest distance from the camera that counts."
+    ),
+    config: Path | None = typer.Option(
+        None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
+    ),
+    settings: list[str] = typer.Option(
+        [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
+    ),
+    programs: Path | None = typer.Option(
+        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
+    ),
+) -> None:
+    """Draw the map of a drive: where it is free, where something stands.
+
+    A 2-D occupancy grid from the rays between camera and landmarks, weighted by the landmarks'
+    covariance. The pair map.pgm, map.yaml is what nav2's map_server reads. A recording is
+    replayed first.
+    """
+    wish = _wish(resolution, height, range_)
+    seen = _seen(source, replay_options(config, settings), programs)
+    grid = occupancy.occupancy(seen, wish)
+    _publish(grid, f"{seen.name}: {files.heights(grid.band)}", folder)
+    _tell(grid, folder)
+
+
+def _wish(resolution: float | None, height: tuple[float, float] | None, range_m: float) -> Wish:
+    if resolution is not None and not (math.isfinite(resolution) and resolution > 0):
+        raise typer.BadParameter(
+            f"{resolution:g} m is no side of a cell; it must be positive", param_hint="--resolution"
+        )
+    if not (math.isfinite(range_m) and range_m > 0):
+        raise typer.BadParameter(
+            f"{range_m:g} m is no distance; it must be positive", param_hint="--range"
+        )
+    if height is not None and not height[0] < height[1]:
+        raise typer.BadParameter(
+            f"{height[0]:g} {height[1]:g} is no band: first the lower height, then the higher one",
+            param_hint="--height",
+        )
+    return Wish(resolution, None if height is None else Band(*height), range_m)
+
+
+def _seen(source: Path, options: list[str], programs: Path | None) -> Sightings:
+    """Of a result as it is; of a recording after a replay."""
+    messages = messages_of(source)
+    if is_result(messages):
+        if options:
+            raise PelorusError(
+                f"{source}: holds a filter's result already: --config and --set are for recordings"
+            )
+        return sightings(source, messages)
+    with tempfile.TemporaryDirectory(prefix="pelorus-map-") as folder:
+        outputs = Outputs.named(Path(folder), "map")
+        _, said = replay(find_programs(programs).float32, source, options, outputs)
+        for line in said:
+            err.print(escape(line))
+        return sightings(source, messages_of(outputs.log))
+
+
+def _publish(grid: Grid, title: str, folder: Path) -> None:
+    from pelorus.grid import picture  # noqa: PLC0415 - matplotlib loads slowly
+    from pelorus.report import style  # noqa: PLC0415 - as above
+
+    files.write(folder, grid, lambda path: style.save(lambda: picture.draw(grid, title), path))
+
+
+def _tell(grid: Grid, folder: Path) -> None:
+    found = files.cells(grid)
+    height, width = found.shape
+    x, y = grid.origin_m
+    out.print(
+        f"{width} x {height} cells of {grid.resolution_m:g} m, {files.heights(grid.band)}: "
+        f"{np.sum(found == files.FREE)} free, {np.sum(found == files.OCCUPIED)} occupied, "
+        f"{np.sum(found == files.UNKNOWN)} not known; {grid.landmarks} landmarks stand in it"
+    )
+    right, up = grid.plane.right.label, grid.plane.up.label
+    out.print(f"lower left corner at ({x:g}, {y:g}); to the right {right}, upwards {up}")
+    out.print(f"map: {escape(str(folder / files.TEXT))}")
