@@ -49,8 +49,8 @@ typedef struct plr_config {
     uint16_t slots;         /* landmarks in use, 1 to PLR_MAX_LANDMARKS */
 
     double pixel_sigma_px;          /* one coordinate of one pixel */
-    double velocity_sigma;          /* m/s of one reading and axis (m with noise = step) */
-    double gyro_sigma;              /* rad/s of one reading and axis (rad with noise = step) */
+    double velocity_sigma[3];       /* m/s of one reading (m with noise = step), body x, y, z */
+    double gyro_sigma[3];           /* rad/s of one reading (rad with noise = step), x, y, z */
     double bias_velocity_sigma_mps; /* prior */
     double bias_gyro_sigma_radps;   /* prior */
     double bias_velocity_walk;      /* (m/s)^2/s, variance added per second */
@@ -98,6 +98,14 @@ const plr_setting *plr_setting_at(unsigned index);
 /* The row of that id or name; NULL if there is none. */
 const plr_setting *plr_setting_by_id(uint8_t id);
 const plr_setting *plr_setting_by_name(const char *name);
+
+/* A setting may have three numbers, for the axes x, y and z of the body: velocity-sigma, gyro-sigma.
+ * Its own row sets all three, and gets x; y and z have rows behind it that set one alone. The row of an
+ * axis, 0 to 2; NULL for a setting of one number. */
+const plr_setting *plr_setting_axis(const plr_setting *setting, unsigned axis);
+
+/* For the row of a y or z axis: the setting that sets it too. NULL for all others. */
+const plr_setting *plr_setting_of_axis(const plr_setting *setting);
 
 /* The value of a setting as a number (switches 0 or 1, choices their number). */
 double plr_config_get(const plr_config *config, const plr_setting *setting);

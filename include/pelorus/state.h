@@ -67,7 +67,7 @@ typedef struct plr_parameters {
     plr_camera camera;
     plr_real Ad_CB[36]; /* Ad(T_CB): body twists to the camera */
     plr_real pixel_variance;
-    plr_real velocity_variance, gyro_variance;
+    plr_real velocity_variance[3], gyro_variance[3]; /* of the body's axes */
     plr_real bias_velocity_walk, bias_gyro_walk;
     plr_real gate_d2, gate_residual2;
     plr_real min_disparity, max_depth, max_row_gap, min_depth;

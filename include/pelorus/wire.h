@@ -70,6 +70,8 @@ typedef struct plr_header {
     double pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps;
     double bias_velocity_sigma_mps, bias_gyro_sigma_radps;
     double bias_velocity_walk, bias_gyro_walk;
+    /* Of the body's x, y and z, where they differ; 0 or negative: as for all axes above. */
+    double velocity_sigma_axes_mps[3], gyro_sigma_axes_radps[3];
     char name[PLR_WIRE_NAME_SIZE];
 } plr_header;
 

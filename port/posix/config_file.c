@@ -77,8 +77,10 @@ bool config_file_read(const char *path, setting_list *list, char problem[PROBLEM
 void config_file_print(const plr_config *config) {
     for (unsigned i = 0; i < plr_setting_count(); i++) {
         const plr_setting *setting = plr_setting_at(i);
-        char value[64], pair[128];
-        setting_value_to_text(setting, plr_config_get(config, setting), value, sizeof value);
+        char value[96], pair[160];
+        if (plr_setting_of_axis(setting) != NULL)
+            continue; /* in the line of the setting that it belongs to */
+        setting_in_force_to_text(setting, config, value, sizeof value);
         snprintf(pair, sizeof pair, "%s = %s", setting->name, value);
         printf("%-36s # %s%s%s\n", pair, setting->unit, setting->unit[0] != '\0' ? ": " : "",
                setting->about);

@@ -46,7 +46,8 @@ static void value_hint(const plr_setting *setting, char *text, size_t size) {
     text[0] = '\0';
     if (setting->choices == NULL) {
         const char *number = setting->kind == PLR_SETTING_COUNT ? "N" : "X";
-        snprintf(text, size, "%s", setting->unit[0] != '\0' ? setting->unit : number);
+        snprintf(text, size, "%s%s", setting->unit[0] != '\0' ? setting->unit : number,
+                 plr_setting_axis(setting, 0) != NULL ? "[,Y,Z]" : "");
         return;
     }
     for (unsigned i = 0; setting->choices[i] != NULL; i++) {
@@ -86,7 +87,7 @@ static void print_settings(void) {
     bool titled = false;
     for (unsigned i = 0; i < plr_setting_count(); i++) {
         const plr_setting *setting = plr_setting_at(i);
-        if (in_group(setting->name))
+        if (in_group(setting->name) || plr_setting_of_axis(setting) != NULL)
             continue;
         if (!titled)
             printf("\nMore settings [default]\n");

@@ -11,15 +11,28 @@
 /* Reads one named value that is not a row of the table. */
 typedef bool (*special_function)(setting_list *list, const char *value, char *problem);
 
-static void set(setting_list *list, const char *name, double value) {
-    const uint8_t id = plr_setting_by_name(name)->id;
+/* What was given for single axes of a setting that is now given for all of them. */
+static void forget_axes(setting_list *list, const plr_setting *whole) {
+    unsigned kept = 0;
+    for (unsigned i = 0; i < list->count; i++)
+        if (plr_setting_of_axis(plr_setting_by_id(list->settings[i].id)) != whole)
+            list->settings[kept++] = list->settings[i];
+    list->count = kept;
+}
+
+static void set_row(setting_list *list, const plr_setting *setting, double value) {
+    forget_axes(list, setting);
     unsigned i = 0;
-    while (i < list->count && list->settings[i].id != id)
+    while (i < list->count && list->settings[i].id != setting->id)
         i++;
-    list->settings[i].id = id;
+    list->settings[i].id = setting->id;
     list->settings[i].value = value;
     if (i == list->count)
         list->count++;
+}
+
+static void set(setting_list *list, const char *name, double value) {
+    set_row(list, plr_setting_by_name(name), value);
 }
 
 /* The gate by probability is the chi-square gate, so the course's own is switched off. */
@@ -94,13 +107,14 @@ bool setting_list_put(setting_list *list, const char *name, const char *value,
                       char problem[PROBLEM_SIZE]) {
     const plr_setting *setting = plr_setting_by_name(name);
     char allowed[PROBLEM_SIZE / 2] = "";
-    double number;
+    double numbers[3];
+    unsigned count;
     bool good;
     if (setting != NULL) {
-        good = setting_value_from_text(setting, value, &number);
-        if (good)
-            set(list, name, number);
-        else
+        good = setting_values_from_text(setting, value, numbers, &count);
+        for (unsigned axis = 0; good && axis < count; axis++)
+            set_row(list, count == 1 ? setting : plr_setting_axis(setting, axis), numbers[axis]);
+        if (!good)
             setting_allowed_text(setting, allowed, sizeof allowed);
     } else {
         char words[PROBLEM_SIZE] = "";

@@ -62,9 +62,61 @@ void setting_value_to_text(const plr_setting *setting, double value, char *text,
         number_to_text(value, text, size);
 }
 
+/* The next of the words between commas, without the blanks around it; false if it is too long. */
+static bool next_word(const char **text, char *word, size_t size) {
+    *text += strspn(*text, " \t");
+    size_t n = strcspn(*text, ",");
+    const char *after = *text + n + ((*text)[n] == ',');
+    while (n > 0 && strchr(" \t", (*text)[n - 1]) != NULL)
+        n--;
+    if (n >= size)
+        return false;
+    memcpy(word, *text, n);
+    word[n] = '\0';
+    *text = after;
+    return true;
+}
+
+bool setting_values_from_text(const plr_setting *setting, const char *text, double values[3],
+                              unsigned *count) {
+    char word[64];
+    *count = 1;
+    if (plr_setting_axis(setting, 0) == NULL || strchr(text, ',') == NULL)
+        return setting_value_from_text(setting, text, values);
+    if (text[strlen(text) - 1] == ',')
+        return false;
+    double parsed[3];
+    for (*count = 0; *count < 3; (*count)++)
+        if (!next_word(&text, word, sizeof word) ||
+            !setting_value_from_text(setting, word, &parsed[*count]))
+            return false;
+    if (*text != '\0')
+        return false;
+    memcpy(values, parsed, sizeof parsed);
+    return true;
+}
+
 static void append(char *text, size_t size, const char *more) {
     const size_t at = strlen(text);
     snprintf(text + at, size - at, "%s", more);
+}
+
+void setting_in_force_to_text(const plr_setting *setting, const plr_config *config, char *text,
+                              size_t size) {
+    const double x = plr_config_get(config, setting);
+    bool same = true;
+    setting_value_to_text(setting, x, text, size);
+    for (unsigned axis = 1; axis < 3; axis++) {
+        const plr_setting *other = plr_setting_axis(setting, axis);
+        same = same && (other == NULL || plr_config_get(config, other) == x);
+    }
+    for (unsigned axis = 1; !same && axis < 3; axis++) {
+        const plr_setting *other = plr_setting_axis(setting, axis);
+        char number[32];
+        setting_value_to_text(other, plr_config_get(config, other), number, sizeof number);
+        append(text, size, ", ");
+        append(text, size, number);
+    }
 }
 
 static void choices_to_text(const char *const *choices, char *text, size_t size) {
@@ -84,7 +136,8 @@ void setting_allowed_text(const plr_setting *setting, char *text, size_t size) {
     }
     setting_value_to_text(setting, setting->minimum, low, sizeof low);
     setting_value_to_text(setting, setting->maximum, high, sizeof high);
-    snprintf(text, size, "%s from %s to %s%s%s",
+    snprintf(text, size, "%s from %s to %s%s%s%s",
              setting->kind == PLR_SETTING_COUNT ? "a whole number" : "a number", low, high,
-             setting->unit[0] != '\0' ? " " : "", setting->unit);
+             setting->unit[0] != '\0' ? " " : "", setting->unit,
+             plr_setting_axis(setting, 0) != NULL ? ", or three with commas: x,y,z" : "");
 }

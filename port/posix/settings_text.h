@@ -17,6 +17,15 @@ bool setting_value_from_text(const plr_setting *setting, const char *text, doubl
 /* The shortest text that gives the same value back. */
 void setting_value_to_text(const plr_setting *setting, double value, char *text, size_t size);
 
+/* The same for a setting that may have a number for each axis: one, or three with commas between. Tells
+ * in *count how many there were; where there is one, it is for all axes. */
+bool setting_values_from_text(const plr_setting *setting, const char *text, double values[3],
+                              unsigned *count);
+
+/* The value in force; three where the axes differ. */
+void setting_in_force_to_text(const plr_setting *setting, const plr_config *config, char *text,
+                              size_t size);
+
 /* What may be given: "body or world", "a number from 0 to 100", "a whole number from 1 to 256". */
 void setting_allowed_text(const plr_setting *setting, char *text, size_t size);
 

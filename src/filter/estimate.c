@@ -78,8 +78,10 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
                                ? PLR_R(1) / (f->interval_s * f->interval_s)
                                : PLR_R(1);
-    for (int i = 0; i < 6; i++)
-        P[7 * i] += scale * (i < 3 ? f->par.velocity_variance : f->par.gyro_variance);
+    for (int i = 0; i < 3; i++) {
+        P[7 * i] += scale * f->par.velocity_variance[i];
+        P[7 * (3 + i)] += scale * f->par.gyro_variance[i];
+    }
     to_double(P_u, P, 36);
     return PLR_OK;
 }

@@ -54,8 +54,10 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     set_camera(&par->camera, calibration);
     plr_se3_adjoint(par->Ad_CB, par->camera.R_CB, par->camera.t_CB);
     par->pixel_variance = squared(c->pixel_sigma_px);
-    par->velocity_variance = squared(c->velocity_sigma);
-    par->gyro_variance = squared(c->gyro_sigma);
+    for (int i = 0; i < 3; i++) {
+        par->velocity_variance[i] = squared(c->velocity_sigma[i]);
+        par->gyro_variance[i] = squared(c->gyro_sigma[i]);
+    }
     par->bias_velocity_walk = (plr_real)c->bias_velocity_walk;
     par->bias_gyro_walk = (plr_real)c->bias_gyro_walk;
     par->gate_d2 = (plr_real)c->gate_d2;

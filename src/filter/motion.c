@@ -42,19 +42,21 @@ static void move_pose(plr_filter *f, const plr_real dR[9], const plr_real d[3]) 
     plr_so3_orthonormalise(f->R_WB);
 }
 
-/* Variance of a step's displacement, for rho (first) and theta. */
+/* Variances of a step's displacement, (rho, theta). */
 static void step_variance(const plr_filter *f, plr_real seconds, plr_real interval,
-                          plr_real variance[2]) {
+                          plr_real variance[6]) {
     const plr_real share = f->config.noise == PLR_NOISE_STEP
                                ? (interval > 0 ? seconds / interval : PLR_R(1))
                                : seconds * interval;
-    variance[0] = f->par.velocity_variance * share;
-    variance[1] = f->par.gyro_variance * share;
+    for (int i = 0; i < 3; i++) {
+        variance[i] = f->par.velocity_variance[i] * share;
+        variance[3 + i] = f->par.gyro_variance[i] * share;
+    }
 }
 
 void plr_motion_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
                      plr_real interval) {
-    plr_real xi[6], R[9], p[3], A[36], next[36], variance[2];
+    plr_real xi[6], R[9], p[3], A[36], next[36], variance[6];
     plr_motion *m = &f->motion;
     displacement(f, reading, seconds, xi);
     plr_se3_exp(R, p, xi);
@@ -67,7 +69,7 @@ void plr_motion_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
     plr_sandwich6(next, A, m->Q);
     step_variance(f, seconds, interval, variance);
     for (int i = 0; i < 6; i++)
-        next[7 * i] += variance[i / 3];
+        next[7 * i] += variance[i];
     memcpy(m->Q, next, sizeof next);
 
     if (f->config.bias) {

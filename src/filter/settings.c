@@ -14,7 +14,12 @@ static const char *const prior_words[] = {"correlated", "independent", NULL};
 static const char *const switch_words[] = {"off", "on", NULL};
 
 /* How a field of plr_config is stored. */
-typedef enum plr_storage { STORE_U8, STORE_U16, STORE_DOUBLE } plr_storage;
+typedef enum plr_storage {
+    STORE_U8,
+    STORE_U16,
+    STORE_DOUBLE,
+    STORE_AXES /* three doubles: set to the same value, known by the first */
+} plr_storage;
 
 typedef struct plr_row {
     plr_setting setting;
@@ -33,8 +38,8 @@ static const plr_row rows[] = {
     {{6, "twist-timing", "", "which interval a reading stands for", PLR_SETTING_CHOICE, timing_words, 0, 2, PLR_TWIST_START}, AT(twist_timing), STORE_U8},
     {{7, "noise", "", "the sigmas are a reading's, or a step's", PLR_SETTING_CHOICE, noise_words, 0, 1, PLR_NOISE_TWIST}, AT(noise), STORE_U8},
     {{8, "pixel-sigma", "px", "noise of a pixel coordinate", PLR_SETTING_NUMBER, NULL, 1e-3, 1e3, 2}, AT(pixel_sigma_px), STORE_DOUBLE},
-    {{9, "velocity-sigma", "m/s", "noise of a velocity reading, per axis", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma), STORE_DOUBLE},
-    {{10, "gyro-sigma", "rad/s", "noise of a rate reading, per axis", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma), STORE_DOUBLE},
+    {{9, "velocity-sigma", "m/s", "noise of a velocity reading: of each axis, or of x, y, z", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma), STORE_AXES},
+    {{10, "gyro-sigma", "rad/s", "noise of a rate reading: of each axis, or of x, y, z", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma), STORE_AXES},
     {{11, "bias-velocity-sigma", "m/s", "prior of the velocity bias", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.03}, AT(bias_velocity_sigma_mps), STORE_DOUBLE},
     {{12, "bias-gyro-sigma", "rad/s", "prior of the gyro bias", PLR_SETTING_NUMBER, NULL, 0, 10, 0.01}, AT(bias_gyro_sigma_radps), STORE_DOUBLE},
     {{13, "bias-velocity-walk", "(m/s)^2/s", "variance that the velocity bias gains in a second", PLR_SETTING_NUMBER, NULL, 0, 1e2, 1e-8}, AT(bias_velocity_walk), STORE_DOUBLE},
@@ -51,10 +56,14 @@ static const plr_row rows[] = {
     {{24, "max-gap", "s", "longest pause in the data that is bridged", PLR_SETTING_NUMBER, NULL, 1e-3, 60, 2}, AT(max_gap_s), STORE_DOUBLE},
     {{25, "twist-delay", "s", "twists wait so long for a late camera", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
     {{26, "landmark-prior", "", "does a new landmark of world share the pose's error?", PLR_SETTING_CHOICE, prior_words, 0, 1, PLR_PRIOR_CORRELATED}, AT(landmark_prior), STORE_U8},
+    {{27, "velocity-sigma-y", "m/s", "of the y axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[1]), STORE_DOUBLE},
+    {{28, "velocity-sigma-z", "m/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[2]), STORE_DOUBLE},
+    {{29, "gyro-sigma-y", "rad/s", "of the y axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma[1]), STORE_DOUBLE},
+    {{30, "gyro-sigma-z", "rad/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma[2]), STORE_DOUBLE},
 };
 /* clang-format on */
 
-enum { COUNT = sizeof rows / sizeof *rows };
+enum { COUNT = sizeof rows / sizeof *rows, AXES = 3 };
 
 unsigned plr_setting_count(void) {
     return COUNT;
@@ -85,6 +94,24 @@ static const plr_row *row_of(const plr_setting *setting) {
     return NULL;
 }
 
+const plr_setting *plr_setting_axis(const plr_setting *setting, unsigned axis) {
+    const plr_row *row = row_of(setting);
+    if (!row || row->storage != STORE_AXES)
+        return NULL;
+    for (unsigned i = 0; axis > 0 && i < COUNT; i++)
+        if (rows[i].offset == row->offset + axis * sizeof(double))
+            return axis < AXES ? &rows[i].setting : NULL;
+    return axis == 0 ? setting : NULL;
+}
+
+const plr_setting *plr_setting_of_axis(const plr_setting *setting) {
+    for (unsigned i = 0; i < COUNT; i++)
+        for (unsigned axis = 1; axis < AXES; axis++)
+            if (setting && plr_setting_axis(&rows[i].setting, axis) == setting)
+                return &rows[i].setting;
+    return NULL;
+}
+
 double plr_config_get(const plr_config *config, const plr_setting *setting) {
     const plr_row *row = row_of(setting);
     if (!config || !row)
@@ -99,6 +126,7 @@ double plr_config_get(const plr_config *config, const plr_setting *setting) {
         memcpy(&count, field, sizeof count);
         return count;
     case STORE_DOUBLE:
+    case STORE_AXES:
         memcpy(&number, field, sizeof number);
         return number;
     }
@@ -131,6 +159,10 @@ plr_status plr_config_set(plr_config *config, const plr_setting *setting, double
     case STORE_DOUBLE:
         memcpy(field, &value, sizeof value);
         break;
+    case STORE_AXES:
+        for (unsigned axis = 0; axis < AXES; axis++)
+            memcpy(field + axis * sizeof value, &value, sizeof value);
+        break;
     }
     return PLR_OK;
 }
@@ -150,8 +182,10 @@ void plr_config_course(plr_config *config) {
     config->landmark_sigma_m = 1.4142135623730951; /* variance 2 m^2 */
     config->start_sigma = 0.022360679774997897;    /* variance 5e-4 */
     config->pixel_sigma_px = 2.23606797749979;     /* variance 5 px^2 */
-    config->velocity_sigma = 0.03162277660168379;  /* variance 1e-3 m^2 a step */
-    config->gyro_sigma = 0.03162277660168379;      /* variance 1e-3 rad^2 a step */
+    for (unsigned axis = 0; axis < AXES; axis++) {
+        config->velocity_sigma[axis] = 0.03162277660168379; /* variance 1e-3 m^2 a step */
+        config->gyro_sigma[axis] = 0.03162277660168379;     /* variance 1e-3 rad^2 a step */
+    }
     config->landmark_prior = PLR_PRIOR_INDEPENDENT;
     config->gate_residual_px = 20; /* ours: the report names no limit */
     config->max_depth_m = 30;      /* ours as well */

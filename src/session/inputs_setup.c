@@ -11,6 +11,10 @@
 #include "session/plausible.h"
 #include "session/send.h"
 
+static bool same_axes(const double a[3], const double b[3]) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
 /* Everything that an estimate depends on; the name and the image size are not that. */
 static bool same_header(const plr_header *a, const plr_header *b) {
     return memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
@@ -18,6 +22,8 @@ static bool same_header(const plr_header *a, const plr_header *b) {
            a->pixel_sigma_px == b->pixel_sigma_px &&
            a->velocity_sigma_mps == b->velocity_sigma_mps &&
            a->gyro_sigma_radps == b->gyro_sigma_radps &&
+           same_axes(a->velocity_sigma_axes_mps, b->velocity_sigma_axes_mps) &&
+           same_axes(a->gyro_sigma_axes_radps, b->gyro_sigma_axes_radps) &&
            a->bias_velocity_sigma_mps == b->bias_velocity_sigma_mps &&
            a->bias_gyro_sigma_radps == b->bias_gyro_sigma_radps &&
            a->bias_velocity_walk == b->bias_velocity_walk && a->bias_gyro_walk == b->bias_gyro_walk;

@@ -12,6 +12,16 @@ static void suggest(plr_config *config, const char *name, double value) {
         (void)plr_config_set(config, plr_setting_by_name(name), value);
 }
 
+/* An axis of which nothing is told has what is told for all of them. */
+static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
+    const plr_setting *setting = plr_setting_by_name(name);
+    for (unsigned axis = 0; axis < 3; axis++) {
+        const double value = axes[axis] > 0 ? axes[axis] : all;
+        if (value >= 0)
+            (void)plr_config_set(config, plr_setting_axis(setting, axis), value);
+    }
+}
+
 static void apply_header(plr_config *config, const plr_header *header, bool sigmas_of_a_reading) {
     const bool has_bias = header->bias_velocity_sigma_mps > 0 || header->bias_gyro_sigma_radps > 0;
     const plr_suggestion suggestions[] = {
@@ -28,8 +38,9 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
     for (unsigned i = 0; i < sizeof suggestions / sizeof suggestions[0]; i++)
         suggest(config, suggestions[i].name, suggestions[i].value);
     if (sigmas_of_a_reading) {
-        suggest(config, "velocity-sigma", header->velocity_sigma_mps);
-        suggest(config, "gyro-sigma", header->gyro_sigma_radps);
+        suggest_axes(config, "velocity-sigma", header->velocity_sigma_mps,
+                     header->velocity_sigma_axes_mps);
+        suggest_axes(config, "gyro-sigma", header->gyro_sigma_radps, header->gyro_sigma_axes_radps);
     }
 }
 
@@ -66,12 +77,24 @@ plr_status plr_layers_compose(plr_config *config, const plr_layers *layers,
     return status == PLR_OK ? plr_config_check(config, culprit) : status;
 }
 
+/* What was wanted for single axes of a setting that is now wanted for all of them. */
+static void forget_axes(plr_config_message *wanted, const plr_setting *whole) {
+    uint8_t kept = 0;
+    for (unsigned i = 0; i < wanted->count; i++) {
+        const plr_setting *setting = plr_setting_by_id(wanted->settings[i].id);
+        if (plr_setting_of_axis(setting) != whole)
+            wanted->settings[kept++] = wanted->settings[i];
+    }
+    wanted->count = kept;
+}
+
 plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
     plr_config scratch;
     const plr_setting *culprit;
     plr_config_default(&scratch);
     if (apply_values(&scratch, &value, 1, &culprit) != PLR_OK)
         return PLR_E_CONFIG;
+    forget_axes(wanted, plr_setting_by_id(value.id));
     unsigned i = 0;
     while (i < wanted->count && wanted->settings[i].id != value.id)
         i++;

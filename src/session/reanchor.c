@@ -49,6 +49,11 @@ static double sum3(const double x[3]) {
     return absolute(x[0]) + absolute(x[1]) + absolute(x[2]);
 }
 
+static double largest3(const double x[3]) {
+    const double pair = x[0] > x[1] ? x[0] : x[1];
+    return pair > x[2] ? pair : x[2];
+}
+
 /* (speed seconds)^2, at most `limit`. */
 static double wandered(double speed, double seconds, double limit) {
     const double variance = speed * seconds * (speed * seconds);
@@ -62,8 +67,8 @@ static plr_status widen(double P[36], const plr_filter *f, double seconds) {
     plr_twist u;
     if (plr_filter_velocity(f, &u) != PLR_OK || plr_filter_pose_covariance(f, P) != PLR_OK)
         return PLR_E_NOT_READY;
-    const double speed = sum3(u.v_B_mps) + (of_reading ? config->velocity_sigma : 0);
-    const double rate = sum3(u.w_B_radps) + (of_reading ? config->gyro_sigma : 0);
+    const double speed = sum3(u.v_B_mps) + (of_reading ? largest3(config->velocity_sigma) : 0);
+    const double rate = sum3(u.w_B_radps) + (of_reading ? largest3(config->gyro_sigma) : 0);
     for (unsigned i = 0; i < 3; i++) {
         P[7 * i] += wandered(speed, seconds, MAX_POSITION_VARIANCE);
         P[7 * (i + 3)] += wandered(rate, seconds, MAX_ANGLE_VARIANCE);

@@ -29,6 +29,17 @@ static void pass_calibration(plr_pass *p, plr_calibration *c) {
     plr_pass_f64s(p, c->T_CB.p, 3);
 }
 
+/* Behind the name, since version 1.2; a payload of 1.1 ends before. */
+static void pass_axes(plr_pass *p, plr_header *m) {
+    if (plr_pass_reads(p) && p->left == 0) {
+        for (unsigned i = 0; i < 3; i++)
+            m->velocity_sigma_axes_mps[i] = m->gyro_sigma_axes_radps[i] = -1;
+        return;
+    }
+    plr_pass_f64s(p, m->velocity_sigma_axes_mps, 3);
+    plr_pass_f64s(p, m->gyro_sigma_axes_radps, 3);
+}
+
 void plr_layout_header(plr_pass *p, plr_header *m) {
     uint8_t units = UNITS_SI;
     uint8_t name_bytes = 0;
@@ -51,6 +62,7 @@ void plr_layout_header(plr_pass *p, plr_header *m) {
     plr_pass_f64s(p, &m->bias_gyro_walk, 1);
     if (p->fault == PLR_FAULT_NONE)
         plr_pass_text(p, m->name, name_bytes);
+    pass_axes(p, m);
 }
 
 void plr_layout_config(plr_pass *p, plr_config_message *m) {

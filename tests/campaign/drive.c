@@ -8,6 +8,7 @@
 #include "campaign/sensors.h"
 #include "campaign/world.h"
 #include "pelorus/pelorus.h"
+#include "support/axes.h"
 
 static const double BEYOND = 5; /* sigmas */
 
@@ -38,8 +39,8 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     plr_calibration calibration;
     plr_config_default(&config);
     config.pixel_sigma_px = s->pixel_px;
-    config.velocity_sigma = s->velocity_mps;
-    config.gyro_sigma = s->gyro_radps;
+    each_axis(config.velocity_sigma, s->velocity_mps);
+    each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
     world_calibration(s, &calibration);
     world_begin(&r->world, s, seed);

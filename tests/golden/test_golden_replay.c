@@ -15,6 +15,7 @@
 #include "filter/covariance.h"
 #include "pelorus/filter.h"
 #include "pelorus/wire.h"
+#include "support/axes.h"
 
 enum { BUFFER = PLR_WIRE_STEREO_BODY(256), LINE = 320, MOST_KNOWN = 200 };
 
@@ -141,8 +142,8 @@ static void begin(const scenario *s, const plr_header *header) {
     config.max_depth_m = s->max_depth_m;
     config.twist_timing = header->twist_timing;
     config.pixel_sigma_px = header->pixel_sigma_px;
-    config.velocity_sigma = header->velocity_sigma_mps;
-    config.gyro_sigma = header->gyro_sigma_radps;
+    each_axis(config.velocity_sigma, header->velocity_sigma_mps);
+    each_axis(config.gyro_sigma, header->gyro_sigma_radps);
     config.bias_velocity_sigma_mps = header->bias_velocity_sigma_mps;
     config.bias_gyro_sigma_radps = header->bias_gyro_sigma_radps;
     config.bias_velocity_walk = header->bias_velocity_walk;

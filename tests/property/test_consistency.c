@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/axes.h"
 #include "support/dense_parts.h"
 #include "support/oracle.h"
 #include "support/rig.h"
@@ -64,8 +65,8 @@ static double mean_squared_error(plr_model_kind model, bool bias) {
     rig.config.model = (uint8_t)model;
     rig.config.bias = bias;
     rig.config.pixel_sigma_px = rig.options.pixel_sigma_px;
-    rig.config.velocity_sigma = rig.options.velocity_sigma_mps;
-    rig.config.gyro_sigma = rig.options.gyro_sigma_radps;
+    each_axis(rig.config.velocity_sigma, rig.options.velocity_sigma_mps);
+    each_axis(rig.config.gyro_sigma, rig.options.gyro_sigma_radps);
     rig.config.gate_d2 = 25; /* wide: what it cuts off is missing in the errors */
     rig.options.landmarks = 300;
     rig.options.most_seen = 20;

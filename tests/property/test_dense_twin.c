@@ -15,6 +15,7 @@
  */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <unity.h>
 
 #include "support/dense_ekf.h"
@@ -159,8 +160,9 @@ static void test_eviction_removes_rows_and_columns(void) {
 
 static void run_step_noise(void) {
     config.noise = PLR_NOISE_STEP;
-    config.velocity_sigma = 2e-3;
-    config.gyro_sigma = 5e-4;
+    const double way[3] = {2e-3, 1e-3, 3e-3}, turn[3] = {5e-4, 2e-4, 8e-4};
+    memcpy(config.velocity_sigma, way, sizeof way);
+    memcpy(config.gyro_sigma, turn, sizeof turn);
     if (config.model == PLR_MODEL_WORLD)
         config.landmark_sigma_m = 1.4;
     run_frames();

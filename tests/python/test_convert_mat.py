@@ -40,7 +40,7 @@ def test_starry_night_brings_its_landmarks_and_its_noise(tmp_path: Path, pelorus
     noise = {
         "y_var": np.array([[4.0], [16.0], [4.0], [16.0]]),
         "v_var": np.array([[0.01], [0.02], [0.03]]),
-        "w_var": np.array([[0.09], [0.09], [0.09]]),
+        "w_var": np.array([[0.09], [0.04], [0.14]]),
     }
     source, target = tmp_path / "starry.mat", tmp_path / "starry.plr"
     savemat(source, mat_arrays(drive) | noise | {"rho_i_pj_i": points})
@@ -51,6 +51,8 @@ def test_starry_night_brings_its_landmarks_and_its_noise(tmp_path: Path, pelorus
     assert np.isclose(header.noise.pixel_sigma_px, np.sqrt(10))
     assert np.isclose(header.noise.velocity_sigma_mps, np.sqrt(0.02))
     assert np.isclose(header.noise.gyro_sigma_radps, 0.3)
+    by_axis = list(vars(header.noise).values())[7:]
+    assert np.allclose(by_axis, np.sqrt([0.01, 0.02, 0.03, 0.09, 0.04, 0.14]))
     assert [m.id for m in known] == list(range(points.shape[1]))
     assert np.array_equal([m.p_W_m for m in known], points.T)
     assert all(m.role is Role.KNOWN for m in known)

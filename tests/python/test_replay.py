@@ -259,7 +259,24 @@ def printed(*arguments: str | Path) -> dict[str, str]:
 
 
 def test_the_settings_are_those_of_the_format() -> None:
-    assert list(printed()) == [setting.name for setting in settings.SETTINGS.values()]
+    assert list(printed()) == [
+        setting.name for setting in settings.SETTINGS.values() if not setting.of_axis
+    ]
+
+
+def test_sigmas_of_three_axes_are_taken_and_printed(record: Record, tmp_path: Path) -> None:
+    noise = Noise(gyro_sigma_radps=0.3, gyro_sigma_y_radps=0.2, velocity_sigma_mps=0.7)
+    path = record([header(noise=noise), *drive()[1:]])
+    assert printed(path)["gyro-sigma"] == "0.3, 0.2, 0.3"
+    assert printed(path)["velocity-sigma"] == "0.7"
+    conf = tmp_path / "robot.conf"
+    conf.write_text("gyro-sigma = 0.1, 0.13, 0.42  # x, y, z\n")
+    got = printed(path, "--config", conf, "--velocity-sigma", "0.5,0.25,0.5")
+    assert got["gyro-sigma"] == "0.1, 0.13, 0.42"
+    assert got["velocity-sigma"] == "0.5, 0.25, 0.5"
+    assert printed(path, "--config", conf, "--gyro-sigma", "0.1")["gyro-sigma"] == "0.1"
+    given = ("--gyro-sigma", "0.1,0.2,0.3", "--gyro-sigma", "0.4")
+    assert printed(path, *given)["gyro-sigma"] == "0.4", "the last one counts, for all axes"
 
 
 def test_option_wins_over_file_over_config_over_header_over_default(
@@ -309,6 +326,12 @@ def test_the_course_preset_is_the_reports(record: Record) -> None:
         (("--pixel-sgima", "1"), "--pixel-sigma"),
         (("--config", "no/such/file"), "no/such/file"),
         (("--landmark-sigma", "1"), "landmark-sigma"),
+        (("--gyro-sigma", "0.1,0.2"), "from 0 to 100 rad/s, or three with commas: x,y,z"),
+        (("--gyro-sigma", "0.1,0.2,0.3,"), "three with commas"),
+        (("--gyro-sigma", "0.1,0.2,0.3,0.4"), "three with commas"),
+        (("--gyro-sigma", "0.1,,0.3"), "three with commas"),
+        (("--gyro-sigma", "0.1,0.2,-1"), "three with commas"),
+        (("--pixel-sigma", "1,2,3"), "a number from 0.001 to 1000 px"),
         (("--landmark-prior", "independent"), "landmark-prior"),
         (("--model", "world", "--landmark-prior", "independent"), "landmark-sigma"),
     ],
@@ -325,7 +348,7 @@ def test_help_and_version_tell_all() -> None:
     shown = run("--help")
     assert shown.status == OK
     for setting in settings.SETTINGS.values():
-        assert f"--{setting.name} " in shown.stdout
+        assert (f"--{setting.name} " in shown.stdout) is not bool(setting.of_axis)
     for name in ("gate", "preset", "start", "config", "trajectory", "map", "frames", "out", "json"):
         assert f"--{name}" in shown.stdout
     assert "float64" in run("--version", program="pelorus-replay-f64").stdout

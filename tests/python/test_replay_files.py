@@ -344,7 +344,7 @@ def test_a_name_with_quotes_and_controls_is_still_json(record: Record) -> None:
     result = run(record([header(name='a "b" \\ \n\x01 \u00e9'), *drive()[1:]]), "--json")
     assert result.summary["name"] == 'a "b" \\ \n\x01 \u00e9'
     payload = bytearray(header(name="abc").pack())
-    payload[-2] = 0xFF
+    payload[payload.index(b"abc") + 1] = 0xFF
 
     class Bad(Message):
         kind = Kind.HEADER

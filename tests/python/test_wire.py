@@ -25,6 +25,7 @@ from pelorus.frames import (
     Landmark,
     MalformedPayload,
     Message,
+    Noise,
     Pose,
     Report,
     Role,
@@ -67,7 +68,7 @@ MESSAGES: list[Message] = [
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
 ]
 SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 settings
-    Kind.HEADER: [202 + 9],
+    Kind.HEADER: [250 + 9],
     Kind.CONFIG: [11 + 9 * 3],
     Kind.START: [369],
     Kind.TWIST: [56],
@@ -131,7 +132,8 @@ def test_a_frame_is_these_bytes() -> None:
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
     assert header[:10] == bytes([1, 2, 2, 0, 0, 9, 0, 0, 0, 0])
-    assert header[202:] == "Straße 7".encode()
+    assert header[202:211] == "Straße 7".encode()
+    assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
     assert struct.unpack_from("<5d", header, 10) == (700.5, 701.5, 320.1, 240.2, 0.54)
     assert np.array_equal(np.frombuffer(header, "<f8", 9, 50), R.ravel())
     assert np.array_equal(np.frombuffer(header, "<f8", 7, 146), np.full(7, -1.0))
@@ -229,6 +231,13 @@ def test_a_longer_payload_is_a_later_version_and_a_shorter_one_is_malformed(
     if not isinstance(message, Text):
         assert shorter == []
         assert (counts.malformed, counts.damaged) == (1, 0)
+
+
+def test_a_header_of_format_1_1_tells_nothing_of_single_axes() -> None:
+    noise = Noise(0.5, gyro_sigma_x_radps=0.1, gyro_sigma_z_radps=0.4)
+    header = Header(Camera(1, 1, 1, 1, 1), noise=noise, name="old")
+    assert Header.unpack(header.pack()) == header
+    assert Header.unpack(header.pack()[:-48]) == replace(header, noise=Noise(0.5))
 
 
 def test_a_report_of_format_1_1_has_the_lower_reasons_alone() -> None:

@@ -155,7 +155,7 @@ def test_the_longest_frame_comes_back(echo: EchoFunction) -> None:
 
 
 def test_blocks_of_every_length_are_stuffed_alike(echo: EchoFunction) -> None:
-    """Bodies with few zeros. A HEADER's last one stands at byte 7, so that a name of 53 bytes makes
+    """Bodies with few zeros. A HEADER's last one stands at byte 7, so that a name of 5 bytes makes
     what follows one full block that ends the frame.
     """
     x = float(np.frombuffer(b"AAAAAAAA")[0])
@@ -167,7 +167,7 @@ def test_blocks_of_every_length_are_stuffed_alike(echo: EchoFunction) -> None:
             t_CB_m=np.full(3, x),
             image_width_px=0x4141,
             image_height_px=0x4141,
-            noise=frames.Noise(x, x, x, x, x, x, x),
+            noise=frames.Noise(*[x] * 13),
             name="x" * n,
         )
         messages.append(header)

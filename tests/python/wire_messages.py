@@ -58,7 +58,7 @@ def a_header(random: np.random.Generator) -> Message:
         twist_timing=frames.TwistTiming(int(random.integers(3))),
         image_width_px=whole(random, 16),
         image_height_px=whole(random, 16),
-        noise=frames.Noise(*reals(random, 7)),
+        noise=frames.Noise(*reals(random, 13)),
         name=a_text(random, frames.NAME_BYTES_MAX),
     )
 

@@ -6,6 +6,7 @@
 #include <unity.h>
 
 #include "pelorus/pelorus.h"
+#include "support/axes.h"
 
 static plr_filter filter;
 static const double sigma_mps = 0.5;
@@ -21,7 +22,7 @@ static void start(plr_mode mode) {
     plr_config config;
     plr_config_default(&config);
     config.mode = (uint8_t)mode;
-    config.velocity_sigma = sigma_mps;
+    each_axis(config.velocity_sigma, sigma_mps);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
     for (unsigned k = 0; k <= 1; k++) /* readings stand for 0.1 s */
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, k * 100000000ULL, &ahead));

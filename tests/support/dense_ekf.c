@@ -63,8 +63,8 @@ static void move_points(dense_ekf *e, const double D[16], double *F, double *K) 
     }
 }
 
-/* T <- T D and x <- F x + G (N b-error + noise): N 6x6 and `variance` of rho and theta. */
-static void move(dense_ekf *e, const double D[16], const double *N, const double variance[2]) {
+/* T <- T D and x <- F x + G (N b-error + noise): N 6x6 and `variance` of (rho, theta). */
+static void move(dense_ekf *e, const double D[16], const double *N, const double variance[6]) {
     const unsigned n = dense_dim(e);
     double *F = dense_identity(n), *G = dense_zeros(n, 6), *K = dense_zeros(e->count, 18);
     double T[16], D_inverse[16], A[36], I6[36] = {0}, Q[36] = {0};
@@ -75,7 +75,7 @@ static void move(dense_ekf *e, const double D[16], const double *N, const double
     dense_put(F, n, 0, 0, 6, 6, A);
     for (int i = 0; i < 6; i++) {
         I6[7 * i] = 1;
-        Q[7 * i] = variance[i / 3];
+        Q[7 * i] = variance[i];
     }
     dense_put(G, 6, 0, 0, 6, 6, I6);
     if (dense_is_body(e)) {
@@ -105,10 +105,11 @@ static void move(dense_ekf *e, const double D[16], const double *N, const double
 void dense_hold(dense_ekf *e, const plr_twist *twist, double seconds, double interval) {
     const bool step = e->config.noise == PLR_NOISE_STEP;
     const double share = step ? seconds / interval : seconds * interval;
-    const double variance[2] = {e->config.velocity_sigma * e->config.velocity_sigma * share,
-                                e->config.gyro_sigma * e->config.gyro_sigma * share};
-    double xi[6], D[16], N[36];
+    const double *const way = e->config.velocity_sigma, *const turn = e->config.gyro_sigma;
+    double xi[6], D[16], N[36], variance[6];
     for (int i = 0; i < 3; i++) {
+        variance[i] = way[i] * way[i] * share;
+        variance[3 + i] = turn[i] * turn[i] * share;
         xi[i] = seconds * (twist->v_B_mps[i] - e->bias[i]);
         xi[3 + i] = seconds * (twist->w_B_radps[i] - e->bias[3 + i]);
     }
@@ -121,7 +122,7 @@ void dense_hold(dense_ekf *e, const plr_twist *twist, double seconds, double int
 }
 
 void dense_move_to(dense_ekf *e, const plr_pose *T_WB) {
-    static const double exact[2] = {0, 0};
+    static const double exact[6] = {0};
     double inverse[16], there[16], D[16];
     rigid_inverse(inverse, e->T_WB);
     dense_motion(there, T_WB);

@@ -78,9 +78,9 @@ static void make_header(plr_header *m, unsigned variant) {
     m->twist_timing = whole8(variant, 2, 1);
     m->image_width_px = whole16(variant, 1226);
     m->image_height_px = whole16(variant, 370);
-    double calibration[17], noise[7];
+    double calibration[17], noise[13];
     fill(calibration, 17, variant, 0);
-    fill(noise, 7, variant, 17);
+    fill(noise, 13, variant, 17);
     m->calibration.fx_px = calibration[0];
     m->calibration.fy_px = calibration[1];
     m->calibration.cx_px = calibration[2];
@@ -95,6 +95,8 @@ static void make_header(plr_header *m, unsigned variant) {
     m->bias_gyro_sigma_radps = noise[4];
     m->bias_velocity_walk = noise[5];
     m->bias_gyro_walk = noise[6];
+    memcpy(m->velocity_sigma_axes_mps, noise + 7, sizeof m->velocity_sigma_axes_mps);
+    memcpy(m->gyro_sigma_axes_radps, noise + 10, sizeof m->gyro_sigma_axes_radps);
     fill_text(m->name, sizeof m->name, variant);
 }
 
@@ -276,6 +278,8 @@ static void same_header(const plr_header *e, const plr_header *a) {
     SAME(bias_gyro_sigma_radps);
     SAME(bias_velocity_walk);
     SAME(bias_gyro_walk);
+    SAME(velocity_sigma_axes_mps);
+    SAME(gyro_sigma_axes_radps);
     TEST_ASSERT_EQUAL_STRING(e->name, a->name);
 }
 

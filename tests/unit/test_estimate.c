@@ -6,6 +6,7 @@
 
 #include "filter/covariance.h"
 #include "linalg/packed.h"
+#include "support/axes.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rig.h"
@@ -84,14 +85,15 @@ static void test_velocity_is_the_reading_without_the_bias(void) {
 
 static void test_velocity_covariance_is_the_readings_plus_the_biases(void) {
     double P_u[36], b[6], P_b[36];
-    rig.config.velocity_sigma = 0.5;
-    rig.config.gyro_sigma = 0.25;
+    const double sigma[6] = {0.5, 0.25, 1, 0.25, 0.125, 2};
+    memcpy(rig.config.velocity_sigma, sigma, sizeof rig.config.velocity_sigma);
+    memcpy(rig.config.gyro_sigma, sigma + 3, sizeof rig.config.gyro_sigma);
     begin_with_bias();
     rig_drive(5);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P_b));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(&rig.filter, P_u));
     for (int i = 0; i < 36; i++) {
-        const double noise = i % 7 ? 0 : i / 7 < 3 ? 0.25 : 0.0625;
+        const double noise = i % 7 ? 0 : sigma[i / 7] * sigma[i / 7];
         TEST_ASSERT_DOUBLE_WITHIN(2 * eps, P_b[i] + noise, P_u[i]);
     }
 }
@@ -100,8 +102,8 @@ static void test_velocity_covariance_is_the_readings_plus_the_biases(void) {
 static void test_noise_of_a_step_is_divided_by_the_step(void) {
     double P_u[36];
     rig.config.noise = PLR_NOISE_STEP;
-    rig.config.velocity_sigma = 0.001;
-    rig.config.gyro_sigma = 0.002;
+    each_axis(rig.config.velocity_sigma, 0.001);
+    each_axis(rig.config.gyro_sigma, 0.002);
     rig_begin();
     rig_drive(2);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(&rig.filter, P_u));

@@ -149,7 +149,8 @@ static double *charts(bool from_point) {
 
 static void check_propagate(bool bias) {
     take_specimen(bias, LANDMARKS);
-    filter.par.velocity_variance = filter.par.gyro_variance = 0; /* noise: tests of motion.c */
+    memset(filter.par.velocity_variance, 0, sizeof filter.par.velocity_variance);
+    memset(filter.par.gyro_variance, 0, sizeof filter.par.gyro_variance); /* tests of motion.c */
     filter.par.bias_velocity_walk = filter.par.bias_gyro_walk = 0;
     const unsigned n = plr_covariance_dim(&filter);
     double q[LANDMARKS][3];

@@ -144,8 +144,10 @@ static void test_the_motion_accumulates_as_a_product(void) {
 /* Q <- Ad(D_k^-1) Q Ad(D_k^-1)^T + Q_k,  B <- Ad(D_k^-1) B - tau Jr(xi) */
 static void test_noise_and_bias_jacobian_follow_their_recursions(void) {
     double Q[36] = {0}, B[36] = {0};
-    filter.par.velocity_variance = PLR_R(0.25);
-    filter.par.gyro_variance = PLR_R(0.01);
+    const plr_real variance[6] = {PLR_R(0.25), PLR_R(0.0625), PLR_R(1),
+                                  PLR_R(0.01), PLR_R(0.04),   PLR_R(0.5)};
+    memcpy(filter.par.velocity_variance, variance, sizeof filter.par.velocity_variance);
+    memcpy(filter.par.gyro_variance, variance + 3, sizeof filter.par.gyro_variance);
     for (int k = 0; k < STEPS; k++) {
         plr_real reading[6];
         double same[6], xi[6], D[16], inverse[16], A[36], Jr[36], next[36];
@@ -158,7 +160,7 @@ static void test_noise_and_bias_jacobian_follow_their_recursions(void) {
         dense_adjoint(A, inverse);
         oracle_sandwich(6, 6, A, Q, next);
         for (int i = 0; i < 6; i++)
-            next[7 * i] += (i < 3 ? 0.25 : (double)PLR_R(0.01)) * tau * tau;
+            next[7 * i] += (double)variance[i] * tau * tau;
         memcpy(Q, next, sizeof Q);
         rigid_right_jacobian(Jr, xi);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 6, 6, 1, A, B, 0, next);
@@ -214,7 +216,7 @@ static double charged(plr_noise_kind noise, double part_s, int parts) {
     setUp();
     memset(filter.bias, 0, sizeof filter.bias);
     filter.config.noise = (uint8_t)noise;
-    filter.par.velocity_variance = PLR_R(4);
+    filter.par.velocity_variance[0] = PLR_R(4);
     for (int k = 0; k < parts; k++)
         plr_motion_step(&filter, filter.t_ns + 1000000, standing, (plr_real)part_s, PLR_R(0.1));
     return (double)filter.motion.Q[0];

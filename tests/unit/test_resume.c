@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/axes.h"
 #include "support/scene.h"
 #include "support/specimens.h"
 
@@ -18,7 +19,7 @@ void setUp(void) {
     scene_start(&world, &options);
     plr_config_default(&config);
     config.pixel_sigma_px = 1;
-    config.velocity_sigma = 0.05;
+    each_axis(config.velocity_sigma, 0.05);
 }
 
 void tearDown(void) {

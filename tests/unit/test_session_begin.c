@@ -49,7 +49,7 @@ static void test_option_wins_over_config_over_header(void) {
     desk_run();
     TEST_ASSERT_EQUAL_UINT16(5, plr_filter_config(&session.filter)->slots);
     TEST_ASSERT_EQUAL_DOUBLE(6, plr_filter_config(&session.filter)->pixel_sigma_px);
-    TEST_ASSERT_EQUAL_DOUBLE(0.5, plr_filter_config(&session.filter)->gyro_sigma);
+    TEST_ASSERT_EACH_EQUAL_DOUBLE(0.5, plr_filter_config(&session.filter)->gyro_sigma, 3);
 }
 
 static void test_the_config_in_force_is_sent_with_the_build(void) {

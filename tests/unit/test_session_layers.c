@@ -77,12 +77,41 @@ static void test_the_header_says_twist_timing_and_all_seven_noises(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
     TEST_ASSERT_EQUAL_UINT8(PLR_TWIST_MID, config.twist_timing);
     TEST_ASSERT_EQUAL_DOUBLE(1.5, config.pixel_sigma_px);
-    TEST_ASSERT_EQUAL_DOUBLE(0.25, config.velocity_sigma);
-    TEST_ASSERT_EQUAL_DOUBLE(0.125, config.gyro_sigma);
+    TEST_ASSERT_EACH_EQUAL_DOUBLE(0.25, config.velocity_sigma, 3);
+    TEST_ASSERT_EACH_EQUAL_DOUBLE(0.125, config.gyro_sigma, 3);
     TEST_ASSERT_EQUAL_DOUBLE(0.5, config.bias_velocity_sigma_mps);
     TEST_ASSERT_EQUAL_DOUBLE(0.0625, config.bias_gyro_sigma_radps);
     TEST_ASSERT_EQUAL_DOUBLE(1e-3, config.bias_velocity_walk);
     TEST_ASSERT_EQUAL_DOUBLE(0, config.bias_gyro_walk);
+}
+
+static void test_the_header_may_tell_the_sigmas_of_single_axes(void) {
+    const double way[3] = {0.25, 0.5, 0.75}, turn[3] = {0.125, 0.0625, 0.125};
+    header.velocity_sigma_mps = 1;
+    header.gyro_sigma_radps = 0.125;
+    memcpy(header.velocity_sigma_axes_mps, way, sizeof way);
+    header.gyro_sigma_axes_radps[0] = -1;
+    header.gyro_sigma_axes_radps[1] = 0.0625;
+    header.gyro_sigma_axes_radps[2] = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(way, config.velocity_sigma, 3);
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(turn, config.gyro_sigma, 3);
+    override("velocity-sigma", 2); /* for all of them, whatever was told of one */
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EACH_EQUAL_DOUBLE(2, config.velocity_sigma, 3);
+}
+
+static void test_what_is_wanted_for_all_axes_last_takes_the_place_of_single_ones(void) {
+    want("gyro-sigma", 0.5);
+    want("gyro-sigma-z", 0.25);
+    want("pixel-sigma", 3);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(0.5, config.gyro_sigma[1]);
+    TEST_ASSERT_EQUAL_DOUBLE(0.25, config.gyro_sigma[2]);
+    want("gyro-sigma", 0.125);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EACH_EQUAL_DOUBLE(0.125, config.gyro_sigma, 3);
+    TEST_ASSERT_EQUAL_DOUBLE(3, config.pixel_sigma_px);
 }
 
 static void test_a_header_that_tells_of_a_bias_switches_its_estimation_on(void) {
@@ -106,8 +135,8 @@ static void test_suggestions_that_make_no_sense_are_left_out(void) {
     header.bias_gyro_sigma_radps = 1e300;
     TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
     TEST_ASSERT_EQUAL_DOUBLE(standard.pixel_sigma_px, config.pixel_sigma_px);
-    TEST_ASSERT_EQUAL_DOUBLE(standard.velocity_sigma, config.velocity_sigma);
-    TEST_ASSERT_EQUAL_DOUBLE(standard.gyro_sigma, config.gyro_sigma);
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(standard.velocity_sigma, config.velocity_sigma, 3);
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(standard.gyro_sigma, config.gyro_sigma, 3);
     TEST_ASSERT_EQUAL_DOUBLE(standard.bias_gyro_sigma_radps, config.bias_gyro_sigma_radps);
 }
 
@@ -121,8 +150,8 @@ static void test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out(void) 
     override("noise", PLR_NOISE_STEP);
     override("velocity-sigma", 0.03);
     TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
-    TEST_ASSERT_EQUAL_DOUBLE(0.03, config.velocity_sigma);
-    TEST_ASSERT_EQUAL_DOUBLE(standard.gyro_sigma, config.gyro_sigma);
+    TEST_ASSERT_EACH_EQUAL_DOUBLE(0.03, config.velocity_sigma, 3);
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(standard.gyro_sigma, config.gyro_sigma, 3);
     TEST_ASSERT_EQUAL_DOUBLE(7, config.pixel_sigma_px);
 }
 
@@ -176,6 +205,8 @@ int main(void) {
     RUN_TEST(test_with_nothing_said_everything_is_at_its_default);
     RUN_TEST(test_each_layer_wins_over_those_below);
     RUN_TEST(test_the_header_says_twist_timing_and_all_seven_noises);
+    RUN_TEST(test_the_header_may_tell_the_sigmas_of_single_axes);
+    RUN_TEST(test_what_is_wanted_for_all_axes_last_takes_the_place_of_single_ones);
     RUN_TEST(test_a_header_that_tells_of_a_bias_switches_its_estimation_on);
     RUN_TEST(test_suggestions_that_make_no_sense_are_left_out);
     RUN_TEST(test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out);

@@ -79,7 +79,11 @@ static void test_ids_are_those_of_the_frame_format(void) {
                                         "max-range",
                                         "max-gap",
                                         "twist-delay",
-                                        "landmark-prior"};
+                                        "landmark-prior",
+                                        "velocity-sigma-y",
+                                        "velocity-sigma-z",
+                                        "gyro-sigma-y",
+                                        "gyro-sigma-z"};
     for (unsigned i = 0; i < sizeof names / sizeof *names; i++)
         TEST_ASSERT_EQUAL_UINT_MESSAGE(i + 1, by_name(names[i])->id, names[i]);
 }
@@ -177,10 +181,38 @@ static void test_setting_one_value_leaves_all_others(void) {
         TEST_ASSERT_EQUAL_INT(
             PLR_OK, plr_config_set(&config, plr_setting_at(i), plr_setting_at(i)->maximum));
         for (unsigned j = 0; j < plr_setting_count(); j++)
-            if (j != i)
+            if (j != i && plr_setting_of_axis(plr_setting_at(j)) != plr_setting_at(i))
                 TEST_ASSERT_EQUAL_DOUBLE(plr_setting_at(j)->standard,
                                          plr_config_get(&config, plr_setting_at(j)));
     }
+}
+
+static void test_a_sigma_is_of_all_axes_or_of_each(void) {
+    static const char *const names[2][3] = {
+        {"velocity-sigma", "velocity-sigma-y", "velocity-sigma-z"},
+        {"gyro-sigma", "gyro-sigma-y", "gyro-sigma-z"}};
+    const double *const sigmas[2] = {config.velocity_sigma, config.gyro_sigma};
+    for (unsigned k = 0; k < 2; k++) {
+        const plr_setting *const whole = by_name(names[k][0]);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, set(names[k][0], 0.5));
+        for (unsigned axis = 0; axis < 3; axis++) {
+            TEST_ASSERT_EQUAL_DOUBLE(0.5, sigmas[k][axis]);
+            TEST_ASSERT_EQUAL_PTR(by_name(names[k][axis]), plr_setting_axis(whole, axis));
+            TEST_ASSERT_EQUAL_PTR(axis > 0 ? whole : NULL,
+                                  plr_setting_of_axis(by_name(names[k][axis])));
+        }
+        TEST_ASSERT_NULL(plr_setting_axis(whole, 3));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, set(names[k][1], 0.25));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, set(names[k][2], 0.125));
+        TEST_ASSERT_EQUAL_DOUBLE(0.5, sigmas[k][0]);
+        TEST_ASSERT_EQUAL_DOUBLE(0.25, sigmas[k][1]);
+        TEST_ASSERT_EQUAL_DOUBLE(0.125, sigmas[k][2]);
+    }
+    TEST_ASSERT_NULL(plr_setting_axis(by_name("pixel-sigma"), 0));
+    TEST_ASSERT_NULL(plr_setting_axis(by_name("gyro-sigma-y"), 0));
+    TEST_ASSERT_NULL(plr_setting_axis(NULL, 0));
+    TEST_ASSERT_NULL(plr_setting_of_axis(by_name("pixel-sigma")));
+    TEST_ASSERT_NULL(plr_setting_of_axis(NULL));
 }
 
 static void test_null_pointers_and_foreign_rows_are_refused(void) {
@@ -215,8 +247,11 @@ static void test_the_check_names_the_field_that_is_wrong(void) {
     config.pixel_sigma_px = 0;
     demand_culprit("pixel-sigma");
     setUp();
-    config.gyro_sigma = (double)NAN;
+    config.gyro_sigma[0] = (double)NAN;
     demand_culprit("gyro-sigma");
+    setUp();
+    config.velocity_sigma[2] = -1;
+    demand_culprit("velocity-sigma-z");
     setUp();
     config.gate_d2 = -1;
     demand_culprit("gate-d2");
@@ -286,6 +321,7 @@ int main(void) {
     RUN_TEST(test_values_outside_the_limits_are_refused_and_change_nothing);
     RUN_TEST(test_whole_numbers_take_no_fractions);
     RUN_TEST(test_setting_one_value_leaves_all_others);
+    RUN_TEST(test_a_sigma_is_of_all_axes_or_of_each);
     RUN_TEST(test_null_pointers_and_foreign_rows_are_refused);
     RUN_TEST(test_the_check_names_the_field_that_is_wrong);
     RUN_TEST(test_combinations_without_sense_are_refused);

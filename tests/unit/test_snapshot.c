@@ -225,7 +225,7 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 /* docs/STATE-FORMAT.md, by its own figures. */
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
-    const uint32_t count_at = 13 + 9 * 26 + 17 * real;
+    const uint32_t count_at = 13 + 9 * 30 + 17 * real;
     const uint32_t slots_at = count_at + 4 + 16 + 24 + 4 + 12 + 56 + 56 + 107 * real;
     const uint32_t slot = 3 * real + 25;
     start(&driven);
@@ -235,7 +235,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
     TEST_ASSERT_EQUAL_UINT32(2, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
-    TEST_ASSERT_EQUAL_UINT(26, state.bytes[12]);
+    TEST_ASSERT_EQUAL_UINT(30, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(slots_at + 3 * real, 4));

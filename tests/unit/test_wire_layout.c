@@ -54,7 +54,7 @@ static void assert_f32s(size_t at, const double *values, unsigned n) {
 
 static void test_header_fields_lie_where_the_page_says(void) {
     const plr_header m = encode(PLR_KIND_HEADER).as.header;
-    TEST_ASSERT_EQUAL_size_t(202 + strlen(m.name), length);
+    TEST_ASSERT_EQUAL_size_t(202 + strlen(m.name) + 48, length);
     ASSERT_NUMBER(0, 1, 1);
     ASSERT_NUMBER(1, 1, PLR_WIRE_VERSION_MINOR);
     ASSERT_NUMBER(2, 1, m.body_axes);
@@ -78,6 +78,8 @@ static void test_header_fields_lie_where_the_page_says(void) {
     ASSERT_F64(186, m.bias_velocity_walk);
     ASSERT_F64(194, m.bias_gyro_walk);
     TEST_ASSERT_EQUAL_MEMORY(m.name, payload + 202, strlen(m.name));
+    assert_f64s(202 + strlen(m.name), m.velocity_sigma_axes_mps, 3);
+    assert_f64s(226 + strlen(m.name), m.gyro_sigma_axes_radps, 3);
 }
 
 static void test_config_fields_lie_where_the_page_says(void) {
@@ -251,8 +253,10 @@ static plr_fault read_payload(plr_kind kind, size_t n, plr_message *m) {
     return pass.fault;
 }
 
-/* Of a recording of format 1.1, in which reasons are 16 bits. */
-enum { REPORT_OF_1_1 = 52 };
+/* By how much a payload of format 1.1 is shorter: half of the reasons, the sigmas of single axes. */
+static size_t since_1_1(plr_kind kind) {
+    return kind == PLR_KIND_REPORT ? 2 : kind == PLR_KIND_HEADER ? 48 : 0;
+}
 
 static void test_every_shorter_payload_is_malformed(void) {
     for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
@@ -260,7 +264,7 @@ static void test_every_shorter_payload_is_malformed(void) {
         encode((plr_kind)kind);
         size_t least = kind == PLR_KIND_TEXT ? 1 : length;
         for (size_t n = 0; n < least; n++) {
-            if (kind == PLR_KIND_REPORT && n == REPORT_OF_1_1)
+            if (since_1_1((plr_kind)kind) > 0 && n == length - since_1_1((plr_kind)kind))
                 continue;
             encode((plr_kind)kind);
             TEST_ASSERT_EQUAL_INT(PLR_FAULT_MALFORMED, read_payload((plr_kind)kind, n, &m));
@@ -270,10 +274,22 @@ static void test_every_shorter_payload_is_malformed(void) {
 
 static void test_a_report_of_format_1_1_has_the_lower_reasons_alone(void) {
     plr_message m, expected = encode(PLR_KIND_REPORT);
-    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_REPORT, REPORT_OF_1_1, &m));
+    const size_t old = length - since_1_1(PLR_KIND_REPORT);
+    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_REPORT, old, &m));
     expected.as.report.report.reasons &= 0xFFFF;
     wire_assert_same(&expected, &m);
     TEST_ASSERT_EQUAL_HEX32(PLR_REASON_FEW_OBSERVATIONS, m.as.report.report.reasons);
+}
+
+static void test_a_header_of_format_1_1_tells_nothing_of_single_axes(void) {
+    plr_message m, expected = encode(PLR_KIND_HEADER);
+    const size_t old = length - since_1_1(PLR_KIND_HEADER);
+    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_HEADER, old, &m));
+    for (unsigned i = 0; i < 3; i++) {
+        expected.as.header.velocity_sigma_axes_mps[i] = -1;
+        expected.as.header.gyro_sigma_axes_radps[i] = -1;
+    }
+    wire_assert_same(&expected, &m);
 }
 
 static void test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored(void) {
@@ -368,6 +384,7 @@ int main(void) {
     RUN_TEST(test_state_fields_lie_where_the_page_says);
     RUN_TEST(test_every_shorter_payload_is_malformed);
     RUN_TEST(test_a_report_of_format_1_1_has_the_lower_reasons_alone);
+    RUN_TEST(test_a_header_of_format_1_1_tells_nothing_of_single_axes);
     RUN_TEST(test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored);
     RUN_TEST(test_values_that_the_page_does_not_list_are_malformed);
     RUN_TEST(test_a_status_of_a_later_version_is_let_through);

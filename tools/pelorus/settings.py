@@ -14,6 +14,7 @@ class Setting(NamedTuple):
     name: str
     unit: str = ""
     words: tuple[str, ...] = ()
+    of_axis: int = 0  # id of the setting that sets this one too, the sigma of a single axis
 
 
 SETTINGS: dict[int, Setting] = {
@@ -43,6 +44,10 @@ SETTINGS: dict[int, Setting] = {
     24: Setting("max-gap", "s"),
     25: Setting("twist-delay", "s"),
     26: Setting("landmark-prior", words=("correlated", "independent")),
+    27: Setting("velocity-sigma-y", "m/s", of_axis=9),
+    28: Setting("velocity-sigma-z", "m/s", of_axis=9),
+    29: Setting("gyro-sigma-y", "rad/s", of_axis=10),
+    30: Setting("gyro-sigma-z", "rad/s", of_axis=10),
 }
 
 

@@ -24,6 +24,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Floats, Poses
 from pelorus.tracks import Tracks
 
+BY_AXIS = [name for name in vars(Noise()) if name.split("_")[2] in ("x", "y", "z")]
 LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by a motion capture system
 
 
@@ -102,11 +103,24 @@ def _features(file: Arrays, count: int) -> Floats:
 
 
 def _noise(file: Arrays) -> Noise:
-    """One sigma for all axes, as the filter wants it: the root of the mean variance.
+    """The sigmas: w_var of the angular, v_var of the linear velocity, y_var of four pixel numbers.
 
-    w_var is that of the angular, v_var of the linear velocity, y_var of the four pixel numbers.
+    Those of the velocities by axis, and the root of their mean variance for a reader of format 1.1.
     """
-    pixel, velocity, gyro = (
-        float(np.sqrt(np.mean(file.get(key)))) for key in ("y_var", "v_var", "w_var")
-    )
-    return Noise(pixel, velocity, gyro)
+    variances = {key: file.get(key).ravel() for key in ("y_var", "v_var", "w_var")}
+    for key, variance in variances.items():
+        if not (variance >= 0).all():
+            raise PelorusError(f"{file.path}: {key} is {variance}: a variance is not negative")
+    mean = (float(np.sqrt(np.mean(variance))) for variance in variances.values())
+    axes = [
+        float(sigma)
+        for key in ("v_var", "w_var")
+        for sigma in np.sqrt(np.broadcast_to(_by_axis(file, key, variances[key]), 3))
+    ]
+    return replace(Noise(*mean), **dict(zip(BY_AXIS, axes, strict=True)))
+
+
+def _by_axis(file: Arrays, key: str, variance: Floats) -> Floats:
+    if variance.size not in (1, 3):
+        raise PelorusError(f"{file.path}: {key} has {variance.size} numbers, due are 1 or 3")
+    return variance

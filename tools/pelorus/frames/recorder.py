@@ -82,6 +82,12 @@ class Noise:
     bias_gyro_sigma_radps: float = -1.0
     bias_velocity_walk: float = -1.0
     bias_gyro_walk: float = -1.0
+    velocity_sigma_x_mps: float = -1.0  # of single axes of the body; 0 or negative: as for all
+    velocity_sigma_y_mps: float = -1.0
+    velocity_sigma_z_mps: float = -1.0
+    gyro_sigma_x_radps: float = -1.0
+    gyro_sigma_y_radps: float = -1.0
+    gyro_sigma_z_radps: float = -1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +109,13 @@ class Header(Message):
 
     kind: ClassVar[Kind] = Kind.HEADER
     _FIXED: ClassVar[struct.Struct] = struct.Struct("<6B2H5d9d3d7d")
+    _AXES: ClassVar[struct.Struct] = struct.Struct("<6d")  # behind the name; since format 1.2
 
     def pack(self) -> bytes:
         name = self.name.encode("utf-8")
         if len(name) > NAME_BYTES_MAX:
             raise ValueError(f"name of {len(name)} bytes, at most {NAME_BYTES_MAX} fit a HEADER")
-        camera, noise = vars(self.camera).values(), vars(self.noise).values()
+        camera, noise = vars(self.camera).values(), list(vars(self.noise).values())
         rotation = np.asarray(self.R_CB, float).reshape(9)
         translation = np.asarray(self.t_CB_m, float).reshape(3)
         return (
@@ -124,9 +131,10 @@ class Header(Message):
                 *camera,
                 *rotation,
                 *translation,
-                *noise,
+                *noise[:7],
             )
             + name
+            + self._AXES.pack(*noise[7:])
         )
 
     @classmethod
@@ -141,7 +149,12 @@ class Header(Message):
         within("units", units, 0, 0)
         within("name_bytes", name_bytes, 0, NAME_BYTES_MAX)
         need(payload, cls._FIXED.size + name_bytes)
-        name = payload[cls._FIXED.size : cls._FIXED.size + name_bytes]
+        end = cls._FIXED.size + name_bytes
+        name = payload[cls._FIXED.size : end]
+        by_axis: tuple[float, ...] = ()
+        if len(payload) > end:
+            need(payload, end + cls._AXES.size)
+            by_axis = cls._AXES.unpack_from(payload, end)
         return cls(
             camera=Camera(*numbers[:5]),
             R_CB=np.array(numbers[5:14]).reshape(3, 3),
@@ -150,7 +163,7 @@ class Header(Message):
             twist_timing=TwistTiming(timing),
             image_width_px=width,
             image_height_px=height,
-            noise=Noise(*numbers[17:24]),
+            noise=Noise(*numbers[17:24], *by_axis),
             name=name.decode("utf-8", errors="replace"),
             version_major=major,
             version_minor=minor,

@@ -210,7 +210,7 @@ def _observe(
 
 def _header(options: Options) -> Header:
     """The noise as it is; what there is none of is no suggestion."""
-    suggested = {name: getattr(options, name) for name in vars(Noise())}
+    suggested = {name: getattr(options, name, -1.0) for name in vars(Noise())}
     width, height = scene.IMAGE_PX
     return Header(
         scene.CAMERA,
