@@ -23,7 +23,7 @@ option(PELORUS_BUILD_REPLAY "Build pelorus-replay" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_BUILD_TESTS "Build the tests and benches" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_INSTALL "Make install rules" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_WERROR "Take warnings as errors (the project's own tests do)" OFF)
-option(PELORUS_REQUIRE_ORACLE "Stop if OpenBLAS or LAPACKE is missing, instead of leaving tests out"
+option(PELORUS_REQUIRE_ORACLE "Stop if OpenBLAS or LAPACKE is missing, instead of testing against plain loops"
   OFF)
 option(PELORUS_FUZZ "Build the libFuzzer programs (clang only)" OFF)
 set(PELORUS_DEPS_DIR "${PROJECT_BINARY_DIR}/deps" CACHE PATH

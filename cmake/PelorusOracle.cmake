@@ -18,6 +18,6 @@ elseif(PELORUS_REQUIRE_ORACLE)
   message(FATAL_ERROR "OpenBLAS or LAPACKE is missing: "
     "apt-get install libopenblas-dev liblapacke-dev, or PELORUS_REQUIRE_ORACLE=OFF.")
 else()
-  message(WARNING "OpenBLAS or LAPACKE is missing: tests that need them, and the bench, are left "
-    "out. apt-get install libopenblas-dev liblapacke-dev.")
+  message(WARNING "OpenBLAS or LAPACKE is missing: the tests are held against plain loops instead, "
+    "and the bench is left out. apt-get install libopenblas-dev liblapacke-dev.")
 endif()

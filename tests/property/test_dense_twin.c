@@ -20,7 +20,6 @@
 
 #include "support/dense_ekf.h"
 #include "support/matrices.h"
-#include "support/oracle.h" /* without OpenBLAS this test is left out */
 #include "support/scene.h"
 
 enum { STEP_NS = 10000000, TWISTS = 10, FRAMES = 40, FRAGILE_FRAMES = 5 };

@@ -8,8 +8,6 @@
  * in the camera (`body`) or of m in the world (`world`). Where the filter has the polar chart, this
  * one stays with points: a linear filter does not depend on the chart, and what the chart does to a
  * correction is written without its basis.
- *
- * A test that uses it must include support/oracle.h, so that it is left out where OpenBLAS is not.
  */
 #ifndef PELORUS_TEST_DENSE_EKF_H
 #define PELORUS_TEST_DENSE_EKF_H

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The oracle: dense linear algebra in double by OpenBLAS and LAPACKE, an implementation that shares
- * nothing with the library. Matrices are row by row and without gaps. A LAPACK failure that is the
- * caller's fault (a wrong argument) ends the program.
+ * The oracle: dense linear algebra in double by OpenBLAS and LAPACKE (oracle_blas.c) or, where they
+ * are missing, by plain loops (oracle_plain.c); neither shares anything with the library. Matrices are
+ * row by row and without gaps. A LAPACK failure that is the caller's fault (a wrong argument) ends the
+ * program.
  */
 #ifndef PELORUS_TEST_ORACLE_H
 #define PELORUS_TEST_ORACLE_H
