@@ -157,11 +157,34 @@ static void print_damage(const summary *s, const plr_session *session) {
            s->ended ? "" : "; no END");
 }
 
+/* A recording is somebody else's: what a terminal would obey is shown, not sent to it. The controls
+ * are the bytes below the blank, DEL, and in UTF-8 0xc2 0x80 to 0xc2 0x9f. */
+static void print_shown(const char *words) {
+    for (const unsigned char *c = (const unsigned char *)words; *c != '\0'; c++) {
+        if (*c < ' ' || *c == 0x7f)
+            printf("\\x%02x", *c);
+        else if (*c == 0xc2 && c[1] >= 0x80 && c[1] < 0xa0)
+            printf("\\x%02x", *++c);
+        else
+            putchar(*c);
+    }
+}
+
+static void print_recording(const char *path, const char *name, double duration_s) {
+    printf("recording     ");
+    print_shown(path);
+    if (name[0] != '\0') {
+        printf(" (");
+        print_shown(name);
+        printf(")");
+    }
+    printf(", %.1f s\n", duration_s);
+}
+
 void summary_print(summary *s, const plr_session *session, const char *path) {
     summary_figures figures;
     summary_figures_of(s, &figures);
-    printf("recording     %s%s%s%s, %.1f s\n", path, session->header.name[0] != '\0' ? " (" : "",
-           session->header.name, session->header.name[0] != '\0' ? ")" : "", figures.duration_s);
+    print_recording(path, session->header.name, figures.duration_s);
     print_filter(session);
     print_counts(s, session);
     printf("path          %.1f m\n", s->path_m);

@@ -11,6 +11,7 @@ import select
 import socket
 import threading
 import tty
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from pelorus.frames import Config, End, Kind, Message, Pose, Report, Stereo, Text
@@ -31,6 +32,8 @@ class Manner:
     most_observations: int = 128
     slots: int = 32
     says: str = ""  # with its settings
+    floods: bytes = b""  # these, for ever
+    floods_after: int | None = None  # answers to STEREO; None: from the first byte heard on
 
 
 @dataclass
@@ -44,8 +47,10 @@ class FakeBoard:
     def serve(self, fd: int, stop: threading.Event) -> None:
         """Until the other side or the board's manner ends it; the descriptor stays open."""
         reader = Reader()
+        os.set_blocking(fd, not self.manner.floods)
         while not stop.is_set():
-            if not select.select([fd], [], [], STOP_S)[0]:
+            self._flood(fd)
+            if not select.select([fd], [], [], 0 if self._flooding else STOP_S)[0]:
                 continue
             try:
                 piece = os.read(fd, 4096)
@@ -57,8 +62,17 @@ class FakeBoard:
                 self.heard.append(received.message)
                 if len(self.poses) == self.manner.leaves_after:
                     return
-                if not self.manner.silent:
+                if not self.manner.silent and not self._flooding:
                     os.write(fd, b"".join(encode(m, 0) for m in self._answer(received.message)))
+
+    @property
+    def _flooding(self) -> bool:
+        return bool(self.manner.floods) and len(self.poses) >= (self.manner.floods_after or 0)
+
+    def _flood(self, fd: int) -> None:
+        if self._flooding:
+            with suppress(OSError):  # a full wire, or one whose other end is gone
+                os.write(fd, self.manner.floods)
 
     def _answer(self, message: Message) -> list[Message]:
         if isinstance(message, End):

@@ -208,20 +208,20 @@ BAD_NPZ = [
     (changed("angular_velocity", None), "angular_velocity or rotational_velocity"),
     (changed("features", np.zeros((3, 5, COUNT))), r"features has the shape \(3, 5, 61\)"),
     (changed("features", np.full((4, 5, COUNT), -1.0)), "holds no observation"),
-    (changed("features", np.zeros((4, 5, COUNT - 1))), "due is 4 x n x 61"),
+    (changed("features", np.zeros((4, 5, COUNT - 1))), "4 x n x 61 is due"),
     (changed("features", np.zeros((4, 5000, COUNT))), "5000 observations.*at most 4096"),
-    (changed("linear_velocity", np.zeros((3, 7))), "due is 3 x 61"),
+    (changed("linear_velocity", np.zeros((3, 7))), "3 x 61 is due"),
     (changed("linear_velocity", np.full((3, COUNT), "fast")), "holds no numbers"),
     (changed("time_stamps", np.zeros((1, 0))), "time_stamps is empty"),
     (changed("time_stamps", np.ones((1, COUNT))), "does not ascend at 1"),
     (changed("time_stamps", 1e18 + np.arange(COUNT)[None] * 1e8), "seconds from 0"),
     (changed("b", np.array(0.0)), "baseline 0.0 m must be positive"),
-    (changed("b", np.array([0.5, 0.6])), "due is one number"),
+    (changed("b", np.array([0.5, 0.6])), "one number is due"),
     (changed("K", np.eye(4)), r"K has the shape \(4, 4\)"),
     (changed("imu_T_cam", np.diag([1.0, 1, 2, 1])), "is no rotation"),
     (changed("imu_T_cam", np.diag([1.0, 1, -1, 1])), "is no rotation"),
     (changed("imu_T_cam", np.eye(4) + np.eye(4, k=-3)), "last row of imu_T_cam"),
-    (spoiled("linear_velocity", (1, 7), np.nan), r"linear_velocity\[1, 7\] is not finite"),
+    (spoiled("linear_velocity", (1, 7), np.nan), r"linear_velocity\[1, 7\]: is not finite"),
     (spoiled("features", (2, 0, 3), np.inf), "is not finite"),
 ]
 
@@ -266,18 +266,22 @@ def test_truth_that_does_not_fit_is_refused(tmp_path: Path, pelorus: Run) -> Non
     source, poses = save_npz(tmp_path / "d.npz", drive), camera_poses(drive)
     twice = Poses(np.concatenate((poses.R, poses.R)), np.concatenate((poses.p, poses.p)))
     long = save_kitti(tmp_path / "long.txt", twice)
-    empty, narrow, words = (tmp_path / name for name in ("empty.txt", "narrow.txt", "words.txt"))
+    empty, narrow, words, letters = (
+        tmp_path / f"{name}.txt" for name in ("empty", "narrow", "words", "letters")
+    )
     empty.write_text("")
     narrow.write_text("1 2 3\n4 5 6\n")
     words.write_text("one two three\n")
+    letters.write_text("a b c d e f g h i j k l\n")
     skewed = tmp_path / "skewed.txt"
     skewed.write_text("1 0.5 0 0 0 1 0 0 0 0 1 0\n")
     for path, said in (
         (long, "122 poses for 61 frames"),
         (empty, "the file is empty"),
-        (narrow, "rows of 3 numbers, 12 are due"),
-        (words, "is no pose file"),
-        (skewed, "row 1 holds no rotation"),
+        (narrow, "line 1: has 3 cells; 12 numbers are due"),
+        (words, "line 1: has 3 cells"),
+        (letters, "line 1: holds something that is no number"),
+        (skewed, "line 1: holds no rotation"),
         (tmp_path / "absent.txt", "cannot be read"),
     ):
         outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr", "--truth", path)

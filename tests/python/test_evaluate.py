@@ -232,15 +232,17 @@ def test_the_first_metres_are_left_out() -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("", "holds no row of numbers"),
+        ("", "the file is empty"),
         ("# only a comment\n", "holds no row of numbers"),
-        ("1 2 3\n", "line 1 has 3 numbers, 8 are due"),
+        ("1 2 3\n", "line 1: has 3 numbers; 8 are due"),
         ("0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "line 2: time does not ascend"),
-        ("0 0 0 0 0 0 0 1\n1 0 0 x 0 0 0 1\n", "line 2 holds something that is no number"),
-        ("0 0 0 nan 0 0 0 1\n", "line 1 holds a number that is not finite"),
+        ("0 0 0 0 0 0 0 1\n1 0 0 x 0 0 0 1\n", "line 2: holds something that is no number"),
+        ("0 0 0 nan 0 0 0 1\n", "line 1: holds a number that is not finite"),
         ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion's norm is not 1"),
         ("now 0 0 0 0 0 0 1\n", "'now' is no time"),
         ("1e300 0 0 0 0 0 0 1\n", "out of range"),
+        ("1e999999999 0 0 0 0 0 0 1\n", "is no time in seconds"),
+        ("1e99999 0 0 0 0 0 0 1\n", "out of range"),
         ("nan 0 0 0 0 0 0 1\n", "is no time"),
     ],
 )

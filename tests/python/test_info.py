@@ -180,3 +180,14 @@ def test_random_bytes_never_break_the_reader(tmp_path: Path, pelorus: Run) -> No
         data[hit] = chance.integers(0, 256, len(hit))
         path.write_bytes(data.tobytes()[: chance.integers(1, len(data))])
         assert pelorus("info", path).status in (0, 1)
+
+
+def test_words_in_a_recording_do_not_command_the_terminal(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(duration_s=1.0).with_header(name="\x1b[31mred\x1b[0m")
+    path = tmp_path / "esc.plr"
+    replace(drive, remarks=[Text("\x1b]0;title\x07 done")]).write(path)
+    said = pelorus("info", path)
+    assert said.status == 0
+    assert r"\x1b[31mred\x1b[0m" in said.out
+    assert r"info: \x1b]0;title\x07 done" in said.out
+    assert "\x1b" not in said.out

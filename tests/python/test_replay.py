@@ -352,3 +352,11 @@ def test_help_and_version_tell_all() -> None:
     for name in ("gate", "preset", "start", "config", "trajectory", "map", "frames", "out", "json"):
         assert f"--{name}" in shown.stdout
     assert "float64" in run("--version", program="pelorus-replay-f64").stdout
+
+
+def test_words_in_a_recording_do_not_command_the_terminal(record: Record) -> None:
+    messages = drive()
+    messages[0] = replace(header(), name="\x1b[31mred\x07 \x9b1m café")
+    said = run(record(messages)).stdout
+    assert r"(\x1b[31mred\x07 \x9b1m café), " in said
+    assert all(c.isprintable() or c == "\n" for c in said)

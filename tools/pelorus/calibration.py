@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pelorus import arrays, se3
-from pelorus.errors import PelorusError
+from pelorus import arrays, foreign, se3
 from pelorus.faults.axes import body_axes
-from pelorus.frames import BodyAxes, Header, Noise, TwistTiming
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import BodyAxes, Header, Noise, TwistTiming, header_name
 from pelorus.se3 import Floats, Poses
 
 CAMERA = ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m")
@@ -23,19 +22,12 @@ AXES = {
     "other": BodyAxes.OTHER,
 }
 IMAGE_SIZE_MAX = 65535
+SHOWN_MAX = 60  # characters of a bad value
 
 
 def read(path: Path) -> Header:
     """The HEADER that the file describes; unknown names are refused, they may be typing errors."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise PelorusError(f"{path}: is no JSON: {error}") from error
-    if not isinstance(content, dict):
-        raise PelorusError(f"{path}: a JSON object with names is due")
-    return _Calibration(path, content).header()
+    return _Calibration(path, foreign.json_object(path)).header()
 
 
 class _Calibration:
@@ -59,15 +51,28 @@ class _Calibration:
             image_width_px=self._size("image_width_px"),
             image_height_px=self._size("image_height_px"),
             noise=self._noise(),
-            name=str(self.content.get("name", self.path.stem))[:60],
+            name=self._name(),
         )
+
+    def _name(self) -> str:
+        name = self.content.get("name", self.path.stem)
+        if not isinstance(name, str):
+            raise self._error("name", name, "words are due")
+        return header_name(name)
+
+    def _error(self, name: str, value: Any, due: str) -> ForeignFileError:
+        shown = repr(value)
+        shown = shown if len(shown) <= SHOWN_MAX else f"{shown[:SHOWN_MAX]}..."
+        return ForeignFileError(self.path, f"{name} is {shown}", due=due)
 
     def _extrinsic(self) -> Poses:
         given = [pair for pair in ("CB", "BC") if f"R_{pair}" in self.content]
         if len(given) != 1:
-            raise PelorusError(
-                f"{self.path}: either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
-                "(the camera's pose in the body) are due"
+            raise ForeignFileError(
+                self.path,
+                f"has {' and '.join(f'R_{pair}' for pair in given) or 'neither R_CB nor R_BC'}",
+                due="either R_CB and t_CB_m (body to left camera) or R_BC and t_BC_m "
+                "(the camera's pose in the body) are due",
             )
         pair = given[0]
         R = arrays.rotation(self.path, f"R_{pair}", self._array(f"R_{pair}", 3, 3))
@@ -76,45 +81,46 @@ class _Calibration:
 
     def _array(self, name: str, *shape: int) -> Floats:
         if name not in self.content:
-            raise PelorusError(
-                f"{self.path}: lacks {name}; there are: {', '.join(self.content) or 'none'}"
-            )
+            there = ", ".join(self.content) or "none"
+            raise ForeignFileError(self.path, f"lacks {name}", due=f"there are: {there}")
         try:
             array = np.array(self.content[name], dtype=np.float64)
         except (TypeError, ValueError):
             array = np.array([np.nan])
         if array.shape != shape or not np.isfinite(array).all():
             due = f"an array of shape {shape} of finite numbers" if shape else "a finite number"
-            raise PelorusError(f"{self.path}: {name} is {self.content[name]!r}, due is {due}")
+            raise self._error(name, self.content[name], f"{due} is due")
         return array
 
     def _choice(self, name: str, choices: dict[str, Any], standard: Any) -> Any:
         if name not in self.content:
             return standard
         word = self.content[name]
-        if word not in choices:
-            raise PelorusError(f"{self.path}: {name} is {word!r}, due is {' or '.join(choices)}")
+        if not isinstance(word, str) or word not in choices:
+            raise self._error(name, word, f"{' or '.join(choices)} is due")
         return choices[word]
 
     def _size(self, name: str) -> int:
         size = self.content.get(name, 0)
         if not isinstance(size, int) or not 0 <= size <= IMAGE_SIZE_MAX:
-            raise PelorusError(f"{self.path}: {name} is {size!r}, due is 0 to {IMAGE_SIZE_MAX}")
+            raise self._error(name, size, f"0 to {IMAGE_SIZE_MAX} is due")
         return size
 
     def _noise(self) -> Noise:
         given = self.content.get("noise", {})
         if not isinstance(given, dict) or not all(
-            isinstance(value, (int, float)) and np.isfinite(value) for value in given.values()
+            isinstance(value, (int, float)) and np.isfinite(float(value))
+            for value in given.values()
         ):
-            raise PelorusError(f"{self.path}: noise is {given!r}, due are names with numbers")
+            raise self._error("noise", given, "names with numbers are due")
         self._only(given, set(vars(Noise())), "noise")
         return Noise(**{name: float(value) for name, value in given.items()})
 
     def _only(self, given: dict[str, Any], known: set[str], where: str) -> None:
-        foreign = sorted(set(given) - known)
-        if foreign:
-            raise PelorusError(
-                f"{self.path}: {where} has the unknown name {', '.join(foreign)}; "
-                f"known are: {', '.join(sorted(known))}"
+        unknown = sorted(set(given) - known)
+        if unknown:
+            raise ForeignFileError(
+                self.path,
+                f"{where} has the unknown name {', '.join(unknown)}",
+                due=f"known are: {', '.join(sorted(known))}",
             )

@@ -1,19 +1,52 @@
 # SPDX-License-Identifier: MIT
-"""What the commands say: results to stdout, progress and errors to stderr."""
+"""What the commands say: results to stdout, progress and errors to stderr.
+
+Words of a file, a board or an emulator may hold anything. A terminal obeys control characters: an
+ESC moves its cursor, renames its window, or types. So both consoles show them instead.
+"""
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import track
+from rich.text import Text
 
 Item = TypeVar("Item")
 
+# Control, format (these turn the direction of what follows), surrogate: what is not to be printed.
+UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")
+LAYOUT = "\n\t"
+
+
+def shown(words: str) -> str:
+    r"""The words with what a terminal would obey made visible: ESC becomes \x1b."""
+    if words.isprintable():
+        return words
+    return "".join(c if _harmless(c) else _escape(ord(c)) for c in words)
+
+
+def _harmless(character: str) -> bool:
+    return character in LAYOUT or unicodedata.category(character) not in UNPRINTABLE
+
+
+def _escape(code: int) -> str:
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+class SafeConsole(Console):
+    """Every string that is printed, in a table too, goes through `shown`."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(shown(text), **options)
+
+
 # No emoji: tcp:x:5000 would be printed with a cross in it.
-out = Console(highlight=False, soft_wrap=True, emoji=False)
-err = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+out = SafeConsole(highlight=False, soft_wrap=True, emoji=False)
+err = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterator[Item]:

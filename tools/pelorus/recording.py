@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -110,8 +111,10 @@ class Recording:
             size = part.stat().st_size
             part.replace(path)
         except OSError as error:
-            part.unlink(missing_ok=True)
             raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
+        finally:  # after a good end it has its own name
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
         return size
 
     def _check(self, path: Path) -> None:

@@ -8,7 +8,6 @@ road on the map may begin later.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +15,10 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
+from pelorus import foreign
 from pelorus.console import progress
 from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
 from pelorus.se3 import Floats
 
 ROAD_STEP_M = 1.0  # the road's points are interpolated to this spacing
@@ -38,20 +39,15 @@ class RoadFigures:
 
 def read_road(path: Path) -> Floats:
     """(n, 2), m: the last two columns of a CSV; lines with # in front are comments."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an empty file is our error, not numpy's warning
-            rows = np.loadtxt(path, delimiter=",", comments="#", ndmin=2)
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, UnicodeDecodeError) as error:
-        raise PelorusError(f"{path}: is no road: rows arc_m,x_m,y_m are due: {error}") from error
-    if rows.shape[0] < 2 or rows.shape[1] < 2 or not np.isfinite(rows).all():
-        raise PelorusError(
-            f"{path}: {rows.shape[0]} rows of {rows.shape[1]} numbers; at least two rows of finite "
-            "arc_m,x_m,y_m are due"
+    rows = foreign.rows(path)
+    columns = len(rows[0].cells)
+    if len(rows) < 2 or columns < 2:
+        raise ForeignFileError(
+            path,
+            f"is no road: {len(rows)} rows of {columns} numbers",
+            due="at least two rows arc_m,x_m,y_m are due",
         )
-    return np.asarray(rows[:, -2:])
+    return foreign.numbers(path, rows)[:, -2:]
 
 
 def compare(position: Floats, road: Floats, skip_m: float) -> RoadFigures:

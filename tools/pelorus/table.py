@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import arrays
-from pelorus.errors import PelorusError
+from pelorus import arrays, foreign
+from pelorus.foreign import ForeignFileError
 from pelorus.se3 import Floats
+
+DIGITS_MAX = 19  # 2^63 has as many
+SHOWN_MAX = 40
 
 
 class Table:
@@ -23,21 +25,11 @@ class Table:
 
     @classmethod
     def read(cls, path: Path) -> Table:
-        try:
-            with path.open(newline="", encoding="utf-8-sig") as stream:
-                rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
-        except OSError as error:
-            raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise PelorusError(f"{path}: is no CSV text: {error}") from error
-        if not rows:
-            raise PelorusError(f"{path}: the file is empty; a row of column names is due")
+        rows = foreign.csv_rows(path)
         names = [name.strip() for name in rows[0]]
-        for number, row in enumerate(rows[1:], start=2):
-            if len(row) != len(names):
-                raise PelorusError(
-                    f"{path}: row {number} has {len(row)} cells, the first row names {len(names)}"
-                )
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            raise ForeignFileError(path, f"names the column {twice[0]} twice", at="row 1")
         return cls(path, {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)})
 
     def require(self, *names: str) -> None:
@@ -46,8 +38,10 @@ class Table:
         if lacking:
             there = ", ".join(self._columns)
             hint = "; commas should part them" if len(self._columns) == 1 and ";" in there else ""
-            raise PelorusError(
-                f"{self.path}: lacks the column {', '.join(lacking)}; there are: {there}{hint}"
+            raise ForeignFileError(
+                self.path,
+                f"lacks the column {', '.join(lacking)}",
+                due=f"there are: {there}{hint}",
             )
 
     def numbers(self, *names: str) -> Floats:
@@ -61,10 +55,11 @@ class Table:
         out = np.empty(len(self._columns[name]), np.int64)
         for row, cell in enumerate(self._columns[name]):
             text = cell.strip()
-            if not text.isdecimal() or int(text) > highest:
-                raise PelorusError(
-                    f"{self.path}: row {row + 2}: {name} is {text!r}, "
-                    f"a whole number from 0 to {highest} is due"
+            if not text.isdecimal() or len(text) > DIGITS_MAX or int(text) > highest:
+                raise ForeignFileError(
+                    self.path,
+                    f"{name} is {_shown(text)}, a whole number from 0 to {highest} is due",
+                    at=f"row {row + 2}",
                 )
             out[row] = int(text)
         return out
@@ -79,16 +74,17 @@ class Table:
                 arrays.check_seconds(self.path, "t_s", seconds)
             t_ns = np.round(seconds * 1e9).astype(np.int64)
         if not len(t_ns):
-            raise PelorusError(f"{self.path}: holds column names but no row")
+            raise ForeignFileError(self.path, "holds column names but no row")
         return t_ns
 
     def ascending_times(self) -> NDArray[np.int64]:
         t_ns = self.times()
         back = np.nonzero(np.diff(t_ns) <= 0)[0]
         if len(back):
-            raise PelorusError(
-                f"{self.path}: row {int(back[0]) + 3}: time does not ascend "
-                f"({t_ns[back[0]]} ns, then {t_ns[back[0] + 1]} ns)"
+            raise ForeignFileError(
+                self.path,
+                f"time does not ascend ({t_ns[back[0]]} ns, then {t_ns[back[0] + 1]} ns)",
+                at=f"row {int(back[0]) + 3}",
             )
         return t_ns
 
@@ -98,13 +94,17 @@ class Table:
             column = np.array(cells, dtype=np.float64)
         except ValueError:
             row = next(k for k, cell in enumerate(cells) if not _is_number(cell))
-            raise PelorusError(
-                f"{self.path}: row {row + 2}: {name} is {cells[row]!r}, a number is due"
+            raise ForeignFileError(
+                self.path, f"{name} is {_shown(cells[row])}, a number is due", at=f"row {row + 2}"
             ) from None
         if not np.isfinite(column).all():
             row = int(np.nonzero(~np.isfinite(column))[0][0])
-            raise PelorusError(f"{self.path}: row {row + 2}: {name} is not finite")
+            raise ForeignFileError(self.path, f"{name} is not finite", at=f"row {row + 2}")
         return column
+
+
+def _shown(cell: str) -> str:
+    return repr(cell if len(cell) <= SHOWN_MAX else f"{cell[:SHOWN_MAX]}...")
 
 
 def _is_number(cell: str) -> bool:

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
 from pelorus.frames import OBSERVATIONS_MAX, Camera
 from pelorus.se3 import Floats
 
@@ -92,18 +93,21 @@ class Tracks:
         first = np.nonzero(found)[0]
         return Pairs(self.frame[first], first, at[first])
 
-    def check(self, source: str) -> None:
+    def check(self, source: Path) -> None:
         """Refuse what no recording can hold."""
         if not len(self):
-            raise PelorusError(f"{source}: holds no observation at all")
+            raise ForeignFileError(source, "holds no observation at all")
         if not np.isfinite(self.pixels).all():
             row = int(np.nonzero(~np.isfinite(self.pixels).all(axis=1))[0][0])
-            raise PelorusError(
-                f"{source}: frame {self.frame[row]}, landmark {self.id[row]}: a pixel is not finite"
+            raise ForeignFileError(
+                source,
+                "a pixel is not finite",
+                at=f"frame {self.frame[row]}, landmark {self.id[row]}",
             )
         fullest = int(self.counts().max())
         if fullest > OBSERVATIONS_MAX:
-            raise PelorusError(
-                f"{source}: a frame has {fullest} observations, "
-                f"at most {OBSERVATIONS_MAX} fit a STEREO frame"
+            raise ForeignFileError(
+                source,
+                f"a frame has {fullest} observations",
+                due=f"at most {OBSERVATIONS_MAX} fit a STEREO frame",
             )

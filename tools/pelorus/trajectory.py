@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal, DecimalException
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pelorus import kitti, se3, wire
+from pelorus import foreign, kitti, se3, wire
 from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Stereo, Truth
 from pelorus.motion import Times
 from pelorus.se3 import Poses
@@ -20,6 +20,7 @@ from pelorus.wire import Received
 TUM_COLUMNS = 8
 KITTI_COLUMNS = 12
 QUATERNION_NORM_TOLERANCE = 1e-2
+CELL_SHOWN = 40  # characters of a bad one
 
 
 class Trajectory(NamedTuple):
@@ -31,22 +32,26 @@ class Trajectory(NamedTuple):
 
 def read_tum(path: Path) -> Trajectory:
     """Times are read as decimals: a double would round today's clock to 0.2 microseconds."""
-    rows = _rows(path)
-    for number, row in rows:
-        if len(row) != TUM_COLUMNS:
-            raise PelorusError(
-                f"{path}: line {number} has {len(row)} numbers, "
-                f"{TUM_COLUMNS} are due: t x y z qx qy qz qw"
+    rows = foreign.rows(path)
+    for line, cells in rows:
+        if len(cells) != TUM_COLUMNS:
+            raise ForeignFileError(
+                path,
+                f"has {len(cells)} numbers",
+                at=f"line {line}",
+                due=f"{TUM_COLUMNS} are due: t x y z qx qy qz qw",
             )
-    t_ns = np.array([_nanoseconds(path, number, row[0]) for number, row in rows], np.int64)
+    t_ns = _times(path, rows)
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
     if len(back):
-        raise PelorusError(f"{path}: line {rows[back[0] + 1][0]}: time does not ascend")
-    numbers = _numbers(path, [(number, row[1:]) for number, row in rows])
+        raise ForeignFileError(path, "time does not ascend", at=f"line {rows[back[0] + 1].line}")
+    numbers = foreign.numbers(path, [Row(line, cells[1:]) for line, cells in rows])
     norms = np.linalg.norm(numbers[:, 3:], axis=1)
     wrong = np.nonzero(np.abs(norms - 1) > QUATERNION_NORM_TOLERANCE)[0]
     if len(wrong):
-        raise PelorusError(f"{path}: line {rows[wrong[0]][0]}: the quaternion's norm is not 1")
+        raise ForeignFileError(
+            path, "the quaternion's norm is not 1", at=f"line {rows[wrong[0]].line}"
+        )
     return Trajectory(t_ns, Poses(se3.from_quaternion(numbers[:, 3:]), numbers[:, :3]))
 
 
@@ -70,16 +75,18 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
     row k belongs to; with the recording they are brought from the camera to the body.
     """
     if not path.is_file():
-        raise PelorusError(f"{path}: there is no such file")
+        raise ForeignFileError(path, "there is no such file")
     if _is_recording(path):
         return truth_of(path)
-    columns = len(_rows(path)[0][1])
+    columns = len(foreign.rows(path)[0].cells)
     if columns == TUM_COLUMNS:
         return read_tum(path)
     if columns == KITTI_COLUMNS:
         return _kitti(path, times, recording)
-    raise PelorusError(
-        f"{path}: rows of {columns} numbers; {TUM_COLUMNS} (TUM) or {KITTI_COLUMNS} (KITTI) are due"
+    raise ForeignFileError(
+        path,
+        f"rows of {columns} numbers",
+        due=f"{TUM_COLUMNS} (TUM) or {KITTI_COLUMNS} (KITTI) are due",
     )
 
 
@@ -107,13 +114,14 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         poses = kitti.body_poses(poses, Poses(header.R_CB, header.t_CB_m))
         whose = recording
     elif times is not None:
-        rows = _rows(times)
-        t_ns = np.array([_nanoseconds(times, number, row[0]) for number, row in rows], np.int64)
+        t_ns = _times(times, foreign.rows(times))
         whose = times
     else:
-        raise PelorusError(f"{path}: KITTI poses carry no times: give --recording or --times")
+        raise ForeignFileError(
+            path, "KITTI poses carry no times", due="give --recording or --times"
+        )
     if len(poses.p) > len(t_ns):
-        raise PelorusError(f"{path}: {len(poses.p)} poses, but {whose} has {len(t_ns)} times")
+        raise ForeignFileError(path, f"{len(poses.p)} poses, but {whose} has {len(t_ns)} times")
     return Trajectory(t_ns[: len(poses.p)], poses)
 
 
@@ -123,42 +131,22 @@ def _frame_times(received: list[Received]) -> set[int]:
 
 def _is_recording(path: Path) -> bool:
     """A text has no zero byte; a recording has one behind each frame."""
-    with path.open("rb") as stream:
-        return path.suffix == ".plr" or b"\0" in stream.read(1 << 17)
+    return path.suffix == ".plr" or b"\0" in foreign.beginning(path)
 
 
-def _rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Line number and cells of each line that is neither blank nor a # comment."""
+def _times(path: Path, rows: list[Row]) -> Times:
+    return np.array([_nanoseconds(path, line, cells[0]) for line, cells in rows], np.int64)
+
+
+def _nanoseconds(path: Path, line: int, cell: str) -> int:
+    at = f"line {line}"
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError:
-        raise PelorusError(f"{path}: is no text") from None
-    rows = [(n, line.replace(",", " ").split()) for n, line in enumerate(lines, 1)]
-    rows = [(n, row) for n, row in rows if row and not row[0].startswith("#")]
-    if not rows:
-        raise PelorusError(f"{path}: holds no row of numbers")
-    return rows
-
-
-def _numbers(path: Path, rows: list[tuple[int, list[str]]]) -> NDArray[np.float64]:
-    out = np.empty((len(rows), len(rows[0][1])))
-    for k, (number, row) in enumerate(rows):
-        try:
-            out[k] = [float(cell) for cell in row]
-        except ValueError:
-            raise PelorusError(f"{path}: line {number} holds something that is no number") from None
-        if not np.isfinite(out[k]).all():
-            raise PelorusError(f"{path}: line {number} holds a number that is not finite")
-    return out
-
-
-def _nanoseconds(path: Path, number: int, cell: str) -> int:
-    try:
-        t_ns = int((Decimal(cell) * 10**9).to_integral_value())
-    except (InvalidOperation, ValueError, OverflowError):
-        raise PelorusError(f"{path}: line {number}: {cell!r} is no time in seconds") from None
-    if not -(2**63) <= t_ns < 2**63:
-        raise PelorusError(f"{path}: line {number}: time {cell} s is out of range")
-    return t_ns
+        t_ns = Decimal(cell) * 10**9
+        in_range = -(2**63) <= t_ns < 2**63 - 1  # half a nanosecond below the end
+    except DecimalException:
+        raise ForeignFileError(
+            path, f"{cell[:CELL_SHOWN]!r} is no time in seconds", at=at
+        ) from None
+    if not in_range:
+        raise ForeignFileError(path, f"time {cell[:CELL_SHOWN]} s is out of range", at=at)
+    return int(t_ns.to_integral_value())

@@ -97,6 +97,9 @@ class Reader:
         """Yield the frames that `piece` completes."""
         self.counts.bytes += len(piece)
         self._held += piece
+        if DELIMITER not in piece:  # what is held is not looked through again for each piece
+            self._give_up_on_overlong()
+            return
         *whole, rest = bytes(self._held).split(DELIMITER)
         self._held = bytearray(rest)
         offset = self._held_at

@@ -23,6 +23,7 @@ from pelorus.robot.stream import ANSWER_S, Outcome, Streamer
 from pelorus.robot.target import BAUD, FORMS, open_target
 from pelorus.wire import header_of, read_file
 
+TEXTS_SHOWN = 200
 BOARDS = ", ".join(MACHINES)
 
 
@@ -197,8 +198,10 @@ def _tell(outcome: Outcome, record: Path | None) -> None:
 
 
 def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]:
-    for remark in outcome.texts:
+    for remark in outcome.texts[:TEXTS_SHOWN]:
         yield "board", remark.text
+    if len(outcome.texts) > TEXTS_SHOWN:
+        yield "board", f"and {len(outcome.texts) - TEXTS_SHOWN} remarks more"
     if outcome.config is not None:
         build = outcome.config
         yield (

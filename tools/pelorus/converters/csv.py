@@ -15,9 +15,9 @@ import numpy as np
 
 from pelorus import calibration, se3
 from pelorus.converters import twist_noise
-from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
+from pelorus.foreign import ForeignFileError
 from pelorus.frames import TwistTiming
 from pelorus.motion import Times
 from pelorus.recording import Recording
@@ -61,9 +61,10 @@ def read(sources: Sources) -> Recording:
     twist_t_ns = twists.ascending_times()
     frame_t_ns, tracks = _stereo(sources.stereo)
     if frame_t_ns[-1] < twist_t_ns[0] or twist_t_ns[-1] < frame_t_ns[0]:
-        raise PelorusError(
-            f"{sources.stereo}: spans {frame_t_ns[0]} to {frame_t_ns[-1]} ns, {sources.twists} "
-            f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap"
+        raise ForeignFileError(
+            sources.stereo,
+            f"spans {frame_t_ns[0]} to {frame_t_ns[-1]} ns, {sources.twists} "
+            f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap",
         )
     recording = Recording(header, twist_t_ns, v, w, frame_t_ns, tracks)
     if sources.truth is None:
@@ -79,15 +80,16 @@ def _stereo(path: Path) -> tuple[Times, Tracks]:
     id = table.integers("id", ID_MAX)
     pixels = table.numbers("uL_px", "vL_px", "uR_px", "vR_px")
     tracks = Tracks.from_rows(len(frame_t_ns), frame.reshape(-1).astype(np.intp), id, pixels)
-    tracks.check(str(path))
+    tracks.check(path)
     twice = (np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)
     if twice.any():
         k = int(np.nonzero(twice)[0][0])
         t_ns = frame_t_ns[tracks.frame[k]]
         rows = np.nonzero((row_t_ns == t_ns) & (id == tracks.id[k]))[0] + 2
-        raise PelorusError(
-            f"{path}: id {tracks.id[k]} stands twice in the frame at {t_ns} ns: "
-            f"rows {rows[0]} and {rows[1]}"
+        raise ForeignFileError(
+            path,
+            f"id {tracks.id[k]} stands twice in the frame at {t_ns} ns: "
+            f"rows {rows[0]} and {rows[1]}",
         )
     return frame_t_ns, tracks
 
@@ -98,8 +100,9 @@ def _truth(path: Path) -> tuple[Times, Poses]:
     quaternions = table.numbers("qx", "qy", "qz", "qw")
     off = np.abs(np.linalg.norm(quaternions, axis=1) - 1)
     if off.max() > QUATERNION_NORM_TOLERANCE:
-        raise PelorusError(
-            f"{path}: row {int(off.argmax()) + 2}: the quaternion's norm is not 1 "
-            "(the columns are qx, qy, qz, qw)"
+        raise ForeignFileError(
+            path,
+            "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
+            at=f"row {int(off.argmax()) + 2}",
         )
     return t_ns, Poses(se3.from_quaternion(quaternions), table.numbers("px_m", "py_m", "pz_m"))

@@ -16,11 +16,11 @@ import numpy as np
 from pelorus import arrays, kitti, se3
 from pelorus.arrays import Arrays
 from pelorus.converters import twist_noise
-from pelorus.errors import PelorusError
 from pelorus.faults import axes, timing
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
-from pelorus.frames import Header, TwistTiming
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import Header, TwistTiming, header_name
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
@@ -61,9 +61,9 @@ def read(source: Path) -> Recording:
     camera = arrays.camera_of(source, K[0, 0], K[1, 1], K[0, 2], K[1, 2], file.scalar("b"))
     T_CB = _extrinsic(file)
     tracks = Tracks.from_dense(file.get("features", shape=(4, None, count)))
-    tracks.check(str(source))
+    tracks.check(source)
     w = file.get("angular_velocity", "rotational_velocity", shape=(3, count)).T
-    header = Header(camera, T_CB.R, T_CB.p, name=source.stem[:60])
+    header = Header(camera, T_CB.R, T_CB.p, name=header_name(source.stem))
     v = file.get("linear_velocity", shape=(3, count)).T
     return Recording(header, t_ns, v, w, t_ns, tracks)
 
@@ -73,7 +73,9 @@ def _extrinsic(file: Arrays) -> Poses:
     key = file.one_of("cam_T_imu", "imu_T_cam")
     matrix = file.get(key, shape=(4, 4))
     if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
-        raise PelorusError(f"{file.path}: the last row of {key} is {matrix[3]}, due is 0 0 0 1")
+        raise ForeignFileError(
+            file.path, f"the last row of {key} is {matrix[3]}", due="0 0 0 1 is due"
+        )
     T = Poses(arrays.rotation(file.path, key, matrix[:3, :3]), matrix[:3, 3])
     return T if key == "cam_T_imu" else se3.inverse(T)
 
@@ -83,6 +85,8 @@ def with_truth(recording: Recording, path: Path) -> Recording:
     poses = kitti.read_poses(path)
     frames = len(recording.frame_t_ns)
     if len(poses.p) > frames:
-        raise PelorusError(f"{path}: {len(poses.p)} poses for {frames} frames, at most one each")
+        raise ForeignFileError(
+            path, f"{len(poses.p)} poses for {frames} frames", due="at most one each is due"
+        )
     body = kitti.body_poses(poses, recording.T_CB)
     return recording.with_truth(recording.frame_t_ns[: len(poses.p)], body)

@@ -19,7 +19,8 @@ from pelorus import arrays, se3
 from pelorus.arrays import Arrays
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
-from pelorus.frames import Header, Landmark, Noise, Role, TwistTiming
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
 from pelorus.recording import Recording
 from pelorus.se3 import Floats, Poses
 from pelorus.tracks import Tracks
@@ -36,13 +37,13 @@ def starry_night(
     """With the noise variances of the file and its landmarks as LANDMARK(known)."""
     file = arrays.read_mat(source)
     recording = _read(file, twist_timing)
-    if landmark_sigma_m <= 0:
+    if not 0 < landmark_sigma_m < np.inf:
         raise PelorusError(f"landmark sigma {landmark_sigma_m} m: must be positive")
     points = file.get("rho_i_pj_i", shape=(3, None)).T
     highest = int(recording.tracks.id.max())
     if highest >= len(points):
-        raise PelorusError(
-            f"{source}: y_k_j shows {highest + 1} landmarks, rho_i_pj_i has {len(points)}"
+        raise ForeignFileError(
+            source, f"y_k_j shows {highest + 1} landmarks, rho_i_pj_i has {len(points)}"
         )
     covariance = landmark_sigma_m**2 * np.array([1.0, 0, 1, 0, 0, 1])
     known = [Landmark(k, p, covariance, Role.KNOWN) for k, p in enumerate(points)]
@@ -62,7 +63,7 @@ def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:
     R_CB = arrays.rotation(file.path, "C_c_v", file.get("C_c_v", shape=(3, 3)))
     t_CB = -R_CB @ file.get("rho_v_c_v", shape=(3, 1)).ravel()
     tracks = Tracks.from_dense(_features(file, count))
-    tracks.check(str(file.path))
+    tracks.check(file.path)
     rotation_vectors, position = (_first(file, key, count) for key in ("theta_vk_i", "r_i_vk_i"))
     header = Header(
         camera,
@@ -70,7 +71,7 @@ def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:
         t_CB,
         body_axes=body_axes(R_CB),
         twist_timing=twist_timing,
-        name=file.path.stem[:60],
+        name=header_name(file.path.stem),
     )
     v, w = (_first(file, key, count) for key in ("v_vk_vk_i", "w_vk_vk_i"))
     truth = Poses(se3.so3_exp(rotation_vectors), position)
@@ -81,8 +82,8 @@ def _first(file: Arrays, key: str, count: int) -> Floats:
     """(count, 3) of a (3, T') array, T' >= count."""
     array = file.get(key, shape=(3, None))
     if array.shape[1] < count:
-        raise PelorusError(
-            f"{file.path}: {key} has {array.shape[1]} columns for {count} times in t"
+        raise ForeignFileError(
+            file.path, f"{key} has {array.shape[1]} columns for {count} times in t"
         )
     return array[:, :count].T
 
@@ -91,14 +92,15 @@ def _features(file: Arrays, count: int) -> Floats:
     """(4, M, T), whichever way round the file has it."""
     y = file.get("y_k_j", shape=(4, None, None))
     if y.shape[1] == y.shape[2] == count:
-        raise PelorusError(f"{file.path}: y_k_j is 4 x {count} x {count}: which axis is time?")
+        raise ForeignFileError(file.path, f"y_k_j is 4 x {count} x {count}: which axis is time?")
     if y.shape[1] == count:
         return np.swapaxes(y, 1, 2)
     if y.shape[2] == count:
         return y
-    raise PelorusError(
-        f"{file.path}: y_k_j has the shape {y.shape}, but t has {count} times: "
-        f"4 x {count} x n or 4 x n x {count} is due"
+    raise ForeignFileError(
+        file.path,
+        f"y_k_j has the shape {y.shape}, but t has {count} times",
+        due=f"4 x {count} x n or 4 x n x {count} is due",
     )
 
 
@@ -109,8 +111,10 @@ def _noise(file: Arrays) -> Noise:
     """
     variances = {key: file.get(key).ravel() for key in ("y_var", "v_var", "w_var")}
     for key, variance in variances.items():
-        if not (variance >= 0).all():
-            raise PelorusError(f"{file.path}: {key} is {variance}: a variance is not negative")
+        if not variance.size or not (variance >= 0).all():
+            raise ForeignFileError(
+                file.path, f"{key} is {variance}", due="variances that are not negative are due"
+            )
     mean = (float(np.sqrt(np.mean(variance))) for variance in variances.values())
     axes = [
         float(sigma)
@@ -122,5 +126,7 @@ def _noise(file: Arrays) -> Noise:
 
 def _by_axis(file: Arrays, key: str, variance: Floats) -> Floats:
     if variance.size not in (1, 3):
-        raise PelorusError(f"{file.path}: {key} has {variance.size} numbers, due are 1 or 3")
+        raise ForeignFileError(
+            file.path, f"{key} has {variance.size} numbers", due="1 or 3 are due"
+        )
     return variance

@@ -26,6 +26,7 @@ from pelorus.frames.recorder import (
     Truth,
     Twist,
     TwistTiming,
+    header_name,
 )
 
 KINDS: dict[int, type[Message]] = {
@@ -75,4 +76,5 @@ __all__ = [
     "Truth",
     "Twist",
     "TwistTiming",
+    "header_name",
 ]

@@ -30,6 +30,15 @@ TEXT_BYTES_MAX = 240
 OBSERVATION = np.dtype([("id", "<u4"), ("pixels", "<f4", (4,))])
 
 
+def header_name(words: str) -> str:
+    """The words as a HEADER can hold them: whole characters of UTF-8, and not too many.
+
+    A file's name may hold bytes that are no text; they become question marks.
+    """
+    stored = words.encode("utf-8", errors="replace")[:NAME_BYTES_MAX]
+    return stored.decode("utf-8", errors="ignore")
+
+
 class BodyAxes(IntEnum):
     """Which way the body's x, y and z point."""
 

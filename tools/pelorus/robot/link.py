@@ -13,7 +13,7 @@ import socket
 import termios
 import time
 import tty
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from pelorus.errors import PelorusError
@@ -22,10 +22,15 @@ READ_BYTES = 65536
 WRITE_BYTES = 4096
 CONNECT_S = 10.0
 CONNECT_AGAIN_S = 0.05
+STALL_S = 1800.0  # where a caller has no limit of its own: against hangs
 
 
 class LinkClosed(PelorusError):
     """The other side is gone."""
+
+
+class LinkStalled(PelorusError):
+    """The other side is there, and takes nothing."""
 
 
 class Link:
@@ -36,31 +41,48 @@ class Link:
         self.what = what
         os.set_blocking(fd, False)
 
-    def exchange(self, outgoing: bytes, wait_s: float = 0.0) -> bytes:
-        """Send everything, and return what came meanwhile.
+    def exchange(self, outgoing: bytes, wait_s: float = 0.0, stall_s: float = STALL_S) -> bytes:
+        """Send everything, and return what came meanwhile: `pieces` in one.
 
-        With nothing (left) to send, wait up to `wait_s` for the first bytes to come. What came
-        before the link closed is still returned; the next call raises LinkClosed.
+        What came before the link closed is still returned; the next call raises LinkClosed.
+        """
+        incoming = bytearray()
+        try:
+            for piece in self.pieces(outgoing, wait_s, stall_s):
+                incoming += piece
+        except LinkClosed:
+            if not incoming:
+                raise
+        return bytes(incoming)
+
+    def pieces(self, outgoing: bytes, wait_s: float, stall_s: float) -> Iterator[bytes]:
+        """Send everything, and yield what comes meanwhile, piece by piece.
+
+        With nothing (left) to send, wait up to `wait_s` for the first bytes to come. LinkStalled
+        where the other side takes no byte for `stall_s`, whatever it says meanwhile.
         """
         deadline = time.monotonic() + wait_s
-        incoming = bytearray()
         left = memoryview(outgoing)
+        took_at, came = time.monotonic(), False
         while True:
-            patience = None if left else max(0.0, deadline - time.monotonic())
+            patience_s = stall_s if left else max(0.0, deadline - time.monotonic())
             readable, writable, _ = select.select(
-                [self._fd], [self._fd] if left else [], [], patience
+                [self._fd], [self._fd] if left else [], [], patience_s
             )
-            try:
-                if readable:
-                    incoming += self._read()
-                if writable:
-                    left = left[self._write(left[:WRITE_BYTES]) :]
-            except LinkClosed:
-                if incoming:
-                    return bytes(incoming)
-                raise
-            if not left and (incoming or time.monotonic() >= deadline):
-                return bytes(incoming)
+            if readable and (piece := self._read()):
+                came = True
+                yield piece
+            if writable:
+                left = left[self._write(left[:WRITE_BYTES]) :]
+                took_at = time.monotonic()
+            now = time.monotonic()
+            if not left and (came or now >= deadline):
+                return
+            if left and not writable and now - took_at >= stall_s:
+                raise LinkStalled(
+                    f"{self.what}: takes no bytes any more, for {stall_s:g} s; "
+                    "is the board running the firmware, at this baud rate?"
+                )
 
     def close(self) -> None:
         os.close(self._fd)

@@ -42,6 +42,7 @@ from pelorus.wire import DELIMITER, Counts, Reader, encode
 BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
 QUIET_S = 0.3
+GREETING_S = 3.0  # a board may be in the middle of something
 WARNING = 1  # severity of a TEXT
 END_AGAIN_S = 1.0
 STATE_S = 15.0  # a save takes as long as the flash: seconds
@@ -120,13 +121,23 @@ class Streamer:
         while not self._ended and time.monotonic() < deadline:
             self._exchange(DELIMITER + encode(End(0, 0, 0, 0, 0), 0), 0.0)
             self._wait(lambda: self._ended, min(END_AGAIN_S, deadline - time.monotonic()))
-        while self._exchange(b"", QUIET_S):
-            pass
+        self._await_quiet()
         self.outcome = Outcome(texts=self.outcome.texts)
         self.reader.counts = Counts()  # what came before is not this drive's
         self._sequence = 1
         self._ended = False
         self._under_way = True
+
+    def _await_quiet(self) -> None:
+        """Let the board finish what it is saying; a line that is never quiet is no board's."""
+        patience_s = max(GREETING_S, self._answer_s)
+        deadline = time.monotonic() + patience_s
+        while self._exchange(b"", QUIET_S):
+            if time.monotonic() >= deadline:
+                raise PelorusError(
+                    f"{self._link.what}: does not stop talking, for {patience_s:g} s; "
+                    "is it a board with the firmware, at this baud rate?"
+                )
 
     def _wait(self, done: Callable[[], bool], patience_s: float) -> None:
         """Take in what comes, until it is done or the time is up."""
@@ -217,10 +228,12 @@ class Streamer:
 
     def _exchange(self, outgoing: bytes, wait_s: float) -> bool:
         """Send and take in; whether anything came."""
-        incoming = self._link.exchange(outgoing, wait_s)
-        for received in list(self.reader.feed(incoming)):
-            self._take(received.message)
-        return bool(incoming)
+        came = False
+        for piece in self._link.pieces(outgoing, wait_s, self._answer_s):
+            came = True
+            for received in list(self.reader.feed(piece)):
+                self._take(received.message)
+        return came
 
     def _take(self, message: Message) -> None:
         if self._under_way and self._log is not None and message.kind != Kind.END:

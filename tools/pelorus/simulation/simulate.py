@@ -9,7 +9,15 @@ import numpy as np
 
 from pelorus.console import progress
 from pelorus.errors import PelorusError
-from pelorus.frames import OBSERVATIONS_MAX, BodyAxes, Header, Landmark, Noise, TwistTiming
+from pelorus.frames import (
+    OBSERVATIONS_MAX,
+    BodyAxes,
+    Header,
+    Landmark,
+    Noise,
+    TwistTiming,
+    header_name,
+)
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Floats, Poses
@@ -221,7 +229,7 @@ def _header(options: Options) -> Header:
         image_width_px=width,
         image_height_px=height,
         noise=Noise(**{name: value if value > 0 else -1.0 for name, value in suggested.items()}),
-        name=f"simulated, seed {options.seed}"[:60],
+        name=header_name(f"simulated, seed {options.seed}"),
     )
 
 

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Every file that somebody else wrote is opened here: text, CSV, JSON, .npz and .mat.
+
+Each reader has a limit of size, and one way to fail: ForeignFileError, whatever the file holds. The
+rest of the package opens no foreign file; tests/python/test_foreign.py sees to it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import zipfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import matfile
+from pelorus.errors import PelorusError
+from pelorus.se3 import Floats
+
+TEXT_BYTES_MAX = 1 << 30
+JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred
+ARRAYS_BYTES_MAX = 1 << 31  # unpacked; the course's largest drive has 0.2 GB
+INTEGER_DIGITS_MAX = 20  # 2^64 has as many
+PIECE_BYTES = 1 << 20
+BEGINNING_BYTES = 1 << 17
+NPY_MAGIC = b"\x93NUMPY"
+
+ArraysByName = dict[str, NDArray[np.generic]]
+
+
+class ForeignFileError(PelorusError):
+    """A file is not what it should be: which one, where in it, what is wrong, what would be right.
+
+    `due` is a sentence of its own: "12 numbers are due".
+    """
+
+    def __init__(self, path: Path, wrong: str, *, at: str = "", due: str = "") -> None:
+        self.path, self.at, self.wrong, self.due = path, at, wrong, due
+        place = f"{path}: {at}" if at else str(path)
+        super().__init__(f"{place}: {wrong}; {due}" if due else f"{place}: {wrong}")
+
+
+# --- bytes and text -------------------------------------------------------------------------------
+
+
+def content(path: Path, most: int) -> bytes:
+    """All bytes of a file or a pipe, if there are no more than `most` and at least one."""
+    pieces, size = [], 0
+    try:
+        with path.open("rb") as stream:
+            while piece := stream.read(PIECE_BYTES):
+                size += len(piece)
+                if size > most:
+                    raise ForeignFileError(path, "is too long", due=f"at most {most} bytes are due")
+                pieces.append(piece)
+    except OSError as error:
+        raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
+    if not size:
+        raise ForeignFileError(path, "the file is empty")
+    return b"".join(pieces)
+
+
+def beginning(path: Path) -> bytes:
+    """The first bytes of a file, to see what it is."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(BEGINNING_BYTES)
+    except OSError as error:
+        raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
+
+
+def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
+    """UTF-8, with a byte order mark or without."""
+    try:
+        return content(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ForeignFileError(
+            path, "is no text", at=f"byte {error.start}", due="text in UTF-8 is due"
+        ) from None
+
+
+# --- rows of numbers ------------------------------------------------------------------------------
+
+
+class Row(NamedTuple):
+    """The cells of a line, which has this number in the file."""
+
+    line: int
+    cells: list[str]
+
+
+def rows(path: Path) -> list[Row]:
+    """Lines of cells parted by blanks or commas; neither blank lines nor # comments."""
+    lines = enumerate(text(path).splitlines(), 1)
+    bare = ((number, line.partition("#")[0].replace(",", " ").split()) for number, line in lines)
+    found = [Row(number, cells) for number, cells in bare if cells]
+    if not found:
+        raise ForeignFileError(path, "holds no row of numbers")
+    return found
+
+
+def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
+    """(rows, columns) finite numbers; as many columns as the first row has, if not said."""
+    due = columns or len(given[0].cells)
+    out = np.empty((len(given), due))
+    for k, (line, cells) in enumerate(given):
+        at = f"line {line}"
+        if len(cells) != due:
+            raise ForeignFileError(
+                path, f"has {len(cells)} numbers", at=at, due=f"{due} a row are due"
+            )
+        try:
+            out[k] = [float(cell) for cell in cells]
+        except ValueError:
+            raise ForeignFileError(path, "holds something that is no number", at=at) from None
+        if not np.isfinite(out[k]).all():
+            raise ForeignFileError(path, "holds a number that is not finite", at=at)
+    return out
+
+
+# --- CSV ------------------------------------------------------------------------------------------
+
+
+def csv_rows(path: Path) -> list[list[str]]:
+    """The cells of every row that is not blank; the first row names the columns."""
+    try:
+        table = list(csv.reader(io.StringIO(text(path), newline="")))
+    except csv.Error as error:
+        raise ForeignFileError(path, f"is no CSV text: {error}") from error
+    table = [row for row in table if any(cell.strip() for cell in row)]
+    if not table:
+        raise ForeignFileError(path, "the file is empty", due="a row of column names is due")
+    for number, row in enumerate(table[1:], start=2):
+        if len(row) != len(table[0]):
+            raise ForeignFileError(
+                path,
+                f"has {len(row)} cells, the first row names {len(table[0])}",
+                at=f"row {number}",
+            )
+    return table
+
+
+# --- JSON -----------------------------------------------------------------------------------------
+
+
+def json_object(path: Path) -> dict[str, Any]:
+    """An object with names: numbers that a double holds, strings that UTF-8 holds."""
+    words = text(path, JSON_BYTES_MAX)
+    try:
+        found = json.loads(
+            words, parse_int=_integer, parse_float=_real, object_pairs_hook=_named_once
+        )
+        json.dumps(found, ensure_ascii=False).encode("utf-8")
+    except RecursionError:
+        raise ForeignFileError(
+            path, "is nested too deep", due="an object with numbers, words and lists of them is due"
+        ) from None
+    except UnicodeEncodeError:
+        raise ForeignFileError(
+            path,
+            "holds half of a surrogate pair (\\ud800 to \\udfff)",
+            due="whole characters are due",
+        ) from None
+    except json.JSONDecodeError as error:
+        raise ForeignFileError(
+            path, f"is no JSON: {error.msg}", at=f"line {error.lineno}, column {error.colno}"
+        ) from None
+    except ValueError as error:
+        raise ForeignFileError(path, str(error)) from None
+    if not isinstance(found, dict):
+        raise ForeignFileError(path, "is JSON without names", due="an object with names is due")
+    return found
+
+
+def _integer(digits: str) -> int:
+    if len(digits.lstrip("-")) > INTEGER_DIGITS_MAX:
+        raise ValueError(
+            f"holds a number of {len(digits)} digits; at most {INTEGER_DIGITS_MAX} are due"
+        )
+    return int(digits)
+
+
+def _real(digits: str) -> float:
+    number = float(digits)
+    if not math.isfinite(number):
+        raise ValueError(f"holds the number {digits[:INTEGER_DIGITS_MAX]}, which no double holds")
+    return number
+
+
+def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"holds the name {twice!r} twice")
+    return found
+
+
+# --- arrays ---------------------------------------------------------------------------------------
+
+
+def npz(path: Path) -> ArraysByName:
+    """All arrays of a .npz file; pickled objects are refused."""
+    _require_file(path)
+    due = "a .npz file (a zip of numpy arrays, as np.savez makes one) is due"
+    if beginning(path).startswith(NPY_MAGIC):
+        raise ForeignFileError(path, "is a lone array (.npy)", due=due)
+    if not zipfile.is_zipfile(path):
+        raise ForeignFileError(path, "is no .npz file, or its end is missing", due=due)
+    try:
+        _require_unpackable(path)
+        with np.load(path, allow_pickle=False) as file:
+            return {key: file[key] for key in file.files}
+    except PelorusError:
+        raise
+    except Exception as error:  # zipfile and numpy raise a dozen kinds on damaged files
+        raise ForeignFileError(path, f"cannot be read as .npz: {_first_line(error)}") from error
+
+
+def _require_unpackable(path: Path) -> None:
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+    locked = [member.filename for member in members if member.flag_bits & 1]
+    if locked:
+        raise ForeignFileError(
+            path, "is encrypted", at=locked[0], due="a zip without a password is due"
+        )
+    _require_size(path, sum(member.file_size for member in members))
+
+
+def mat(path: Path) -> ArraysByName:
+    """All variables of a MATLAB file of version 5 to 7."""
+    _require_file(path)
+    packed = content(path, ARRAYS_BYTES_MAX)
+    if matfile.is_hdf5(packed):
+        raise ForeignFileError(
+            path, "is a MATLAB 7.3 file (HDF5)", due="save it with -v7 to convert it"
+        )
+    try:
+        return matfile.arrays(packed, ARRAYS_BYTES_MAX)
+    except matfile.BrokenMatFile as error:
+        raise ForeignFileError(path, f"cannot be read as .mat: {error}") from None
+
+
+def _require_file(path: Path) -> None:
+    if not path.is_file():
+        raise ForeignFileError(path, "there is no such file")
+    size = path.stat().st_size
+    if not size:
+        raise ForeignFileError(path, "the file is empty")
+    _require_size(path, size)
+
+
+def _require_size(path: Path, size: int) -> None:
+    if size > ARRAYS_BYTES_MAX:
+        raise ForeignFileError(
+            path,
+            f"holds {size} bytes of arrays",
+            due=f"at most {ARRAYS_BYTES_MAX} are due: cut the drive into pieces",
+        )
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
