@@ -42,6 +42,8 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     each_axis(config.velocity_sigma, s->velocity_mps);
     each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
+    if (s->slots)
+        config.slots = (uint16_t)s->slots;
     world_calibration(s, &calibration);
     world_begin(&r->world, s, seed);
     sensors_begin(&r->sensors, s, &config, seed);
@@ -102,11 +104,14 @@ static void judge_error(run *r, account *a, plr_health health, const plr_pose *p
     }
 }
 
-static void judge_health(run *r, account *a, plr_health health) {
+static void judge_health(run *r, account *a, const plr_report *report) {
     outcome *o = r->result;
+    const plr_health health = report->health;
     const unsigned end = r->before + r->during;
     a->frames++;
     a->good += health == PLR_HEALTH_GOOD;
+    for (unsigned i = 0; i < REASONS && health != PLR_HEALTH_GOOD; i++)
+        o->reasons[phase_of(r, r->k)][i] += (uint32_t)report->reasons >> i & 1;
     if (health != PLR_HEALTH_GOOD && r->k >= r->before && o->told_frames < 0)
         o->told_frames = r->k - r->before;
     if (r->k < end)
@@ -134,7 +139,7 @@ static void judge(run *r, const plr_report *report) {
         if (r->result->first_diverged < 0)
             r->result->first_diverged = r->k;
     }
-    judge_health(r, a, report->health);
+    judge_health(r, a, report);
 }
 
 static void finish(run *r) {

@@ -21,13 +21,16 @@ typedef struct account {
     double sigma_m, sigma_rad;             /* the filter's own at the end: root of the trace */
 } account;
 
+enum { REASONS = 32 }; /* bits of plr_report.reasons */
+
 typedef struct outcome {
     bool done; /* false: the process ended before its time */
     account phase[PHASES];
     double bias_sigmas[6]; /* error at the end in sigmas */
     bool has_bias;
     unsigned matched, gated, refused;
-    unsigned resets;       /* times that the filter says it was set or widened */
+    unsigned reasons[PHASES][REASONS]; /* frames not GOOD, by the bits that were set */
+    unsigned resets;                   /* times that the filter says it was set or widened */
     double told_frames;    /* from the beginning of the event to the first frame not GOOD; -1 */
     double again_s;        /* from true again to GOOD again; -1: never */
     double first_diverged; /* frame; -1: never */

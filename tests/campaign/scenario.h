@@ -38,10 +38,12 @@ typedef struct bars {
 
 typedef struct scenario {
     const char *name, *about;
-    double speed_mps, turn; /* turn 1: the usual bends, 0: none */
+    bool room; /* all points stand around the start for good, and the body goes in a circle */
+    double speed_mps, turn; /* turn 1: the usual bends, or a circle in 20 s; 0: none */
     double near_m, far_m;   /* depths at which points appear */
     double baseline_m;
-    unsigned landmarks;
+    unsigned landmarks; /* offered in a frame */
+    unsigned slots;     /* 0: the filter's default */
     unsigned twists_per_frame;
     double pixel_px, velocity_mps, gyro_radps; /* true, and told to the filter */
     bool bias; /* biases drawn from the prior and estimated; else none, and off */
@@ -58,7 +60,10 @@ enum { FRAME_HZ = 10 };
 extern const scenario scenarios[];
 extern const unsigned scenario_count;
 
-/* NULL if there is none. */
-const scenario *scenario_by_name(const char *name, unsigned length);
+/* Changes fields: "speed=2,bias=1". Returns NULL, or the first part that makes no sense. */
+const char *scenario_change(scenario *s, const char *changes);
+
+/* The names of what can be changed, with commas. */
+void scenario_fields(char *text, unsigned size);
 
 #endif

@@ -36,6 +36,7 @@ typedef struct tally {
     mean nees[PHASES], end_m[PHASES], end_rad[PHASES], own_m[PHASES], own_rad[PHASES];
     mean bias[6];
     double matched, gated, refused, resets;
+    double reasons[PHASES][REASONS];
     double *told, *again; /* sorted; those never told or good again at the end, as infinity */
     double first_diverged, second_later_sigmas, second_later_m;
 } tally;
@@ -68,6 +69,9 @@ static void add(tally *t, const outcome *o) {
         add_phase(t, (phase)p, &o->phase[p]);
     for (int i = 0; i < 6 && o->has_bias; i++)
         mean_add(&t->bias[i], o->bias_sigmas[i]);
+    for (int p = 0; p < PHASES; p++)
+        for (int i = 0; i < REASONS; i++)
+            t->reasons[p][i] += o->reasons[p][i];
     t->matched += o->matched;
     t->gated += o->gated;
     t->refused += o->refused;
@@ -146,6 +150,16 @@ static verdict judge(const scenario *s, const tally *t) {
 
 /* ---------------------------------------------------------------- printing */
 
+/* The names of plr_reason, short. */
+static const char *reason_name(unsigned bit) {
+    static const char *const names[] = {
+        "few",          "none-used",    "gate-locked", "gate-inert", "block-failed", "sink",
+        "no-room",      "refused",      "nis-high",    "range",      "not-positive", "budget",
+        "contradicted", "may-be-wrong", "bias-off",    "nis-low",    "frozen",       "disagrees",
+        "recovered",    "no-frames",    "damaged",     "no-twists"};
+    return bit < sizeof names / sizeof names[0] ? names[bit] : "?";
+}
+
 void table_heading(void) {
     static const char *const phases[] = {
         "phases: nominal (or before an event), event, after.",
@@ -172,6 +186,22 @@ static void print_phase(const char *name, const char *label, const tally *t, pha
     if (a->diverged)
         printf("  diverged in %u frames", a->diverged);
     printf("\n");
+}
+
+/* What kept the filter from being GOOD: shares of the phase's frames. */
+static void print_reasons(const tally *t, phase p) {
+    static const char *const names[PHASES] = {"before", "event", "after"};
+    bool any = false;
+    for (unsigned i = 0; i < REASONS; i++)
+        if (t->reasons[p][i] > 0) {
+            if (!any)
+                printf("  not GOOD %s:", names[p]);
+            printf("%s %s %.4f", any ? "," : "", reason_name(i),
+                   share(t->reasons[p][i], t->phase[p].frames));
+            any = true;
+        }
+    if (any)
+        printf("\n");
 }
 
 static void print_details(const scenario *s, const tally *t) {
@@ -215,6 +245,8 @@ bool table_print(const scenario *s, const outcome *outcomes, unsigned seeds) {
     print_phase(t.phase[BEFORE].frames ? "" : s->name, "event", &t, DURING);
     print_phase("", "after", &t, AFTER);
     print_details(s, &t);
+    for (int p = 0; p < PHASES; p++)
+        print_reasons(&t, (phase)p);
     const verdict v = judge(s, &t);
     printf("  %s: %s\n", v.pass ? "pass" : "FAIL", v.text);
     fflush(stdout);

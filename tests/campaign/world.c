@@ -4,7 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-static const double FOCAL_PX = 500, CONVOY_SPEED = 0.8;
+static const double PI = 3.14159265358979323846, FOCAL_PX = 500, CONVOY_SPEED = 0.8;
+static const double CIRCLE_RADPS = 0.31415926535897931; /* of a room: once around in 20 s */
 
 /* Body forward, left, up; camera right, down, forward, 0.2 m ahead of the body and 0.1 m above. */
 void world_calibration(const scenario *s, plr_calibration *calibration) {
@@ -37,6 +38,16 @@ static void place(world *w, point *p) {
     p->id = w->next_id++;
 }
 
+/* A point of a room: anywhere around, at the height of the camera more or less. */
+static void place_around(world *w, point *p) {
+    const double distance = chance_uniform(&w->chance, w->s->near_m, w->s->far_m);
+    const double bearing = chance_uniform(&w->chance, -PI, PI);
+    p->m[0] = distance * cos(bearing);
+    p->m[1] = distance * sin(bearing);
+    p->m[2] = 0.1 + distance * chance_uniform(&w->chance, -0.4, 0.4);
+    p->id = w->next_id++;
+}
+
 void world_begin(world *w, const scenario *s, uint64_t seed) {
     memset(w, 0, sizeof *w);
     w->s = s;
@@ -47,13 +58,13 @@ void world_begin(world *w, const scenario *s, uint64_t seed) {
     if (s->mishap == FOCAL)
         w->calibration.fx_px = w->calibration.fy_px *= 1 + s->strength;
     for (int i = 0; i < 6; i++)
-        w->phase[i] = chance_uniform(&w->chance, 0, 2 * acos(-1));
+        w->phase[i] = chance_uniform(&w->chance, 0, 2 * PI);
     for (int i = 0; i < 3; i++)
         w->T_WB.R[4 * i] = 1;
     w->step_s = 1.0 / (FRAME_HZ * s->twists_per_frame);
     w->next_id = 1;
     for (unsigned i = 0; i < s->landmarks; i++)
-        place(w, &w->points[i]);
+        (s->room ? place_around : place)(w, &w->points[i]);
 }
 
 void world_choose_twist(world *w) {
@@ -64,6 +75,8 @@ void world_choose_twist(world *w) {
         .w_B_radps = {a * 0.05 * sin(1.1 * t + ph[3]), a * 0.05 * sin(0.8 * t + ph[4]),
                       a * (0.1 + 0.15 * sin(0.3 * t + ph[5]))}};
     w->twist = u;
+    if (w->s->room)
+        w->twist.w_B_radps[2] = a * CIRCLE_RADPS;
 }
 
 static void move_points(world *w) {
@@ -129,7 +142,7 @@ bool world_project(const world *w, const point *p, double z[4]) {
 
 void world_renew(world *w) {
     double z[4];
-    for (unsigned k = 0; k < w->s->landmarks; k++)
+    for (unsigned k = 0; k < w->s->landmarks && !w->s->room; k++)
         if (!world_project(w, &w->points[k], z))
             place(w, &w->points[k]);
 }
