@@ -97,7 +97,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u);
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b);
 
 /* Trace of the whole covariance (mixed units: a trend, not a quantity); 0 once it has diverged. */
-double plr_filter_trace(plr_filter *f);
+double plr_filter_trace(const plr_filter *f);
 
 /* --- landmarks --- */
 

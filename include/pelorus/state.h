@@ -76,6 +76,17 @@ typedef struct plr_parameters {
     plr_time_ns max_gap_ns;
 } plr_parameters;
 
+/* The noise of a frame's motion, kept out of P until the frame's observations are in: the state is
+ * x + W nu with nu ~ N(0, I) a priori, and what the observations tell of nu gathers as information.
+ * docs/MATH.md 10. */
+typedef struct plr_noise {
+    plr_real Wt[PLR_POSE_DIM * PLR_MAX_LD + PLR_KERNEL_MARGIN]; /* W^T, 6 x dim */
+    plr_real Lambda[21 + PLR_KERNEL_MARGIN];                    /* 6x6, packed upper triangle */
+    plr_real eta[PLR_POSE_DIM];
+    plr_real z[PLR_POSE_DIM]; /* nu is counted from here */
+    uint8_t open; /* 1: W is part of the covariance and not yet in P */
+} plr_noise;
+
 /* Workspace of one call; nothing in it lives longer. */
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
@@ -86,6 +97,7 @@ typedef struct plr_workspace {
     plr_real y[PLR_BLOCK_ROWS];
     plr_real dx[PLR_MAX_STATE];
     plr_real diagonal[PLR_MAX_STATE];       /* of P, as a block would leave it */
+    plr_noise noise;                        /* of the motion that this frame applies */
     plr_real gain[PLR_MAX_OBSERVATIONS];    /* how much order[k] would tell; see gate.h */
     uint16_t order[PLR_MAX_OBSERVATIONS];   /* good observations of the frame, by id */
     uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* the slot of order[k], or PLR_NO_SLOT */

@@ -48,3 +48,14 @@ void plr_camera_from_body(plr_real q[3], const plr_camera *camera, const plr_rea
 void plr_camera_to_body(plr_real s[3], const plr_camera *camera, const plr_real q[3]) {
     plr_se3_inverse_point(s, camera->R_CB, camera->t_CB, q);
 }
+
+void plr_camera_motion(plr_real R_C[9], plr_real p_C[3], const plr_camera *camera,
+                       const plr_real R[9], const plr_real p[3]) {
+    plr_real RD[9], moved[3], back[3];
+    plr_mat3_mul(RD, camera->R_CB, R);
+    plr_mat3_mul_nt(R_C, RD, camera->R_CB);
+    plr_camera_from_body(moved, camera, p);
+    plr_mat3_vec(back, R_C, camera->t_CB);
+    for (int i = 0; i < 3; i++)
+        p_C[i] = moved[i] - back[i];
+}

@@ -16,6 +16,7 @@ typedef struct plr_block {
     unsigned n, ld;                          /* dimension of the state; between rows of V^T */
     unsigned row_of[PLR_BLOCK_OBSERVATIONS]; /* first row of each landmark in the state */
     plr_linearisation lin[PLR_BLOCK_OBSERVATIONS];
+    plr_real E[6 * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
 } plr_block;
 
 /* sum = H_a x: x is a vector over the state. */
@@ -41,8 +42,12 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
 
         plr_real r[3];
         plr_gate_innovation(r, &observations[w->order[used[a]]], lin);
-        for (unsigned i = 0; i < PLR_ROWS; i++)
+        for (unsigned i = 0; i < PLR_ROWS; i++) {
             w->y[PLR_ROWS * a + i] = r[i] - apply_row(block, a, i, w->dx);
+            for (unsigned k = 0; w->noise.open && k < 6; k++)
+                block->E[6 * (PLR_ROWS * a + i) + k] =
+                    apply_row(block, a, i, w->noise.Wt + k * block->ld);
+        }
     }
     const unsigned rows = PLR_ROWS * block->count;
     plr_real *S = w->S;
@@ -52,9 +57,28 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
                    (i == j ? plr_gate_noise(f, i % PLR_ROWS) : PLR_R(0));
 }
 
-/* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but the workspace, if
- * S is not positive (*factorised = false) or a variance would be lost. */
-static bool apply_block(plr_filter *f, const plr_block *block, bool *factorised) {
+/* What the block tells of the motion's noise, with E = U^-T H W and y = U^-T (r - H dx):
+ * Lambda += E^T E, eta += E^T y, W -= V E. */
+static void inform_noise(plr_filter *f, plr_block *block, unsigned rows) {
+    plr_workspace *w = &f->work;
+    plr_real *Lambda = w->noise.Lambda, column[PLR_BLOCK_ROWS];
+    for (unsigned k = 0; k < 6; k++) {
+        for (unsigned r = 0; r < rows; r++)
+            w->noise.eta[k] = PLR_FMA(block->E[6 * r + k], w->y[r], w->noise.eta[k]);
+        for (unsigned l = k; l < 6; l++, Lambda++)
+            for (unsigned r = 0; r < rows; r++)
+                *Lambda = PLR_FMA(block->E[6 * r + k], block->E[6 * r + l], *Lambda);
+    }
+    for (unsigned k = 0; k < 6; k++) {
+        for (unsigned r = 0; r < rows; r++)
+            column[r] = -block->E[6 * r + k];
+        plr_combine_rows(block->ld, rows, column, w->Vt, block->ld, w->noise.Wt + k * block->ld);
+    }
+}
+
+/* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but the
+ * workspace, if S is not positive (*factorised = false) or a variance would be lost. */
+static bool apply_block(plr_filter *f, plr_block *block, bool *factorised) {
     plr_workspace *w = &f->work;
     const unsigned rows = PLR_ROWS * block->count;
     *factorised = plr_cholesky_upper(rows, w->S);
@@ -65,6 +89,10 @@ static bool apply_block(plr_filter *f, const plr_block *block, bool *factorised)
     if (!plr_covariance_subtract(f, rows))
         return false;
     plr_combine_rows(block->n, rows, w->y, w->Vt, block->ld, w->dx);
+    if (w->noise.open) {
+        plr_solve_upper_transposed(rows, 6, w->S, block->E, 6);
+        inform_noise(f, block, rows);
+    }
     return true;
 }
 
@@ -81,7 +109,8 @@ static bool is_sane(const plr_filter *f, unsigned n) {
 plr_correction plr_correct(plr_filter *f, const plr_observation *observations, unsigned count) {
     plr_correction result = {0};
     const unsigned n = plr_covariance_dim(f);
-    memset(f->work.dx, 0, n * sizeof *f->work.dx);
+    if (!f->work.noise.open)
+        memset(f->work.dx, 0, n * sizeof *f->work.dx);
     for (unsigned at = 0; at < count && !f->diverged; at += PLR_BLOCK_OBSERVATIONS) {
         plr_block block = {.n = n, .ld = plr_covariance_ld(f), .count = count - at};
         if (block.count > PLR_BLOCK_OBSERVATIONS)
@@ -95,7 +124,9 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
         else
             plr_filter_diverge(f);
     }
-    if (result.applied == 0)
+    const bool moved = f->work.noise.open;
+    plr_covariance_close_noise(f, result.nu);
+    if (result.applied == 0 && !moved)
         return result;
     if (!is_sane(f, n)) {
         plr_filter_diverge(f);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/covariance.h"
 
+#include "filter/motion.h"
 #include "linalg/dense.h"
 #include "linalg/packed.h"
 #include "linalg/small.h"
@@ -89,6 +90,11 @@ void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_p
     memset(P_out, 0, 9 * sizeof *P_out);
     plr_gemm_nt(3, 3, 6, left, 6, J_pose, 6, P_out, 3);
     plr_gemm_nt(3, 3, 3, right, 3, J_landmark, 3, P_out, 3);
+}
+
+void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]) {
+    const unsigned s = plr_covariance_row(f, slot);
+    get_block(f, s, 3, s, 3, P_ll);
 }
 
 double plr_covariance_trace(const plr_filter *f) {
@@ -182,11 +188,78 @@ void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_rea
         transport_landmark(f, slot, At, F);
 }
 
-/* Rows of the workspace in a predict: U^T = [-Y -G]^T, W^T = [G Y]^T, six rows each part. */
-enum { MINUS_Y = 0, MINUS_G = 6, PLUS_G = 12, PLUS_Y = 18 };
+/* v <- L^-1 v: L is 6x6, lower; where a column is zero so is v. */
+static void solve_lower(const plr_real L[36], plr_real v[6]) {
+    for (unsigned k = 0; k < 6; k++) {
+        plr_real sum = v[k];
+        for (unsigned l = 0; l < k; l++)
+            sum = PLR_FMA(-L[6 * k + l], v[l], sum);
+        v[k] = L[7 * k] > 0 ? sum * (PLR_R(1) / L[7 * k]) : PLR_R(0);
+    }
+}
 
-plr_real *plr_covariance_motion_rows(plr_filter *f) {
-    return f->work.Vt + PLUS_G * plr_covariance_dim(f);
+void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
+                                 const plr_real L[36], plr_real *V) {
+    memset(V, 0, 6 * rows * sizeof *V);
+    if (!f->config.bias)
+        return;
+    for (unsigned i = 0; i < rows; i++) {
+        plr_real P_ib[6];
+        get_block(f, row + i, 1, BIAS, 6, P_ib);
+        plr_gemm_nt(1, 6, 6, P_ib, 6, f->motion.B, 6, V + 6 * i, 6);
+        solve_lower(L, V + 6 * i);
+    }
+}
+
+void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) {
+    const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
+    plr_noise *noise = &f->work.noise;
+    memset(noise->Lambda, 0, sizeof noise->Lambda);
+    for (unsigned k = 0; k < 6; k++) {
+        noise->Lambda[plr_upper_row(6, k)] = 1;
+        noise->eta[k] = -motion->z[k];
+        noise->z[k] = motion->z[k];
+    }
+    memset(f->work.dx, 0, n * sizeof *f->work.dx);
+    noise->open = 1;
+    if (!f->config.bias)
+        return;
+    plr_real *Vt = f->work.Vt;
+    memset(Vt, 0, 6 * ld * sizeof *Vt);
+    for (unsigned i = 0; i < n; i++) {
+        plr_real v[6];
+        plr_covariance_motion_share(f, i, 1, motion->L, v);
+        for (unsigned k = 0; k < 6; k++) {
+            Vt[k * ld + i] = v[k];
+            noise->Wt[k * ld + i] += v[k];
+            f->work.dx[i] = PLR_FMA(v[k], motion->z[k], f->work.dx[i]);
+        }
+    }
+    plr_packed_subtract(n, 6, Vt, Vt, ld, f->P);
+}
+
+void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]) {
+    const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
+    plr_noise *noise = &f->work.noise;
+    if (!noise->open)
+        return;
+    noise->open = 0;
+    if (!plr_cholesky_upper(6, noise->Lambda)) {
+        plr_filter_diverge(f);
+        return;
+    }
+    plr_real *Xt = noise->Wt, *minus = f->work.Vt;
+    plr_solve_upper_transposed(6, ld, noise->Lambda, Xt, ld);
+    plr_solve_upper_transposed(6, 1, noise->Lambda, noise->eta, 1);
+    plr_combine_rows(n, 6, noise->eta, Xt, ld, f->work.dx);
+    for (unsigned i = 0; i < 6 * ld; i++)
+        minus[i] = -Xt[i];
+    plr_packed_subtract(n, 6, minus, Xt, ld, f->P);
+    if (nu) {
+        plr_solve_upper(6, noise->Lambda, noise->eta);
+        for (unsigned k = 0; k < 6; k++)
+            nu[k] = noise->z[k] + noise->eta[k];
+    }
 }
 
 /* B P_bb B^T + Q, 6x6 */
@@ -199,36 +272,6 @@ static void motion_covariance(const plr_filter *f, const plr_motion *motion, plr
     }
     for (unsigned i = 0; i < 36; i++)
         M[i] += motion->Q[i];
-}
-
-/*
- * With M = B P_bb B^T + Q and Y = P_(:,b) B^T + G M / 2 the whole effect is Y G^T + G Y^T: one
- * symmetric product of depth 12, by the same kernel that an update uses.
- */
-void plr_covariance_add_motion(plr_filter *f, const plr_motion *motion) {
-    const unsigned n = plr_covariance_dim(f);
-    plr_real *Vt = f->work.Vt;
-    plr_real *Gt = Vt + PLUS_G * n, *Yt = Vt + PLUS_Y * n;
-    plr_real M[36];
-    motion_covariance(f, motion, M);
-    for (unsigned i = 0; i < 36; i++)
-        M[i] *= PLR_R(0.5);
-
-    memset(Yt, 0, 6 * n * sizeof *Yt);
-    plr_gemm_nn(6, n, 6, M, 6, Gt, n, Yt, n);
-    if (f->config.bias)
-        for (unsigned i = 0; i < n; i++) {
-            plr_real P_ib[6];
-            get_block(f, i, 1, BIAS, 6, P_ib);
-            for (unsigned k = 0; k < 6; k++)
-                for (unsigned l = 0; l < 6; l++)
-                    Yt[k * n + i] = PLR_FMA(motion->B[6 * k + l], P_ib[l], Yt[k * n + i]);
-        }
-    for (unsigned i = 0; i < 6 * n; i++) {
-        Vt[MINUS_Y * n + i] = -Yt[i];
-        Vt[MINUS_G * n + i] = -Gt[i];
-    }
-    plr_packed_subtract(n, 12, Vt, Gt, n, f->P);
 }
 
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion) {
@@ -287,6 +330,20 @@ void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_lin
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = i; j < 3; j++)
             *S++ = full[3 * j + i];
+}
+
+void plr_covariance_add_open_noise(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                                   plr_real S[6]) {
+    const unsigned s = plr_covariance_row(f, slot), ld = plr_covariance_ld(f);
+    for (unsigned k = 0; k < 6; k++) {
+        const plr_real *w = f->work.noise.Wt + k * ld;
+        plr_real a[3];
+        plr_mat3_vec(a, lin->H_landmark, w + s);
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned j = i; j < 3; j++)
+                S[plr_upper_row(3, i) + j - i] =
+                    PLR_FMA(a[i], a[j], S[plr_upper_row(3, i) + j - i]);
+    }
 }
 
 /* out[i] += a P(i, column) for all rows i, whichever side of the diagonal. */

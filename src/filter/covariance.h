@@ -38,6 +38,9 @@ void plr_covariance_pose_bias(const plr_filter *f, plr_real P_xib[36]);
 void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_pose[18],
                           const plr_real J_landmark[9], plr_real P_out[9]);
 
+/* A landmark's own block, 3x3. */
+void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]);
+
 double plr_covariance_trace(const plr_filter *f);
 
 /* False if a variance is negative or not finite. */
@@ -48,13 +51,19 @@ bool plr_covariance_is_positive(const plr_filter *f);
 /* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
 void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F);
 
-/* Where a model puts the rows of G^T (6 x dim, leading dimension dim) for plr_covariance_add_motion:
- * G says how the noise n of the motion enters the state. */
-plr_real *plr_covariance_motion_rows(plr_filter *f);
+/* Splits what the motion and the biases have in common off P: with C = P_(:,b) B^T and nu = L^-1 n,
+ *   P -= (C L^-T) (C L^-T)^T,  W += C L^-T,  Lambda = I,  eta = -z,  dx = C L^-T z,
+ * so that the state is x + W (nu - z) with x and nu independent. W^T (6 x dim, leading dimension
+ * plr_covariance_ld) holds the motion's own part already. */
+void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
 
-/* P <- P + the effect of x <- x + G n, n = B db + N(0, Q), over the whole matrix. G's rows of the
- * bias must be zero. */
-void plr_covariance_add_motion(plr_filter *f, const plr_motion *motion);
+/* Takes the noise back: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T and dx += W Lambda^-1 eta.
+ * nu (6; may be NULL) is what came out: z + Lambda^-1 eta. Nothing where no noise is open. */
+void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]);
+
+/* V = C L^-T of some rows of the state, rows x 6: their correlation with nu. */
+void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
+                                 const plr_real L[36], plr_real *V);
 
 /* The pose's rows alone: xi <- A xi + B db + N(0, Q). */
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion);
@@ -67,6 +76,10 @@ void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyr
 /* S = H P H^T of one observation, 3x3, the upper triangle packed row by row (6 numbers). */
 void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
                                plr_real S[6]);
+
+/* S += (H W)(H W)^T, 3x3 packed: the share of the motion's open noise, before any block. */
+void plr_covariance_add_open_noise(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                                   plr_real S[6]);
 
 /* Three rows of (P H^T)^T, each dim long, and zeros up to the leading dimension ld. */
 void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,

@@ -102,11 +102,25 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     return PLR_OK;
 }
 
-double plr_filter_trace(plr_filter *f) {
-    if (!ready(f))
+double plr_filter_trace(const plr_filter *f) {
+    if (!ready(f) || f->diverged)
         return 0;
-    plr_motion_settle(f);
-    return f->diverged ? 0 : plr_covariance_trace(f);
+    plr_real P[36], P_b[36] = {0};
+    double trace = plr_covariance_trace(f);
+    plr_covariance_pose(f, P); /* the pose's and the biases' variances are those of now */
+    for (int i = 0; i < 6; i++)
+        trace -= (double)P[7 * i];
+    plr_motion_pose_covariance(f, P);
+    if (f->config.bias) {
+        plr_real before[36];
+        plr_covariance_bias(f, before);
+        bias_covariance(f, P_b);
+        for (int i = 0; i < 6; i++)
+            trace += (double)P_b[7 * i] - (double)before[7 * i];
+    }
+    for (int i = 0; i < 6; i++)
+        trace += (double)P[7 * i];
+    return trace;
 }
 
 plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals) {

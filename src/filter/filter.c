@@ -197,8 +197,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
 
     double P_start[36];
     start_covariance(f, P_start);
-    plr_motion_settle(f); /* so that the bias has its walk */
-    plr_motion_clear(&f->motion);
+    plr_motion_drop(f);
     if (f->clock_started)
         f->totals.resets++;
     f->count = 0;

@@ -36,6 +36,14 @@ static bool is_basis_for_linearisation(const plr_filter *f, const plr_real S[6])
     return true;
 }
 
+bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
+    const bool fixed = f->par.gate_residual2 > 0;
+    if (fixed && residual2 <= f->par.gate_residual2)
+        return true;
+    return (!fixed || plr_health_fixed_gate_is_open(f)) && plr_is_finite(d2) &&
+           (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
+}
+
 plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
     plr_verdict verdict = {.accepted = false};
     plr_linearisation lin;
@@ -44,6 +52,8 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
 
     plr_real S[6 + PLR_KERNEL_MARGIN] = {0}, r[3];
     plr_covariance_innovation(f, slot, &lin, S);
+    if (f->work.noise.open)
+        plr_covariance_add_open_noise(f, slot, &lin, S);
     if (!f->slots[slot].known && !is_basis_for_linearisation(f, S))
         return verdict;
     for (unsigned i = 0; i < PLR_ROWS; i++)
@@ -56,11 +66,6 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
     verdict.d2 = plr_dot3(r, r) + row_gap * row_gap / (PLR_R(2) * f->par.pixel_variance);
     verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
 
-    const bool fixed = f->par.gate_residual2 > 0;
-    if (fixed)
-        verdict.accepted = residual_norm2(seen, &lin) <= f->par.gate_residual2;
-    if (!fixed || plr_health_fixed_gate_is_open(f))
-        verdict.accepted |=
-            plr_is_finite(verdict.d2) && (f->par.gate_d2 <= 0 || verdict.d2 <= f->par.gate_d2);
+    verdict.accepted = plr_gate_accepts(f, verdict.d2, residual_norm2(seen, &lin));
     return verdict;
 }

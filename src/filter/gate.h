@@ -21,6 +21,10 @@ void plr_gate_innovation(plr_real r[3], const plr_observation *seen, const plr_l
 /* R, the noise of rows (uL, uR, v): s^2, s^2, s^2 / 2. */
 plr_real plr_gate_noise(const plr_filter *f, unsigned row);
 
+/* The verdict itself: d^2 against `gate-d2`, or with `gate-residual` the squared norm of the four
+ * residuals against that, px^2. */
+bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2);
+
 /* Judges an observation of a slot at the current estimate. Rejected whatever its residual: a point
  * nearer than min-depth, and one whose predicted pixels have a sigma of more than a focal length (but for known ones). */
 plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observation *seen);

@@ -3,7 +3,6 @@
 #include "filter/covariance.h"
 #include "filter/filter_internal.h"
 #include "filter/model.h"
-#include "filter/motion.h"
 #include "filter/slots.h"
 
 unsigned plr_filter_landmark_count(const plr_filter *f) {
@@ -17,11 +16,8 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
         return PLR_E_NOT_READY;
     if (slot >= f->count)
         return PLR_E_ARGUMENT;
-    plr_motion_settle(f);
     if (f->diverged)
         return PLR_E_DIVERGED;
-    if (slot >= f->count) /* the camera has run into some */
-        return PLR_E_ARGUMENT;
     plr_slots_export(f, slot, landmark);
     return PLR_OK;
 }
@@ -47,9 +43,6 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
     plr_new_landmark entering;
     if (!f->model->adopt(f, landmark, &entering))
         return PLR_E_RANGE;
-    plr_motion_settle(f); /* not before the refusals, which change nothing */
-    if (f->diverged)
-        return PLR_E_DIVERGED;
     plr_slots_append(f, landmark->id, true, &entering);
     return PLR_OK;
 }
@@ -61,7 +54,6 @@ plr_status plr_filter_flush_map(plr_filter *f) {
         return PLR_E_NOT_READY;
     if (!f->map.sink)
         return PLR_E_MODE;
-    plr_motion_settle(f);
     if (f->diverged)
         return PLR_E_DIVERGED;
     for (unsigned slot = f->count; slot-- > 0;) { /* backwards: removing moves the last */

@@ -8,6 +8,7 @@
 
 #include <stdbool.h>
 
+#include "filter/motion.h"
 #include "pelorus/state.h"
 
 /* An observation's prediction and derivatives at the current estimate. Rows (uL, uR, v). */
@@ -37,9 +38,9 @@ typedef struct plr_world_point {
 struct plr_model {
     const char *name;
 
-    /* Applies f->motion to landmarks and covariance. T_WB has moved already. May remove landmarks
-     * that the camera runs into. */
-    void (*propagate)(plr_filter *f);
+    /* Applies a motion to landmarks and covariance. T_WB has moved already. `body` leaves its noise in
+     * work.noise, open; `world` puts it into P. */
+    void (*propagate)(plr_filter *f, const plr_applied_motion *motion);
 
     /* Predicts an observation of a slot. False if the point lies nearer than min_depth in front of
      * the camera: no basis for a linearisation. */
@@ -62,7 +63,7 @@ struct plr_model {
 };
 
 /* J = R_WB [I | -[s]x], 3x6: how the pose's error moves a point that stands at s in the body. */
-void plr_world_by_pose(const plr_filter *f, const plr_real s_B[3], plr_real J[18]);
+void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3], plr_real J[18]);
 
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;

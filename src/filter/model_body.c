@@ -66,60 +66,60 @@ static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
     F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
-/* D_C = T_CB D T_CB^-1: the body's motion, as the camera makes it. */
-static void motion_of_camera(const plr_camera *camera, const plr_motion *motion, plr_real R[9],
-                             plr_real p[3]) {
-    plr_real RD[9], moved[3], back[3];
-    plr_mat3_mul(RD, camera->R_CB, motion->R);
-    plr_mat3_mul_nt(R, RD, camera->R_CB);
-    plr_camera_from_body(moved, camera, motion->p);
-    plr_mat3_vec(back, R, camera->t_CB);
+/* Nearer than this a landmark is put no further: the camera has run into it, and the frame drops it. */
+static void keep_off(plr_real q[3]) {
+    const plr_real range2 = plr_dot3(q, q);
+    if (range2 >= PLR_MIN_RANGE * PLR_MIN_RANGE)
+        return;
+    const plr_real scale = range2 > 0 ? PLR_MIN_RANGE / PLR_SQRT(range2) : 0;
     for (int i = 0; i < 3; i++)
-        p[i] = moved[i] - back[i];
+        q[i] *= scale;
+    if (!(range2 > 0))
+        q[2] = PLR_MIN_RANGE;
 }
 
-static void body_propagate(plr_filter *f) {
+/* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
+static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size_t ld) {
+    memset(Wt, 0, 6 * ld * sizeof *Wt);
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned k = 0; k < 6; k++)
+            Wt[k * ld + i] = JL[6 * i + k];
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const unsigned row = plr_covariance_row(f, slot);
+        plr_polar chart;
+        plr_real G[18], GL[18] = {0};
+        plr_polar_at(&chart, f->slots[slot].x);
+        chart_by_body_twist(f, &chart, G);
+        plr_gemm_nn(3, 6, 6, G, 6, JL, 6, GL, 6);
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned k = 0; k < 6; k++)
+                Wt[k * ld + row + i] = GL[6 * i + k];
+    }
+}
+
+static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_real R[9], p[3];
-    motion_of_camera(&f->par.camera, &f->motion, R, p);
+    plr_camera_motion(R, p, &f->par.camera, motion->R, motion->p);
 
     plr_real *F = f->work.Vt;
-    for (unsigned slot = 0; slot < f->count;) {
+    for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_real q[3];
-        plr_se3_inverse_point(q, R, p, s->x);
-        if (plr_dot3(q, q) < PLR_MIN_RANGE * PLR_MIN_RANGE) {
-            plr_slots_remove(f, slot); /* the last one takes its place: look at it next */
-            continue;
-        }
         plr_polar from, to;
+        plr_se3_inverse_point(q, R, p, s->x);
+        keep_off(q);
         plr_polar_at(&from, s->x);
         plr_polar_at(&to, q);
         carry_chart(F + 9 * slot, &to, R, p, &from);
         memcpy(s->x, q, sizeof q);
-        slot++;
     }
     plr_real A[36];
-    plr_se3_adjoint_inverse(A, f->motion.R, f->motion.p);
+    plr_se3_adjoint_inverse(A, motion->R, motion->p);
     plr_covariance_transport(f, A, F);
     if (!f->motion.noisy)
         return;
-
-    const unsigned n = plr_covariance_dim(f);
-    plr_real *Gt = plr_covariance_motion_rows(f);
-    memset(Gt, 0, 6 * n * sizeof *Gt);
-    for (unsigned k = 0; k < 6; k++)
-        Gt[k * n + k] = 1;
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        const unsigned row = plr_covariance_row(f, slot);
-        plr_polar chart;
-        plr_real G[18];
-        plr_polar_at(&chart, f->slots[slot].x);
-        chart_by_body_twist(f, &chart, G);
-        for (unsigned i = 0; i < 3; i++)
-            for (unsigned k = 0; k < 6; k++)
-                Gt[k * n + row + i] = G[6 * i + k];
-    }
-    plr_covariance_add_motion(f, &f->motion);
+    enter_noise(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
+    plr_covariance_open_noise(f, motion);
 }
 
 /* H_l = Dz Ji(q). */
@@ -179,10 +179,12 @@ static bool carry_covariance(plr_real P[9], const plr_real J[9], const double P_
 }
 
 static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark) {
-    plr_real offset_W[3], s_B[3], R_CW[9];
+    plr_real offset_W[3], s_B[3], R_CW[9], R_WB[9];
+    double p_WB[3];
+    plr_motion_reference(f, R_WB, p_WB);
     for (int i = 0; i < 3; i++)
-        offset_W[i] = (plr_real)(known->p_W_m[i] - f->p_WB[i]);
-    plr_mat3_tvec(s_B, f->R_WB, offset_W);
+        offset_W[i] = (plr_real)(known->p_W_m[i] - p_WB[i]);
+    plr_mat3_tvec(s_B, R_WB, offset_W);
     plr_camera_from_body(landmark->x, &f->par.camera, s_B);
     const plr_real range2 = plr_dot3(landmark->x, landmark->x);
     if (!(range2 > PLR_MIN_RANGE * PLR_MIN_RANGE) ||
@@ -195,7 +197,7 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     chart_by_body_twist(f, &chart, landmark->J_pose);
     landmark->uses_pose = true;
     plr_polar_from_point(Jw, &chart);
-    plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, f->R_WB);
+    plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, R_WB);
     plr_mat3_mul(J_W, Jw, R_CW);
     return carry_covariance(landmark->P, J_W, known->P_W_m2);
 }
@@ -270,16 +272,18 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
 
 static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
     plr_polar chart;
-    plr_real s_B[3], offset[3], Ji[9], R_WC[9];
+    plr_real s_B[3], offset[3], Ji[9], R_WC[9], R_WB[9];
+    double p_WB[3];
+    plr_motion_reference(f, R_WB, p_WB);
     plr_camera_to_body(s_B, &f->par.camera, slot->x);
-    plr_mat3_vec(offset, f->R_WB, s_B);
+    plr_mat3_vec(offset, R_WB, s_B);
     for (int i = 0; i < 3; i++)
-        point->p_W[i] = f->p_WB[i] + (double)offset[i];
+        point->p_W[i] = p_WB[i] + (double)offset[i];
 
-    plr_world_by_pose(f, s_B, point->J_pose);
+    plr_world_by_pose(R_WB, s_B, point->J_pose);
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
-    plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
+    plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
     plr_mat3_mul(point->J_landmark, R_WC, Ji);
 }
 

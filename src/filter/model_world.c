@@ -20,8 +20,9 @@ static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
     plr_mat3_tvec(s, f->R_WB, offset);
 }
 
-static void world_propagate(plr_filter *f) {
+static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_real A[36];
+    (void)motion; /* the pose alone moves, by f->motion */
     plr_se3_adjoint_inverse(A, f->motion.R, f->motion.p);
     plr_covariance_predict_pose(f, A, &f->motion);
 }
@@ -59,7 +60,7 @@ static void world_initialise(const plr_filter *f, const plr_real q[3], const plr
         landmark->x[i] = (plr_real)(f->p_WB[i] + (double)offset[i]);
     landmark->uses_pose = f->config.landmark_prior == PLR_PRIOR_CORRELATED;
     if (landmark->uses_pose)
-        plr_world_by_pose(f, s, landmark->J_pose);
+        plr_world_by_pose(f->R_WB, s, landmark->J_pose);
     plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
     plr_mat3_mul(RS, R_WC, S_q);
     plr_mat3_mul_nt(landmark->P, RS, RS);

@@ -105,16 +105,114 @@ void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]) {
     move_pose(f, R, p);
 }
 
-void plr_motion_settle(plr_filter *f) {
-    if (!f->motion.pending || f->diverged)
+/* A part of the biases' effect on the motion that is charged as noise besides. It keeps the factor of M
+ * from depending on the biases alone, which would leave the biases' own variance to rounding. */
+#define SHARE_OF_BIAS PLR_R(1e-4)
+
+/* M = B P_bb B^T + Q, 6x6. */
+static void motion_covariance(const plr_filter *f, plr_real M[36]) {
+    memset(M, 0, 36 * sizeof *M);
+    if (f->config.bias) {
+        plr_real P_b[36];
+        plr_covariance_bias(f, P_b);
+        plr_sandwich6(M, f->motion.B, P_b);
+    }
+    for (int i = 0; i < 36; i++)
+        M[i] = PLR_FMA(SHARE_OF_BIAS, M[i], M[i]) + f->motion.Q[i];
+}
+
+/* M = L L^T, 6x6. A direction in which M is zero, to rounding, becomes a zero column. */
+static void factorise(const plr_real M[36], plr_real L[36]) {
+    memset(L, 0, 36 * sizeof *L);
+    for (unsigned k = 0; k < 6; k++) {
+        plr_real pivot = M[7 * k];
+        for (unsigned l = 0; l < k; l++)
+            pivot = PLR_FMA(-L[6 * k + l], L[6 * k + l], pivot);
+        if (!(pivot > PLR_R(1e-6) * M[7 * k]))
+            continue;
+        const plr_real root = PLR_SQRT(pivot), inverse = PLR_R(1) / root;
+        L[7 * k] = root;
+        for (unsigned i = k + 1; i < 6; i++) {
+            plr_real sum = M[6 * i + k];
+            for (unsigned l = 0; l < k; l++)
+                sum = PLR_FMA(-L[6 * i + l], L[6 * k + l], sum);
+            L[6 * i + k] = sum * inverse;
+        }
+    }
+}
+
+void plr_motion_prior(const plr_filter *f, plr_applied_motion *applied) {
+    plr_real M[36];
+    memset(applied, 0, sizeof *applied);
+    memcpy(applied->R, f->motion.R, sizeof applied->R);
+    memcpy(applied->p, f->motion.p, sizeof applied->p);
+    if (!f->motion.noisy)
         return;
-    f->model->propagate(f);
+    motion_covariance(f, M);
+    factorise(M, applied->L);
+    memcpy(applied->JL, applied->L, sizeof applied->JL);
+}
+
+void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
+                   plr_applied_motion *applied) {
+    plr_real n[6] = {0}, R[9], p[3], Jr[36];
+    if (applied != prior)
+        *applied = *prior;
+    memcpy(applied->z, z, sizeof applied->z);
+    plr_gemm_nn(6, 1, 6, applied->L, 6, z, 1, n, 1);
+    plr_se3_exp(R, p, n);
+    memcpy(applied->R, f->motion.R, sizeof applied->R);
+    memcpy(applied->p, f->motion.p, sizeof applied->p);
+    plr_se3_append(applied->R, applied->p, R, p);
+    plr_so3_orthonormalise(applied->R);
+    plr_se3_right_jacobian(Jr, n);
+    memset(applied->JL, 0, sizeof applied->JL);
+    plr_gemm_nn(6, 6, 6, Jr, 6, applied->L, 6, applied->JL, 6);
+}
+
+static bool is_zero6(const plr_real x[6]) {
+    return plr_dot3(x, x) + plr_dot3(x + 3, x + 3) <= 0;
+}
+
+void plr_motion_drop(plr_filter *f) {
     if (f->config.bias)
         plr_covariance_add_bias_walk(f, f->par.bias_velocity_walk * f->motion.seconds,
                                      f->par.bias_gyro_walk * f->motion.seconds);
     plr_motion_clear(&f->motion);
+}
+
+void plr_motion_apply(plr_filter *f, const plr_applied_motion *applied) {
+    if (!is_zero6(applied->z)) {
+        plr_real n[6] = {0};
+        plr_gemm_nn(6, 1, 6, applied->L, 6, applied->z, 1, n, 1);
+        plr_motion_correct_pose(f, n);
+    }
+    f->model->propagate(f, applied);
+    plr_motion_drop(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);
+}
+
+void plr_motion_settle(plr_filter *f) {
+    plr_applied_motion applied;
+    if (!f->motion.pending || f->diverged)
+        return;
+    plr_motion_prior(f, &applied);
+    plr_motion_apply(f, &applied);
+    plr_covariance_close_noise(f, NULL);
+}
+
+void plr_motion_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
+    plr_real moved[3];
+    memcpy(R_WB, f->R_WB, sizeof f->R_WB);
+    memcpy(p_WB, f->p_WB, sizeof f->p_WB);
+    if (!f->motion.pending)
+        return;
+    plr_mat3_mul_nt(R_WB, f->R_WB, f->motion.R); /* T D^-1 */
+    plr_so3_orthonormalise(R_WB);
+    plr_mat3_vec(moved, R_WB, f->motion.p);
+    for (int i = 0; i < 3; i++)
+        p_WB[i] -= (double)moved[i];
 }
 
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {

@@ -26,8 +26,35 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], co
 /* T <- T Exp(xi), and R once more a rotation to rounding: the end of a frame's correction. */
 void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]);
 
-/* Brings landmarks and covariance up to the pose. Sets f->diverged where a variance is lost. */
+/* The accumulated motion as a frame applies it, once its observations have said what it was: the
+ * motion is D Exp(L nu) with nu ~ N(0, I), taken at nu = z (docs/MATH.md 4 and 10). */
+typedef struct plr_applied_motion {
+    plr_real R[9], p[3]; /* D' = D Exp(L z) */
+    plr_real L[36];      /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
+    plr_real JL[36];     /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
+    plr_real z[6];
+} plr_applied_motion;
+
+/* The motion at nu = 0: D' = D. */
+void plr_motion_prior(const plr_filter *f, plr_applied_motion *applied);
+
+/* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
+void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
+                   plr_applied_motion *applied);
+
+/* Brings landmarks and covariance up to D', and the pose from D to D'. In `body` the motion's noise
+ * stays outside of P, in work.noise, until plr_covariance_close_noise. Sets f->diverged where a
+ * variance is lost. */
+void plr_motion_apply(plr_filter *f, const plr_applied_motion *applied);
+
+/* Brings landmarks and covariance up to the pose, with nothing but the twists to say how it moved. */
 void plr_motion_settle(plr_filter *f);
+
+/* Forgets the motion not yet applied; the biases have their walk all the same. */
+void plr_motion_drop(plr_filter *f);
+
+/* The pose at which landmarks and covariance stand: that of before the motion not yet applied. */
+void plr_motion_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]);
 
 /* The pose's covariance as it would be after plr_motion_settle, 6x6; changes nothing. */
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]);

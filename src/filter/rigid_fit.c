@@ -29,16 +29,6 @@ void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[18], const plr_real 
     }
 }
 
-/* x <- U^-1 x: U is 6x6, upper, packed row by row. */
-static void solve_upper(const plr_real *U, plr_real x[6]) {
-    for (unsigned k = 6; k-- > 0;) {
-        const plr_real *row = U + plr_upper_row(6, k);
-        for (unsigned l = k + 1; l < 6; l++)
-            x[k] = PLR_FMA(-row[l - k], x[l], x[k]);
-        x[k] *= PLR_R(1) / row[0];
-    }
-}
-
 void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], plr_real eta[6]) {
     memcpy(eta, fit->b, sizeof fit->b);
     for (unsigned k = 0; k < 6; k++) {
@@ -49,7 +39,7 @@ void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], plr_real eta[
     }
     if (plr_cholesky_upper(6, fit->A)) {
         plr_solve_upper_transposed(6, 1, fit->A, eta, 1);
-        solve_upper(fit->A, eta);
+        plr_solve_upper(6, fit->A, eta);
         if (plr_dot3(eta + 3, eta + 3) < PLR_MAX_CORRECTION_TURN2)
             return;
     }

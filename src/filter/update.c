@@ -12,6 +12,7 @@
 #include "filter/health.h"
 #include "filter/model.h"
 #include "filter/motion.h"
+#include "filter/motion_first.h"
 #include "filter/order.h"
 #include "filter/slots.h"
 #include "linalg/small.h"
@@ -137,7 +138,7 @@ static bool position_before(const void *context, uint16_t a, uint16_t b) {
 
 /* work.used: the positions in order that pass the gate, at most `budget` of them: those with the
  * largest gain, ties to the lower id. */
-static unsigned gate_all(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
+static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
     plr_workspace *w = &f->work;
     unsigned used = 0;
     for (unsigned k = 0; k < n; k++) {
@@ -145,15 +146,11 @@ static unsigned gate_all(plr_filter *f, const plr_frame *frame, unsigned n, plr_
         if (slot == PLR_NO_SLOT)
             continue;
         report->matched++;
-        const plr_verdict verdict = plr_gate_judge(f, slot, &frame->observations[w->order[k]]);
-        if (!verdict.accepted) {
+        if (w->gain[k] < 0) {
             report->gated++;
             f->slots[slot].times_gated++;
-            w->gain[k] = REJECTED;
             continue;
         }
-        w->gain[k] = verdict.gain;
-        report->nis += (float)verdict.d2;
         w->used[used++] = (uint16_t)k;
     }
     if (used <= frame->budget)
@@ -162,6 +159,35 @@ static unsigned gate_all(plr_filter *f, const plr_frame *frame, unsigned n, plr_
     report->left_out = (uint16_t)(used - frame->budget);
     plr_order_sort(w->used, frame->budget, position_before, NULL);
     return frame->budget;
+}
+
+/* work.gain by each observation's own prediction: where the motion is given, or has been applied. */
+static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
+    plr_workspace *w = &f->work;
+    for (unsigned k = 0; k < n; k++) {
+        if (w->slot_of[k] == PLR_NO_SLOT)
+            continue;
+        const plr_verdict verdict =
+            plr_gate_judge(f, w->slot_of[k], &frame->observations[w->order[k]]);
+        w->gain[k] = verdict.accepted ? verdict.gain : REJECTED;
+        report->nis += verdict.accepted ? (float)verdict.d2 : 0;
+    }
+}
+
+/* Brings landmarks and covariance up to this frame, and judges its observations. */
+static void move(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
+    plr_motion_first first;
+    if (f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
+        f->config.mode == PLR_MODE_SLAM) {
+        plr_motion_find(f, frame, n, &first, &report->nis);
+        plr_motion_apply(f, &first.motion);
+        return;
+    }
+    if (f->motion.pending) {
+        plr_motion_prior(f, &first.motion);
+        plr_motion_apply(f, &first.motion);
+    }
+    gate_each(f, frame, n, report);
 }
 
 /* ---------------------------------------------------------------- new landmarks */
@@ -237,7 +263,10 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     match(f, seen, n);
     adopt_known(f, seen, n, &events, report);
     count_seen(f, n);
-    const unsigned used = gate_all(f, frame, n, report);
+    move(f, frame, n, report);
+    if (f->diverged)
+        return;
+    const unsigned used = choose(f, frame, n, report);
     const plr_correction correction = plr_correct(f, seen, used);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_blocks;
@@ -308,7 +337,6 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
-    plr_motion_settle(f);
     if (f->config.mode != PLR_MODE_DEAD_RECKONING && !f->diverged)
         process(f, frame, r);
     if (f->diverged) {

@@ -128,6 +128,15 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
         solve_column(k, U, X + j, ldx);
 }
 
+void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x) {
+    for (unsigned i = k; i-- > 0;) {
+        const plr_real *row = U + plr_upper_row(k, i);
+        for (unsigned j = i + 1; j < k; j++)
+            x[i] = PLR_FMA(-row[j - i], x[j], x[i]);
+        x[i] *= PLR_R(1) / row[0];
+    }
+}
+
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
                       const plr_real *restrict X, size_t ldx, plr_real *restrict x) {
     unsigned j = 0;

@@ -55,6 +55,9 @@ bool plr_cholesky_upper(unsigned n, plr_real *S);
 /* X <- U^-T X: U is k x k, packed upper; X is k x n with leading dimension ldx. */
 void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_real *X, size_t ldx);
 
+/* x <- U^-1 x, k long: U is k x k, packed upper. */
+void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x);
+
 /* x += sum_k a_k X_k: X is depth x n with leading dimension ldx, x is n long. */
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, const plr_real *X, size_t ldx,
                       plr_real *x);

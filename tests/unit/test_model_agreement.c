@@ -130,7 +130,7 @@ static void test_how_the_pose_moves_a_point_agrees_with_differences(void) {
         rng_normals(&chance, 5, s, 3);
         to_reals(s_real, s, 3);
         to_doubles(s, s_real, 3);
-        plr_world_by_pose(&body, s_real, J);
+        plr_world_by_pose(body.R_WB, s_real, J);
         for (int j = 0; j < 6; j++) {
             const double h = 1e-6;
             double ends[2][3];
