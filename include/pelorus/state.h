@@ -84,6 +84,7 @@ typedef struct plr_noise {
     plr_real Lambda[21 + PLR_KERNEL_MARGIN];                    /* 6x6, packed upper triangle */
     plr_real eta[PLR_POSE_DIM];
     plr_real z[PLR_POSE_DIM]; /* nu is counted from here */
+    plr_real closer[PLR_MAX_LANDMARKS]; /* by which a slot's inverse range is about to change, 1/m */
     uint8_t open; /* 1: W is part of the covariance and not yet in P */
 } plr_noise;
 

@@ -220,7 +220,6 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
         noise->eta[k] = -motion->z[k];
         noise->z[k] = motion->z[k];
     }
-    memset(f->work.dx, 0, n * sizeof *f->work.dx);
     noise->open = 1;
     if (!f->config.bias)
         return;

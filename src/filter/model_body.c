@@ -97,21 +97,40 @@ static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size
     }
 }
 
+/* Moves a landmark along its ray to where the frame's observation is about to put it, and returns the
+ * change of inverse range. What follows is linearised there; the state's correction begins with what
+ * takes it back. */
+static plr_real bring_closer(plr_filter *f, unsigned slot) {
+    plr_real *q = f->slots[slot].x;
+    const plr_real closer = f->work.noise.closer[slot], range = PLR_SQRT(plr_dot3(q, q));
+    const plr_real ratio = PLR_FMA(closer, range, PLR_R(1)); /* of inverse ranges */
+    if (!(ratio >= PLR_R(0.5) && ratio <= PLR_R(2)) ||
+        !(ratio >= f->par.min_inverse_range * range && ratio * PLR_MIN_RANGE <= range))
+        return 0;
+    for (int i = 0; i < 3; i++)
+        q[i] /= ratio;
+    return closer;
+}
+
 static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_real R[9], p[3];
     plr_camera_motion(R, p, &f->par.camera, motion->R, motion->p);
 
     plr_real *F = f->work.Vt;
+    memset(f->work.dx, 0, plr_covariance_dim(f) * sizeof *f->work.dx);
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_real q[3];
         plr_polar from, to;
+        const plr_real closer = bring_closer(f, slot);
         plr_se3_inverse_point(q, R, p, s->x);
         keep_off(q);
         plr_polar_at(&from, s->x);
         plr_polar_at(&to, q);
         carry_chart(F + 9 * slot, &to, R, p, &from);
         memcpy(s->x, q, sizeof q);
+        for (unsigned i = 0; i < 3; i++)
+            f->work.dx[plr_covariance_row(f, slot) + i] = -closer * F[9 * slot + 3 * i + 2];
     }
     plr_real A[36];
     plr_se3_adjoint_inverse(A, motion->R, motion->p);

@@ -141,8 +141,9 @@ static void factorise(const plr_real M[36], plr_real L[36]) {
     }
 }
 
-void plr_motion_prior(const plr_filter *f, plr_applied_motion *applied) {
+void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
     plr_real M[36];
+    memset(f->work.noise.closer, 0, sizeof f->work.noise.closer);
     memset(applied, 0, sizeof *applied);
     memcpy(applied->R, f->motion.R, sizeof applied->R);
     memcpy(applied->p, f->motion.p, sizeof applied->p);

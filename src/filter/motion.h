@@ -36,7 +36,7 @@ typedef struct plr_applied_motion {
 } plr_applied_motion;
 
 /* The motion at nu = 0: D' = D. */
-void plr_motion_prior(const plr_filter *f, plr_applied_motion *applied);
+void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
 
 /* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],

@@ -33,6 +33,7 @@ typedef struct plr_sighting {
     plr_real U[2][6]; /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
     plr_real a[18];   /* U^-T dz/dnu, 3x6, at the point evaluated last */
     plr_real rho[3];  /* U^-T r there */
+    plr_real w[3];    /* P J^T S^-1 r: what the observation alone says of its landmark's chart */
     plr_real weight;  /* Huber's: 1, and less for a large residual */
     plr_real cost;    /* Huber's rho at the best point */
     plr_real at_zero; /* d^2 around the twists' prediction; negative: no place to linearise */
@@ -146,6 +147,8 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_moti
     memcpy(at->a, dz, sizeof at->a);
     plr_solve_upper_transposed(3, 6, S, at->a, 6);
     plr_solve_upper_transposed(3, 1, S, at->rho, 1);
+    plr_solve_upper_transposed(3, 3, S, JP, 3);
+    plr_mat3_tvec(at->w, JP, at->rho);
     memcpy(at->U[1 - s->bank], S, sizeof at->U[0]);
     return true;
 }
@@ -403,7 +406,11 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     if (first->found)
         (void)step(&best, U, dz);
     plr_motion_at(f, &s.prior, best.z, &first->motion);
-    for (unsigned i = 0; i < s.count; i++)
-        f->work.gain[f->work.used[i]] =
-            judge(&s, i, first->found, U, dz, nis) ? s.sightings[i].gain : PLR_R(-1);
+    memset(f->work.noise.closer, 0, f->count * sizeof *f->work.noise.closer);
+    for (unsigned i = 0; i < s.count; i++) {
+        const bool accepted = judge(&s, i, first->found, U, dz, nis);
+        f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);
+        if (accepted)
+            f->work.noise.closer[slot_of(&s, i) - f->slots] = s.sightings[i].w[2];
+    }
 }
