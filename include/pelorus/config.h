@@ -17,7 +17,7 @@
 
 /* Counts the changes after which a filter computes other bits; part of the build fingerprint, so that
  * a log tells whether its robot computed as this source does. tests/golden asks for it. */
-#define PLR_ARITHMETIC 3
+#define PLR_ARITHMETIC 4
 
 /* Bits of a real: 32 (float, the main road) or 64 (double). */
 #ifndef PLR_REAL
@@ -86,12 +86,14 @@ float plr_fmaf_exact(float a, float b, float c);
 #endif
 #define PLR_SQRT(x)         __builtin_sqrtf(x)
 #define PLR_SMALLEST_NORMAL 1.17549435e-38F
+#define PLR_EPSILON         1.1920928955078125e-7F
 #elif PLR_REAL == 64
 typedef double plr_real;
 /* float64 rounds twice on every target: not all of them fuse it. */
 #define PLR_FMA(a, b, c)    ((a) * (b) + (c))
 #define PLR_SQRT(x)         __builtin_sqrt(x)
 #define PLR_SMALLEST_NORMAL 2.2250738585072014e-308
+#define PLR_EPSILON         2.220446049250313e-16
 #else
 #error "PLR_REAL must be 32 or 64."
 #endif

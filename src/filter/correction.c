@@ -137,6 +137,7 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
             f->bias[i] += f->work.dx[PLR_POSE_DIM + i];
     result.cut = f->model->retract(f, f->work.dx);
     plr_motion_correct_pose(f, f->work.dx);
+    plr_covariance_make_up_for_rounding(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);
     return result;

@@ -427,6 +427,12 @@ bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
     return true;
 }
 
+void plr_covariance_make_up_for_rounding(plr_filter *f) {
+    const unsigned n = plr_covariance_dim(f);
+    for (unsigned i = first_landmark_row(f); i < n; i++)
+        f->P[plr_packed_row(i) + i] *= PLR_R(1) + PLR_R(8) * PLR_EPSILON;
+}
+
 /* ---------------------------------------------------------------- slots */
 
 void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {

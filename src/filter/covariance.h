@@ -90,6 +90,11 @@ void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linear
  * would cease to be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
+/* The landmarks' variances grow by a few roundings, P_ii *= 1 + 8 epsilon: as much as the roundings of
+ * an update can take away. Without it they add up for as long as a robot stands still, and P ceases to
+ * be a covariance (docs/NUMERICS.md 1). */
+void plr_covariance_make_up_for_rounding(plr_filter *f);
+
 /* --- slots --- */
 
 /* Appends the rows of slot f->count (not yet counted): error = J_pose xi + N(0, landmark->P). */
