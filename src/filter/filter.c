@@ -144,6 +144,12 @@ plr_status plr_filter_reset(plr_filter *f) {
 
 /* ---------------------------------------------------------------- from outside */
 
+void plr_filter_forget_reading(plr_filter *f) {
+    f->reading_valid = 0;
+    f->interval_s = 0;
+    memcpy(f->reading, f->bias, sizeof f->reading);
+}
+
 void plr_filter_count_refusal(plr_filter *f, plr_status status) {
     if (status == PLR_E_LATE)
         f->totals.late++;
@@ -205,16 +211,13 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     put_pose(f, t_ns, T_WB);
     f->diverged = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
-    /* a reading of another clock says nothing any more */
-    if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns) {
-        f->reading_valid = 0;
-        f->interval_s = 0;
-        memset(f->reading, 0, sizeof f->reading);
-    }
     if (!plr_covariance_is_positive(f) && f->config.bias) { /* the bias is lost too: its prior */
         memset(f->bias, 0, sizeof f->bias);
         start_bias(f);
     }
+    /* a reading of another clock says nothing any more */
+    if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
+        plr_filter_forget_reading(f);
     return PLR_OK;
 }
 
@@ -235,6 +238,7 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
             return refuse(f, PLR_E_ARGUMENT);
     for (int i = 0; i < 6; i++)
         f->bias[i] = (plr_real)mean[i];
+    plr_filter_forget_reading(f);
     plr_covariance_set_bias(f, variance);
     return PLR_OK;
 }

@@ -20,6 +20,9 @@ static inline plr_real plr_seconds(plr_time_ns ns) {
     return (plr_real)((double)ns * 1e-9);
 }
 
+/* No reading says anything of now: the body is taken to stand. Reading less bias is 0. */
+void plr_filter_forget_reading(plr_filter *f);
+
 /* A refused call in the totals. */
 void plr_filter_count_refusal(plr_filter *f, plr_status status);
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 /* Going on after an interruption: another clock, and perhaps another place. */
-#include <string.h>
-
 #include "filter/filter_internal.h"
 
 static plr_status refuse(plr_filter *f, plr_status status) {
@@ -30,9 +28,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     if (status != PLR_OK)
         return refuse(f, status);
     f->t_ns = t_ns;
-    f->reading_valid = 0; /* a reading of before says nothing of now */
-    f->interval_s = 0;
-    memset(f->reading, 0, sizeof f->reading);
+    plr_filter_forget_reading(f); /* one of before says nothing of now */
     if (!P_moved)
         return PLR_OK;
     /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */

@@ -32,7 +32,7 @@ typedef struct plr_row {
 static const plr_row rows[] = {
     {{1, "model", "", "where landmarks live", PLR_SETTING_CHOICE, model_words, 0, 1, PLR_MODEL_BODY}, AT(model), STORE_U8},
     {{2, "mode", "", "what is estimated", PLR_SETTING_CHOICE, mode_words, 0, 3, PLR_MODE_SLAM}, AT(mode), STORE_U8},
-    {{3, "bias", "", "estimate the biases of the twist", PLR_SETTING_SWITCH, switch_words, 0, 1, 0}, AT(bias), STORE_U8},
+    {{3, "bias", "", "estimate the biases of the twist", PLR_SETTING_SWITCH, switch_words, 0, 1, 1}, AT(bias), STORE_U8},
     {{4, "slots", "", "landmarks held at once", PLR_SETTING_COUNT, NULL, 1, PLR_MAX_LANDMARKS, PLR_MAX_LANDMARKS < 100 ? PLR_MAX_LANDMARKS : 100}, AT(slots), STORE_U16},
     {{5, "known-map", "", "slam uses known landmarks too", PLR_SETTING_SWITCH, switch_words, 0, 1, 0}, AT(known_map), STORE_U8},
     {{6, "twist-timing", "", "which interval a reading stands for", PLR_SETTING_CHOICE, timing_words, 0, 2, PLR_TWIST_START}, AT(twist_timing), STORE_U8},

@@ -23,7 +23,8 @@ static void suggest_axes(plr_config *config, const char *name, double all, const
 }
 
 static void apply_header(plr_config *config, const plr_header *header, bool sigmas_of_a_reading) {
-    const bool has_bias = header->bias_velocity_sigma_mps > 0 || header->bias_gyro_sigma_radps > 0;
+    const double v = header->bias_velocity_sigma_mps, w = header->bias_gyro_sigma_radps;
+    const double has_bias = v > 0 || w > 0 ? 1 : v >= 0 && w >= 0 ? 0 : -1;
     const plr_suggestion suggestions[] = {
         {"twist-timing", header->twist_timing},
         {"pixel-sigma", header->pixel_sigma_px},
@@ -31,9 +32,9 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
         {"bias-gyro-sigma", header->bias_gyro_sigma_radps},
         {"bias-velocity-walk", header->bias_velocity_walk},
         {"bias-gyro-walk", header->bias_gyro_walk},
-        /* a sensor that is said to have a bias gets it estimated: without, the filter would believe
-         * more than it knows */
-        {"bias", has_bias ? 1 : -1},
+        /* only a sensor that is said to have none does without: else the filter would believe more
+         * than it knows */
+        {"bias", has_bias},
     };
     for (unsigned i = 0; i < sizeof suggestions / sizeof suggestions[0]; i++)
         suggest(config, suggestions[i].name, suggestions[i].value);

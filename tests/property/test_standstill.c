@@ -90,6 +90,7 @@ static void test_an_hour_of_standing_still_with_biases_moves_nothing(void) {
 /* The same hour without any noise: certainty may grow, and never beyond what floats can hold. */
 static void test_an_hour_without_noise_stays_exact(void) {
     rig.options.pixel_sigma_px = rig.options.velocity_sigma_mps = rig.options.gyro_sigma_radps = 0;
+    rig.config.bias = 0;
     each_axis(rig.config.velocity_sigma, 0);
     each_axis(rig.config.gyro_sigma, 0);
     rig_begin();

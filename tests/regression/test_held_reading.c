@@ -22,6 +22,7 @@ static void start(plr_mode mode) {
     plr_config config;
     plr_config_default(&config);
     config.mode = (uint8_t)mode;
+    config.bias = 0;
     each_axis(config.velocity_sigma, sigma_mps);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
     for (unsigned k = 0; k <= 1; k++) /* readings stand for 0.1 s */

@@ -101,6 +101,7 @@ static void test_velocity_covariance_is_the_readings_plus_the_biases(void) {
 /* With noise = step the sigmas are a displacement's: the velocity's are those by the step. */
 static void test_noise_of_a_step_is_divided_by_the_step(void) {
     double P_u[36];
+    rig.config.bias = 0;
     rig.config.noise = PLR_NOISE_STEP;
     each_axis(rig.config.velocity_sigma, 0.001);
     each_axis(rig.config.gyro_sigma, 0.002);
@@ -115,6 +116,8 @@ static void test_noise_of_a_step_is_divided_by_the_step(void) {
 
 static void test_without_bias_states_the_bias_is_zero(void) {
     double b[6] = {1, 1, 1, 1, 1, 1}, P[36];
+    rig.config.bias = 0;
+    rig_begin();
     rig_drive(3);
     P[0] = 1;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
@@ -172,6 +175,7 @@ static void test_trace_is_of_the_whole_settled_covariance(void) {
 
 static void test_asking_for_the_trace_changes_the_estimate_by_rounding_alone(void) {
     plr_pose asked, quiet;
+    rig.config.bias = 0; /* its walk is added when motion is applied: then in other pieces */
     for (int ask = 0; ask < 2; ask++) {
         rig_begin();
         for (int k = 0; k < 10; k++) {

@@ -207,6 +207,7 @@ static void test_a_bias_prior_comes_too_late_after_a_frame(void) {
 
 static void test_without_bias_states_there_is_no_prior(void) {
     const double mean[6] = {0}, variance[6] = {0};
+    begin_with(PLR_MODE_SLAM, false);
     rig_remember();
     rig_demand_refusal(PLR_E_MODE, plr_filter_set_bias(&rig.filter, mean, variance));
 }

@@ -60,7 +60,10 @@ static unsigned count_answers(faulty_port *p, plr_kind kind) {
 }
 
 static void test_a_drive_is_answered_with_poses_near_the_truth(void) {
+    const plr_wire_setting without_bias = {plr_setting_by_name("bias")->id, 0};
     plr_message pose, report;
+    options.overrides = &without_bias;
+    options.override_count = 1;
     begin(&session, &port);
     send_drive(&port, 100);
     send_end(&port);

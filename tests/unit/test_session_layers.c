@@ -114,8 +114,13 @@ static void test_what_is_wanted_for_all_axes_last_takes_the_place_of_single_ones
     TEST_ASSERT_EQUAL_DOUBLE(3, config.pixel_sigma_px);
 }
 
-static void test_a_header_that_tells_of_a_bias_switches_its_estimation_on(void) {
-    header.bias_velocity_sigma_mps = header.bias_gyro_sigma_radps = 0;
+static void test_a_bias_is_estimated_unless_the_header_tells_that_there_is_none(void) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(1, config.bias);
+    header.bias_gyro_sigma_radps = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(1, config.bias);
+    header.bias_velocity_sigma_mps = 0;
     TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
     TEST_ASSERT_EQUAL_UINT8(0, config.bias);
     header.bias_gyro_sigma_radps = 0.01;
@@ -207,7 +212,7 @@ int main(void) {
     RUN_TEST(test_the_header_says_twist_timing_and_all_seven_noises);
     RUN_TEST(test_the_header_may_tell_the_sigmas_of_single_axes);
     RUN_TEST(test_what_is_wanted_for_all_axes_last_takes_the_place_of_single_ones);
-    RUN_TEST(test_a_header_that_tells_of_a_bias_switches_its_estimation_on);
+    RUN_TEST(test_a_bias_is_estimated_unless_the_header_tells_that_there_is_none);
     RUN_TEST(test_suggestions_that_make_no_sense_are_left_out);
     RUN_TEST(test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out);
     RUN_TEST(test_an_impossible_override_names_its_setting);

@@ -131,7 +131,7 @@ static void test_default_is_the_standard_of_every_row_and_passes_the_check(void)
 static void test_defaults_are_those_that_the_documentation_gives(void) {
     TEST_ASSERT_EQUAL_UINT(PLR_MODEL_BODY, config.model);
     TEST_ASSERT_EQUAL_UINT(PLR_MODE_SLAM, config.mode);
-    TEST_ASSERT_EQUAL_UINT(0, config.bias);
+    TEST_ASSERT_EQUAL_UINT(1, config.bias);
     TEST_ASSERT_EQUAL_DOUBLE(2, config.pixel_sigma_px);
     TEST_ASSERT_EQUAL_DOUBLE(1e-8, config.bias_velocity_walk);
     TEST_ASSERT_EQUAL_DOUBLE(1e-10, config.bias_gyro_walk);
