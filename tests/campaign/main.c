@@ -127,6 +127,22 @@ static void list(void) {
         printf("%-18s %s\n", scenarios[i].name, scenarios[i].about);
 }
 
+typedef struct task {
+    const scenario *s;
+    uint64_t seed;
+} task;
+
+typedef struct campaign {
+    task *tasks;
+    outcome *outcomes;
+    unsigned parked_frames;
+} campaign;
+
+static void drive_one(void *context, unsigned index) {
+    const campaign *c = context;
+    drive(c->tasks[index].s, c->tasks[index].seed, c->parked_frames, &c->outcomes[index]);
+}
+
 static scenario changed(const scenario *original, const char *changes) {
     char names[400];
     scenario s = *original;
@@ -155,7 +171,8 @@ static unsigned run(const options *o, const bool *chosen, unsigned n) {
         for (unsigned k = 0; chosen[i] && k < seeds; k++)
             tasks[filled++] = (task){&copies[i], o->first_seed + k};
     }
-    pool_run(tasks, filled, (unsigned)o->jobs, (unsigned)o->parked_frames, outcomes);
+    campaign c = {tasks, outcomes, (unsigned)o->parked_frames};
+    pool_run(filled, (unsigned)o->jobs, 0, "drives", drive_one, &c);
     table_heading();
     for (unsigned i = 0; i < filled; i += seeds)
         failed += !table_print(tasks[i].s, outcomes + i, seeds);

@@ -3,6 +3,7 @@
 #include "campaign/pool.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -10,10 +11,13 @@
 #include <time.h>
 #include <unistd.h>
 
+enum { FRESH_PLEASE = 3 }; /* exit status of a worker whose batch is done */
+
 typedef struct pool {
-    const task *tasks;
-    unsigned n, parked_frames;
-    outcome *outcomes;
+    unsigned n, batch;
+    const char *what;
+    pool_work work;
+    void *context;
     volatile unsigned *next, *done; /* shared */
     time_t began;
 } pool;
@@ -32,14 +36,15 @@ unsigned pool_processors(void) {
     return n > 0 ? (unsigned)n : 1;
 }
 
-static void work(const pool *p) {
-    for (;;) {
+static int work(const pool *p) {
+    for (unsigned k = 0; p->batch == 0 || k < p->batch; k++) {
         const unsigned i = __atomic_fetch_add(p->next, 1, __ATOMIC_SEQ_CST);
         if (i >= p->n)
-            return;
-        drive(p->tasks[i].s, p->tasks[i].seed, p->parked_frames, &p->outcomes[i]);
+            return 0;
+        p->work(p->context, i);
         __atomic_fetch_add(p->done, 1, __ATOMIC_SEQ_CST);
     }
+    return FRESH_PLEASE;
 }
 
 static void start_worker(const pool *p) {
@@ -48,23 +53,21 @@ static void start_worker(const pool *p) {
         perror("campaign: no process can be started");
         exit(2);
     }
-    if (child == 0) {
-        work(p);
-        _exit(0);
-    }
+    if (child == 0)
+        _exit(work(p));
 }
 
 static void show_progress(const pool *p, bool last) {
     const unsigned done = *p->done;
     const double spent = difftime(time(NULL), p->began);
     const double left = done ? spent * (p->n - done) / done : 0;
-    fprintf(stderr, "\r%u of %u drives, %.0f s, %.0f s to go  %s", done, p->n, spent, left,
+    fprintf(stderr, "\r%u of %u %s, %.0f s, %.0f s to go  %s", done, p->n, p->what, spent, left,
             last ? "\n" : "");
     fflush(stderr);
 }
 
-/* A worker that was killed is replaced: the drive that it died of stays undone, and the table
- * says so. */
+/* A worker that was killed is replaced: the piece that it died of stays undone, for the caller to
+ * see. */
 static unsigned reap(const pool *p, unsigned running) {
     int status;
     while (running > 0 && waitpid(-1, &status, WNOHANG) > 0) {
@@ -76,10 +79,10 @@ static unsigned reap(const pool *p, unsigned running) {
     return running;
 }
 
-void pool_run(const task *tasks, unsigned n, unsigned jobs, unsigned parked_frames,
-              outcome *outcomes) {
+void pool_run(unsigned n, unsigned jobs, unsigned batch, const char *what, pool_work work_on,
+              void *context) {
     volatile unsigned *counters = pool_shared(2 * sizeof *counters);
-    const pool p = {tasks, n, parked_frames, outcomes, &counters[0], &counters[1], time(NULL)};
+    const pool p = {n, batch, what, work_on, context, &counters[0], &counters[1], time(NULL)};
     unsigned running = 0, polls = 0;
     fflush(stdout);
     for (; running < jobs && running < n; running++)

@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: MIT
-/* Runs (scenario, seed) pairs on several processes. A process that dies takes its own pair with it
- * and no other. */
+/* Work in pieces on several processes. A process that dies takes its own piece with it, no other. */
 #ifndef CAMPAIGN_POOL_H
 #define CAMPAIGN_POOL_H
 
 #include <stddef.h>
-#include <stdint.h>
-
-#include "campaign/drive.h"
-
-typedef struct task {
-    const scenario *s;
-    uint64_t seed;
-} task;
 
 /* Memory that all processes share; ends the program with a message if there is none. */
 void *pool_shared(size_t bytes);
 
-/* outcomes, of pool_shared, is filled: one for each task. Progress on stderr. */
-void pool_run(const task *tasks, unsigned n, unsigned jobs, unsigned parked_frames,
-              outcome *outcomes);
+/* Does piece `index` of the work; what it finds out goes to memory of pool_shared. */
+typedef void (*pool_work)(void *context, unsigned index);
+
+/* Does pieces 0 to n - 1 on so many processes; one that has done `batch` pieces makes place for a
+ * fresh one (0: never). Progress on stderr: "so many of n `what`". */
+void pool_run(unsigned n, unsigned jobs, unsigned batch, const char *what, pool_work work,
+              void *context);
 
 /* Processors that are there. */
 unsigned pool_processors(void);
