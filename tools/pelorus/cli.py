@@ -12,11 +12,11 @@ import typer
 from rich.markup import escape
 
 from pelorus import __version__
-from pelorus.commands import compare, convert, evaluate, info, map, report, simulate, stream
+from pelorus.commands import compare, convert, course, evaluate, info, map, report, simulate, stream
 from pelorus.console import err, out
 from pelorus.errors import PelorusError
 
-COMMANDS = (convert, info, evaluate, simulate, report, map, stream, compare)
+COMMANDS = (convert, info, evaluate, simulate, report, map, course, stream, compare)
 
 app = typer.Typer(
     name="pelorus",

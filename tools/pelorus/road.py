@@ -50,9 +50,32 @@ def read_road(path: Path) -> Floats:
     return foreign.numbers(path, rows)[:, -2:]
 
 
+@dataclass(frozen=True)
+class RoadFit:
+    """How a trajectory came to lie on the road: levelled, mirrored or not, turned, shifted."""
+
+    figures: RoadFigures
+    middle_m: Floats  # (3,)
+    axes: Floats  # (2, 3): the trajectory's plane
+    mirror: Floats  # (2,)
+    turn_rad: float
+    shift_m: Floats  # (2,)
+
+    def place(self, points: Floats) -> Floats:
+        """Points of the trajectory's world (n, 3) -> the road's map (n, 2), m."""
+        return _moved((points - self.middle_m) @ self.axes.T * self.mirror,
+                      np.array([self.turn_rad, *self.shift_m]))  # fmt: skip
+
+
 def compare(position: Floats, road: Floats, skip_m: float) -> RoadFigures:
     """Positions (n, 3), m, against the road (n, 2), m."""
-    centred = position - position.mean(axis=0)
+    return fit(position, road, skip_m).figures
+
+
+def fit(position: Floats, road: Floats, skip_m: float) -> RoadFit:
+    """The best fit of positions (n, 3), m, to the road (n, 2), m."""
+    middle = position.mean(axis=0)
+    centred = position - middle
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     plane = (centred @ axes[:2].T)[arc_length(position) > skip_m][::EVERY]
     if len(plane) < POINTS_MIN:
@@ -60,11 +83,13 @@ def compare(position: Floats, road: Floats, skip_m: float) -> RoadFigures:
             f"the trajectory is {arc_length(position)[-1]:.1f} m long: too short to compare behind "
             f"the first {skip_m:g} m"
         )
-    return RoadFigures(
-        road_m=_fit(plane, densified(road)),
+    road_m, mirror, motion = _fit(plane, densified(road))
+    found = RoadFigures(
+        road_m=road_m,
         out_of_plane_m=float(np.sqrt(np.mean((centred @ axes[2]) ** 2))),
         tilt_deg=float(np.degrees(np.arccos(min(1.0, abs(axes[2][2]))))),
     )
+    return RoadFit(found, middle, axes[:2], mirror, float(motion[0]), motion[1:])
 
 
 def arc_length(points: Floats) -> Floats:
@@ -80,21 +105,29 @@ def densified(road: Floats) -> Floats:
     return np.stack([np.interp(at, arc, road[:, axis]) for axis in range(2)], axis=-1)
 
 
-def _fit(points: Floats, road: Floats) -> float:
-    """The smallest RMS distance over all planar motions, mirrored or not (axes have no sign)."""
+def _moved(points: Floats, motion: Floats) -> Floats:
+    """(n, 2) turned by motion[0] and shifted by the rest."""
+    c, s = np.cos(motion[0]), np.sin(motion[0])
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + motion[1:])
+
+
+def _fit(points: Floats, road: Floats) -> tuple[float, Floats, Floats]:
+    """The smallest RMS distance over all planar motions, mirrored or not (axes have no sign), with
+    the mirror and the motion that give it.
+    """
     nearest = cKDTree(road)
 
     def distance(x: Floats, mirror: Floats) -> Floats:
-        c, s = np.cos(x[0]), np.sin(x[0])
-        moved = (points * mirror) @ np.array([[c, s], [-s, c]]) + x[1:]
-        return np.asarray(nearest.query(moved)[0])
+        return np.asarray(nearest.query(_moved(points * mirror, x))[0])
 
     headings = np.arange(STARTS) * 2 * np.pi / STARTS
     tries = [(heading, sign) for sign in (1.0, -1.0) for heading in headings]
-    best = np.inf
+    best: tuple[float, Floats, Floats] = (np.inf, np.ones(2), np.zeros(3))
     for heading, sign in progress(tries, "fitting to the road"):
         start = np.concatenate(([heading], road.mean(axis=0)))
         mirror = np.array([1.0, sign])
         found = least_squares(distance, start, args=(mirror,), max_nfev=EVALUATIONS_MAX)
-        best = min(best, float(np.sqrt(np.mean(found.fun**2))))
+        rms = float(np.sqrt(np.mean(found.fun**2)))
+        if rms < best[0]:
+            best = (rms, mirror, np.asarray(found.x))
     return best

@@ -52,10 +52,15 @@ def ece276a(
         TimingOrAuto.AUTO,
         help="When a twist reading holds; auto: end if the data say so clearly, else start.",
     ),
+    keep_ids: bool = typer.Option(
+        False,
+        "--keep-ids",
+        help="Leave stale tracks under the ids that the file gives them.",
+    ),
 ) -> None:
     """Convert a .npz file of UCSD's ECE276A project 3 (visual-inertial SLAM)."""
     recording, findings = ece276a_converter.convert(
-        source, truth, fix is Fix.AUTO, twist_timing.value_in_header
+        source, truth, fix is Fix.AUTO, twist_timing.value_in_header, keep_ids
     )
     _write(recording, findings, target)
 

@@ -9,6 +9,7 @@ measured of it goes into the HEADER (twist_noise.py).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from pelorus import arrays, kitti, se3
 from pelorus.arrays import Arrays
 from pelorus.converters import twist_noise
-from pelorus.faults import axes, timing
+from pelorus.faults import axes, stale, timing
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
 from pelorus.foreign import ForeignFileError
@@ -31,12 +32,14 @@ def convert(
     truth: Path | None = None,
     fix: bool = True,
     twist_timing: TwistTiming | None = None,
+    keep_ids: bool = False,
 ) -> tuple[Recording, list[Finding]]:
     """Read; if asked, mend and measure the twists' noise; add the truth.
 
-    `twist_timing` None: let the data decide.
+    `twist_timing` None: let the data decide. `keep_ids`: what else is mended, stale tracks are not.
     """
     recording = read(source)
+    tracks = recording.tracks
     findings: list[Finding] = []
     if fix:
         recording, findings = mend(recording)
@@ -48,8 +51,17 @@ def convert(
     if fix:
         recording, finding = twist_noise.suggest(recording)
         findings.append(finding)
+    if keep_ids:
+        recording = replace(recording, tracks=tracks)
+        findings = [_left_alone(finding) for finding in findings]
     recording = recording.with_header(body_axes=axes.body_axes(recording.T_CB.R))
     return (with_truth(recording, truth) if truth else recording), findings
+
+
+def _left_alone(finding: Finding) -> Finding:
+    if finding.subject != stale.SUBJECT or not finding.found:
+        return finding
+    return replace(finding, action="left as they are, since the ids were to be kept")
 
 
 def read(source: Path) -> Recording:

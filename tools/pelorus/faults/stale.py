@@ -19,6 +19,7 @@ from pelorus.recording import Recording
 from pelorus.tracks import Pairs, Tracks, project
 from pelorus.visual_motion import seen_pairs
 
+SUBJECT = "stale tracks"
 MOVED_MIN_PX = 0.1  # median image motion that the twists must predict for a repeat to be false
 LIVE_MIN = 3  # tracks that must repeat together
 
@@ -29,10 +30,9 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     repeats = _repeats(recording.tracks, pairs)
     frames = _stale_frames(recording, pairs, repeats)
     stale = pairs.second[repeats & frames[recording.tracks.frame[pairs.second]]]
-    subject = "stale tracks"
     if not len(stale):
         evidence = f"no moving frame repeats all its pixels ({int(repeats.sum())} single repeats)"
-        return recording, Finding(subject, False, evidence, "nothing to mend")
+        return recording, Finding(SUBJECT, False, evidence, "nothing to mend")
     tracks = _split(recording.tracks, stale)
     moved = _predicted_px(recording)
     evidence = (
@@ -42,7 +42,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"{np.nanmedian(moved[frames]):.1f} px there"
     )
     action = f"{len(stale)} tracks split: a new id from the repeated pixel on"
-    return replace(recording, tracks=tracks), Finding(subject, True, evidence, action)
+    return replace(recording, tracks=tracks), Finding(SUBJECT, True, evidence, action)
 
 
 def _repeats(tracks: Tracks, pairs: Pairs) -> NDArray[np.bool_]:

@@ -14,9 +14,11 @@ from pelorus.report import style
 from pelorus.report.accuracy import Accuracy, assess
 from pelorus.report.results import Run
 from pelorus.report.subject import Subject
+from pelorus.report.whole_map import Traces, traces
 from pelorus.se3 import Floats
 
 MAIN = "body"  # the default model: what the report is about
+COURSE = "course"
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,12 @@ class Comparison:
             return occupancy(sightings(log, messages_of(log)), Wish())
         except PelorusError:
             return None
+
+    @cached_property
+    def whole_map(self) -> Traces:
+        """Of the course's filter, whose landmarks have their covariance in metres."""
+        run = self.run(COURSE)
+        return traces(messages_of(run.log), run.frames.t_ns, run.frames["trace"])
 
     @cached_property
     def origin_ns(self) -> int:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import chi2
 
-from pelorus.report.comparison import Comparison
+from pelorus.report.comparison import COURSE, Comparison
 from pelorus.report.results import POSE_SIZE, Run
 from pelorus.report.style import (
     BLUE,
@@ -34,19 +34,25 @@ BIASES = ("bias_vx", "bias_vy", "bias_vz", "bias_wx", "bias_wy", "bias_wz")
 
 
 def covariance(compared: Comparison) -> Figure:
-    """Trace of the whole covariance (the course's figure 2), and of its position block."""
-    figure = new_figure(WIDTH_IN, 6.5)
-    whole, position = figure.subplots(2, 1, sharex=True)
+    """Trace of the state's covariance, of the whole map's (the course's figure 2), and of the
+    position block.
+    """
+    figure = new_figure(WIDTH_IN, 9.0)
+    state, whole, position = figure.subplots(3, 1, sharex=True)
     for run in _in_layers(compared):
         t = compared.seconds(run.frames.t_ns)
-        _positive(whole, t, run.frames["trace"], run)
+        _positive(state, t, run.frames["trace"], run)
         _positive(position, t, run.frames.stack(*POSITION).sum(axis=-1), run)
-    whole.set_ylabel("trace of P (mixed units)")
-    position.set_ylabel("trace of position block (m²)")
+    found = compared.whole_map
+    whole.plot(compared.seconds(found.t_ns), found.whole, **PENS[COURSE].line)
+    whole.set_ylim(bottom=0)
+    state.set_ylabel("trace of P, state\n(mixed units)")
+    whole.set_ylabel("trace of P, whole map\n(course: m², rad²)")
+    position.set_ylabel("trace of position block\n(m²)")
     position.set_xlabel(TIME)
-    for axes in (whole, position):
+    for axes in (state, position):
         limit_decades(axes)
-    legend_above(figure, whole)
+    legend_above(figure, state)
     return figure
 
 

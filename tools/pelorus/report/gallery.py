@@ -106,9 +106,12 @@ def _covariance(compared: Comparison) -> Picture:
     return Picture(
         "covariance",
         "Trace of the covariance",
-        "Above, of the whole state: the course's figure 2. The models count landmarks in different "
-        "units (world in metres, body in angles and inverse range), so compare the runs below, "
-        "where it is the position alone.",
+        "Above, of the state as it is: pose and the landmarks in its slots, more of them at one "
+        "time than at another. In the middle, of the whole map, the course's figure 2, for "
+        f"the course's filter: all {compared.whole_map.ids} landmarks of the recording, those not "
+        "seen yet at their prior of 6 m², those that have left with the covariance with which they "
+        "left. The models count landmarks in different units (world in metres, body in angles and "
+        "inverse range), so compare the runs below, where it is the position alone.",
         partial(curves.covariance, compared),
     )
 

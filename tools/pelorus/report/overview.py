@@ -25,17 +25,17 @@ def row(run: Run) -> tuple[str, ...]:
     summary = run.summary
     return (
         run.name,
-        _number(summary["err0_m"]),
-        _number(summary["ate_m"]),
-        _number(summary["rot_deg"]),
-        _number(summary["nees_per_dof"]),
+        number(summary["err0_m"]),
+        number(summary["ate_m"]),
+        number(summary["rot_deg"]),
+        number(summary["nees_per_dof"]),
         str(summary["used"]),
         str(summary["gated"]),
         _factor(summary["realtime_factor"]),
     )
 
 
-def _number(value: Any) -> str:
+def number(value: Any) -> str:
     """Three digits, and no more than a millimetre."""
     if value is None:
         return NONE

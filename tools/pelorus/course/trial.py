@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""One recording, run three ways: dead reckoning, the course's filter, ours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from pelorus import figures, road
+from pelorus.console import progress
+from pelorus.errors import PelorusError
+from pelorus.figures import Figures
+from pelorus.grid.sightings import messages_of, sightings
+from pelorus.report import plane
+from pelorus.report.comparison import COURSE, Comparison
+from pelorus.report.replay import Programs
+from pelorus.report.results import Run, carry_out
+from pelorus.report.runs import plan_runs
+from pelorus.report.subject import Subject
+from pelorus.report.whole_map import Traces
+from pelorus.road import RoadFit
+from pelorus.se3 import Floats, apply
+
+RUNS = ("dead-reckoning", "course", "body")
+SKIP_M = 45.0  # the digitised road begins later than the drive
+NEAR_M, SIGMA_MOST_M = (
+    40.0,
+    2.0,
+)  # landmarks that make a picture: near, and certain beside the camera
+SEEN_LEAST = 3
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the trajectories are held against: a truth (in the subject), a road, or nothing."""
+
+    road_m: Floats | None = None  # (n, 2)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """The runs, in the order of RUNS, and the reference."""
+
+    compared: Comparison
+    reference: Reference
+
+    @property
+    def subject(self) -> Subject:
+        return self.compared.subject
+
+    @property
+    def runs(self) -> list[Run]:
+        return self.compared.runs
+
+    @cached_property
+    def truth_figures(self) -> dict[str, Figures]:
+        truth = self.subject.truth
+        if truth is None:
+            return {}
+        names = (self.subject.path, self.subject.path)
+        return {run.name: figures.compare(run.trajectory, truth, 0, names) for run in self.runs}
+
+    @cached_property
+    def road_fits(self) -> dict[str, RoadFit]:
+        """Each trajectory fitted to the road on its own."""
+        way = self.reference.road_m
+        if way is None or self.subject.truth is not None:
+            return {}
+        return {run.name: road.fit(run.trajectory.poses.p, way, SKIP_M) for run in self.runs}
+
+    @property
+    def traces(self) -> dict[str, Traces]:
+        """Of the runs that have landmarks with a covariance in metres: the course's."""
+        return {COURSE: self.compared.whole_map}
+
+    def nees(self, name: str) -> float | None:
+        """Mean NEES a degree of freedom; None without truth."""
+        accuracy = self.compared.accuracy.get(name)
+        if accuracy is None or not np.isfinite(accuracy.nees).any():
+            return None
+        return float(np.nanmean(accuracy.nees))
+
+    def flat(self, name: str, points: Floats) -> Floats:
+        """Points of a run's world (n, 3) -> the picture (n, 2)."""
+        if name in self.road_fits:
+            return self.road_fits[name].place(points)
+        seen = plane.choose(self.subject.header.body_axes, self.compared.main.trajectory.poses)
+        return np.stack((seen.right.of(points), seen.up.of(points)), axis=-1)
+
+    def scatter(self, name: str) -> Floats:
+        """(n, 2): the landmarks of a run that are near and certain enough to be drawn."""
+        log = self.compared.run(name).log
+        try:
+            seen = sightings(log, messages_of(log))
+        except PelorusError:  # no landmarks: nothing to draw
+            return np.empty((0, 2))
+        distance = np.linalg.norm(seen.landmarks_W - seen.camera_W[seen.last_frame], axis=1)
+        sigma = np.sqrt(np.linalg.eigvalsh(seen.spread)[:, -1])
+        good = (distance < NEAR_M) & (sigma < SIGMA_MOST_M) & (seen.times_seen >= SEEN_LEAST)
+        return self.flat(name, seen.landmarks_W[good])
+
+    @cached_property
+    def true_path(self) -> Floats | None:
+        """(n, 2): truth at the estimate's start, or the road; None without either."""
+        if self.subject.truth is not None:
+            accuracy = self.compared.accuracy["course"]
+            return self.flat("course", apply(accuracy.A, self.subject.truth.poses.p))
+        return self.reference.road_m if self.road_fits else None
+
+
+def carry_out_trial(
+    subject: Subject, reference: Reference, programs: Programs, options: Sequence[str], folder: Path
+) -> Trial:
+    """Replay the recording; the files of the runs stay in the folder."""
+    planned = {plan.name: plan for plan in plan_runs(programs, subject.path, options)}
+    plans = progress([planned[name] for name in RUNS], f"replaying {subject.path.name}")
+    runs = [carry_out(plan, subject.path, folder) for plan in plans]
+    return Trial(Comparison(subject, runs), reference)
