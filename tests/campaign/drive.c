@@ -99,9 +99,12 @@ static void judge_error(run *r, account *a, plr_health health, const plr_pose *p
         r->last_beyond = (int)r->k;
     }
     if (r->k == r->before + r->during + FRAME_HZ) {
-        r->result->second_later_sigmas = worst;
-        r->result->second_later_m = a->sigma_m;
+        r->result->later_sigmas = worst;
+        r->result->later_error_m = a->error_m;
+        r->result->later_own_m = a->sigma_m;
     }
+    if (r->k == FRAME_HZ)
+        r->result->fresh_own_m = a->sigma_m;
 }
 
 static void judge_health(run *r, account *a, const plr_report *report) {

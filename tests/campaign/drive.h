@@ -34,7 +34,9 @@ typedef struct outcome {
     double told_frames;    /* from the beginning of the event to the first frame not GOOD; -1 */
     double again_s;        /* from true again to GOOD again; -1: never */
     double first_diverged; /* frame; -1: never */
-    double second_later_sigmas, second_later_m; /* one second after the event: error, own sigma */
+    /* One second after the event: the error in sigmas and in m, and the filter's own sigma; and its
+     * sigma one second after it was started. */
+    double later_sigmas, later_error_m, later_own_m, fresh_own_m;
 } outcome;
 
 /* Frames of a phase in this run. */

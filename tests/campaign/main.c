@@ -18,7 +18,7 @@ typedef struct options {
     bool list, gate;
 } options;
 
-enum { SHORT_SEEDS = 6, SEEDS = 30, LONG_SEEDS = 300 };
+enum { SHORT_SEEDS = 4, SEEDS = 30, LONG_SEEDS = 300 };
 enum { SHORT_PARKED = 3000, PARKED = 20000, LONG_PARKED = 100000 };
 
 static void usage(FILE *out) {
@@ -29,7 +29,7 @@ static void usage(FILE *out) {
           "  --first-seed N        (1)\n"
           "  --jobs N              processes (as many as processors)\n"
           "  --parked-frames N     length of the parked scenarios (20000)\n"
-          "  --short               6 seeds, 3000 parked frames\n"
+          "  --short               4 seeds, 3000 parked frames\n"
           "  --long                300 seeds, 100000 parked frames\n"
           "  --set NAME=VALUE,...  change the scenarios; the limits are not meant for that\n"
           "  --gate                exit status 1 if a limit is not met\n"

@@ -20,6 +20,7 @@ typedef enum mishap {
     BASELINE,    /* the true baseline is so much larger than the filter's, as a share; all along */
     FOCAL,       /* the true focal length; all along */
     THROWN,      /* the body is thrown by 5 m and 1 rad times the strength at the first frame */
+    SWAPPED,     /* from the first frame on every id stands for another point */
     BLIND        /* no point is seen, and the readings are garbage */
 } mishap;
 
@@ -33,6 +34,8 @@ typedef struct bars {
     double told_frames;  /* until an event is told, in 95 % of the seeds */
     double error_m;      /* mean position error at the end of an event */
     double again_s;      /* from true again to GOOD again, in 95 % of the seeds */
+    double later_sigmas; /* largest component of the error one second after the event */
+    double later_width;  /* own sigma then, beside the error then and a fresh start's sigma */
     bool no_divergence;
 } bars;
 

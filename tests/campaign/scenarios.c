@@ -42,6 +42,22 @@ enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
         }                                                                                          \
     }
 
+/* What no filter can follow, and good data after it. */
+#define WAYOUT(title, text, kind, how, frames)                                                     \
+    {                                                                                              \
+        .name = title, .about = text, CAMERA, DEFAULT, .speed_mps = 1, .turn = 1,                  \
+        .twists_per_frame = 5, .bias = true, .before = HALF_MINUTE, .during = frames,              \
+        .after = HALF_MINUTE, .mishap = kind, .strength = how, .bars = {                           \
+            .silent = 0.01,                                                                        \
+            .told_frames = 5,                                                                      \
+            .later_sigmas = 5,                                                                     \
+            .later_width = 3,                                                                      \
+            .again_s = 10,                                                                         \
+            .good = 0.995,                                                                         \
+            .no_divergence = true                                                                  \
+        }                                                                                          \
+    }
+
 /* Wrong from the first frame on; what is told in the first second, when nothing is matched yet, does
  * not count. */
 #define MISFIT(title, text, kind, how)                                                             \
@@ -131,8 +147,12 @@ const scenario scenarios[] = {
     MISFIT("focal-0.5", "the focal length is 0.5 % longer than the filter thinks", FOCAL, 0.005),
     MISFIT("focal-1", "the focal length is 1 % longer than the filter thinks", FOCAL, 0.01),
     MISFIT("focal-2", "the focal length is 2 % longer than the filter thinks", FOCAL, 0.02),
-    EVENT("wayout-thrown", "the body is thrown by 5 m and 1 rad", THROWN, 1, 1, 5, 0),
-    EVENT("wayout-blind", "no points and garbage readings", BLIND, 1, 1, 5, 0),
+    WAYOUT("wayout-swapped", "every id stands for another point from one frame to the next", SWAPPED, 1, 1),
+    WAYOUT("wayout-thrown-half", "the body is thrown by 2.5 m and 0.5 rad", THROWN, 0.5, 1),
+    WAYOUT("wayout-thrown", "the body is thrown by 5 m and 1 rad", THROWN, 1, 1),
+    WAYOUT("wayout-blind-half", "no points and garbage readings for 2.5 s", BLIND, 1, 25),
+    WAYOUT("wayout-blind", "no points and garbage readings for 5 s", BLIND, 1, 50),
+    WAYOUT("wayout-blind-double", "no points and garbage readings for 10 s", BLIND, 1, 100),
 };
 /* clang-format on */
 const unsigned scenario_count = sizeof scenarios / sizeof scenarios[0];

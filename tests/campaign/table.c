@@ -38,7 +38,8 @@ typedef struct tally {
     double matched, gated, refused, resets;
     double reasons[PHASES][REASONS];
     double *told, *again; /* sorted; those never told or good again at the end, as infinity */
-    double first_diverged, second_later_sigmas, second_later_m;
+    double first_diverged, later_sigmas;
+    mean later_error2, later_own2, fresh_own2; /* m^2 */
 } tally;
 
 static void add_phase(tally *t, phase p, const account *a) {
@@ -78,8 +79,10 @@ static void add(tally *t, const outcome *o) {
     t->resets += o->resets;
     t->told[t->seeds] = o->told_frames < 0 ? HUGE_VAL : o->told_frames;
     t->again[t->seeds] = o->again_s < 0 ? HUGE_VAL : o->again_s;
-    t->second_later_sigmas = fmax(t->second_later_sigmas, o->second_later_sigmas);
-    t->second_later_m = fmax(t->second_later_m, o->second_later_m);
+    t->later_sigmas = fmax(t->later_sigmas, o->later_sigmas);
+    mean_add(&t->later_error2, o->later_error_m * o->later_error_m);
+    mean_add(&t->later_own2, o->later_own_m * o->later_own_m);
+    mean_add(&t->fresh_own2, o->fresh_own_m * o->fresh_own_m);
     if (o->first_diverged >= 0) {
         t->diverged_seeds++;
         if (!(t->first_diverged <= o->first_diverged))
@@ -123,6 +126,12 @@ static void most(verdict *v, const char *what, double is, double limit) {
         hold(v, is <= limit, what, is, limit);
 }
 
+/* How wide the filter's sigma is one second after an event, beside what it ought to cover: the
+ * errors that there are, and what no filter knows better one second after a start. */
+static double width(const tally *t) {
+    return sqrt(mean_of(&t->later_own2) / (mean_of(&t->later_error2) + mean_of(&t->fresh_own2)));
+}
+
 static verdict judge(const scenario *s, const tally *t) {
     const bars *b = &s->bars;
     const account *before = &t->phase[BEFORE], *during = &t->phase[DURING];
@@ -141,6 +150,8 @@ static verdict judge(const scenario *s, const tally *t) {
     most(&v, "told", quantile(t->told, t->seeds, 0.95), b->told_frames);
     most(&v, "error m", mean_of(&t->end_m[DURING]), b->error_m);
     most(&v, "again s", quantile(t->again, t->seeds, 0.95), b->again_s);
+    most(&v, "later sigmas", t->later_sigmas, b->later_sigmas);
+    most(&v, "width", width(t), b->later_width);
     if (b->no_divergence && t->diverged_seeds)
         hold(&v, false, "diverged", t->diverged_seeds, 0);
     if (t->died)
@@ -217,9 +228,12 @@ static void print_details(const scenario *s, const tally *t) {
         printf(", told after %g (95 %%: %g) frames", quantile(t->told, t->seeds, 0.5),
                quantile(t->told, t->seeds, 0.95));
     if (s->after)
-        printf(", GOOD again after %g (95 %%: %g) s, 1 s later within %.3g sigma, own %.3g m",
+        printf(", GOOD again after %g (95 %%: %g) s\n"
+               "  one second later: within %.3g sigma, error %.3g m, own %.3g m, a fresh start's "
+               "%.3g m, width %.3g",
                quantile(t->again, t->seeds, 0.5), quantile(t->again, t->seeds, 0.95),
-               t->second_later_sigmas, t->second_later_m);
+               t->later_sigmas, sqrt(mean_of(&t->later_error2)), sqrt(mean_of(&t->later_own2)),
+               sqrt(mean_of(&t->fresh_own2)), width(t));
     if (t->refused > 0)
         printf(", %.0f readings refused", t->refused);
     if (t->resets > 0)

@@ -122,6 +122,12 @@ void world_strike(world *w) {
         w->T_WB = pose_moved(&w->T_WB, thrown);
     } else if (w->s->mishap == JUMP_CAMERA) {
         w->camera_shift_m = a;
+    } else if (w->s->mishap == SWAPPED) {
+        for (unsigned k = 0; k < w->s->landmarks; k++) {
+            const uint32_t id = w->points[k].id;
+            place(w, &w->points[k]);
+            w->points[k].id = id;
+        }
     }
 }
 
