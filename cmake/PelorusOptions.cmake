@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: MIT
-# Everything that a user may choose. The defaults are the desktop's.
+# Everything that a user may choose.
 
-set(PLR_MAX_LANDMARKS 256 CACHE STRING "Most landmarks a filter can hold, 1 to 1024")
-set(PLR_MAX_OBSERVATIONS 1024 CACHE STRING "Most observations in one frame, 1 to 4096")
+# Of the library, as include/pelorus/config.h has them.
+set(PLR_MAX_LANDMARKS 32 CACHE STRING "Most landmarks a filter can hold, 1 to 1024")
+set(PLR_MAX_OBSERVATIONS 128 CACHE STRING "Most observations in one frame, 1 to 4096")
+# Of pelorus-replay, the tests and the bench.
+set(PELORUS_DESKTOP_LANDMARKS 256 CACHE STRING "Most landmarks of pelorus-replay, 1 to 1024")
+set(PELORUS_DESKTOP_OBSERVATIONS 1024 CACHE STRING
+  "Most observations in one frame of pelorus-replay, 1 to 4096")
 set(PLR_BLOCK_OBSERVATIONS 8 CACHE STRING
   "Observations processed at once, 1 to 16; results depend on it in their last bits")
 option(PLR_PORTABLE

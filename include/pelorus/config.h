@@ -4,13 +4,17 @@
  *
  * Every value has a default here and may be overridden on the compiler's command line (CMake does
  * that through options of the same names). Two translation units that share a filter must agree on
- * all of them; plr_build_fingerprint() tells whether they do. This is the only file of the library
- * in which preprocessor conditions stand.
+ * all of them: plr_filter_init and plr_session_init refuse a caller who does not. This is the only
+ * file of the library in which preprocessor conditions stand.
  */
 #ifndef PELORUS_CONFIG_H
 #define PELORUS_CONFIG_H
 
 #include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* Version, major << 16 | minor << 8 | patch; plr_version() has it as text. */
 #define PLR_VERSION_NUMBER 0x000100
@@ -113,5 +117,31 @@ enum {
     PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond its end */
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
 };
+
+/* What the layout of a filter or a session hangs on, as one translation unit was compiled, and how
+ * large it is there. Every init hands over the caller's; the library refuses what is not its own. */
+typedef struct plr_sizes {
+    uint32_t bytes, real, landmarks, observations, block;
+} plr_sizes;
+
+/* Those of the translation unit that calls it. */
+static inline plr_sizes plr_sizes_here(uint32_t bytes) {
+    plr_sizes sizes;
+    sizes.bytes = bytes;
+    sizes.real = PLR_REAL;
+    sizes.landmarks = PLR_MAX_LANDMARKS;
+    sizes.observations = PLR_MAX_OBSERVATIONS;
+    sizes.block = PLR_BLOCK_OBSERVATIONS;
+    return sizes;
+}
+
+static inline int plr_sizes_agree(const plr_sizes *a, const plr_sizes *b) {
+    return a->bytes == b->bytes && a->real == b->real && a->landmarks == b->landmarks &&
+           a->observations == b->observations && a->block == b->block;
+}
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -24,17 +24,30 @@
 #include "pelorus/state.h"
 #include "pelorus/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* --- life --- */
+
+/* What plr_filter_init calls, with the sizes of whoever calls it. */
+plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibration,
+                                 const plr_config *config, const plr_map *map,
+                                 const plr_sizes *caller);
 
 /* Prepares a filter: pose identity with covariance start_sigma^2 I, bias 0 with its prior, no
  * landmarks, clock not started (the first twist or frame starts it). `map` may be NULL: no sink, no
  * source. All three are copied, so they need not outlive the call.
  * PLR_E_ARGUMENT null pointer; PLR_E_CONFIG, see plr_config_check; PLR_E_CALIBRATION focal length
  * or baseline not positive, or T_CB not a rigid motion, or a number of them beyond 1e6;
- * PLR_E_MODE localization without a source; PLR_E_CPU the processor flushes subnormals to zero.
- * After an error the filter refuses every call with PLR_E_NOT_READY. */
-plr_status plr_filter_init(plr_filter *f, const plr_calibration *calibration,
-                           const plr_config *config, const plr_map *map);
+ * PLR_E_MODE localization without a source; PLR_E_CPU the processor flushes subnormals to zero;
+ * PLR_E_SIZE the caller was compiled with other sizes than the library: nothing is written.
+ * After any other error the filter refuses every call with PLR_E_NOT_READY. */
+static inline plr_status plr_filter_init(plr_filter *f, const plr_calibration *calibration,
+                                         const plr_config *config, const plr_map *map) {
+    const plr_sizes here = plr_sizes_here(sizeof(plr_filter));
+    return plr_filter_init_sized(f, calibration, config, map, &here);
+}
 
 /* Back to the state after plr_filter_init, with all counters at zero. */
 plr_status plr_filter_reset(plr_filter *f);
@@ -182,5 +195,9 @@ const char *plr_health_text(plr_health health);
  * (PLR_ARITHMETIC), precision, capacity, block size. */
 const char *plr_version(void);
 uint32_t plr_build_fingerprint(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

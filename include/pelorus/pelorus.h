@@ -4,17 +4,9 @@
 #ifndef PELORUS_PELORUS_H
 #define PELORUS_PELORUS_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #include "pelorus/config.h"
 #include "pelorus/filter.h"
 #include "pelorus/settings.h"
 #include "pelorus/types.h"
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

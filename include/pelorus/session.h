@@ -211,10 +211,18 @@ typedef struct plr_session {
  * for known landmarks, no storage, no observer. */
 void plr_session_options_default(plr_session_options *options);
 
+/* What plr_session_init calls, with the sizes of whoever calls it. */
+plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
+                                  const plr_session_options *options, const plr_sizes *caller);
+
 /* Prepares a session. Port and options are copied; what they point to is not. PLR_E_ARGUMENT a null
- * pointer or a port without read; PLR_E_CONFIG an override that no setting allows. */
-plr_status plr_session_init(plr_session *s, const plr_port *port,
-                            const plr_session_options *options);
+ * pointer or a port without read; PLR_E_CONFIG an override that no setting allows; PLR_E_SIZE the
+ * caller was compiled with other sizes than the library: nothing is written. */
+static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
+                                          const plr_session_options *options) {
+    const plr_sizes here = plr_sizes_here(sizeof(plr_session));
+    return plr_session_init_sized(s, port, options, &here);
+}
 
 /* Reads what is there, up to the end of one frame, and handles it. Bounded: PLR_SESSION_CHUNK
  * bytes, one filter update, and, at END, one LANDMARK for each slot. */

@@ -9,6 +9,10 @@
 
 #include "pelorus/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum plr_model_kind {
     PLR_MODEL_BODY = 0, /* landmarks in the camera, polar, invariant: consistent; the default */
     PLR_MODEL_WORLD = 1 /* landmarks in the world, the course report's; float64 only in earnest */
@@ -125,5 +129,9 @@ void plr_config_course(plr_config *config);
 /* PLR_OK, or PLR_E_CONFIG with the offending row in *culprit (which may be NULL). Also refuses
  * combinations that make no sense; the row is then the one to change. */
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

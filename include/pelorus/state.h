@@ -13,6 +13,10 @@
 #include "pelorus/settings.h"
 #include "pelorus/types.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Where landmarks go to and come from. Both functions may be NULL. They must not call the filter. */
 typedef struct plr_map {
     void *context;
@@ -84,8 +88,9 @@ typedef struct plr_noise {
     plr_real Lambda[21 + PLR_KERNEL_MARGIN];                    /* 6x6, packed upper triangle */
     plr_real eta[PLR_POSE_DIM];
     plr_real z[PLR_POSE_DIM]; /* nu is counted from here */
-    plr_real closer[PLR_MAX_LANDMARKS]; /* by which a slot's inverse range is about to change, 1/m */
-    uint8_t open; /* 1: W is part of the covariance and not yet in P */
+    plr_real
+        closer[PLR_MAX_LANDMARKS]; /* by which a slot's inverse range is about to change, 1/m */
+    uint8_t open;                  /* 1: W is part of the covariance and not yet in P */
 } plr_noise;
 
 /* Workspace of one call; nothing in it lives longer. */
@@ -137,5 +142,9 @@ typedef struct plr_filter {
     uint32_t matches_since_gated;
     plr_totals totals;
 } plr_filter;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -12,6 +12,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Time in nanoseconds; the zero is the recorder's choice. */
 typedef uint64_t plr_time_ns;
 
@@ -193,5 +197,9 @@ typedef struct plr_health_state {
     uint32_t resets; /* what the reset counter of a POSE counts: poses set from outside, and times
                         the covariance was widened */
 } plr_health_state;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -71,10 +71,14 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     par->max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
 }
 
-plr_status plr_filter_init(plr_filter *f, const plr_calibration *calibration,
-                           const plr_config *config, const plr_map *map) {
-    if (!f)
+plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibration,
+                                 const plr_config *config, const plr_map *map,
+                                 const plr_sizes *caller) {
+    const plr_sizes here = plr_sizes_here(sizeof(plr_filter));
+    if (!f || !caller)
         return PLR_E_ARGUMENT;
+    if (!plr_sizes_agree(caller, &here))
+        return PLR_E_SIZE;
     f->magic = 0;
     if (!calibration || !config)
         return PLR_E_ARGUMENT;

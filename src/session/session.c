@@ -32,8 +32,13 @@ static int write_to_port(void *context, const uint8_t *bytes, size_t n) {
     return s->port.write(s->port.context, bytes, n);
 }
 
-plr_status plr_session_init(plr_session *s, const plr_port *port,
-                            const plr_session_options *options) {
+plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
+                                  const plr_session_options *options, const plr_sizes *caller) {
+    const plr_sizes here = plr_sizes_here(sizeof(plr_session));
+    if (!caller)
+        return PLR_E_ARGUMENT;
+    if (!plr_sizes_agree(caller, &here))
+        return PLR_E_SIZE;
     if (s == NULL || port == NULL || options == NULL || port->read == NULL ||
         (options->override_count > 0 && options->overrides == NULL))
         return PLR_E_ARGUMENT;

@@ -64,6 +64,29 @@ def build_with_one_command(folder: Path, example: str, root: Path, cc: str) -> P
     return folder / "example"
 
 
+def check_sizes(folder: Path, example: str, prefix: Path, cc: str) -> None:
+    """By hand, the installed library is that of the headers' defaults; other sizes are refused."""
+    folder.mkdir()
+    (folder / "example.c").write_text(example, encoding="utf-8")
+    (library,) = prefix.glob("lib*/**/libpelorus.a")
+    command: list[str | Path] = [
+        cc,
+        "-std=c99",
+        f"-I{prefix / 'include'}",
+        folder / "example.c",
+        library,
+        "-o",
+    ]
+    run(*command, folder / "same")
+    run(folder / "same")
+    run(*command, folder / "other", "-DPLR_MAX_LANDMARKS=16")
+    refused = subprocess.run([folder / "other"], capture_output=True, text=True, check=False)
+    if refused.returncode == 0 or "other sizes" not in refused.stdout + refused.stderr:
+        print("compiled for 16 landmarks, the example runs with a library for 32:")
+        print(refused.stdout, refused.stderr, sep="\n")
+        raise SystemExit(1)
+
+
 def readme_example(root: Path) -> str:
     """The first C block of the README."""
     readme = root / "README.md"
@@ -102,6 +125,7 @@ def main() -> int:
             build_with_one_command(here / "bare", example, root, cc),
         ]
         outputs = [run(program) for program in programs]
+        check_sizes(here / "sizes", example, prefix, cc)
     print(outputs[0], end="")
     if len(set(outputs)) != 1:
         print("the three builds print different things:", *outputs, sep="\n")

@@ -29,8 +29,8 @@ build_robot() {
 # build_desktop NAME COMPILER FLAGS ARCH: a replay with the boards' capacities.
 build_desktop() {
     cmake -S "$ROOT" -B "$ROBOT/desktop-$1" -DCMAKE_BUILD_TYPE=None -DCMAKE_C_COMPILER="$2" \
-        -DCMAKE_C_FLAGS="$3" -DPELORUS_ARCH="$4" -DPLR_MAX_LANDMARKS=32 \
-        -DPLR_MAX_OBSERVATIONS=128 -DPELORUS_BUILD_TESTS=OFF -DPELORUS_INSTALL=OFF &&
+        -DCMAKE_C_FLAGS="$3" -DPELORUS_ARCH="$4" -DPELORUS_DESKTOP_LANDMARKS=32 \
+        -DPELORUS_DESKTOP_OBSERVATIONS=128 -DPELORUS_BUILD_TESTS=OFF -DPELORUS_INSTALL=OFF &&
         cmake --build "$ROBOT/desktop-$1" -j "$JOBS"
 }
 
