@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The course report's filter as the report has it (III.1 to III.14), at full size: one state of pose
+ * and ALL landmarks, four rows an observation, all observations of a frame in one gain, in double, on
+ * OpenBLAS and LAPACKE. It is the oracle of the tests for the model `world`, and pelorus-textbook.
+ * It shares nothing with src/.
+ *
+ * Errors: pose xi = (rho, theta) on the right, T = T^ Exp(xi); biases; and of a landmark dm in the
+ * world. Rows of P: xi (6), db (6, where biases are estimated), then three a landmark. Of P the lower
+ * triangle is kept, row by row, `ld` numbers a row.
+ *
+ * Each function says what it computes; the sources of the equations are in docs/MATH.md 14.
+ */
+#ifndef PELORUS_TEXTBOOK_H
+#define PELORUS_TEXTBOOK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "pelorus/settings.h"
+#include "pelorus/types.h"
+
+enum { TEXTBOOK_ROWS = 4 }; /* of an observation: uL, vL, uR, vR */
+
+typedef struct textbook_landmark {
+    double m[3]; /* in the world, m */
+    uint32_t id, times_seen, times_gated;
+    plr_time_ns last_seen_ns;
+    bool known;    /* from a map */
+    bool rejected; /* by the gate, in the last frame that saw it */
+} textbook_landmark;
+
+typedef struct textbook {
+    plr_config config; /* `slots` is not looked at */
+    plr_calibration camera;
+    double T_CB[16];
+
+    double T_WB[16], bias[6];
+    unsigned count, most; /* landmarks, and how many there is room for */
+    textbook_landmark *landmarks;
+    double *P;
+    size_t ld;
+    bool gate_open; /* a gate of fixed pixels lets through what the covariance explains */
+    bool diverged;  /* a variance has ceased to be positive */
+
+    unsigned most_seen; /* observations in a frame */
+    double *rows;       /* H P: 4 most_seen x ld */
+    double *pose, *own; /* rows of P, whole: the pose's six and one landmark's three */
+    double *S, *innovation, *correction;
+    unsigned *matched; /* landmark of each observation, count where there is none */
+} textbook;
+
+/* What a frame came to. */
+typedef struct textbook_report {
+    unsigned matched, used, gated;
+    bool failed; /* S could not be factorised: nothing was used */
+    double nis;
+} textbook_report;
+
+/* Bytes that textbook_init asks for. */
+size_t textbook_bytes(const plr_config *config, unsigned most, unsigned most_seen);
+
+/* At identity, with start_sigma^2 I (zero in mapping) and the bias prior; room for `most` landmarks
+ * and frames of `most_seen` observations. False if there is no memory. */
+bool textbook_init(textbook *t, const plr_calibration *calibration, const plr_config *config,
+                   unsigned most, unsigned most_seen);
+void textbook_free(textbook *t);
+
+/* As after init, in the memory that it has. */
+void textbook_reset(textbook *t);
+
+/* Sets pose and pose covariance, 6x6; drops the landmarks. Biases stay. */
+void textbook_set_pose(textbook *t, const plr_pose *T_WB, const double P_xi[36]);
+
+/* Sets the bias and its variances. Before any landmark. */
+void textbook_set_bias(textbook *t, const double mean[6], const double variance[6]);
+
+/* III.8, III.14: T <- T Exp(s (u - b)), P <- F P F^T + W, s `seconds` of an interval of the reading.
+ * W is sigma^2 s interval, or with noise = step sigma^2 s / interval. */
+void textbook_hold(textbook *t, const plr_twist *twist, double seconds, double interval);
+
+/* T <- T_WB, exactly. */
+void textbook_move_to(textbook *t, const plr_pose *T_WB);
+
+/* III.5, III.10: match, gate, and one gain for all that passed, by the observations of landmarks that
+ * it holds. Ids may stand once in a frame; it has at most `most_seen` observations. */
+textbook_report textbook_update(textbook *t, plr_time_ns t_ns, const plr_frame *frame);
+
+/* A new landmark from pixels (Sigma_m of III-F, or from their noise); `at` is its place in the
+ * state: count, or that of one that it replaces. False, and nothing done, where the pixels fail the
+ * settings' tests or there is no room. */
+bool textbook_create(textbook *t, unsigned at, plr_time_ns t_ns, const plr_observation *seen);
+
+/* Does an observation pass the tests that a new landmark must pass? */
+bool textbook_is_worth_a_landmark(const plr_config *config, const plr_calibration *camera,
+                                  const plr_observation *seen);
+
+/* A landmark of known place and covariance. False if there is no room. */
+bool textbook_insert_known(textbook *t, const plr_landmark *known);
+
+/* The place of an id among the landmarks; count if it is not there. */
+unsigned textbook_find(const textbook *t, uint32_t id);
+
+/* Landmark in the world. */
+void textbook_landmark_of(const textbook *t, unsigned landmark, plr_landmark *out);
+
+/* Rows of P in use; the first row of a landmark; P(i, j); its trace. */
+unsigned textbook_dim(const textbook *t);
+unsigned textbook_row(const textbook *t, unsigned landmark);
+double textbook_covariance(const textbook *t, unsigned i, unsigned j);
+double textbook_trace(const textbook *t);
+
+#endif
