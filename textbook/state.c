@@ -27,11 +27,16 @@ double textbook_trace(const textbook *t) {
     return trace;
 }
 
-unsigned textbook_find(const textbook *t, uint32_t id) {
+unsigned textbook_place(const textbook *t, uint32_t id) {
     unsigned i = 0;
     while (i < t->count && t->landmarks[i].id != id)
         i++;
     return i;
+}
+
+unsigned textbook_find(const textbook *t, uint32_t id) {
+    const unsigned i = textbook_place(t, id);
+    return i < t->count && t->landmarks[i].dropped ? t->count : i;
 }
 
 void textbook_landmark_of(const textbook *t, unsigned landmark, plr_landmark *out) {

@@ -28,6 +28,7 @@ typedef struct textbook_landmark {
     plr_time_ns last_seen_ns;
     bool known;    /* from a map */
     bool rejected; /* by the gate, in the last frame that saw it */
+    bool dropped;  /* a locked gate was wrong about it: seen again, it is a new one in its place */
 } textbook_landmark;
 
 typedef struct textbook {
@@ -98,8 +99,10 @@ bool textbook_is_worth_a_landmark(const plr_config *config, const plr_calibratio
 /* A landmark of known place and covariance. False if there is no room. */
 bool textbook_insert_known(textbook *t, const plr_landmark *known);
 
-/* The place of an id among the landmarks; count if it is not there. */
+/* The place of an id among the landmarks that are not dropped, or among all; count if it is not
+ * there. */
 unsigned textbook_find(const textbook *t, uint32_t id);
+unsigned textbook_place(const textbook *t, uint32_t id);
 
 /* Landmark in the world. */
 void textbook_landmark_of(const textbook *t, unsigned landmark, plr_landmark *out);

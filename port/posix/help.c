@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "posix/options.h"
+#include "posix/program.h"
 #include "posix/replay.h"
 #include "posix/settings_text.h"
 
@@ -102,6 +103,7 @@ void help_print(void) {
            "Runs the filter, in %s, over a recording: docs/REPLAY-FORMAT.md. IN.plr may be -,\n"
            "the standard input.\n"
            "\n"
+           "%s"
            "  " PELORUS_NAME " drive.plr --bias on --gate 0.99 --trajectory drive.tum\n"
            "  " PELORUS_NAME " drive.plr --config robot.conf --slots 120 --json\n"
            "  " PELORUS_NAME " drive.plr --preset course --print-config\n"
@@ -112,7 +114,7 @@ void help_print(void) {
            "CONFIG, the recording's HEADER, default.\n"
            "\n"
            "Options\n",
-           sizeof(plr_real) == sizeof(float) ? "float32" : "float64");
+           sizeof(plr_real) == sizeof(float) ? "float32" : "float64", program_about);
     for (unsigned i = 0; options_describe(i) != NULL; i++) {
         const option_description *o = options_describe(i);
         print_row(o->name, o->value, o->about);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "posix/gate.h"
+#include "posix/program.h"
 #include "posix/settings_text.h"
 
 void summary_init(summary *s) {
@@ -86,7 +87,9 @@ static void print_filter(const plr_session *session) {
         setting_value_to_text(setting, plr_config_get(config, setting), value, sizeof value);
         printf(", %s %s", shown[i], value);
     }
-    printf(", %u slots\n", (unsigned)config->slots);
+    char capacity[64];
+    program_capacity(config, capacity, sizeof capacity);
+    printf(", %s\n", capacity);
 }
 
 static double percent(uint64_t part, uint64_t whole) {
