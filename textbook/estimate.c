@@ -80,7 +80,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     return PLR_OK;
 }
 
-double plr_filter_trace(plr_filter *f) {
+double plr_filter_trace(const plr_filter *f) {
     (void)f;
     return is_sound() == PLR_OK ? textbook_trace(&the.book) : 0;
 }

@@ -15,10 +15,12 @@ void textbook_program_reserve(unsigned landmarks, unsigned observations) {
 
 /* ---------------------------------------------------------------- life */
 
-plr_status plr_filter_init(plr_filter *f, const plr_calibration *calibration,
-                           const plr_config *config, const plr_map *map) {
+plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibration,
+                                 const plr_config *config, const plr_map *map,
+                                 const plr_sizes *caller) {
     static const plr_map none = {0};
     (void)f;
+    (void)caller; /* one program, compiled at once */
     the.ready = false;
     if (!calibration || !config)
         return PLR_E_ARGUMENT;
