@@ -58,7 +58,7 @@ typedef struct plr_slot {
 
 /* Motion since the covariance was last brought up to date: xi+ = Ad(D^-1) xi + B db + N(0, Q). */
 typedef struct plr_motion {
-    plr_real R[9], p[3]; /* D */
+    plr_real E[9], p[3]; /* D = (I + E, p) */
     plr_real Q[36];      /* 6x6 */
     plr_real B[36];      /* 6x6 */
     plr_real seconds;    /* for the bias walk */

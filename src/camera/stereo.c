@@ -49,13 +49,13 @@ void plr_camera_to_body(plr_real s[3], const plr_camera *camera, const plr_real 
     plr_se3_inverse_point(s, camera->R_CB, camera->t_CB, q);
 }
 
-void plr_camera_motion(plr_real R_C[9], plr_real p_C[3], const plr_camera *camera,
-                       const plr_real R[9], const plr_real p[3]) {
-    plr_real RD[9], moved[3], back[3];
-    plr_mat3_mul(RD, camera->R_CB, R);
-    plr_mat3_mul_nt(R_C, RD, camera->R_CB);
-    plr_camera_from_body(moved, camera, p);
-    plr_mat3_vec(back, R_C, camera->t_CB);
+void plr_camera_motion(plr_real E_C[9], plr_real p_C[3], const plr_camera *camera,
+                       const plr_real E[9], const plr_real p[3]) {
+    plr_real RE[9], back[3];
+    plr_mat3_mul(RE, camera->R_CB, E);
+    plr_mat3_mul_nt(E_C, RE, camera->R_CB);
+    plr_mat3_vec(p_C, camera->R_CB, p);
+    plr_mat3_vec(back, E_C, camera->t_CB);
     for (int i = 0; i < 3; i++)
-        p_C[i] = moved[i] - back[i];
+        p_C[i] -= back[i];
 }

@@ -29,8 +29,8 @@ void plr_camera_from_body(plr_real q[3], const plr_camera *camera, const plr_rea
 /* s = R_CB^T (q - t_CB): left camera to body. */
 void plr_camera_to_body(plr_real s[3], const plr_camera *camera, const plr_real q[3]);
 
-/* D_C = T_CB D T_CB^-1: the body's motion D = (R, p), as the camera makes it. */
-void plr_camera_motion(plr_real R_C[9], plr_real p_C[3], const plr_camera *camera,
-                       const plr_real R[9], const plr_real p[3]);
+/* D_C = T_CB D T_CB^-1: the body's motion D = (I + E, p), as the camera makes it. */
+void plr_camera_motion(plr_real E_C[9], plr_real p_C[3], const plr_camera *camera,
+                       const plr_real E[9], const plr_real p[3]);
 
 #endif

@@ -428,9 +428,13 @@ bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
 }
 
 void plr_covariance_make_up_for_rounding(plr_filter *f) {
-    const unsigned n = plr_covariance_dim(f);
-    for (unsigned i = first_landmark_row(f); i < n; i++)
-        f->P[plr_packed_row(i) + i] *= PLR_R(1) + PLR_R(8) * PLR_EPSILON;
+    if (f->frame_number % 32 != 0)
+        return;
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const unsigned row = plr_covariance_row(f, slot);
+        for (unsigned i = row; f->slots[slot].last_frame == f->frame_number && i < row + 3; i++)
+            f->P[plr_packed_row(i) + i] *= PLR_R(1) + PLR_R(8) * PLR_EPSILON;
+    }
 }
 
 /* ---------------------------------------------------------------- slots */

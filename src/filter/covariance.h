@@ -90,9 +90,10 @@ void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linear
  * would cease to be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
-/* The landmarks' variances grow by a few roundings, P_ii *= 1 + 8 epsilon: as much as the roundings of
- * an update can take away. Without it they add up for as long as a robot stands still, and P ceases to
- * be a covariance (docs/NUMERICS.md 1). */
+/* In one frame of 32 the variances of the landmarks that it saw grow by a few roundings, P_ii *= 1 + 8
+ * epsilon: more than the roundings of the updates between can take away. Without it they add up for as
+ * long as a robot stands still and measures the same landmarks, and P ceases to be a covariance
+ * (docs/NUMERICS.md 1). */
 void plr_covariance_make_up_for_rounding(plr_filter *f);
 
 /* --- slots --- */

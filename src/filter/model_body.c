@@ -107,33 +107,34 @@ static plr_real bring_closer(plr_filter *f, unsigned slot) {
     if (!(ratio >= PLR_R(0.5) && ratio <= PLR_R(2)) ||
         !(ratio >= f->par.min_inverse_range * range && ratio * PLR_MIN_RANGE <= range))
         return 0;
+    const plr_real step = -closer * range / ratio;
     for (int i = 0; i < 3; i++)
-        q[i] /= ratio;
+        q[i] = PLR_FMA(step, q[i], q[i]);
     return closer;
 }
 
 static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
-    plr_real R[9], p[3];
-    plr_camera_motion(R, p, &f->par.camera, motion->R, motion->p);
+    plr_real E[9], R[9], p[3];
+    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
+    plr_se3_rotation(R, E);
 
     plr_real *F = f->work.Vt;
     memset(f->work.dx, 0, plr_covariance_dim(f) * sizeof *f->work.dx);
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
-        plr_real q[3];
         plr_polar from, to;
         const plr_real closer = bring_closer(f, slot);
-        plr_se3_inverse_point(q, R, p, s->x);
-        keep_off(q);
         plr_polar_at(&from, s->x);
-        plr_polar_at(&to, q);
+        plr_se3_move_back(s->x, E, p);
+        keep_off(s->x);
+        plr_polar_at(&to, s->x);
         carry_chart(F + 9 * slot, &to, R, p, &from);
-        memcpy(s->x, q, sizeof q);
         for (unsigned i = 0; i < 3; i++)
             f->work.dx[plr_covariance_row(f, slot) + i] = -closer * F[9 * slot + 3 * i + 2];
     }
     plr_real A[36];
-    plr_se3_adjoint_inverse(A, motion->R, motion->p);
+    plr_se3_rotation(R, motion->E);
+    plr_se3_adjoint_inverse(A, R, motion->p);
     plr_covariance_transport(f, A, F);
     if (!f->motion.noisy)
         return;
@@ -251,30 +252,28 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real eta[
  * by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
-    plr_real R_xi[9], p_xi[3], A[36], eta[6], eta_C[6] = {0}, R_C[9], p_C[3];
+    plr_real R_xi[9], p_xi[3], A[36], eta[6], eta_C[6] = {0}, E_C[9], R_C[9], p_C[3];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
     common_motion(f, dx, eta);
     plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, eta, 1, eta_C, 1);
-    plr_se3_exp(R_C, p_C, eta_C);
+    plr_se3_expm1(E_C, p_C, eta_C);
+    plr_se3_rotation(R_C, E_C);
 
     unsigned cut = 0;
     plr_real *F = f->work.Vt;
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, there, to;
-        plr_real J[18], M[4], w[3], q[3], rigid[9];
+        plr_real J[18], M[4], w[3], rigid[9];
         plr_polar_at(&from, s->x);
         chart_by_body_twist(f, &from, J);
         memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
                 w[i] = PLR_FMA(-J[6 * i + k], eta[k], w[i]);
-        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range);
-        for (int i = 0; i < 3; i++)
-            q[i] = there.r * there.mu[i];
-        plr_se3_inverse_point(s->x, R_C, p_C, q);
-
+        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x);
+        plr_se3_move_back(s->x, E_C, p_C);
         plr_polar_at(&to, s->x);
         carry_chart(rigid, &to, R_C, p_C, &there);
         plr_real *own = F + 9 * slot;

@@ -21,9 +21,10 @@ static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
 }
 
 static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
-    plr_real A[36];
+    plr_real A[36], R[9];
     (void)motion; /* the pose alone moves, by f->motion */
-    plr_se3_adjoint_inverse(A, f->motion.R, f->motion.p);
+    plr_se3_rotation(R, f->motion.E);
+    plr_se3_adjoint_inverse(A, R, f->motion.p);
     plr_covariance_predict_pose(f, A, &f->motion);
 }
 

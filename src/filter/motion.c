@@ -13,7 +13,6 @@
 
 void plr_motion_clear(plr_motion *motion) {
     memset(motion, 0, sizeof *motion);
-    plr_mat3_identity(motion->R);
 }
 
 /* xi = seconds (reading - b) */
@@ -32,13 +31,14 @@ plr_status plr_motion_check(const plr_filter *f, const plr_real reading[6], plr_
 
 /* p <- p + R d, in double; R <- R dR, once more a rotation to rounding: an hour of steps without
  * that leaves it by a hundredth in float32. */
-static void move_pose(plr_filter *f, const plr_real dR[9], const plr_real d[3]) {
-    plr_real step[3], R[9];
+static void move_pose(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
+    plr_real step[3], change[9];
     plr_mat3_vec(step, f->R_WB, d);
-    plr_mat3_mul(R, f->R_WB, dR);
+    plr_mat3_mul(change, f->R_WB, E);
     for (int i = 0; i < 3; i++)
         f->p_WB[i] += (double)step[i];
-    memcpy(f->R_WB, R, sizeof R);
+    for (int i = 0; i < 9; i++)
+        f->R_WB[i] += change[i];
     plr_so3_orthonormalise(f->R_WB);
 }
 
@@ -56,15 +56,16 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
 
 void plr_motion_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
                      plr_real interval) {
-    plr_real xi[6], R[9], p[3], A[36], next[36], variance[6];
+    plr_real xi[6], E[9], R[9], p[3], A[36], next[36], variance[6];
     plr_motion *m = &f->motion;
     displacement(f, reading, seconds, xi);
-    plr_se3_exp(R, p, xi);
+    plr_se3_expm1(E, p, xi);
+    plr_se3_rotation(R, E);
     plr_se3_adjoint_inverse(A, R, p);
     f->t_ns = t_ns;
-    move_pose(f, R, p);
-    plr_se3_append(m->R, m->p, R, p);
-    plr_so3_orthonormalise(m->R);
+    move_pose(f, E, p);
+    plr_se3_append(m->E, m->p, E, p);
+    plr_so3_orthonormalise_small(m->E);
 
     plr_sandwich6(next, A, m->Q);
     step_variance(f, seconds, interval, variance);
@@ -92,7 +93,9 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
         offset[i] = (plr_real)(p_WB[i] - f->p_WB[i]);
     plr_mat3_tvec(d, f->R_WB, offset);
     plr_mat3_mul_tn(dR, f->R_WB, R_WB);
-    plr_se3_append(f->motion.R, f->motion.p, dR, d);
+    for (int i = 0; i < 9; i += 4)
+        dR[i] -= PLR_R(1);
+    plr_se3_append(f->motion.E, f->motion.p, dR, d);
     f->motion.pending = 1;
     f->t_ns = t_ns;
     memcpy(f->R_WB, R_WB, sizeof f->R_WB);
@@ -100,9 +103,9 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
 }
 
 void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]) {
-    plr_real R[9], p[3];
-    plr_se3_exp(R, p, xi);
-    move_pose(f, R, p);
+    plr_real E[9], p[3];
+    plr_se3_expm1(E, p, xi);
+    move_pose(f, E, p);
 }
 
 /* A part of the biases' effect on the motion that is charged as noise besides. It keeps the factor of M
@@ -145,7 +148,7 @@ void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
     plr_real M[36];
     memset(f->work.noise.closer, 0, sizeof f->work.noise.closer);
     memset(applied, 0, sizeof *applied);
-    memcpy(applied->R, f->motion.R, sizeof applied->R);
+    memcpy(applied->E, f->motion.E, sizeof applied->E);
     memcpy(applied->p, f->motion.p, sizeof applied->p);
     if (!f->motion.noisy)
         return;
@@ -156,16 +159,16 @@ void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
 
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
                    plr_applied_motion *applied) {
-    plr_real n[6] = {0}, R[9], p[3], Jr[36];
+    plr_real n[6] = {0}, E[9], p[3], Jr[36];
     if (applied != prior)
         *applied = *prior;
     memcpy(applied->z, z, sizeof applied->z);
     plr_gemm_nn(6, 1, 6, applied->L, 6, z, 1, n, 1);
-    plr_se3_exp(R, p, n);
-    memcpy(applied->R, f->motion.R, sizeof applied->R);
+    plr_se3_expm1(E, p, n);
+    memcpy(applied->E, f->motion.E, sizeof applied->E);
     memcpy(applied->p, f->motion.p, sizeof applied->p);
-    plr_se3_append(applied->R, applied->p, R, p);
-    plr_so3_orthonormalise(applied->R);
+    plr_se3_append(applied->E, applied->p, E, p);
+    plr_so3_orthonormalise_small(applied->E);
     plr_se3_right_jacobian(Jr, n);
     memset(applied->JL, 0, sizeof applied->JL);
     plr_gemm_nn(6, 6, 6, Jr, 6, applied->L, 6, applied->JL, 6);
@@ -209,7 +212,10 @@ void plr_motion_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3])
     memcpy(p_WB, f->p_WB, sizeof f->p_WB);
     if (!f->motion.pending)
         return;
-    plr_mat3_mul_nt(R_WB, f->R_WB, f->motion.R); /* T D^-1 */
+    plr_real back[9];
+    plr_mat3_mul_nt(back, f->R_WB, f->motion.E); /* T D^-1 */
+    for (int i = 0; i < 9; i++)
+        R_WB[i] += back[i];
     plr_so3_orthonormalise(R_WB);
     plr_mat3_vec(moved, R_WB, f->motion.p);
     for (int i = 0; i < 3; i++)
@@ -218,8 +224,9 @@ void plr_motion_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3])
 
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
     const plr_motion *m = &f->motion;
-    plr_real A[36], P[36];
-    plr_se3_adjoint_inverse(A, m->R, m->p);
+    plr_real A[36], P[36], R[9];
+    plr_se3_rotation(R, m->E);
+    plr_se3_adjoint_inverse(A, R, m->p);
     plr_covariance_pose(f, P);
     plr_sandwich6(P_xi, A, P);
     for (int i = 0; i < 36; i++)

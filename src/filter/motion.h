@@ -29,7 +29,7 @@ void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]);
 /* The accumulated motion as a frame applies it, once its observations have said what it was: the
  * motion is D Exp(L nu) with nu ~ N(0, I), taken at nu = z (docs/MATH.md 4 and 10). */
 typedef struct plr_applied_motion {
-    plr_real R[9], p[3]; /* D' = D Exp(L z) */
+    plr_real E[9], p[3]; /* D' = D Exp(L z) = (I + E, p) */
     plr_real L[36];      /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
     plr_real JL[36];     /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
     plr_real z[6];

@@ -117,15 +117,17 @@ static void differentiate(const plr_camera *camera, const plr_polar *chart, cons
 
 /* One observation at a point: U of the trial bank, a and rho. False where nothing can be said. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_motion *m,
-                         const plr_real R[9], const plr_real p[3]) {
+                         const plr_real E[9], const plr_real p[3]) {
     const plr_camera *camera = &s->f->par.camera;
     const plr_slot *slot = slot_of(s, i);
     plr_sighting *at = &s->sightings[i];
     plr_linearisation lin;
     plr_polar chart;
-    plr_real q[3], J[9], A[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
+    plr_real R[9], q[3], J[9], A[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
     plr_real S[6 + PLR_KERNEL_MARGIN] = {0};
-    plr_se3_inverse_point(q, R, p, slot->x);
+    memcpy(q, slot->x, sizeof q);
+    plr_se3_move_back(q, E, p);
+    plr_se3_rotation(R, E);
     if (!(q[2] >= s->f->par.min_depth))
         return false;
     plr_polar_at(&chart, slot->x);
@@ -183,16 +185,16 @@ static plr_real norm2(const plr_real z[6]) {
  * point's measure. An observation that falls behind the camera is left out of the comparison. */
 static plr_real evaluate(plr_search *s, const plr_real z[6], plr_search_point *point) {
     plr_applied_motion m;
-    plr_real R[9], p[3], change = 0;
+    plr_real E[9], p[3], change = 0;
     plr_motion_at(s->f, &s->prior, z, &m);
-    plr_camera_motion(R, p, &s->f->par.camera, m.R, m.p);
+    plr_camera_motion(E, p, &s->f->par.camera, m.E, m.p);
     memset(point, 0, sizeof *point);
     memcpy(point->z, z, sizeof point->z);
     point->cost = norm2(z);
     for (unsigned i = 0; i < s->count; i++) {
         plr_sighting *at = &s->sightings[i];
         at->weight = 0;
-        if (!evaluate_one(s, i, &m, R, p)) {
+        if (!evaluate_one(s, i, &m, E, p)) {
             memcpy(at->U[1 - s->bank], at->U[s->bank], sizeof at->U[0]);
             continue;
         }

@@ -44,7 +44,7 @@ void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart) {
 }
 
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
-                       const plr_real w[3], plr_real min_inverse_range) {
+                       const plr_real w[3], plr_real min_inverse_range, plr_real q[3]) {
     bool cut = false;
     plr_real w1 = w[0], w2 = w[1];
     const plr_real turn2 = PLR_FMA(w2, w2, w1 * w1);
@@ -58,7 +58,7 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     for (int i = 0; i < 3; i++)
         along[i] = PLR_FMA(chart->N[2 * i + 1], w2, chart->N[2 * i] * w1);
     plr_cross3(a, chart->mu, along);
-    plr_so3_exp(E, a);
+    plr_so3_expm1(E, a);
 
     plr_real inverse = PLR_R(1) / chart->r + w[2];
     if (!(inverse >= min_inverse_range)) {
@@ -69,17 +69,20 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
         cut = true;
     }
     result->r = PLR_R(1) / inverse;
-    plr_real mu[3];
-    plr_mat3_vec(mu, E, chart->mu);
-    const plr_real unit = PLR_R(1) / PLR_SQRT(plr_dot3(mu, mu));
+    plr_real turn[3];
+    plr_mat3_vec(turn, E, chart->mu);
+    /* r+ - r = -r r+ w_3; and q+ - q = (r+ - r) (mu + turn) + r turn */
+    const plr_real further = cut ? result->r - chart->r : -chart->r * result->r * w[2];
     for (int i = 0; i < 3; i++)
-        result->mu[i] = mu[i] * unit;
-    basis(result->N, result->mu);
+        q[i] += PLR_FMA(further, chart->mu[i] + turn[i], chart->r * turn[i]);
+    plr_polar_at(result, q);
 
     for (int column = 0; column < 2; column++) {
         const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
         plr_real turned[3];
         plr_mat3_vec(turned, E, n);
+        for (int i = 0; i < 3; i++)
+            turned[i] += n[i];
         for (int row = 0; row < 2; row++) {
             const plr_real to[3] = {result->N[row], result->N[2 + row], result->N[4 + row]};
             M[2 * row + column] = plr_dot3(to, turned);

@@ -63,7 +63,7 @@ static const plr_field filter_fields[] = {
     OF_FILTER(p_WB, PLR_FIELD_F64, 3),
     OF_FILTER(bias, PLR_FIELD_REAL, PLR_BIAS_DIM),
     OF_FILTER(reading, PLR_FIELD_REAL, 6),
-    OF_FILTER(motion.R, PLR_FIELD_REAL, 9),
+    OF_FILTER(motion.E, PLR_FIELD_REAL, 9),
     OF_FILTER(motion.p, PLR_FIELD_REAL, 3),
     OF_FILTER(motion.Q, PLR_FIELD_REAL, 36),
     OF_FILTER(motion.B, PLR_FIELD_REAL, 36),

@@ -18,16 +18,27 @@ static void put_blocks(plr_real A[36], const plr_real R[9], const plr_real C[9])
     put_block(A, 0, 3, C);
 }
 
-void plr_se3_exp(plr_real R[9], plr_real p[3], const plr_real xi[6]) {
+void plr_se3_expm1(plr_real E[9], plr_real p[3], const plr_real xi[6]) {
     const plr_real *rho = xi, *theta = xi + 3;
     plr_so3_series s;
     plr_so3_series_at(&s, plr_dot3(theta, theta));
-    plr_so3_exp(R, theta);
+    plr_so3_expm1(E, theta);
     plr_real once[3], twice[3];
     plr_cross3(once, theta, rho);
     plr_cross3(twice, theta, once);
     for (int i = 0; i < 3; i++)
         p[i] = PLR_FMA(s.c, twice[i], PLR_FMA(s.b, once[i], rho[i]));
+}
+
+void plr_se3_exp(plr_real R[9], plr_real p[3], const plr_real xi[6]) {
+    plr_real E[9];
+    plr_se3_expm1(E, p, xi);
+    plr_se3_rotation(R, E);
+}
+
+void plr_se3_rotation(plr_real R[9], const plr_real E[9]) {
+    for (int i = 0; i < 9; i++)
+        R[i] = E[i] + (i % 4 == 0 ? PLR_R(1) : PLR_R(0));
 }
 
 void plr_se3_adjoint(plr_real Ad[36], const plr_real R[9], const plr_real p[3]) {
@@ -75,13 +86,22 @@ void plr_se3_right_jacobian(plr_real Jr[36], const plr_real xi[6]) {
     put_blocks(Jr, J, Q);
 }
 
-void plr_se3_append(plr_real R[9], plr_real p[3], const plr_real dR[9], const plr_real dp[3]) {
+void plr_se3_append(plr_real E[9], plr_real p[3], const plr_real dE[9], const plr_real dp[3]) {
     plr_real step[3], product[9];
-    plr_mat3_vec(step, R, dp);
-    plr_mat3_mul(product, R, dR);
+    plr_mat3_vec(step, E, dp);
+    plr_mat3_mul(product, E, dE);
     for (int i = 0; i < 3; i++)
-        p[i] += step[i];
-    memcpy(R, product, sizeof product);
+        p[i] += dp[i] + step[i];
+    for (int i = 0; i < 9; i++)
+        E[i] += dE[i] + product[i];
+}
+
+void plr_se3_move_back(plr_real x[3], const plr_real E[9], const plr_real p[3]) {
+    const plr_real offset[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
+    plr_real turn[3];
+    plr_mat3_tvec(turn, E, offset);
+    for (int i = 0; i < 3; i++)
+        x[i] += turn[i] - p[i];
 }
 
 void plr_se3_inverse_point(plr_real y[3], const plr_real R[9], const plr_real p[3],

@@ -11,6 +11,9 @@
 /* (R, p) = Exp(xi): p = (I + b [theta]x + c [theta]x^2) rho. Course report III.8. */
 void plr_se3_exp(plr_real R[9], plr_real p[3], const plr_real xi[6]);
 
+/* The same with E = R - I, to the relative precision of xi. */
+void plr_se3_expm1(plr_real E[9], plr_real p[3], const plr_real xi[6]);
+
 /* Ad(T) = [R, [p]x R; 0, R]. */
 void plr_se3_adjoint(plr_real Ad[36], const plr_real R[9], const plr_real p[3]);
 
@@ -22,8 +25,15 @@ void plr_se3_adjoint_inverse(plr_real Ad[36], const plr_real R[9], const plr_rea
  * 7.86, at -xi. */
 void plr_se3_right_jacobian(plr_real Jr[36], const plr_real xi[6]);
 
-/* (R, p) <- (R, p) (dR, dp) */
-void plr_se3_append(plr_real R[9], plr_real p[3], const plr_real dR[9], const plr_real dp[3]);
+/* (I + E, p) <- (I + E, p) (I + dE, dp) */
+void plr_se3_append(plr_real E[9], plr_real p[3], const plr_real dE[9], const plr_real dp[3]);
+
+/* R = I + E */
+void plr_se3_rotation(plr_real R[9], const plr_real E[9]);
+
+/* x <- T^-1 x = x + (E^T (x - p) - p) for T = (I + E, p): the point is rounded once, at the end, and a
+ * small motion does not stretch what it moves. */
+void plr_se3_move_back(plr_real x[3], const plr_real E[9], const plr_real p[3]);
 
 /* y = T^-1 x = R^T (x - p); y may not be x. */
 void plr_se3_inverse_point(plr_real y[3], const plr_real R[9], const plr_real p[3],

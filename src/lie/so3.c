@@ -41,16 +41,32 @@ void plr_so3_series_at(plr_so3_series *s, plr_real theta2) {
     s->e = alternating_weighted(theta2) * PLR_R(1.0 / 120);
 }
 
-void plr_so3_exp(plr_real R[9], const plr_real theta[3]) {
+void plr_so3_expm1(plr_real E[9], const plr_real theta[3]) {
     const plr_real theta2 = plr_dot3(theta, theta);
     const plr_real a = alternating(theta2, 1);
     const plr_real b = alternating(theta2, 2) * PLR_R(0.5);
     plr_real W[9], WW[9];
     plr_skew(W, theta);
     plr_mat3_mul(WW, W, W);
-    plr_mat3_identity(R);
     for (int i = 0; i < 9; i++)
-        R[i] = PLR_FMA(b, WW[i], PLR_FMA(a, W[i], R[i]));
+        E[i] = PLR_FMA(b, WW[i], a * W[i]);
+}
+
+void plr_so3_exp(plr_real R[9], const plr_real theta[3]) {
+    plr_so3_expm1(R, theta);
+    for (int i = 0; i < 9; i += 4)
+        R[i] += PLR_R(1);
+}
+
+void plr_so3_orthonormalise_small(plr_real E[9]) {
+    plr_real S[9], ES[9];
+    plr_mat3_mul_tn(S, E, E); /* (I + E)^T (I + E) - I = E + E^T + E^T E */
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            S[3 * i + j] += E[3 * i + j] + E[3 * j + i];
+    plr_mat3_mul(ES, E, S);
+    for (int i = 0; i < 9; i++)
+        E[i] -= PLR_R(0.5) * (S[i] + ES[i]);
 }
 
 void plr_so3_orthonormalise(plr_real R[9]) {

@@ -23,6 +23,13 @@ void plr_so3_series_at(plr_so3_series *s, plr_real theta2);
 /* R = Exp(theta) = I + a [theta]x + b [theta]x^2 (Rodrigues). */
 void plr_so3_exp(plr_real R[9], const plr_real theta[3]);
 
+/* E = Exp(theta) - I, to the relative precision of theta: what a small turn changes is not rounded at
+ * the size of 1. */
+void plr_so3_expm1(plr_real E[9], const plr_real theta[3]);
+
+/* E <- E' with I + E' = (I + E) (3 I - (I + E)^T (I + E)) / 2, in small numbers throughout. */
+void plr_so3_orthonormalise_small(plr_real E[9]);
+
 /* R <- R (3 I - R^T R) / 2: one Newton step towards the nearest rotation. What a frame of rounding
  * has put wrong is squared away. */
 void plr_so3_orthonormalise(plr_real R[9]);
