@@ -15,7 +15,7 @@ from pelorus import road
 from pelorus.converters import ece276a
 from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
 from pelorus.grid.sightings import messages_of
-from pelorus.report.whole_map import MIN_DISPARITY, traces
+from pelorus.report.whole_map import LANDMARK_SIGMA, MIN_DISPARITY, traces
 from pelorus.settings import SETTINGS
 from PIL import Image
 from replay_drive import BIN, ROOT, drive, encode, header
@@ -63,6 +63,12 @@ def test_an_observation_of_which_no_landmark_can_be_made_does_not_count_as_seen(
     messages = [config, *frame(0, 1, disparity=0.05), *frame(1, 1, disparity=0.2)]
     assert whole(messages, [1.0, 1.0]) == [1 + PRIOR, 1]
     assert SETTINGS[MIN_DISPARITY].name == "min-disparity"
+
+
+def test_the_prior_is_the_landmark_sigma_in_force() -> None:
+    config = Config({LANDMARK_SIGMA: 0.5}, build_fingerprint=1)
+    assert whole([config, *frame(0, 1), *frame(1, 2)], [1.0, 1.0]) == [1 + 0.75, 1]
+    assert SETTINGS[LANDMARK_SIGMA].name == "landmark-sigma"
 
 
 # --- ids as they stand in the file ----------------------------------------------------------------
@@ -124,6 +130,21 @@ def test_figures_and_table_are_made_in_one_go(pelorus: Command, tmp_path: Path) 
         assert sum(run in line for line in table) == 2
         assert run in said.out
     assert "the whole map of" in said.out
+
+
+def test_the_course_filter_can_be_changed_to_try_its_claims(
+    pelorus: Command, tmp_path: Path
+) -> None:
+    built_programs()
+    path, common = recorded(tmp_path, "one", drive(sigma_px=1)), ("--bin", BIN)
+    rows = []
+    for changes in ((), ("--course", "landmark-sigma=0.001", "--course", "gate=off")):
+        said = pelorus("course", path, "--out", tmp_path / "out", *common, *changes)
+        assert said.status == 0, said.err
+        rows.append((tmp_path / "out" / "table.md").read_text().splitlines()[2:])
+    assert rows[0][1] != rows[1][1]  # the course's
+    assert rows[0][0] == rows[1][0]
+    assert rows[0][2] == rows[1][2]
 
 
 def test_a_truth_is_taken_for_the_one_recording_that_has_none(

@@ -291,3 +291,14 @@ def test_a_recording_without_truth_is_no_reference(tmp_path: Path, pelorus: Run)
     assert "none of its 21 TRUTH frames has a STEREO's time" in outcome.err
     drive.write(tmp_path / "good.plr")
     assert len(read_truth(tmp_path / "good.plr").t_ns) == 21
+
+
+def test_a_step_that_changes_is_told_in_the_body_s_own_axes() -> None:
+    """A circle at an even pace is as calm as a straight way; a shake is what it is."""
+    turns = np.stack((np.zeros(50), np.zeros(50), 0.1 * np.arange(50)), axis=-1)
+    circle = Poses(se3.so3_exp(turns), 10 * np.stack((np.sin(turns[:, 2]), -np.cos(turns[:, 2]),
+                                                      np.zeros(50)), axis=-1))  # fmt: skip
+    assert figures.step_change(circle) == pytest.approx(0, abs=1e-12)
+    shaken = Poses(np.tile(np.eye(3), (50, 1, 1)), np.zeros((50, 3)))
+    shaken.p[::2, 0] = 0.5
+    assert figures.step_change(shaken) == pytest.approx(1.0)

@@ -85,6 +85,12 @@ def rigid_fit(source: Floats, target: Floats) -> Poses:
     return Poses(R, middle_target - R @ middle_source)
 
 
+def step_change(poses: Poses) -> float:
+    """How erratic a trajectory is: RMS change of the body's step from one pose to the next, m."""
+    steps = np.einsum("nij,ni->nj", poses.R[:-1], np.diff(poses.p, axis=0))
+    return rms(np.diff(steps, axis=0)) if len(steps) > 1 else 0.0
+
+
 def rms(errors: Floats) -> float:
     """Root of the mean squared norm of the rows."""
     return float(np.sqrt(np.mean(np.sum(errors**2, axis=-1))))

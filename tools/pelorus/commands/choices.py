@@ -43,12 +43,12 @@ class TimingOrAuto(str, Enum):
         return None if self is TimingOrAuto.AUTO else TwistTiming[self.name]
 
 
-def replay_options(config: Path | None, settings: list[str]) -> list[str]:
-    """What --config and --set NAME=VALUE become on the command line of pelorus-replay."""
+def replay_options(config: Path | None, settings: list[str], hint: str = "--set") -> list[str]:
+    """What --config and NAME=VALUE become on the command line of pelorus-replay."""
     options = [] if config is None else ["--config", str(config)]
     for setting in settings:
         name, equals, value = setting.partition("=")
         if not (name and equals and value):
-            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="--set")
+            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint=hint)
         options += [f"--{name}", value]
     return options

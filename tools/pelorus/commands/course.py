@@ -56,6 +56,13 @@ def course(
     settings: list[str] = typer.Option(
         [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
     ),
+    changes: list[str] = typer.Option(
+        [],
+        "--course",
+        metavar="NAME=VALUE",
+        help="Change the course's filter, to try its claims: gate=off, landmark-sigma=0.1, "
+        "max-depth=60; repeatable.",
+    ),
     programs: Path | None = typer.Option(
         None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
     ),
@@ -69,11 +76,14 @@ def course(
     from pelorus.course import trial  # noqa: PLC0415 - matplotlib and scipy load slowly
 
     options = _options(configs, settings, recordings)
+    changed = replay_options(None, changes, "--course")
     pairs = _references([read_subject(path) for path in recordings], truth, road_file)
     found_programs = find_programs(programs)
     trials = [
-        trial.carry_out_trial(subject, reference, found_programs, wanted, _runs(folder, subject))
-        for (subject, reference), wanted in zip(pairs, options, strict=True)
+        trial.carry_out_trial(
+            subject, reference, found_programs, trial.Options(ours, changed), _runs(folder, subject)
+        )
+        for (subject, reference), ours in zip(pairs, options, strict=True)
     ]
     _publish(trials, folder)
 

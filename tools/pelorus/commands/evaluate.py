@@ -23,6 +23,7 @@ MEANING = {
     "road_m": "RMS distance to the road",
     "out_of_plane_m": "RMS distance out of the trajectory's plane",
     "tilt_deg": "tilt of that plane against the first pose's z",
+    "step_change_m": "RMS change of the step from pose to pose: how erratic it is",
 }
 
 
@@ -71,6 +72,7 @@ def evaluate(
     else:
         assert road_file is not None
         found = _road(estimate, road_file, skip)
+    found["step_change_m"] = figures.step_change(estimate.poses)
     if as_json:
         typer.echo(json.dumps(found))
     else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pelorus.course.pictures import NAMES
 from pelorus.course.trial import Trial
+from pelorus.figures import step_change
 from pelorus.report.overview import NONE, number
 from pelorus.se3 import Floats
 
@@ -20,6 +21,7 @@ TITLES = (
     "ATE m",
     "rot deg",
     "NEES/6",
+    "step change m",
     "used",
     "gated",
     "trace, state",
@@ -45,6 +47,7 @@ def _row(trial: Trial, name: str) -> tuple[str, ...]:
         number(truth.ate_m if truth else None),
         number(truth.rot_deg if truth else None),
         number(trial.nees(name)),
+        number(step_change(run.trajectory.poses)),
         str(run.summary["used"]),
         str(run.summary["gated"]),
         *(cell or NONE for cell in moving),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -112,11 +112,23 @@ class Trial:
         return self.reference.road_m if self.road_fits else None
 
 
+@dataclass(frozen=True)
+class Options:
+    """For the replay: of dead reckoning and Pelorus; and what the course's filter gets besides its
+    preset.
+    """
+
+    ours: Sequence[str] = ()
+    course: Sequence[str] = ()
+
+
 def carry_out_trial(
-    subject: Subject, reference: Reference, programs: Programs, options: Sequence[str], folder: Path
+    subject: Subject, reference: Reference, programs: Programs, options: Options, folder: Path
 ) -> Trial:
     """Replay the recording; the files of the runs stay in the folder."""
-    planned = {plan.name: plan for plan in plan_runs(programs, subject.path, options)}
+    planned = {plan.name: plan for plan in plan_runs(programs, subject.path, options.ours)}
+    preset = planned[COURSE]
+    planned[COURSE] = replace(preset, options=(*preset.options, *options.course))
     plans = progress([planned[name] for name in RUNS], f"replaying {subject.path.name}")
     runs = [carry_out(plan, subject.path, folder) for plan in plans]
     return Trial(Comparison(subject, runs), reference)
