@@ -56,23 +56,60 @@ count() {
     [ "$status" -eq 0 ] || failures+=("$name (build-logs/$(basename "$log"))")
 }
 
-# step NAME COMMAND...: runs it, shows its end, and counts.
-step() {
-    local name=$1 log status started=$SECONDS
-    shift
-    log=$LOGS/$(tr -cs 'A-Za-z0-9\n' '-' <<<"$name").log
+log_of() {
+    printf '%s/%s.log' "$LOGS" "$(tr -cs 'A-Za-z0-9\n' '-' <<<"$1")"
+}
+
+# told NAME STATUS TIME: shows the end of what a step said, and counts.
+told() {
+    local name=$1 status=$2 seconds=$3 log
+    log=$(log_of "$name")
     heading "$name (build-logs/$(basename "$log"))"
-    "$@" >"$log" 2>&1
-    status=$?
-    if [ $status -eq 0 ]; then
+    if [ "$status" -eq 0 ]; then
         tail -3 "$log"
-        echo "ok, $((SECONDS - started)) s"
+        echo "ok, $seconds s"
     else
         tail -80 "$log"
-        echo "FAILED with status $status after $((SECONDS - started)) s"
+        echo "FAILED with status $status after $seconds s"
     fi
-    count "$log" $status "$name"
-    return $status
+    count "$log" "$status" "$name"
+    return "$status"
+}
+
+# step NAME COMMAND...: runs it, and tells.
+step() {
+    local name=$1 started=$SECONDS
+    shift
+    "$@" >"$(log_of "$name")" 2>&1
+    told "$name" $? $((SECONDS - started))
+}
+
+# beside NAME COMMAND...: begins a step that needs one processor, beside others of its kind, JOBS at a
+# time; `joined` waits for them all and tells, in the order of their beginning.
+begun=()
+beside() {
+    local name=$1
+    shift
+    while [ "$(jobs -rp | wc -l)" -ge "$JOBS" ]; do
+        wait -n
+    done
+    begun+=("$name")
+    {
+        local started=$SECONDS
+        "$@" >"$(log_of "$name")" 2>&1
+        echo "$? $((SECONDS - started))" >"$(log_of "$name").end"
+    } &
+}
+
+joined() {
+    local name end
+    wait
+    for name in "${begun[@]}"; do
+        read -ra end <"$(log_of "$name").end"
+        rm "$(log_of "$name").end"
+        told "$name" "${end[@]}"
+    done
+    begun=()
 }
 
 # What tests said when they left something out: Unity's IGNORE lines, pytest's SKIPPED lines and the
@@ -147,21 +184,22 @@ fi
 # --- form ----------------------------------------------------------------------------------------
 
 if command -v clang-format-14 >/dev/null; then
-    step 'C format' check_format
+    beside 'C format' check_format
 else
     skip 'C format' 'clang-format-14 is not here'
 fi
-step 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
-step 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
-step 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
+beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
+beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
+beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
     tools/pelorus tests/python tests/layering tests/golden tests/fuzz
-step 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
-    --config-file tools/pyproject.toml tests/target
+beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
+    --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
+joined
 
 # --- the desktop ---------------------------------------------------------------------------------
 
 step 'build: gcc' build_preset release "${strict[@]}" && step 'test: gcc' run_ctest build
-step 'test: Python' "$VENV/bin/python" -m pytest -q -rs tests/python
+step 'test: Python' "$VENV/bin/python" -m pytest -q -rs -n "$JOBS" tests/python
 
 if [ $extent != quick ]; then
     clang=$(command -v clang-14 || command -v clang)

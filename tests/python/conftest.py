@@ -12,10 +12,20 @@ import pytest
 from flight_logs import Compare, robots_log
 from pelorus.cli import main
 from pelorus.frames import Message
+from pelorus.robot import stream
 from replay_drive import BIN, drive, encode
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
+
+
+HANG_S = 1800.0  # nothing is awaited by the clock: only what hangs is ended
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine even the board that is none may take its time."""
+    monkeypatch.setattr(stream, "ANSWER_S", HANG_S)
 
 
 class Said(NamedTuple):

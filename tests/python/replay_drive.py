@@ -146,7 +146,7 @@ def run(*arguments: str | Path, program: str = "pelorus-replay", stdin: bytes = 
     if not path.exists():
         pytest.skip(f"{path} is not built")
     command = [str(path), *map(str, arguments)]
-    done = subprocess.run(command, input=stdin, capture_output=True, check=False, timeout=60)
+    done = subprocess.run(command, input=stdin, capture_output=True, check=False, timeout=1800)
     assert done.returncode >= 0, f"killed by signal {-done.returncode}"
     return Result(done.returncode, done.stdout.decode(), done.stderr.decode())
 

@@ -51,7 +51,9 @@ def echo(tmp_path_factory: pytest.TempPathFactory) -> EchoFunction:
     )
 
     def run(stream: bytes) -> Echo:
-        done = subprocess.run([program], input=stream, capture_output=True, check=False, timeout=60)
+        done = subprocess.run(
+            [program], input=stream, capture_output=True, check=False, timeout=1800
+        )
         words = done.stderr.decode().split()
         counts = {name: int(value) for name, value in (word.split("=") for word in words)}
         return Echo(done.returncode, done.stdout, counts)

@@ -11,9 +11,23 @@ from pathlib import Path
 
 import pytest
 from pelorus.frames import Message
+from pelorus.robot import emulator as emulators
+from pelorus.robot import link as links
+from pelorus.robot import stream
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.wire import read_file
+
+HANG_S = 1800.0  # nothing is awaited by the clock: only what hangs is ended
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A board that is emulated on a busy machine may take its time."""
+    monkeypatch.setattr(stream, "ANSWER_S", HANG_S)
+    monkeypatch.setattr(stream, "STATE_S", HANG_S)
+    monkeypatch.setattr(links, "CONNECT_S", HANG_S)
+    monkeypatch.setattr(emulators, "STOP_S", HANG_S)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

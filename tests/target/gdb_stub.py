@@ -10,7 +10,7 @@ import socket
 import subprocess
 from pathlib import Path
 
-TIMEOUT_S = 20.0
+TIMEOUT_S = 1800.0  # against hangs
 STOPPED = "T"
 
 

@@ -14,9 +14,9 @@ set -uo pipefail
 BOARDS=(mps2_an386 mps2_an500 mps3_an547 stm32f405)
 [ $# -eq 0 ] || BOARDS=("$@")
 ROBOT=$ROOT/build/robot
-BOARD_SECONDS=1500
+BOARD_SECONDS=14400 # against hangs: a busy machine takes four times as long, or ten
 long=()
-[ "${PELORUS_LONG:-0}" = 1 ] && long=(--long) && BOARD_SECONDS=7200
+[ "${PELORUS_LONG:-0}" = 1 ] && long=(--long) && BOARD_SECONDS=28800
 export PELORUS_DATA=${PELORUS_DATA:-$ROOT/../shared/data}
 
 build_robot() {

@@ -32,7 +32,7 @@ UNKNOWN_KINDS = (0, 77, 200, 255)
 FOREIGN, NOT_READY = -16, -13  # plr_status
 FUZZ = Path(__file__).resolve().parents[1] / "fuzz"
 STREAM = 128  # in the first byte of an input of corpus_session: see fuzz_session.c
-PATIENCE_S = 60.0
+PATIENCE_S = 1800.0  # against hangs
 DAY_NS = 86_400_000_000_000
 END = DELIMITER + encode(End(0, 0, 0, 0, 0), 0)
 

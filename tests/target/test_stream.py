@@ -27,7 +27,7 @@ from pelorus.wire import Counts, Writer, read_file
 from recordings import first_frames
 
 FRAMES = 40
-PATIENCE_S = 60.0
+PATIENCE_S = 1800.0  # against hangs
 LOOK_AGAIN_S = 0.02
 
 
@@ -97,7 +97,10 @@ BOTH = pytest.mark.parametrize("behind", [behind_tcp, behind_a_terminal], ids=["
 
 
 def words(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "pelorus", *map(str, arguments)]
+    given = [*map(str, arguments)]
+    if given[0] == "stream":
+        given += ["--answer", str(PATIENCE_S)]
+    return [sys.executable, "-m", "pelorus", *given]
 
 
 def pelorus(*arguments: object) -> subprocess.CompletedProcess[str]:

@@ -58,8 +58,12 @@ def stream(
     frames: int | None = typer.Option(
         None, min=1, metavar="N", help="Stop after so many stereo frames."
     ),
-    answer: float = typer.Option(
-        ANSWER_S, min=0.01, metavar="S", help="How long to wait for the answer to a frame."
+    answer: float | None = typer.Option(
+        None,
+        min=0.01,
+        metavar="S",
+        show_default=f"{ANSWER_S:g}",
+        help="How long to wait for the answer to a frame.",
     ),
     save_state: bool = typer.Option(
         False,

@@ -77,14 +77,14 @@ class Streamer:
         link: Link,
         log: BinaryIO | None = None,
         on_pose: Callable[[Pose], None] = lambda _: None,
-        answer_s: float = ANSWER_S,
+        answer_s: float | None = None,
     ) -> None:
         self.outcome = Outcome()
         self.reader = Reader()
         self._link = link
         self._log = None if log is None else FlightLog(log)
         self._on_pose = on_pose
-        self._answer_s = answer_s
+        self.answer_s = ANSWER_S if answer_s is None else answer_s
         self._sequence = 0
         self._sent: Counter[Kind] = Counter()
         self._setup: list[Message] = []
@@ -117,7 +117,7 @@ class Streamer:
         END is answered with END. It is said again while no answer comes: what arrives while a board
         boots is lost.
         """
-        deadline = time.monotonic() + self._answer_s
+        deadline = time.monotonic() + self.answer_s
         while not self._ended and time.monotonic() < deadline:
             self._exchange(DELIMITER + encode(End(0, 0, 0, 0, 0), 0), 0.0)
             self._wait(lambda: self._ended, min(END_AGAIN_S, deadline - time.monotonic()))
@@ -130,7 +130,7 @@ class Streamer:
 
     def _await_quiet(self) -> None:
         """Let the board finish what it is saying; a line that is never quiet is no board's."""
-        patience_s = max(GREETING_S, self._answer_s)
+        patience_s = max(GREETING_S, self.answer_s)
         deadline = time.monotonic() + patience_s
         while self._exchange(b"", QUIET_S):
             if time.monotonic() >= deadline:
@@ -164,7 +164,7 @@ class Streamer:
     def finish(self) -> None:
         """Say END, and hear the board's."""
         self._put(self._end(), logged=False)
-        self._wait(lambda: self._ended, self._answer_s)
+        self._wait(lambda: self._ended, self.answer_s)
         if self._log is not None:
             self._log.end()
 
@@ -188,7 +188,7 @@ class Streamer:
         self._unread_bytes = 0
 
     def _await_answer(self, t_ns: int) -> None:
-        self._wait(lambda: self._awaited is None or self._board_is_new, self._answer_s)
+        self._wait(lambda: self._awaited is None or self._board_is_new, self.answer_s)
         if self._awaited is None:
             self._unread_bytes = 0
             self._unanswered_in_a_row = 0
@@ -208,7 +208,7 @@ class Streamer:
         Without the state that it was to go on from, a drive would be another one: it ends there.
         """
         answers = len(self.outcome.states)
-        patience_s = max(STATE_S, self._answer_s)
+        patience_s = max(STATE_S, self.answer_s)
         self._wait(lambda: len(self.outcome.states) > answers or self._board_is_new, patience_s)
         self._unread_bytes = 0
         if len(self.outcome.states) > answers:
@@ -229,7 +229,7 @@ class Streamer:
     def _exchange(self, outgoing: bytes, wait_s: float) -> bool:
         """Send and take in; whether anything came."""
         came = False
-        for piece in self._link.pieces(outgoing, wait_s, self._answer_s):
+        for piece in self._link.pieces(outgoing, wait_s, self.answer_s):
             came = True
             for received in list(self.reader.feed(piece)):
                 self._take(received.message)
