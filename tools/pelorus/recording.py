@@ -37,6 +37,7 @@ class Recording:
     known: list[Landmark] = field(default_factory=list)
     remarks: list[Text] = field(default_factory=list)
     camera_delay_ns: int = 0  # frames stand so much later in the file, as they come off a robot
+    twist_delay_ns: int = 0  # twists likewise
 
     def with_header(self, **changes: Any) -> Recording:
         return replace(self, header=replace(self.header, **changes))
@@ -84,7 +85,7 @@ class Recording:
 
     def _twists(self) -> Iterator[tuple[int, int, Message]]:
         for t, v, w in zip(self.twist_t_ns.tolist(), self.v_B_mps, self.w_B_radps, strict=True):
-            yield t, 0, Twist(t, v, w)
+            yield t + self.twist_delay_ns, 0, Twist(t, v, w)
 
     def _truths(self) -> Iterator[tuple[int, int, Message]]:
         for t, R, p in zip(self.truth_t_ns.tolist(), *self.truth, strict=True):

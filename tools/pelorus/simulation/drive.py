@@ -47,6 +47,13 @@ def drive(t_ns: Times, timing: TwistTiming, speed_mps: float, lap_s: float) -> D
     return Drive(t_ns, v, w, chain(steps))
 
 
+def stood(t_ns: Times) -> Drive:
+    """At the first pose for ever."""
+    still: Floats = np.zeros((len(t_ns), 3))
+    R = np.broadcast_to(FIRST_R, (len(t_ns), 3, 3))
+    return Drive(t_ns, still, still, Poses(R, np.broadcast_to(FIRST_P_M, still.shape)))
+
+
 def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
     """Linear and angular velocity (n, 3) in a forward-left-up body."""
     t = np.asarray(t_ns * 1e-9, np.float64)

@@ -31,26 +31,56 @@ class View(NamedTuple):
     visible: NDArray[np.bool_]
 
 
-def landmarks(path: Poses, count: int, chance: np.random.Generator) -> Floats:
+class Depths(NamedTuple):
+    """Landmarks are seen between these depths; 0: as the camera and its range allow."""
+
+    least_m: float = 0.0
+    most_m: float = 0.0
+
+    @property
+    def side_m(self) -> tuple[float, float]:
+        """How far beside the way they stand, so that there are some at these depths."""
+        return (self.least_m or SIDE_M[0], self.most_m or max(SIDE_M[1], 2 * self.least_m))
+
+    @property
+    def given(self) -> bool:
+        return bool(self.least_m or self.most_m)
+
+
+ANY_DEPTH = Depths()
+
+
+def landmarks(
+    path: Poses, count: int, chance: np.random.Generator, depths: Depths = ANY_DEPTH
+) -> Floats:
     """(count, 3) in the world, beside random poses of the path."""
     at = chance.integers(0, len(path.p), count)
-    side = chance.uniform(*SIDE_M, count) * chance.choice((-1.0, 1.0), count)
+    side = chance.uniform(*depths.side_m, count) * chance.choice((-1.0, 1.0), count)
     ahead = chance.uniform(-3.0, 3.0, count)
-    up = chance.uniform(*HEIGHT_M, count)
+    up = chance.uniform(*HEIGHT_M, count) * max(1.0, depths.side_m[0] / SIDE_M[1])
     return path.p[at] + rotate(path.R[at], np.stack((ahead, side, up), axis=-1))
 
 
-def view(R_WB: Floats, p_WB: Floats, points_W: Floats, range_m: float) -> View:
+def view(
+    R_WB: Floats,
+    p_WB: Floats,
+    points_W: Floats,
+    range_m: float,
+    camera: Camera = CAMERA,
+    depths: Depths = ANY_DEPTH,
+) -> View:
     """What the camera of a body at (R, p) sees of the points."""
     in_body = rotate(R_WB.T, points_W - p_WB)
     q = rotate(T_CB.R, in_body) + T_CB.p
     x, y, z = q.T
     depth = np.maximum(z, DEPTH_MIN_M)
-    u_left = CAMERA.fx_px * x / depth + CAMERA.cx_px
-    v = CAMERA.fy_px * y / depth + CAMERA.cy_px
-    u_right = CAMERA.fx_px * (x - CAMERA.baseline_m) / depth + CAMERA.cx_px
+    u_left = camera.fx_px * x / depth + camera.cx_px
+    v = camera.fy_px * y / depth + camera.cy_px
+    u_right = camera.fx_px * (x - camera.baseline_m) / depth + camera.cx_px
     width, height = IMAGE_PX
     distance = np.sqrt(x * x + y * y + z * z)
     visible = (z > DEPTH_MIN_M) & (distance < range_m) & (u_left < width) & (u_right >= 0)
-    visible &= (v >= 0) & (v < height)
+    visible &= (v >= 0) & (v < height) & (z >= depths.least_m)
+    if depths.most_m:
+        visible &= z <= depths.most_m
     return View(q, np.stack((u_left, v, u_right, v), axis=-1), visible)

@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.frames import (
     OBSERVATIONS_MAX,
     BodyAxes,
+    Camera,
     Header,
     Landmark,
     Noise,
@@ -22,8 +24,9 @@ from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Floats, Poses
 from pelorus.simulation import scene, sensors
-from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive
-from pelorus.tracks import Tracks
+from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
+from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
+from pelorus.tracks import Indices, Tracks
 
 FRAMES_MAX = 1_000_000
 PEAK_TURN = 1.7  # the peak of the turn rate over its mean, and some roll and pitch
@@ -40,9 +43,13 @@ class Options:
     twist_timing: TwistTiming = TwistTiming.START
     speed_mps: float = 3.0
     lap_s: float = 40.0
+    parked: bool = False
     landmarks: int = 800
     observations: int = 60
     range_m: float = 30.0
+    min_depth_m: float = 0.0
+    max_depth_m: float = 0.0
+    baseline_m: float = scene.CAMERA.baseline_m
     keep_ids: bool = False
     known: bool = False
     known_sigma_m: float = 0.01
@@ -57,11 +64,13 @@ class Options:
     outliers: float = 0.02
     drop: float = 0.01
     camera_delay_s: float = 0.0
+    mishaps: Mishaps = NO_MISHAPS
 
     def check(self) -> None:
         """Refuse what makes no sense, by the option's name."""
         for name in ("duration_s", "frame_rate_hz", "twist_rate_hz", "lap_s", "range_m"):
             self._require(name, getattr(self, name) > 0, "a positive number")
+        self._require("baseline_m", self.baseline_m > 0, "a positive number")
         for name in ("loss", "outliers", "drop"):
             self._require(name, 0 <= getattr(self, name) < 1, "a fraction from 0 to below 1")
         for name in vars(self):
@@ -73,6 +82,9 @@ class Options:
         self._require(
             "observations", 0 < self.observations <= OBSERVATIONS_MAX, f"1 to {OBSERVATIONS_MAX}"
         )
+        deeper = not self.max_depth_m or self.max_depth_m > self.min_depth_m
+        self._require("max_depth_m", deeper, "more than --min-depth")
+        self.mishaps.check()
         self._require("seed", self.seed >= 0, "a whole number, not negative")
         ratio = self.twist_rate_hz / self.frame_rate_hz
         self._require(
@@ -81,6 +93,21 @@ class Options:
         self._require("duration_s", self.frames <= FRAMES_MAX, f"at most {FRAMES_MAX} frames")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
         self._require("lap_s", turn < TURN_MAX_RAD, f"at most {TURN_MAX_RAD} rad a twist")
+
+    @property
+    def depths(self) -> scene.Depths:
+        return scene.Depths(self.min_depth_m, self.max_depth_m)
+
+    @property
+    def seen_m(self) -> float:
+        """How far is seen: the depths that are asked for are not cut off."""
+        deepest = self.depths.side_m[1] if self.depths.given else 0.0
+        return max(self.range_m, 2 * deepest)
+
+    @property
+    def camera(self) -> Camera:
+        """As the HEADER tells it."""
+        return replace(scene.CAMERA, baseline_m=self.baseline_m)
 
     @property
     def frames(self) -> int:
@@ -109,7 +136,7 @@ class _Chances:
 
     def __init__(self, seed: int) -> None:
         names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
-        self._names = (*names, "bias_w")
+        self._names = (*names, "bias_w", "drift", "moving", "moving_ways")
         seeds = np.random.SeedSequence(seed).spawn(len(self._names))
         self._streams = [np.random.Generator(np.random.PCG64(s)) for s in seeds]
 
@@ -125,7 +152,7 @@ class Simulation:
     points_W: Floats  # (landmarks, 3)
     bias_velocity_mps: Floats  # (twists, 3)
     bias_gyro_radps: Floats
-    outlier: np.ndarray[tuple[int], np.dtype[np.bool_]]  # of each observation
+    outlier: Flags  # of each observation
 
 
 def simulate(options: Options) -> Simulation:
@@ -138,27 +165,41 @@ def simulate(options: Options) -> Simulation:
         options.speed_mps,
         options.lap_s,
     )
-    points = scene.landmarks(beyond.poses, options.landmarks, chances["scene"])
+    points = scene.landmarks(beyond.poses, options.landmarks, chances["scene"], options.depths)
     t_ns = _node_times(options)
-    way = beyond.until(len(t_ns))
+    way = stood(t_ns) if options.parked else beyond.until(len(t_ns))
     v, w, bias_v, bias_w = _readings(options, way, chances)
     at_frames = np.arange(options.frames) * options.twists_per_frame
-    truth = way.poses.at(at_frames)
+    frame_t_ns = t_ns[at_frames]
+    truth = options.mishaps.jumped(frame_t_ns, way.poses.at(at_frames))
     kept = np.nonzero(chances["drops"].random(options.frames) >= options.drop)[0]
-    tracks, outlier = _observe(options, truth.at(kept), points, chances)
+    tracks, outlier = _observe(options, frame_t_ns[kept], truth.at(kept), points, chances)
     recording = Recording(
         _header(options),
         t_ns,
         v,
         w,
-        t_ns[at_frames][kept],
+        frame_t_ns[kept],
         tracks,
-        t_ns[at_frames],
+        frame_t_ns,
         truth,
         known=_known(options, points),
         camera_delay_ns=round(options.camera_delay_s * 1e9),
+        twist_delay_ns=round(options.mishaps.twist_delay_s * 1e9),
     )
     return Simulation(recording, points, bias_v, bias_w, outlier)
+
+
+def blindness(recording: Recording) -> str:
+    """What is to be told of frames in which nothing is seen; nothing if there are none."""
+    frames = len(recording.frame_t_ns)
+    blind = int((recording.tracks.counts() == 0).sum())
+    if not blind:
+        return ""
+    return (
+        f"nothing is seen in {blind} of {frames} frames: more --landmarks, a longer --range, a "
+        "slower --speed or a smaller --min-depth would show more"
+    )
 
 
 def _node_times(options: Options, more_s: float = 0.0) -> Times:
@@ -180,12 +221,13 @@ def _readings(
     )
     v = way.v_B_mps + sensors.white(options.velocity_sigma_mps, count, chances["velocity"]) + bias_v
     w = way.w_B_radps + sensors.white(options.gyro_sigma_radps, count, chances["gyro"]) + bias_w
+    v, w = options.mishaps.readings(way.t_ns, v, w)
     return v, w, bias_v, bias_w
 
 
 def _observe(
-    options: Options, poses: Poses, points: Floats, chances: _Chances
-) -> tuple[Tracks, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
+) -> tuple[Tracks, Flags]:
     tracker = sensors.Tracker(
         options.landmarks,
         options.observations,
@@ -193,10 +235,12 @@ def _observe(
         options.keep_ids or options.known,
         chances["tracker"],
     )
+    eye = _Eye(options, t_ns, poses, points, chances)
     frames, ids, pixels, wrong = [], [], [], []
-    for k, (R, p) in enumerate(progress(zip(*poses, strict=True), "simulating", len(poses.p))):
-        seen = scene.view(R, p, points, options.range_m)
+    for k in progress(range(len(t_ns)), "simulating", len(t_ns)):
+        seen = eye.look(k)
         landmarks = tracker.follow(seen.visible)
+        id = tracker.ids(landmarks)
         measured, bad = sensors.measure(
             seen,
             landmarks,
@@ -206,14 +250,42 @@ def _observe(
             chances["outliers"],
         )
         frames.append(np.full(len(landmarks), k, np.intp))
-        ids.append(tracker.ids(landmarks))
-        pixels.append(measured)
+        ids.append(id)
+        pixels.append(measured + eye.drift(k, landmarks, id))
         wrong.append(bad)
     id = np.concatenate(ids)
     frame = np.concatenate(frames)
     order = np.lexsort((id, frame))
     tracks = Tracks.from_rows(len(poses.p), frame, id, np.concatenate(pixels))
-    return tracks, np.concatenate(wrong)[order]
+    tracks, whose = options.mishaps.freeze(t_ns, tracks)
+    return tracks, np.concatenate(wrong)[order][whose]
+
+
+class _Eye:
+    """The true camera, and where the landmarks are meanwhile."""
+
+    def __init__(
+        self, options: Options, t_ns: Times, poses: Poses, points: Floats, chances: _Chances
+    ) -> None:
+        mishaps = options.mishaps
+        self._options = options
+        self._camera = mishaps.true_camera(options.camera)
+        self._poses = poses
+        self._points = points
+        moves = chances["moving"].random(len(points)) < mishaps.moving
+        self._moves = moves[:, None]
+        self._ways = mishaps.ways(t_ns, poses, chances["moving_ways"])
+        self._drift = Drift(len(points), mishaps.track_drift, chances["drift"])
+        self._tau_s = np.diff(t_ns, prepend=t_ns[:1]) * 1e-9
+
+    def look(self, k: int) -> scene.View:
+        options = self._options
+        points = np.where(self._moves, self._points + self._ways[k], self._points)
+        R, p = self._poses.at(k)
+        return scene.view(R, p, points, options.seen_m, self._camera, options.depths)
+
+    def drift(self, k: int, landmarks: Indices, ids: NDArray[np.int64]) -> Floats:
+        return self._drift.wander(landmarks, ids, float(self._tau_s[k]))
 
 
 def _header(options: Options) -> Header:
@@ -221,7 +293,7 @@ def _header(options: Options) -> Header:
     suggested = {name: getattr(options, name, -1.0) for name in vars(Noise())}
     width, height = scene.IMAGE_PX
     return Header(
-        scene.CAMERA,
+        options.camera,
         scene.T_CB.R,
         scene.T_CB.p,
         body_axes=BodyAxes.FORWARD_LEFT_UP,
