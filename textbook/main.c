@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "posix/map_in.h"
 #include "posix/options.h"
 #include "posix/replay.h"
 #include "posix/verdict.h"
@@ -72,6 +73,8 @@ static int check_settings(const plr_config *config) {
 /* The first reading. A recording of which nothing can be made is for the second to explain. */
 static int look_ahead(const replay_options *o, census *c) {
     plr_config config;
+    map_in map;
+    char problem[PROBLEM_SIZE];
     const plr_setting *culprit;
     const plr_layers layers = {&c->header, &c->wanted, o->overrides, o->override_count};
     if (o->load_state != NULL || o->save_state != NULL)
@@ -84,6 +87,11 @@ static int look_ahead(const replay_options *o, census *c) {
         return verdict_say(o->input, REPLAY_EXIT_RECORDING, strerror(errno));
     if (c->header.version_major == 0 || plr_layers_compose(&config, &layers, &culprit) != PLR_OK)
         return REPLAY_EXIT_OK;
+    const bool mapped = map_in_read(&map, o->map_in, problem);
+    c->known += (unsigned)map.landmarks.count;
+    map_in_free(&map);
+    if (!mapped)
+        return usage_error(problem);
     const int status = check_settings(&config);
     return status == REPLAY_EXIT_OK && !o->print_config ? reserve(o, c, &config) : status;
 }

@@ -109,6 +109,9 @@ typedef struct plr_session_options {
                              src/session/budget.h */
     plr_landmark *known;  /* memory for LANDMARK (known); must outlive the session */
     unsigned known_capacity;
+    const plr_landmark
+        *map;               /* known landmarks of every drive, besides the stream's own; ids once */
+    unsigned map_count;     /* at most known_capacity; an echo of them stands in a flight log */
     plr_state_store *store; /* initialised; NULL: there is no storage. Must outlive the session */
     plr_session_observer observer;
 } plr_session_options;

@@ -109,6 +109,8 @@ void help_print(void) {
            "  " PELORUS_NAME " drive.plr --preset course --print-config\n"
            "  " PELORUS_NAME " morning.plr --save-state robot.state\n"
            "  " PELORUS_NAME " evening.plr --load-state robot.state\n"
+           "  " PELORUS_NAME " first.plr --out map.plr\n"
+           "  " PELORUS_NAME " second.plr --mode localization --map-in map.plr\n"
            "\n"
            "A setting is taken from the first that gives it: option, config file, the recording's\n"
            "CONFIG, the recording's HEADER, default.\n"

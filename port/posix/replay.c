@@ -10,6 +10,7 @@
 #include "posix/config_file.h"
 #include "posix/file_port.h"
 #include "posix/help.h"
+#include "posix/map_in.h"
 #include "posix/options.h"
 #include "posix/progress.h"
 #include "posix/result_file.h"
@@ -19,7 +20,7 @@
 #include "posix/verdict.h"
 
 enum {
-    KNOWN_LANDMARKS = 1 << 16,
+    KNOWN_LANDMARKS = MAP_IN_MOST,
     FOREIGN_BYTES = 1 << 20 /* without one good frame: no recording */
 };
 
@@ -31,6 +32,7 @@ typedef struct replay {
     file_port port;
     result_file trajectory, map, frames, out;
     storage storage;
+    map_in map_in;
     bool finishing;    /* the end is the replay's own doing, not a message's */
     samples landmarks; /* plr_landmark_message */
     summary summary;
@@ -43,7 +45,18 @@ typedef struct replay {
 
 static void on_started(void *context) {
     replay *run = context;
+    const plr_config *config = plr_filter_config(&run->session.filter);
     run->outcome.started = true;
+    run->outcome.foreign_map =
+        !map_in_fits(&run->map_in, &run->session.header, run->outcome.map_problem);
+    if (run->map_in.path == NULL)
+        return;
+    if (config->mode != PLR_MODE_LOCALIZATION && config->known_map == 0)
+        complaints_say(&run->complaints, "the map of --map-in is not asked for: give --mode "
+                                         "localization, or --known-map on");
+    if (map_in_is_of_another_camera(&run->map_in, &run->session.header))
+        complaints_say(&run->complaints, "the map of --map-in was made with another camera: its "
+                                         "ids must be those of this recording's front end");
 }
 
 /* Trace of the whole covariance. In dead reckoning it is put together from parts that leave the
@@ -176,6 +189,8 @@ static plr_status start_session(replay *run) {
     options.output |= PLR_OUTPUT_ECHO;
     options.known = run->known;
     options.known_capacity = KNOWN_LANDMARKS;
+    options.map = run->map_in.landmarks.items;
+    options.map_count = (unsigned)run->map_in.landmarks.count;
     storage_lend(&run->storage, &run->options, &options);
     options.observer = (plr_session_observer){.context = run,
                                               .started = on_started,
@@ -215,7 +230,8 @@ static bool take_step(replay *run) {
         storage_begin(&run->storage);
     const bool foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
     progress_show(&run->progress, counts->bytes, run->summary.frames);
-    return !foreign && run->outcome.init_status == PLR_OK && run->storage.load_status == PLR_OK &&
+    return !foreign && !run->outcome.foreign_map && run->outcome.init_status == PLR_OK &&
+           run->storage.load_status == PLR_OK &&
            !(run->outcome.started && run->options.print_config);
 }
 
@@ -249,7 +265,7 @@ static void read_recording(replay *run) {
     run->summary.cut_in_frame = plr_reader_mid_frame(&run->session.reader);
     run->finishing = true;
     if (!run->summary.ended && run->outcome.started && run->storage.load_status == PLR_OK &&
-        !run->options.print_config) {
+        !run->options.print_config && !run->outcome.foreign_map) {
         storage_begin(&run->storage);
         plr_session_finish(&run->session);
     }
@@ -283,11 +299,18 @@ static bool memory_sufficed(const replay *run) {
     return true;
 }
 
+static int usage_error(const char *problem) {
+    fprintf(stderr, PELORUS_NAME ": %s\n", problem);
+    return REPLAY_EXIT_USAGE;
+}
+
 static int run_recording(replay *run) {
     read_recording(run);
     int status = verdict_on_recording(run->options.input, &run->session, &run->outcome);
     if (status == REPLAY_EXIT_OK)
         status = storage_verdict_on_load(&run->storage, &run->options);
+    if (status == REPLAY_EXIT_OK && run->outcome.foreign_map)
+        status = usage_error(run->outcome.map_problem);
     if (status == REPLAY_EXIT_OK && run->options.print_config) {
         config_file_print(plr_filter_config(&run->session.filter));
         return fflush(stdout) == 0 ? REPLAY_EXIT_OK : REPLAY_EXIT_OUTPUT;
@@ -322,15 +345,18 @@ static int print_settings(const replay_options *options) {
     return REPLAY_EXIT_OK;
 }
 
-static int usage_error(const char *problem) {
-    fprintf(stderr, PELORUS_NAME ": %s\n", problem);
-    return REPLAY_EXIT_USAGE;
-}
-
 static int open_and_run(replay *run) {
     const replay_options *o = &run->options;
-    if (!file_port_open(&run->port, o->input))
-        return verdict_say(o->input, REPLAY_EXIT_RECORDING, strerror(errno));
+    char problem[PROBLEM_SIZE];
+    if (!map_in_read(&run->map_in, o->map_in, problem)) {
+        map_in_free(&run->map_in);
+        return usage_error(problem);
+    }
+    if (!file_port_open(&run->port, o->input)) {
+        const int error = errno;
+        map_in_free(&run->map_in);
+        return verdict_say(o->input, REPLAY_EXIT_RECORDING, strerror(error));
+    }
     int status = storage_open(&run->storage, o);
     samples_init(&run->landmarks, sizeof(plr_landmark_message));
     summary_init(&run->summary);
@@ -346,6 +372,7 @@ static int open_and_run(replay *run) {
     summary_free(&run->summary);
     samples_free(&run->landmarks);
     storage_close(&run->storage);
+    map_in_free(&run->map_in);
     file_port_close(&run->port);
     return status;
 }

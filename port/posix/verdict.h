@@ -3,6 +3,7 @@
 #ifndef PELORUS_POSIX_VERDICT_H
 #define PELORUS_POSIX_VERDICT_H
 
+#include "posix/setting_list.h"
 #include "posix/summary.h"
 
 /* What the run met, besides what the session and the summary tell. */
@@ -12,6 +13,8 @@ typedef struct outcome {
     int read_error;         /* errno; 0 where all was read */
     plr_status init_status; /* why the filter did not start */
     char culprit[64];       /* setting to change, "" where it is not one */
+    bool foreign_map;       /* the map of --map-in is in another frame */
+    char map_problem[PROBLEM_SIZE];
 } outcome;
 
 /* Says what is wrong with the file, and gives the status back. */

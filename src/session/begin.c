@@ -25,6 +25,8 @@ void plr_begin_anew(plr_session *s) {
     s->predict_ns = 0;
     plr_held_init(&s->held);
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
+    for (unsigned i = 0; i < s->options.map_count; i++)
+        (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */
     plr_clock_watch_init(&s->watch);
     plr_budget_init(&s->budget, s->options.deadline_us);
 }
@@ -99,6 +101,8 @@ bool plr_begin_filter(plr_session *s) {
 void plr_begin_announce(plr_session *s) {
     s->phase = PLR_PHASE_RUNNING;
     plr_send_config(s);
+    for (unsigned i = 0; i < s->options.map_count; i++)
+        plr_send_known(s, &s->options.map[i]);
     if (s->options.observer.started != NULL)
         s->options.observer.started(s->options.observer.context);
     warn_about(s, plr_filter_config(&s->filter));

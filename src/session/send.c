@@ -108,6 +108,13 @@ void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_st
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
 }
 
+void plr_send_known(plr_session *s, const plr_landmark *landmark) {
+    s->out.kind = PLR_KIND_LANDMARK;
+    s->out.as.landmark.role = PLR_LANDMARK_KNOWN;
+    s->out.as.landmark.landmark = *landmark;
+    put(s, PLR_OUTPUT_ECHO, &s->out);
+}
+
 void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
     s->out.kind = PLR_KIND_LANDMARK;
     s->out.as.landmark.role = (uint8_t)role;

@@ -40,7 +40,9 @@ plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
     if (!plr_sizes_agree(caller, &here))
         return PLR_E_SIZE;
     if (s == NULL || port == NULL || options == NULL || port->read == NULL ||
-        (options->override_count > 0 && options->overrides == NULL))
+        (options->override_count > 0 && options->overrides == NULL) ||
+        (options->map_count > 0 && options->map == NULL) ||
+        options->map_count > options->known_capacity)
         return PLR_E_ARGUMENT;
     if (check_overrides(options) != PLR_OK)
         return PLR_E_CONFIG;

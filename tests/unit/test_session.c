@@ -247,6 +247,14 @@ static void test_impossible_arguments_are_refused(void) {
     options.override_count = 1;
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_session_init(&session, &functions, &options));
     options.override_count = 0;
+    options.map_count = 1;
+    options.known_capacity = 1;
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_session_init(&session, &functions, &options));
+    static const plr_landmark landmark = {.id = 1};
+    options.map = &landmark;
+    options.known_capacity = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_session_init(&session, &functions, &options));
+    options.map_count = 0;
     functions.read = NULL;
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_session_init(&session, &functions, &options));
 }
