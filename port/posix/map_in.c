@@ -27,6 +27,7 @@ static void take(map_in *map, desk *d) {
     if (d->in.kind == PLR_KIND_LANDMARK) {
         plr_landmark landmark = d->in.as.landmark.landmark;
         landmark.known = true;
+        landmark.last_seen_ns = 0; /* docs/REPLAY-FORMAT.md: of a known one */
         samples_add(&map->landmarks, &landmark);
     }
     d->ended = d->ended || d->in.kind == PLR_KIND_END;
