@@ -64,6 +64,14 @@ class Table:
             out[row] = int(text)
         return out
 
+    def has(self, name: str) -> bool:
+        return name in self._columns
+
+    def words(self, name: str) -> list[str]:
+        """The cells of a column, without the blanks around them."""
+        self.require(name)
+        return [cell.strip() for cell in self._columns[name]]
+
     def times(self) -> NDArray[np.int64]:
         """ns from the column t_ns, or from t_s; not yet checked to ascend."""
         if "t_ns" in self._columns:

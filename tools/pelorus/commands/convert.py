@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import typer
 from rich.markup import escape
 
@@ -13,7 +14,7 @@ from pelorus.commands.choices import Fix, Timing, TimingOrAuto
 from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
-from pelorus.converters import matlab
+from pelorus.converters import landmark_map, matlab
 from pelorus.faults.finding import Finding
 from pelorus.frames import TEXT_BYTES_MAX, Text
 from pelorus.recording import Recording
@@ -133,6 +134,36 @@ def csv(
         twist_timing.value_in_header if twist_timing else None,
     )
     _write(recording, findings, target)
+
+
+@app.command(
+    "map",
+    epilog="Example:  pelorus convert map landmarks.csv map.plr --like drive.plr",
+)
+def map_(
+    source: Path = typer.Argument(
+        ...,
+        metavar="IN",
+        help="CSV with the columns id, x_m, y_m, z_m in the world, and sigma_m or cov_xx_m2, "
+        "cov_yx_m2, cov_yy_m2, cov_zx_m2, cov_zy_m2, cov_zz_m2 (a column frame must say world); "
+        "or a PLY of pelorus-replay --map.",
+    ),
+    target: Path = typer.Argument(..., metavar="OUT.plr", help="The map to write."),
+    like: Path = typer.Option(
+        ...,
+        "--like",
+        metavar="DRIVE.plr",
+        help="A recording of the camera that will see the landmarks: for HEADER and body axes.",
+    ),
+) -> None:
+    """Make known landmarks of a map, to be localised in."""
+    recording = landmark_map.convert(source, like)
+    size = recording.write(target)
+    sigma = [float(np.sqrt(m.covariance[[0, 2, 5]].mean())) for m in recording.known]
+    out.print(
+        f"{escape(str(target))}: {size} bytes, {len(sigma)} known landmarks, sigma "
+        f"{min(sigma):.3g} to {max(sigma):.3g} m"
+    )
 
 
 def _verdict(finding: Finding) -> str:
