@@ -207,7 +207,7 @@ if [ $extent != quick ]; then
     build_and_test clang 'clang' "${strict[@]}" -DCMAKE_C_COMPILER="$clang"
     build_and_test portable 'portable' "${strict[@]}"
     step 'build: less optimised' build_preset o2 -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON
-    step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
+    beside 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then
         step 'fuzz the reader' fuzz 120 fuzz_reader tests/fuzz/corpus 4096
@@ -216,6 +216,7 @@ if [ $extent != quick ]; then
     if [ -x tests/target/run.sh ]; then
         step 'microcontroller' tests/target/run.sh
     fi
+    joined
 fi
 
 # --- summary -------------------------------------------------------------------------------------

@@ -77,13 +77,24 @@ fi
 "$VENV/bin/python" "$ROOT/tests/target/recordings.py" "$ROBOT/recordings" "${long[@]}" ||
     die 'the recordings could not be made'
 
+# Most of it needs one processor alone, so the boards run meanwhile.
+sizes_check() {
+    rm -f "$LOGS/target-sizes.passed"
+    "$ROOT/tools/sizes.sh" --check >"$LOGS/target-sizes.log" 2>&1 &&
+        touch "$LOGS/target-sizes.passed"
+}
+
 heading "Emulated boards: ${BOARDS[*]}"
 failed=0
-running=0
+running=0 at_once=2
+if [ $# -eq 0 ]; then
+    sizes_check &
+    running=1 at_once=3
+fi
 for board in "${BOARDS[@]}"; do
     test_board "$board" &
     running=$((running + 1))
-    if [ $running -ge 2 ]; then
+    if [ $running -ge $at_once ]; then
         wait -n || failed=1
         running=$((running - 1))
     fi
@@ -100,7 +111,7 @@ passes=$(total passed) failures=$(total failed)
 
 if [ $# -eq 0 ]; then
     heading 'What it costs, against docs/SIZES.md'
-    if "$ROOT/tools/sizes.sh" --check >"$LOGS/target-sizes.log" 2>&1; then
+    if [ -e "$LOGS/target-sizes.passed" ]; then
         passes=$((passes + 1))
         tail -1 "$LOGS/target-sizes.log"
     else
