@@ -2,13 +2,25 @@
 # The desktop replay. Built for the processor family's baseline, not for PELORUS_ARCH: it looks at
 # the processor and says what is missing before it calls the library.
 
+# Compressed recordings, where libzstd is: chosen by file.
+find_path(PELORUS_ZSTD_INCLUDE zstd.h)
+find_library(PELORUS_ZSTD_LIBRARY zstd)
+if(PELORUS_ZSTD_INCLUDE AND PELORUS_ZSTD_LIBRARY)
+  list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/compressed_none\\.c$")
+else()
+  message(STATUS "libzstd is missing: .plr.zst are not read or written "
+    "(on Debian and Ubuntu: apt-get install libzstd-dev)")
+  list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/compressed_zstd\\.c$")
+  set(PELORUS_ZSTD_LIBRARY "")
+endif()
+
 # pelorus_replay(NAME LIBRARY): the program, and NAME-parts, all of it but main, for the tests.
 function(pelorus_replay name library)
   set(parts ${PELORUS_POSIX_SOURCES})
   list(FILTER parts EXCLUDE REGEX "/main\\.c$")
   add_library(${name}-parts STATIC ${parts})
   target_include_directories(${name}-parts PUBLIC "${PROJECT_SOURCE_DIR}/port")
-  target_link_libraries(${name}-parts PUBLIC ${library} m)
+  target_link_libraries(${name}-parts PUBLIC ${library} ${PELORUS_ZSTD_LIBRARY} m)
   add_executable(${name} "${PROJECT_SOURCE_DIR}/port/posix/main.c")
   target_link_libraries(${name} PRIVATE ${name}-parts)
   foreach(target ${name}-parts ${name})

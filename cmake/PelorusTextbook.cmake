@@ -39,7 +39,8 @@ add_executable(pelorus-textbook
   ${pelorus_textbook_session} ${pelorus_textbook_posix})
 target_include_directories(pelorus-textbook PRIVATE
   "${PROJECT_SOURCE_DIR}/src" "${PROJECT_SOURCE_DIR}/port")
-target_link_libraries(pelorus-textbook PRIVATE pelorus-textbook-filter m)
+target_link_libraries(pelorus-textbook PRIVATE
+  pelorus-textbook-filter ${PELORUS_ZSTD_LIBRARY} m)
 target_compile_options(pelorus-textbook PRIVATE -ffp-contract=off)
 target_compile_definitions(pelorus-textbook PRIVATE
   _POSIX_C_SOURCE=200809L

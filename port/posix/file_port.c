@@ -8,41 +8,96 @@
 #include <time.h>
 #include <unistd.h>
 
-bool file_port_open(file_port *port, const char *path) {
+static bool is_open(file_port *port) {
     struct stat about;
-    port->at = port->count = 0;
-    port->size = 0;
-    port->read_error = port->write_error = 0;
-    port->output = NULL;
-    port->input = strcmp(path, "-") == 0 ? STDIN_FILENO : open(path, O_RDONLY);
     if (port->input < 0)
         return false;
-    if (fstat(port->input, &about) == 0) {
-        if (S_ISDIR(about.st_mode)) {
-            file_port_close(port);
-            errno = EISDIR;
-            return false;
-        }
-        if (S_ISREG(about.st_mode))
-            port->size = (uint64_t)about.st_size;
+    if (fstat(port->input, &about) != 0)
+        return true;
+    if (S_ISDIR(about.st_mode)) {
+        file_port_close(port);
+        errno = EISDIR;
+        return false;
     }
+    uint8_t head[4];
+    const bool packed = S_ISREG(about.st_mode) && pread(port->input, head, sizeof head, 0) == 4 &&
+                        compressed_begins(head, sizeof head);
+    if (S_ISREG(about.st_mode) && !packed)
+        port->size = (uint64_t)about.st_size;
     return true;
+}
+
+bool file_port_open(file_port *port, const char *path) {
+    memset(port, 0, sizeof *port);
+    port->input = strcmp(path, "-") == 0 ? STDIN_FILENO : open(path, O_RDONLY);
+    return is_open(port);
 }
 
 void file_port_close(file_port *port) {
     if (port->input > STDIN_FILENO)
         close(port->input);
     port->input = -1;
+    compressed_input_close(port->unpacker);
+    port->unpacker = NULL;
 }
 
-/* The next piece of the file; false at its end or when it cannot be read. */
-static bool refill(file_port *port) {
-    ssize_t n;
+const char *file_port_problem(const file_port *port) {
+    return port->read_error != 0 ? strerror(port->read_error) : port->read_problem;
+}
+
+/* The next bytes of the file as it is. */
+static long fetch_raw(void *context, uint8_t *bytes, size_t n) {
+    file_port *port = context;
+    if (port->head_at < port->head_count) { /* looked at, and not yet handed on */
+        size_t count = port->head_count - port->head_at;
+        count = count < n ? count : n;
+        memcpy(bytes, port->head + port->head_at, count);
+        port->head_at += count;
+        return (long)count;
+    }
+    ssize_t count;
     do
-        n = read(port->input, port->buffer, sizeof port->buffer);
-    while (n < 0 && errno == EINTR);
-    if (n < 0)
+        count = read(port->input, bytes, n);
+    while (count < 0 && errno == EINTR);
+    if (count < 0)
         port->read_error = errno;
+    return (long)count;
+}
+
+/* Looks at the first bytes: is it compressed? A pipe may give them one by one. */
+static void begin(file_port *port) {
+    long count = 1;
+    port->begun = true;
+    while (port->head_count < sizeof port->head && count > 0) {
+        port->head_at = port->head_count; /* so that fetch_raw reads on */
+        count =
+            fetch_raw(port, port->head + port->head_count, sizeof port->head - port->head_count);
+        port->head_count += count > 0 ? (size_t)count : 0;
+    }
+    port->head_at = 0;
+    if (!compressed_begins(port->head, port->head_count))
+        return;
+    port->unpacker = compressed_input_open(fetch_raw, port);
+    if (port->unpacker == NULL)
+        port->read_problem = compressed_is_built_in()
+                                 ? "out of memory"
+                                 : "is compressed by zstd, and this build has no libzstd: zstdcat "
+                                   "FILE | " PELORUS_NAME " -";
+}
+
+/* The next piece of the recording; false at its end or when it cannot be read. */
+static bool refill(file_port *port) {
+    if (!port->begun)
+        begin(port);
+    if (file_port_problem(port) != NULL)
+        return false;
+    const long n = port->unpacker != NULL
+                       ? compressed_input_read(port->unpacker, port->buffer, sizeof port->buffer)
+                       : fetch_raw(port, port->buffer, sizeof port->buffer);
+    if (n == COMPRESSED_DAMAGED)
+        port->read_problem = "its compression is damaged: zstd -t FILE tells where";
+    else if (n == COMPRESSED_CUT)
+        port->cut = true;
     port->at = 0;
     port->count = n > 0 ? (size_t)n : 0;
     return n > 0;
@@ -51,7 +106,7 @@ static bool refill(file_port *port) {
 static int read_input(void *context, uint8_t *bytes, size_t n) {
     file_port *port = context;
     if (port->at == port->count && !refill(port))
-        return port->read_error != 0 ? PLR_PORT_FAILED : PLR_PORT_CLOSED;
+        return file_port_problem(port) != NULL ? PLR_PORT_FAILED : PLR_PORT_CLOSED;
     if (n > port->count - port->at)
         n = port->count - port->at;
     memcpy(bytes, port->buffer + port->at, n);
@@ -61,7 +116,8 @@ static int read_input(void *context, uint8_t *bytes, size_t n) {
 
 static int write_output(void *context, const uint8_t *bytes, size_t n) {
     file_port *port = context;
-    if (fwrite(bytes, 1, n, port->output) == n)
+    if (port->packer != NULL ? compressed_output_write(port->packer, bytes, n)
+                             : fwrite(bytes, 1, n, port->output) == n)
         return 0;
     if (port->write_error == 0)
         port->write_error = errno != 0 ? errno : EIO;

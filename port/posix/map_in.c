@@ -112,8 +112,8 @@ static bool check_landmarks(map_in *map, char *problem) {
 
 static bool check_file(const map_in *map, const desk *d, char *problem) {
     char words[128];
-    if (d->port.read_error != 0)
-        return say(problem, map->path, strerror(d->port.read_error));
+    if (file_port_problem(&d->port) != NULL)
+        return say(problem, map->path, file_port_problem(&d->port));
     if (map->landmarks.out_of_memory)
         return say(problem, map->path, "out of memory");
     if (d->reader.counts.frames == 0)

@@ -159,19 +159,41 @@ static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_st
 
 /* --- the run --- */
 
+/* A flight log NAME.zst is compressed while it is written. */
+static bool open_log(replay *run) {
+    const replay_options *o = &run->options;
+    const bool packed = o->out != NULL && compressed_is_name(o->out);
+    if (packed && !compressed_is_built_in()) {
+        fprintf(stderr,
+                PELORUS_NAME ": %s: this build has no libzstd: give --out OUT.plr, and zstd it "
+                             "then\n",
+                o->out);
+        return false;
+    }
+    if (!result_file_open(&run->out, o->out, o->input))
+        return false;
+    run->port.output = run->out.file;
+    if (packed)
+        run->port.packer = compressed_output_open(run->out.file);
+    if (packed && run->port.packer == NULL)
+        fprintf(stderr, PELORUS_NAME ": %s: out of memory\n", o->out);
+    return !packed || run->port.packer != NULL;
+}
+
 static bool open_outputs(replay *run) {
     const replay_options *o = &run->options;
     if (o->print_config)
         return true; /* nothing is computed */
     return result_file_open(&run->trajectory, o->trajectory, o->input) &&
            result_file_open(&run->map, o->map, o->input) &&
-           result_file_open(&run->frames, o->frames, o->input) &&
-           result_file_open(&run->out, o->out, o->input);
+           result_file_open(&run->frames, o->frames, o->input) && open_log(run);
 }
 
 static bool close_outputs(replay *run) {
     map_put(run->map.file, &run->landmarks);
-    bool good = result_file_close(&run->trajectory);
+    bool good = compressed_output_close(run->port.packer); /* told with the file, below */
+    run->port.packer = NULL;
+    good = result_file_close(&run->trajectory) && good;
     good = result_file_close(&run->map) && good;
     good = result_file_close(&run->frames) && good;
     good = result_file_close(&run->out) && good;
@@ -209,7 +231,7 @@ static bool take_step(replay *run) {
     case PLR_STEP_CLOSED:
         return false;
     case PLR_STEP_FAILED:
-        run->outcome.read_error = run->port.read_error;
+        run->outcome.read_problem = file_port_problem(&run->port);
         return false;
     case PLR_STEP_FUTURE:
         run->outcome.future = true;
@@ -243,6 +265,8 @@ static void tell_ending(replay *run) {
                  s->reader.counts.bytes);
         complaints_say(&run->complaints, words);
     }
+    if (run->port.cut)
+        complaints_say(&run->complaints, "its compression ends early: the file was cut");
     if (!run->summary.ended)
         complaints_say(&run->complaints, "has no END: it was cut short; what is there was used");
     else if (s->chunk_at < s->chunk_count || run->port.at < run->port.count)
@@ -364,7 +388,6 @@ static int open_and_run(replay *run) {
     if (status == REPLAY_EXIT_OK && !open_outputs(run))
         status = REPLAY_EXIT_OUTPUT;
     if (status == REPLAY_EXIT_OK) {
-        run->port.output = run->out.file;
         status = start_session(run) == PLR_OK
                      ? run_recording(run)
                      : usage_error("the settings asked for are outside their limits");

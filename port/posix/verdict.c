@@ -28,8 +28,8 @@ static int explain_no_start(const char *path, const outcome *run) {
 int verdict_on_recording(const char *path, const plr_session *s, const outcome *run) {
     const plr_reader_counts *counts = &s->reader.counts;
     char words[256];
-    if (run->read_error != 0)
-        return verdict_say(path, REPLAY_EXIT_RECORDING, strerror(run->read_error));
+    if (run->read_problem != NULL)
+        return verdict_say(path, REPLAY_EXIT_RECORDING, run->read_problem);
     if (run->future && !run->started) {
         snprintf(words, sizeof words,
                  "is written in version %u of the format, and this program reads version %u: take "

@@ -8,12 +8,12 @@
 
 /* What the run met, besides what the session and the summary tell. */
 typedef struct outcome {
-    bool started;           /* the filter took data */
-    bool future;            /* a HEADER of a later version */
-    int read_error;         /* errno; 0 where all was read */
-    plr_status init_status; /* why the filter did not start */
-    char culprit[64];       /* setting to change, "" where it is not one */
-    bool foreign_map;       /* the map of --map-in is in another frame */
+    bool started;             /* the filter took data */
+    bool future;              /* a HEADER of a later version */
+    const char *read_problem; /* why reading failed; NULL where all was read */
+    plr_status init_status;   /* why the filter did not start */
+    char culprit[64];         /* setting to change, "" where it is not one */
+    bool foreign_map;         /* the map of --map-in is in another frame */
     char map_problem[PROBLEM_SIZE];
 } outcome;
 
