@@ -286,8 +286,8 @@ OPENS = re.compile(
 )
 # What they open is the project's own: recordings, results of its replay, its build, its devices.
 OWN = (
-    *("wire.py", "recording.py", "report/results.py", "report/replay.py", "report/page.py"),
-    *("commands/stream.py", "robot/compare.py", "robot/emulator.py", "robot/link.py"),
+    *("packed_file.py", "report/results.py", "report/replay.py", "report/page.py"),
+    *("robot/compare.py", "robot/emulator.py", "robot/link.py"),
     *("robot/sizes.py", "robot/stack.py"),
 )
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pelorus import motion, se3
+from pelorus import motion, packed_file, se3
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Landmark, Message, Stereo, Text, Truth, Twist
@@ -104,7 +104,7 @@ class Recording:
         self._check(path)
         part = path.with_name(path.name + ".part")
         try:
-            with part.open("wb") as stream:
+            with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
                 writer = Writer(stream)
                 for message in progress(self.messages(), "writing", len(self)):
                     writer.write(message)

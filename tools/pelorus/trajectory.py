@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import foreign, kitti, se3, wire
+from pelorus import foreign, kitti, packed_file, se3, wire
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Stereo, Truth
@@ -131,7 +131,8 @@ def _frame_times(received: list[Received]) -> set[int]:
 
 def _is_recording(path: Path) -> bool:
     """A text has no zero byte; a recording has one behind each frame."""
-    return path.suffix == ".plr" or b"\0" in foreign.beginning(path)
+    beginning = foreign.beginning(path)
+    return path.suffix == ".plr" or beginning.startswith(packed_file.MAGIC) or b"\0" in beginning
 
 
 def _times(path: Path, rows: list[Row]) -> Times:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from pelorus import cobs
+from pelorus import cobs, packed_file
 from pelorus.errors import PelorusError
 from pelorus.frames import KINDS, End, Header, Kind, MalformedPayload, Message
 
@@ -117,6 +117,14 @@ class Reader:
             self._damaged(self._held_at, "cut off by the end of the stream")
         self._held.clear()
 
+    def lose(self, why: str) -> None:
+        """The rest of the stream cannot be had: one frame more is damaged, and no END will come.
+
+        It stands before all other faults, which it may be the cause of.
+        """
+        self.counts.damaged += 1
+        self.counts.faults.insert(0, Fault(self.counts.bytes, f"damaged: {why}"))
+
     def _give_up_on_overlong(self) -> None:
         if len(self._held) <= STUFFED_BYTES_MAX:
             return
@@ -213,18 +221,24 @@ class Writer:
 
 
 def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], Counts]:
-    """All good frames of a file, and the counts. Raises PelorusError where nothing can be read."""
+    """All good frames of a file, packed or not, and the counts.
+
+    Raises PelorusError where nothing can be read.
+    """
     reader = Reader()
     received: list[Received] = []
     try:
-        with path.open("rb") as stream:
-            while piece := stream.read(piece_bytes):
-                received.extend(reader.feed(piece))
+        for piece in packed_file.pieces(path, piece_bytes):
+            received.extend(reader.feed(piece))
+    except packed_file.PackingDamaged as error:
+        reader.lose(str(error))
     except OSError as error:
         raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
     except VersionError as error:
         raise VersionError(f"{path}: {error}") from None
     reader.finish()
+    if not received and reader.counts.faults and not reader.counts.bytes:
+        raise PelorusError(f"{path}: {reader.counts.faults[0].what}")
     if not reader.counts.bytes:
         raise PelorusError(f"{path}: the file is empty, a recording begins with a HEADER frame")
     if not received:

@@ -20,7 +20,9 @@ from pelorus.frames import TEXT_BYTES_MAX, Text
 from pelorus.recording import Recording
 
 SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
-TARGET = typer.Argument(..., metavar="OUT.plr", help="The recording to write.")
+TARGET = typer.Argument(
+    ..., metavar="OUT.plr", help="The recording to write; as OUT.plr.zst it is packed."
+)
 FIX = typer.Option(
     Fix.AUTO,
     help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "

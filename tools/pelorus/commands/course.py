@@ -15,6 +15,7 @@ from pelorus import road
 from pelorus.commands.choices import replay_options
 from pelorus.console import out
 from pelorus.errors import PelorusError
+from pelorus.packed_file import bare_name
 from pelorus.report.replay import find_programs
 from pelorus.report.subject import Subject, read_subject
 from pelorus.trajectory import read_truth
@@ -95,7 +96,7 @@ def _options(configs: list[Path], settings: list[str], recordings: list[Path]) -
             "for each",
             param_hint="--config",
         )
-    names = {path.stem for path in recordings}
+    names = {bare_name(path) for path in recordings}
     if len(names) < len(recordings):
         raise typer.BadParameter(
             "two of them have the same name, and so would their runs", param_hint="RECORDING..."
@@ -136,7 +137,7 @@ def _references(
 
 
 def _runs(folder: Path, subject: Subject) -> Path:
-    runs = folder / "runs" / subject.path.stem
+    runs = folder / "runs" / bare_name(subject.path)
     try:
         runs.mkdir(parents=True, exist_ok=True)
     except OSError as error:

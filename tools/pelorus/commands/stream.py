@@ -12,6 +12,7 @@ from typing import BinaryIO
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from pelorus import packed_file
 from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.frames import Kind, Message, Pose
@@ -42,7 +43,8 @@ def stream(
     record: Path | None = typer.Option(
         None,
         metavar="OUT.plr",
-        help="Keep what both sides said, as a recording: replayed, it gives the robot's bits.",
+        help="Keep what both sides said, as a recording: replayed, it gives the robot's bits. Cut "
+        "short, it is whole up to there; as OUT.plr.zst up to the last 32 KB.",
     ),
     compare: bool = typer.Option(
         False,
@@ -155,7 +157,7 @@ def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
         yield None
         return
     try:
-        stream = path.open("wb")
+        stream = packed_file.create(path, packed_file.is_packed(path), live=True)
     except OSError as error:
         raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
     try:

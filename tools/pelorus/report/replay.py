@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pelorus import packed_file
 from pelorus.errors import PelorusError
 
 SOURCE_ROOT = Path(__file__).resolve().parents[3]
@@ -90,15 +91,15 @@ def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> flo
 
 
 def _call(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, str]:
-    command = [str(program), str(recording), *options]
+    name, unpacked = packed_file.for_program(recording)
+    command = [str(program), name, *options]
     try:
-        done = subprocess.run(
-            command, capture_output=True, check=False, encoding="utf-8", errors="replace"
-        )
+        done = subprocess.run(command, input=unpacked, capture_output=True, check=False)
     except OSError as error:
         raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
+    stdout, stderr = (said.decode("utf-8", "replace") for said in (done.stdout, done.stderr))
     if done.returncode != 0:
         how = f"status {done.returncode}" if done.returncode > 0 else f"signal {-done.returncode}"
-        said = done.stderr.replace(f"{program.name}: ", "").strip() or "it said nothing"
+        said = stderr.replace(f"{program.name}: ", "").strip() or "it said nothing"
         raise PelorusError(f"{recording}: {program.name} ended with {how}:\n{said}")
-    return done.stdout, done.stderr
+    return stdout, stderr

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pelorus import packed_file
 from pelorus.errors import PelorusError
 from pelorus.frames import OBSERVATIONS_MAX, Kind, Message, Pose, Stereo
 from pelorus.robot.emulator import SOURCE_ROOT
@@ -74,13 +75,14 @@ def desktop_log(recording: Path, program: Path, options: Sequence[str] = ()) -> 
     """Replay a recording on this machine: its inputs and what the filter answered."""
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         answers = Path(folder) / "answers.plr"
-        command = [str(program), str(recording), "--quiet", *options, "--out", str(answers)]
+        name, unpacked = packed_file.for_program(recording)
+        command = [str(program), name, "--quiet", *options, "--out", str(answers)]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            done = subprocess.run(command, input=unpacked, capture_output=True, check=False)
         except OSError as error:
             raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
         if done.returncode != 0:
-            raise PelorusError(f"{program} failed on {recording}: {done.stderr.strip()}")
+            raise PelorusError(f"{program} failed on {recording}: {done.stderr.decode().strip()}")
         received, _ = read_file(answers)
     return [frame.message for frame in received]
 

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Packed recordings (.plr.zst): every command reads and writes them by their name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from converted import Run
+from fake_board import FakeBoard, TcpBoard
+from pelorus import packed_file, wire
+from pelorus.frames import Stereo
+from replay_drive import BIN, drive, encode
+from report_runs import built_programs
+
+
+def packed(folder: Path, content: bytes, name: str = "drive.plr.zst") -> Path:
+    path = folder / name
+    path.write_bytes(zstandard.ZstdCompressor().compress(content))
+    return path
+
+
+def test_a_packed_recording_is_read_as_the_plain_one(tmp_path: Path) -> None:
+    content = encode(drive())
+    plain = tmp_path / "drive.plr"
+    plain.write_bytes(content)
+    expected, counts = wire.read_file(plain)
+    for name in ("drive.plr.zst", "misnamed.plr"):  # what it is, its bytes say
+        received, found = wire.read_file(packed(tmp_path, content, name))
+        assert received == expected
+        assert found == counts
+
+
+def test_two_packed_pieces_in_a_row_are_one_recording(tmp_path: Path) -> None:
+    content = encode(drive())
+    pack = zstandard.ZstdCompressor().compress
+    path = tmp_path / "drive.plr.zst"
+    path.write_bytes(pack(content[:3000]) + pack(content[3000:]))
+    assert wire.read_file(path)[1].ended
+
+
+@pytest.mark.parametrize("cut", [0.3, 0.9])
+def test_of_a_file_that_was_cut_short_what_is_there_is_read(tmp_path: Path, cut: float) -> None:
+    path = tmp_path / "drive.plr.zst"
+    with closing(packed_file.create(path, packed=True, live=True)) as stream:  # a killed recorder's
+        for start in range(0, len(content := encode(drive(200))), 500):
+            stream.write(content[start : start + 500])
+            stream.flush()
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(cut * len(whole))])
+    received, counts = wire.read_file(path)
+    assert len(received) > 0.5 * cut * 600
+    assert not counts.ended
+
+
+def test_behind_damage_nothing_can_be_unpacked_and_that_is_told(
+    pelorus: Run, tmp_path: Path
+) -> None:
+    content = encode(drive(200))
+    path = tmp_path / "drive.plr.zst"
+    with closing(packed_file.create(path, packed=True, live=True)) as stream:
+        for start in range(0, len(content), 500):
+            stream.write(content[start : start + 500])
+            stream.flush()
+    bytes_ = bytearray(path.read_bytes())
+    bytes_[len(bytes_) // 2 : len(bytes_) // 2 + 40] = b"\xff" * 40
+    path.write_bytes(bytes_)
+    received, counts = wire.read_file(path)
+    assert 0 < len(received) < 600
+    assert counts.damaged >= 1
+    assert "zstd packing is damaged" in pelorus("info", path).out
+    path.write_bytes(packed_file.MAGIC + b"nonsense")
+    said = pelorus("info", path)
+    assert said.status == 1
+    assert "damaged: the zstd packing is damaged here" in said.err
+
+
+def test_a_killed_recorder_leaves_all_but_the_last_block(tmp_path: Path) -> None:
+    path, content = tmp_path / "log.plr.zst", encode(drive(300))
+    stream = packed_file.create(path, packed=True, live=True)
+    for start in range(0, len(content), 500):
+        stream.write(content[start : start + 500])
+        stream.flush()
+    left = b"".join(packed_file.pieces(path))  # never closed
+    assert len(content) - len(left) <= packed_file.LIVE_BYTES + 500
+    assert content.startswith(left)
+    stream.close()
+    assert b"".join(packed_file.pieces(path)) == content
+
+
+def test_a_simulated_drive_is_packed_by_its_name(pelorus: Run, tmp_path: Path) -> None:
+    plain, small = tmp_path / "drive.plr", tmp_path / "drive.plr.zst"
+    options = ("--seed", 3, "--duration", 5)
+    assert pelorus("simulate", plain, *options).status == 0
+    assert pelorus("simulate", small, *options).status == 0
+    assert small.stat().st_size < 0.9 * plain.stat().st_size
+    assert b"".join(packed_file.pieces(small)) == plain.read_bytes()
+    assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.mark.parametrize("command", ["info", "report", "map", "course", "evaluate"])
+def test_a_command_takes_a_packed_recording(pelorus: Run, tmp_path: Path, command: str) -> None:
+    """Though the replay may know no zstd."""
+    built_programs()
+    path, out = packed(tmp_path, encode(drive())), tmp_path / "out"
+    common: tuple[object, ...] = (path, "--out", out, "--bin", BIN)
+    if command == "info":
+        common = (path,)
+    if command == "evaluate":
+        said = pelorus("course", *common)
+        assert said.status == 0, said.err
+        common = (out / "runs" / "drive" / "body.tum", "--truth", path)
+    said = pelorus(command, *common)
+    assert said.status == 0, said.err
+
+
+def test_a_robots_log_is_packed_and_compared(pelorus: Run, tmp_path: Path) -> None:
+    path, log = packed(tmp_path, encode(drive(12))), tmp_path / "flight.plr.zst"
+    with TcpBoard(FakeBoard()) as board:
+        said = pelorus("stream", path, "--to", board.target, "--record", log)
+    assert said.status == 0, said.err
+    assert log.read_bytes().startswith(packed_file.MAGIC)
+    assert wire.read_file(log)[1].ended
+    assert pelorus("compare", log, "--bin", BIN).status in (0, 1)  # the fake board's own bits
+
+
+def test_0027_takes_no_more_than_15_bytes_an_observation(
+    pelorus: Run, real: Callable[[str], Path], tmp_path: Path
+) -> None:
+    source, path = real("ece276a/0027.npz"), tmp_path / "0027.plr.zst"
+    assert pelorus("convert", "ece276a", source, path).status == 0
+    frames = [r.message for r in wire.read_file(path)[0] if isinstance(r.message, Stereo)]
+    observations = int(np.sum([len(frame.ids) for frame in frames]))
+    assert observations == 75647
+    assert path.stat().st_size <= 15 * observations < source.stat().st_size

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Recordings as they lie on a disk: plain (.plr), or packed by zstd (.plr.zst).
+
+What is read is told by its first bytes, what is written by its name. Inside, the frames are the
+same: `zstdcat FILE.plr.zst` gives the plain recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, cast
+
+import zstandard
+
+from pelorus.errors import PelorusError
+
+SUFFIX = ".zst"
+MAGIC = b"\x28\xb5\x2f\xfd"  # of a zstd frame (RFC 8878, 3.1.1)
+LEVEL, LIVE_LEVEL = 19, 3  # a finished recording has time; a log is written while a robot waits
+LIVE_BYTES = 1 << 15  # after so many of a live log the block is closed, and outlives a crash
+
+
+class PackingDamaged(PelorusError):
+    """Nothing behind this place can be unpacked."""
+
+
+def is_packed(path: Path) -> bool:
+    """Whether the name asks for zstd."""
+    return path.suffix == SUFFIX
+
+
+def bare_name(path: Path) -> str:
+    """The file's name without .plr, .plr.zst."""
+    return (path.with_suffix("") if is_packed(path) else path).stem
+
+
+def pieces(path: Path, piece_bytes: int = 1 << 16) -> Iterator[bytes]:
+    """The recording's bytes, unpacked where they are packed.
+
+    OSError where the disk fails; PackingDamaged behind the last bytes that could be unpacked.
+    """
+    with path.open("rb") as stream:
+        packed = stream.peek(len(MAGIC))[: len(MAGIC)] == MAGIC
+        unpacker = zstandard.ZstdDecompressor()
+        source = unpacker.stream_reader(stream, read_across_frames=True) if packed else stream
+        try:
+            while piece := source.read(piece_bytes):
+                yield piece
+        except zstandard.ZstdError as error:
+            raise PackingDamaged(f"the zstd packing is damaged here: {error}") from error
+
+
+def create(path: Path, packed: bool, live: bool = False) -> BinaryIO:
+    """A file to write a recording to; OSError where there can be none.
+
+    `live`: of what was written, all but the last LIVE_BYTES stays readable if the program is
+    killed; plain, all of it.
+    """
+    stream = path.open("wb")
+    return cast(BinaryIO, _Packer(stream, live)) if packed else stream
+
+
+class _Packer:
+    """Packs what it is given; as much of a file as a recording's writers need."""
+
+    def __init__(self, stream: BinaryIO, live: bool) -> None:
+        level = LIVE_LEVEL if live else LEVEL
+        self._packer = zstandard.ZstdCompressor(level=level, write_checksum=True).compressobj()
+        self._stream = stream
+        self._live = live
+        self._held = 0
+        self.name = stream.name
+
+    def write(self, data: bytes) -> int:
+        self._stream.write(self._packer.compress(data))
+        self._held += len(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Closes a block where it is large enough: a block each message would pack badly."""
+        if self._live and self._held >= LIVE_BYTES:
+            self._stream.write(self._packer.flush(zstandard.COMPRESSOBJ_FLUSH_BLOCK))
+            self._held = 0
+        self._stream.flush()
+
+    def close(self) -> None:
+        try:
+            if not self._stream.closed:
+                self._stream.write(self._packer.flush())
+        finally:
+            self._stream.close()
+
+
+def for_program(path: Path) -> tuple[str, bytes | None]:
+    """A recording as an argument of pelorus-replay, and what it is to read from standard input.
+
+    A packed one is unpacked here: the program need not know zstd.
+    """
+    try:
+        with path.open("rb") as stream:
+            if stream.read(len(MAGIC)) == MAGIC:
+                return "-", b"".join(pieces(path))
+    except OSError:
+        pass  # the program opens it next, and says why it cannot
+    except PackingDamaged as error:
+        raise PelorusError(f"{path}: {error}") from error
+    return str(path), None
