@@ -1,20 +1,35 @@
 // SPDX-License-Identifier: MIT
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
-#include "filter/polar.h"
 #include "support/dense_parts.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
+#include "support/specimens.h"
 
-/* Ji at a slot's point, 3x3: from the filter's chart to an error of the point. */
-static void chart_to_point(const plr_slot *slot, double Ji[9]) {
-    plr_polar chart;
-    plr_real J[9];
-    plr_polar_at(&chart, slot->x);
-    plr_polar_to_point(J, &chart);
-    to_doubles(Ji, J, 9);
+/* The charts are the filter's: what is added to a bearing's two variances depends on their basis. */
+void dense_make_up_for_rounding(dense_ekf *e, double share) {
+    const unsigned n = dense_dim(e);
+    for (unsigned i = 0; i < e->count; i++) {
+        const unsigned row = dense_row(e, i);
+        double P_q[9], P_w[9], own[9], Jw[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, Ji[9];
+        memcpy(Ji, Jw, sizeof Ji);
+        if (dense_is_body(e)) {
+            plr_real x[3];
+            to_reals(x, e->x[i], 3);
+            specimen_chart(x, Jw, Ji);
+        }
+        for (unsigned k = 0; k < 9; k++)
+            P_q[k] = e->P[(row + k / 3) * n + row + k % 3];
+        oracle_sandwich(3, 3, Jw, P_q, P_w);
+        for (unsigned k = 0; k < 9; k++)
+            P_w[k] *= k % 4 == 0 ? share : 0;
+        oracle_sandwich(3, 3, Ji, P_w, own);
+        for (unsigned k = 0; k < 9; k++)
+            e->P[(row + k / 3) * n + row + k % 3] += own[k];
+    }
 }
 
 /* The filter's slot of each of the oracle's landmarks. False if one is missing. */
@@ -39,9 +54,9 @@ static double *covariance_of(const dense_ekf *e, const plr_filter *f, const unsi
     for (unsigned i = 0; i < first; i++)
         J[i * n + i] = 1;
     for (unsigned i = 0; i < e->count; i++) {
-        double Ji[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+        double Jw[9], Ji[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
         if (dense_is_body(e))
-            chart_to_point(&f->slots[slot_of[i]], Ji);
+            specimen_chart(f->slots[slot_of[i]].x, Jw, Ji);
         dense_put(J, n, dense_row(e, i), first + 3 * slot_of[i], 3, 3, Ji);
     }
     oracle_sandwich(n, n, J, P, S);
@@ -85,12 +100,11 @@ static double rotation_gap(const dense_ekf *e, const plr_filter *f) {
     return sqrt(xi[3] * xi[3] + xi[4] * xi[4] + xi[5] * xi[5]);
 }
 
-bool dense_compare(const dense_ekf *e, plr_filter *f, dense_gap *gap) {
+bool dense_compare(const dense_ekf *e, const plr_filter *f, dense_gap *gap) {
     static const double origin[3] = {0, 0, 0};
     unsigned slot_of[DENSE_MAX];
     *gap = (dense_gap){0};
-    (void)plr_filter_trace(f); /* settles the motion */
-    if (!match(e, f, slot_of))
+    if (e->pending || f->motion.pending || !match(e, f, slot_of))
         return false;
     const double p[3] = {e->T_WB[3], e->T_WB[7], e->T_WB[11]};
     gap->position_m = distance(p, f->p_WB);

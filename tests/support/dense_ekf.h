@@ -8,6 +8,10 @@
  * in the camera (`body`) or of m in the world (`world`). Where the filter has the polar chart, this
  * one stays with points: a linear filter does not depend on the chart, and what the chart does to a
  * correction is written without its basis.
+ *
+ * In `body` the error n of a frame's motion is a part of the joint covariance from reading to reading,
+ * and a frame is linearised at the motion that its observations tell (dense_first.h): the prior mean is
+ * then no longer zero, and all of it goes into one gain. Nothing is kept outside of P.
  */
 #ifndef PELORUS_TEST_DENSE_EKF_H
 #define PELORUS_TEST_DENSE_EKF_H
@@ -31,6 +35,13 @@ typedef struct dense_ekf {
     double x[DENSE_MAX][3];
     double P[DENSE_MAX_DIM * DENSE_MAX_DIM]; /* dim x dim, row by row */
     double walked_s;                         /* for the bias walk */
+
+    /* `body`: the motion D since the landmarks were last brought up to date, T_WB = T D, with an error
+     * n, T = T^ D Exp(n). P is of the state before the motion. */
+    bool pending;
+    double D[16];
+    double M[36];                /* covariance of n */
+    double C[DENSE_MAX_DIM * 6]; /* of the state with n */
 } dense_ekf;
 
 /* What a frame came to. */
@@ -51,15 +62,22 @@ void dense_init(dense_ekf *e, const plr_calibration *calibration, const plr_conf
 /* Sets pose and pose covariance; drops the landmarks. */
 void dense_set_pose(dense_ekf *e, const plr_pose *T_WB, const double P_xi[36]);
 
-/* T <- T Exp(seconds (u - b)), with the whole of P. `interval` is the reading's own, of which
- * `seconds` may be a part. */
+/* T <- T Exp(seconds (u - b)). `world`: with the whole of P; `body`: with the joint covariance of state
+ * and motion. `interval` is the reading's own, of which `seconds` may be a part. */
 void dense_hold(dense_ekf *e, const plr_twist *twist, double seconds, double interval);
 
 /* T <- T_WB without noise. */
 void dense_move_to(dense_ekf *e, const plr_pose *T_WB);
 
+/* The pose's covariance now, whatever motion is pending, 6x6. */
+void dense_pose_covariance(const dense_ekf *e, double P_xi[36]);
+
 /* Match, gate, update, retract, by the observations of landmarks that it holds. */
 dense_report dense_update(dense_ekf *e, const plr_frame *frame);
+
+/* What the filter adds to the landmarks' variances at the end of a frame (docs/NUMERICS.md 1): `share` of
+ * each, in its own charts. */
+void dense_make_up_for_rounding(dense_ekf *e, double share);
 
 /* New landmarks from the others, in the frame's order and while there is room. Returns how many. */
 unsigned dense_create(dense_ekf *e, const plr_frame *frame);
@@ -80,8 +98,7 @@ typedef struct dense_gap {
     double covariance; /* |P_ij - P'_ij| / sqrt(P_ii P_jj), in the oracle's errors */
 } dense_gap;
 
-/* Compares; applies the filter's accumulated motion first. False if they do not hold the same
- * landmarks. */
-bool dense_compare(const dense_ekf *e, plr_filter *f, dense_gap *gap);
+/* Compares after a frame: neither has a motion pending. False if they do not hold the same landmarks. */
+bool dense_compare(const dense_ekf *e, const plr_filter *f, dense_gap *gap);
 
 #endif

@@ -6,9 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "support/dense_first.h"
 #include "support/dense_parts.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
+
+static const double min_range = 0.01; /* nothing is put nearer to the camera */
 
 /* Observations that passed the gate, stacked. */
 typedef struct stack {
@@ -43,11 +46,15 @@ static bool linearise(const dense_ekf *e, unsigned landmark, const plr_observati
     return true;
 }
 
-/* d^2 of one observation (MATH 8). */
-static double distance2(const dense_ekf *e, const plr_observation *o, const double *H,
-                        const double r[3]) {
-    const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
+/* What the rows of both images differ by, squared, for d^2 (MATH 8). */
+static double row_gap2(const dense_ekf *e, const plr_observation *o) {
     const double gap = (double)o->vL_px - (double)o->vR_px;
+    return gap * gap / (2 * e->config.pixel_sigma_px * e->config.pixel_sigma_px);
+}
+
+/* r^T S^-1 r of one observation. */
+static double distance2(const dense_ekf *e, const double *H, const double r[3]) {
+    const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
     double S[9], y[3] = {r[0], r[1], r[2]};
     oracle_sandwich(3, dense_dim(e), H, e->P, S);
     S[0] += s2;
@@ -55,10 +62,10 @@ static double distance2(const dense_ekf *e, const plr_observation *o, const doub
     S[8] += s2 / 2;
     if (!oracle_solve_spd(3, 1, S, y))
         return (double)INFINITY;
-    return r[0] * y[0] + r[1] * y[1] + r[2] * y[2] + gap * gap / (2 * s2);
+    return r[0] * y[0] + r[1] * y[1] + r[2] * y[2];
 }
 
-/* dx = K r and P in Joseph's form, K = P H^T S^-1. */
+/* dx += K (r - H dx) and P in Joseph's form, K = P H^T S^-1. */
 static void gain(dense_ekf *e, const stack *s, double *dx) {
     const unsigned n = dense_dim(e), m = s->rows;
     double *HP = dense_zeros(m, n), *S = dense_zeros(m, m), *K = dense_zeros(n, m),
@@ -69,7 +76,8 @@ static void gain(dense_ekf *e, const stack *s, double *dx) {
         S[i * m + i] += s->R[i];
     if (!oracle_solve_spd(m, n, S, HP)) /* now S^-1 H P = K^T */
         abort();
-    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, 1, m, 1, HP, s->r, 0, dx);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, 1, n, -1, s->H, dx, 1, s->r);
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, 1, m, 1, HP, s->r, 1, dx);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, n, m, -1, HP, s->H, 1, IKH);
     dense_sandwich(e, IKH);
     for (unsigned i = 0; i < n; i++)
@@ -156,6 +164,9 @@ static void append(dense_ekf *e, uint32_t id, const double x[3], const double *J
     dense_put(grown, N, n, n, 3, 3, own);
     memcpy(e->P, grown, (size_t)N * N * sizeof *grown);
     free(grown);
+    memset(e->C + (size_t)6 * n, 0, 18 * sizeof *e->C);
+    if (J)
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 6, 1, J, e->C, 0, e->C + (size_t)6 * n);
     e->id[e->count] = id;
     e->known[e->count] = false;
     memcpy(e->x[e->count++], x, 3 * sizeof *x);
@@ -190,8 +201,9 @@ void dense_insert_known(dense_ekf *e, const plr_landmark *known) {
         e->known[e->count - 1] = true;
         return;
     }
-    double T_BW[16], q[3], K[18], R_WC[9], R_CW[9], P_q[9];
-    rigid_inverse(T_BW, e->T_WB);
+    double T_WB[16], T_BW[16], q[3], K[18], R_WC[9], R_CW[9], P_q[9];
+    dense_reference(e, T_WB);
+    rigid_inverse(T_BW, T_WB);
     dense_apply(q, T_BW, known->p_W_m);
     dense_apply(q, e->T_CB, q);
     dense_camera_by_pose(e, q, K);
@@ -214,7 +226,7 @@ static bool is_worth_it(const dense_ekf *e, const plr_observation *o) {
             fabs((double)o->vL_px - (double)o->vR_px) <= c->max_row_gap_px);
 }
 
-static unsigned find(const dense_ekf *e, uint32_t id) {
+unsigned dense_find(const dense_ekf *e, uint32_t id) {
     unsigned i = 0;
     while (i < e->count && e->id[i] != id)
         i++;
@@ -231,7 +243,7 @@ static void walk(dense_ekf *e) {
 }
 
 void dense_remove(dense_ekf *e, uint32_t id) {
-    const unsigned n = dense_dim(e), landmark = find(e, id), row = dense_row(e, landmark);
+    const unsigned n = dense_dim(e), landmark = dense_find(e, id), row = dense_row(e, landmark);
     if (landmark == e->count)
         return;
     double *next = e->P;
@@ -239,6 +251,7 @@ void dense_remove(dense_ekf *e, uint32_t id) {
         for (unsigned j = 0; j < n; j++)
             if ((i < row || i >= row + 3) && (j < row || j >= row + 3))
                 *next++ = e->P[i * n + j];
+    memmove(e->C + (size_t)6 * row, e->C + (size_t)6 * (row + 3), (n - row - 3) * 6 * sizeof *e->C);
     e->count--;
     for (unsigned i = landmark; i < e->count; i++) {
         e->id[i] = e->id[i + 1];
@@ -247,22 +260,109 @@ void dense_remove(dense_ekf *e, uint32_t id) {
     }
 }
 
+/* Brings landmarks along their rays to where they are linearised. `mean` (dim) takes what that leaves of
+ * the prior, P the stretch. */
+static void bring_closer(dense_ekf *e, const double *closer, double *mean) {
+    const unsigned n = dense_dim(e);
+    double *F = dense_identity(n), *C = dense_zeros(n, 6);
+    for (unsigned i = 0; i < e->count; i++) {
+        double *q = e->x[i], along[3], moved[3], J[9];
+        const double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), ratio = 1 + closer[i] * r;
+        if (!(ratio >= 0.5 && ratio <= 2) || !(r / ratio <= e->config.max_range_m) ||
+            !(r / ratio >= min_range))
+            continue;
+        for (int k = 0; k < 3; k++)
+            along[k] =
+                -closer[i] * r * q[k]; /* a change of range, to first order in inverse range */
+        dense_polar_step(q, along, moved, J);
+        dense_put(F, n, dense_row(e, i), dense_row(e, i), 3, 3, J);
+        for (int k = 0; k < 3; k++) {
+            q[k] = moved[k];
+            mean[dense_row(e, i) + (unsigned)k] = closer[i] * (r / ratio) * moved[k];
+        }
+    }
+    dense_sandwich(e, F);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, n, 6, n, 1, F, e->C, 0, C);
+    memcpy(e->C, C, (size_t)n * 6 * sizeof *C);
+    free(C);
+    free(F);
+}
+
+/* The pending motion, D Exp(n) at n = L z, and the noise of n about it: with F and G of that motion,
+ *   mean <- F mean - G n,  P <- F P F^T + F Cov(x, n) G^T + (...)^T + G L L^T G^T,  G = G_0 Jr(n). */
+static void apply_motion(dense_ekf *e, const dense_first *first, double *mean) {
+    const unsigned n = dense_dim(e);
+    double motion[6], E[16], T[16], D[16], Jr[36], M[36], A[36], back[16];
+    double *F = dense_identity(n), *G = dense_zeros(n, 6), *K = dense_zeros(e->count, 18);
+    double *FC = dense_zeros(n, 6), *FCG = dense_zeros(n, n), *GMG = dense_zeros(n, n);
+    double *moved = dense_zeros(n, 1);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, first->L, first->z, 0, motion);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, 6, 6, 6, 1, first->L, first->L, 0, M);
+    rigid_exp(E, motion);
+    rigid_right_jacobian(Jr, motion);
+    square_multiply(4, e->T_WB, E, T);
+    memcpy(e->T_WB, T, sizeof T);
+    square_multiply(4, e->D, E, D);
+    rigid_inverse(back, D);
+    dense_adjoint(A, back);
+    dense_put(F, n, 0, 0, 6, 6, A);
+    dense_put(G, 6, 0, 0, 6, 6, Jr);
+    dense_move_points(e, D, F, K);
+    for (unsigned i = 0; i < e->count; i++)
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 6, 1, K + 18 * i, Jr, 0,
+                    G + 6 * dense_row(e, i));
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, n, 1, n, 1, F, mean, 0, moved);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, n, 1, 6, -1, G, motion, 1, moved);
+    memcpy(mean, moved, n * sizeof *mean);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, n, 6, n, 1, F, e->C, 0, FC);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, n, n, 6, 1, FC, G, 0, FCG);
+    oracle_sandwich(n, 6, G, M, GMG);
+    dense_sandwich(e, F);
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j < n; j++)
+            e->P[i * n + j] += FCG[i * n + j] + FCG[j * n + i] + GMG[i * n + j];
+    dense_forget_motion(e);
+    free(moved);
+    free(GMG);
+    free(FCG);
+    free(FC);
+    free(K);
+    free(G);
+    free(F);
+}
+
+/* Brings the state up to the frame; `mean` is what the prior says of the errors there. */
+static void catch_up(dense_ekf *e, const plr_frame *frame, dense_first *first, double *mean) {
+    memset(first, 0, sizeof *first);
+    if (e->pending) {
+        dense_motion_prior(e, first->L);
+        if (e->config.mode == PLR_MODE_SLAM)
+            dense_find_motion(e, frame, first);
+        bring_closer(e, first->closer, mean);
+        apply_motion(e, first, mean);
+    }
+    walk(e);
+}
+
 dense_report dense_update(dense_ekf *e, const plr_frame *frame) {
     dense_report report = {0};
-    walk(e);
+    dense_first first;
     const unsigned n = dense_dim(e);
+    double *dx = dense_zeros(n, 1);
+    catch_up(e, frame, &first, dx);
     stack s = {0, dense_zeros(3U * frame->count, n), dense_zeros(3U * frame->count, 1),
                dense_zeros(3U * frame->count, 1)};
     const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
     for (unsigned i = 0; i < frame->count; i++) {
         const plr_observation *o = &frame->observations[i];
-        const unsigned landmark = find(e, o->id);
+        const unsigned landmark = dense_find(e, o->id);
         double *H = s.H + (size_t)s.rows * n, *r = s.r + s.rows;
         if (landmark == e->count)
             continue;
         report.matched++;
-        const double d2 =
-            linearise(e, landmark, o, H, r) ? distance2(e, o, H, r) : (double)INFINITY;
+        double d2 = (double)INFINITY;
+        if (linearise(e, landmark, o, H, r))
+            d2 = (first.judged ? first.d2[landmark] : distance2(e, H, r)) + row_gap2(e, o);
         if (!(isfinite(d2) && (e->config.gate_d2 <= 0 || d2 <= e->config.gate_d2))) {
             report.gated++;
             continue;
@@ -272,12 +372,10 @@ dense_report dense_update(dense_ekf *e, const plr_frame *frame) {
         for (int k = 0; k < 3; k++)
             s.R[s.rows++] = k == 2 ? s2 / 2 : s2;
     }
-    if (s.rows > 0) {
-        double *dx = dense_zeros(n, 1);
+    if (s.rows > 0)
         gain(e, &s, dx);
-        retract(e, dx);
-        free(dx);
-    }
+    retract(e, dx);
+    free(dx);
     free(s.R);
     free(s.r);
     free(s.H);
@@ -287,7 +385,7 @@ dense_report dense_update(dense_ekf *e, const plr_frame *frame) {
 unsigned dense_create(dense_ekf *e, const plr_frame *frame) {
     const unsigned before = e->count;
     for (unsigned i = 0; i < frame->count && e->count < e->config.slots; i++)
-        if (find(e, frame->observations[i].id) == e->count &&
+        if (dense_find(e, frame->observations[i].id) == e->count &&
             is_worth_it(e, &frame->observations[i]))
             create(e, &frame->observations[i]);
     return e->count - before;
@@ -298,10 +396,11 @@ void dense_landmark(const dense_ekf *e, unsigned landmark, double p_W[3], double
     double J[3 * DENSE_MAX_DIM] = {0}, own[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     memcpy(p_W, e->x[landmark], 3 * sizeof *p_W);
     if (dense_is_body(e)) {
-        double T_BC[16], s[3], J_pose[18];
+        double T_WB[16], T_BC[16], s[3], J_pose[18];
+        dense_reference(e, T_WB);
         rigid_inverse(T_BC, e->T_CB);
         dense_apply(s, T_BC, e->x[landmark]);
-        dense_apply(p_W, e->T_WB, s);
+        dense_apply(p_W, T_WB, s);
         dense_world_by_pose(e, s, J_pose);
         dense_camera_to_world(e, own);
         dense_put(J, n, 0, 0, 3, 6, J_pose);

@@ -105,15 +105,17 @@ void dense_camera_by_pose(const dense_ekf *e, const double q[3], double K[18]) {
 }
 
 void dense_world_by_pose(const dense_ekf *e, const double s[3], double J[18]) {
-    double B[18], R[9];
+    double B[18], R[9], T_WB[16];
     point_by_twist(B, s);
-    dense_rotation(R, e->T_WB);
+    dense_reference(e, T_WB);
+    dense_rotation(R, T_WB);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, -1, R, B, 0, J);
 }
 
 void dense_camera_to_world(const dense_ekf *e, double R_WC[9]) {
-    double R_WB[9], R_BC[9];
-    dense_rotation(R_WB, e->T_WB);
+    double R_WB[9], R_BC[9], T_WB[16];
+    dense_reference(e, T_WB);
+    dense_rotation(R_WB, T_WB);
     dense_rotation_back(R_BC, e->T_CB);
     square_multiply(3, R_WB, R_BC, R_WC);
 }

@@ -11,6 +11,15 @@ enum { DENSE_BIAS = 6 }; /* the first row of the biases, where they are estimate
 
 bool dense_is_body(const dense_ekf *e);
 
+/* The pose at which P and the landmarks of `body` stand: before the pending motion. */
+void dense_reference(const dense_ekf *e, double T_WB[16]);
+
+/* No motion is pending any more. */
+void dense_forget_motion(dense_ekf *e);
+
+/* The index of the landmark of that id; `count` if there is none. */
+unsigned dense_find(const dense_ekf *e, uint32_t id);
+
 /* --- matrices, row by row; to be freed --- */
 
 double *dense_zeros(unsigned n, unsigned m);
@@ -46,6 +55,10 @@ void dense_world_by_pose(const dense_ekf *e, const double s[3], double J[18]);
 
 /* R_WC = R_WB R_CB^T, 3x3. */
 void dense_camera_to_world(const dense_ekf *e, double R_WC[9]);
+
+/* Moves the landmarks of `body` under a motion D of the body, and puts their blocks into F (dim x dim).
+ * K[i] (3x6) is then how landmark i takes a twist of the body. */
+void dense_move_points(dense_ekf *e, const double D[16], double *F, double *K);
 
 /* z = (uL, uR, v) of q and Dz = dz/dq. */
 void dense_project(const plr_calibration *c, const double q[3], double z[3], double Dz[9]);

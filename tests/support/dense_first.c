@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: MIT
+#include "support/dense_first.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "support/dense_parts.h"
+#include "support/oracle.h"
+#include "support/rigid.h"
+
+enum { TRIALS = 4, FEW = 3 };
+
+static const double huber_limit = 2.5, least_promise = 0.01, least_rest = 0.05;
+static const double share_of_bias = 1e-4, zero_column = 1e-6;
+
+/* A landmark that the frame sees. */
+typedef struct sight {
+    unsigned landmark;
+    const plr_observation *o;
+    double V[18], P[9];   /* correlation of its point with nu, 3x6; covariance once nu is known */
+    bool in_front;        /* at the point looked at last */
+    double J[9], S[9];    /* d z / d q, and S = J P J^T + R, there */
+    double a[18], rho[3]; /* d z / d nu and residual, whitened */
+    double weight, cost, best_S[9];
+    double at_zero; /* d2 by the twists alone; infinite if there is no place to linearise */
+    double voice;
+} sight;
+
+typedef struct search {
+    const dense_ekf *e;
+    const double *L;
+    unsigned count;
+    sight sights[DENSE_MAX];
+} search;
+
+/* |z|^2 + sum rho, and its normal equations. */
+typedef struct sum {
+    double z[6], A[36], b[6]; /* A = sum w a^T a, b = sum w a^T rho */
+} sum;
+
+static double dot(const double *a, const double *b, unsigned n) {
+    double s = 0;
+    for (unsigned i = 0; i < n; i++)
+        s += a[i] * b[i];
+    return s;
+}
+
+static double huber(double d2) {
+    return d2 <= huber_limit * huber_limit ? d2
+                                           : 2 * huber_limit * sqrt(d2) - huber_limit * huber_limit;
+}
+
+/* ---------------------------------------------------------------- the prior */
+
+static void factorise(const double M[36], double L[36]) {
+    memset(L, 0, 36 * sizeof *L);
+    for (unsigned k = 0; k < 6; k++) {
+        const double pivot = M[7 * k] - dot(L + 6 * k, L + 6 * k, k);
+        for (unsigned i = k; i < 6 && pivot > zero_column * M[7 * k]; i++)
+            L[6 * i + k] = (M[6 * i + k] - dot(L + 6 * i, L + 6 * k, k)) / sqrt(pivot);
+    }
+}
+
+void dense_motion_prior(const dense_ekf *e, double L[36]) {
+    const unsigned n = dense_dim(e);
+    double M[36], P_b[36], C_b[36], X[36], by_bias[36] = {0};
+    memcpy(M, e->M, sizeof M);
+    if (e->config.bias) { /* Cov(n, b) P_bb^-1 Cov(b, n) is what n has from the biases */
+        for (unsigned i = 0; i < 36; i++)
+            P_b[i] = e->P[(DENSE_BIAS + i / 6) * n + DENSE_BIAS + i % 6];
+        memcpy(C_b, e->C + 6 * DENSE_BIAS, sizeof C_b);
+        memcpy(X, C_b, sizeof X);
+        if (oracle_solve_spd(6, 6, P_b, X))
+            oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 6, 6, share_of_bias, C_b, X, 0,
+                        by_bias);
+    }
+    for (unsigned i = 0; i < 36; i++)
+        M[i] += by_bias[i];
+    factorise(M, L);
+}
+
+/* x <- L^-1 x, with a zero where L has a zero column. */
+static void solve_lower(const double L[36], double x[6]) {
+    for (unsigned k = 0; k < 6; k++)
+        x[k] = L[7 * k] > 0 ? (x[k] - dot(L + 6 * k, x, k)) / L[7 * k] : 0;
+}
+
+/* ---------------------------------------------------------------- the sum at a point */
+
+/* q of the landmarks' places and the rotation there, after D Exp(L z). */
+static void camera_motion(const search *s, const double z[6], double back[16], double JL[36]) {
+    double n[6], Jr[36], E[16], D[16], T_BC[16], CD[16], D_C[16];
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, s->L, z, 0, n);
+    rigid_exp(E, n);
+    rigid_right_jacobian(Jr, n);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 6, 6, 1, Jr, s->L, 0, JL);
+    square_multiply(4, s->e->D, E, D);
+    rigid_inverse(T_BC, s->e->T_CB);
+    square_multiply(4, s->e->T_CB, D, CD);
+    square_multiply(4, CD, T_BC, D_C);
+    rigid_inverse(back, D_C);
+}
+
+static void look(const search *s, sight *at, const double z[6], const double back[16],
+                 const double JL[36]) {
+    const dense_ekf *e = s->e;
+    const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
+    double q[3], seen[3], Dz[9], R[9], K[18], KJL[18], L_S[9];
+    dense_apply(q, back, e->x[at->landmark]);
+    at->in_front = q[2] >= e->config.min_depth_m;
+    if (!at->in_front)
+        return;
+    dense_project(&e->camera, q, seen, Dz);
+    dense_rotation(R, back);
+    square_multiply(3, Dz, R, at->J);
+    oracle_sandwich(3, 3, at->J, at->P, at->S);
+    for (unsigned i = 0; i < 3; i++)
+        at->S[4 * i] += i == 2 ? s2 / 2 : s2;
+    dense_camera_by_pose(e, q, K);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 6, 1, K, JL, 0, KJL);
+    double JV[18], pixels[3] = {(double)at->o->uL_px, (double)at->o->uR_px,
+                                ((double)at->o->vL_px + (double)at->o->vR_px) / 2};
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, at->J, at->V, 0, JV);
+    for (unsigned i = 0; i < 3; i++)
+        at->rho[i] = pixels[i] - seen[i] - dot(JV + 6 * i, z, 6);
+    memcpy(at->a, JV, sizeof JV);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, Dz, KJL, 1, at->a);
+    memcpy(L_S, at->S, sizeof L_S);
+    (void)oracle_cholesky(3, L_S);
+    oracle_solve_lower(3, 6, L_S, at->a);
+    oracle_solve_lower(3, 1, L_S, at->rho);
+}
+
+/* r^T S^-1 r with S of the best point, r = the residual of the point looked at last. */
+static double in_best_measure(const sight *at) {
+    double L_now[9], L_best[9], r[3];
+    memcpy(L_now, at->S, sizeof L_now);
+    memcpy(L_best, at->best_S, sizeof L_best);
+    (void)oracle_cholesky(3, L_now);
+    (void)oracle_cholesky(3, L_best);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, L_now, at->rho, 0, r);
+    oracle_solve_lower(3, 1, L_best, r);
+    return dot(r, r, 3);
+}
+
+/* A += w a^T a, b += w a^T rho. */
+static void add(const sight *at, double weight, double A[36], double b[6]) {
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 6, 3, weight, at->a, at->a, 1, A);
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 1, 3, weight, at->a, at->rho, 1, b);
+}
+
+/* Looks at all from z; returns by how much the residuals' share of the sum is larger than at the best
+ * point, in that point's measure. */
+static double evaluate(search *s, const double z[6], sum *point) {
+    double back[16], JL[36], change = 0;
+    camera_motion(s, z, back, JL);
+    memset(point, 0, sizeof *point);
+    memcpy(point->z, z, sizeof point->z);
+    for (unsigned i = 0; i < s->count; i++) {
+        sight *at = &s->sights[i];
+        look(s, at, z, back, JL);
+        const double d2 = dot(at->rho, at->rho, 3);
+        at->weight =
+            at->in_front ? at->voice * (sqrt(d2) <= huber_limit ? 1 : huber_limit / sqrt(d2)) : 0;
+        if (!(at->weight > 0))
+            continue;
+        change += huber(in_best_measure(at)) - at->cost;
+        add(at, at->weight, point->A, point->b);
+    }
+    return change;
+}
+
+static void accept(search *s) {
+    for (unsigned i = 0; i < s->count; i++) {
+        sight *at = &s->sights[i];
+        at->cost = huber(dot(at->rho, at->rho, 3));
+        memcpy(at->best_S, at->S, sizeof at->S);
+    }
+}
+
+/* ---------------------------------------------------------------- the search */
+
+/* dz of (I + A + damping (I + diag A)) dz = b - z; returns what it promises of the sum. */
+static double step(const sum *point, double damping, double dz[6]) {
+    double N[36], gradient[6];
+    memcpy(N, point->A, sizeof N);
+    for (unsigned k = 0; k < 6; k++) {
+        N[7 * k] = (1 + N[7 * k]) * (1 + damping);
+        gradient[k] = dz[k] = point->b[k] - point->z[k];
+    }
+    return oracle_solve_spd(6, 1, N, dz) ? dot(dz, gradient, 6) : 0;
+}
+
+static bool is_within_reach(const double L[36], const double z[6]) {
+    double n[6];
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, L, z, 0, n);
+    return sqrt(dot(n, n, 3)) <= 1000 && sqrt(dot(n + 3, n + 3, 3)) <= 2;
+}
+
+static void descend(search *s, sum *best) {
+    double damping = 0;
+    for (int i = 0; i < TRIALS; i++) {
+        double z[6], dz[6];
+        sum trial;
+        if (!(step(best, damping, dz) >= least_promise))
+            break;
+        for (unsigned k = 0; k < 6; k++)
+            z[k] = best->z[k] + dz[k];
+        if (is_within_reach(s->L, z) &&
+            evaluate(s, z, &trial) + dot(z, z, 6) < dot(best->z, best->z, 6)) {
+            *best = trial;
+            accept(s);
+            damping *= 0.1;
+        } else {
+            damping = damping > 0 ? 10 * damping : 0.01;
+        }
+    }
+    const sum kept = *best; /* a trial that was not taken may have been looked at last */
+    (void)evaluate(s, kept.z, best);
+    accept(s);
+}
+
+/* ---------------------------------------------------------------- verdicts */
+
+/* (rho - a dz)^T (I + a N^-1 a^T)^-1 (rho - a dz) with N = I + A, dz = N^-1 (b - z). */
+static double distance2(const sight *at, const double A[36], const double b[6], const double z[6]) {
+    double N[36], X[36 + 6], M[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, e[3], x[3];
+    memcpy(N, A, sizeof N);
+    for (unsigned k = 0; k < 6; k++)
+        N[7 * k] += 1;
+    for (unsigned k = 0; k < 6; k++) { /* columns: a^T and b - z */
+        for (unsigned r = 0; r < 3; r++)
+            X[4 * k + r] = at->a[6 * r + k];
+        X[4 * k + 3] = b[k] - z[k];
+    }
+    if (!oracle_solve_spd(6, 4, N, X))
+        return (double)INFINITY;
+    for (unsigned r = 0; r < 3; r++) {
+        e[r] = at->rho[r];
+        for (unsigned k = 0; k < 6; k++) {
+            e[r] -= at->a[6 * r + k] * X[4 * k + 3];
+            for (unsigned c = 0; c < 3; c++)
+                M[3 * r + c] += at->a[6 * r + k] * X[4 * k + c];
+        }
+    }
+    memcpy(x, e, sizeof x);
+    return oracle_solve_spd(3, 1, M, x) ? dot(e, x, 3) : (double)INFINITY;
+}
+
+/* What the twists alone say: no observation in A and b. */
+static void judge_at_zero(const search *s, sight *at) {
+    static const double none[36] = {0};
+    const double s2 = s->e->config.pixel_sigma_px * s->e->config.pixel_sigma_px;
+    const double limit = s->e->camera.fx_px * s->e->camera.fx_px;
+    double L_S[9], La[18];
+    at->at_zero = (double)INFINITY;
+    if (!at->in_front) {
+        at->voice = 0;
+        return;
+    }
+    memcpy(L_S, at->S, sizeof L_S);
+    (void)oracle_cholesky(3, L_S);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, L_S, at->a, 0, La);
+    for (unsigned r = 0; r < 3; r++)
+        if (at->S[4 * r] + dot(La + 6 * r, La + 6 * r, 6) - (r == 2 ? s2 / 2 : s2) > limit &&
+            !s->e->known[at->landmark]) {
+            at->voice = 0;
+            return;
+        }
+    at->at_zero = distance2(at, none, none, none);
+}
+
+/* Is so much of what is known of this prediction from the others that they can judge it? The least
+ * pivot of (I - w h) (I + (1 - w) h), h = a (I + A)^-1 a^T. */
+static bool others_know(const sight *at, const double A[36]) {
+    double N[36], X[18], h[9], left[9], right[9], M[9];
+    memcpy(N, A, sizeof N);
+    for (unsigned k = 0; k < 6; k++) {
+        N[7 * k] += 1;
+        for (unsigned r = 0; r < 3; r++)
+            X[3 * k + r] = at->a[6 * r + k];
+    }
+    if (!oracle_solve_spd(6, 3, N, X))
+        return false;
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 3, 6, 1, at->a, X, 0, h);
+    for (unsigned i = 0; i < 9; i++) {
+        left[i] = (i % 4 == 0) - at->weight * h[i];
+        right[i] = (i % 4 == 0) + (1 - at->weight) * h[i];
+    }
+    square_multiply(3, left, right, M);
+    if (!oracle_cholesky(3, M))
+        return false;
+    return fmin(M[0], fmin(M[4], M[8])) >= sqrt(least_rest);
+}
+
+static double judge(const sight *at, const sum *best, bool found) {
+    double A[36], b[6];
+    if (!isfinite(at->at_zero) || !at->in_front)
+        return (double)INFINITY;
+    if (!found || !others_know(at, best->A))
+        return at->at_zero;
+    memcpy(A, best->A, sizeof A);
+    memcpy(b, best->b, sizeof b);
+    add(at, -at->weight, A, b);
+    return distance2(at, A, b, best->z);
+}
+
+/* -mu^T (P J^T S^-1 r) / r^2: the change of inverse range that the observation alone makes. */
+static double change_of_inverse_range(const dense_ekf *e, const sight *at) {
+    const double *q = e->x[at->landmark];
+    const double range2 = dot(q, q, 3);
+    double L_S[9], r[3], S[9], JP[9], moved[3];
+    memcpy(L_S, at->S, sizeof L_S);
+    memcpy(S, at->S, sizeof S);
+    (void)oracle_cholesky(3, L_S);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, L_S, at->rho, 0, r);
+    (void)oracle_solve_spd(3, 1, S, r);
+    square_multiply(3, at->J, at->P, JP);
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 3, 1, 3, 1, JP, r, 0, moved);
+    return -dot(q, moved, 3) / (range2 * sqrt(range2));
+}
+
+static bool is_accepted(const dense_ekf *e, const sight *at, double d2) {
+    const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
+    const double gap = (double)at->o->vL_px - (double)at->o->vR_px;
+    return isfinite(d2) &&
+           (e->config.gate_d2 <= 0 || d2 + gap * gap / (2 * s2) <= e->config.gate_d2);
+}
+
+/* ---------------------------------------------------------------- all of it */
+
+static void prepare(search *s, unsigned landmark, const plr_observation *o) {
+    const dense_ekf *e = s->e;
+    const unsigned n = dense_dim(e), row = dense_row(e, landmark);
+    sight *at = &s->sights[s->count++];
+    memset(at, 0, sizeof *at);
+    at->landmark = landmark;
+    at->o = o;
+    at->voice = e->known[landmark] ? 0 : 1;
+    for (unsigned r = 0; r < 3; r++) {
+        memcpy(at->V + 6 * r, e->C + 6 * (row + r), 6 * sizeof *at->V);
+        solve_lower(s->L, at->V + 6 * r);
+    }
+    for (unsigned r = 0; r < 3; r++)
+        for (unsigned c = 0; c < 3; c++)
+            at->P[3 * r + c] = e->P[(row + r) * n + row + c] - dot(at->V + 6 * r, at->V + 6 * c, 6);
+    for (unsigned r = 0; r < 3; r++) /* of no point yet: any measure will do */
+        at->best_S[4 * r] = 1;
+}
+
+void dense_find_motion(const dense_ekf *e, const plr_frame *frame, dense_first *first) {
+    static const double zero[6] = {0};
+    search s = {.e = e, .L = first->L};
+    sum best;
+    unsigned voices = 0;
+    for (unsigned i = 0; i < frame->count; i++) {
+        const unsigned landmark = dense_find(e, frame->observations[i].id);
+        if (landmark < e->count)
+            prepare(&s, landmark, &frame->observations[i]);
+    }
+    (void)evaluate(&s, zero, &best);
+    accept(&s);
+    for (unsigned i = 0; i < s.count; i++) {
+        judge_at_zero(&s, &s.sights[i]);
+        voices += s.sights[i].voice > 0;
+    }
+    const bool found = voices >= FEW;
+    if (found)
+        descend(&s, &best);
+    memcpy(first->z, best.z, sizeof first->z);
+    first->judged = true;
+    for (unsigned i = 0; i < s.count; i++) {
+        const sight *at = &s.sights[i];
+        const double d2 = judge(at, &best, found);
+        first->d2[at->landmark] = d2;
+        if (is_accepted(e, at, d2))
+            first->closer[at->landmark] = change_of_inverse_range(e, at);
+    }
+}
