@@ -178,30 +178,6 @@ static void expect_motion(const plr_motion *motion, double *F, const double *G) 
     free(GB);
 }
 
-static void check_add_motion(void) {
-    plr_motion motion;
-    double *F = twin_identity(), *G = specimen_zeros(twin.n, 6);
-    specimen_motion(&twin.filter, &twin.chance, &motion);
-    for (unsigned i = 0; i < twin.n; i++)
-        for (unsigned k = 0; k < 6; k++) {
-            const bool is_bias = twin.filter.config.bias && i >= 6 && i < 12;
-            G[6 * i + k] = is_bias ? 0 : (double)(plr_real)rng_normal(&twin.chance);
-        }
-    plr_real *Gt = plr_covariance_motion_rows(&twin.filter);
-    for (unsigned i = 0; i < twin.n; i++)
-        for (unsigned k = 0; k < 6; k++)
-            Gt[k * twin.n + i] = (plr_real)G[6 * i + k];
-    expect_motion(&motion, F, G);
-    plr_covariance_add_motion(&twin.filter, &motion);
-    twin_demand_expected(200);
-    free(G);
-    free(F);
-}
-
-static void test_motion_of_everything_agrees(void) {
-    twin_for_each_size(check_add_motion);
-}
-
 static void check_predict_pose(void) {
     plr_motion motion;
     plr_real A[36];
@@ -244,7 +220,6 @@ int main(void) {
     RUN_TEST(test_trace_is_the_sum_of_the_variances);
     RUN_TEST(test_each_variance_is_looked_at);
     RUN_TEST(test_transport_agrees);
-    RUN_TEST(test_motion_of_everything_agrees);
     RUN_TEST(test_motion_of_the_pose_alone_agrees);
     RUN_TEST(test_the_walk_adds_to_the_bias_variances_alone);
     return UNITY_END();
