@@ -73,8 +73,16 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     plr_mat3_vec(turn, E, chart->mu);
     /* r+ - r = -r r+ w_3; and q+ - q = (r+ - r) (mu + turn) + r turn */
     const plr_real further = cut ? result->r - chart->r : -chart->r * result->r * w[2];
-    for (int i = 0; i < 3; i++)
-        q[i] += PLR_FMA(further, chart->mu[i] + turn[i], chart->r * turn[i]);
+    const plr_real mu[3] = {chart->mu[0] + turn[0], chart->mu[1] + turn[1], chart->mu[2] + turn[2]};
+    if (further <
+        PLR_R(-0.25) * chart->r) { /* the far point's rounding must not stay in the near one */
+        const plr_real scale = result->r / PLR_SQRT(plr_dot3(mu, mu));
+        for (int i = 0; i < 3; i++)
+            q[i] = scale * mu[i];
+    } else {
+        for (int i = 0; i < 3; i++)
+            q[i] += PLR_FMA(further, mu[i], chart->r * turn[i]);
+    }
     plr_polar_at(result, q);
 
     for (int column = 0; column < 2; column++) {

@@ -123,8 +123,8 @@ static void look(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &frame, &report));
     const bool moves = dense.pending; /* a frame that does nothing is not rounded either */
     const dense_report expected = dense_update(&dense, &frame);
-    if (expected.used > 0 || moves)
-        dense_make_up_for_rounding(&dense, 8 * REAL_EPSILON);
+    if (filter.frame_number % 32 == 0 && (expected.used > 0 || moves))
+        dense_make_up_for_rounding(&dense, &frame, 8 * REAL_EPSILON);
     for (unsigned i = 0; i < evictions; i++)
         dense_remove(&dense, evicted[i]);
     const bool adopts = config.mode == PLR_MODE_LOCALIZATION;

@@ -85,8 +85,8 @@ static void test_without_motion_a_second_frame_changes_both_alike(void) {
     demand_same_poses(1e-6 + 100 * REAL_EPSILON, 1e-6 + 100 * REAL_EPSILON, 1e-4 + rounding);
 }
 
-/* Motion alone is the same for both: the pose's block does not know the landmarks. */
-static void test_by_prediction_alone_poses_are_the_same(void) {
+/* Drives blindly, then has an empty frame apply the motion. */
+static void drive_blindly(void) {
     plr_report reports[2];
     begin_both();
     look(reports);
@@ -98,11 +98,25 @@ static void test_by_prediction_alone_poses_are_the_same(void) {
         scene_move(&rig.world, RIG_STEP_NS);
     }
     demand_same_poses(0, 0, 0);
-    const plr_frame empty = {.t_ns = plr_filter_time(&filters[0]), .budget = 1}; /* applies it */
+    const plr_frame empty = {.t_ns = plr_filter_time(&filters[0]), .budget = 1};
     for (int model = 0; model < 2; model++)
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filters[model], &empty, NULL));
-    demand_same_poses(0, 0, 1e-12 + 100 * REAL_EPSILON);
+}
+
+/* Motion alone is the same for both: the pose's block does not know the landmarks. */
+static void test_by_prediction_alone_poses_are_the_same(void) {
+    rig.config.bias = 0;
+    drive_blindly();
+    demand_same_poses(0, 2 * REAL_EPSILON, 1e-12 + 100 * REAL_EPSILON);
     demand_same_landmarks(1e-12 + 2000 * REAL_EPSILON, 1e-9 + 1e4 * REAL_EPSILON);
+}
+
+/* With biases, `body` charges a ten-thousandth of what they make of the motion as noise besides. */
+static void test_by_prediction_with_biases_poses_differ_by_the_share_that_is_charged(void) {
+    rig.config.bias = 1;
+    drive_blindly();
+    demand_same_poses(0, 2 * REAL_EPSILON, 1e-4 + 100 * REAL_EPSILON);
+    demand_same_landmarks(1e-12 + 2000 * REAL_EPSILON, 1e-4 + 1e4 * REAL_EPSILON);
 }
 
 int main(void) {
@@ -110,5 +124,6 @@ int main(void) {
     RUN_TEST(test_after_the_first_frame_landmarks_are_the_same);
     RUN_TEST(test_without_motion_a_second_frame_changes_both_alike);
     RUN_TEST(test_by_prediction_alone_poses_are_the_same);
+    RUN_TEST(test_by_prediction_with_biases_poses_differ_by_the_share_that_is_charged);
     return UNITY_END();
 }

@@ -128,7 +128,7 @@ void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion) {
     for (int i = 0; i < 3; i++) {
         motion->p[i] = (plr_real)D[4 * i + 3];
         for (int j = 0; j < 3; j++)
-            motion->R[3 * i + j] = (plr_real)D[4 * i + j];
+            motion->E[3 * i + j] = (plr_real)(D[4 * i + j] - (i == j));
     }
     random_spd(r, 6, 0.1, Q);
     for (int i = 0; i < 36; i++)

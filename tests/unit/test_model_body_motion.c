@@ -418,7 +418,7 @@ static void test_far_points_keep_the_variance_of_their_bearing(void) {
     for (int i = 0; i < 3; i++) {
         filter.motion.p[i] = (plr_real)D[4 * i + 3];
         for (int j = 0; j < 3; j++)
-            filter.motion.R[3 * i + j] = (plr_real)D[4 * i + j];
+            filter.motion.E[3 * i + j] = (plr_real)(D[4 * i + j] - (i == j));
     }
     filter.motion.pending = 1;
     plr_motion_settle(&filter);

@@ -143,6 +143,18 @@ static void test_from_point_agrees_with_differences_of_the_coordinates(void) {
     }
 }
 
+/* Retracts from q, and demands that the point goes where its chart goes. */
+static bool retract_from(const plr_real q[3], plr_polar *moved, plr_real M[4],
+                         const plr_polar *chart, const plr_real w[3]) {
+    plr_real to[3];
+    memcpy(to, q, sizeof to);
+    const bool cut = plr_polar_retract(moved, M, chart, w, MIN_INVERSE_RANGE, to);
+    for (int i = 0; i < 3; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(8 * eps * (double)moved->r,
+                                  (double)moved->r * (double)moved->mu[i], (double)to[i]);
+    return cut;
+}
+
 static void test_retracting_nothing_moves_nothing(void) {
     const plr_real w[3] = {0, 0, 0};
     for (int run = 0; run < RUNS; run++) {
@@ -151,7 +163,7 @@ static void test_retracting_nothing_moves_nothing(void) {
         double exact[3];
         random_point(run, random_range(), q, exact);
         plr_polar_at(&chart, q);
-        TEST_ASSERT_FALSE(plr_polar_retract(&moved, M, &chart, w, MIN_INVERSE_RANGE));
+        TEST_ASSERT_FALSE(retract_from(q, &moved, M, &chart, w));
         TEST_ASSERT_DOUBLE_WITHIN(4 * eps * (double)chart.r, (double)chart.r, (double)moved.r);
         for (int i = 0; i < 3; i++)
             TEST_ASSERT_DOUBLE_WITHIN(8 * eps, (double)chart.mu[i], (double)moved.mu[i]);
@@ -193,7 +205,7 @@ static void test_retraction_follows_its_equations(void) {
         if (r < 0.1)
             w[2] = (double)(w_real[2] = 0); /* so that no limit is met */
         retract(&chart, w, expected, E);
-        TEST_ASSERT_FALSE(plr_polar_retract(&moved, M, &chart, w_real, MIN_INVERSE_RANGE));
+        TEST_ASSERT_FALSE(retract_from(q, &moved, M, &chart, w_real));
         const double r_moved = norm(expected);
         TEST_ASSERT_DOUBLE_WITHIN(10 * eps * r_moved, r_moved, (double)moved.r);
         for (int i = 0; i < 3; i++)
@@ -222,7 +234,7 @@ static void test_transport_is_a_rotation_of_the_plane(void) {
         rng_normals(&chance, 0.3, w_double, 2);
         w_double[2] = 0;
         to_reals(w, w_double, 3);
-        (void)plr_polar_retract(&moved, M, &chart, w, MIN_INVERSE_RANGE);
+        (void)retract_from(q, &moved, M, &chart, w);
         const double m[4] = {(double)M[0], (double)M[1], (double)M[2], (double)M[3]};
         TEST_ASSERT_DOUBLE_WITHIN(30 * eps, 1, m[0] * m[0] + m[2] * m[2]);
         TEST_ASSERT_DOUBLE_WITHIN(30 * eps, 1, m[1] * m[1] + m[3] * m[3]);
@@ -264,7 +276,7 @@ static void retract_at_10_m(const double w_double[3], plr_polar *chart, plr_pola
     plr_real w[3], M[4];
     to_reals(w, w_double, 3);
     plr_polar_at(chart, q);
-    *cut = plr_polar_retract(moved, M, chart, w, MIN_INVERSE_RANGE);
+    *cut = retract_from(q, moved, M, chart, w);
 }
 
 static double angle_between(const plr_polar *a, const plr_polar *b) {
@@ -326,6 +338,33 @@ static void test_an_inverse_range_that_is_no_number_is_cut(void) {
     TEST_ASSERT_TRUE(isfinite((double)moved.r));
 }
 
+/* A parked robot corrects by micrometres: what a step changes is rounded at the point's size, not the
+ * point's direction and length each on its own. A step there and back is the same point but for one
+ * rounding of it, and no step at all is no change of a bit. */
+static void test_small_steps_are_rounded_once(void) {
+    for (int run = 0; run < RUNS; run++) {
+        plr_polar chart, there, back;
+        plr_real q[3], to[3], M[4], w[3], w_back[3], zero[3] = {0};
+        double exact[3], small[3];
+        random_point(run, rng_uniform(&chance, 2, 30), q, exact);
+        plr_polar_at(&chart, q);
+        memcpy(to, q, sizeof to);
+        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, zero, MIN_INVERSE_RANGE, to));
+        TEST_ASSERT_TRUE(same_bits(q, to, 3));
+
+        rng_normals(&chance, 1e-6, small, 3);
+        to_reals(w, small, 3);
+        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, w, MIN_INVERSE_RANGE, to));
+        for (int i = 0; i < 2; i++) /* -M w */
+            w_back[i] = -(M[2 * i] * w[0] + M[2 * i + 1] * w[1]);
+        w_back[2] = -w[2];
+        TEST_ASSERT_FALSE(plr_polar_retract(&back, M, &there, w_back, MIN_INVERSE_RANGE, to));
+        const double most = largest((double[3]){(double)q[0], (double)q[1], (double)q[2]}, 3);
+        for (int i = 0; i < 3; i++)
+            TEST_ASSERT_DOUBLE_WITHIN(1.01 * eps * most + 1e-10, (double)q[i], (double)to[i]);
+    }
+}
+
 /* Three kilometres away a point's range is uncertain by its own size: corrections of the range must
  * not shake its bearing, which holds the attitude. */
 static void test_far_points_keep_their_bearing(void) {
@@ -336,11 +375,11 @@ static void test_far_points_keep_their_bearing(void) {
         random_point(run, 3000, q, exact);
         plr_polar_at(&chart, q);
         w[2] = (plr_real)rng_uniform(&chance, -3.2e-4, 1e-2);
-        (void)plr_polar_retract(&moved, M, &chart, w, MIN_INVERSE_RANGE);
+        (void)retract_from(q, &moved, M, &chart, w);
         TEST_ASSERT_DOUBLE_WITHIN(4 * eps, 0, angle_between(&chart, &moved));
 
         const plr_real turned[3] = {PLR_R(3e-5), PLR_R(-4e-5), w[2]};
-        (void)plr_polar_retract(&moved, M, &chart, turned, MIN_INVERSE_RANGE);
+        (void)retract_from(q, &moved, M, &chart, turned);
         TEST_ASSERT_DOUBLE_WITHIN(4 * eps, 5e-5, angle_between(&chart, &moved));
     }
 }
@@ -360,6 +399,7 @@ int main(void) {
     RUN_TEST(test_a_bearing_turns_by_one_radian_at_most);
     RUN_TEST(test_corrections_within_the_limits_are_not_cut);
     RUN_TEST(test_an_inverse_range_that_is_no_number_is_cut);
+    RUN_TEST(test_small_steps_are_rounded_once);
     RUN_TEST(test_far_points_keep_their_bearing);
     return UNITY_END();
 }

@@ -167,6 +167,12 @@ static void test_right_jacobian_agrees_with_differences(void) {
     }
 }
 
+/* E = R - I */
+static void less_identity(plr_real E[9], const plr_real R[9]) {
+    for (int i = 0; i < 9; i++)
+        E[i] = R[i] - (i % 4 == 0 ? PLR_R(1) : PLR_R(0));
+}
+
 static void test_append_multiplies_motions(void) {
     rng r = rng_seeded(66);
     for (int run = 0; run < RUNS; run++) {
@@ -174,10 +180,81 @@ static void test_append_multiplies_motions(void) {
         const motion b = random_motion(&r);
         double expected[16], got[16];
         square_multiply(4, a.M, b.M, expected);
-        plr_se3_append(a.R, a.p, b.R, b.p);
+        plr_real E[9], dE[9];
+        less_identity(E, a.R);
+        less_identity(dE, b.R);
+        plr_se3_append(E, a.p, dE, b.p);
+        plr_se3_rotation(a.R, E);
         to_matrix(got, a.R, a.p);
         TEST_ASSERT_DOUBLE_WITHIN(60 * eps, 0, largest_difference(expected, got, 16));
     }
+}
+
+/* Exp(xi) - I as its small numbers: theta rho / 2 and the like are right to their own size. */
+static void test_a_small_exponential_is_right_to_its_own_size(void) {
+    rng r = rng_seeded(68);
+    for (int run = 0; run < RUNS; run++) {
+        double twin[6];
+        plr_real xi[6], E[9], p[3];
+        random_tangent(&r, pow(10, -3 - 9.0 * run / RUNS), twin, xi);
+        plr_se3_expm1(E, p, xi);
+        const double t[3] = {twin[3], twin[4], twin[5]};
+        const double size2 = t[0] * t[0] + t[1] * t[1] + t[2] * t[2], size = sqrt(size2);
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) { /* [t]x + [t]x^2 / 2, the next term is |t|^3 / 6 */
+                const double skew = i == j                 ? 0
+                                    : (j - i + 3) % 3 == 1 ? -t[3 - i - j]
+                                                           : t[3 - i - j];
+                const double expected = skew + (t[i] * t[j] - (i == j ? size2 : 0)) / 2;
+                TEST_ASSERT_DOUBLE_WITHIN(8 * eps * size + size2 * size, expected,
+                                          (double)E[3 * i + j]);
+            }
+    }
+}
+
+/* Ten thousand steps of a micrometre and a microradian: what each adds is not rounded at the size of 1. */
+static void test_small_motions_add_up(void) {
+    const double xi[6] = {1e-6, -2e-6, 3e-6, 2e-6, -1e-6, 3e-6};
+    plr_real xi_real[6], E[9] = {0}, p[3] = {0}, dE[9], dp[3], R[9];
+    double all[6], expected[16], got[16];
+    to_reals(xi_real, xi, 6);
+    plr_se3_expm1(dE, dp, xi_real);
+    for (int k = 0; k < 10000; k++)
+        plr_se3_append(E, p, dE, dp);
+    for (int i = 0; i < 6; i++)
+        all[i] = 10000 * (double)xi_real[i];
+    rigid_exp(expected, all);
+    plr_se3_rotation(R, E);
+    to_matrix(got, R, p);
+    TEST_ASSERT_DOUBLE_WITHIN(30 * eps, 0, largest_difference(expected, got, 16));
+}
+
+/* A point that a small motion moves is rounded once: there and back it is within one rounding. */
+static void test_moving_back_undoes_the_motion(void) {
+    rng r = rng_seeded(69);
+    for (int run = 0; run < RUNS; run++) {
+        double twin[6], M[16], exact[3], expected[3];
+        plr_real xi[6], E[9], p[3], x[3];
+        random_tangent(&r, angle_of(run), twin, xi);
+        rigid_exp(M, twin);
+        plr_se3_expm1(E, p, xi);
+        rng_normals(&r, 5, exact, 3);
+        to_reals(x, exact, 3);
+        to_doubles(exact, x, 3);
+        for (int i = 0; i < 3; i++) {
+            expected[i] = 0;
+            for (int j = 0; j < 3; j++)
+                expected[i] += M[4 * j + i] * (exact[j] - M[4 * j + 3]);
+        }
+        plr_se3_move_back(x, E, p);
+        for (int i = 0; i < 3; i++)
+            TEST_ASSERT_DOUBLE_WITHIN(100 * eps, expected[i], (double)x[i]);
+    }
+    const plr_real none[9] = {0};
+    plr_real x[3] = {PLR_R(3.1), PLR_R(-0.7), PLR_R(12.3)};
+    const plr_real before[3] = {x[0], x[1], x[2]};
+    plr_se3_move_back(x, none, none);
+    TEST_ASSERT_TRUE(same_bits(before, x, 3));
 }
 
 static void test_inverse_point_undoes_the_motion(void) {
@@ -206,6 +283,9 @@ int main(void) {
     RUN_TEST(test_right_jacobian_agrees_with_its_series);
     RUN_TEST(test_right_jacobian_agrees_with_differences);
     RUN_TEST(test_append_multiplies_motions);
+    RUN_TEST(test_a_small_exponential_is_right_to_its_own_size);
+    RUN_TEST(test_small_motions_add_up);
+    RUN_TEST(test_moving_back_undoes_the_motion);
     RUN_TEST(test_inverse_point_undoes_the_motion);
     return UNITY_END();
 }

@@ -167,6 +167,32 @@ static void test_orthonormalise_leaves_a_rotation_alone(void) {
     }
 }
 
+/* The same in small numbers: (I + E) of a turn comes out as good a rotation, and what a small turn is
+ * off by is squared away at its own size. */
+static void test_orthonormalise_of_a_small_turn_is_the_same(void) {
+    rng r = rng_seeded(55);
+    for (int run = 0; run < RUNS; run++) {
+        const double length = run % 2 == 0 ? pi * run / RUNS : pow(10, -9.0 * run / RUNS);
+        double twin[3], before[9], after[9];
+        plr_real theta[3], E[9], R[9];
+        random_theta(&r, length, twin, theta);
+        plr_so3_expm1(E, theta);
+        to_doubles(before, E, 9);
+        plr_so3_orthonormalise_small(E);
+        to_doubles(after, E, 9);
+        TEST_ASSERT_DOUBLE_WITHIN(8 * eps * fmin(1, length), 0,
+                                  largest_difference(before, after, 9));
+
+        for (int i = 0; i < 9; i++)
+            E[i] = (plr_real)(before[i] + 1e-3 * length * rng_uniform(&r, -1, 1));
+        plr_so3_orthonormalise_small(E);
+        for (int i = 0; i < 9; i++)
+            R[i] = E[i] + (i % 4 == 0 ? PLR_R(1) : PLR_R(0));
+        TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(20e-6 * length * length + 8 * eps,
+                                         distance_to_orthonormal(R));
+    }
+}
+
 static void test_a_million_steps_stay_a_rotation(void) {
     plr_real R[9], step[9], product[9];
     const plr_real theta[3] = {PLR_R(0.01), PLR_R(-0.02), PLR_R(0.005)};
@@ -189,6 +215,7 @@ int main(void) {
     RUN_TEST(test_exp_of_minus_theta_is_the_transpose);
     RUN_TEST(test_orthonormalise_squares_the_error_away);
     RUN_TEST(test_orthonormalise_leaves_a_rotation_alone);
+    RUN_TEST(test_orthonormalise_of_a_small_turn_is_the_same);
     RUN_TEST(test_a_million_steps_stay_a_rotation);
     return UNITY_END();
 }
