@@ -13,6 +13,8 @@
  * Time is an argument: the filter has no clock. Every call runs a bounded number of steps, whatever
  * its data; the bounds are in docs/SIZES.md. Two filters can live side by side; one filter is not
  * thread-safe: calls on it must not overlap. A call that is refused (status < 0) changes nothing.
+ * Every call first looks whether the filter's memory is as the last one left it; if not, it returns
+ * PLR_E_DAMAGED, and so do all that follow, until an init.
  *
  * Errors are on the right: T = T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in
  * rad; b = b^ + db. Covariances are of these. Source of the equations: docs/MATH.md.

@@ -40,7 +40,7 @@ typedef struct plr_totals {
     uint32_t recoveries;     /* landmarks dropped to go on after divergence or a lost lock */
     uint32_t contradictions; /* times vision's word was taken against the twists */
     uint32_t twists_refused, frames_refused; /* for any reason */
-    uint32_t damaged;                        /* calls refused with PLR_E_DAMAGED */
+    uint32_t damaged;                        /* frames refused with PLR_E_DAMAGED */
     uint64_t observations, matched, used, gated, created, evicted;
     plr_time_ns diverged_ns; /* when a variance ceased to be positive; 0: never */
 } plr_totals;
@@ -110,14 +110,18 @@ typedef struct plr_workspace {
     uint16_t used[PLR_MAX_OBSERVATIONS];    /* positions k in order that go into the update */
 } plr_workspace;
 
-struct plr_model;
+/* Sums of the filter's memory, by which a call sees that nobody else wrote to it. */
+typedef struct plr_guard {
+    uint64_t constant, small, large;
+} plr_guard;
 
+/* The order of the members counts: config to model never change, and work is of one call. */
 typedef struct plr_filter {
     uint32_t magic; /* set by a successful init */
     plr_config config;
     plr_map map;
     plr_parameters par;
-    const struct plr_model *model;
+    uint8_t model; /* plr_model_kind: of the table of models */
 
     plr_time_ns t_ns;       /* of the estimate */
     plr_time_ns reading_ns; /* of the last twist */
@@ -141,6 +145,7 @@ typedef struct plr_filter {
     uint16_t frames_without_use, frames_mostly_gated;
     uint32_t matches_since_gated;
     plr_totals totals;
+    plr_guard guard; /* last: what stands before it is guarded */
 } plr_filter;
 
 #ifdef __cplusplus

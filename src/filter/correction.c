@@ -5,6 +5,7 @@
 
 #include "filter/covariance.h"
 #include "filter/gate.h"
+#include "filter/model.h"
 #include "filter/motion.h"
 #include "filter/rigid_fit.h"
 #include "linalg/dense.h"
@@ -36,7 +37,8 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
     for (unsigned a = 0; a < block->count; a++) {
         const unsigned slot = w->slot_of[used[a]];
         plr_linearisation *lin = &block->lin[a];
-        (void)f->model->linearise(f, &f->slots[slot], lin); /* the gate has seen it succeed */
+        (void)plr_model_of(f)->linearise(f, &f->slots[slot],
+                                         lin); /* the gate has seen it succeed */
         block->row_of[a] = plr_covariance_row(f, slot);
         plr_covariance_project(f, slot, lin, w->Vt + PLR_ROWS * a * block->ld, block->ld);
 
@@ -135,7 +137,7 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
     if (f->config.bias)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
             f->bias[i] += f->work.dx[PLR_POSE_DIM + i];
-    result.cut = f->model->retract(f, f->work.dx);
+    result.cut = plr_model_of(f)->retract(f, f->work.dx);
     plr_motion_correct_pose(f, f->work.dx);
     plr_covariance_make_up_for_rounding(f);
     if (!plr_covariance_is_positive(f))

@@ -5,6 +5,7 @@
 
 #include "filter/covariance.h"
 #include "filter/filter_internal.h"
+#include "filter/guard.h"
 #include "filter/motion.h"
 #include "filter/slots.h"
 
@@ -24,8 +25,9 @@ plr_time_ns plr_filter_time(const plr_filter *f) {
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
     if (!f || !T_WB)
         return PLR_E_ARGUMENT;
-    if (!ready(f))
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     to_double(T_WB->R, f->R_WB, 9);
     memcpy(T_WB->p, f->p_WB, sizeof T_WB->p);
     return PLR_OK;
@@ -34,8 +36,9 @@ plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     if (!f || !P_xi)
         return PLR_E_ARGUMENT;
-    if (!ready(f))
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     if (f->diverged)
         return PLR_E_DIVERGED;
     plr_real P[36];
@@ -47,8 +50,9 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
 plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     if (!f || !velocity)
         return PLR_E_ARGUMENT;
-    if (!ready(f))
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     for (int i = 0; i < 3; i++) {
         velocity->v_B_mps[i] = (double)(f->reading[i] - f->bias[i]);
         velocity->w_B_radps[i] = (double)(f->reading[3 + i] - f->bias[3 + i]);
@@ -67,8 +71,9 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[36]) {
 plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     if (!f || !P_u)
         return PLR_E_ARGUMENT;
-    if (!ready(f))
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     if (f->diverged)
         return PLR_E_DIVERGED;
     plr_real P[36] = {0};
@@ -89,8 +94,9 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     if (!f || !b)
         return PLR_E_ARGUMENT;
-    if (!ready(f))
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     if (f->diverged && P_b)
         return PLR_E_DIVERGED;
     plr_real P[36] = {0};
@@ -103,7 +109,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
 }
 
 double plr_filter_trace(const plr_filter *f) {
-    if (!ready(f) || f->diverged)
+    if (!f || plr_guard_look_whole(f) != PLR_OK || f->diverged)
         return 0;
     plr_real P[36], P_b[36] = {0};
     double trace = plr_covariance_trace(f);

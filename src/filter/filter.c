@@ -6,6 +6,7 @@
 
 #include "filter/covariance.h"
 #include "filter/filter_internal.h"
+#include "filter/guard.h"
 #include "filter/model.h"
 #include "filter/motion.h"
 #include "lie/se3.h"
@@ -95,9 +96,10 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
     f->config = *config;
     if (map)
         f->map = *map;
-    f->model = config->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
+    f->model = config->model;
     set_parameters(&f->par, calibration, config);
     f->magic = PLR_FILTER_MAGIC;
+    plr_guard_seal_constant(f);
     return plr_filter_reset(f);
 }
 
@@ -124,8 +126,9 @@ plr_status plr_filter_reset(plr_filter *f) {
     double P_xi[36];
     if (!f)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_constant(f);
+    if (sound != PLR_OK)
+        return sound;
     f->t_ns = f->reading_ns = 0;
     f->interval_s = 0;
     f->clock_started = f->reading_valid = f->diverged = 0;
@@ -143,6 +146,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     plr_covariance_set_pose(f, P_xi);
     if (f->config.bias)
         start_bias(f);
+    plr_guard_seal_whole(f);
     return PLR_OK;
 }
 
@@ -159,6 +163,7 @@ void plr_filter_count_refusal(plr_filter *f, plr_status status) {
         f->totals.late++;
     else
         f->totals.refused++;
+    plr_guard_seal(f);
 }
 
 static plr_status refuse(plr_filter *f, plr_status status) {
@@ -191,8 +196,9 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
                                const double *P_xi) {
     if (!f || !T_WB)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return sound;
     if (f->config.mode == PLR_MODE_MAPPING)
         return refuse(f, PLR_E_MODE);
     const plr_status status = check_pose(T_WB);
@@ -222,14 +228,16 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     /* a reading of another clock says nothing any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
+    plr_guard_seal_whole(f);
     return PLR_OK;
 }
 
 plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *variance) {
     if (!f || !mean || !variance)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return sound;
     if (!f->config.bias || f->totals.twists > 0 || f->totals.frames > 0 ||
         f->config.mode == PLR_MODE_MAPPING)
         return refuse(f, PLR_E_MODE);
@@ -244,14 +252,16 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
         f->bias[i] = (plr_real)mean[i];
     plr_filter_forget_reading(f);
     plr_covariance_set_bias(f, variance);
+    plr_guard_seal_whole(f);
     return PLR_OK;
 }
 
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
     if (!f || !T_WB)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     if (f->config.mode != PLR_MODE_MAPPING)
         return refuse(f, PLR_E_MODE);
     const plr_status status = check_pose(T_WB);
@@ -261,11 +271,13 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
         return refuse(f, PLR_E_TIME);
     if (!f->clock_started) {
         put_pose(f, t_ns, T_WB);
+        plr_guard_seal(f);
         return PLR_OK;
     }
     plr_real R[9];
     get_rotation(R, T_WB);
     plr_motion_jump(f, t_ns, R, T_WB->p);
+    plr_guard_seal(f);
     return PLR_OK;
 }
 
@@ -310,8 +322,9 @@ static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
     if (!f || !twist)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
         return refuse(f, PLR_E_NOT_FINITE);
 
@@ -324,6 +337,7 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     }
     if (f->config.mode == PLR_MODE_MAPPING) {
         f->totals.twists++;
+        plr_guard_seal(f);
         return PLR_OK;
     }
     const plr_status in_time = check_time(f, t_ns);
@@ -340,5 +354,6 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     f->t_ns = t_ns;
     f->clock_started = 1;
     take_reading(f, t_ns, reading, interval);
+    plr_guard_seal(f);
     return PLR_OK;
 }

@@ -3,6 +3,7 @@
 
 #include "filter/covariance.h"
 #include "filter/health.h"
+#include "filter/model.h"
 #include "linalg/dense.h"
 #include "linalg/small.h"
 
@@ -47,7 +48,7 @@ bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
 plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
     plr_verdict verdict = {.accepted = false};
     plr_linearisation lin;
-    if (!f->model->linearise(f, &f->slots[slot], &lin))
+    if (!plr_model_of(f)->linearise(f, &f->slots[slot], &lin))
         return verdict;
 
     plr_real S[6 + PLR_KERNEL_MARGIN] = {0}, r[3];

@@ -88,6 +88,12 @@ void plr_health_after_refusal(const plr_filter *f, plr_report *report) {
     report->active = (uint16_t)f->count;
 }
 
+void plr_health_damaged(plr_filter *f, plr_report *report) {
+    f->totals.damaged++; /* the sums stay wrong */
+    report->health = PLR_HEALTH_DIVERGED;
+    report->reasons = PLR_REASON_STATE_DAMAGED;
+}
+
 void plr_health_count(plr_filter *f, const plr_report *report) {
     plr_totals *t = &f->totals;
     t->blocks_failed += report->blocks_failed;

@@ -29,6 +29,9 @@ void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report 
 /* Fills health of a frame that was refused. */
 void plr_health_after_refusal(const plr_filter *f, plr_report *report);
 
+/* Fills health where a guard found the filter's memory changed. */
+void plr_health_damaged(plr_filter *f, plr_report *report);
+
 /* Adds a frame to the totals. */
 void plr_health_count(plr_filter *f, const plr_report *report);
 

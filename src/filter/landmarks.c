@@ -2,18 +2,20 @@
 /* Landmarks as the caller sees them: in the world, in and out. */
 #include "filter/covariance.h"
 #include "filter/filter_internal.h"
+#include "filter/guard.h"
 #include "filter/model.h"
 #include "filter/slots.h"
 
 unsigned plr_filter_landmark_count(const plr_filter *f) {
-    return f && f->magic == PLR_FILTER_MAGIC ? f->count : 0;
+    return f && plr_guard_look(f) == PLR_OK ? f->count : 0;
 }
 
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark) {
     if (!f || !landmark)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return sound;
     if (slot >= f->count)
         return PLR_E_ARGUMENT;
     if (f->diverged)
@@ -25,8 +27,9 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
 plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) {
     if (!f || !landmark)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return sound;
     if (!plr_all_finite(landmark->p_W_m, 3) || !plr_all_finite(landmark->P_W_m2, 9))
         return PLR_E_NOT_FINITE;
     if (!plr_all_within(landmark->p_W_m, 3, PLR_MAX_POSITION) ||
@@ -41,17 +44,19 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
     if (f->count >= f->config.slots)
         return PLR_E_FULL;
     plr_new_landmark entering;
-    if (!f->model->adopt(f, landmark, &entering))
+    if (!plr_model_of(f)->adopt(f, landmark, &entering))
         return PLR_E_RANGE;
     plr_slots_append(f, landmark->id, true, &entering);
+    plr_guard_seal_whole(f);
     return PLR_OK;
 }
 
 plr_status plr_filter_flush_map(plr_filter *f) {
     if (!f)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return sound;
     if (!f->map.sink)
         return PLR_E_MODE;
     if (f->diverged)
@@ -62,5 +67,6 @@ plr_status plr_filter_flush_map(plr_filter *f) {
         if (f->map.sink(f->map.context, &landmark) == 0)
             plr_slots_remove(f, slot);
     }
+    plr_guard_seal_whole(f);
     return f->count == 0 ? PLR_OK : PLR_E_IO;
 }

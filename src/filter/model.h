@@ -68,4 +68,9 @@ void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3], plr_real J
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 
+/* By number: a pointer in RAM could be made to point anywhere. */
+static inline const struct plr_model *plr_model_of(const plr_filter *f) {
+    return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
+}
+
 #endif

@@ -2,6 +2,7 @@
 #include "filter/motion.h"
 
 #include "filter/covariance.h"
+#include "filter/model.h"
 #include "lie/se3.h"
 #include "lie/so3.h"
 #include "linalg/dense.h"
@@ -191,7 +192,7 @@ void plr_motion_apply(plr_filter *f, const plr_applied_motion *applied) {
         plr_gemm_nn(6, 1, 6, applied->L, 6, applied->z, 1, n, 1);
         plr_motion_correct_pose(f, n);
     }
-    f->model->propagate(f, applied);
+    plr_model_of(f)->propagate(f, applied);
     plr_motion_drop(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* Going on after an interruption: another clock, and perhaps another place. */
 #include "filter/filter_internal.h"
+#include "filter/guard.h"
 
 static plr_status refuse(plr_filter *f, plr_status status) {
     plr_filter_count_refusal(f, status);
@@ -22,19 +23,23 @@ static plr_status check_moved(const plr_filter *f, const double *P_moved) {
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved) {
     if (!f)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     const plr_status status = check_moved(f, P_moved);
     if (status != PLR_OK)
         return refuse(f, status);
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* one of before says nothing of now */
-    if (!P_moved)
+    if (!P_moved) {
+        plr_guard_seal(f);
         return PLR_OK;
+    }
     /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */
     for (unsigned i = 0; i < 6; i++)
         for (unsigned j = 0; j < 6; j++)
             f->motion.Q[6 * i + j] += (plr_real)(0.5 * (P_moved[6 * i + j] + P_moved[6 * j + i]));
     f->motion.pending = f->motion.noisy = 1;
+    plr_guard_seal(f);
     return PLR_OK;
 }

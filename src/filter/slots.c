@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "filter/covariance.h"
+#include "filter/model.h"
 
 uint16_t plr_slots_find(const plr_filter *f, uint32_t id) {
     for (unsigned slot = 0; slot < f->count; slot++)
@@ -69,7 +70,7 @@ void plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark
     const plr_slot *s = &f->slots[slot];
     plr_world_point point;
     plr_real P[9];
-    f->model->in_world(f, s, &point);
+    plr_model_of(f)->in_world(f, s, &point);
     plr_covariance_joint(f, slot, point.J_pose, point.J_landmark, P);
     landmark->id = s->id;
     landmark->times_seen = s->times_seen;

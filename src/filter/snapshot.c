@@ -6,6 +6,7 @@
 #include "filter/covariance.h"
 #include "filter/fields.h"
 #include "filter/filter_internal.h"
+#include "filter/guard.h"
 #include "linalg/packed.h"
 
 /* "PLRF" */
@@ -125,7 +126,7 @@ static plr_state_setting setting_in_force(const plr_filter *f, unsigned index) {
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
-    if (!f || f->magic != PLR_FILTER_MAGIC || landmarks > f->config.slots)
+    if (!f || plr_guard_look(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
     const plr_field P = reals((uint32_t)plr_packed_row(plr_covariance_row(f, landmarks)));
     return plr_fields_size(origin_fields, LENGTH(origin_fields)) + plr_fields_size(u32_fields, 1) +
@@ -153,8 +154,9 @@ static void put_belonging(plr_fields_out *out, const plr_filter *f) {
 plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *context) {
     if (!f)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return sound;
     if (f->diverged || !plr_covariance_is_positive(f))
         return PLR_E_DIVERGED;
     plr_fields_out out = {.sink = sink, .context = context, .status = PLR_OK};
@@ -232,8 +234,9 @@ plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source s
                               void *context) {
     if (!f || !source)
         return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
     const plr_fields_in start = {
         .source = source, .context = context, .length = length, .status = PLR_OK};
     unsigned landmarks = 0;
@@ -252,7 +255,9 @@ plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source s
         status = read_count(&in, f, &landmarks); /* of the length, so the same as before */
     if (status == PLR_OK)
         status = load_rest(&in, f, landmarks);
-    if (status != PLR_OK)
+    if (status == PLR_OK)
+        plr_guard_seal_whole(f);
+    else
         (void)plr_filter_reset(f);
     return status;
 }

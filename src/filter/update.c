@@ -9,6 +9,7 @@
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
+#include "filter/guard.h"
 #include "filter/health.h"
 #include "filter/model.h"
 #include "filter/motion.h"
@@ -107,7 +108,7 @@ static void adopt_known(plr_filter *f, const plr_observation *seen, unsigned n,
         plr_new_landmark landmark;
         if (f->work.slot_of[k] != PLR_NO_SLOT || !f->map.source(f->map.context, id, &known))
             continue;
-        if (!plr_landmark_is_valid(&known) || !f->model->adopt(f, &known, &landmark))
+        if (!plr_landmark_is_valid(&known) || !plr_model_of(f)->adopt(f, &known, &landmark))
             continue;
         if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
             report->no_room = (uint16_t)(report->no_room + alone);
@@ -233,7 +234,7 @@ static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
         }
         plr_stereo_back_project(q, Dq, &f->par.camera, z);
         initial_factor(f, Dq, S_q);
-        f->model->initialise(f, q, S_q, &landmark);
+        plr_model_of(f)->initialise(f, q, S_q, &landmark);
         plr_slots_append(f, o->id, false, &landmark);
         report->created++;
     }
@@ -326,8 +327,11 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     r->t_ns = frame->t_ns;
     r->budget = frame->budget;
     r->observations = frame->count;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return r->status = PLR_E_NOT_READY;
+    r->status = plr_guard_look_whole(f);
+    if (r->status == PLR_E_DAMAGED)
+        plr_health_damaged(f, r);
+    if (r->status != PLR_OK)
+        return r->status;
     r->status = check(f, frame);
     if (r->status != PLR_OK) {
         plr_filter_count_refusal(f, r->status);
@@ -346,5 +350,6 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     }
     r->active = (uint16_t)f->count;
     plr_health_count(f, r);
+    plr_guard_seal_whole(f);
     return r->status;
 }

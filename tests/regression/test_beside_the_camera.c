@@ -9,6 +9,7 @@
 #include <unity.h>
 
 #include "pelorus/pelorus.h"
+#include "support/reseal.h"
 
 static plr_filter filter;
 
@@ -37,6 +38,7 @@ static plr_report show(double x, double y, double z, double sigma_m, bool is_kno
         known.P_W_m2[4 * i] = sigma_m * sigma_m;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_insert_known(&filter, &known));
     filter.slots[0].known = is_known;
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &frame, &report));
     return report;
 }

@@ -9,6 +9,7 @@
 #include "filter/model.h"
 #include "filter/polar.h"
 #include "support/matrices.h"
+#include "support/reseal.h"
 #include "support/rigid.h"
 #include "support/scene.h"
 
@@ -110,6 +111,7 @@ void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, uns
         slot->last_seen_ns = f->t_ns;
     }
     random_covariance(f, r);
+    reseal(f);
 }
 
 double *specimen_covariance(const plr_filter *f) {
@@ -141,7 +143,7 @@ void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion) {
 
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
     plr_linearisation lin;
-    if (!f->model->linearise(f, &f->slots[slot], &lin))
+    if (!plr_model_of(f)->linearise(f, &f->slots[slot], &lin))
         abort();
     return (plr_observation){f->slots[slot].id, (float)lin.z[0] + shift_px[0],
                              (float)lin.z[2] + shift_px[1], (float)lin.z[1] + shift_px[2],
@@ -163,6 +165,7 @@ bool specimen_same_state(const plr_filter *a, const plr_filter *b) {
     memcpy(&copy, a, sizeof copy);
     memcpy(&copy.work, &b->work, sizeof copy.work);
     memcpy(&copy.totals, &b->totals, sizeof copy.totals);
+    memcpy(&copy.guard, &b->guard, sizeof copy.guard);
     return memcmp(&copy, b, sizeof copy) == 0 && a->totals.diverged_ns == b->totals.diverged_ns;
 }
 

@@ -58,6 +58,7 @@ bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
         return false;
     memcpy(&copy, a, sizeof copy);
     memcpy(&copy.work, &b->work, sizeof copy.work);
+    memcpy(&copy.guard, &b->guard, sizeof copy.guard);
     memcpy(copy.slots + a->count, b->slots + a->count,
            (PLR_MAX_LANDMARKS - a->count) * sizeof *copy.slots);
     memcpy(copy.P + P, b->P + P, (PLR_PACKED_SIZE - P) * sizeof *copy.P);

@@ -9,6 +9,7 @@
 #include "filter/correction.h"
 #include "filter/covariance.h"
 #include "filter/gate.h"
+#include "filter/model.h"
 #include "linalg/packed.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
@@ -52,7 +53,7 @@ static void dense_correction(unsigned count, double *dx, double *P) {
         plr_linearisation lin;
         plr_real r_real[3];
         double pose[18], landmark[9];
-        TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[a], &lin));
+        TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[a], &lin));
         to_doubles(landmark, lin.H_landmark, 9);
         specimen_put(H, n, 3 * a, plr_covariance_row(&filter, a), 3, 3, landmark);
         if (lin.uses_pose) {

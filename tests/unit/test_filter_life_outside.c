@@ -7,6 +7,7 @@
 
 #include "linalg/packed.h"
 #include "support/matrices.h"
+#include "support/reseal.h"
 #include "support/rig.h"
 
 void setUp(void) {
@@ -88,6 +89,7 @@ static void test_a_pose_from_outside_heals_a_diverged_filter(void) {
     rig_drive(5);
     rig.filter.P[plr_packed_at(7, 7)] = (plr_real)NAN; /* of the biases too */
     rig.filter.diverged = 1;
+    reseal(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_filter_set_pose(&rig.filter, rig.world.t_ns, &rig_identity, NULL));
     double b[6], P[36];

@@ -9,6 +9,7 @@
 #include "filter/gate.h"
 #include "linalg/packed.h"
 #include "support/matrices.h"
+#include "support/reseal.h"
 #include "support/rig.h"
 #include "support/specimens.h"
 
@@ -344,6 +345,7 @@ static void test_a_diverged_filter_refuses_updates_and_goes_on_by_prediction(voi
     double P[36];
     rig_drive(5);
     rig.filter.P[plr_packed_at(0, 0)] = PLR_R(-1e3);
+    reseal(&rig.filter);
     rig_twist();
     const plr_time_ns when = rig.world.t_ns;
     const plr_frame first = look();
@@ -374,6 +376,7 @@ static void test_an_update_that_loses_a_variance_diverges(void) {
     const unsigned row = plr_covariance_row(&rig.filter, 0);
     for (unsigned i = 0; i < 3; i++)
         rig.filter.P[plr_packed_at(row + i, 0)] = PLR_R(10); /* correlated beyond 1 */
+    reseal(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, update(&frame));
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DIVERGED, rig.report.health);
     TEST_ASSERT_TRUE(specimen_gives_finite_numbers(&rig.filter));

@@ -7,6 +7,7 @@
 
 #include "filter/covariance.h"
 #include "filter/gate.h"
+#include "filter/model.h"
 #include "linalg/packed.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
@@ -49,7 +50,7 @@ static void dense_innovation(unsigned slot, const plr_observation *seen, double 
     plr_linearisation lin;
     plr_real r_real[3];
     double pose[18], landmark[9], *H = specimen_zeros(3, n), *P = specimen_covariance(&filter);
-    TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[slot], &lin));
+    TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[slot], &lin));
     to_doubles(landmark, lin.H_landmark, 9);
     specimen_put(H, n, 0, plr_covariance_row(&filter, slot), 3, 3, landmark);
     if (lin.uses_pose) {

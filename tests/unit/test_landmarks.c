@@ -6,6 +6,7 @@
 
 #include "support/matrices.h"
 #include "support/oracle.h"
+#include "support/reseal.h"
 #include "support/rig.h"
 #include "support/specimens.h"
 
@@ -96,6 +97,7 @@ static void test_a_diverged_filter_shows_no_landmark(void) {
     const plr_landmark known = known_landmark();
     rig_drive(3);
     rig.filter.diverged = 1;
+    reseal(&rig.filter);
     rig_remember();
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_landmark(&rig.filter, 0, &landmark));
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_insert_known(&rig.filter, &known));

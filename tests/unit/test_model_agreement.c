@@ -56,7 +56,7 @@ static void take_pair(bool bias) {
     specimen_filter(&body, &chance, PLR_MODEL_BODY, bias, LANDMARKS);
     world = body;
     world.config.model = PLR_MODEL_WORLD;
-    world.model = &plr_model_world;
+    world.model = PLR_MODEL_WORLD;
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
         plr_world_point point;
         plr_model_body.in_world(&body, &body.slots[slot], &point);

@@ -44,7 +44,7 @@ static void test_observation_agrees_with_differences(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             plr_linearisation lin;
             double q[3], z[3], got[3], unused[9], Jw[9], Ji[9];
-            TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[slot], &lin));
+            TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[slot], &lin));
             TEST_ASSERT_FALSE(lin.uses_pose);
             point_of(slot, q);
             dense_project(&truth.camera, q, z, unused);
@@ -77,10 +77,10 @@ static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
     plr_linearisation lin;
     for (unsigned i = 0; i < sizeof depths_m / sizeof *depths_m; i++) {
         filter.slots[0].x[2] = (plr_real)depths_m[i];
-        TEST_ASSERT_FALSE(filter.model->linearise(&filter, &filter.slots[0], &lin));
+        TEST_ASSERT_FALSE(plr_model_of(&filter)->linearise(&filter, &filter.slots[0], &lin));
     }
     filter.slots[0].x[2] = PLR_R(0.301);
-    TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[0], &lin));
+    TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[0], &lin));
 }
 
 /* ---------------------------------------------------------------- new landmarks */
@@ -96,7 +96,7 @@ static void test_a_new_landmark_takes_its_covariance_through_the_chart(void) {
         rng_normals(&chance, 0.1, s, 9);
         to_reals(S, s, 9);
         to_doubles(s, S, 9);
-        filter.model->initialise(&filter, filter.slots[slot].x, S, &landmark);
+        plr_model_of(&filter)->initialise(&filter, filter.slots[slot].x, S, &landmark);
         specimen_chart(filter.slots[slot].x, Jw, Ji);
         square_multiply(3, Jw, s, JS);
         oracle_sandwich(3, 3, JS, identity, expected);
@@ -133,7 +133,7 @@ static void test_a_known_landmark_hangs_on_the_pose_as_differences_say(void) {
         double q[3], got[3], Jw[9], Ji[9];
         take_specimen(false, 0);
         known_landmark(&known);
-        TEST_ASSERT_TRUE(filter.model->adopt(&filter, &known, &landmark));
+        TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
         seen_from((const double[6]){0}, known.p_W_m, q);
         to_doubles(got, landmark.x, 3);
         TEST_ASSERT_DOUBLE_WITHIN(300 * eps, 0, largest_difference(q, got, 3));
@@ -176,15 +176,15 @@ static void test_a_known_landmark_on_the_camera_or_out_of_range_is_refused(void)
     rigid_inverse(T_BC, truth.T_CB);
     dense_apply(centre, T_BC, (const double[3]){0});
     dense_apply(known.p_W_m, truth.T_WB, centre);
-    TEST_ASSERT_FALSE(filter.model->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
     known.p_W_m[0] += 0.5;
-    TEST_ASSERT_TRUE(filter.model->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
     known.p_W_m[0] += 99990;
-    TEST_ASSERT_TRUE(filter.model->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
     known.p_W_m[0] += 20; /* max-range is 100 km */
-    TEST_ASSERT_FALSE(filter.model->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
     known.p_W_m[0] = 1e300;
-    TEST_ASSERT_FALSE(filter.model->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
 }
 
 /* ---------------------------------------------------------------- in the world */
@@ -195,7 +195,7 @@ static void test_place_in_the_world_agrees_with_differences(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             plr_world_point point;
             double q[3], s[3], m[3], T_BC[16], Jw[9], Ji[9], R_WC[9], J[9];
-            filter.model->in_world(&filter, &filter.slots[slot], &point);
+            plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &point);
             point_of(slot, q);
             rigid_inverse(T_BC, truth.T_CB);
             dense_apply(s, T_BC, q);

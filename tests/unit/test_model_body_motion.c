@@ -318,7 +318,7 @@ static void check_retract(bool bias) {
         point_of(slot, q[slot]);
     random_correction(dx, same);
     retract_twin(same, q, T);
-    TEST_ASSERT_EQUAL_UINT(0, filter.model->retract(&filter, dx));
+    TEST_ASSERT_EQUAL_UINT(0, plr_model_of(&filter)->retract(&filter, dx));
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
         double got[3];
         point_of(slot, got);
@@ -355,7 +355,7 @@ static void test_a_rigid_correction_moves_no_landmark_in_the_world(void) {
         random_correction(dx, same);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             double q[3], K[18], e[3], w[3], Jw[9], Ji[9];
-            filter.model->in_world(&filter, &filter.slots[slot], &before[slot]);
+            plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &before[slot]);
             point_of(slot, q);
             dense_camera_by_pose(&truth, q, K);
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, 1, K, same, 0, e);
@@ -363,10 +363,10 @@ static void test_a_rigid_correction_moves_no_landmark_in_the_world(void) {
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, Jw, e, 0, w);
             to_reals(dx + plr_covariance_row(&filter, slot), w, 3);
         }
-        (void)filter.model->retract(&filter, dx);
+        (void)plr_model_of(&filter)->retract(&filter, dx);
         plr_motion_correct_pose(&filter, dx);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
-            filter.model->in_world(&filter, &filter.slots[slot], &after);
+            plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &after);
             /* w_3 is rounded as a part of 1/r: r^2 times that, with r up to 35 m */
             TEST_ASSERT_DOUBLE_WITHIN(3000 * eps, 0,
                                       largest_difference(before[slot].p_W, after.p_W, 3));
@@ -384,7 +384,7 @@ static void test_corrections_that_are_cut_are_counted(void) {
     plr_real dx[12 + 3 * LANDMARKS] = {0};
     take_specimen(false, LANDMARKS);
     dx[plr_covariance_row(&filter, 1) + 2] = -1; /* beyond infinity */
-    TEST_ASSERT_EQUAL_UINT(1, filter.model->retract(&filter, dx));
+    TEST_ASSERT_EQUAL_UINT(1, plr_model_of(&filter)->retract(&filter, dx));
     assert_finite_landmarks();
     double far[3];
     point_of(1, far);
@@ -394,7 +394,7 @@ static void test_corrections_that_are_cut_are_counted(void) {
     take_specimen(false, LANDMARKS);
     dx[plr_covariance_row(&filter, 4)] = 3; /* against each other: no rigid motion does that */
     dx[plr_covariance_row(&filter, 5)] = -3;
-    TEST_ASSERT_EQUAL_UINT(2, filter.model->retract(&filter, dx));
+    TEST_ASSERT_EQUAL_UINT(2, plr_model_of(&filter)->retract(&filter, dx));
     assert_finite_landmarks();
 }
 

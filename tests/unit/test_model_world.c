@@ -60,7 +60,7 @@ static void test_observation_agrees_with_differences(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             plr_linearisation lin;
             double m[3], z[3], got[3], ends[2][3];
-            TEST_ASSERT_TRUE(filter.model->linearise(&filter, &filter.slots[slot], &lin));
+            TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[slot], &lin));
             TEST_ASSERT_TRUE(lin.uses_pose);
             to_doubles(m, filter.slots[slot].x, 3);
             seen_from(none, m, z);
@@ -99,7 +99,7 @@ static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
         dense_apply(m, T_BC, m);
         dense_apply(m, truth.T_WB, m);
         to_reals(filter.slots[0].x, m, 3);
-        TEST_ASSERT_FALSE(filter.model->linearise(&filter, &filter.slots[0], &lin));
+        TEST_ASSERT_FALSE(plr_model_of(&filter)->linearise(&filter, &filter.slots[0], &lin));
     }
 }
 
@@ -127,7 +127,7 @@ static void test_a_new_landmark_copies_the_pose_through_its_jacobian(void) {
         rng_normals(&chance, 0.3, s, 9);
         to_reals(S, s, 9);
         to_doubles(s, S, 9);
-        filter.model->initialise(&filter, q_real, S, &landmark);
+        plr_model_of(&filter)->initialise(&filter, q_real, S, &landmark);
 
         place_from(none, q, m);
         to_doubles(got, landmark.x, 3);
@@ -158,7 +158,7 @@ static void test_an_independent_landmark_shares_nothing_with_the_pose(void) {
     take_specimen(true, LANDMARKS);
     filter.config.landmark_prior = PLR_PRIOR_INDEPENDENT;
     plr_new_landmark landmark;
-    filter.model->initialise(&filter, q, S, &landmark);
+    plr_model_of(&filter)->initialise(&filter, q, S, &landmark);
     TEST_ASSERT_FALSE(landmark.uses_pose);
     plr_covariance_append(&filter, &landmark);
     const unsigned row = plr_covariance_dim(&filter);
@@ -172,7 +172,7 @@ static void test_a_known_landmark_enters_as_it_is(void) {
     plr_landmark known = {.p_W_m = {1, -2, 3}, .P_W_m2 = {4, 1, 0, 1, 5, 2, 0, 2, 6}};
     plr_new_landmark landmark;
     take_specimen(false, 0);
-    TEST_ASSERT_TRUE(filter.model->adopt(&filter, &known, &landmark));
+    TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
     TEST_ASSERT_FALSE(landmark.uses_pose);
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(0, known.p_W_m[i], (double)landmark.x[i]);
@@ -208,7 +208,7 @@ static void test_retraction_adds_to_landmarks_and_leaves_P_alone(void) {
     for (unsigned slot = 0; slot < LANDMARKS; slot++)
         to_doubles(before + 3 * slot, filter.slots[slot].x, 3);
     double *P = specimen_covariance(&filter);
-    TEST_ASSERT_EQUAL_UINT(0, filter.model->retract(&filter, dx));
+    TEST_ASSERT_EQUAL_UINT(0, plr_model_of(&filter)->retract(&filter, dx));
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
         to_doubles(after, filter.slots[slot].x, 3);
         for (unsigned i = 0; i < 3; i++)
@@ -226,7 +226,7 @@ static void test_place_in_the_world_is_the_landmark_itself(void) {
     for (unsigned slot = 0; slot < LANDMARKS; slot++) {
         plr_world_point point;
         double m[3];
-        filter.model->in_world(&filter, &filter.slots[slot], &point);
+        plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &point);
         to_doubles(m, filter.slots[slot].x, 3);
         TEST_ASSERT_DOUBLE_WITHIN(0, 0, largest_difference(m, point.p_W, 3));
         for (int i = 0; i < 18; i++)

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/reseal.h"
 #include "support/session_desk.h"
 
 static plr_status refused_status;
@@ -256,6 +257,7 @@ static void test_a_widened_covariance_counts_as_a_reset_too(void) {
     desk_send(drive_stereo(5));
     desk_run();
     session.filter.totals.widened++; /* as the filter counts it */
+    reseal(&session.filter);
     desk_send(drive_stereo(6));
     desk_run();
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));

@@ -3,6 +3,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/reseal.h"
 #include "support/scene.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
@@ -164,6 +165,7 @@ static void test_every_field_is_carried(void) {
     driven.frames_mostly_gated = 0xC3D4;
     driven.matches_since_gated = 0xE5F60718;
     driven.slots[1].times_gated = 0x12345678;
+    reseal(&driven);
     state_bytes_save(&state, &driven);
     start(&restored);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));
@@ -176,6 +178,7 @@ static void test_negative_zeros_and_subnormals_keep_their_bits(void) {
     driven.p_WB[0] = -0.0;
     driven.p_WB[1] = 4.9406564584124654e-324;
     driven.motion.p[2] = -PLR_SMALLEST_NORMAL / 2;
+    reseal(&driven);
     state_bytes_save(&state, &driven);
     start(&restored);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &restored));

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/reseal.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
 
@@ -30,6 +31,7 @@ void setUp(void) {
     rng chance = rng_seeded(9);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
     filter.config.slots = LANDMARKS + 1;
+    reseal(&filter);
     memcpy(&other, &filter, sizeof other);
     state_bytes_save(&state, &filter);
 }
@@ -63,10 +65,15 @@ static void test_each_setting_that_differs_makes_it_foreign(void) {
     for (unsigned i = 0; i < plr_setting_count(); i++) {
         const plr_setting *setting = plr_setting_at(i);
         const double here = plr_config_get(&other.config, setting);
-        const double another = here > setting->minimum ? setting->minimum : setting->maximum;
+        const double end = here > setting->minimum ? setting->minimum : setting->maximum;
+        const double another = setting->kind == PLR_SETTING_COUNT ? here + 1 : end;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_set(&other.config, setting, another));
+        other.model = other.config.model;
+        reseal(&other);
         refuses(PLR_E_FOREIGN);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_set(&other.config, setting, here));
+        other.model = other.config.model;
+        reseal(&other);
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
@@ -84,8 +91,10 @@ static void test_each_number_of_another_camera_makes_it_foreign(void) {
     for (unsigned i = 0; i < 17; i++) {
         const plr_real here = *numbers[i];
         *numbers[i] = here + PLR_R(1e-3);
+        reseal(&other);
         refuses(PLR_E_FOREIGN);
         *numbers[i] = here;
+        reseal(&other);
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
@@ -106,6 +115,7 @@ static void test_any_length_but_the_right_one_is_refused(void) {
 
 static void test_more_landmarks_than_slots_are_refused(void) {
     filter.config.slots = LANDMARKS + 1;
+    reseal(&filter);
     const uint32_t counts[] = {LANDMARKS - 1, LANDMARKS + 1, LANDMARKS + 2, 0x7FFFFFFF, 0xFFFFFFFF};
     for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++) {
         memcpy(state.bytes + COUNT_AT, &counts[i], 4);
@@ -206,16 +216,21 @@ static void test_a_source_that_tells_another_story_the_second_time_resets_the_fi
 
 static void test_a_broken_state_is_not_saved(void) {
     filter.diverged = 1;
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_save(&filter, NULL, NULL));
     filter.diverged = 0;
     filter.P[2] = -1; /* the variance of rho_y */
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, plr_filter_save(&filter, NULL, NULL));
     filter.P[2] = 1;
     filter.P[1] = (plr_real)NAN; /* no variance */
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, plr_filter_save(&filter, NULL, NULL));
     filter.P[1] = 0;
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(&filter, NULL, NULL));
-    filter.p_WB[2] = (double)INFINITY;
+    filter.bias[2] = (plr_real)INFINITY;
+    reseal(&filter);
     state.length = state.calls = 0;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, plr_filter_save(&filter, state_bytes_take, &state));
 }
@@ -223,6 +238,7 @@ static void test_a_broken_state_is_not_saved(void) {
 static void test_a_diverged_filter_is_sound_again_after_a_restore(void) {
     other.diverged = 1;
     other.P[0] = -1;
+    reseal(&other);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
     TEST_ASSERT_TRUE(state_bytes_same_filter(&filter, &other));
 }

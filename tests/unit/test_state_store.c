@@ -5,6 +5,7 @@
 
 #include "pelorus/state_store.h"
 #include "support/faulty_flash.h"
+#include "support/reseal.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
 
@@ -22,6 +23,7 @@ static void become(unsigned k) {
     filter.p_WB[0] = k;
     filter.slots[0].times_seen = 10 * k;
     filter.P[0] = PLR_R(0.5) + (plr_real)k;
+    reseal(&filter);
 }
 
 static void start_store(uint32_t size, uint32_t erase_size, uint32_t program_size) {
@@ -33,6 +35,7 @@ void setUp(void) {
     rng chance = rng_seeded(3);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
     filter.config.slots = LANDMARKS;
+    reseal(&filter);
     memcpy(&restored, &filter, sizeof restored);
     for (unsigned k = 0; k < STATES; k++) {
         become(k);

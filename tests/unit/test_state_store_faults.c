@@ -6,6 +6,7 @@
 #include "pelorus/state_store.h"
 #include "pelorus/wire.h"
 #include "support/faulty_flash.h"
+#include "support/reseal.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
 
@@ -24,6 +25,7 @@ static plr_stored_state found;
 static void become(unsigned k) {
     filter.t_ns = 1000000000u * (k + 1);
     filter.P[0] = PLR_R(0.5) + (plr_real)k;
+    reseal(&filter);
 }
 
 static void start_store(void) {
@@ -35,6 +37,7 @@ void setUp(void) {
     rng chance = rng_seeded(4);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
     filter.config.slots = LANDMARKS;
+    reseal(&filter);
     memcpy(&restored, &filter, sizeof restored);
     for (unsigned k = 0; k < STATES; k++) {
         become(k);
@@ -362,9 +365,12 @@ static void test_a_broken_filter_is_not_saved_over_a_good_one(void) {
     saves(0);
     const uint64_t work = flash.work;
     filter.diverged = 1;
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, save(1));
     filter.diverged = 0;
-    filter.p_WB[1] = 1e300 * 1e300;
+    reseal(&filter);
+    filter.bias[1] = (plr_real)NAN;
+    reseal(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, save(1));
     filter.magic = 0;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, save(1));

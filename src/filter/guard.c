@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include "filter/guard.h"
+
+#include <string.h>
+
+#include "filter/covariance.h"
+#include "filter/filter_internal.h"
+#include "linalg/packed.h"
+
+enum {
+    LANES = 4, /* sums side by side: some processors add them at once */
+    HEAD = (PLR_POSE_DIM + PLR_BIAS_DIM) * (PLR_POSE_DIM + PLR_BIAS_DIM + 1) / 2
+};
+
+/* ---------------------------------------------------------------- sums */
+
+/* Of memory: `plain` is a sum of its words, by which a change of one word is seen for sure; `placed`
+ * adds up the sums on the way, by which words that changed places, or change together, are. */
+typedef struct plr_sum {
+    uint32_t plain, placed;
+} plr_sum;
+
+/* Of two numbers that differ, the results do too. */
+static uint32_t step(uint32_t sum, uint32_t word) {
+    sum = (sum ^ word) * 0x9E3779B1U;
+    return sum ^ sum >> 15;
+}
+
+static void put_in(plr_sum *sum, plr_sum more) {
+    sum->plain = step(sum->plain, more.plain);
+    sum->placed = step(sum->placed, more.placed);
+}
+
+static void add(plr_sum *sum, const void *memory, size_t bytes) {
+    const unsigned char *at = memory;
+    uint32_t plain[LANES] = {0}, placed[LANES] = {0}, word[LANES];
+    for (; bytes >= sizeof word; bytes -= sizeof word, at += sizeof word) {
+        memcpy(word, at, sizeof word);
+        for (unsigned lane = 0; lane < LANES; lane++) {
+            plain[lane] += word[lane];
+            placed[lane] += plain[lane];
+        }
+    }
+    memset(word, 0, sizeof word);
+    memcpy(word, at, bytes);
+    for (unsigned lane = 0; lane < LANES; lane++) {
+        const plr_sum of_lane = {plain[lane] + word[lane], placed[lane] + plain[lane] + word[lane]};
+        put_in(sum, of_lane);
+    }
+}
+
+/* The members from one offset to another. */
+static void add_between(plr_sum *sum, const plr_filter *f, size_t from, size_t to) {
+    add(sum, (const unsigned char *)f + from, to - from);
+}
+
+static uint64_t both(plr_sum sum) {
+    return (uint64_t)sum.placed << 32 | sum.plain;
+}
+
+static uint64_t constant_sum(const plr_filter *f) {
+    plr_sum sum = {0, 0};
+    add_between(&sum, f, offsetof(plr_filter, config), offsetof(plr_filter, t_ns));
+    return both(sum);
+}
+
+static uint64_t small_sum(const plr_filter *f) {
+    const size_t used = plr_packed_row(plr_covariance_dim(f));
+    plr_sum sum = {0, 0};
+    add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
+    add(&sum, f->P, (used < HEAD ? used : HEAD) * sizeof *f->P);
+    add_between(&sum, f, offsetof(plr_filter, frame_number), offsetof(plr_filter, guard));
+    return both(sum);
+}
+
+static uint64_t large_sum(const plr_filter *f) {
+    plr_sum sum = {0, 0};
+    add(&sum, f->slots, f->count * sizeof *f->slots);
+    add(&sum, f->P, plr_packed_row(plr_covariance_dim(f)) * sizeof *f->P);
+    return both(sum);
+}
+
+/* ---------------------------------------------------------------- ranges */
+
+bool plr_guard_is_in_range(const plr_filter *f) {
+    const plr_config *c = &f->config;
+    return c->model <= PLR_MODEL_WORLD && f->model == c->model &&
+           c->mode <= PLR_MODE_DEAD_RECKONING && c->twist_timing <= PLR_TWIST_MID &&
+           c->noise <= PLR_NOISE_STEP && c->bias <= 1 && c->known_map <= 1 &&
+           c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
+           c->slots <= PLR_MAX_LANDMARKS && f->count <= c->slots && f->clock_started <= 1 &&
+           f->reading_valid <= 1 && f->diverged <= 1 && f->motion.pending <= 1 &&
+           f->motion.noisy <= 1;
+}
+
+/* R^T R = I to rounding and more, p a number. */
+static bool is_pose(const plr_filter *f) {
+    const plr_real allowed = PLR_R(1e-3);
+    const plr_real *R = f->R_WB;
+    for (unsigned i = 0; i < 3; i++) {
+        if (!(f->p_WB[i] - f->p_WB[i] <= 0))
+            return false;
+        for (unsigned j = 0; j <= i; j++) {
+            const plr_real dot = R[i] * R[j] + R[3 + i] * R[3 + j] + R[6 + i] * R[6 + j];
+            const plr_real off = dot - (i == j ? PLR_R(1) : PLR_R(0));
+            if (!(off <= allowed && off >= -allowed))
+                return false;
+        }
+    }
+    return true;
+}
+
+/* ---------------------------------------------------------------- what calls use */
+
+static plr_status sound(bool is_sound) {
+    return is_sound ? PLR_OK : PLR_E_DAMAGED;
+}
+
+plr_status plr_guard_look_constant(const plr_filter *f) {
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    return sound(constant_sum(f) == f->guard.constant);
+}
+
+plr_status plr_guard_look(const plr_filter *f) {
+    if (f->magic != PLR_FILTER_MAGIC)
+        return PLR_E_NOT_READY;
+    return sound(plr_guard_is_in_range(f) && is_pose(f) && constant_sum(f) == f->guard.constant &&
+                 small_sum(f) == f->guard.small);
+}
+
+plr_status plr_guard_look_whole(const plr_filter *f) {
+    const plr_status status = plr_guard_look(f);
+    return status != PLR_OK ? status : sound(large_sum(f) == f->guard.large);
+}
+
+void plr_guard_seal(plr_filter *f) {
+    f->guard.small = small_sum(f);
+}
+
+void plr_guard_seal_whole(plr_filter *f) {
+    f->guard.large = large_sum(f);
+    plr_guard_seal(f);
+}
+
+void plr_guard_seal_constant(plr_filter *f) {
+    f->guard.constant = constant_sum(f);
+}
