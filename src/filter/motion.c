@@ -249,4 +249,5 @@ void plr_filter_diverge(plr_filter *f) {
     if (!f->diverged)
         f->totals.diverged_ns = f->t_ns;
     f->diverged = 1;
+    f->work.noise.open = 0; /* what was about to come back into P is lost with it */
 }
