@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import stat
@@ -13,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
-from pelorus import se3
+from pelorus import map_error, se3
 from pelorus.errors import PelorusError
-from pelorus.frames import Pose, Stereo, Truth
-from pelorus.packed import unpack_symmetric
+from pelorus.frames import Landmark, Pose, Role, Stereo, Truth
+from pelorus.packed import pack_symmetric, unpack_symmetric
 from pelorus.report import gallery, verdict
 from pelorus.report.accuracy import assess, nees_per_dof
 from pelorus.report.comparison import Comparison
@@ -24,7 +25,8 @@ from pelorus.report.replay import Outputs, Programs
 from pelorus.report.results import read_frames, read_map, read_poses
 from pelorus.trajectory import Trajectory, read_tum
 from PIL import Image
-from replay_drive import FRAMES, ROOT, drive, header, t_ns
+from replay_drive import FRAMES, ROOT, drive, encode, header, known, t_ns
+from replay_drive import run as run_replay
 from report_runs import built_programs, compared, recorded
 
 ALWAYS = {"top-view", "map", "covariance", "bias", "observations", "time"}
@@ -319,3 +321,63 @@ def test_a_bias_that_is_suggested_and_not_estimated_is_told(
     messages = [header(noise=noise), *drive()[1:]]
     found = compared(recorded(tmp_path, messages), programs, "--bias", "off")
     assert "try --set bias=on" in lines_with(found)
+
+
+# --- maps ---------------------------------------------------------------------------------------
+
+
+def test_where_poses_are_given_the_map_is_judged_and_not_the_poses(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path = recorded(tmp_path, [header(), *known(), *drive()[1:]])
+    options = ("--bin", programs.float32.parent, "--set", "pixel-sigma=0.5")
+    said = pelorus("report", path, "--out", tmp_path, *options, "--set", "mode=mapping")
+    assert said.status == 0, said.err
+    assert "body: its poses were given; the map of" in said.out
+    assert "not positive" not in said.out  # the given poses have no covariance
+    assert not {"error-body", "error-world", "hero"} & pictures_in(tmp_path)
+    assert "error-course" in pictures_in(tmp_path)  # its preset has a mode of its own
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    body = re.search(r"<tr><td>body</td>(.*?)</tr>", page)
+    assert body is not None
+    cells = re.findall(r"<td>(.*?)</td>", body.group(1))
+    assert cells[:4] == ["-"] * 4
+    assert 0 < float(cells[4]) < 0.5
+
+
+def test_a_map_is_compared_in_the_estimates_world_and_by_its_covariance() -> None:
+    chance = np.random.default_rng(5)
+    points = chance.uniform(-20, 20, (400, 3))
+    root = np.tril(chance.normal(size=(3, 3))) + 2 * np.eye(3)
+    packed = pack_symmetric(0.01 * root @ root.T)
+    A = se3.exp([5.0, -3.0, 1.0], [0.2, 1.0, -0.4])
+    truth = [Landmark(k, p) for k, p in enumerate(points)]
+    mine = se3.apply(A, points) + 0.1 * chance.normal(size=(400, 3)) @ root.T
+    result = [Landmark(k, p, packed, Role.FINAL) for k, p in enumerate(mine)]
+    found = map_error.compare(
+        [*truth, *result, Landmark(999, mine[0], packed, Role.FINAL)], truth, A
+    )
+    assert found is not None
+    assert found.landmarks == 400
+    assert found.map_nees == pytest.approx(1, abs=0.15)
+    assert found.map_rms_m == pytest.approx(0.1 * np.sqrt(np.trace(root @ root.T)), rel=0.1)
+    assert map_error.compare(truth, truth, A) is None  # known ones are no result
+
+
+def test_evaluate_compares_the_map_of_a_result(pelorus: Command, tmp_path: Path) -> None:
+    path = recorded(tmp_path, [header(), *known(), *drive()[1:]])
+    for mode, pose in (("mapping", False), ("slam", True)):
+        log = tmp_path / f"{mode}.plr"
+        done = run_replay(path, "--mode", mode, "--pixel-sigma", "0.5", "--out", log, "--quiet")
+        assert done.status == 0, done.stderr
+        said = pelorus("evaluate", log, "--truth", path, "--json")
+        assert said.status == 0, said.err
+        found = json.loads(said.out)
+        assert ("err0_m" in found) is pose
+        assert 0 < found["map_median_m"] < 0.3
+    bare = tmp_path / "bare.plr"
+    bare.write_bytes(encode(drive()))
+    assert run_replay(bare, "--mode", "mapping", "--out", log, "--quiet").status == 0
+    said = pelorus("evaluate", log, "--truth", bare)
+    assert said.status == 1
+    assert "there is nothing to compare" in said.err

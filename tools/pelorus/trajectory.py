@@ -76,7 +76,7 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
     """
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
-    if _is_recording(path):
+    if is_recording(path):
         return truth_of(path)
     columns = len(foreign.rows(path)[0].cells)
     if columns == TUM_COLUMNS:
@@ -129,7 +129,7 @@ def _frame_times(received: list[Received]) -> set[int]:
     return {frame.message.t_ns for frame in received if isinstance(frame.message, Stereo)}
 
 
-def _is_recording(path: Path) -> bool:
+def is_recording(path: Path) -> bool:
     """A text has no zero byte; a recording has one behind each frame."""
     beginning = foreign.beginning(path)
     return path.suffix == ".plr" or beginning.startswith(packed_file.MAGIC) or b"\0" in beginning

@@ -4,15 +4,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 import typer
 from rich.table import Table
 
-from pelorus import figures, road
+from pelorus import figures, map_error, road, se3
 from pelorus.console import out
-from pelorus.trajectory import Trajectory, read_truth, read_tum
+from pelorus.errors import PelorusError
+from pelorus.frames import Message
+from pelorus.grid.sightings import messages_of
+from pelorus.report.results import read_poses
+from pelorus.trajectory import Trajectory, is_recording, read_truth, read_tum
 
 MEANING = {
     "err0_m": "RMS position error, first poses aligned",
@@ -23,6 +28,10 @@ MEANING = {
     "road_m": "RMS distance to the road",
     "out_of_plane_m": "RMS distance out of the trajectory's plane",
     "tilt_deg": "tilt of that plane against the first pose's z",
+    "map_rms_m": "RMS distance of the landmarks from where they are known to be",
+    "map_median_m": "median of that distance",
+    "map_nees": "squared error of a landmark over its covariance, an axis: 1 is due",
+    "landmarks": "landmarks compared",
     "step_change_m": "RMS change of the step from pose to pose: how erratic it is",
 }
 
@@ -36,7 +45,10 @@ def register(parent: typer.Typer) -> None:
 
 def evaluate(
     trajectory: Path = typer.Argument(
-        ..., metavar="TRAJECTORY.tum", help="Rows t x y z qx qy qz qw, s and m."
+        ...,
+        metavar="TRAJECTORY.tum",
+        help="Rows t x y z qx qy qz qw, s and m; or a result (.plr), whose map is compared too "
+        "where it or the truth's recording knows landmarks.",
     ),
     truth: Path | None = typer.Option(
         None,
@@ -61,22 +73,53 @@ def evaluate(
     ),
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),
 ) -> None:
-    """Compare a trajectory with a reference, or with a road."""
+    """Compare a trajectory with a reference, or with a road.
+
+    Of a result in mode mapping, whose poses were given, the map alone is compared.
+    """
     if (truth is None) == (road_file is None):
         raise typer.BadParameter("either --truth or --road is due", param_hint="--truth / --road")
-    estimate = read_tum(trajectory)
-    if truth is not None:
+    result = messages_of(trajectory) if is_recording(trajectory) else []
+    estimate = read_poses(trajectory)[0] if result else read_tum(trajectory)
+    found: dict[str, float] = {}
+    if road_file is not None:
+        found = _road(estimate, road_file, skip)
+    elif truth is not None:
         reference = read_truth(truth, times, recording)
         tolerance_ns = round(tolerance * 1e9)
-        found = asdict(figures.compare(estimate, reference, tolerance_ns, (trajectory, truth)))
-    else:
-        assert road_file is not None
-        found = _road(estimate, road_file, skip)
+        if not map_error.is_mapping(result):  # the poses are the reference's
+            found = asdict(figures.compare(estimate, reference, tolerance_ns, (trajectory, truth)))
+        found |= _map(result, truth, estimate, reference, tolerance_ns)
+        if not found:
+            raise PelorusError(
+                f"{trajectory}: its poses were given (mode mapping), and {truth} knows none of its "
+                "landmarks: there is nothing to compare"
+            )
     found["step_change_m"] = figures.step_change(estimate.poses)
     if as_json:
         typer.echo(json.dumps(found))
     else:
         _show(found)
+
+
+def _map(
+    result: Sequence[Message],
+    truth: Path,
+    estimate: Trajectory,
+    reference: Trajectory,
+    tolerance_ns: int,
+) -> dict[str, float]:
+    """Of the landmarks that the truth's recording, or the result itself, knows."""
+    known = map_error.known_in(messages_of(truth)) if is_recording(truth) else []
+    known = known or map_error.known_in(result)
+    mine, theirs = figures.match(estimate, reference, tolerance_ns)
+    if not len(mine):
+        return {}
+    start = se3.compose(
+        estimate.poses.at(int(mine[0])), se3.inverse(reference.poses.at(int(theirs[0])))
+    )
+    found = map_error.compare(result, known, start)
+    return {} if found is None else asdict(found)
 
 
 def _road(estimate: Trajectory, path: Path, skip: float) -> dict[str, float]:

@@ -15,7 +15,7 @@ from pelorus.console import out, progress
 from pelorus.errors import PelorusError
 from pelorus.report import overview
 from pelorus.report.replay import find_programs
-from pelorus.report.results import Run, carry_out
+from pelorus.report.results import carry_out
 from pelorus.report.runs import plan_runs
 from pelorus.report.subject import read_subject
 
@@ -82,17 +82,17 @@ def _publish(compared: Comparison, folder: Path) -> None:
         drawn.append((picture, path))
     lines = verdict.verdicts(compared)
     page.write(folder / PAGE, compared, lines, drawn)
-    _tell(compared.runs, lines, folder / PAGE)
+    _tell(compared, lines, folder / PAGE)
 
 
-def _tell(runs: list[Run], lines: list[str], page: Path) -> None:
+def _tell(compared: Comparison, lines: list[str], page: Path) -> None:
     table = Table(box=None, pad_edge=False)
-    for title in overview.TITLES:
+    for title in overview.titles(compared):
         name = title == "run"
         table.add_column(title, justify="left" if name else "right", no_wrap=name, overflow="fold")
-    table.columns[0].min_width = max(len(run.name) for run in runs)
-    for run in runs:
-        table.add_row(*overview.row(run))
+    table.columns[0].min_width = max(len(run.name) for run in compared.runs)
+    for run in compared.runs:
+        table.add_row(*overview.row(compared, run))
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")

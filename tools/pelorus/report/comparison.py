@@ -6,9 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from pelorus import map_error
 from pelorus.errors import PelorusError
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import messages_of, sightings
+from pelorus.map_error import MapFigures
 from pelorus.motion import Times
 from pelorus.report import style
 from pelorus.report.accuracy import Accuracy, assess
@@ -52,6 +54,19 @@ class Comparison:
             return occupancy(sightings(log, messages_of(log)), Wish())
         except PelorusError:
             return None
+
+    @cached_property
+    def map_error(self) -> dict[str, MapFigures]:
+        """By the run's name; empty where the recording knows no landmark."""
+        if not self.subject.known:
+            return {}
+        found = {run.name: self._map_error(run) for run in self.runs}
+        return {name: figures for name, figures in found.items() if figures is not None}
+
+    def _map_error(self, run: Run) -> MapFigures | None:
+        accuracy = self.accuracy.get(run.name)
+        A = accuracy.A if accuracy else map_error.UNMOVED
+        return map_error.compare(messages_of(run.log), self.subject.known, A)
 
     @cached_property
     def whole_map(self) -> Traces:

@@ -73,7 +73,7 @@ def nees(compared: Comparison) -> Figure:
     axes.axhspan(
         low / POSE_SIZE, high / POSE_SIZE, color=PALE, label=f"{BAND:.0%} band, χ² (6)", zorder=1
     )
-    for run in _in_layers(compared):
+    for run in (run for run in _in_layers(compared) if not run.poses_given):
         accuracy = compared.accuracy[run.name]
         _positive(axes, compared.seconds(accuracy.t_ns), accuracy.nees, run)
     axes.axhline(1.0, color=GREY, linewidth=1, zorder=2)

@@ -43,13 +43,14 @@ def pictures(compared: Comparison) -> list[Picture]:
     truths = [len(accuracy.t_ns) for accuracy in compared.accuracy.values()]
     judged = min(truths, default=0) >= CURVE_MIN
     if judged:
-        out += [_errors(compared, name) for name in ("body", "world", "course")]
+        runs = [compared.run(name) for name in ("body", "world", "course")]
+        out += [_errors(compared, run.name) for run in runs if not run.poses_given]
         out.append(_nees(compared))
     out.append(_covariance(compared))
     if compared.main.summary["bias"] == "on":
         out.append(_biases(compared))
     out += [_observations(compared), _times(compared)]
-    if judged:
+    if judged and not compared.main.poses_given:
         out.append(Picture("hero", "", "", partial(hero.draw, compared)))
     return out
 

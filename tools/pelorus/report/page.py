@@ -29,7 +29,9 @@ figcaption { color: #444; } code { font-size: .9em; overflow-wrap: anywhere; }
 MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
     "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
-    "and gated: observations. The last column: time of the recording over time of the computing. "
+    "and gated: observations. Map: RMS distance of the landmarks from where the recording knows "
+    "them to be, with its NEES an axis; poses that were given, in mode mapping, have no error. The "
+    "last column: time of the recording over time of the computing. "
     "Dead reckoning and body run in float32, course and world in float64. Body is the filter as it "
     "is meant to be used; world, for comparison, is the textbook's EKF with landmarks in world "
     "coordinates, and course the same with the settings of the course report that Pelorus grew "
@@ -48,7 +50,7 @@ def write(
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>",
         f"<h1>{escape(title)}</h1>",
         f"<p>{escape(_facts(compared))}</p>",
-        _table(compared.runs),
+        _table(compared),
         f"<p>{escape(MEANING)}</p>",
         _list("What is off", lines),
         *(_figure(picture, file) for picture, file in drawn if picture.caption),
@@ -73,11 +75,13 @@ def _facts(compared: Comparison) -> str:
     )
 
 
-def _table(runs: Sequence[Run]) -> str:
-    head = "".join(f"<th>{escape(title)}</th>" for title in overview.TITLES)
+def _table(compared: Comparison) -> str:
+    head = "".join(f"<th>{escape(title)}</th>" for title in overview.titles(compared))
     rows = "\n".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in overview.row(run)) + "</tr>"
-        for run in runs
+        "<tr>"
+        + "".join(f"<td>{escape(cell)}</td>" for cell in overview.row(compared, run))
+        + "</tr>"
+        for run in compared.runs
     )
     return f'<div class="wide"><table>\n<tr>{head}</tr>\n{rows}\n</table></div>'
 

@@ -71,6 +71,11 @@ class Run:
     def name(self) -> str:
         return self.plan.name
 
+    @property
+    def poses_given(self) -> bool:
+        """Mode mapping: they are the truth's, and have no error of their own."""
+        return bool(self.summary["mode"] == "mapping")
+
 
 def carry_out(plan: Plan, recording: Path, folder: Path) -> Run:
     """Replay the recording as planned, leave the files in the folder, and read them."""

@@ -10,19 +10,25 @@ import numpy as np
 
 from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Landmark, Role, Truth
+from pelorus.frames import Header, Landmark, Truth
+from pelorus.map_error import known_in
 from pelorus.se3 import Floats
 from pelorus.trajectory import Trajectory, truth_of
 
 
 @dataclass(frozen=True)
 class Subject:
-    """`truth` holds the poses at STEREO times; `known_W_m` (n, 3) lies in the truth's world."""
+    """`truth` holds the poses at STEREO times; `known` landmarks lie in the truth's world."""
 
     path: Path
     header: Header
     truth: Trajectory | None
-    known_W_m: Floats
+    known: list[Landmark]
+
+    @property
+    def known_W_m(self) -> Floats:
+        """(n, 3)."""
+        return np.array([landmark.p_W_m for landmark in self.known]).reshape(-1, 3)
 
     @property
     def title(self) -> str:
@@ -36,9 +42,8 @@ def read_subject(path: Path) -> Subject:
     received, _ = wire.read_file(path)
     header = wire.header_of(received, path)
     messages = [frame.message for frame in received]
-    known = [m.p_W_m for m in messages if isinstance(m, Landmark) and m.role == Role.KNOWN]
     truth = _truth(path) if any(isinstance(m, Truth) for m in messages) else None
-    return Subject(path, header, truth, np.array(known).reshape(-1, 3))
+    return Subject(path, header, truth, known_in(messages))
 
 
 def _truth(path: Path) -> Trajectory | None:

@@ -53,7 +53,7 @@ def _of_run(run: Run, dead_reckoning: Run, compared: Comparison) -> Iterator[str
     checks = (
         _health(run, compared.origin_ns),
         _frames(run),
-        _consistency(run),
+        _map(run, compared) if run.poses_given else _consistency(run),
         _gate(run),
         _room(run),
         _use(run, dead_reckoning),
@@ -98,6 +98,23 @@ def _consistency(run: Run) -> Iterator[str]:
         )
     if nees is not None and nees < NEES_LOW:
         yield f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due."
+
+
+def _map(run: Run, compared: Comparison) -> Iterator[str]:
+    """Where the poses are given, the map is what was estimated."""
+    found = compared.map_error.get(run.name)
+    if found is None:
+        yield "its poses were given, and the recording knows no landmarks: nothing to compare."
+        return
+    yield (
+        f"its poses were given; the map of {found.landmarks} landmarks is {found.map_rms_m:.3f} m "
+        f"RMS off, {found.map_median_m:.3f} m median."
+    )
+    if found.map_nees > NEES_HIGH:
+        yield (
+            f"the map believes more than it knows: NEES/3 is {found.map_nees:.3g} where 1 is due. "
+            "Given poses and calibration have errors too, which do not average out."
+        )
 
 
 def _gate(run: Run) -> Iterator[str]:
