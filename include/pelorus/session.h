@@ -171,8 +171,9 @@ typedef enum plr_session_phase {
     PLR_PHASE_RUNNING = 2
 } plr_session_phase;
 
-/* `filter`, `totals`, `phase`, `header`, `init_failed`, `in` (the last message), `reader.counts` and
- * `reader.skipped_*` are for the caller to read; the rest is the session's own. */
+/* `filter`, `totals`, `phase`, `header`, `known`, `init_failed`, `in` (the last message),
+ * `reader.counts` and `reader.skipped_*` are for the caller to read; the rest is the session's
+ * own. */
 typedef struct plr_session {
     plr_filter filter;
     plr_session_totals totals;

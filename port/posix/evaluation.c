@@ -166,6 +166,21 @@ static double trajectory_error(const pair *pairs, size_t n) {
     return sqrt(sum / (double)n);
 }
 
+void evaluation_start(evaluation *e, plr_pose *A) {
+    static const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    samples pairs;
+    samples_init(&pairs, sizeof(pair));
+    find_pairs(e, &pairs);
+    *A = identity;
+    if (pairs.count > 0) {
+        const pair *first = pairs.items;
+        plr_pose inverse;
+        pose_inverse(&inverse, &first->truth->T_WB);
+        pose_compose(A, &first->estimate->T_WB, &inverse);
+    }
+    samples_free(&pairs);
+}
+
 void evaluation_figures_of(evaluation *e, evaluation_figures *figures) {
     samples pairs;
     samples_init(&pairs, sizeof(pair));

@@ -35,6 +35,10 @@ void evaluation_add_estimate(evaluation *e, const plr_pose_message *pose);
 /* One that is not finite is left out. Of two at the same time the later counts. */
 void evaluation_add_truth(evaluation *e, const plr_truth *truth);
 
+/* A: the truth brought to the estimate's start; identity where there is no frame with truth. Sorts what
+ * was collected. */
+void evaluation_start(evaluation *e, plr_pose *A);
+
 /* Sorts what was collected. */
 void evaluation_figures_of(evaluation *e, evaluation_figures *figures);
 

@@ -33,8 +33,7 @@ typedef struct replay {
     result_file trajectory, map, frames, out;
     storage storage;
     map_in map_in;
-    bool finishing;    /* the end is the replay's own doing, not a message's */
-    samples landmarks; /* plr_landmark_message */
+    bool finishing; /* the end is the replay's own doing, not a message's */
     summary summary;
     complaints complaints;
     progress progress;
@@ -99,8 +98,7 @@ static void on_truth(void *context, const plr_truth *truth) {
 
 static void on_landmark(void *context, const plr_landmark_message *landmark) {
     replay *run = context;
-    if (run->map.file != NULL)
-        samples_add(&run->landmarks, landmark);
+    samples_add(&run->summary.landmarks, landmark);
 }
 
 static void on_text(void *context, const plr_text *text) {
@@ -190,7 +188,7 @@ static bool open_outputs(replay *run) {
 }
 
 static bool close_outputs(replay *run) {
-    map_put(run->map.file, &run->landmarks);
+    map_put(run->map.file, &run->summary.landmarks);
     bool good = compressed_output_close(run->port.packer); /* told with the file, below */
     run->port.packer = NULL;
     good = result_file_close(&run->trajectory) && good;
@@ -313,7 +311,7 @@ static bool print_results(replay *run) {
 }
 
 static bool memory_sufficed(const replay *run) {
-    const samples *lists[] = {&run->landmarks, &run->summary.compute_us,
+    const samples *lists[] = {&run->summary.landmarks, &run->summary.compute_us,
                               &run->summary.evaluation.estimates, &run->summary.evaluation.truths};
     for (unsigned i = 0; i < sizeof lists / sizeof lists[0]; i++)
         if (lists[i]->out_of_memory) {
@@ -382,7 +380,6 @@ static int open_and_run(replay *run) {
         return verdict_say(o->input, REPLAY_EXIT_RECORDING, strerror(error));
     }
     int status = storage_open(&run->storage, o);
-    samples_init(&run->landmarks, sizeof(plr_landmark_message));
     summary_init(&run->summary);
     complaints_init(&run->complaints, o->input, o->quiet);
     if (status == REPLAY_EXIT_OK && !open_outputs(run))
@@ -393,7 +390,6 @@ static int open_and_run(replay *run) {
                      : usage_error("the settings asked for are outside their limits");
     }
     summary_free(&run->summary);
-    samples_free(&run->landmarks);
     storage_close(&run->storage);
     map_in_free(&run->map_in);
     file_port_close(&run->port);

@@ -5,6 +5,7 @@
 
 #include "pelorus/session.h"
 #include "posix/evaluation.h"
+#include "posix/map_evaluation.h"
 
 typedef struct summary {
     uint64_t frames, frames_refused;
@@ -18,6 +19,7 @@ typedef struct summary {
     samples compute_us; /* double, a frame each */
     uint64_t compute_ns;
     evaluation evaluation;
+    samples landmarks; /* plr_landmark_message: those that left the state, and those at the end */
 
     /* Filled in at the end. */
     double wall_s;
@@ -34,13 +36,14 @@ void summary_add_frame(summary *s, const plr_frame_result *result);
 void summary_print(summary *s, const plr_session *session, const char *path);
 void summary_print_json(summary *s, const plr_session *session, const char *path);
 
-/* The figures that both print. */
+/* The figures that both print. In mapping the poses are given: nothing is told of their accuracy. */
 typedef struct summary_figures {
     evaluation_figures truth;
+    map_figures map;
     double update_us_median, update_us_p99, update_us_max; /* NaN without frames */
     double duration_s, realtime_factor;
 } summary_figures;
 
-void summary_figures_of(summary *s, summary_figures *figures);
+void summary_figures_of(summary *s, const plr_session *session, summary_figures *figures);
 
 #endif

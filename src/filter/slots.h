@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The ring of landmark slots: dense from 0, so that time follows the active count. */
+/* The landmark slots: an array, dense from 0, so that time follows the active count. What has to leave
+ * a full one is the landmark longest unseen, not the one that came first (docs/MATH.md 13). */
 #ifndef PLR_FILTER_SLOTS_H
 #define PLR_FILTER_SLOTS_H
 
@@ -14,7 +15,7 @@
 /* The slot of an id, or PLR_NO_SLOT. */
 uint16_t plr_slots_find(const plr_filter *f, uint32_t id);
 
-/* Makes room for one landmark if the ring is full: the one longest unseen goes to the map sink,
+/* Makes room for one landmark if all slots are taken: the one longest unseen goes to the map sink,
  * never one seen in the current frame; ties: lowest slot. False if there is no room. `evicted` and
  * `sink_failed` are raised by what happened. */
 bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed);

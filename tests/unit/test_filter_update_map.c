@@ -164,7 +164,7 @@ static void test_a_full_ring_hands_the_oldest_to_the_sink(void) {
     TEST_ASSERT_GREATER_THAN_UINT(0, handed_over);
     TEST_ASSERT_EQUAL_UINT(handed_over, rig.report.evicted);
     TEST_ASSERT_EQUAL_UINT(10, rig.filter.count);
-    /* none in the ring was unseen for longer than the one that left */
+    /* none that stayed was unseen for longer than the one that left */
     const plr_time_ns left = handed[0].last_seen_ns;
     TEST_ASSERT_FALSE(holds(handed[0].id));
     for (unsigned slot = 0; slot < rig.filter.count; slot++)

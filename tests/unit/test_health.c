@@ -90,7 +90,7 @@ static void test_each_event_has_its_reason(void) {
     judge(PLR_REASON_GATE_LOCKED, PLR_HEALTH_LOST);
     events.locked = false;
     frame(10, 1);
-    report.no_room = 4; /* a full ring is no fault */
+    report.no_room = 4; /* full slots are no fault */
     judge(PLR_REASON_NO_ROOM, PLR_HEALTH_GOOD);
 }
 

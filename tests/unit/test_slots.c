@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The ring of slots: who is found, who is evicted, who takes whose place (MATH 13). */
+/* The slots: who is found, who is evicted, who takes whose place (MATH 13). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
