@@ -26,7 +26,7 @@ static void take(map_in *map, desk *d) {
         map->header = d->in.as.header;
     if (d->in.kind == PLR_KIND_LANDMARK) {
         plr_landmark landmark = d->in.as.landmark.landmark;
-        landmark.known = true;
+        landmark.known = d->in.as.landmark.role == PLR_LANDMARK_KNOWN;
         landmark.last_seen_ns = 0; /* docs/REPLAY-FORMAT.md: of a known one */
         samples_add(&map->landmarks, &landmark);
     }
@@ -81,6 +81,22 @@ static const char *fault(const plr_landmark *l) {
     if (determinant < -1e-9 * P[0] * P[4] * P[8])
         return "its covariance is not positive: its determinant is negative";
     return NULL;
+}
+
+/* Of a log that holds results, those are the map: what was known to the filter that made it stands
+ * among its inputs, under the same ids. */
+static void choose(samples *list) {
+    plr_landmark *landmarks = list->items;
+    bool results = false;
+    size_t kept = 0;
+    for (size_t i = 0; i < list->count; i++)
+        results = results || !landmarks[i].known;
+    for (size_t i = 0; i < list->count; i++)
+        if (!results || !landmarks[i].known) {
+            landmarks[kept] = landmarks[i];
+            landmarks[kept++].known = true;
+        }
+    list->count = kept;
 }
 
 static int by_id(const void *a, const void *b) {
@@ -146,8 +162,9 @@ bool map_in_read(map_in *map, const char *path, char problem[PROBLEM_SIZE]) {
         return say(problem, path, strerror(error));
     }
     read_all(map, d);
-    file_port_close(&d->port);
+    choose(&map->landmarks);
     const bool good = check_file(map, d, problem) && check_landmarks(map, problem);
+    file_port_close(&d->port);
     free(d);
     return good;
 }

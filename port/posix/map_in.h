@@ -3,8 +3,8 @@
  * A map that comes back in (--map-in): the landmarks of an earlier result, as known ones.
  *
  * A map is a .plr whose LANDMARK messages say where points are and how well that is known: the flight
- * log of --out (roles evicted and final), or a map of known ones. Positions are in that drive's
- * world, so the drive that takes it must begin in the same one.
+ * log of --out (roles evicted and final), or, where it has none of those, known ones. Positions are in
+ * that drive's world, so the drive that takes it must begin in the same one.
  */
 #ifndef PELORUS_POSIX_MAP_IN_H
 #define PELORUS_POSIX_MAP_IN_H

@@ -95,6 +95,18 @@ def test_slam_takes_it_where_known_map_is_on(record: Record, map_of_the_first_ha
     assert aided.summary["err0_m"] < told.summary["err0_m"]
 
 
+def test_what_made_the_map_is_no_part_of_it(record: Record, tmp_path: Path) -> None:
+    """A log holds the known landmarks of its recording too, under the ids of the map's own."""
+    path, log = tmp_path / "map.plr", tmp_path / "log.plr"
+    knows = record([header(), *known(), *half(0)[1:]])
+    assert run(knows, *SLOTS, "--mode", "mapping", "--out", path).status == OK
+    assert run(record(half(HALF)), *LOCALIZE, "--map-in", path, "--out", log).status == OK
+    made = {m.id: m for m in log_of(path) if isinstance(m, Landmark) and m.role is not Role.KNOWN}
+    given = [m for m in log_of(log) if isinstance(m, Landmark) and m.role is Role.KNOWN]
+    assert len(given) == len(made)
+    assert all(np.array_equal(m.p_W_m, made[m.id].p_W_m) for m in given)
+
+
 Change = Callable[[Landmark], list[Message]]
 
 
