@@ -17,7 +17,11 @@ if(PELORUS_CBLAS_INCLUDE AND PELORUS_LAPACKE_INCLUDE
 elseif(PELORUS_REQUIRE_ORACLE)
   message(FATAL_ERROR "OpenBLAS or LAPACKE is missing: "
     "apt-get install libopenblas-dev liblapacke-dev, or PELORUS_REQUIRE_ORACLE=OFF.")
-else()
+elseif(PELORUS_BUILD_TESTS)
   message(WARNING "OpenBLAS or LAPACKE is missing: the tests are held against plain loops instead, "
-    "and the bench is left out. apt-get install libopenblas-dev liblapacke-dev.")
+    "and the bench and pelorus-textbook are left out. "
+    "apt-get install libopenblas-dev liblapacke-dev.")
+else()
+  message(STATUS "OpenBLAS or LAPACKE is missing: pelorus-textbook is left out "
+    "(apt-get install libopenblas-dev liblapacke-dev)")
 endif()

@@ -11,7 +11,7 @@ from pelorus import road
 from pelorus.trajectory import read_tum
 from replay_drive import Result, run
 
-SLOTS_MOST = ("100", "256")  # what a landmark loses by being evicted is millimetres here
+SLOTS_MOST = ("100", "256")  # what is lost by eviction is centimetres here
 
 
 def replay(recording: Path, slots: str, *arguments: str | Path) -> Result:
@@ -20,16 +20,15 @@ def replay(recording: Path, slots: str, *arguments: str | Path) -> Result:
     return run(recording, *options, program="pelorus-replay-f64")
 
 
-@pytest.mark.parametrize("slots", SLOTS_MOST)
 def test_on_03_the_preset_stays_within_5_m_of_the_road(
-    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path, slots: str
+    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path
 ) -> None:
     recording, trajectory = tmp_path / "03.plr", tmp_path / "03.tum"
     pelorus("convert", "ece276a", real("ece276a/03.npz"), recording)
-    replay(recording, slots, "--trajectory", trajectory)
+    replay(recording, "100", "--trajectory", trajectory)
     way = road.read_road(real("truth/kitti360-0003-path.csv"))
     found = road.compare(read_tum(trajectory).poses.p, way, skip_m=45.0)
-    assert 4.0 < found.road_m <= 5.0  # 4.5 with the report's equations in numpy
+    assert 4.0 < found.road_m <= 5.0  # numpy, without a gate that opens: 4.5
 
 
 @pytest.mark.parametrize("slots", SLOTS_MOST)
