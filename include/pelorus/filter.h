@@ -180,6 +180,10 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
 
 /* --- what happened --- */
 
+/* How it stands at t_ns, with or without a frame: ask it as often as the pose is used. It knows of a
+ * camera or an odometry that has fallen silent, which no report can tell. Changes nothing. */
+plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
+
 /* Counts since init or reset. */
 plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals);
 

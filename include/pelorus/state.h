@@ -48,10 +48,14 @@ typedef struct plr_totals {
 /* One landmark slot. */
 typedef struct plr_slot {
     plr_real x[PLR_LANDMARK_DIM]; /* body: q in the current left camera; world: m; metres */
+    plr_real
+        beyond; /* body: the inverse range is 1 / |x| + beyond, 1/m; negative for a point that the
+                        pixels' noise has put beyond infinity */
     uint32_t id;
     uint32_t times_seen;
     uint32_t times_gated;
     uint32_t last_frame; /* number of the frame that saw it last */
+    uint32_t print;      /* of the pixels that it was seen at last */
     plr_time_ns last_seen_ns;
     uint8_t known;
 } plr_slot;
@@ -65,6 +69,33 @@ typedef struct plr_motion {
     uint8_t pending;     /* 1 if any motion is accumulated */
     uint8_t noisy;       /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
+
+/* Sums over frames that fade: of nu, how the motion differed from the twists in their sigmas, and of
+ * the covariance that it should have had. */
+typedef struct plr_consistency_window {
+    plr_real sum[6];
+    plr_real variance[21]; /* 6x6, packed upper triangle */
+} plr_consistency_window;
+
+enum { PLR_CONSISTENCY_WINDOWS = 3 };
+
+/* Whether twists and pictures tell the same story; see src/filter/consistency.h. */
+typedef struct plr_consistency {
+    plr_consistency_window windows[PLR_CONSISTENCY_WINDOWS];
+    plr_real apart[6];          /* between the two stories, as a twist of the body: m, rad */
+    plr_real still_way[6];      /* what the twists moved while the picture stayed the same */
+    plr_real still_variance[6]; /* and its variance */
+    plr_real matched, gated, nis, nis_dof; /* counts of the frames, fading */
+    uint16_t agreeing;                     /* frames in agreement, one after the other */
+    plr_real
+        excess; /* of a frame that contradicted the twists outright, squared, in their sigmas */
+    uint16_t insisting;   /* frames that contradict the twists by much */
+    uint16_t slight;      /* frames in which they differ by little */
+    uint8_t contradicted; /* 1: the twists are not believed */
+    uint8_t drifting;     /* 1: over many frames they differ by more than noise */
+    uint8_t frozen;       /* 1: this frame's picture was sent before */
+    uint8_t doubtful;     /* 1: the pose may be wrong */
+} plr_consistency;
 
 /* The settings and the camera as the filter computes with them: in its own precision, squared. */
 typedef struct plr_parameters {
@@ -132,7 +163,9 @@ typedef struct plr_filter {
     plr_real R_WB[9];
     double p_WB[3]; /* double in both builds: a float32 would round small steps away */
     plr_real bias[PLR_BIAS_DIM];
-    plr_real reading[6]; /* last twist */
+    plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
+    plr_real recovery_P[21]; /* the pose's covariance when it was last in order, packed lower */
+    plr_real reading[6];     /* last twist */
     plr_motion motion;
 
     unsigned count; /* active slots, dense from 0 */
@@ -141,7 +174,12 @@ typedef struct plr_filter {
                                                         landmarks */
     plr_workspace work;
 
-    uint32_t frame_number;
+    uint32_t frame_number; /* first of what is guarded with the small state */
+    plr_consistency consistency;
+    uint8_t health; /* plr_health of the last frame, and why */
+    uint32_t reasons;
+    plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
+    uint32_t refused_before;                /* twists refused until the last frame */
     uint16_t frames_without_use, frames_mostly_gated;
     uint32_t matches_since_gated;
     plr_totals totals;

@@ -126,9 +126,10 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
         else
             plr_filter_diverge(f);
     }
-    const bool moved = f->work.noise.open;
+    result.moved = f->work.noise.open;
+    memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
     plr_covariance_close_noise(f, result.nu);
-    if (result.applied == 0 && !moved)
+    if (result.applied == 0 && !result.moved)
         return result;
     if (!is_sane(f, n)) {
         plr_filter_diverge(f);

@@ -11,6 +11,8 @@ typedef struct plr_correction {
     unsigned failed_blocks; /* left out: S could not be factorised */
     unsigned cut;           /* landmark corrections stopped at the limits of range */
     plr_real nu[6];         /* of the motion's noise, in its own sigmas: what came out */
+    plr_real Lambda[21];    /* the information on it, with the prior */
+    bool moved;             /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
 /* Takes the observations work.used[0..count-1] (positions in work.order), all linearised at the

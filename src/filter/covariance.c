@@ -53,6 +53,12 @@ void plr_covariance_set_pose(plr_filter *f, const double P_xi[36]) {
     }
 }
 
+void plr_covariance_widen_pose(plr_filter *f, const plr_real C[36]) {
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++)
+            f->P[plr_packed_at(POSE + i, POSE + j)] += C[6 * i + j];
+}
+
 void plr_covariance_set_bias(plr_filter *f, const double variance[6]) {
     for (unsigned i = 0; i < 6; i++) {
         plr_real *row = f->P + plr_packed_row(BIAS + i);
@@ -428,8 +434,6 @@ bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
 }
 
 void plr_covariance_make_up_for_rounding(plr_filter *f) {
-    if (f->frame_number % 32 != 0)
-        return;
     for (unsigned slot = 0; slot < f->count; slot++) {
         const unsigned row = plr_covariance_row(f, slot);
         for (unsigned i = row; f->slots[slot].last_frame == f->frame_number && i < row + 3; i++)

@@ -26,6 +26,9 @@ unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
  * landmarks. */
 void plr_covariance_set_pose(plr_filter *f, const double P_xi[36]);
 
+/* P_xi += C, 6x6 and symmetric. */
+void plr_covariance_widen_pose(plr_filter *f, const plr_real C[36]);
+
 /* Sets the bias block to a diagonal, uncorrelated with anything. Only without landmarks. */
 void plr_covariance_set_bias(plr_filter *f, const double variance[6]);
 
@@ -90,7 +93,7 @@ void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linear
  * would cease to be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
-/* In one frame of 32 the variances of the landmarks that it saw grow by a few roundings, P_ii *= 1 + 8
+/* The variances of the landmarks that a frame saw grow by a few roundings, P_ii *= 1 + 8
  * epsilon: more than the roundings of the updates between can take away. Without it they add up for as
  * long as a robot stands still and measures the same landmarks, and P ceases to be a covariance
  * (docs/NUMERICS.md 1). */

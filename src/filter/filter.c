@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "filter/consistency.h"
 #include "filter/covariance.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
@@ -120,6 +121,8 @@ static void start_bias(plr_filter *f) {
             variance[i] = sigma * sigma;
         }
     plr_covariance_set_bias(f, variance);
+    for (int i = 0; i < 6; i++)
+        f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
 }
 
 plr_status plr_filter_reset(plr_filter *f) {
@@ -142,8 +145,15 @@ plr_status plr_filter_reset(plr_filter *f) {
     f->frame_number = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
     f->matches_since_gated = 0;
+    f->health = PLR_HEALTH_DEGRADED; /* nothing has been seen yet */
+    f->reasons = PLR_REASON_FEW_OBSERVATIONS;
+    f->last_frame_ns = f->last_use_ns = 0;
+    f->refused_before = 0;
+    memset(f->bias_prior, 0, sizeof f->bias_prior);
+    plr_consistency_clear(f);
     start_covariance(f, P_xi);
     plr_covariance_set_pose(f, P_xi);
+    plr_filter_keep_for_recovery(f);
     if (f->config.bias)
         start_bias(f);
     plr_guard_seal_whole(f);
@@ -219,6 +229,8 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     f->count = 0;
     plr_covariance_set_pose(f, P_xi ? P_xi : P_start);
     put_pose(f, t_ns, T_WB);
+    plr_consistency_clear(f);
+    plr_filter_keep_for_recovery(f);
     f->diverged = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
     if (!plr_covariance_is_positive(f) && f->config.bias) { /* the bias is lost too: its prior */
@@ -319,6 +331,11 @@ static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading
     f->totals.twists++;
 }
 
+static plr_status refuse_twist(plr_filter *f, plr_status status) {
+    f->totals.twists_refused++;
+    return refuse(f, status);
+}
+
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
     if (!f || !twist)
         return PLR_E_ARGUMENT;
@@ -326,14 +343,14 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     if (sound != PLR_OK)
         return sound;
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
-        return refuse(f, PLR_E_NOT_FINITE);
+        return refuse_twist(f, PLR_E_NOT_FINITE);
 
     plr_real reading[6], held[6];
     for (int i = 0; i < 3; i++) {
         reading[i] = (plr_real)twist->v_B_mps[i];
         reading[3 + i] = (plr_real)twist->w_B_radps[i];
         if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
-            return refuse(f, PLR_E_RANGE);
+            return refuse_twist(f, PLR_E_RANGE);
     }
     if (f->config.mode == PLR_MODE_MAPPING) {
         f->totals.twists++;
@@ -342,13 +359,13 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     }
     const plr_status in_time = check_time(f, t_ns);
     if (in_time != PLR_OK)
-        return refuse(f, in_time);
+        return refuse_twist(f, in_time);
     twist_of_step(f, reading, held);
     const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
     const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
     if (plr_motion_check(f, held, seconds) != PLR_OK ||
         check_reading(f, reading, interval) != PLR_OK)
-        return refuse(f, PLR_E_RANGE);
+        return refuse_twist(f, PLR_E_RANGE);
     if (seconds > 0)
         plr_motion_step(f, t_ns, held, seconds, interval);
     f->t_ns = t_ns;

@@ -1,18 +1,30 @@
 // SPDX-License-Identifier: MIT
 #include "filter/health.h"
 
+#include <string.h>
+
+#include "filter/consistency.h"
+#include "filter/filter_internal.h"
+#include "filter/guard.h"
+
 enum {
-    LOCK_FRAMES = 10,     /* successive frames of a gate that rejects nearly all */
-    LOCK_MATCHES = 5,     /* fewer matches say nothing about the gate */
-    LOST_FRAMES = 10,     /* frames without one used observation */
-    FEW_USED = 3,         /* fewer do not fix a pose */
-    INERT_MATCHES = 1000, /* a gate that rejects none of so many does nothing */
-    NIS_DOF = 20,         /* fewer degrees of freedom say little of the mean */
-    NIS_LIMIT = 2         /* mean of d^2 per degree of freedom that the noise does not explain */
+    LOCK_FRAMES = 10,    /* successive frames of a gate that rejects nearly all */
+    LOCK_MATCHES = 5,    /* fewer matches say nothing about the gate */
+    LOST_FRAMES = 10,    /* frames without one used observation */
+    FEW_USED = 3,        /* fewer do not fix a pose */
+    INERT_MATCHES = 1000 /* a gate that rejects none of so many does nothing */
 };
 
+/* The pose goes on by prediction for longer than this, s. */
+#define LOST_S 1.0
+/* A reading is held for longer than it may be: so many of the intervals in which readings come, and s. */
+#define HELD_INTERVALS 3.0
+#define HELD_S         0.05
+
 /* Reasons that leave the estimate as good as it should be. */
-#define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM)
+#define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW)
+/* Reasons by which the pose is lost. */
+#define LOST (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES)
 
 bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report) {
     const bool rejects =
@@ -37,6 +49,21 @@ static void count_up(uint16_t *count, bool more) {
         (*count)++;
 }
 
+static double seconds_since(plr_time_ns then, plr_time_ns now) {
+    return then == 0 || now < then ? 0 : (double)(now - then) * 1e-9;
+}
+
+/* Was a reading refused since the last frame, or is the last one being held for longer than readings
+ * come? */
+static bool lacks_twists(plr_filter *f) {
+    const bool refused = f->totals.twists_refused != f->refused_before;
+    f->refused_before = f->totals.twists_refused;
+    if (f->config.mode == PLR_MODE_MAPPING)
+        return false;
+    const double held = seconds_since(f->reading_ns, f->t_ns);
+    return refused || !f->reading_valid || held > HELD_INTERVALS * (double)f->interval_s + HELD_S;
+}
+
 static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
                              const plr_report *report) {
     uint32_t reasons = 0;
@@ -47,7 +74,8 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
 
     if (report->used < FEW_USED)
         reasons |= PLR_REASON_FEW_OBSERVATIONS;
-    if (f->frames_without_use >= LOST_FRAMES)
+    if (f->frames_without_use >= LOST_FRAMES ||
+        (f->frames_without_use > 0 && seconds_since(f->last_use_ns, f->t_ns) > LOST_S))
         reasons |= PLR_REASON_NO_OBSERVATIONS;
     if (events->locked)
         reasons |= PLR_REASON_GATE_LOCKED;
@@ -62,29 +90,42 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_NO_ROOM;
     if (report->refused || report->duplicates)
         reasons |= PLR_REASON_REFUSED_INPUT;
-    if (report->nis_dof >= NIS_DOF && report->nis > (float)(NIS_LIMIT * report->nis_dof))
-        reasons |= PLR_REASON_NIS_HIGH;
     if (events->cut)
         reasons |= PLR_REASON_RANGE_LIMITED;
     if (report->left_out)
         reasons |= PLR_REASON_BUDGET;
+    if (events->recovered)
+        reasons |= PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
+    if (lacks_twists(f))
+        reasons |= PLR_REASON_NO_TWISTS;
     return reasons;
+}
+
+static plr_health health_of(uint32_t reasons) {
+    if (reasons & PLR_REASON_STATE_DAMAGED)
+        return PLR_HEALTH_DIVERGED;
+    if (reasons & LOST)
+        return PLR_HEALTH_LOST;
+    return reasons & ~(uint32_t)HARMLESS ? PLR_HEALTH_DEGRADED : PLR_HEALTH_GOOD;
 }
 
 void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report *report) {
     report->reasons = find_reasons(f, events, report);
+    report->reasons |= plr_consistency_judge(f, report, (report->reasons & LOST) != 0);
+    report->health = health_of(report->reasons);
     f->totals.range_limited += events->cut;
-    if (report->reasons & (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED))
-        report->health = PLR_HEALTH_LOST;
-    else if (report->reasons & ~(unsigned)HARMLESS)
-        report->health = PLR_HEALTH_DEGRADED;
-    else
-        report->health = PLR_HEALTH_GOOD;
+    f->last_frame_ns = f->t_ns;
+    if (report->used > 0) {
+        f->last_use_ns = f->t_ns;
+        plr_filter_keep_for_recovery(f);
+    }
+    f->health = (uint8_t)report->health;
+    f->reasons = report->reasons;
 }
 
 void plr_health_after_refusal(const plr_filter *f, plr_report *report) {
-    report->health = f->diverged ? PLR_HEALTH_DIVERGED : PLR_HEALTH_DEGRADED;
-    report->reasons = f->diverged ? PLR_REASON_NOT_POSITIVE : 0;
+    report->health = f->health == PLR_HEALTH_GOOD ? PLR_HEALTH_DEGRADED : (plr_health)f->health;
+    report->reasons = f->reasons;
     report->active = (uint16_t)f->count;
 }
 
@@ -92,6 +133,35 @@ void plr_health_damaged(plr_filter *f, plr_report *report) {
     f->totals.damaged++; /* the sums stay wrong */
     report->health = PLR_HEALTH_DIVERGED;
     report->reasons = PLR_REASON_STATE_DAMAGED;
+}
+
+plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health) {
+    if (!f || !health)
+        return PLR_E_ARGUMENT;
+    memset(health, 0, sizeof *health);
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK) {
+        health->health = PLR_HEALTH_DIVERGED;
+        health->reasons = sound == PLR_E_DAMAGED ? PLR_REASON_STATE_DAMAGED : 0;
+        return sound;
+    }
+    const plr_time_ns now = t_ns > f->t_ns ? t_ns : f->t_ns;
+    const bool looks = f->config.mode != PLR_MODE_DEAD_RECKONING;
+    health->reasons = f->reasons;
+    health->seconds_without_frame = seconds_since(f->last_frame_ns, now);
+    health->seconds_without_use = seconds_since(f->last_use_ns, now);
+    health->seconds_without_twist = seconds_since(f->reading_ns, now);
+    health->resets = f->totals.resets + f->totals.widened;
+    if (looks && (f->last_frame_ns == 0 || health->seconds_without_frame > LOST_S))
+        health->reasons |= PLR_REASON_NO_FRAMES;
+    if (looks && (f->last_use_ns == 0 || health->seconds_without_use > LOST_S))
+        health->reasons |= PLR_REASON_NO_OBSERVATIONS;
+    if (f->config.mode != PLR_MODE_MAPPING &&
+        (!f->reading_valid || f->totals.twists_refused != f->refused_before ||
+         health->seconds_without_twist > HELD_INTERVALS * (double)f->interval_s + HELD_S))
+        health->reasons |= PLR_REASON_NO_TWISTS;
+    health->health = health_of(health->reasons);
+    return PLR_OK;
 }
 
 void plr_health_count(plr_filter *f, const plr_report *report) {

@@ -11,6 +11,7 @@
 typedef struct plr_frame_events {
     bool sink_failed;
     bool locked;
+    bool recovered;
     unsigned cut;
 } plr_frame_events;
 

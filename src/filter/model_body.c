@@ -97,20 +97,23 @@ static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size
     }
 }
 
-/* Moves a landmark along its ray to where the frame's observation is about to put it, and returns the
- * change of inverse range. What follows is linearised there; the state's correction begins with what
- * takes it back. */
+/* Moves a landmark along its ray to where the frame's observation is about to put it; what follows is
+ * linearised there. Returns what is left between that point and the estimate, as inverse range: the
+ * state's correction begins with it. */
 static plr_real bring_closer(plr_filter *f, unsigned slot) {
-    plr_real *q = f->slots[slot].x;
-    const plr_real closer = f->work.noise.closer[slot], range = PLR_SQRT(plr_dot3(q, q));
-    const plr_real ratio = PLR_FMA(closer, range, PLR_R(1)); /* of inverse ranges */
-    if (!(ratio >= PLR_R(0.5) && ratio <= PLR_R(2)) ||
-        !(ratio >= f->par.min_inverse_range * range && ratio * PLR_MIN_RANGE <= range))
-        return 0;
-    const plr_real step = -closer * range / ratio;
+    plr_slot *s = &f->slots[slot];
+    const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
+    const plr_real wanted = s->beyond + f->work.noise.closer[slot];
+    plr_real ratio = PLR_FMA(wanted, range, PLR_R(1)); /* of inverse ranges */
+    const plr_real farthest = f->par.min_inverse_range * range;
+    ratio = ratio < PLR_R(0.5) ? PLR_R(0.5) : ratio > PLR_R(2) ? PLR_R(2) : ratio;
+    ratio = ratio < farthest ? farthest : ratio > nearest ? nearest : ratio;
+    const plr_real step = (PLR_R(1) - ratio) / ratio;
     for (int i = 0; i < 3; i++)
-        q[i] = PLR_FMA(step, q[i], q[i]);
-    return closer;
+        s->x[i] = PLR_FMA(step, s->x[i], s->x[i]);
+    const plr_real left = s->beyond - (ratio - PLR_R(1)) / range;
+    s->beyond = 0;
+    return left;
 }
 
 static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
@@ -123,14 +126,14 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, to;
-        const plr_real closer = bring_closer(f, slot);
+        const plr_real left = bring_closer(f, slot);
         plr_polar_at(&from, s->x);
         plr_se3_move_back(s->x, E, p);
         keep_off(s->x);
         plr_polar_at(&to, s->x);
         carry_chart(F + 9 * slot, &to, R, p, &from);
         for (unsigned i = 0; i < 3; i++)
-            f->work.dx[plr_covariance_row(f, slot) + i] = -closer * F[9 * slot + 3 * i + 2];
+            f->work.dx[plr_covariance_row(f, slot) + i] = left * F[9 * slot + 3 * i + 2];
     }
     plr_real A[36];
     plr_se3_rotation(R, motion->E);
@@ -272,10 +275,12 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
                 w[i] = PLR_FMA(-J[6 * i + k], eta[k], w[i]);
-        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x);
+        w[2] += s->beyond; /* 0 where the motion has taken it in */
+        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_se3_move_back(s->x, E_C, p_C);
         plr_polar_at(&to, s->x);
         carry_chart(rigid, &to, R_C, p_C, &there);
+        s->beyond *= rigid[8];
         plr_real *own = F + 9 * slot;
         for (int i = 0; i < 3; i++) {
             const plr_real *row = rigid + 3 * i;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/motion.h"
 
+#include "filter/consistency.h"
 #include "filter/covariance.h"
 #include "filter/model.h"
 #include "lie/se3.h"
@@ -145,7 +146,8 @@ static void factorise(const plr_real M[36], plr_real L[36]) {
     }
 }
 
-void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
+static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
+                      plr_real turn2) {
     plr_real M[36];
     memset(f->work.noise.closer, 0, sizeof f->work.noise.closer);
     memset(applied, 0, sizeof *applied);
@@ -154,8 +156,20 @@ void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
     if (!f->motion.noisy)
         return;
     motion_covariance(f, M);
+    for (int i = 0; i < 36; i++)
+        M[i] *= scale;
+    for (int i = 0; i < 6; i++)
+        M[7 * i] += i < 3 ? way2 : turn2;
     factorise(M, applied->L);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
+}
+
+void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
+    put_prior(f, applied, 1, 0, 0);
+}
+
+void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {
+    put_prior(f, applied, PLR_R(900), PLR_R(0.09), PLR_R(0.01));
 }
 
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
@@ -204,7 +218,10 @@ void plr_motion_settle(plr_filter *f) {
         return;
     plr_motion_prior(f, &applied);
     plr_motion_apply(f, &applied);
+    if (!f->work.noise.open)
+        return;
     plr_covariance_close_noise(f, NULL);
+    (void)plr_model_of(f)->retract(f, f->work.dx); /* landmarks beyond infinity go back there */
 }
 
 void plr_motion_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
@@ -230,6 +247,7 @@ void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
     plr_se3_adjoint_inverse(A, R, m->p);
     plr_covariance_pose(f, P);
     plr_sandwich6(P_xi, A, P);
+    plr_consistency_cover(f, P_xi);
     for (int i = 0; i < 36; i++)
         P_xi[i] += m->Q[i];
     if (!f->config.bias)

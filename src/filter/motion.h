@@ -38,6 +38,10 @@ typedef struct plr_applied_motion {
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
 
+/* The motion at nu = 0 with a prior that excludes nothing a robot may have done between two frames: 30
+ * times the sigmas of plr_motion_prior, and 0.3 m and 0.1 rad besides. */
+void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
+
 /* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
                    plr_applied_motion *applied);

@@ -15,30 +15,38 @@
 
 enum {
     TRIALS = 4, /* of a better point; the start and a return to the best one come on top */
-    FEW = 3     /* fewer points say nothing that could be checked */
+    FEW = 3,    /* fewer points say nothing that could be checked */
+    MANY = 6    /* fewer are not believed against the twists */
 };
 
 /* Huber's limit on a whitened residual of three rows: beyond it an observation pulls no harder. */
 #define HUBER PLR_R(2.5)
 /* A step that promises less of the sum is not worth its evaluation. */
 #define SMALL_GAIN PLR_R(0.01)
+/* An observation speaks for one of two motions if its squared residuals differ by more. */
+#define DECISIVE PLR_R(9)
+/* It agrees with a motion if its squared residual is below this. */
+#define AGREES PLR_R(16)
+/* Points are well spread if together they leave no more of an open prior's variance in any direction. */
+#define LEFT_OPEN PLR_R(0.25)
 /* The least share, about, that a point may leave to the others in what is known of its own prediction.
  * Below it the point has made the motion what it is, and cannot be judged by it. */
 #define LEAST_REST PLR_R(0.05)
 
 /* One matched observation. */
 typedef struct plr_sighting {
-    plr_real V[18];   /* correlation of the landmark with nu: P_(i,b) B^T L^-T, 3x6 */
-    plr_real P[9];    /* the landmark's covariance once nu is known */
-    plr_real U[2][6]; /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
-    plr_real a[18];   /* U^-T dz/dnu, 3x6, at the point evaluated last */
-    plr_real rho[3];  /* U^-T r there */
-    plr_real w[3];    /* P J^T S^-1 r: what the observation alone says of its landmark's chart */
-    plr_real weight;  /* Huber's: 1, and less for a large residual */
-    plr_real cost;    /* Huber's rho at the best point */
-    plr_real at_zero; /* d^2 around the twists' prediction; negative: no place to linearise */
-    plr_real gain;    /* det S there */
-    plr_real voice;   /* 1: takes part in the search; 0: known, or barred */
+    plr_real V[18];     /* correlation of the landmark with nu: P_(i,b) B^T L^-T, 3x6 */
+    plr_real P[9];      /* the landmark's covariance once nu is known */
+    plr_real U[2][6];   /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
+    plr_real a[18];     /* U^-T dz/dnu, 3x6, at the point evaluated last */
+    plr_real rho[3];    /* U^-T r there */
+    plr_real closer;    /* P J^T S^-1 r: by how much the observation changes its inverse range */
+    plr_real weight;    /* Huber's: 1, and less for a large residual */
+    plr_real cost;      /* Huber's rho at the best point */
+    plr_real at_zero;   /* d^2 around the twists' prediction; negative: no place to linearise */
+    plr_real gain;      /* det S there */
+    plr_real voice;     /* 1: takes part in the search; 0: known, or barred */
+    plr_real by_twists; /* |U^-T r|^2 where the twists have their say */
 } plr_sighting;
 
 /* The search for nu. */
@@ -78,14 +86,12 @@ static void prepare(plr_search *s, unsigned i) {
     plr_filter *f = s->f;
     plr_sighting *at = &s->sightings[i];
     const unsigned slot = f->work.slot_of[f->work.used[i]];
-    memset(at, 0, sizeof *at);
     plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, s->prior.L, at->V);
     plr_covariance_landmark(f, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
             for (unsigned k = 0; k < 6; k++)
                 at->P[3 * r + c] = PLR_FMA(-at->V[6 * r + k], at->V[6 * c + k], at->P[3 * r + c]);
-    at->voice = f->slots[slot].known ? 0 : 1;
 }
 
 /* How the pixels of a landmark at q0, which the camera's motion (R, p) brings to q, depend on the chart
@@ -115,6 +121,14 @@ static void differentiate(const plr_camera *camera, const plr_polar *chart, cons
         }
 }
 
+/* Does a single observation still make a part of what is known of a landmark's range? Of one that
+ * has been seen often, the uncertainty is nearly all the camera's, common to all, and moving each by
+ * itself would shift them against the pose. */
+static bool depends_on_observation(const plr_filter *f, const plr_real J[9], const plr_real P[9]) {
+    const plr_real by_range = J[2] - J[5];
+    return by_range * by_range * P[8] > PLR_R(0.02) * f->par.pixel_variance;
+}
+
 /* One observation at a point: U of the trial bank, a and rho. False where nothing can be said. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_motion *m,
                          const plr_real E[9], const plr_real p[3]) {
@@ -142,6 +156,8 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_moti
         return false;
     plr_gemm_nn(3, 6, 3, J, 3, at->V, 6, dz, 6);
     plr_gemm_nn(3, 1, 6, dz, 6, m->z, 1, shift, 1);
+    for (unsigned r = 0; r < 3; r++)
+        shift[r] = PLR_FMA(J[3 * r + 2], slot->beyond, shift[r]);
     plr_gemm_nn(3, 6, 6, A, 6, m->JL, 6, dz, 6);
     plr_gate_innovation(at->rho, observation_of(s, i), &lin);
     for (unsigned r = 0; r < 3; r++)
@@ -149,8 +165,12 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_moti
     memcpy(at->a, dz, sizeof at->a);
     plr_solve_upper_transposed(3, 6, S, at->a, 6);
     plr_solve_upper_transposed(3, 1, S, at->rho, 1);
-    plr_solve_upper_transposed(3, 3, S, JP, 3);
-    plr_mat3_tvec(at->w, JP, at->rho);
+    at->closer = 0;
+    if (depends_on_observation(s->f, J, at->P)) {
+        plr_solve_upper_transposed(3, 3, S, JP, 3);
+        const plr_real column[3] = {JP[2], JP[5], JP[8]};
+        at->closer = plr_dot3(column, at->rho);
+    }
     memcpy(at->U[1 - s->bank], S, sizeof at->U[0]);
     return true;
 }
@@ -379,21 +399,108 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U, cons
     return accepted;
 }
 
+/* Have so many observations little weight that another motion may fit them better? */
+static bool is_suspicious(const plr_search *s, const plr_search_point *best) {
+    plr_real voices = 0, weight = 0;
+    for (unsigned i = 0; i < s->count; i++) {
+        voices += s->sightings[i].voice;
+        weight += s->sightings[i].weight;
+    }
+    return weight < PLR_R(0.7) * voices || norm2(best->z) > PLR_R(36);
+}
+
+/* Do the observations leave no direction of the motion open? */
+static bool is_well_spread(const plr_search_point *point) {
+    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, C[36] = {0};
+    if (!factorise(point, 0, U))
+        return false;
+    for (unsigned k = 0; k < 6; k++)
+        C[7 * k] = 1;
+    plr_solve_upper_transposed(6, 6, U, C, 6);
+    for (unsigned k = 0; k < 6; k++) {
+        plr_real left = 0;
+        for (unsigned r = 0; r < 6; r++)
+            left = PLR_FMA(C[6 * r + k], C[6 * r + k], left);
+        if (left > LEFT_OPEN)
+            return false;
+    }
+    return true;
+}
+
+/* Do at least a fifth of the observations, and four times as many as for the twists, speak for the other
+ * motion, and do most of many well-spread points agree on it? */
+static bool speaks_against_twists(const plr_search *s, const plr_search_point *open) {
+    unsigned with = 0, against = 0, agree = 0, voices = 0;
+    for (unsigned i = 0; i < s->count; i++) {
+        const plr_sighting *at = &s->sightings[i];
+        const plr_real d2 = plr_dot3(at->rho, at->rho);
+        if (!(at->voice > 0))
+            continue;
+        voices++;
+        agree += d2 < AGREES;
+        against += at->by_twists > d2 + DECISIVE;
+        with += d2 > at->by_twists + DECISIVE;
+    }
+    return against >= FEW && 4 * with <= against && 5 * agree >= 3 * voices && voices >= MANY &&
+           is_well_spread(open);
+}
+
+static void search_from_zero(plr_search *s, plr_search_point *best) {
+    static const plr_real zero[6] = {0};
+    for (unsigned i = 0; i < s->count; i++)
+        prepare(s, i);
+    (void)evaluate(s, zero, best);
+    accept(s);
+}
+
+/* Where the observations may contradict the twists, they are asked again with the twists' word left out.
+ * True, with the search at their motion, if they agree on one that the twists exclude; else the search
+ * is as it was. */
+static bool contradicts(plr_search *s, plr_search_point *best) {
+    const plr_applied_motion believed = s->prior;
+    plr_search_point open;
+    for (unsigned i = 0; i < s->count; i++)
+        s->sightings[i].by_twists = plr_dot3(s->sightings[i].rho, s->sightings[i].rho);
+    plr_motion_open_prior(s->f, &s->prior);
+    search_from_zero(s, &open);
+    for (unsigned i = 0; i < 2; i++)
+        descend(s, &open);
+    if (speaks_against_twists(s, &open)) {
+        *best = open;
+        return true;
+    }
+    const plr_search_point kept = *best;
+    s->prior = believed;
+    for (unsigned i = 0; i < s->count; i++)
+        prepare(s, i);
+    (void)evaluate(s, kept.z, best);
+    accept(s);
+    return false;
+}
+
+/* Of one or two points none can be checked by the others: only those have a voice that the twists'
+ * prediction lets through the gate. */
+static void hush_outliers(plr_search *s, plr_search_point *best) {
+    for (unsigned i = 0; i < s->count; i++)
+        if (!plr_gate_accepts(s->f, s->sightings[i].at_zero, 0))
+            s->sightings[i].voice = 0;
+    search_from_zero(s, best);
+}
+
 void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
                      float *nis) {
     plr_search s = {.f = f, .frame = frame, .sightings = (plr_sighting *)(void *)f->work.Vt};
     plr_search_point best;
     plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, dz[6] = {0};
-    static const plr_real zero[6] = {0};
     unsigned voices = 0;
     plr_motion_prior(f, &s.prior);
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
             f->work.used[s.count] = (uint16_t)k;
-            prepare(&s, s.count++);
+            memset(&s.sightings[s.count], 0, sizeof *s.sightings);
+            s.sightings[s.count++].voice = f->slots[f->work.slot_of[k]].known ? 0 : 1;
         }
-    (void)evaluate(&s, zero, &best);
-    accept(&s);
+    search_from_zero(&s, &best);
     for (unsigned i = 0; i < s.count; i++) {
         if (s.sightings[i].weight > 0 || slot_of(&s, i)->known)
             judge_at_zero(&s, i);
@@ -402,8 +509,11 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         voices += s.sightings[i].voice > 0;
     }
     first->found = voices >= FEW;
-    if (first->found)
+    if (voices < FEW)
+        hush_outliers(&s, &best);
+    if (voices > 0)
         descend(&s, &best);
+    first->contradicted = first->found && is_suspicious(&s, &best) && contradicts(&s, &best);
     first->found = first->found && factorise(&best, 0, U);
     if (first->found)
         (void)step(&best, U, dz);
@@ -413,6 +523,6 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);
         if (accepted)
-            f->work.noise.closer[slot_of(&s, i) - f->slots] = s.sightings[i].w[2];
+            f->work.noise.closer[slot_of(&s, i) - f->slots] = s.sightings[i].closer;
     }
 }

@@ -14,6 +14,9 @@
 typedef struct plr_motion_first {
     plr_applied_motion motion; /* at the nu that was found, or at 0 */
     bool found;                /* false: too few observations, or no better than the twists */
+    bool
+        contradicted; /* the observations agree on a motion that the twists exclude: `motion` has their
+                          word, with a prior wide enough for it */
 } plr_motion_first;
 
 /* Finds nu, and judges every matched observation there: work.gain[k] >= 0 of those accepted, -1 of

@@ -44,7 +44,8 @@ void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart) {
 }
 
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
-                       const plr_real w[3], plr_real min_inverse_range, plr_real q[3]) {
+                       const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
+                       plr_real *beyond) {
     bool cut = false;
     plr_real w1 = w[0], w2 = w[1];
     const plr_real turn2 = PLR_FMA(w2, w2, w1 * w1);
@@ -61,18 +62,21 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     plr_so3_expm1(E, a);
 
     plr_real inverse = PLR_R(1) / chart->r + w[2];
+    bool held = false;
+    *beyond = 0;
     if (!(inverse >= min_inverse_range)) {
+        *beyond = inverse - min_inverse_range;
         inverse = min_inverse_range;
-        cut = true;
+        held = true;
     } else if (inverse > PLR_R(1) / PLR_MIN_RANGE) {
         inverse = PLR_R(1) / PLR_MIN_RANGE;
-        cut = true;
+        cut = held = true;
     }
     result->r = PLR_R(1) / inverse;
     plr_real turn[3];
     plr_mat3_vec(turn, E, chart->mu);
     /* r+ - r = -r r+ w_3; and q+ - q = (r+ - r) (mu + turn) + r turn */
-    const plr_real further = cut ? result->r - chart->r : -chart->r * result->r * w[2];
+    const plr_real further = held ? result->r - chart->r : -chart->r * result->r * w[2];
     const plr_real mu[3] = {chart->mu[0] + turn[0], chart->mu[1] + turn[1], chart->mu[2] + turn[2]};
     if (further <
         PLR_R(-0.25) * chart->r) { /* the far point's rounding must not stay in the near one */

@@ -34,9 +34,11 @@ void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart);
 /* Moves a point along its chart: a = mu x (N w_12), mu+ = Exp(a) mu, 1/r+ = 1/r + w_3.
  * q, the chart's point, goes there by what is added to it: a small step is rounded at its own size.
  * *result is the chart at the new point, M = N(mu+)^T Exp(a) N(mu) (2x2) the transport of the
- * bearing part. Returns true where w had to be cut: a bearing change over 1 rad, or a range beyond
- * 1 / min_inverse_range or under PLR_MIN_RANGE. */
+ * bearing part. Where 1/r+ would be below min_inverse_range the point stays there, and *beyond (0
+ * elsewhere) is what is left of w_3. Returns true where w had to be cut: a bearing change over 1 rad, or
+ * a range under PLR_MIN_RANGE. */
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
-                       const plr_real w[3], plr_real min_inverse_range, plr_real q[3]);
+                       const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
+                       plr_real *beyond);
 
 #endif

@@ -46,7 +46,7 @@ static const plr_row rows[] = {
     {{14, "bias-gyro-walk", "(rad/s)^2/s", "variance that the gyro bias gains in a second", PLR_SETTING_NUMBER, NULL, 0, 1e2, 1e-10}, AT(bias_gyro_walk), STORE_DOUBLE},
     {{15, "gate-d2", "", "largest squared Mahalanobis distance, 4 d.o.f.; 0 = off", PLR_SETTING_NUMBER, NULL, 0, 1e12, 13.276704135987622}, AT(gate_d2), STORE_DOUBLE},
     {{16, "gate-residual", "px", "instead: largest norm of the four residuals; 0 = off", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0}, AT(gate_residual_px), STORE_DOUBLE},
-    {{17, "min-disparity", "px", "least disparity of a new landmark", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0.1}, AT(min_disparity_px), STORE_DOUBLE},
+    {{17, "min-disparity", "px", "least disparity of a new landmark; 0 = as noise leaves it to far ones", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0}, AT(min_disparity_px), STORE_DOUBLE},
     {{18, "max-depth", "m", "greatest depth of a new landmark; 0 = no limit", PLR_SETTING_NUMBER, NULL, 0, 1e6, 0}, AT(max_depth_m), STORE_DOUBLE},
     {{19, "max-row-gap", "px", "greatest |vL - vR| of a new landmark; 0 = no limit", PLR_SETTING_NUMBER, NULL, 0, 1e4, 2}, AT(max_row_gap_px), STORE_DOUBLE},
     {{20, "min-depth", "m", "predicted depth below which nothing is linearised", PLR_SETTING_NUMBER, NULL, 0.01, 1e3, 0.3}, AT(min_depth_m), STORE_DOUBLE},

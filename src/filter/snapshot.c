@@ -17,10 +17,11 @@ enum { STATE_VERSION = 2 };
 #define LENGTH(table) (sizeof(table) / sizeof *(table))
 #define FIELD(type, member, kind, n)                                                               \
     { offsetof(type, member), kind, n }
-#define OF_FILTER(member, kind, n) FIELD(plr_filter, member, kind, n)
-#define OF_CAMERA(member, n)       FIELD(plr_camera, member, PLR_FIELD_REAL, n)
-#define OF_SLOT(member, kind, n)   FIELD(plr_slot, member, kind, n)
-#define OF_TOTALS(member, kind)    OF_FILTER(totals.member, kind, 1)
+#define OF_FILTER(member, kind, n)      FIELD(plr_filter, member, kind, n)
+#define OF_CONSISTENCY(member, kind, n) FIELD(plr_filter, consistency.member, kind, n)
+#define OF_CAMERA(member, n)            FIELD(plr_camera, member, PLR_FIELD_REAL, n)
+#define OF_SLOT(member, kind, n)        FIELD(plr_slot, member, kind, n)
+#define OF_TOTALS(member, kind)         OF_FILTER(totals.member, kind, 1)
 
 /* ---------------------------------------------------------------- layout */
 
@@ -72,6 +73,35 @@ static const plr_field filter_fields[] = {
     OF_FILTER(motion.pending, PLR_FIELD_FLAG, 1),
     OF_FILTER(motion.noisy, PLR_FIELD_FLAG, 1),
     OF_FILTER(frame_number, PLR_FIELD_U32, 1),
+    OF_FILTER(bias_prior, PLR_FIELD_REAL, PLR_BIAS_DIM),
+    OF_FILTER(bias_prior_sigma, PLR_FIELD_REAL, PLR_BIAS_DIM),
+    OF_FILTER(recovery_P, PLR_FIELD_REAL, 21),
+    OF_CONSISTENCY(windows[0].sum, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(windows[0].variance, PLR_FIELD_REAL, 21),
+    OF_CONSISTENCY(windows[1].sum, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(windows[1].variance, PLR_FIELD_REAL, 21),
+    OF_CONSISTENCY(windows[2].sum, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(windows[2].variance, PLR_FIELD_REAL, 21),
+    OF_CONSISTENCY(apart, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(still_way, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(still_variance, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(matched, PLR_FIELD_REAL, 1),
+    OF_CONSISTENCY(gated, PLR_FIELD_REAL, 1),
+    OF_CONSISTENCY(nis, PLR_FIELD_REAL, 1),
+    OF_CONSISTENCY(nis_dof, PLR_FIELD_REAL, 1),
+    OF_CONSISTENCY(agreeing, PLR_FIELD_U16, 1),
+    OF_CONSISTENCY(excess, PLR_FIELD_REAL, 1),
+    OF_CONSISTENCY(insisting, PLR_FIELD_U16, 1),
+    OF_CONSISTENCY(slight, PLR_FIELD_U16, 1),
+    OF_CONSISTENCY(contradicted, PLR_FIELD_FLAG, 1),
+    OF_CONSISTENCY(drifting, PLR_FIELD_FLAG, 1),
+    OF_CONSISTENCY(frozen, PLR_FIELD_FLAG, 1),
+    OF_CONSISTENCY(doubtful, PLR_FIELD_FLAG, 1),
+    OF_FILTER(health, PLR_FIELD_U8, 1),
+    OF_FILTER(reasons, PLR_FIELD_U32, 1),
+    OF_FILTER(last_frame_ns, PLR_FIELD_U64, 1),
+    OF_FILTER(last_use_ns, PLR_FIELD_U64, 1),
+    OF_FILTER(refused_before, PLR_FIELD_U32, 1),
     OF_FILTER(frames_without_use, PLR_FIELD_U16, 1),
     OF_FILTER(frames_mostly_gated, PLR_FIELD_U16, 1),
     OF_FILTER(matches_since_gated, PLR_FIELD_U32, 1),
@@ -100,10 +130,12 @@ static const plr_field filter_fields[] = {
 
 static const plr_field slot_fields[] = {
     OF_SLOT(x, PLR_FIELD_REAL, PLR_LANDMARK_DIM),
+    OF_SLOT(beyond, PLR_FIELD_REAL, 1),
     OF_SLOT(id, PLR_FIELD_U32, 1),
     OF_SLOT(times_seen, PLR_FIELD_U32, 1),
     OF_SLOT(times_gated, PLR_FIELD_U32, 1),
     OF_SLOT(last_frame, PLR_FIELD_U32, 1),
+    OF_SLOT(print, PLR_FIELD_U32, 1),
     OF_SLOT(last_seen_ns, PLR_FIELD_U64, 1),
     OF_SLOT(known, PLR_FIELD_FLAG, 1),
 };

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "camera/stereo.h"
+#include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
@@ -175,23 +176,20 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
     }
 }
 
-/* Brings landmarks and covariance up to this frame, and judges its observations. */
-static void move(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
-    plr_motion_first first;
-    if (f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
-        f->config.mode == PLR_MODE_SLAM) {
-        plr_motion_find(f, frame, n, &first, &report->nis);
-        plr_motion_apply(f, &first.motion);
-        return;
-    }
-    if (f->motion.pending) {
-        plr_motion_prior(f, &first.motion);
-        plr_motion_apply(f, &first.motion);
-    }
-    gate_each(f, frame, n, report);
+/* ---------------------------------------------------------------- new landmarks */
+
+/* The disparity of a point at infinity lies above this but for one in 700. */
+static plr_real least_disparity(const plr_filter *f) {
+    return f->config.model == PLR_MODEL_BODY ? PLR_R(-4.25) * PLR_SQRT(f->par.pixel_variance) : 0;
 }
 
-/* ---------------------------------------------------------------- new landmarks */
+/* A landmark stands no further at its birth than where this is its disparity, px: further off, what a
+ * single observation says of its bearing would be left to rounding in float32. */
+static plr_real farthest_disparity(const plr_filter *f) {
+    const plr_real by_range =
+        f->par.camera.fx * f->par.camera.baseline * f->par.min_inverse_range * PLR_R(1.5);
+    return by_range > PLR_R(0.05) ? by_range : PLR_R(0.05);
+}
 
 /* The tests that pixels must pass before they may make a landmark. */
 static bool is_worth_a_landmark(const plr_filter *f, const plr_observation *o, plr_real z[3]) {
@@ -200,11 +198,26 @@ static bool is_worth_a_landmark(const plr_filter *f, const plr_observation *o, p
     z[2] = PLR_R(0.5) * ((plr_real)o->vL_px + (plr_real)o->vR_px);
     const plr_real disparity = z[0] - z[1];
     const plr_real row_gap = plr_abs((plr_real)o->vL_px - (plr_real)o->vR_px);
+    const plr_real least = f->par.min_disparity > 0 ? f->par.min_disparity : least_disparity(f);
+    if (!(disparity >= least) || (f->par.max_row_gap > 0 && row_gap > f->par.max_row_gap))
+        return false;
+    const bool any_depth = f->config.model == PLR_MODEL_BODY && f->par.max_depth <= 0;
+    if (any_depth && disparity < farthest_disparity(f))
+        return true;
     const plr_real depth = f->par.camera.fx * f->par.camera.baseline / disparity;
-    return disparity >= f->par.min_disparity && disparity > 0 && depth >= f->par.min_depth &&
+    return disparity > 0 && depth >= f->par.min_depth &&
            (f->par.max_depth <= 0 || depth <= f->par.max_depth) &&
-           (f->par.max_row_gap <= 0 || row_gap <= f->par.max_row_gap) &&
            depth * f->par.min_inverse_range < 1;
+}
+
+/* Where a point's noise has left it no disparity to stand at, the landmark stands at this one, and what
+ * is missing goes into its inverse range besides. */
+static plr_real stand_at_some_distance(const plr_filter *f, plr_real z[3]) {
+    const plr_real disparity = z[0] - z[1], farthest = farthest_disparity(f);
+    if (f->config.model != PLR_MODEL_BODY || disparity >= farthest)
+        return 0;
+    z[1] = z[0] - farthest;
+    return disparity - farthest;
 }
 
 /* S_q with S_q S_q^T = Dq R Dq^T, the pixels' noise in the camera; or the course's constant. */
@@ -215,9 +228,13 @@ static void initial_factor(const plr_filter *f, const plr_real Dq[9], plr_real S
                               : Dq[i] * PLR_SQRT(plr_gate_noise(f, i % 3));
 }
 
+static bool makes_landmarks(const plr_filter *f) {
+    return f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
+}
+
 static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
                            plr_frame_events *events, plr_report *report) {
-    const bool makes = f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
+    const bool makes = makes_landmarks(f);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_real z[3], q[3], Dq[9], S_q[9];
@@ -232,10 +249,14 @@ static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
             report->no_room++;
             continue;
         }
+        const plr_real missing = stand_at_some_distance(f, z);
         plr_stereo_back_project(q, Dq, &f->par.camera, z);
         initial_factor(f, Dq, S_q);
         plr_model_of(f)->initialise(f, q, S_q, &landmark);
         plr_slots_append(f, o->id, false, &landmark);
+        /* inverse range is disparity over focal length and baseline, along the ray */
+        f->slots[f->count - 1].beyond =
+            missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (f->par.camera.fx * f->par.camera.baseline);
         report->created++;
     }
     if (!makes) /* those that found no slot are counted as such already */
@@ -257,26 +278,86 @@ static void unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
         w->slot_of[k] = plr_slots_find(f, frame->observations[w->order[k]].id);
 }
 
+/* Is there anything in this frame that needs landmarks and covariance to stand where the body is? If
+ * not, the motion goes on being accumulated, and a dark camera stays out of P. */
+static bool is_needed(const plr_filter *f, const plr_frame *frame, unsigned n) {
+    plr_real z[3];
+    for (unsigned k = 0; k < n; k++) {
+        const bool used = f->work.slot_of[k] != PLR_NO_SLOT && f->work.gain[k] >= 0;
+        const bool born = f->work.slot_of[k] == PLR_NO_SLOT && makes_landmarks(f) &&
+                          is_worth_a_landmark(f, &frame->observations[f->work.order[k]], z);
+        if (used || born)
+            return true;
+    }
+    return false;
+}
+
+/* Finds the motion, judges the observations by it, and corrects. */
+static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsigned n,
+                                   plr_report *report) {
+    plr_applied_motion believed;
+    plr_motion_first first;
+    plr_correction correction = {0};
+    plr_consistency_widen(f, &believed);
+    plr_motion_find(f, frame, n, &first, &report->nis);
+    if (!is_needed(f, frame, n)) {
+        (void)choose(f, frame, n, report);
+        return correction;
+    }
+    plr_motion_apply(f, &first.motion);
+    if (f->diverged)
+        return correction;
+    correction = plr_correct(f, frame->observations, choose(f, frame, n, report));
+    if (correction.moved && !f->diverged)
+        plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda,
+                            first.contradicted);
+    return correction;
+}
+
+/* The motion is given, or the observations have no say in it before the update. */
+static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, unsigned n,
+                                      plr_report *report) {
+    const plr_correction none = {0};
+    if (f->motion.pending) {
+        plr_applied_motion motion;
+        plr_motion_prior(f, &motion);
+        plr_motion_apply(f, &motion);
+    }
+    if (f->diverged)
+        return none;
+    gate_each(f, frame, n, report);
+    return plr_correct(f, frame->observations, choose(f, frame, n, report));
+}
+
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_frame_events events = {0};
     const plr_observation *seen = frame->observations;
-    const unsigned n = put_in_order(f, frame, report);
+    unsigned n = put_in_order(f, frame, report);
     match(f, seen, n);
     adopt_known(f, seen, n, &events, report);
     count_seen(f, n);
-    move(f, frame, n, report);
-    if (f->diverged)
-        return;
-    const unsigned used = choose(f, frame, n, report);
-    const plr_correction correction = plr_correct(f, seen, used);
+    if (plr_consistency_is_frozen(f, frame, n))
+        n = 0; /* it says nothing of now */
+    const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
+                       f->config.mode == PLR_MODE_SLAM;
+    const plr_correction correction =
+        finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_blocks;
     report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
     events.cut = correction.cut;
     if (!f->diverged) {
         events.locked = plr_health_gate_is_locked(f, report);
-        if (events.locked)
+        if (events.locked) {
+            plr_motion_settle(f);
             unlock(f, frame, n);
+        }
+        initialise_new(f, frame, n, &events, report);
+    }
+    if (f->diverged) {
+        plr_filter_recover(f);
+        events.recovered = true;
+        match(f, seen, n);
         initialise_new(f, frame, n, &events, report);
     }
     plr_health_judge(f, &events, report);
@@ -334,6 +415,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         return r->status;
     r->status = check(f, frame);
     if (r->status != PLR_OK) {
+        f->totals.frames_refused++;
         plr_filter_count_refusal(f, r->status);
         plr_health_after_refusal(f, r);
         return r->status;
@@ -341,12 +423,12 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
-    if (f->config.mode != PLR_MODE_DEAD_RECKONING && !f->diverged)
+    if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
         process(f, frame, r);
-    if (f->diverged) {
-        r->status = PLR_E_DIVERGED;
-        r->health = PLR_HEALTH_DIVERGED;
-        r->reasons |= PLR_REASON_NOT_POSITIVE;
+    } else {
+        plr_motion_settle(f);
+        if (f->diverged)
+            plr_filter_recover(f);
     }
     r->active = (uint16_t)f->count;
     plr_health_count(f, r);

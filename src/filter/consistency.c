@@ -1,0 +1,408 @@
+// SPDX-License-Identifier: MIT
+#include "filter/consistency.h"
+
+#include <string.h>
+
+#include "filter/covariance.h"
+#include "filter/slots.h"
+#include "lie/se3.h"
+#include "linalg/dense.h"
+#include "linalg/small.h"
+
+enum {
+    FAST_WINDOWS = 2,    /* they decide whether the twists are believed */
+    SETTLED_FRAMES = 15, /* in agreement, one after the other, before all is well again */
+    FEW = 3,             /* points */
+    FROZEN_SHARE = 2,    /* one in so many */
+    STALE_FRAMES = 10    /* frames until a share of rejected matches counts */
+};
+
+/* How much of the past a window keeps from frame to frame: they look back some 4, 19 and 130 frames. */
+static const plr_real keeps[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), PLR_R(0.985)};
+
+/* Chi-square, 6 degrees of freedom: told beyond 1 in 25,000, in agreement again below 1 in 70. */
+#define DIFFERS PLR_R(30)
+#define AGREES  PLR_R(16)
+/* Noise settings are never quite true. A filter that gave up its twists whenever they differ by more than
+ * their noise would lose what they are good for: they are taken at less than their word only where they
+ * differ by much more, and by a good part of the motion itself. */
+#define CONTRADICTED PLR_R(40)
+#define SHARE_OF_WAY PLR_R(0.15)
+#define LEAST_WAY    PLR_R(0.004) /* m a frame */
+/* What one frame said outright against the twists holds for the next ones too, fading. */
+#define EXCESS_KEEPS PLR_R(0.8)
+/* How well the way between two stories is known, beside its own direction. */
+#define SIDEWAYS   PLR_R(0.2)
+#define LEAST_TURN PLR_R(0.004) /* rad a frame */
+/* Directions that hardly anything was seen of do not count. */
+#define UNSEEN PLR_R(0.05)
+/* The bias is off its prior beyond so many sigmas of it. */
+#define OFF_PRIOR PLR_R(3.3)
+/* Fading sums of the counts keep so much. */
+#define COUNTS_KEEP PLR_R(0.9)
+/* More rejected than this share: the scene does not agree with itself. */
+#define REJECTED_SHARE PLR_R(0.3)
+/* Means of d^2 per degree of freedom, over the window of the counts. */
+#define NIS_HIGH PLR_R(1.5)
+#define NIS_LOW  PLR_R(0.3)
+#define NIS_DOF  PLR_R(200)
+/* The twists' motion while the picture stays the same, squared, in its own variances. */
+#define MOVED PLR_R(36)
+
+void plr_consistency_clear(plr_filter *f) {
+    memset(&f->consistency, 0, sizeof f->consistency);
+}
+
+/* ---------------------------------------------------------------- the windows */
+
+/* s^T (V + UNSEEN I)^-1 s */
+static plr_real statistic(const plr_consistency_window *w) {
+    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, s[6];
+    memcpy(U, w->variance, sizeof w->variance);
+    memcpy(s, w->sum, sizeof s);
+    for (unsigned k = 0; k < 6; k++)
+        U[plr_upper_row(6, k)] += UNSEEN;
+    if (!plr_cholesky_upper(6, U))
+        return 0;
+    plr_solve_upper_transposed(6, 1, U, s, 1);
+    return plr_dot3(s, s) + plr_dot3(s + 3, s + 3);
+}
+
+static plr_real fast_statistic(const plr_filter *f) {
+    const plr_real a = statistic(&f->consistency.windows[0]);
+    const plr_real b = statistic(&f->consistency.windows[1]);
+    return a > b ? a : b;
+}
+
+void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
+    plr_motion_prior(f, believed);
+    if (!f->consistency.contradicted)
+        return;
+    const plr_real fast = fast_statistic(f), excess = f->consistency.excess;
+    const plr_real factor = PLR_R(1) + (fast > excess ? fast : excess) / PLR_R(6);
+    f->consistency.excess *= EXCESS_KEEPS;
+    for (unsigned i = 0; i < 36; i++)
+        f->motion.Q[i] *= factor;
+}
+
+/* What a frame says of nu in the twists' own sigmas: from units of applied->L to those of believed->L.
+ * With T = L'^-1 L, J <- T^T J T, b <- T^T b. */
+static void in_own_sigmas(const plr_real L[36], const plr_real own[36], plr_real J[36],
+                          plr_real b[6]) {
+    plr_real T[36] = {0}, TtJ[36] = {0}, turned[6] = {0};
+    for (unsigned c = 0; c < 6; c++)
+        for (unsigned r = c; r < 6; r++) {
+            plr_real sum = own[6 * r + c];
+            for (unsigned l = c; l < r; l++)
+                sum = PLR_FMA(-L[6 * r + l], T[6 * l + c], sum);
+            T[6 * r + c] = L[7 * r] > 0 ? sum / L[7 * r] : 0;
+        }
+    for (unsigned r = 0; r < 6; r++)
+        for (unsigned c = 0; c < 6; c++)
+            for (unsigned l = 0; l < 6; l++) {
+                TtJ[6 * r + c] = PLR_FMA(T[6 * l + r], J[6 * l + c], TtJ[6 * r + c]);
+                if (c == 0)
+                    turned[r] = PLR_FMA(T[6 * l + r], b[l], turned[r]);
+            }
+    memset(J, 0, 36 * sizeof *J);
+    plr_gemm_nn(6, 6, 6, TtJ, 6, T, 6, J, 6);
+    memcpy(b, turned, sizeof turned);
+}
+
+/* nu = (I + J)^-1 b and V = I - (I + J)^-1, its covariance if the twists are what they say. */
+static bool estimate(const plr_real J[36], const plr_real b[6], plr_real nu[6], plr_real V[21]) {
+    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, C[36] = {0};
+    for (unsigned k = 0, at = 0; k < 6; k++)
+        for (unsigned l = k; l < 6; l++, at++)
+            U[at] = PLR_R(0.5) * (J[6 * k + l] + J[6 * l + k]) + (k == l ? PLR_R(1) : PLR_R(0));
+    if (!plr_cholesky_upper(6, U))
+        return false;
+    memcpy(nu, b, 6 * sizeof *nu);
+    plr_solve_upper_transposed(6, 1, U, nu, 1);
+    plr_solve_upper(6, U, nu);
+    for (unsigned k = 0; k < 6; k++)
+        C[7 * k] = 1;
+    plr_solve_upper_transposed(6, 6, U, C, 6); /* U^-T; (I + J)^-1 = its square */
+    for (unsigned k = 0, at = 0; k < 6; k++)
+        for (unsigned l = k; l < 6; l++, at++) {
+            V[at] = k == l ? PLR_R(1) : PLR_R(0);
+            for (unsigned r = 0; r < 6; r++)
+                V[at] = PLR_FMA(-C[6 * r + k], C[6 * r + l], V[at]);
+        }
+    return true;
+}
+
+/* n = (V + UNSEEN I)^-1 nu: what the observations alone make of it, where they see it. */
+static void by_vision_alone(const plr_real nu[6], const plr_real V[21], plr_real n[6]) {
+    plr_real U[21 + PLR_KERNEL_MARGIN] = {0};
+    memcpy(U, V, 21 * sizeof *V);
+    memcpy(n, nu, 6 * sizeof *nu);
+    for (unsigned k = 0; k < 6; k++)
+        U[plr_upper_row(6, k)] += UNSEEN;
+    if (!plr_cholesky_upper(6, U))
+        return;
+    plr_solve_upper_transposed(6, 1, U, n, 1);
+    plr_solve_upper(6, U, n);
+}
+
+static void fade_in(plr_consistency_window *w, plr_real keep, const plr_real nu[6],
+                    const plr_real V[21]) {
+    for (unsigned k = 0; k < 6; k++)
+        w->sum[k] = PLR_FMA(keep, w->sum[k], nu[k]);
+    for (unsigned k = 0; k < 21; k++)
+        w->variance[k] = PLR_FMA(keep * keep, w->variance[k], V[k]);
+}
+
+/* ---------------------------------------------------------------- the contradiction */
+
+/* d <- Ad(D^-1) d + n: the way between the two stories, in the body as it stands now. */
+static void carry_apart(plr_filter *f, const plr_applied_motion *applied, const plr_real n[6]) {
+    plr_real R[9], A[36], d[6] = {0};
+    plr_se3_rotation(R, applied->E);
+    plr_se3_adjoint_inverse(A, R, applied->p);
+    plr_gemm_nn(6, 1, 6, A, 6, f->consistency.apart, 1, d, 1);
+    for (unsigned k = 0; k < 6; k++)
+        f->consistency.apart[k] = d[k] + n[k];
+}
+
+/* Is what the last frames make of the difference a good part of the motion? */
+static bool differs_much(const plr_consistency_window *w, const plr_real L[36],
+                         const plr_applied_motion *applied) {
+    plr_real mean[6], n[6] = {0};
+    by_vision_alone(w->sum, w->variance, mean);
+    plr_gemm_nn(6, 1, 6, L, 6, mean, 1, n, 1);
+    for (unsigned k = 0; k < 6; k++)
+        n[k] /= PLR_R(1) + keeps[0]; /* of sums over frames to the mean of a frame */
+    const plr_real *E = applied->E;
+    const plr_real turn[3] = {PLR_R(0.5) * (E[7] - E[5]), PLR_R(0.5) * (E[2] - E[6]),
+                              PLR_R(0.5) * (E[3] - E[1])};
+    const plr_real way = SHARE_OF_WAY * PLR_SQRT(plr_dot3(applied->p, applied->p)) + LEAST_WAY;
+    const plr_real angle = SHARE_OF_WAY * PLR_SQRT(plr_dot3(turn, turn)) + LEAST_TURN;
+    return plr_dot3(n, n) > way * way || plr_dot3(n + 3, n + 3) > angle * angle;
+}
+
+/* |L^-1 n|^2 */
+static plr_real in_sigmas(const plr_real L[36], const plr_real n[6]) {
+    plr_real v[6], sum = 0;
+    for (unsigned k = 0; k < 6; k++) {
+        v[k] = n[k];
+        for (unsigned l = 0; l < k; l++)
+            v[k] = PLR_FMA(-L[6 * k + l], v[l], v[k]);
+        v[k] = L[7 * k] > 0 ? v[k] / L[7 * k] : 0;
+        sum = PLR_FMA(v[k], v[k], sum);
+    }
+    return sum;
+}
+
+static void contradict(plr_filter *f) {
+    f->totals.contradictions++;
+    f->consistency.contradicted = f->consistency.drifting = 1;
+    memset(f->consistency.windows, 0, sizeof f->consistency.windows);
+}
+
+void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
+                         const plr_applied_motion *applied, const plr_real nu[6],
+                         const plr_real Lambda[21], bool outright) {
+    plr_consistency *c = &f->consistency;
+    plr_real J[36], b[6] = {0}, own[6], V[21], n[6] = {0};
+    if (outright) {
+        plr_gemm_nn(6, 1, 6, applied->L, 6, nu, 1, n, 1);
+        carry_apart(f, applied, n);
+        contradict(f);
+        c->excess = in_sigmas(believed->L, n);
+        return;
+    }
+    for (unsigned k = 0, at = 0; k < 6; k++)
+        for (unsigned l = k; l < 6; l++, at++)
+            J[6 * k + l] = J[6 * l + k] = Lambda[at];
+    plr_gemm_nn(6, 1, 6, J, 6, nu, 1, b, 1);
+    for (unsigned k = 0; k < 6; k++)
+        J[7 * k] -= 1;
+    if (c->contradicted)
+        in_own_sigmas(applied->L, believed->L, J, b);
+    if (!estimate(J, b, own, V))
+        return;
+    if (c->contradicted || c->drifting) {
+        by_vision_alone(own, V, n);
+        plr_real way[6] = {0};
+        plr_gemm_nn(6, 1, 6, believed->L, 6, n, 1, way, 1);
+        carry_apart(f, applied, way);
+    }
+    for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
+        if (w < FAST_WINDOWS || !c->contradicted)
+            fade_in(&c->windows[w], keeps[w], own, V);
+    const plr_real fast = fast_statistic(f), slow = statistic(&c->windows[FAST_WINDOWS]);
+    const plr_real most = fast > slow ? fast : slow;
+    if (!c->drifting && most > DIFFERS) { /* what has come apart until now */
+        const plr_consistency_window *w = &c->windows[slow > fast ? FAST_WINDOWS : 1];
+        plr_gemm_nn(6, 1, 6, believed->L, 6, w->sum, 1, c->apart, 1);
+    }
+    c->drifting = most > DIFFERS || (c->drifting && most > AGREES);
+    const bool much = differs_much(&c->windows[0], believed->L, applied);
+    c->slight = much ? 0 : (uint16_t)(c->slight + (c->slight < UINT16_MAX));
+    c->insisting =
+        much && fast > CONTRADICTED ? (uint16_t)(c->insisting + (c->insisting < UINT16_MAX)) : 0;
+    if (!c->contradicted && c->insisting >= FEW) {
+        const plr_consistency_window fastest = c->windows[0];
+        contradict(f);
+        c->windows[0] = fastest;
+    } else if (c->slight >= SETTLED_FRAMES) {
+        c->contradicted = 0;
+    }
+}
+
+/* ---------------------------------------------------------------- frozen pictures */
+
+/* A number that another set of four pixels hardly ever has. */
+static uint32_t print_of(const plr_observation *o) {
+    const float pixels[4] = {o->uL_px, o->vL_px, o->uR_px, o->vR_px};
+    uint32_t print = 2166136261U;
+    for (unsigned i = 0; i < 4; i++) {
+        uint32_t bits;
+        memcpy(&bits, &pixels[i], sizeof bits);
+        print = (print ^ bits) * 16777619U;
+        print ^= print >> 15;
+    }
+    return print;
+}
+
+/* How far, in its own variances, the twists have moved the body since the picture was new. */
+static bool has_moved(plr_filter *f) {
+    plr_consistency *c = &f->consistency;
+    const plr_motion *m = &f->motion;
+    const plr_real turn[3] = {m->E[7] - m->E[5], m->E[2] - m->E[6], m->E[3] - m->E[1]};
+    plr_real sum = 0;
+    for (unsigned k = 0; k < 6; k++) {
+        const plr_real way = c->still_way[k] + (k < 3 ? m->p[k] : PLR_R(0.5) * turn[k - 3]);
+        const plr_real variance = c->still_variance[k] + m->Q[7 * k];
+        if (variance > 0)
+            sum += way * way / variance;
+        else if (way * way > PLR_R(1e-8))
+            sum += PLR_R(2) * MOVED;
+    }
+    return sum > MOVED;
+}
+
+bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n) {
+    plr_consistency *c = &f->consistency;
+    unsigned matched = 0, same = 0;
+    for (unsigned k = 0; k < n; k++) {
+        if (f->work.slot_of[k] == PLR_NO_SLOT)
+            continue;
+        plr_slot *slot = &f->slots[f->work.slot_of[k]];
+        const uint32_t print = print_of(&frame->observations[f->work.order[k]]);
+        matched++;
+        same += slot->print == print;
+        slot->print = print;
+    }
+    c->frozen = 0;
+    if (matched < FEW || FROZEN_SHARE * same < matched) {
+        memset(c->still_way, 0, sizeof c->still_way);
+        memset(c->still_variance, 0, sizeof c->still_variance);
+        return false;
+    }
+    if (has_moved(f)) {
+        c->frozen = 1;
+        return true;
+    }
+    const plr_motion *m =
+        &f->motion; /* this picture is used: what moved until now is not pending */
+    const plr_real turn[3] = {m->E[7] - m->E[5], m->E[2] - m->E[6], m->E[3] - m->E[1]};
+    for (unsigned k = 0; k < 6; k++) {
+        c->still_way[k] += k < 3 ? m->p[k] : PLR_R(0.5) * turn[k - 3];
+        c->still_variance[k] += m->Q[7 * k];
+    }
+    return false;
+}
+
+/* ---------------------------------------------------------------- the verdict */
+
+static bool bias_is_off(const plr_filter *f) {
+    for (unsigned k = 0; k < 6; k++) {
+        const plr_real limit = OFF_PRIOR * f->bias_prior_sigma[k];
+        if (limit > 0 && plr_abs(f->bias[k] - f->bias_prior[k]) > limit)
+            return true;
+    }
+    return false;
+}
+
+static void count(plr_filter *f, const plr_report *report) {
+    plr_consistency *c = &f->consistency;
+    c->matched = PLR_FMA(COUNTS_KEEP, c->matched, (plr_real)report->matched);
+    c->gated = PLR_FMA(COUNTS_KEEP, c->gated, (plr_real)report->gated);
+    c->nis = PLR_FMA(COUNTS_KEEP, c->nis, (plr_real)report->nis);
+    c->nis_dof = PLR_FMA(COUNTS_KEEP, c->nis_dof, (plr_real)report->nis_dof);
+}
+
+static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
+    const plr_consistency *c = &f->consistency;
+    uint32_t reasons = 0;
+    if (c->contradicted || c->drifting)
+        reasons |= PLR_REASON_TWIST_CONTRADICTED;
+    if (c->frozen)
+        reasons |= PLR_REASON_FROZEN_IMAGE;
+    if (f->config.bias && bias_is_off(f))
+        reasons |= PLR_REASON_BIAS_OFF_PRIOR;
+    if (report->matched > 0 && c->matched > STALE_FRAMES && c->gated > REJECTED_SHARE * c->matched)
+        reasons |= PLR_REASON_SCENE_DISAGREES;
+    if (c->nis_dof > NIS_DOF && c->nis > NIS_HIGH * c->nis_dof)
+        reasons |= PLR_REASON_NIS_HIGH;
+    if (c->nis_dof > NIS_DOF && c->nis < NIS_LOW * c->nis_dof)
+        reasons |= PLR_REASON_NIS_LOW;
+    return reasons;
+}
+
+/* C = d d^T, and a share of it to all sides, for d itself is not known any better. */
+static void covariance_of(const plr_real d[6], plr_real C[36]) {
+    const plr_real way = SIDEWAYS * SIDEWAYS * plr_dot3(d, d);
+    const plr_real turn = SIDEWAYS * SIDEWAYS * plr_dot3(d + 3, d + 3);
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned j = 0; j < 6; j++)
+            C[6 * i + j] = d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn);
+}
+
+/* Both stories have agreed for long enough: what lies between them becomes a part of P. */
+static void settle(plr_filter *f) {
+    plr_consistency *c = &f->consistency;
+    const plr_real apart2 = plr_dot3(c->apart, c->apart) + plr_dot3(c->apart + 3, c->apart + 3);
+    if (apart2 > 0) {
+        plr_real C[36];
+        covariance_of(c->apart, C);
+        plr_covariance_widen_pose(f, C);
+        f->totals.widened++;
+    }
+    memset(c->apart, 0, sizeof c->apart);
+    memset(c->windows, 0, sizeof c->windows);
+    c->contradicted = c->drifting = c->doubtful = 0;
+    c->agreeing = 0;
+}
+
+uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost) {
+    plr_consistency *c = &f->consistency;
+    count(f, report);
+    uint32_t reasons = find_reasons(f, report);
+    const uint32_t doubts =
+        PLR_REASON_TWIST_CONTRADICTED | PLR_REASON_FROZEN_IMAGE | PLR_REASON_SCENE_DISAGREES;
+    if (lost || (reasons & doubts))
+        c->doubtful = 1;
+    const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
+                        fast_statistic(f) < AGREES && !(reasons & PLR_REASON_SCENE_DISAGREES);
+    c->agreeing = agrees ? (uint16_t)(c->agreeing + (c->agreeing < UINT16_MAX)) : 0;
+    if (c->doubtful && c->agreeing >= SETTLED_FRAMES)
+        settle(f);
+    return c->doubtful ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;
+}
+
+void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]) {
+    const plr_motion *m = &f->motion;
+    plr_real R[9], A[36], d[6] = {0};
+    if (!f->consistency.contradicted && !f->consistency.drifting)
+        return;
+    plr_se3_rotation(R, m->E);
+    plr_se3_adjoint_inverse(A, R, m->p);
+    plr_gemm_nn(6, 1, 6, A, 6, f->consistency.apart, 1, d, 1);
+    plr_real C[36];
+    covariance_of(d, C);
+    for (unsigned i = 0; i < 36; i++)
+        P_xi[i] += C[i];
+}
