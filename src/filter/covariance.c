@@ -260,6 +260,13 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]) {
     for (unsigned i = 0; i < 6 * ld; i++)
         minus[i] = -Xt[i];
     plr_packed_subtract(n, 6, minus, Xt, ld, f->P);
+    for (unsigned i = first_landmark_row(f); i < n;
+         i++) { /* what it rounds away of what was there */
+        plr_real added = 0;
+        for (unsigned k = 0; k < 6; k++)
+            added = PLR_FMA(Xt[k * ld + i], Xt[k * ld + i], added);
+        f->P[plr_packed_row(i) + i] += PLR_R(8) * PLR_EPSILON * added;
+    }
     if (nu) {
         plr_solve_upper(6, noise->Lambda, noise->eta);
         for (unsigned k = 0; k < 6; k++)
@@ -434,10 +441,14 @@ bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
 }
 
 void plr_covariance_make_up_for_rounding(plr_filter *f) {
+    const plr_real seen = PLR_R(8) * PLR_EPSILON, unseen = PLR_EPSILON;
     for (unsigned slot = 0; slot < f->count; slot++) {
         const unsigned row = plr_covariance_row(f, slot);
-        for (unsigned i = row; f->slots[slot].last_frame == f->frame_number && i < row + 3; i++)
-            f->P[plr_packed_row(i) + i] *= PLR_R(1) + PLR_R(8) * PLR_EPSILON;
+        const plr_real share = f->slots[slot].last_frame == f->frame_number ? seen : unseen;
+        for (unsigned i = row; i < row + 3; i++) {
+            plr_real *variance = &f->P[plr_packed_row(i) + i];
+            *variance = PLR_FMA(share, *variance, *variance);
+        }
     }
 }
 

@@ -7,10 +7,6 @@
 #include "filter/filter_internal.h"
 #include "filter/motion.h"
 
-/* The last frame that was in order left this much uncertainty; what it may have been wrong by since is
- * of the same size. */
-#define CAUTION 4.0
-
 void plr_filter_keep_for_recovery(plr_filter *f) {
     plr_real P[36];
     plr_covariance_pose(f, P);
@@ -29,7 +25,7 @@ void plr_filter_recover(plr_filter *f) {
     f->work.noise.open = 0;
     for (unsigned i = 0, at = 0; i < 6; i++)
         for (unsigned j = 0; j <= i; j++, at++)
-            P_xi[6 * i + j] = P_xi[6 * j + i] = CAUTION * (double)f->recovery_P[at];
+            P_xi[6 * i + j] = P_xi[6 * j + i] = (double)f->recovery_P[at];
     for (unsigned i = 0; i < 6; i++)
         P_xi[7 * i] += (double)f->motion.Q[7 * i];
     plr_motion_clear(&f->motion);

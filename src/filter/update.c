@@ -298,9 +298,12 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_applied_motion believed;
     plr_motion_first first;
     plr_correction correction = {0};
+    plr_real Q[36];
+    memcpy(Q, f->motion.Q, sizeof Q);
     plr_consistency_widen(f, &believed);
     plr_motion_find(f, frame, n, &first, &report->nis);
-    if (!is_needed(f, frame, n)) {
+    if (!is_needed(f, frame, n)) { /* the motion goes on: as the twists have it */
+        memcpy(f->motion.Q, Q, sizeof Q);
         (void)choose(f, frame, n, report);
         return correction;
     }
