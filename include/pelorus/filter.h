@@ -12,7 +12,9 @@
  *
  * Time is an argument: the filter has no clock. Every call runs a bounded number of steps, whatever
  * its data; the bounds are in docs/SIZES.md. Two filters can live side by side; one filter is not
- * thread-safe: calls on it must not overlap. A call that is refused (status < 0) changes nothing.
+ * thread-safe: calls on it must not overlap. A call that is refused (status < 0) changes nothing but
+ * the counts of what was refused, and a question changes nothing at all: asked or not, the bits to
+ * come are the same.
  * Every call first looks whether the filter's memory is as the last one left it; if not, it returns
  * PLR_E_DAMAGED, and so do all that follow, until an init.
  *
@@ -82,13 +84,14 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
  * PLR_E_RANGE (beyond 1e9 m). */
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB);
 
-/* A stereo frame: predict up to its time, match, gate, update, retract, evict, initialise. The order
- * of the observations changes no bit. Single observations that are malformed are left out and
+/* A stereo frame: predict up to its time, match, find the motion, gate, update, retract, evict,
+ * initialise, judge health. The order of the observations changes no bit. Single observations that are malformed are left out and
  * counted. `report` (may be NULL) is filled in any case.
  * PLR_E_LATE older than the last predict; PLR_E_GAP; PLR_E_RANGE the last reading cannot be held so
  * long; PLR_E_ARGUMENT more than PLR_MAX_OBSERVATIONS; PLR_E_MODE in mapping, when
- * plr_filter_move_to has not been called for this time;
- * PLR_E_DIVERGED after a variance ceased to be positive: the pose still goes on by prediction. */
+ * plr_filter_move_to has not been called for this time.
+ * Should a variance cease to be positive, the filter keeps the pose, drops the landmarks, widens the
+ * covariance and goes on with this frame's: PLR_OK, and reasons NOT_POSITIVE and RECOVERED. */
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report);
 
 /* --- estimate; valid at plr_filter_time() --- */
@@ -99,7 +102,8 @@ plr_time_ns plr_filter_time(const plr_filter *f);
 /* T_WB. */
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB);
 
-/* Covariance of (rho, theta), 6x6, m and rad. */
+/* Covariance of (rho, theta), 6x6, m and rad. While vision contradicts the twists it reaches from one
+ * story to the other (docs/MATH.md 17). */
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi);
 
 /* u - b: the last reading without its estimated bias. */
@@ -111,7 +115,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u);
 /* (b_v, b_w), 6, and its covariance, 6x6. Zeros while bias is off. `P_b` may be NULL. */
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b);
 
-/* Trace of the whole covariance (mixed units: a trend, not a quantity); 0 once it has diverged. */
+/* Trace of the whole covariance (mixed units: a trend, not a quantity); 0 where it cannot be told. */
 double plr_filter_trace(const plr_filter *f);
 
 /* --- landmarks --- */
@@ -119,13 +123,12 @@ double plr_filter_trace(const plr_filter *f);
 /* How many the state holds. */
 unsigned plr_filter_landmark_count(const plr_filter *f);
 
-/* Landmark in slot 0 to count - 1, in the world, with covariance. Applies the accumulated motion
- * first. The covariance is what is left of pose and landmark: where those are uncertain by metres
+/* Landmark in slot 0 to count - 1, in the world, with covariance. The covariance is what is left of pose and landmark: where those are uncertain by metres
  * and it by centimetres, float32 may leave a variance below zero by rounding; the map sink's is the
  * same. PLR_E_ARGUMENT beyond the last slot. */
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark);
 
-/* Puts a landmark of known world position and covariance into the state, at the current time. Its
+/* Puts a landmark of known world position and covariance into the state. Its
  * error is taken as independent of the state's: a landmark that was evicted and is inserted again
  * is counted twice (docs/MATH.md). PLR_E_EXISTS; PLR_E_FULL; PLR_E_ARGUMENT covariance not positive;
  * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e9 m or a variance of 1e12, or (`body`) it lies on the
@@ -180,8 +183,11 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
 
 /* --- what happened --- */
 
-/* How it stands at t_ns, with or without a frame: ask it as often as the pose is used. It knows of a
- * camera or an odometry that has fallen silent, which no report can tell. Changes nothing. */
+/* How it stands at t_ns, with or without a frame: ask it as often as the pose is used. To the reasons
+ * of the last frame it adds what no report can tell: NO_FRAMES and NO_OBSERVATIONS after a second,
+ * NO_TWISTS where readings were refused or the last one is older than three of their intervals and
+ * 50 ms. t_ns before the filter's own time counts as that. Changes nothing. PLR_E_DAMAGED,
+ * PLR_E_NOT_READY: `health` says DIVERGED. */
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
 
 /* Counts since init or reset. */

@@ -41,7 +41,11 @@ typedef enum plr_landmark_prior {
     PLR_PRIOR_INDEPENDENT = 1 /* it is landmark_sigma_m alone, the report's Sigma_m; `world` only */
 } plr_landmark_prior;
 
-/* Defaults and limits stand in the table of src/filter/settings.c, which plr_setting_at shows. */
+/* Defaults and limits stand in the table of src/filter/settings.c, which plr_setting_at shows.
+ *
+ * min_disparity_px = 0: in `body`, without max_depth_m, a new landmark may have any disparity that noise
+ * leaves of a point at infinity, some pixels below zero too. Above 0 it is a hard limit, and chooses
+ * far landmarks by their noise: speed and biases then lean to one side. */
 typedef struct plr_config {
     uint8_t model;          /* plr_model_kind */
     uint8_t mode;           /* plr_mode */
@@ -63,13 +67,13 @@ typedef struct plr_config {
     double gate_d2;          /* largest squared Mahalanobis distance (4 d.o.f.); 0: gate off */
     double gate_residual_px; /* the course's gate instead: largest norm of the four residuals;
                                 0: not used */
-    double min_disparity_px; /* of a new landmark */
+    double min_disparity_px; /* of a new landmark; 0: see above */
     double max_depth_m;      /* of a new landmark; 0: no limit */
     double max_row_gap_px;   /* |vL - vR| of a new landmark; 0: no limit */
     double min_depth_m;      /* predicted depth below which an observation is rejected */
     double start_sigma;      /* m and rad: initial pose, where no covariance is given */
     double landmark_sigma_m; /* of a new landmark's position per axis; 0: from the pixels */
-    double max_range_m;      /* no correction takes a landmark further */
+    double max_range_m;      /* no landmark stands further, whatever its inverse range */
     double max_gap_s;        /* a longer pause in the data is refused with PLR_E_GAP */
     double twist_delay_s;    /* the session holds twists back so long for a late camera */
 } plr_config;

@@ -34,10 +34,10 @@ typedef struct plr_totals {
     uint32_t refused;       /* other calls refused for their data */
     uint32_t resets;        /* poses set from outside */
     uint32_t locks;         /* times the gate was locked */
-    uint32_t range_limited; /* landmark corrections stopped at max_range */
+    uint32_t range_limited; /* landmark corrections stopped: see PLR_REASON_RANGE_LIMITED */
     uint32_t blocks_failed;
     uint32_t widened;        /* times the covariance was widened: the pose may have jumped */
-    uint32_t recoveries;     /* landmarks dropped to go on after divergence or a lost lock */
+    uint32_t recoveries;     /* landmarks dropped to go on after a divergence */
     uint32_t contradictions; /* times vision's word was taken against the twists */
     uint32_t twists_refused, frames_refused; /* for any reason */
     uint32_t damaged;                        /* frames refused with PLR_E_DAMAGED */
@@ -87,14 +87,14 @@ typedef struct plr_consistency {
     plr_real still_variance[6]; /* and its variance */
     plr_real matched, gated, nis, nis_dof; /* counts of the frames, fading */
     uint16_t agreeing;                     /* frames in agreement, one after the other */
-    plr_real
-        excess; /* of a frame that contradicted the twists outright, squared, in their sigmas */
-    uint16_t insisting;   /* frames that contradict the twists by much */
-    uint16_t slight;      /* frames in which they differ by little */
-    uint8_t contradicted; /* 1: the twists are not believed */
-    uint8_t drifting;     /* 1: over many frames they differ by more than noise */
-    uint8_t frozen;       /* 1: this frame's picture was sent before */
-    uint8_t doubtful;     /* 1: the pose may be wrong */
+    plr_real excess;                       /* |L^-1 n|^2 of a frame that contradicted the twists
+                                              outright, fading */
+    uint16_t insisting;                    /* frames that contradict the twists by much */
+    uint16_t slight;                       /* frames in which they differ by little */
+    uint8_t contradicted;                  /* 1: the twists are not believed */
+    uint8_t drifting;                      /* 1: over many frames they differ by more than noise */
+    uint8_t frozen;                        /* 1: this frame's picture was sent before */
+    uint8_t doubtful;                      /* 1: the pose may be wrong */
 } plr_consistency;
 
 /* The settings and the camera as the filter computes with them: in its own precision, squared. */

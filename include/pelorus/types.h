@@ -33,7 +33,7 @@ typedef enum plr_status {
     PLR_E_MODE = -9,        /* the call does not belong to the mode in force */
     PLR_E_FULL = -10,       /* no slot is free, or a device is too small for the state */
     PLR_E_EXISTS = -11,     /* a landmark of this id is in the state already */
-    PLR_E_DIVERGED = -12,   /* a variance is not positive: no update until a reset */
+    PLR_E_DIVERGED = -12,   /* a variance is not positive: there is nothing to tell or to save */
     PLR_E_NOT_READY = -13,  /* the filter was never initialised, or the session saw no HEADER yet */
     PLR_E_CPU = -14,        /* the processor flushes subnormals to zero */
     PLR_E_CORRUPT = -15,    /* stored bytes fail their check */
@@ -48,7 +48,7 @@ typedef enum plr_health {
     PLR_HEALTH_GOOD = 0,     /* nothing to report */
     PLR_HEALTH_DEGRADED = 1, /* works, with less than it should have: see the reasons */
     PLR_HEALTH_LOST = 2,     /* the pose goes on by prediction alone, or vision contradicts it */
-    PLR_HEALTH_DIVERGED = 3  /* the covariance is broken: updates are refused until a reset */
+    PLR_HEALTH_DIVERGED = 3  /* the filter's memory was changed by something else: init again */
 } plr_health;
 
 /* Why health is not good: bits of plr_report.reasons and plr_health_state.reasons. Beside each: what
@@ -57,7 +57,8 @@ typedef enum plr_reason {
     /* Fewer than 3 observations used in this frame: a bare wall, darkness, a covered camera, or the
      * gate rejects what is seen. Passes by itself; if it stays, look at the tracker. */
     PLR_REASON_FEW_OBSERVATIONS = 1 << 0,
-    /* None used in the last 10 frames: the pose goes on by twists alone and drifts. As above. */
+    /* None used in the last 10 frames, or for a second: the pose goes on by twists alone and drifts.
+     * As above. */
     PLR_REASON_NO_OBSERVATIONS = 1 << 1,
     /* Most matches rejected in 10 successive frames; the landmarks were dropped. The camera was moved,
      * ids changed their meaning, or a sigma is far too small. */
@@ -76,10 +77,11 @@ typedef enum plr_reason {
     /* Innovations are larger than the noise explains: pixel-sigma, or a twist's sigma, is too small,
      * or the calibration is off. */
     PLR_REASON_NIS_HIGH = 1 << 8,
-    /* An update pushed a landmark beyond max-range, and was stopped there. Points that far give no
-     * position: max-depth keeps them out. */
+    /* An update would have turned a landmark's bearing by more than 1 rad, or put it nearer than 1 cm,
+     * and was stopped there: a point beside the camera, or a wrong match that the gate let through. */
     PLR_REASON_RANGE_LIMITED = 1 << 9,
-    /* A variance ceased to be positive: the filter has diverged. Set the pose, or reset. */
+    /* A variance ceased to be positive, and the filter recovered in the same frame: see RECOVERED.
+     * Numbers of very different size: check the sigmas and the covariances that were given. */
     PLR_REASON_NOT_POSITIVE = 1 << 10,
     /* Observations were left out for want of time. A longer deadline, or fewer features. */
     PLR_REASON_BUDGET = 1 << 11,
@@ -98,14 +100,14 @@ typedef enum plr_reason {
     /* The same pixels in successive frames while the twists go on: a camera or a tracker that sends
      * the same image again. Restart it. */
     PLR_REASON_FROZEN_IMAGE = 1 << 16,
-    /* The matched points do not agree on one motion: much of the scene moves, or tracks are stale.
-     * The pose leans on the twists until they agree. */
+    /* The matched points do not agree on one motion: more than 30 % are rejected. Much of the scene
+     * moves, or tracks are stale. The pose leans on the twists until they agree. */
     PLR_REASON_SCENE_DISAGREES = 1 << 17,
-    /* To go on after divergence or a lost lock, the landmarks were dropped and the covariance was
-     * widened. Told once; the reset counter of POSE and ODOMETRY counts it. */
+    /* To go on after a divergence, the landmarks were dropped and the pose's covariance was widened.
+     * Told once; the reset counter of POSE and ODOMETRY counts it. */
     PLR_REASON_RECOVERED = 1 << 18,
-    /* No frame was used for too long. Camera, tracker or link are silent; plr_filter_health alone
-     * tells it, as a report needs a frame. */
+    /* No frame came for more than a second. Camera, tracker or link are silent; plr_filter_health
+     * alone tells it, as a report needs a frame. */
     PLR_REASON_NO_FRAMES = 1 << 19,
     /* A guard found the filter's memory changed: a stray write, a flipped bit, a stack that grew into
      * it. plr_filter_init anew; if it comes again, look for the writer. */
@@ -182,12 +184,13 @@ typedef struct plr_report {
     uint16_t left_out;      /* beyond the budget */
     uint16_t blocks_failed; /* blocks whose innovation covariance could not be factorised */
     uint16_t active;        /* landmarks in the state afterwards */
-    uint16_t nis_dof;       /* degrees of freedom of nis */
-    float nis;              /* sum of the gate distances d^2 of those accepted, left out or not */
+    uint16_t nis_dof;       /* 4 for each observation accepted: the mean that nis should have */
+    float nis; /* sum of the gate distances d^2 of those accepted, left out or not; each
+                               judged by what the others say of the motion (docs/MATH.md 8) */
 } plr_report;
 
-/* How it stands at some time, with or without a frame: plr_filter_health. Seconds are infinite where
- * there never was one. */
+/* How it stands at some time, with or without a frame: plr_filter_health. Seconds are 0 where there
+ * never was one; the reasons then say NO_FRAMES, NO_OBSERVATIONS or NO_TWISTS. */
 typedef struct plr_health_state {
     plr_health health;
     uint32_t reasons;             /* bits of plr_reason */

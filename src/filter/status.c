@@ -32,7 +32,7 @@ const char *plr_status_text(plr_status status) {
     case PLR_E_EXISTS:
         return "the state holds a landmark of this id already";
     case PLR_E_DIVERGED:
-        return "a variance ceased to be positive: no update until a reset or a pose from outside";
+        return "a variance is not positive: there is no covariance to tell or to save";
     case PLR_E_NOT_READY:
         return "not initialised yet";
     case PLR_E_CPU:
@@ -75,7 +75,7 @@ const char *plr_reason_text(plr_reason reason) {
     case PLR_REASON_NIS_HIGH:
         return "innovations are larger than the noise explains: is pixel-sigma too small?";
     case PLR_REASON_RANGE_LIMITED:
-        return "a correction would have pushed a landmark beyond max-range";
+        return "a landmark's correction was stopped: more than 1 rad, or nearer than 1 cm";
     case PLR_REASON_NOT_POSITIVE:
         return "a variance ceased to be positive";
     case PLR_REASON_BUDGET:

@@ -40,7 +40,7 @@ REASONS = (
     "no room for new landmarks",
     "observations were malformed or doubled",
     "innovations larger than the noise explains",
-    "a landmark beyond max-range",
+    "a landmark's correction was stopped",
     "a variance is not positive",
     "observations left out for want of time",
     "vision contradicts the twists",
