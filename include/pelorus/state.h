@@ -174,9 +174,9 @@ typedef struct plr_filter {
                                                         landmarks */
     plr_workspace work;
 
-    uint32_t frame_number; /* first of what is guarded with the small state */
     plr_consistency consistency;
-    uint8_t health; /* plr_health of the last frame, and why */
+    uint32_t frame_number; /* from here on it is guarded with the small state */
+    uint8_t health;        /* plr_health of the last frame, and why */
     uint32_t reasons;
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     uint32_t refused_before;                /* twists refused until the last frame */

@@ -194,26 +194,19 @@ void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_rea
         transport_landmark(f, slot, At, F);
 }
 
-/* v <- L^-1 v: L is 6x6, lower; where a column is zero so is v. */
-static void solve_lower(const plr_real L[36], plr_real v[6]) {
-    for (unsigned k = 0; k < 6; k++) {
-        plr_real sum = v[k];
-        for (unsigned l = 0; l < k; l++)
-            sum = PLR_FMA(-L[6 * k + l], v[l], sum);
-        v[k] = L[7 * k] > 0 ? sum * (PLR_R(1) / L[7 * k]) : PLR_R(0);
-    }
-}
-
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real L[36], plr_real *V) {
+                                 const plr_real K[36], plr_real *V) {
     memset(V, 0, 6 * rows * sizeof *V);
     if (!f->config.bias)
         return;
-    for (unsigned i = 0; i < rows; i++) {
-        plr_real P_ib[6];
-        get_block(f, row + i, 1, BIAS, 6, P_ib);
-        plr_gemm_nt(1, 6, 6, P_ib, 6, f->motion.B, 6, V + 6 * i, 6);
-        solve_lower(L, V + 6 * i);
+    for (unsigned i = row; i < row + rows; i++) {
+        plr_real before[6];
+        const plr_real *P_ib = f->P + plr_packed_row(i) + BIAS;
+        if (i < BIAS + PLR_BIAS_DIM) { /* a part of it stands above the diagonal */
+            get_block(f, i, 1, BIAS, 6, before);
+            P_ib = before;
+        }
+        plr_gemm_nt(1, 6, 6, P_ib, 6, K, 6, V + 6 * (i - row), 6);
     }
 }
 
@@ -233,7 +226,7 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     memset(Vt, 0, 6 * ld * sizeof *Vt);
     for (unsigned i = 0; i < n; i++) {
         plr_real v[6];
-        plr_covariance_motion_share(f, i, 1, motion->L, v);
+        plr_covariance_motion_share(f, i, 1, motion->K, v);
         for (unsigned k = 0; k < 6; k++) {
             Vt[k * ld + i] = v[k];
             noise->Wt[k * ld + i] += v[k];

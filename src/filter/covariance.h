@@ -64,9 +64,9 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
  * nu (6; may be NULL) is what came out: z + Lambda^-1 eta. Nothing where no noise is open. */
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]);
 
-/* V = C L^-T of some rows of the state, rows x 6: their correlation with nu. */
+/* V = C L^-T = P_(:,b) K^T of some rows of the state, rows x 6: their correlation with nu. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real L[36], plr_real *V);
+                                 const plr_real K[36], plr_real *V);
 
 /* The pose's rows alone: xi <- A xi + B db + N(0, Q). */
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion);

@@ -76,6 +76,7 @@ static uint64_t small_sum(const plr_filter *f) {
 static uint64_t large_sum(const plr_filter *f) {
     plr_sum sum = {0, 0};
     add(&sum, f->slots, f->count * sizeof *f->slots);
+    add(&sum, &f->consistency, sizeof f->consistency);
     add(&sum, f->P, plr_packed_row(plr_covariance_dim(f)) * sizeof *f->P);
     return both(sum);
 }

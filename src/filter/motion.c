@@ -146,6 +146,20 @@ static void factorise(const plr_real M[36], plr_real L[36]) {
     }
 }
 
+/* K = L^-1 B. */
+static void share_of_bias(const plr_real L[36], const plr_real B[36], plr_real K[36]) {
+    memcpy(K, B, 36 * sizeof *K);
+    for (unsigned k = 0; k < 6; k++) {
+        const plr_real inverse = L[7 * k] > 0 ? PLR_R(1) / L[7 * k] : PLR_R(0);
+        for (unsigned c = 0; c < 6; c++) {
+            plr_real sum = K[6 * k + c];
+            for (unsigned l = 0; l < k; l++)
+                sum = PLR_FMA(-L[6 * k + l], K[6 * l + c], sum);
+            K[6 * k + c] = sum * inverse;
+        }
+    }
+}
+
 static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
                       plr_real turn2) {
     plr_real M[36];
@@ -161,6 +175,8 @@ static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale
     for (int i = 0; i < 6; i++)
         M[7 * i] += i < 3 ? way2 : turn2;
     factorise(M, applied->L);
+    if (f->config.bias)
+        share_of_bias(applied->L, f->motion.B, applied->K);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
 
@@ -242,25 +258,30 @@ void plr_motion_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3])
 
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
     const plr_motion *m = &f->motion;
-    plr_real A[36], P[36], R[9];
+    plr_real A[36], P[36], R[9], BPB[36] = {0};
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
     plr_covariance_pose(f, P);
     plr_sandwich6(P_xi, A, P);
-    plr_consistency_cover(f, P_xi);
     for (int i = 0; i < 36; i++)
         P_xi[i] += m->Q[i];
-    if (!f->config.bias)
-        return;
-    plr_real AP[36] = {0}, cross[36] = {0}, BPB[36];
-    plr_covariance_pose_bias(f, P);
-    plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
-    plr_gemm_nt(6, 6, 6, AP, 6, m->B, 6, cross, 6);
-    plr_covariance_bias(f, P);
-    plr_sandwich6(BPB, m->B, P);
+    if (f->config.bias) {
+        plr_covariance_bias(f, P);
+        plr_sandwich6(BPB, m->B, P);
+    }
+    /* the terms that follow may take most of a variance away: their rounding is made up for */
     for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++)
-            P_xi[6 * i + j] += cross[6 * i + j] + cross[6 * j + i] + BPB[6 * i + j];
+        P_xi[7 * i] = PLR_FMA(PLR_R(8) * PLR_EPSILON, P_xi[7 * i] + BPB[7 * i], P_xi[7 * i]);
+    if (f->config.bias) {
+        plr_real AP[36] = {0}, cross[36] = {0};
+        plr_covariance_pose_bias(f, P);
+        plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
+        plr_gemm_nt(6, 6, 6, AP, 6, m->B, 6, cross, 6);
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < 6; j++)
+                P_xi[6 * i + j] += cross[6 * i + j] + cross[6 * j + i] + BPB[6 * i + j];
+    }
+    plr_consistency_cover(f, P_xi);
 }
 
 void plr_filter_diverge(plr_filter *f) {

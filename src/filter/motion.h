@@ -31,6 +31,7 @@ void plr_motion_correct_pose(plr_filter *f, const plr_real xi[6]);
 typedef struct plr_applied_motion {
     plr_real E[9], p[3]; /* D' = D Exp(L z) = (I + E, p) */
     plr_real L[36];      /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
+    plr_real K[36];      /* L^-1 B, rows of zero columns zero: what nu shares with the biases */
     plr_real JL[36];     /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
     plr_real z[6];
 } plr_applied_motion;

@@ -22,7 +22,7 @@ enum {
 /* Huber's limit on a whitened residual of three rows: beyond it an observation pulls no harder. */
 #define HUBER PLR_R(2.5)
 /* A step that promises less of the sum is not worth its evaluation. */
-#define SMALL_GAIN PLR_R(0.01)
+#define SMALL_GAIN PLR_R(0.1)
 /* An observation speaks for one of two motions if its squared residuals differ by more. */
 #define DECISIVE PLR_R(9)
 /* It agrees with a motion if its squared residual is below this. */
@@ -86,7 +86,7 @@ static void prepare(plr_search *s, unsigned i) {
     plr_filter *f = s->f;
     plr_sighting *at = &s->sightings[i];
     const unsigned slot = f->work.slot_of[f->work.used[i]];
-    plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, s->prior.L, at->V);
+    plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, s->prior.K, at->V);
     plr_covariance_landmark(f, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
