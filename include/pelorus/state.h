@@ -83,6 +83,8 @@ enum { PLR_CONSISTENCY_WINDOWS = 3 };
 typedef struct plr_consistency {
     plr_consistency_window windows[PLR_CONSISTENCY_WINDOWS];
     plr_real apart[6];          /* between the two stories, as a twist of the body: m, rad */
+    plr_real apart_sigmas[6];   /* the same in the twists' sigmas */
+    plr_real apart_noise;       /* what its square would be by their noise */
     plr_real still_way[6];      /* what the twists moved while the picture stayed the same */
     plr_real still_variance[6]; /* and its variance */
     plr_real matched, gated, nis, nis_dof; /* counts of the frames, fading */

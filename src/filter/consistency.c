@@ -155,14 +155,26 @@ static void fade_in(plr_consistency_window *w, plr_real keep, const plr_real nu[
 
 /* ---------------------------------------------------------------- the contradiction */
 
-/* d <- Ad(D^-1) d + n: the way between the two stories, in the body as it stands now. */
-static void carry_apart(plr_filter *f, const plr_applied_motion *applied, const plr_real n[6]) {
+static plr_real trace(const plr_real V[21]) {
+    plr_real sum = 0;
+    for (unsigned k = 0; k < 6; k++)
+        sum += V[plr_upper_row(6, k)];
+    return sum;
+}
+
+/* d <- Ad(D^-1) d + n: the way between the two stories, in the body as it stands now. nu is the same in
+ * the twists' own sigmas, and `noise` is what its square would be by their noise alone. */
+static void carry_apart(plr_filter *f, const plr_applied_motion *applied, const plr_real n[6],
+                        const plr_real nu[6], plr_real noise) {
     plr_real R[9], A[36], d[6] = {0};
     plr_se3_rotation(R, applied->E);
     plr_se3_adjoint_inverse(A, R, applied->p);
     plr_gemm_nn(6, 1, 6, A, 6, f->consistency.apart, 1, d, 1);
     for (unsigned k = 0; k < 6; k++)
         f->consistency.apart[k] = d[k] + n[k];
+    for (unsigned k = 0; k < 6; k++)
+        f->consistency.apart_sigmas[k] += nu[k];
+    f->consistency.apart_noise += noise;
 }
 
 /* Is what the last frames make of the difference a good part of the motion? */
@@ -181,17 +193,18 @@ static bool differs_much(const plr_consistency_window *w, const plr_real L[36],
     return plr_dot3(n, n) > way * way || plr_dot3(n + 3, n + 3) > angle * angle;
 }
 
-/* |L^-1 n|^2 */
-static plr_real in_sigmas(const plr_real L[36], const plr_real n[6]) {
-    plr_real v[6], sum = 0;
+/* v = L^-1 n */
+static void in_sigmas(const plr_real L[36], const plr_real n[6], plr_real v[6]) {
     for (unsigned k = 0; k < 6; k++) {
         v[k] = n[k];
         for (unsigned l = 0; l < k; l++)
             v[k] = PLR_FMA(-L[6 * k + l], v[l], v[k]);
         v[k] = L[7 * k] > 0 ? v[k] / L[7 * k] : 0;
-        sum = PLR_FMA(v[k], v[k], sum);
     }
-    return sum;
+}
+
+static plr_real norm2(const plr_real x[6]) {
+    return plr_dot3(x, x) + plr_dot3(x + 3, x + 3);
 }
 
 static void contradict(plr_filter *f) {
@@ -207,9 +220,10 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     plr_real J[36], b[6] = {0}, own[6], V[21], n[6] = {0};
     if (outright) {
         plr_gemm_nn(6, 1, 6, applied->L, 6, nu, 1, n, 1);
-        carry_apart(f, applied, n);
+        in_sigmas(believed->L, n, own);
+        carry_apart(f, applied, n, own, 0);
         contradict(f);
-        c->excess = in_sigmas(believed->L, n);
+        c->excess = norm2(own);
         return;
     }
     for (unsigned k = 0, at = 0; k < 6; k++)
@@ -226,7 +240,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         by_vision_alone(own, V, n);
         plr_real way[6] = {0};
         plr_gemm_nn(6, 1, 6, believed->L, 6, n, 1, way, 1);
-        carry_apart(f, applied, way);
+        carry_apart(f, applied, way, own, trace(V));
     }
     for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
         if (w < FAST_WINDOWS || !c->contradicted)
@@ -235,7 +249,10 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     const plr_real most = fast > slow ? fast : slow;
     if (!c->drifting && most > DIFFERS) { /* what has come apart until now */
         const plr_consistency_window *w = &c->windows[slow > fast ? FAST_WINDOWS : 1];
+        memset(c->apart, 0, sizeof c->apart);
         plr_gemm_nn(6, 1, 6, believed->L, 6, w->sum, 1, c->apart, 1);
+        memcpy(c->apart_sigmas, w->sum, sizeof c->apart_sigmas);
+        c->apart_noise = trace(w->variance);
     }
     c->drifting = most > DIFFERS || (c->drifting && most > AGREES);
     const bool much = differs_much(&c->windows[0], believed->L, applied);
@@ -352,26 +369,31 @@ static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
     return reasons;
 }
 
-/* C = d d^T, and a share of it to all sides, for d itself is not known any better. */
-static void covariance_of(const plr_real d[6], plr_real C[36]) {
+/* C = s d d^T, and a share of it to all sides, for d itself is not known any better; s is what of d the
+ * twists' own noise does not explain, for that is in P already. */
+static void covariance_of(const plr_filter *f, const plr_real d[6], plr_real C[36]) {
+    const plr_real sigmas2 = norm2(f->consistency.apart_sigmas);
+    const plr_real noise = f->consistency.apart_noise;
+    const plr_real s = sigmas2 > noise ? PLR_R(1) - noise / sigmas2 : PLR_R(0);
     const plr_real way = SIDEWAYS * SIDEWAYS * plr_dot3(d, d);
     const plr_real turn = SIDEWAYS * SIDEWAYS * plr_dot3(d + 3, d + 3);
     for (unsigned i = 0; i < 6; i++)
         for (unsigned j = 0; j < 6; j++)
-            C[6 * i + j] = d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn);
+            C[6 * i + j] = s * (d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn));
 }
 
 /* Both stories have agreed for long enough: what lies between them becomes a part of P. */
 static void settle(plr_filter *f) {
     plr_consistency *c = &f->consistency;
-    const plr_real apart2 = plr_dot3(c->apart, c->apart) + plr_dot3(c->apart + 3, c->apart + 3);
-    if (apart2 > 0) {
+    if (norm2(c->apart) > 0) {
         plr_real C[36];
-        covariance_of(c->apart, C);
+        covariance_of(f, c->apart, C);
         plr_covariance_widen_pose(f, C);
         f->totals.widened++;
     }
     memset(c->apart, 0, sizeof c->apart);
+    memset(c->apart_sigmas, 0, sizeof c->apart_sigmas);
+    c->apart_noise = 0;
     memset(c->windows, 0, sizeof c->windows);
     c->contradicted = c->drifting = c->doubtful = 0;
     c->agreeing = 0;
@@ -402,7 +424,7 @@ void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]) {
     plr_se3_adjoint_inverse(A, R, m->p);
     plr_gemm_nn(6, 1, 6, A, 6, f->consistency.apart, 1, d, 1);
     plr_real C[36];
-    covariance_of(d, C);
+    covariance_of(f, d, C);
     for (unsigned i = 0; i < 36; i++)
         P_xi[i] += C[i];
 }

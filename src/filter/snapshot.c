@@ -83,6 +83,8 @@ static const plr_field filter_fields[] = {
     OF_CONSISTENCY(windows[2].sum, PLR_FIELD_REAL, 6),
     OF_CONSISTENCY(windows[2].variance, PLR_FIELD_REAL, 21),
     OF_CONSISTENCY(apart, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(apart_sigmas, PLR_FIELD_REAL, 6),
+    OF_CONSISTENCY(apart_noise, PLR_FIELD_REAL, 1),
     OF_CONSISTENCY(still_way, PLR_FIELD_REAL, 6),
     OF_CONSISTENCY(still_variance, PLR_FIELD_REAL, 6),
     OF_CONSISTENCY(matched, PLR_FIELD_REAL, 1),
