@@ -34,8 +34,8 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
 /* Takes in the counts of a frame; returns the reasons that they give. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);
 
-/* The covariance that the contradiction adds to the pose's, as long as it lasts: d d^T of the way that
- * lies between the two stories. P_xi, 6x6, is of now. */
+/* Adds to the pose's covariance, as long as a contradiction lasts, what reaches from one story to the
+ * other: d d^T of the way d between them, and a share of it to all sides. P_xi, 6x6, is of now. */
 void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]);
 
 #endif

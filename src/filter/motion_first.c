@@ -35,7 +35,7 @@ enum {
 
 /* One matched observation. */
 typedef struct plr_sighting {
-    plr_real V[18];     /* correlation of the landmark with nu: P_(i,b) B^T L^-T, 3x6 */
+    plr_real V[18];     /* what the landmark shares with nu by the biases: P_(i,b) B^T L^-T, 3x6 */
     plr_real P[9];      /* the landmark's covariance once nu is known */
     plr_real U[2][6];   /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
     plr_real a[18];     /* U^-T dz/dnu, 3x6, at the point evaluated last */
@@ -427,8 +427,8 @@ static bool is_well_spread(const plr_search_point *point) {
     return true;
 }
 
-/* Do at least a fifth of the observations, and four times as many as for the twists, speak for the other
- * motion, and do most of many well-spread points agree on it? */
+/* Do at least three of the observations, and four times as many as for the twists, speak for the other
+ * motion, and do three fifths of at least six, well spread, agree on it? */
 static bool speaks_against_twists(const plr_search *s, const plr_search_point *open) {
     unsigned with = 0, against = 0, agree = 0, voices = 0;
     for (unsigned i = 0; i < s->count; i++) {
