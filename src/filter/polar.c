@@ -66,6 +66,10 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     *beyond = 0;
     if (!(inverse >= min_inverse_range)) {
         *beyond = inverse - min_inverse_range;
+        if (!(*beyond <= 0)) { /* no number */
+            *beyond = 0;
+            cut = true;
+        }
         inverse = min_inverse_range;
         held = true;
     } else if (inverse > PLR_R(1) / PLR_MIN_RANGE) {

@@ -12,7 +12,7 @@
 #include "pelorus/port.h"
 #include "support/random.h"
 
-enum { FAULTY_FLASH_BYTES = 1 << 14, FAULTY_FLASH_ALWAYS = -1 };
+enum { FAULTY_FLASH_BYTES = 1 << 15, FAULTY_FLASH_ALWAYS = -1 };
 
 /* What the byte holds at which the power failed. */
 typedef enum faulty_flash_tear {

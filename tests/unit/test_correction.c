@@ -206,17 +206,51 @@ static void test_a_senseless_correction_marks_the_filter_diverged(void) {
     TEST_ASSERT_EQUAL_MEMORY(pose.p, filter.p_WB, sizeof pose.p);
 }
 
-static void test_corrections_at_the_limits_of_range_are_counted(void) {
+/* Landmarks each for itself: they are not correlated, and have no voice in a common motion. */
+static void take_loose_specimen(void) {
     take_specimen(PLR_MODEL_BODY, false);
+    for (unsigned slot = 0; slot < MANY; slot++)
+        filter.slots[slot].known = 1;
+    for (unsigned i = 0; i < plr_covariance_dim(&filter); i++)
+        memset(filter.P + plr_packed_at(i, 0), 0, i * sizeof *filter.P);
+}
+
+static double range_of(unsigned slot) {
+    const plr_real *q = filter.slots[slot].x;
+    return sqrt((double)(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]));
+}
+
+/* Pixels that say "beyond infinity" are believed: the point stands at the largest range, and what is
+ * missing is kept beside it, so that nothing is cut. */
+static void test_corrections_beyond_the_largest_range_are_kept(void) {
+    take_loose_specimen();
     filter.par.min_inverse_range = PLR_R(1) / PLR_R(40); /* 40 m, and all lie within 30 or so */
     filter.par.pixel_variance = PLR_R(1e-6);
+    const double by_inverse_range =
+        (double)(filter.par.camera.fx * filter.par.camera.baseline); /* px m, along the axis */
     for (unsigned slot = 0; slot < 3; slot++)
         seen[slot].uR_px = seen[slot].uL_px + 30; /* beyond infinity */
     const plr_correction correction = plr_correct(&filter, seen, 3);
-    TEST_ASSERT_GREATER_THAN_UINT(0, correction.cut);
+    TEST_ASSERT_EQUAL_UINT(0, correction.cut);
     TEST_ASSERT_EQUAL_UINT(3, correction.applied);
-    for (unsigned slot = 0; slot < MANY; slot++)
+    for (unsigned slot = 0; slot < 3; slot++) {
+        const double range = range_of(slot), axis = (double)filter.slots[slot].x[2] / range;
+        const double inverse_range = 1 / range + (double)filter.slots[slot].beyond;
+        TEST_ASSERT_DOUBLE_WITHIN(0.4, 40, range);
+        TEST_ASSERT_DOUBLE_WITHIN(0.3, -30, inverse_range / axis * by_inverse_range);
+    }
+    for (unsigned slot = 3; slot < MANY; slot++)
         TEST_ASSERT_TRUE(isfinite((double)filter.slots[slot].x[2]));
+}
+
+static void test_corrections_at_the_least_range_are_counted(void) {
+    take_loose_specimen();
+    filter.par.pixel_variance = PLR_R(1e-6);
+    seen[0].uR_px = seen[0].uL_px - 1e5F; /* a millimetre before the lens */
+    const plr_correction correction = plr_correct(&filter, seen, 1);
+    TEST_ASSERT_EQUAL_UINT(1, correction.applied);
+    TEST_ASSERT_EQUAL_UINT(1, correction.cut);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.01, range_of(0));
 }
 
 int main(void) {
@@ -227,6 +261,7 @@ int main(void) {
     RUN_TEST(test_blocks_beside_a_failed_one_are_applied);
     RUN_TEST(test_a_variance_that_would_be_lost_stops_the_correction);
     RUN_TEST(test_a_senseless_correction_marks_the_filter_diverged);
-    RUN_TEST(test_corrections_at_the_limits_of_range_are_counted);
+    RUN_TEST(test_corrections_beyond_the_largest_range_are_kept);
+    RUN_TEST(test_corrections_at_the_least_range_are_counted);
     return UNITY_END();
 }

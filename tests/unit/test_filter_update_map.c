@@ -80,12 +80,34 @@ static bool makes(double disparity_px, double row_gap_px) {
     return rig.report.created == 1;
 }
 
-static void test_without_disparity_there_is_no_landmark(void) {
+/* Noise may leave a far point no disparity, or a negative one. To take only those whose noise has the
+ * right sign would bring all that is far nearer; so each makes a landmark, but for those that no noise
+ * of 1 px a picture explains: beyond 3 sigma of a difference of two. */
+static void test_noise_alone_does_not_keep_a_far_point_out(void) {
+    rig.config.pixel_sigma_px = 1;
+    TEST_ASSERT_TRUE(makes(10, 0));
+    TEST_ASSERT_TRUE(makes(0, 0));
+    TEST_ASSERT_TRUE(makes(-1, 0));
+    TEST_ASSERT_TRUE(makes(-4.2, 0));
+    TEST_ASSERT_FALSE(makes(-4.3, 0));
+    TEST_ASSERT_FALSE(makes(-300, 0));
+    rig.config.pixel_sigma_px = 0.1; /* the limit is one of noise */
+    TEST_ASSERT_TRUE(makes(-0.42, 0));
+    TEST_ASSERT_FALSE(makes(-0.43, 0));
+}
+
+static void test_with_a_limit_of_depth_or_in_the_world_there_is_no_landmark_without_disparity(void) {
+    rig.config.max_depth_m = 1e6;
     TEST_ASSERT_TRUE(makes(10, 0));
     TEST_ASSERT_FALSE(makes(0, 0));
-    TEST_ASSERT_FALSE(makes(-5, 0));
-    TEST_ASSERT_FALSE(makes(-300, 0));
-    rig.config.min_disparity_px = 0; /* even then */
+    TEST_ASSERT_FALSE(makes(-1, 0));
+    rig.config.max_depth_m = 0;
+    rig.config.min_disparity_px = 0.5;
+    TEST_ASSERT_FALSE(makes(0, 0));
+    TEST_ASSERT_FALSE(makes(-1, 0));
+    rig.config.min_disparity_px = 0;
+    rig.config.model = PLR_MODEL_WORLD;
+    TEST_ASSERT_TRUE(makes(10, 0));
     TEST_ASSERT_FALSE(makes(0, 0));
     TEST_ASSERT_FALSE(makes(-1, 0));
 }
@@ -104,8 +126,12 @@ static void test_each_limit_of_a_new_landmark_holds(void) {
     TEST_ASSERT_TRUE(makes(239, 0));
     TEST_ASSERT_FALSE(makes(241, 0));
     rig.config.max_range_m = 100;
+    TEST_ASSERT_TRUE(makes(1.21, 0));
+    TEST_ASSERT_TRUE(makes(1.19, 0)); /* it stands nearer, and the rest is kept beside it */
+    rig.config.max_depth_m = 1000;
     TEST_ASSERT_FALSE(makes(1.19, 0));
     TEST_ASSERT_TRUE(makes(1.21, 0));
+    rig.config.max_depth_m = 0;
     rig.config.max_row_gap_px = 1.5;
     TEST_ASSERT_TRUE(makes(10, 1.5));
     TEST_ASSERT_FALSE(makes(10, -1.6));
@@ -388,7 +414,8 @@ static void test_a_map_entry_that_is_none_is_not_taken(void) {
 
 int main(void) {
     UNITY_BEGIN();
-    RUN_TEST(test_without_disparity_there_is_no_landmark);
+    RUN_TEST(test_noise_alone_does_not_keep_a_far_point_out);
+    RUN_TEST(test_with_a_limit_of_depth_or_in_the_world_there_is_no_landmark_without_disparity);
     RUN_TEST(test_each_limit_of_a_new_landmark_holds);
     RUN_TEST(test_a_new_landmark_lies_where_its_pixels_say);
     RUN_TEST(test_new_ids_beyond_the_slots_are_taken_from_the_lowest);

@@ -380,15 +380,44 @@ static void assert_finite_landmarks(void) {
             TEST_ASSERT_TRUE(isfinite((double)filter.slots[slot].x[i]));
 }
 
+static double range_of(const double q[3]) {
+    return sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+}
+
+/* The point itself can go no further than the largest range. The rest of the correction is not cut off,
+ * or noise would bring every point at infinity nearer: it stays beside the point, and comes back. */
+static void test_a_correction_beyond_infinity_is_kept_and_comes_back(void) {
+    plr_real dx[12 + 3 * LANDMARKS] = {0};
+    double q[3];
+    take_specimen(false, LANDMARKS);
+    for (unsigned slot = 0; slot < LANDMARKS; slot++)
+        filter.slots[slot].known = 1; /* no voice in a common motion: each goes for itself */
+    plr_real *inverse_range = &dx[plr_covariance_row(&filter, 1) + 2];
+    point_of(1, q);
+    const double before = 1 / range_of(q);
+    *inverse_range = -1;
+    TEST_ASSERT_EQUAL_UINT(0, plr_model_of(&filter)->retract(&filter, dx));
+    assert_finite_landmarks();
+    point_of(1, q);
+    TEST_ASSERT_DOUBLE_WITHIN(10, 1e5, range_of(q));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, before - 1, (double)filter.slots[1].beyond);
+    for (unsigned slot = 0; slot < LANDMARKS; slot++)
+        if (slot != 1)
+            TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.slots[slot].beyond);
+
+    *inverse_range = 1;
+    TEST_ASSERT_EQUAL_UINT(0, plr_model_of(&filter)->retract(&filter, dx));
+    point_of(1, q);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, before, 1 / range_of(q));
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.slots[1].beyond);
+}
+
 static void test_corrections_that_are_cut_are_counted(void) {
     plr_real dx[12 + 3 * LANDMARKS] = {0};
     take_specimen(false, LANDMARKS);
-    dx[plr_covariance_row(&filter, 1) + 2] = -1; /* beyond infinity */
+    dx[plr_covariance_row(&filter, 1) + 2] = 1000; /* before the lens */
     TEST_ASSERT_EQUAL_UINT(1, plr_model_of(&filter)->retract(&filter, dx));
     assert_finite_landmarks();
-    double far[3];
-    point_of(1, far);
-    TEST_ASSERT_DOUBLE_WITHIN(10, 1e5, sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2]));
 
     memset(dx, 0, sizeof dx);
     take_specimen(false, LANDMARKS);
@@ -436,6 +465,7 @@ int main(void) {
     RUN_TEST(test_a_landmark_that_the_camera_meets_is_kept_off_it);
     RUN_TEST(test_retraction_and_its_transport_agree);
     RUN_TEST(test_a_rigid_correction_moves_no_landmark_in_the_world);
+    RUN_TEST(test_a_correction_beyond_infinity_is_kept_and_comes_back);
     RUN_TEST(test_corrections_that_are_cut_are_counted);
     RUN_TEST(test_far_points_keep_the_variance_of_their_bearing);
     return UNITY_END();

@@ -143,12 +143,16 @@ static void test_from_point_agrees_with_differences_of_the_coordinates(void) {
     }
 }
 
+/* What the last retraction left beyond the farthest range. */
+static plr_real beyond;
+
 /* Retracts from q, and demands that the point goes where its chart goes. */
 static bool retract_from(const plr_real q[3], plr_polar *moved, plr_real M[4],
                          const plr_polar *chart, const plr_real w[3]) {
     plr_real to[3];
     memcpy(to, q, sizeof to);
-    const bool cut = plr_polar_retract(moved, M, chart, w, MIN_INVERSE_RANGE, to);
+    beyond = PLR_R(7); /* it is set in any case */
+    const bool cut = plr_polar_retract(moved, M, chart, w, MIN_INVERSE_RANGE, to, &beyond);
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(8 * eps * (double)moved->r,
                                   (double)moved->r * (double)moved->mu[i], (double)to[i]);
@@ -289,14 +293,51 @@ static double angle_between(const plr_polar *a, const plr_polar *b) {
     return atan2(norm(cross), dot);
 }
 
-static void test_a_range_beyond_the_limit_is_cut_there(void) {
+/* A point that noise puts beyond infinity stands at the farthest range and remembers the rest: nothing
+ * of the correction is lost, so that noise of the other sign brings it back to where it was. */
+static void test_what_lies_beyond_the_farthest_range_is_kept(void) {
     const double w[3][3] = {{0, 0, -0.1}, {0, 0, -5}, {0.1, 0.1, -1e30}};
     for (int i = 0; i < 3; i++) {
         plr_polar chart, moved;
         bool cut;
         retract_at_10_m(w[i], &chart, &moved, &cut);
-        TEST_ASSERT_TRUE(cut);
+        TEST_ASSERT_FALSE(cut);
         TEST_ASSERT_DOUBLE_WITHIN(1e5 * 4 * eps, 1e5, (double)moved.r);
+        const double left = 0.1 + w[i][2] - 1e-5;
+        TEST_ASSERT_DOUBLE_WITHIN(4 * eps * (0.1 + fabs(w[i][2])), left, (double)beyond);
+    }
+}
+
+static void test_a_range_that_can_be_had_leaves_nothing_beyond(void) {
+    const double w[3][3] = {{0, 0, 0}, {0.1, -0.2, -0.0999}, {0, 0, 300}};
+    for (int i = 0; i < 3; i++) {
+        plr_polar chart, moved;
+        bool cut;
+        retract_at_10_m(w[i], &chart, &moved, &cut);
+        TEST_ASSERT_EQUAL(i == 2, cut);
+        TEST_ASSERT_EQUAL_DOUBLE(0, (double)beyond);
+    }
+}
+
+/* There and back, in steps of any size through infinity: the sum of the inverse range and of what is
+ * beyond is what the steps add up to. */
+static void test_steps_through_infinity_and_back_lose_nothing(void) {
+    plr_real q[3], M[4];
+    double exact[3], expected = 0.001, size = expected;
+    plr_polar chart, moved;
+    random_point(9, 1000, q, exact);
+    beyond = 0;
+    for (int run = 0; run < RUNS; run++) {
+        const double step = rng_normal(&chance) * 0.001 - 0.1 * (expected - 0.001);
+        const plr_real w[3] = {0, 0, beyond + (plr_real)step};
+        plr_polar_at(&chart, q);
+        (void)plr_polar_retract(&moved, M, &chart, w, MIN_INVERSE_RANGE, q, &beyond);
+        expected += (double)(plr_real)step;
+        size += fabs(expected) + fabs(step);
+        TEST_ASSERT_TRUE(beyond <= 0);
+        TEST_ASSERT_TRUE(beyond >= 0 || (double)moved.r > 1e5 * (1 - 4 * eps));
+        TEST_ASSERT_DOUBLE_WITHIN(2 * eps * size, expected,
+                                  1 / (double)moved.r + (double)beyond);
     }
 }
 
@@ -336,6 +377,7 @@ static void test_an_inverse_range_that_is_no_number_is_cut(void) {
     retract_at_10_m(w, &chart, &moved, &cut);
     TEST_ASSERT_TRUE(cut);
     TEST_ASSERT_TRUE(isfinite((double)moved.r));
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)beyond);
 }
 
 /* A parked robot corrects by micrometres: what a step changes is rounded at the point's size, not the
@@ -349,16 +391,16 @@ static void test_small_steps_are_rounded_once(void) {
         random_point(run, rng_uniform(&chance, 2, 30), q, exact);
         plr_polar_at(&chart, q);
         memcpy(to, q, sizeof to);
-        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, zero, MIN_INVERSE_RANGE, to));
+        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, zero, MIN_INVERSE_RANGE, to, &beyond));
         TEST_ASSERT_TRUE(same_bits(q, to, 3));
 
         rng_normals(&chance, 1e-6, small, 3);
         to_reals(w, small, 3);
-        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, w, MIN_INVERSE_RANGE, to));
+        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, w, MIN_INVERSE_RANGE, to, &beyond));
         for (int i = 0; i < 2; i++) /* -M w */
             w_back[i] = -(M[2 * i] * w[0] + M[2 * i + 1] * w[1]);
         w_back[2] = -w[2];
-        TEST_ASSERT_FALSE(plr_polar_retract(&back, M, &there, w_back, MIN_INVERSE_RANGE, to));
+        TEST_ASSERT_FALSE(plr_polar_retract(&back, M, &there, w_back, MIN_INVERSE_RANGE, to, &beyond));
         const double most = largest((double[3]){(double)q[0], (double)q[1], (double)q[2]}, 3);
         for (int i = 0; i < 3; i++)
             TEST_ASSERT_DOUBLE_WITHIN(1.01 * eps * most + 1e-10, (double)q[i], (double)to[i]);
@@ -394,7 +436,9 @@ int main(void) {
     RUN_TEST(test_retraction_follows_its_equations);
     RUN_TEST(test_transport_is_a_rotation_of_the_plane);
     RUN_TEST(test_retraction_starts_along_the_chart);
-    RUN_TEST(test_a_range_beyond_the_limit_is_cut_there);
+    RUN_TEST(test_what_lies_beyond_the_farthest_range_is_kept);
+    RUN_TEST(test_a_range_that_can_be_had_leaves_nothing_beyond);
+    RUN_TEST(test_steps_through_infinity_and_back_lose_nothing);
     RUN_TEST(test_a_range_below_a_centimetre_is_cut_there);
     RUN_TEST(test_a_bearing_turns_by_one_radian_at_most);
     RUN_TEST(test_corrections_within_the_limits_are_not_cut);
