@@ -56,8 +56,11 @@ static void test_landmarks_are_as_far_away_as_before(void) {
     rig_frame();
     const double before = distance_of_first_landmark();
     turn_for_an_hour();
-    const plr_frame empty = {.t_ns = plr_filter_time(&rig.filter), .budget = 1}; /* applies the hour */
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &empty, NULL));
+    /* a new point needs the map where the body is: it applies the hour, and tells nothing of it */
+    const plr_observation point = {1, 400, 300, 380, 300};
+    const plr_frame frame = {plr_filter_time(&rig.filter), PLR_NO_BUDGET, 1, &point};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
+    TEST_ASSERT_EQUAL_UINT16(1, rig.report.created);
     TEST_ASSERT_EQUAL_UINT8(0, rig.filter.motion.pending);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4 * before, before, distance_of_first_landmark());
 }
