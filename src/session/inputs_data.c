@@ -119,14 +119,14 @@ static void refuse_frame(plr_session *s, const plr_frame *frame, plr_status stat
         s->options.observer.frame(s->options.observer.context, &result);
 }
 
-static void tell_divergence(plr_session *s, plr_health before) {
-    if (s->last.health != PLR_HEALTH_DIVERGED || before == PLR_HEALTH_DIVERGED)
+static void tell_divergence(plr_session *s) {
+    if (!(s->last.reasons & PLR_REASON_RECOVERED))
         return;
     plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR);
     plr_line_words(&s->out.as.text, "the filter diverged at ");
     plr_line_time(&s->out.as.text, s->last.t_ns);
-    plr_line_words(&s->out.as.text, ": a variance is not positive; from here on the pose is "
-                                    "predicted from twists alone");
+    plr_line_words(&s->out.as.text, ": a variance was not positive; it goes on from its pose, "
+                                    "and the landmarks were dropped");
     plr_send_text(s);
 }
 
@@ -161,7 +161,6 @@ static void process(plr_session *s, const plr_frame *frame) {
         refuse_frame(s, frame, PLR_E_TIME);
         return;
     }
-    const plr_health before = s->last.health;
     uint64_t update_ns;
     plr_report report;
     plr_status status = update(s, frame, &report, &update_ns);
@@ -179,7 +178,7 @@ static void process(plr_session *s, const plr_frame *frame) {
     learn(s, update_ns);
     answer(s, frame, update_ns + s->predict_ns);
     s->predict_ns = 0;
-    tell_divergence(s, before);
+    tell_divergence(s);
 }
 
 void plr_take_stereo(plr_session *s) {

@@ -96,7 +96,8 @@ static void test_noise_alone_does_not_keep_a_far_point_out(void) {
     TEST_ASSERT_FALSE(makes(-0.43, 0));
 }
 
-static void test_with_a_limit_of_depth_or_in_the_world_there_is_no_landmark_without_disparity(void) {
+static void
+test_with_a_limit_of_depth_or_in_the_world_there_is_no_landmark_without_disparity(void) {
     rig.config.max_depth_m = 1e6;
     TEST_ASSERT_TRUE(makes(10, 0));
     TEST_ASSERT_FALSE(makes(0, 0));

@@ -3,6 +3,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "filter/consistency.h"
 #include "filter/health.h"
 #include "support/specimens.h"
 
@@ -14,6 +15,9 @@ void setUp(void) {
     rng chance = rng_seeded(53);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, false, 4);
     filter.par.gate_d2 = PLR_R(13.3);
+    filter.reading_ns = filter.t_ns; /* a twist came just now */
+    filter.reading_valid = 1;
+    filter.interval_s = PLR_R(0.01);
     memset(&events, 0, sizeof events);
 }
 
@@ -46,21 +50,64 @@ static void test_a_frame_with_enough_of_everything_is_good(void) {
 static void test_fewer_than_three_used_degrade(void) {
     frame(2, 0);
     judge(PLR_REASON_FEW_OBSERVATIONS, PLR_HEALTH_DEGRADED);
-    frame(9, 7);
+    frame(4, 2);
     judge(PLR_REASON_FEW_OBSERVATIONS, PLR_HEALTH_DEGRADED);
 }
 
+/* Once all is well again it is well only after so many frames, one after the other. */
+static void demand_settling(void) {
+    for (int k = 1; k < 15; k++) {
+        frame(5, 0);
+        judge(PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_DEGRADED);
+    }
+    frame(5, 0);
+    judge(0, PLR_HEALTH_GOOD);
+}
+
 static void test_ten_frames_without_one_used_are_lost(void) {
+    const unsigned lost = PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS;
     for (int k = 0; k < 9; k++) {
         frame(0, 0);
         judge(PLR_REASON_FEW_OBSERVATIONS, PLR_HEALTH_DEGRADED);
     }
     frame(0, 0);
-    judge(PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS, PLR_HEALTH_LOST);
+    judge(lost | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_LOST);
     frame(0, 0);
-    judge(PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS, PLR_HEALTH_LOST);
-    frame(5, 0);
+    judge(lost | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_LOST);
+    demand_settling();
+}
+
+static void wait_ms(unsigned milliseconds) {
+    filter.t_ns += milliseconds * UINT64_C(1000000);
+    filter.reading_ns = filter.t_ns;
+}
+
+/* Frames may come slowly: then a second is what counts. */
+static void test_a_second_without_one_used_is_lost(void) {
+    frame(10, 1);
     judge(0, PLR_HEALTH_GOOD);
+    wait_ms(1000);
+    frame(0, 0);
+    judge(PLR_REASON_FEW_OBSERVATIONS, PLR_HEALTH_DEGRADED);
+    wait_ms(1);
+    frame(0, 0);
+    judge(PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS | PLR_REASON_POSE_MAY_BE_WRONG,
+          PLR_HEALTH_LOST);
+    demand_settling();
+}
+
+static void test_a_bad_frame_begins_the_settling_anew(void) {
+    frame(10, 1);
+    events.locked = true;
+    judge(PLR_REASON_GATE_LOCKED | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_LOST);
+    events.locked = false;
+    for (int k = 0; k < 14; k++) {
+        frame(5, 0);
+        judge(PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_DEGRADED);
+    }
+    frame(2, 0);
+    judge(PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_DEGRADED);
+    demand_settling();
 }
 
 static void test_each_event_has_its_reason(void) {
@@ -86,22 +133,123 @@ static void test_each_event_has_its_reason(void) {
     TEST_ASSERT_EQUAL_UINT32(3, filter.totals.range_limited);
     events.cut = 0;
     frame(10, 1);
-    events.locked = true;
-    judge(PLR_REASON_GATE_LOCKED, PLR_HEALTH_LOST);
-    events.locked = false;
-    frame(10, 1);
     report.no_room = 4; /* full slots are no fault */
     judge(PLR_REASON_NO_ROOM, PLR_HEALTH_GOOD);
+    frame(10, 1);
+    events.recovered = true;
+    judge(PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED, PLR_HEALTH_DEGRADED);
+    events.recovered = false;
+    frame(10, 1);
+    events.locked = true;
+    judge(PLR_REASON_GATE_LOCKED | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_LOST);
+    events.locked = false;
+    demand_settling();
 }
 
-static void test_innovations_above_twice_their_mean_degrade(void) {
-    frame(10, 0);
-    report.nis = 80;
+static void test_missing_and_refused_twists_degrade(void) {
+    filter.t_ns += 79900000; /* 50 ms and three times the 10 ms in which they come: 80 */
+    frame(10, 1);
     judge(0, PLR_HEALTH_GOOD);
-    report.nis = 80.01F;
+    filter.t_ns += 200000;
+    frame(10, 1);
+    judge(PLR_REASON_NO_TWISTS, PLR_HEALTH_DEGRADED);
+    filter.reading_ns = filter.t_ns;
+    frame(10, 1);
+    judge(0, PLR_HEALTH_GOOD);
+    filter.totals.twists_refused++;
+    frame(10, 1);
+    judge(PLR_REASON_NO_TWISTS, PLR_HEALTH_DEGRADED);
+    frame(10, 1); /* that one was before the last frame */
+    judge(0, PLR_HEALTH_GOOD);
+    filter.reading_valid = 0;
+    frame(10, 1);
+    judge(PLR_REASON_NO_TWISTS, PLR_HEALTH_DEGRADED);
+    filter.config.mode = PLR_MODE_MAPPING; /* has no use for them */
+    frame(10, 1);
+    judge(0, PLR_HEALTH_GOOD);
+}
+
+/* A frame of 40 degrees of freedom: ten used, none rejected. */
+static void frame_of_nis(double per_degree) {
+    frame(10, 0);
+    report.nis = (float)(40 * per_degree);
+}
+
+/* The sums fade by a tenth a frame: six such frames are 187 degrees of freedom, seven are 209. */
+static void test_innovations_above_what_noise_explains_degrade(void) {
+    for (int k = 0; k < 6; k++) {
+        frame_of_nis(1.51);
+        judge(0, PLR_HEALTH_GOOD);
+    }
+    frame_of_nis(1.51);
     judge(PLR_REASON_NIS_HIGH, PLR_HEALTH_DEGRADED);
-    frame(4, 0); /* 16 degrees of freedom say too little */
-    report.nis = 1000;
+    frame_of_nis(1.3); /* which brings the mean below 1.5 */
+    judge(0, PLR_HEALTH_GOOD);
+    frame_of_nis(50); /* and a single frame back above it: nothing is said of a mean below */
+    judge(PLR_REASON_NIS_HIGH, PLR_HEALTH_DEGRADED);
+}
+
+static void test_innovations_far_below_their_noise_are_said_and_do_no_harm(void) {
+    for (int k = 0; k < 6; k++) {
+        frame_of_nis(0.29);
+        judge(0, PLR_HEALTH_GOOD);
+    }
+    frame_of_nis(0.29);
+    judge(PLR_REASON_NIS_LOW, PLR_HEALTH_GOOD);
+    frame_of_nis(0.4);
+    judge(0, PLR_HEALTH_GOOD);
+}
+
+static void test_few_degrees_of_freedom_say_nothing_of_the_noise(void) {
+    for (int k = 0; k < 30; k++) { /* their sum tends to 160 */
+        frame(4, 0);
+        report.nis = k % 2 ? 1000 : 0;
+        judge(0, PLR_HEALTH_GOOD);
+    }
+}
+
+/* Three tenths of what is matched may be rejected, over some frames. */
+static void test_a_scene_that_disagrees_with_itself_is_said(void) {
+    frame(10, 10); /* too little of it yet */
+    report.used = 3;
+    judge(0, PLR_HEALTH_GOOD);
+    plr_consistency_clear(&filter);
+    for (int k = 0; k < 60; k++) {
+        frame(100, 29);
+        judge(0, PLR_HEALTH_GOOD);
+    }
+    for (int k = 0; k < 6; k++) { /* of 29 and 31 the mean: 0.9^7 < 1/2 */
+        frame(100, 31);
+        judge(0, PLR_HEALTH_GOOD);
+    }
+    frame(100, 31);
+    judge(PLR_REASON_SCENE_DISAGREES | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_DEGRADED);
+    frame(0, 0); /* of a frame without matches nothing is said */
+    judge(PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_DEGRADED);
+    frame(100, 0);
+    judge(PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_DEGRADED);
+}
+
+static void test_a_bias_beyond_its_prior_is_said(void) {
+    filter.config.bias = 1;
+    for (int k = 0; k < 6; k++) {
+        filter.bias[k] = filter.bias_prior[k] = PLR_R(0.2);
+        filter.bias_prior_sigma[k] = PLR_R(0.01);
+    }
+    for (int k = 0; k < 6; k++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0329) * (plr_real)sign;
+            frame(10, 1);
+            judge(0, PLR_HEALTH_GOOD);
+            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0331) * (plr_real)sign;
+            frame(10, 1);
+            judge(PLR_REASON_BIAS_OFF_PRIOR, PLR_HEALTH_DEGRADED);
+        }
+        filter.bias[k] = PLR_R(0.2);
+    }
+    filter.bias_prior_sigma[2] = 0; /* no prior, no limit */
+    filter.bias[2] = 5;
+    frame(10, 1);
     judge(0, PLR_HEALTH_GOOD);
 }
 
@@ -197,16 +345,34 @@ static void test_a_frame_below_the_limits_breaks_the_row(void) {
 
 /* ---------------------------------------------------------------- refusals and totals */
 
-static void test_a_refused_frame_says_whether_the_filter_is_broken(void) {
+static void refuse(unsigned reasons, plr_health health) {
     memset(&report, 0, sizeof report);
     plr_health_after_refusal(&filter, &report);
-    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, report.health);
-    TEST_ASSERT_EQUAL_HEX32(0, report.reasons);
+    TEST_ASSERT_EQUAL_INT(health, report.health);
+    TEST_ASSERT_EQUAL_HEX32(reasons, report.reasons);
     TEST_ASSERT_EQUAL_UINT16(4, report.active);
-    filter.diverged = 1;
-    plr_health_after_refusal(&filter, &report);
+}
+
+static void test_a_refused_frame_says_how_it_stood_and_is_never_good(void) {
+    frame(10, 1);
+    judge(0, PLR_HEALTH_GOOD);
+    refuse(0, PLR_HEALTH_DEGRADED);
+    frame(10, 1);
+    report.refused = 1;
+    judge(PLR_REASON_REFUSED_INPUT, PLR_HEALTH_DEGRADED);
+    refuse(PLR_REASON_REFUSED_INPUT, PLR_HEALTH_DEGRADED);
+    frame(10, 1);
+    events.locked = true;
+    judge(PLR_REASON_GATE_LOCKED | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_LOST);
+    refuse(PLR_REASON_GATE_LOCKED | PLR_REASON_POSE_MAY_BE_WRONG, PLR_HEALTH_LOST);
+}
+
+static void test_damaged_memory_is_the_end(void) {
+    memset(&report, 0, sizeof report);
+    plr_health_damaged(&filter, &report);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DIVERGED, report.health);
-    TEST_ASSERT_EQUAL_HEX32(PLR_REASON_NOT_POSITIVE, report.reasons);
+    TEST_ASSERT_EQUAL_HEX32(PLR_REASON_STATE_DAMAGED, report.reasons);
+    TEST_ASSERT_EQUAL_UINT32(1, filter.totals.damaged);
 }
 
 static void test_totals_are_the_sums_of_the_reports(void) {
@@ -234,8 +400,15 @@ int main(void) {
     RUN_TEST(test_a_frame_with_enough_of_everything_is_good);
     RUN_TEST(test_fewer_than_three_used_degrade);
     RUN_TEST(test_ten_frames_without_one_used_are_lost);
+    RUN_TEST(test_a_second_without_one_used_is_lost);
+    RUN_TEST(test_a_bad_frame_begins_the_settling_anew);
     RUN_TEST(test_each_event_has_its_reason);
-    RUN_TEST(test_innovations_above_twice_their_mean_degrade);
+    RUN_TEST(test_missing_and_refused_twists_degrade);
+    RUN_TEST(test_innovations_above_what_noise_explains_degrade);
+    RUN_TEST(test_innovations_far_below_their_noise_are_said_and_do_no_harm);
+    RUN_TEST(test_few_degrees_of_freedom_say_nothing_of_the_noise);
+    RUN_TEST(test_a_scene_that_disagrees_with_itself_is_said);
+    RUN_TEST(test_a_bias_beyond_its_prior_is_said);
     RUN_TEST(test_a_gate_that_rejects_none_of_a_thousand_is_inert);
     RUN_TEST(test_a_gate_that_is_off_is_not_inert);
     RUN_TEST(test_the_count_of_matches_cannot_overflow);
@@ -244,7 +417,8 @@ int main(void) {
     RUN_TEST(test_a_fixed_gate_is_open_from_a_lock_until_a_frame_is_seen);
     RUN_TEST(test_a_fixed_gate_is_open_after_ten_frames_without_use);
     RUN_TEST(test_a_frame_below_the_limits_breaks_the_row);
-    RUN_TEST(test_a_refused_frame_says_whether_the_filter_is_broken);
+    RUN_TEST(test_a_refused_frame_says_how_it_stood_and_is_never_good);
+    RUN_TEST(test_damaged_memory_is_the_end);
     RUN_TEST(test_totals_are_the_sums_of_the_reports);
     return UNITY_END();
 }

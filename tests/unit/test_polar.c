@@ -336,8 +336,7 @@ static void test_steps_through_infinity_and_back_lose_nothing(void) {
         size += fabs(expected) + fabs(step);
         TEST_ASSERT_TRUE(beyond <= 0);
         TEST_ASSERT_TRUE(beyond >= 0 || (double)moved.r > 1e5 * (1 - 4 * eps));
-        TEST_ASSERT_DOUBLE_WITHIN(2 * eps * size, expected,
-                                  1 / (double)moved.r + (double)beyond);
+        TEST_ASSERT_DOUBLE_WITHIN(2 * eps * size, expected, 1 / (double)moved.r + (double)beyond);
     }
 }
 
@@ -391,7 +390,8 @@ static void test_small_steps_are_rounded_once(void) {
         random_point(run, rng_uniform(&chance, 2, 30), q, exact);
         plr_polar_at(&chart, q);
         memcpy(to, q, sizeof to);
-        TEST_ASSERT_FALSE(plr_polar_retract(&there, M, &chart, zero, MIN_INVERSE_RANGE, to, &beyond));
+        TEST_ASSERT_FALSE(
+            plr_polar_retract(&there, M, &chart, zero, MIN_INVERSE_RANGE, to, &beyond));
         TEST_ASSERT_TRUE(same_bits(q, to, 3));
 
         rng_normals(&chance, 1e-6, small, 3);
@@ -400,7 +400,8 @@ static void test_small_steps_are_rounded_once(void) {
         for (int i = 0; i < 2; i++) /* -M w */
             w_back[i] = -(M[2 * i] * w[0] + M[2 * i + 1] * w[1]);
         w_back[2] = -w[2];
-        TEST_ASSERT_FALSE(plr_polar_retract(&back, M, &there, w_back, MIN_INVERSE_RANGE, to, &beyond));
+        TEST_ASSERT_FALSE(
+            plr_polar_retract(&back, M, &there, w_back, MIN_INVERSE_RANGE, to, &beyond));
         const double most = largest((double[3]){(double)q[0], (double)q[1], (double)q[2]}, 3);
         for (int i = 0; i < 3; i++)
             TEST_ASSERT_DOUBLE_WITHIN(1.01 * eps * most + 1e-10, (double)q[i], (double)to[i]);

@@ -145,8 +145,8 @@ static void test_allowances_add_up_and_outlast_their_application(void) {
     const plr_observation point = {77, 400, 300, 380, 300};
     const plr_frame frame = {78, 1, 1, &point}; /* a new point, for which it is applied */
     for (int applied = 0; applied < 2; applied++) {
-        TEST_ASSERT_EQUAL_INT(
-            PLR_OK, plr_filter_update(&filter, applied ? &frame : &empty, &report));
+        TEST_ASSERT_EQUAL_INT(PLR_OK,
+                              plr_filter_update(&filter, applied ? &frame : &empty, &report));
         TEST_ASSERT_EQUAL_UINT16(applied, report.created);
         TEST_ASSERT_EQUAL_DOUBLE(applied ? 0 : (double)(PLR_R(0.04) + PLR_R(0.04)),
                                  (double)filter.motion.Q[0]);

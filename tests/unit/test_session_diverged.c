@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* A filter that has diverged still says where it is, and that it does not know how well. */
+/* A filter that has diverged still says where it is, and that it does not know how well; with the next
+ * frame it goes on by itself, and a human is told. */
 #include <string.h>
 #include <unity.h>
 
@@ -39,7 +40,7 @@ static bool is_unknown(const double packed[21]) {
     return memcmp(packed, full, sizeof full) == 0;
 }
 
-static void test_its_poses_go_on_and_say_that_no_covariance_is_known(void) {
+static void test_the_next_frame_recovers_and_its_pose_has_a_covariance_again(void) {
     plr_message answer;
     begin_and_diverge();
     run_frames(5, 15);
@@ -49,16 +50,26 @@ static void test_its_poses_go_on_and_say_that_no_covariance_is_known(void) {
         const plr_pose_message *pose = &answer.as.pose;
         TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0.1 * k), pose->t_ns);
         TEST_ASSERT_TRUE(pose->after_update);
-        for (int i = 0; i < 3; i++) /* predicted, from twists without noise */
+        for (int i = 0; i < 3; i++) /* kept, and carried on by twists and pixels without noise */
             TEST_ASSERT_DOUBLE_WITHIN(0.01, truth.p[i], pose->T_WB.p[i]);
         TEST_ASSERT_DOUBLE_WITHIN(0.01, 1, pose->velocity.v_B_mps[0]);
-        TEST_ASSERT_TRUE(is_unknown(pose->P_xi));
-        TEST_ASSERT_TRUE(is_unknown(pose->P_u));
+        TEST_ASSERT_FALSE(is_unknown(pose->P_xi));
+        TEST_ASSERT_FALSE(is_unknown(pose->P_u));
+        for (int i = 0; i < 6; i++) {
+            TEST_ASSERT_TRUE(pose->P_xi[i * (i + 3) / 2] > 0);
+            TEST_ASSERT_TRUE(pose->P_xi[i * (i + 3) / 2] < 0.1);
+        }
         TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer));
-        TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, answer.as.report.report.status);
-        TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DIVERGED, answer.as.report.report.health);
+        const plr_report *report = &answer.as.report.report;
+        const uint32_t recovery = PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, report->status);
+        TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, report->health);
+        TEST_ASSERT_EQUAL_HEX32(k == 5 ? recovery : 0, report->reasons & recovery);
+        TEST_ASSERT_TRUE(report->reasons & PLR_REASON_POSE_MAY_BE_WRONG);
+        TEST_ASSERT_TRUE(k == 5 ? report->created > 3 : report->used > 3);
     }
-    TEST_ASSERT_EQUAL_UINT32(10, session.totals.refused);
+    TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
+    TEST_ASSERT_EQUAL_UINT32(1, session.filter.totals.recoveries);
 }
 
 static void test_poses_after_each_twist_say_so_too(void) {
@@ -84,17 +95,31 @@ static void test_a_sound_filter_never_says_so(void) {
     }
 }
 
-static void test_a_human_is_told_once(void) {
+/* What there is to tell of `words`. */
+static unsigned count_texts(plr_severity severity, const char *words) {
     plr_message answer;
     unsigned told = 0;
-    begin_and_diverge();
-    run_frames(5, 15);
     while (faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer))
-        if (strstr(answer.as.text.text, "the filter diverged at") != NULL) {
-            TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_ERROR, answer.as.text.severity);
+        if (strstr(answer.as.text.text, words) != NULL) {
+            TEST_ASSERT_EQUAL_UINT8(severity, answer.as.text.severity);
             told++;
         }
-    TEST_ASSERT_EQUAL_UINT(1, told);
+    return told;
+}
+
+static void test_a_human_is_told_once(void) {
+    begin_and_diverge();
+    run_frames(5, 15);
+    TEST_ASSERT_EQUAL_UINT(1, count_texts(PLR_SEVERITY_ERROR, "the filter diverged at"));
+}
+
+static void test_a_human_is_told_each_time(void) {
+    begin_and_diverge();
+    run_frames(5, 10);
+    session.filter.diverged = 1;
+    reseal(&session.filter);
+    run_frames(10, 15);
+    TEST_ASSERT_EQUAL_UINT(2, count_texts(PLR_SEVERITY_ERROR, "the filter diverged at"));
 }
 
 static void test_a_start_makes_the_covariance_known_again(void) {
@@ -103,6 +128,8 @@ static void test_a_start_makes_the_covariance_known_again(void) {
     run_frames(5, 7);
     while (faulty_port_answer(&port, &answer))
         continue;
+    session.filter.diverged = 1; /* and no frame comes between */
+    reseal(&session.filter);
     desk_send(drive_start(0.6));
     run_frames(7, 9);
     for (int k = 7; k < 9; k++) {
@@ -112,14 +139,16 @@ static void test_a_start_makes_the_covariance_known_again(void) {
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, session.last.status);
     TEST_ASSERT_TRUE(session.last.used > 3);
+    TEST_ASSERT_FALSE(session.last.reasons & (PLR_REASON_RECOVERED | PLR_REASON_POSE_MAY_BE_WRONG));
 }
 
 int main(void) {
     UNITY_BEGIN();
-    RUN_TEST(test_its_poses_go_on_and_say_that_no_covariance_is_known);
+    RUN_TEST(test_the_next_frame_recovers_and_its_pose_has_a_covariance_again);
     RUN_TEST(test_poses_after_each_twist_say_so_too);
     RUN_TEST(test_a_sound_filter_never_says_so);
     RUN_TEST(test_a_human_is_told_once);
+    RUN_TEST(test_a_human_is_told_each_time);
     RUN_TEST(test_a_start_makes_the_covariance_known_again);
     return UNITY_END();
 }

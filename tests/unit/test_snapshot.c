@@ -139,6 +139,29 @@ static void test_a_filter_that_has_seen_nothing_can_be_saved(void) {
     TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
 }
 
+static void fill_reals(rng *chance, plr_real *x, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        x[i] = (plr_real)rng_normal(chance);
+}
+
+/* Every field of a struct that is plain numbers gets one that it has not by chance. */
+static void fill_consistency(rng *chance, plr_consistency *c) {
+    for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++) {
+        fill_reals(chance, c->windows[w].sum, 6);
+        fill_reals(chance, c->windows[w].variance, 21);
+    }
+    fill_reals(chance, c->apart, 6);
+    fill_reals(chance, c->still_way, 6);
+    fill_reals(chance, c->still_variance, 6);
+    plr_real *const counts[] = {&c->matched, &c->gated, &c->nis, &c->nis_dof, &c->excess};
+    for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
+        fill_reals(chance, counts[i], 1);
+    c->agreeing = 0x1122;
+    c->insisting = 0x3344;
+    c->slight = 0x5566;
+    c->contradicted = c->drifting = c->frozen = c->doubtful = 1;
+}
+
 /* A field that a later version adds to the filter, and forgets here, is found by this. */
 static void test_every_field_is_carried(void) {
     plr_totals *t = &driven.totals;
@@ -156,10 +179,19 @@ static void test_every_field_is_carried(void) {
         *counts[i] = (uint32_t)rng_bits(&chance);
     for (unsigned i = 0; i < sizeof sums / sizeof *sums; i++)
         *sums[i] = rng_bits(&chance);
-    for (unsigned i = 0; i < 36; i++)
-        driven.motion.B[i] = (plr_real)rng_normal(&chance);
-    for (unsigned i = 0; i < 6; i++)
-        driven.bias[i] = (plr_real)rng_normal(&chance);
+    fill_reals(&chance, driven.motion.B, 36);
+    fill_reals(&chance, driven.bias, PLR_BIAS_DIM);
+    fill_reals(&chance, driven.bias_prior, PLR_BIAS_DIM);
+    fill_reals(&chance, driven.bias_prior_sigma, PLR_BIAS_DIM);
+    fill_reals(&chance, driven.recovery_P, 21);
+    fill_consistency(&chance, &driven.consistency);
+    driven.health = PLR_HEALTH_LOST;
+    driven.reasons = 0x12345678;
+    driven.last_frame_ns = rng_bits(&chance);
+    driven.last_use_ns = rng_bits(&chance);
+    driven.refused_before = 0x23456789;
+    driven.slots[1].beyond = PLR_R(-0.25);
+    driven.slots[1].print = 0x3456789A;
     driven.frame_number = (uint32_t)rng_bits(&chance);
     driven.frames_without_use = 0xA1B2;
     driven.frames_mostly_gated = 0xC3D4;
@@ -229,8 +261,11 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 30 + 17 * real;
-    const uint32_t slots_at = count_at + 4 + 16 + 24 + 4 + 12 + 56 + 56 + 107 * real;
-    const uint32_t slot = 3 * real + 25;
+    const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 107 * real;
+    const uint32_t health_at = frames_at + 4 + 6 + 4 + 137 * real;
+    const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
+    const uint32_t slots_at = totals_at + 56 + 56;
+    const uint32_t id_at = slots_at + 4 * real, slot = 4 * real + 29;
     start(&driven);
     drive(&driven, NULL, 5);
     const uint32_t dim = 12 + 3 * driven.count;
@@ -241,8 +276,16 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT(30, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
-    TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(slots_at + 3 * real, 4));
-    TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(slots_at + slot + 3 * real, 4));
+    TEST_ASSERT_EQUAL_UINT32(driven.frame_number, number_at(frames_at, 4));
+    TEST_ASSERT_EQUAL_UINT8(driven.health, number_at(health_at, 1));
+    TEST_ASSERT_EQUAL_HEX32(driven.reasons, number_at(health_at + 1, 4));
+    TEST_ASSERT_EQUAL_UINT64(driven.last_frame_ns, number_at(health_at + 5, 8));
+    TEST_ASSERT_EQUAL_UINT32(driven.totals.twists, number_at(totals_at, 4));
+    TEST_ASSERT_EQUAL_UINT64(driven.totals.created, number_at(totals_at + 56 + 4 * 8, 8));
+    TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
+    TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
+    TEST_ASSERT_EQUAL_HEX32(driven.slots[1].print, number_at(id_at + slot + 16, 4));
+    TEST_ASSERT_EQUAL_UINT32(490 + 261 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
                              state.length);
 }

@@ -18,8 +18,10 @@ enum {
     COUNT_AT = CAMERA_AT + 17 * REAL,
     INTERVAL_AT = COUNT_AT + 4 + 16,
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
-    SLOTS_AT = COUNT_AT + 4 + 16 + 24 + 4 + 12 + 56 + 56 + 107 * REAL,
-    SLOT_SIZE = 3 * REAL + 25,
+    FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 107 * REAL,
+    HEALTH_AT = FRAMES_AT + 4 + 6 + 4 + 137 * REAL, /* doubtful stands before it */
+    SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 56 + 56,
+    SLOT_SIZE = 4 * REAL + 29,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 1,
     P_AT = SLOTS_AT + LANDMARKS * SLOT_SIZE
 };
@@ -125,8 +127,9 @@ static void test_more_landmarks_than_slots_are_refused(void) {
 
 static void test_numbers_that_are_not_finite_are_refused(void) {
     const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
-    const uint32_t places[] = {INTERVAL_AT, SLOTS_AT,        SLOTS_AT + 2 * REAL,
-                               P_AT,        P_AT + 5 * REAL, state.length - REAL};
+    const uint32_t places[] = {INTERVAL_AT,     FRAMES_AT + 4,       HEALTH_AT - 8 - REAL,
+                               SLOTS_AT,        SLOTS_AT + 3 * REAL, P_AT,
+                               P_AT + 5 * REAL, state.length - REAL};
     for (unsigned i = 0; i < 3; i++)
         for (unsigned k = 0; k < sizeof places / sizeof *places; k++) {
             state_bytes_save(&state, &filter);
@@ -147,8 +150,9 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 }
 
 static void test_a_flag_is_0_or_1(void) {
-    const uint32_t flags[] = {CLOCK_STARTED_AT, CLOCK_STARTED_AT + 1, KNOWN_AT,
-                              KNOWN_AT + SLOT_SIZE};
+    const uint32_t flags[] = {CLOCK_STARTED_AT, CLOCK_STARTED_AT + 1, HEALTH_AT - 4,
+                              HEALTH_AT - 3,    HEALTH_AT - 2,        HEALTH_AT - 1,
+                              KNOWN_AT,         KNOWN_AT + SLOT_SIZE};
     for (unsigned i = 0; i < sizeof flags / sizeof *flags; i++) {
         state_bytes_save(&state, &filter);
         TEST_ASSERT_LESS_OR_EQUAL_UINT8(1, state.bytes[flags[i]]);
