@@ -151,6 +151,8 @@ static void fill_consistency(rng *chance, plr_consistency *c) {
         fill_reals(chance, c->windows[w].variance, 21);
     }
     fill_reals(chance, c->apart, 6);
+    fill_reals(chance, c->apart_sigmas, 6);
+    fill_reals(chance, &c->apart_noise, 1);
     fill_reals(chance, c->still_way, 6);
     fill_reals(chance, c->still_variance, 6);
     plr_real *const counts[] = {&c->matched, &c->gated, &c->nis, &c->nis_dof, &c->excess};
@@ -262,7 +264,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 30 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 107 * real;
-    const uint32_t health_at = frames_at + 4 + 6 + 4 + 137 * real;
+    const uint32_t health_at = frames_at + 4 + 6 + 4 + 144 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
     const uint32_t slots_at = totals_at + 56 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 4 * real + 29;
@@ -285,7 +287,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].print, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(490 + 261 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(490 + 268 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
                              state.length);
 }
