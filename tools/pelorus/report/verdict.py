@@ -68,7 +68,7 @@ def _health(run: Run, origin_ns: int) -> Iterator[str]:
         t_s = (int(run.frames.t_ns[diverged[0]]) - origin_ns) * 1e-9
         yield (
             f"diverged at t = {t_s:.1f} s: a variance ceased to be "
-            "positive; from there on the pose is predicted from the twists alone."
+            "positive; the filter went on from its pose and dropped its landmarks."
         )
     lost, frames = run.summary["frames_lost"], run.summary["frames"]
     if lost > LOST_MANY * frames:
