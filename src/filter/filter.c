@@ -112,7 +112,16 @@ static void start_covariance(const plr_filter *f, double P_xi[36]) {
         P_xi[7 * i] = sigma * sigma;
 }
 
+static void set_bias_prior(plr_filter *f, const double mean[6], const double variance[6]) {
+    for (int i = 0; i < 6; i++) {
+        f->bias[i] = f->bias_prior[i] = (plr_real)mean[i];
+        f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
+    }
+    plr_covariance_set_bias(f, variance);
+}
+
 static void start_bias(plr_filter *f) {
+    static const double zero[6] = {0};
     double variance[6] = {0};
     if (f->config.mode != PLR_MODE_MAPPING)
         for (int i = 0; i < 6; i++) {
@@ -120,9 +129,17 @@ static void start_bias(plr_filter *f) {
                 i < 3 ? f->config.bias_velocity_sigma_mps : f->config.bias_gyro_sigma_radps;
             variance[i] = sigma * sigma;
         }
+    set_bias_prior(f, zero, variance);
+}
+
+/* After the biases' covariance was lost. */
+static void go_back_to_bias_prior(plr_filter *f) {
+    double variance[6];
+    for (int i = 0; i < 6; i++) {
+        f->bias[i] = f->bias_prior[i];
+        variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
+    }
     plr_covariance_set_bias(f, variance);
-    for (int i = 0; i < 6; i++)
-        f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
 }
 
 plr_status plr_filter_reset(plr_filter *f) {
@@ -233,13 +250,13 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     plr_filter_keep_for_recovery(f);
     f->diverged = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
-    if (!plr_covariance_is_positive(f) && f->config.bias) { /* the bias is lost too: its prior */
-        memset(f->bias, 0, sizeof f->bias);
-        start_bias(f);
-    }
-    /* a reading of another clock says nothing any more */
+    if (!plr_covariance_is_positive(f) && f->config.bias) /* the bias is lost too */
+        go_back_to_bias_prior(f);
+    /* a reading, and a frame, of another clock say nothing any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
+    if (f->last_frame_ns > t_ns || t_ns - f->last_frame_ns > f->par.max_gap_ns)
+        f->last_frame_ns = f->last_use_ns = 0;
     plr_guard_seal_whole(f);
     return PLR_OK;
 }
@@ -260,10 +277,8 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
     for (int i = 0; i < 6; i++)
         if (variance[i] < 0)
             return refuse(f, PLR_E_ARGUMENT);
-    for (int i = 0; i < 6; i++)
-        f->bias[i] = (plr_real)mean[i];
+    set_bias_prior(f, mean, variance);
     plr_filter_forget_reading(f);
-    plr_covariance_set_bias(f, variance);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -29,6 +29,9 @@ void plr_filter_count_refusal(plr_filter *f, plr_status status);
 /* Notes the pose's covariance of a frame that is in order. */
 void plr_filter_keep_for_recovery(plr_filter *f);
 
+/* Brings what was noted up to the end of the motion that is about to be applied. */
+void plr_filter_carry_recovery(plr_filter *f);
+
 /* After a divergence: the pose stays, with the covariance that it had when all was in order and that of
  * the motion since; landmarks are dropped, biases go back to their prior's covariance. */
 void plr_filter_recover(plr_filter *f);

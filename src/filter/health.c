@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/health.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "filter/consistency.h"
@@ -135,6 +136,10 @@ void plr_health_damaged(plr_filter *f, plr_report *report) {
     report->reasons = PLR_REASON_STATE_DAMAGED;
 }
 
+static double seconds_if(bool ever, plr_time_ns then, plr_time_ns now) {
+    return ever ? seconds_since(then, now) : (double)INFINITY;
+}
+
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health) {
     if (!f || !health)
         return PLR_E_ARGUMENT;
@@ -148,13 +153,13 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
     const plr_time_ns now = t_ns > f->t_ns ? t_ns : f->t_ns;
     const bool looks = f->config.mode != PLR_MODE_DEAD_RECKONING;
     health->reasons = f->reasons;
-    health->seconds_without_frame = seconds_since(f->last_frame_ns, now);
-    health->seconds_without_use = seconds_since(f->last_use_ns, now);
-    health->seconds_without_twist = seconds_since(f->reading_ns, now);
+    health->seconds_without_frame = seconds_if(f->last_frame_ns != 0, f->last_frame_ns, now);
+    health->seconds_without_use = seconds_if(f->last_use_ns != 0, f->last_use_ns, now);
+    health->seconds_without_twist = seconds_if(f->reading_valid, f->reading_ns, now);
     health->resets = f->totals.resets + f->totals.widened;
-    if (looks && (f->last_frame_ns == 0 || health->seconds_without_frame > LOST_S))
+    if (looks && health->seconds_without_frame > LOST_S)
         health->reasons |= PLR_REASON_NO_FRAMES;
-    if (looks && (f->last_use_ns == 0 || health->seconds_without_use > LOST_S))
+    if (looks && health->seconds_without_use > LOST_S)
         health->reasons |= PLR_REASON_NO_OBSERVATIONS;
     if (f->config.mode != PLR_MODE_MAPPING &&
         (!f->reading_valid || f->totals.twists_refused != f->refused_before ||

@@ -116,17 +116,20 @@ static plr_real bring_closer(plr_filter *f, unsigned slot) {
     return left;
 }
 
+static unsigned body_retract(plr_filter *f, const plr_real *dx);
+
 static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_real E[9], R[9], p[3];
     plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
     plr_se3_rotation(R, E);
 
-    plr_real *F = f->work.Vt;
+    plr_real *F = f->work.Vt, most_left = 0;
     memset(f->work.dx, 0, plr_covariance_dim(f) * sizeof *f->work.dx);
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, to;
         const plr_real left = bring_closer(f, slot);
+        most_left = plr_abs(left) > most_left ? plr_abs(left) : most_left;
         plr_polar_at(&from, s->x);
         plr_se3_move_back(s->x, E, p);
         keep_off(s->x);
@@ -139,8 +142,11 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_se3_rotation(R, motion->E);
     plr_se3_adjoint_inverse(A, R, motion->p);
     plr_covariance_transport(f, A, F);
-    if (!f->motion.noisy)
+    if (!f->motion.noisy) { /* no correction follows that would begin with what is left */
+        if (most_left > 0)
+            (void)body_retract(f, f->work.dx);
         return;
+    }
     enter_noise(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
     plr_covariance_open_noise(f, motion);
 }
@@ -165,6 +171,7 @@ static bool body_linearise(const plr_filter *f, const plr_slot *slot, plr_linear
     /* -r^2 Dz mu: along its own ray a point moves in the right image alone */
     lin->H_landmark[2] = lin->H_landmark[8] = 0;
     lin->H_landmark[5] = -camera->fx * camera->baseline * chart.r / slot->x[2];
+    lin->z[1] = PLR_FMA(lin->H_landmark[5], slot->beyond, lin->z[1]);
     return true;
 }
 

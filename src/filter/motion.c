@@ -3,6 +3,7 @@
 
 #include "filter/consistency.h"
 #include "filter/covariance.h"
+#include "filter/filter_internal.h"
 #include "filter/model.h"
 #include "lie/se3.h"
 #include "lie/so3.h"
@@ -223,6 +224,7 @@ void plr_motion_apply(plr_filter *f, const plr_applied_motion *applied) {
         plr_motion_correct_pose(f, n);
     }
     plr_model_of(f)->propagate(f, applied);
+    plr_filter_carry_recovery(f);
     plr_motion_drop(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);

@@ -6,28 +6,61 @@
 #include "filter/covariance.h"
 #include "filter/filter_internal.h"
 #include "filter/motion.h"
+#include "lie/se3.h"
+#include "linalg/dense.h"
+#include "linalg/small.h"
 
-void plr_filter_keep_for_recovery(plr_filter *f) {
-    plr_real P[36];
-    plr_covariance_pose(f, P);
+static void pack(plr_filter *f, const plr_real P[36]) {
     for (unsigned i = 0, at = 0; i < 6; i++)
         for (unsigned j = 0; j <= i; j++)
             f->recovery_P[at++] = P[6 * i + j];
 }
 
+static void unpack(const plr_filter *f, plr_real P[36]) {
+    for (unsigned i = 0, at = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++, at++)
+            P[6 * i + j] = P[6 * j + i] = f->recovery_P[at];
+}
+
+void plr_filter_keep_for_recovery(plr_filter *f) {
+    plr_real P[36];
+    plr_covariance_pose(f, P);
+    pack(f, P);
+}
+
+/* P <- Ad(D^-1) P Ad(D^-1)^T + Q + B S B^T, S of the biases' prior: what is known of them now may be
+ * what has broken down. */
+void plr_filter_carry_recovery(plr_filter *f) {
+    const plr_motion *m = &f->motion;
+    plr_real R[9], A[36], P[36], carried[36], S[36] = {0}, BSB[36];
+    plr_se3_rotation(R, m->E);
+    plr_se3_adjoint_inverse(A, R, m->p);
+    unpack(f, P);
+    plr_sandwich6(carried, A, P);
+    for (unsigned i = 0; i < 6; i++)
+        S[7 * i] = f->bias_prior_sigma[i] * f->bias_prior_sigma[i];
+    plr_sandwich6(BSB, m->B, S);
+    for (unsigned i = 0; i < 36; i++)
+        carried[i] += m->Q[i] + BSB[i];
+    pack(f, carried);
+}
+
 void plr_filter_recover(plr_filter *f) {
+    plr_real P[36];
     double P_xi[36], variance[6];
+    if (f->motion.pending)
+        plr_filter_carry_recovery(f);
+    unpack(f, P);
+    plr_consistency_cover(f, P);
+    pack(f, P);
+    for (unsigned i = 0; i < 36; i++)
+        P_xi[i] = (double)P[i];
     f->count = 0;
     f->diverged = 0;
     f->totals.recoveries++;
     f->totals.widened++;
     f->frames_without_use = f->frames_mostly_gated = 0;
     f->work.noise.open = 0;
-    for (unsigned i = 0, at = 0; i < 6; i++)
-        for (unsigned j = 0; j <= i; j++, at++)
-            P_xi[6 * i + j] = P_xi[6 * j + i] = (double)f->recovery_P[at];
-    for (unsigned i = 0; i < 6; i++)
-        P_xi[7 * i] += (double)f->motion.Q[7 * i];
     plr_motion_clear(&f->motion);
     plr_covariance_set_pose(f, P_xi);
     plr_consistency_clear(f);

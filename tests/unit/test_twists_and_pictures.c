@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: MIT
+/* Twists against pictures (MATH 17): noise is taken for noise, a slip is told at once, and what lies
+ * between two stories is a part of the covariance until they agree again. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "filter/consistency.h"
+#include "linalg/dense.h"
+#include "linalg/packed.h"
+#include "support/matrices.h"
+#include "support/reseal.h"
+#include "support/rig.h"
+#include "support/specimens.h"
+
+/* A frame in which the twists announce 0.2 m ahead, to 1 cm and 2 mrad. */
+#define WAY_M        0.2
+#define SIGMA_M      0.01
+#define SIGMA_RAD    0.002
+#define SETTLED      15
+#define CONTRADICTED PLR_REASON_TWIST_CONTRADICTED
+#define MAY_BE_WRONG PLR_REASON_POSE_MAY_BE_WRONG
+
+static plr_filter filter;
+static plr_applied_motion believed, applied;
+static rng chance;
+static double information[6]; /* of a picture on nu, without the prior */
+
+void setUp(void) {
+    chance = rng_seeded(61);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, false, 4);
+    plr_consistency_clear(&filter);
+    memset(&believed, 0, sizeof believed);
+    believed.p[0] = (plr_real)WAY_M;
+    for (unsigned k = 0; k < 6; k++) {
+        believed.L[7 * k] = (plr_real)(k < 3 ? SIGMA_M : SIGMA_RAD);
+        information[k] = 100;
+    }
+    applied = believed;
+}
+
+void tearDown(void) {
+}
+
+/* A frame whose picture puts nu at `mean`, give or take its own noise. */
+static void add(const double mean[6], double noise) {
+    plr_real nu[6], Lambda[21] = {0};
+    for (unsigned k = 0; k < 6; k++) {
+        const double seen = mean[k] + noise * rng_normal(&chance) / sqrt(information[k]);
+        nu[k] = (plr_real)(information[k] / (1 + information[k]) * seen);
+        Lambda[plr_upper_row(6, k)] = (plr_real)(1 + information[k]);
+    }
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, false);
+}
+
+static void add_noise(void) {
+    double nu[6];
+    rng_normals(&chance, 1, nu, 6);
+    add(nu, 1);
+}
+
+/* The wheels turn and the body stands. */
+static void add_slip(void) {
+    const double nu[6] = {-WAY_M / SIGMA_M};
+    add(nu, 0);
+}
+
+static void add_agreement(void) {
+    const double nu[6] = {0};
+    add(nu, 0);
+}
+
+static uint32_t judge(void) {
+    const plr_report report = {.matched = 10, .used = 10, .nis = 40, .nis_dof = 40};
+    return plr_consistency_judge(&filter, &report, false);
+}
+
+/* ---------------------------------------------------------------- noise */
+
+/* s^T V^-1 s of a window, where V is diagonal: of as many degrees of freedom as there are directions. */
+static double statistic(const plr_consistency_window *w) {
+    double sum = 0;
+    for (unsigned k = 0; k < 6; k++)
+        sum += pow((double)w->sum[k], 2) / (double)w->variance[plr_upper_row(6, k)];
+    return sum;
+}
+
+/* Some directions are seen well, others hardly: the windows know how much noise each may hold. */
+static void test_under_noise_each_window_is_chi_square_of_six(void) {
+    enum { RUNS = 3000, FRAMES = 40 };
+    static const double seen[6] = {1000, 100, 10, 1, 0.1, 0.03};
+    double sum[PLR_CONSISTENCY_WINDOWS] = {0}, squares[PLR_CONSISTENCY_WINDOWS] = {0};
+    unsigned beyond[PLR_CONSISTENCY_WINDOWS] = {0};
+    memcpy(information, seen, sizeof information);
+    for (int run = 0; run < RUNS; run++) {
+        plr_consistency_clear(&filter);
+        for (int k = 0; k < FRAMES; k++)
+            add_noise();
+        for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++) {
+            const double s = statistic(&filter.consistency.windows[w]);
+            sum[w] += s;
+            squares[w] += s * s;
+            beyond[w] += s > 16.81; /* one in a hundred */
+        }
+    }
+    for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++) {
+        const double mean = sum[w] / RUNS;
+        /* mean 6 and variance 12, to four sigmas of so many runs */
+        TEST_ASSERT_DOUBLE_WITHIN(4 * sqrt(12.0 / RUNS), 6, mean);
+        TEST_ASSERT_DOUBLE_WITHIN(1.8, 12, squares[w] / RUNS - mean * mean);
+        TEST_ASSERT_UINT_WITHIN(22, RUNS / 100, beyond[w]);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, filter.totals.contradictions);
+}
+
+static void test_noise_is_not_told(void) {
+    unsigned told = 0;
+    for (int k = 0; k < 3000; k++) {
+        add_noise();
+        told += judge() != 0;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(60, told); /* one excursion in all that, with its settling */
+    TEST_ASSERT_EQUAL_UINT32(0, filter.totals.contradictions);
+}
+
+/* ---------------------------------------------------------------- a slip */
+
+static void test_a_slip_is_told_within_five_frames(void) {
+    for (int k = 0; k < 100; k++) {
+        add_noise();
+        (void)judge();
+    }
+    int frames = 0;
+    while (!filter.consistency.contradicted && frames < 20) {
+        add_slip();
+        frames++;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_INT(5, frames);
+    TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge() & (CONTRADICTED | MAY_BE_WRONG));
+    TEST_ASSERT_EQUAL_UINT32(1, filter.totals.contradictions);
+}
+
+/* Noise settings are never quite true: what differs by more than its noise, and by little, is said, and
+ * the twists keep their word. */
+static void test_a_small_difference_is_said_and_widens_nothing(void) {
+    const double nu[6] = {3}; /* 3 cm in a frame of 20 */
+    plr_motion before;
+    for (int k = 0; k < 100; k++) {
+        add(nu, 0);
+        (void)judge();
+    }
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.drifting);
+    TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
+    TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge() & (CONTRADICTED | MAY_BE_WRONG));
+    TEST_ASSERT_EQUAL_UINT32(0, filter.totals.contradictions);
+    specimen_motion(&filter, &chance, &filter.motion);
+    memcpy(&before, &filter.motion, sizeof before);
+    plr_consistency_widen(&filter, &believed);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &filter.motion, sizeof before);
+}
+
+static void test_twists_that_are_contradicted_are_believed_less(void) {
+    plr_motion before;
+    for (int k = 0; k < 5; k++)
+        add_slip();
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
+    specimen_motion(&filter, &chance, &filter.motion);
+    memcpy(&before, &filter.motion, sizeof before);
+    plr_consistency_widen(&filter, &believed);
+    const double factor = (double)filter.motion.Q[0] / (double)before.Q[0];
+    TEST_ASSERT_GREATER_THAN_DOUBLE(40.0 / 6, factor); /* they are not, before a window says 40 */
+    for (unsigned i = 0; i < 36; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(4 * REAL_EPSILON * fabs(factor * (double)before.Q[i]),
+                                  factor * (double)before.Q[i], (double)filter.motion.Q[i]);
+    TEST_ASSERT_EQUAL_MEMORY(before.B, filter.motion.B, sizeof before.B);
+}
+
+/* As long as it lasts the pose's covariance reaches from one story to the other. */
+static void test_the_covariance_covers_both_stories(void) {
+    plr_real C[36] = {0};
+    plr_motion_clear(&filter.motion);
+    plr_consistency_cover(&filter, C);
+    for (unsigned i = 0; i < 36; i++)
+        TEST_ASSERT_EQUAL_DOUBLE(0, (double)C[i]);
+    for (int k = 0; k < 10; k++)
+        add_slip();
+    const double apart = (double)filter.consistency.apart[0];
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, -10 * WAY_M, apart);
+    plr_consistency_cover(&filter, C);
+    TEST_ASSERT_DOUBLE_WITHIN(0.06 * apart * apart, apart * apart, (double)C[0]);
+    for (unsigned i = 1; i < 3; i++) /* and a fifth of it to the sides */
+        TEST_ASSERT_DOUBLE_WITHIN(0.002 * apart * apart, 0.04 * apart * apart, (double)C[7 * i]);
+}
+
+/* ---------------------------------------------------------------- outright */
+
+static void contradict_outright(double way_m) {
+    plr_real nu[6] = {(plr_real)(way_m / 0.5)}, Lambda[21] = {0};
+    for (unsigned k = 0; k < 6; k++) {
+        applied.L[7 * k] = PLR_R(0.5);
+        Lambda[plr_upper_row(6, k)] = 1000;
+    }
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, true);
+    applied = believed;
+}
+
+static void test_a_frame_may_contradict_the_twists_outright(void) {
+    add_noise();
+    TEST_ASSERT_EQUAL_HEX32(0, judge());
+    contradict_outright(0.4);
+    TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge());
+    TEST_ASSERT_EQUAL_UINT32(1, filter.totals.contradictions);
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.4, (double)filter.consistency.apart[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-2, pow(0.4 / SIGMA_M, 2), (double)filter.consistency.excess);
+}
+
+static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
+    const double before = (double)filter.P[plr_packed_at(0, 0)];
+    const uint32_t widened = filter.totals.widened;
+    contradict_outright(0.4);
+    (void)judge();
+    for (int k = 1; k < SETTLED; k++) {
+        add_agreement();
+        TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge() | CONTRADICTED);
+        TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
+        TEST_ASSERT_EQUAL_UINT32(widened, filter.totals.widened);
+    }
+    const double apart = (double)filter.consistency.apart[0];
+    add_agreement();
+    TEST_ASSERT_EQUAL_HEX32(0, judge());
+    TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
+    TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.doubtful);
+    TEST_ASSERT_EQUAL_UINT32(widened + 1,
+                             filter.totals.widened); /* what was between them is in P */
+    TEST_ASSERT_DOUBLE_WITHIN(0.06 * apart * apart, before + 1.04 * apart * apart,
+                              (double)filter.P[plr_packed_at(0, 0)]);
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.consistency.apart[0]);
+}
+
+static void test_a_frame_that_differs_begins_the_settling_anew(void) {
+    const double nu[6] = {0, 8};
+    contradict_outright(0.4);
+    (void)judge();
+    for (int k = 1; k < SETTLED; k++) {
+        add_agreement();
+        (void)judge();
+    }
+    add(nu, 0);
+    for (int k = 1; k < SETTLED; k++) {
+        TEST_ASSERT_TRUE(judge() & MAY_BE_WRONG);
+        add_agreement();
+    }
+}
+
+/* ---------------------------------------------------------------- on a drive */
+
+static double error_m(void) {
+    plr_pose truth, pose;
+    scene_pose(&rig.world, &truth);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    return sqrt(pow(truth.p[0] - pose.p[0], 2) + pow(truth.p[1] - pose.p[1], 2) +
+                pow(truth.p[2] - pose.p[2], 2));
+}
+
+static void begin_drive(void) {
+    rig_set_up();
+    rig.config.pixel_sigma_px = 1;
+    rig_begin();
+    rig_drive(20);
+    TEST_ASSERT_FALSE(rig.report.reasons & CONTRADICTED);
+}
+
+/* Ten readings of `speed`, in which the body stands. */
+static void readings_in_place(double speed) {
+    const plr_twist twist = {{speed, 0, 0}, {0}};
+    for (int k = 0; k < RIG_TWISTS; k++) {
+        rig.world.t_ns += RIG_STEP_NS;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+    }
+}
+
+static void test_wheels_that_slip_do_not_carry_the_pose_away(void) {
+    int frames = 0;
+    begin_drive();
+    do {
+        readings_in_place(2);
+        rig_frame();
+    } while (!(rig.report.reasons & CONTRADICTED) && ++frames < 20);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(4, frames); /* told in the fifth at the latest */
+    for (int k = 0; k < 10; k++) {
+        readings_in_place(2);
+        rig_frame();
+    }
+    TEST_ASSERT_TRUE(error_m() < 0.1); /* the readings have gone 2 m */
+    TEST_ASSERT_TRUE(rig.report.reasons & MAY_BE_WRONG);
+    for (int k = 0; k < 60; k++) {
+        readings_in_place(0);
+        rig_frame();
+    }
+    TEST_ASSERT_FALSE(rig.report.reasons & (CONTRADICTED | MAY_BE_WRONG));
+}
+
+/* The picture of the last look, at another time. */
+static void show_again(plr_frame frame) {
+    frame.t_ns = rig.world.t_ns;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
+}
+
+static void test_a_picture_that_is_sent_again_does_not_hold_a_moving_body(void) {
+    begin_drive();
+    const plr_frame frozen = scene_look(&rig.world);
+    show_again(frozen);
+    for (int k = 0; k < 10; k++) {
+        for (int i = 0; i < RIG_TWISTS; i++)
+            rig_twist();
+        show_again(frozen);
+        if (k >= 1) {
+            TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
+            TEST_ASSERT_EQUAL_UINT16(0, rig.report.used);
+        }
+    }
+    TEST_ASSERT_TRUE(error_m() < 0.4); /* of 2 m */
+    rig_drive(1);                      /* new pixels */
+    TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
+    TEST_ASSERT_GREATER_THAN_UINT(3, rig.report.used);
+}
+
+static void test_a_body_that_stands_may_see_the_same_picture(void) {
+    begin_drive();
+    const plr_frame same = scene_look(&rig.world);
+    for (int k = 0; k < 10; k++) {
+        readings_in_place(0);
+        show_again(same);
+        TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
+        TEST_ASSERT_GREATER_THAN_UINT(3, rig.report.used);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_under_noise_each_window_is_chi_square_of_six);
+    RUN_TEST(test_noise_is_not_told);
+    RUN_TEST(test_a_slip_is_told_within_five_frames);
+    RUN_TEST(test_a_small_difference_is_said_and_widens_nothing);
+    RUN_TEST(test_twists_that_are_contradicted_are_believed_less);
+    RUN_TEST(test_the_covariance_covers_both_stories);
+    RUN_TEST(test_a_frame_may_contradict_the_twists_outright);
+    RUN_TEST(test_after_fifteen_frames_of_agreement_it_is_settled);
+    RUN_TEST(test_a_frame_that_differs_begins_the_settling_anew);
+    RUN_TEST(test_wheels_that_slip_do_not_carry_the_pose_away);
+    RUN_TEST(test_a_picture_that_is_sent_again_does_not_hold_a_moving_body);
+    RUN_TEST(test_a_body_that_stands_may_see_the_same_picture);
+    return UNITY_END();
+}
