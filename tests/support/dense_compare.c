@@ -106,7 +106,7 @@ bool dense_compare(const dense_ekf *e, const plr_filter *f, dense_gap *gap) {
     static const double origin[3] = {0, 0, 0};
     unsigned slot_of[DENSE_MAX];
     *gap = (dense_gap){0};
-    if (e->pending || f->motion.pending || !match(e, f, slot_of))
+    if (e->pending != (f->motion.pending == 1) || !match(e, f, slot_of))
         return false;
     const double p[3] = {e->T_WB[3], e->T_WB[7], e->T_WB[11]};
     gap->position_m = distance(p, f->p_WB);

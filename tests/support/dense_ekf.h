@@ -98,7 +98,8 @@ typedef struct dense_gap {
     double covariance; /* |P_ij - P'_ij| / sqrt(P_ii P_jj), in the oracle's errors */
 } dense_gap;
 
-/* Compares after a frame: neither has a motion pending. False if they do not hold the same landmarks. */
+/* Compares after a frame. False if they do not hold the same landmarks, or one has a motion pending and
+ * the other has not. */
 bool dense_compare(const dense_ekf *e, const plr_filter *f, dense_gap *gap);
 
 #endif

@@ -10,6 +10,9 @@
 
 enum { TRIALS = 4, FEW = 3 };
 
+/* Below this share of a pixel's variance an observation says nothing of a range. */
+static const double least_range_share = 0.02;
+
 static const double huber_limit = 2.5, least_promise = 0.01, least_rest = 0.05;
 static const double share_of_bias = 1e-4, zero_column = 1e-6;
 
@@ -305,11 +308,19 @@ static double judge(const sight *at, const sum *best, bool found) {
     return distance2(at, A, b, best->z);
 }
 
-/* -mu^T (P J^T S^-1 r) / r^2: the change of inverse range that the observation alone makes. */
+/* -mu^T (P J^T S^-1 r) / r^2: the change of inverse range that the observation alone makes; none where
+ * what is left uncertain of the range moves the disparity by little. */
 static double change_of_inverse_range(const dense_ekf *e, const sight *at) {
     const double *q = e->x[at->landmark];
-    const double range2 = dot(q, q, 3);
-    double L_S[9], r[3], S[9], JP[9], moved[3];
+    const double range2 = dot(q, q, 3), range = sqrt(range2);
+    const double mu[3] = {q[0] / range, q[1] / range, q[2] / range};
+    double S[9], L_S[9], r[3], JP[9], moved[3], along[3], sideways[3];
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, at->J, mu, 0, along);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, at->P, mu, 0, sideways);
+    const double disparity = along[0] - along[1];
+    if (!(disparity * disparity * dot(mu, sideways, 3) >
+          least_range_share * e->config.pixel_sigma_px * e->config.pixel_sigma_px))
+        return 0;
     memcpy(L_S, at->S, sizeof L_S);
     memcpy(S, at->S, sizeof S);
     (void)oracle_cholesky(3, L_S);
@@ -317,7 +328,7 @@ static double change_of_inverse_range(const dense_ekf *e, const sight *at) {
     (void)oracle_solve_spd(3, 1, S, r);
     square_multiply(3, at->J, at->P, JP);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 3, 1, 3, 1, JP, r, 0, moved);
-    return -dot(q, moved, 3) / (range2 * sqrt(range2));
+    return -dot(mu, moved, 3) / range2;
 }
 
 static bool is_accepted(const dense_ekf *e, const sight *at, double d2) {
@@ -365,7 +376,14 @@ void dense_find_motion(const dense_ekf *e, const plr_frame *frame, dense_first *
         voices += s.sights[i].voice > 0;
     }
     const bool found = voices >= FEW;
-    if (found)
+    if (!found) { /* none can be checked by the others: the twists' prediction says who may speak */
+        for (unsigned i = 0; i < s.count; i++)
+            if (!(e->config.gate_d2 <= 0 || s.sights[i].at_zero <= e->config.gate_d2))
+                s.sights[i].voice = 0;
+        (void)evaluate(&s, zero, &best);
+        accept(&s);
+    }
+    if (voices > 0)
         descend(&s, &best);
     memcpy(first->z, best.z, sizeof first->z);
     first->judged = true;
@@ -373,7 +391,9 @@ void dense_find_motion(const dense_ekf *e, const plr_frame *frame, dense_first *
         const sight *at = &s.sights[i];
         const double d2 = judge(at, &best, found);
         first->d2[at->landmark] = d2;
-        if (is_accepted(e, at, d2))
-            first->closer[at->landmark] = change_of_inverse_range(e, at);
+        if (!is_accepted(e, at, d2))
+            continue;
+        first->accepted++;
+        first->closer[at->landmark] = change_of_inverse_range(e, at);
     }
 }

@@ -16,7 +16,8 @@ typedef struct dense_first {
     double z[6];              /* nu at which the frame is linearised */
     double closer[DENSE_MAX]; /* by how much each landmark's inverse range is changed before, 1/m */
     bool judged;              /* d2 is filled */
-    double d2[DENSE_MAX];     /* by landmark, without what the rows of an image differ by */
+    unsigned accepted;
+    double d2[DENSE_MAX]; /* by landmark, without what the rows of an image differ by */
 } dense_first;
 
 /* L L^T = the covariance of the pending motion, with the small part of the biases' effect that is

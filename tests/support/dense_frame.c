@@ -267,18 +267,16 @@ static void bring_closer(dense_ekf *e, const double *closer, double *mean) {
     double *F = dense_identity(n), *C = dense_zeros(n, 6);
     for (unsigned i = 0; i < e->count; i++) {
         double *q = e->x[i], along[3], moved[3], J[9];
-        const double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), ratio = 1 + closer[i] * r;
-        if (!(ratio >= 0.5 && ratio <= 2) || !(r / ratio <= e->config.max_range_m) ||
-            !(r / ratio >= min_range))
-            continue;
+        const double r = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+        double ratio = fmin(2, fmax(0.5, 1 + closer[i] * r)); /* of inverse ranges */
+        ratio = fmin(r / min_range, fmax(r / e->config.max_range_m, ratio));
         for (int k = 0; k < 3; k++)
-            along[k] =
-                -closer[i] * r * q[k]; /* a change of range, to first order in inverse range */
+            along[k] = (1 - ratio) * q[k]; /* a change of range, to first order in inverse range */
         dense_polar_step(q, along, moved, J);
         dense_put(F, n, dense_row(e, i), dense_row(e, i), 3, 3, J);
         for (int k = 0; k < 3; k++) {
             q[k] = moved[k];
-            mean[dense_row(e, i) + (unsigned)k] = closer[i] * (r / ratio) * moved[k];
+            mean[dense_row(e, i) + (unsigned)k] = (ratio - 1) / ratio * moved[k];
         }
     }
     dense_sandwich(e, F);
@@ -331,6 +329,15 @@ static void apply_motion(dense_ekf *e, const dense_first *first, double *mean) {
     free(F);
 }
 
+/* A frame that uses nothing and makes no landmark leaves the motion pending. */
+static bool is_needed(const dense_ekf *e, const plr_frame *frame, const dense_first *first) {
+    bool needed = first->accepted > 0 || e->config.mode != PLR_MODE_SLAM || !dense_is_body(e);
+    for (unsigned i = 0; i < frame->count; i++)
+        needed = needed || (dense_find(e, frame->observations[i].id) == e->count &&
+                            is_worth_it(e, &frame->observations[i]));
+    return needed;
+}
+
 /* Brings the state up to the frame; `mean` is what the prior says of the errors there. */
 static void catch_up(dense_ekf *e, const plr_frame *frame, dense_first *first, double *mean) {
     memset(first, 0, sizeof *first);
@@ -338,6 +345,8 @@ static void catch_up(dense_ekf *e, const plr_frame *frame, dense_first *first, d
         dense_motion_prior(e, first->L);
         if (e->config.mode == PLR_MODE_SLAM)
             dense_find_motion(e, frame, first);
+        if (!is_needed(e, frame, first))
+            return;
         bring_closer(e, first->closer, mean);
         apply_motion(e, first, mean);
     }
@@ -361,7 +370,7 @@ dense_report dense_update(dense_ekf *e, const plr_frame *frame) {
             continue;
         report.matched++;
         double d2 = (double)INFINITY;
-        if (linearise(e, landmark, o, H, r))
+        if (!e->pending && linearise(e, landmark, o, H, r))
             d2 = (first.judged ? first.d2[landmark] : distance2(e, H, r)) + row_gap2(e, o);
         if (!(isfinite(d2) && (e->config.gate_d2 <= 0 || d2 <= e->config.gate_d2))) {
             report.gated++;
@@ -374,7 +383,8 @@ dense_report dense_update(dense_ekf *e, const plr_frame *frame) {
     }
     if (s.rows > 0)
         gain(e, &s, dx);
-    retract(e, dx);
+    if (!e->pending)
+        retract(e, dx);
     free(dx);
     free(s.R);
     free(s.r);
