@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+/*
+ * While twists are contradicted, a frame takes their noise for larger. A frame that used nothing left
+ * the motion pending with that larger noise, and the next one enlarged it again: a camera that went dark
+ * in the middle of a contradiction made the pose's covariance grow without end, and within seconds it
+ * was no number.
+ */
+#include <math.h>
+#include <unity.h>
+
+#include "support/rig.h"
+
+enum { DARK_FRAMES = 300 };
+
+void setUp(void) {
+    rig_set_up();
+}
+
+void tearDown(void) {
+}
+
+static double sigma_m(void) {
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    return sqrt(P[0] + P[7] + P[14]);
+}
+
+/* Wheels that slip: the twists tell half of the way. */
+static void slip(unsigned frames) {
+    for (unsigned k = 0; k < frames; k++) {
+        for (unsigned i = 0; i < RIG_TWISTS; i++) {
+            plr_twist twist = scene_read(&rig.world);
+            for (int axis = 0; axis < 3; axis++)
+                twist.v_B_mps[axis] *= 0.5;
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+            scene_move(&rig.world, RIG_STEP_NS);
+        }
+        rig_frame();
+    }
+}
+
+static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone(void) {
+    rig.config.bias = 0;
+    rig_begin();
+    rig_drive(20);
+    slip(10);
+    TEST_ASSERT_EQUAL_UINT8(1, rig.filter.consistency.contradicted);
+    const double before = sigma_m();
+    for (unsigned k = 0; k < DARK_FRAMES; k++) {
+        for (unsigned i = 0; i < RIG_TWISTS; i++)
+            rig_twist();
+        const plr_frame dark = {.t_ns = rig.world.t_ns, .budget = 1};
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &dark, &rig.report));
+        TEST_ASSERT_EQUAL_UINT32(0, rig.filter.totals.recoveries);
+    }
+    /* half a minute at 0.05 m/s and 0.01 rad/s, each reading on its own, on a way of 60 m */
+    TEST_ASSERT_LESS_THAN_DOUBLE(2 * before + 2, sigma_m());
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone);
+    return UNITY_END();
+}
