@@ -124,7 +124,7 @@ static void look(void) {
     const bool was_pending = dense.pending; /* a frame that does nothing is not rounded either */
     const dense_report expected = dense_update(&dense, &frame);
     if (expected.used > 0 || (was_pending && !dense.pending))
-        dense_make_up_for_rounding(&dense, &frame, 8 * REAL_EPSILON);
+        dense_make_up_for_rounding(&dense, &frame, REAL_EPSILON);
     for (unsigned i = 0; i < evictions; i++)
         dense_remove(&dense, evicted[i]);
     const bool adopts = config.mode == PLR_MODE_LOCALIZATION;

@@ -85,7 +85,7 @@ static void test_without_motion_a_second_frame_changes_both_alike(void) {
     demand_same_poses(1e-6 + 100 * REAL_EPSILON, 1e-6 + 100 * REAL_EPSILON, 1e-4 + rounding);
 }
 
-/* Drives blindly, then has an empty frame apply the motion. */
+/* Drives blindly, then has the birth of a landmark apply the motion. */
 static void drive_blindly(void) {
     plr_report reports[2];
     begin_both();
@@ -98,9 +98,12 @@ static void drive_blindly(void) {
         scene_move(&rig.world, RIG_STEP_NS);
     }
     demand_same_poses(0, 0, 0);
-    const plr_frame empty = {.t_ns = plr_filter_time(&filters[0]), .budget = 1};
-    for (int model = 0; model < 2; model++)
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filters[model], &empty, NULL));
+    const plr_observation unknown = {99, 400, 300, 390, 300};
+    const plr_frame frame = {plr_filter_time(&filters[0]), 1, 1, &unknown};
+    for (int model = 0; model < 2; model++) {
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filters[model], &frame, NULL));
+        TEST_ASSERT_EQUAL_UINT8(0, filters[model].motion.pending);
+    }
 }
 
 /* Motion alone is the same for both: the pose's block does not know the landmarks. */

@@ -10,12 +10,14 @@
 #include "support/specimens.h"
 
 /* The charts are the filter's: what is added to a bearing's two variances depends on their basis. */
-void dense_make_up_for_rounding(dense_ekf *e, const plr_frame *frame, double share) {
+void dense_make_up_for_rounding(dense_ekf *e, const plr_frame *frame, double rounding) {
     const unsigned n = dense_dim(e);
-    for (unsigned at = 0; at < frame->count; at++) {
-        const unsigned i = dense_find(e, frame->observations[at].id), row = dense_row(e, i);
-        if (i == e->count)
-            continue;
+    for (unsigned i = 0; i < e->count; i++) {
+        const unsigned row = dense_row(e, i);
+        double share = rounding;
+        for (unsigned at = 0; at < frame->count; at++)
+            if (frame->observations[at].id == e->id[i])
+                share = 8 * rounding;
         double P_q[9], P_w[9], own[9], Jw[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, Ji[9];
         memcpy(Ji, Jw, sizeof Ji);
         if (dense_is_body(e)) {

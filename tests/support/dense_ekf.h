@@ -75,9 +75,9 @@ void dense_pose_covariance(const dense_ekf *e, double P_xi[36]);
 /* Match, gate, update, retract, by the observations of landmarks that it holds. */
 dense_report dense_update(dense_ekf *e, const plr_frame *frame);
 
-/* What the filter adds to the variances of the landmarks that it sees, at the end of some frames
- * (docs/NUMERICS.md 1): `share` of each, in its own charts. */
-void dense_make_up_for_rounding(dense_ekf *e, const plr_frame *frame, double share);
+/* What the filter adds to the landmarks' variances at the end of a frame (docs/NUMERICS.md 1): a rounding of
+ * each, eight of those that it saw, in its own charts. */
+void dense_make_up_for_rounding(dense_ekf *e, const plr_frame *frame, double rounding);
 
 /* New landmarks from the others, in the frame's order and while there is room. Returns how many. */
 unsigned dense_create(dense_ekf *e, const plr_frame *frame);
