@@ -13,7 +13,7 @@ enum { TRIALS = 4, FEW = 3 };
 /* Below this share of a pixel's variance an observation says nothing of a range. */
 static const double least_range_share = 0.02;
 
-static const double huber_limit = 2.5, least_promise = 0.01, least_rest = 0.05;
+static const double huber_limit = 2.5, least_promise = 0.1, least_rest = 0.05;
 static const double share_of_bias = 1e-4, zero_column = 1e-6;
 
 /* A landmark that the frame sees. */
