@@ -166,7 +166,7 @@ typedef struct plr_filter {
     double p_WB[3]; /* double in both builds: a float32 would round small steps away */
     plr_real bias[PLR_BIAS_DIM];
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
-    plr_real recovery_P[21]; /* the pose's covariance when it was last in order, packed lower */
+    plr_real recovery_P[21]; /* the pose's covariance, last in order, carried along; packed lower */
     plr_real reading[6];     /* last twist */
     plr_motion motion;
 

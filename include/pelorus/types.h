@@ -189,8 +189,8 @@ typedef struct plr_report {
                                judged by what the others say of the motion (docs/MATH.md 8) */
 } plr_report;
 
-/* How it stands at some time, with or without a frame: plr_filter_health. Seconds are 0 where there
- * never was one; the reasons then say NO_FRAMES, NO_OBSERVATIONS or NO_TWISTS. */
+/* How it stands at some time, with or without a frame: plr_filter_health. Seconds are infinite
+ * where there never was one; the reasons then say NO_FRAMES, NO_OBSERVATIONS or NO_TWISTS. */
 typedef struct plr_health_state {
     plr_health health;
     uint32_t reasons;             /* bits of plr_reason */
