@@ -37,8 +37,11 @@ static void add_counts(summary *s, const plr_report *report) {
     s->left_out += report->left_out;
     s->blocks_failed += report->blocks_failed;
     s->health[report->health]++;
-    if (report->health == PLR_HEALTH_DIVERGED && s->diverged_ns == 0)
-        s->diverged_ns = report->t_ns;
+    if (report->reasons & PLR_REASON_RECOVERED) {
+        if (s->recoveries == 0)
+            s->diverged_ns = report->t_ns;
+        s->recoveries++;
+    }
 }
 
 static void add_pose(summary *s, const plr_pose_message *pose) {
@@ -145,6 +148,11 @@ static void print_counts(const summary *s, const plr_session *session) {
            " diverged\n",
            s->health[PLR_HEALTH_GOOD], s->health[PLR_HEALTH_DEGRADED], s->health[PLR_HEALTH_LOST],
            s->health[PLR_HEALTH_DIVERGED]);
+    if (s->recoveries > 0)
+        printf("              diverged and recovered %" PRIu64
+               " times, first at %.3f s: the pose was kept,\n"
+               "              the landmarks were dropped\n",
+               s->recoveries, (double)s->diverged_ns * 1e-9);
 }
 
 static void print_truth(const evaluation_figures *truth) {

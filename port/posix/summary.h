@@ -12,8 +12,9 @@ typedef struct summary {
     uint64_t observations, matched, used, gated, created, evicted;
     uint64_t refused_observations, duplicates, no_room, poor, left_out, blocks_failed;
     uint64_t health[PLR_HEALTH_DIVERGED + 1]; /* frames in each */
+    uint64_t recoveries;                      /* from divergence, in the same frame */
     uint64_t warnings;
-    plr_time_ns first_ns, last_ns, diverged_ns;
+    plr_time_ns first_ns, last_ns, diverged_ns; /* the first time; 0: never */
     plr_pose last_pose;
     double path_m;
     samples compute_us; /* double, a frame each */

@@ -75,6 +75,7 @@ static void put_counts(json_object *o, const summary *s, const plr_session *sess
     json_count(o, "frames_degraded", s->health[PLR_HEALTH_DEGRADED]);
     json_count(o, "frames_lost", s->health[PLR_HEALTH_LOST]);
     json_count(o, "frames_diverged", s->health[PLR_HEALTH_DIVERGED]);
+    json_count(o, "recoveries", s->recoveries);
     json_number(o, "diverged_s", s->diverged_ns > 0 ? (double)s->diverged_ns * 1e-9 : nan(""));
 }
 
