@@ -14,6 +14,7 @@ from pelorus.frames import (
     Camera,
     Kind,
     Message,
+    Report,
     Stereo,
     Text,
     Twist,
@@ -41,6 +42,8 @@ from replay_drive import (
     truth,
     twist,
 )
+
+FROZEN_IMAGE = 1 << 16  # plr_reason
 
 
 @pytest.fixture
@@ -271,17 +274,20 @@ def test_more_observations_than_fit_are_refused_and_the_rest_used(record: Record
     assert "longer than this build holds" in result.stderr
 
 
-@pytest.mark.parametrize("disparity", [0.0, -5.0, 0.01])
+@pytest.mark.parametrize(
+    ("disparity", "model"), [(0.0, "world"), (-5.0, "world"), (1e-4, "world"), (-10.0, "body")]
+)
 def test_disparities_that_put_a_point_nowhere_make_no_landmark(
-    record: Record, tmp_path: Path, disparity: float
+    record: Record, tmp_path: Path, disparity: float, model: str
 ) -> None:
+    """`body` takes a point beyond infinity if noise explains it; `world` has no place for one."""
     messages, out = drive(), tmp_path / "out.plr"
     for i, m in enumerate(messages):
         if isinstance(m, Stereo):
             pixels = m.pixels.copy()
             pixels[:, 2] = pixels[:, 0] - disparity
             messages[i] = replace(m, pixels=pixels)
-    result = run(record(messages), "--json", "--out", out)
+    result = run(record(messages), "--json", "--out", out, "--model", model)
     assert result.status == OK
     assert (result.summary["new"], result.summary["used"]) == (0, 0)
     assert result.summary["poor"] > FRAMES
@@ -292,17 +298,40 @@ def test_disparities_that_put_a_point_nowhere_make_no_landmark(
 def test_landmarks_that_fall_behind_the_camera_break_nothing(
     record: Record, tmp_path: Path
 ) -> None:
-    """The body turns on the spot, and goes on claiming to see what is behind it."""
+    """The body turns on the spot, and goes on claiming to see what is behind it.
+
+    With so few points: many that agree would be believed against the twists.
+    """
     first, out = stereo(0), tmp_path / "out.plr"
     messages: list[Message] = [header()]
     for k in range(FRAMES):
         messages.append(Twist(t_ns(k), np.zeros(3), np.array([0, 0, 1.0])))
-        messages.append(replace(first, t_ns=t_ns(k)))
+        moved = first.pixels + np.float32(
+            0.25 * (k % 2)
+        )  # or it would be taken for a frozen picture
+        messages.append(replace(first, t_ns=t_ns(k), ids=first.ids[:5], pixels=moved[:5]))
     for model in ("body", "world"):
         result = run(record(messages), "--json", "--out", out, "--model", model)
         assert result.status == OK
         assert result.summary["gated"] > 0
         assert assert_healthy(out) == FRAMES
+
+
+def test_a_picture_that_is_sent_again_while_the_body_turns_is_frozen(
+    record: Record, tmp_path: Path
+) -> None:
+    first, out = stereo(0), tmp_path / "out.plr"
+    messages: list[Message] = [header()]
+    for k in range(FRAMES):
+        messages.append(Twist(t_ns(k), np.zeros(3), np.array([0, 0, 1.0])))
+        messages.append(replace(first, t_ns=t_ns(k)))
+    result = run(record(messages), "--json", "--out", out)
+    assert result.status == OK
+    assert assert_healthy(out) == FRAMES
+    frozen = [bool(m.reasons & FROZEN_IMAGE) for m in log_of(out) if isinstance(m, Report)]
+    assert sum(frozen) > FRAMES - 5
+    assert not frozen[0]
+    assert result.summary["used"] < 3 * len(first.ids)
 
 
 def test_empty_frames_are_frames(record: Record) -> None:
