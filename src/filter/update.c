@@ -339,7 +339,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     match(f, seen, n);
     adopt_known(f, seen, n, &events, report);
     count_seen(f, n);
-    if (plr_consistency_is_frozen(f, frame, n))
+    if (f->config.model == PLR_MODEL_BODY && plr_consistency_is_frozen(f, frame, n))
         n = 0; /* it says nothing of now */
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
                        f->config.mode == PLR_MODE_SLAM;
