@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "filter/health.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "filter/consistency.h"
@@ -137,7 +136,7 @@ void plr_health_damaged(plr_filter *f, plr_report *report) {
 }
 
 static double seconds_if(bool ever, plr_time_ns then, plr_time_ns now) {
-    return ever ? seconds_since(then, now) : (double)INFINITY;
+    return ever ? seconds_since(then, now) : (double)__builtin_inf();
 }
 
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health) {
