@@ -99,7 +99,7 @@ static void demand_consistent(double velocity, double gyro, double pixel, unsign
         setUp();
         rig.config.bias = (uint8_t)bias;
         const double mean = drive(velocity, gyro, pixel, landmarks);
-        char at[64];
+        char at[160];
         snprintf(at, sizeof at, "%g m/s, %g rad/s, %g px, %u landmarks, bias %d", velocity, gyro,
                  pixel, landmarks, bias);
         /* 1, and as so few drives scatter; less where twists and pictures seemed to come apart for a while,
