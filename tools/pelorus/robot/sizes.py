@@ -280,15 +280,15 @@ def _title(names: str) -> str:
     return f"| {names} |\n|---|{'---:|' * (count - 1)}"
 
 
-# The search for a frame's motion takes one to six evaluations: so far apart frames of the same counts
-# may be.
+# The search for a frame's motion takes one to six evaluations: frames of the same counts may be so
+# far apart.
 SPREAD_LIMIT = 1.3
 
 TEMPLATE = """# What it costs
 
 Made by `tools/sizes.sh`; `tools/sizes.sh --check` measures again and fails where a number has moved
-by more than {tolerance} (stack seen: 64 bytes; worst / median: never above {spread_limit}). The images are
-float32, bias on, blocks of 8, at most 128 observations a frame (64 for N = 8 and 16); compiler
+by more than {tolerance} (stack seen: 64 bytes; worst / median: never above {spread_limit}).
+The images are float32, bias on, blocks of 8, at most 128 observations a frame (64 for N = 8 and 16); compiler
 `arm-none-eabi-gcc` 12.2, library at -O3.
 
 ## Memory
