@@ -288,7 +288,8 @@ TEMPLATE = """# What it costs
 
 Made by `tools/sizes.sh`; `tools/sizes.sh --check` measures again and fails where a number has moved
 by more than {tolerance} (stack seen: 64 bytes; worst / median: never above {spread_limit}).
-The images are float32, bias on, blocks of 8, at most 128 observations a frame (64 for N = 8 and 16); compiler
+The images are float32, bias on, blocks of 8, at most 128 observations a frame (64 for N = 8 and
+16); compiler
 `arm-none-eabi-gcc` 12.2, library at -O3.
 
 ## Memory
