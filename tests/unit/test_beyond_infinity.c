@@ -72,7 +72,7 @@ static void test_points_are_born_with_the_disparity_that_was_seen(void) {
 /* Seen so often that the noise of each is 1/5 px: the mean of all is right to 1/35. */
 static void demand_no_bias(plr_mode mode, bool same_time, double disparity_px) {
     unsigned negative;
-    rig.config.mode = mode;
+    rig.config.mode = (uint8_t)mode;
     rig_begin();
     plr_time_ns t_ns = 1000000000;
     for (int k = 0; k < FRAMES; k++) {

@@ -71,7 +71,7 @@ static void take_specimen(noise_kind kind, bool bias, bool shifted) {
 static void for_each_noise(void (*check)(noise_kind kind, bool bias, bool shifted)) {
     for (int kind = 0; kind < KINDS; kind++)
         for (int run = 0; run < 4 * RUNS; run++)
-            check(kind, run % 2, run / 2 % 2);
+            check((noise_kind)kind, run % 2, run / 2 % 2);
 }
 
 /* ---------------------------------------------------------------- the factor */
