@@ -22,6 +22,11 @@ set(FORBIDDEN malloc calloc realloc free _malloc_r _free_r _sbrk printf snprintf
   puts fopen fma fmaf sin cos tan atan2 exp log pow sinf cosf tanf atan2f expf logf powf)
 list(TRANSFORM FORBIDDEN PREPEND "-Wl,--wrap=")
 
+# By the bits of a number, which fill most of a frame. tests/target holds it against what the deepest
+# chain of calls takes.
+set(stack_bytes_32 8192)
+set(stack_bytes_64 16384)
+
 # -fstack-usage and -fcallgraph-info are what docs/SIZES.md's bound of the stack is made from.
 set(flags_c -O2 -ffp-contract=off -fno-math-errno -fsigned-char
   -ffunction-sections -fdata-sections -fno-common -fstack-usage -fcallgraph-info=su
@@ -83,8 +88,8 @@ function(cortexm_library result cpu capacity bits)
   set(${result} ${name} PARENT_SCOPE)
 endfunction()
 
-# An image `name` for a board, out of sources and a library, in all three forms.
-function(cortexm_image name board library)
+# An image `name` for a board, out of sources and a library of that precision, in all three forms.
+function(cortexm_image name board library bits)
   set(cpu ${board_${board}_cpu})
   set(drivers ${board_${board}_drivers} ${cpu_${cpu}_guard})
   list(TRANSFORM drivers PREPEND "${PORT}/drivers/")
@@ -96,6 +101,7 @@ function(cortexm_image name board library)
     LINK_DEPENDS "${folder}/memory.ld;${PORT}/boards/sections.ld")
   target_link_libraries(${name} PRIVATE ${library})
   target_link_options(${name} PRIVATE ${cpu_${cpu}} -nostartfiles --specs=nano.specs
+    "-Wl,--defsym=STACK_SIZE=${stack_bytes_${bits}}"
     -T "${folder}/memory.ld" "-L${PORT}/boards" -Wl,--gc-sections -Wl,--fatal-warnings
     "-Wl,-Map=${IMAGES}/${name}.map" ${FORBIDDEN})
   add_custom_command(TARGET ${name} POST_BUILD
@@ -105,7 +111,7 @@ endfunction()
 
 function(cortexm_bringup board)
   cortexm_library(library ${board_${board}_cpu} 8 32)
-  cortexm_image(bringup-${board} ${board} ${library} "${PORT}/main_bringup.c")
+  cortexm_image(bringup-${board} ${board} ${library} 32 "${PORT}/main_bringup.c")
   add_dependencies(bringup bringup-${board})
 endfunction()
 
@@ -115,7 +121,7 @@ function(cortexm_firmware board capacity bits)
   if(bits EQUAL 64)
     string(APPEND suffix -f64)
   endif()
-  cortexm_image(pelorus-${suffix} ${board} ${library}
+  cortexm_image(pelorus-${suffix} ${board} ${library} ${bits}
     "${PORT}/main_firmware.c" "${PORT}/port_serial.c" ${telemetry_sources})
   if(PELORUS_MAVLINK)
     add_dependencies(pelorus-${suffix} pelorus_mavlink_headers)
@@ -127,7 +133,7 @@ endfunction()
 function(cortexm_bench board capacity)
   cortexm_library(library ${board_${board}_cpu} ${capacity} 32)
   set(name bench-${board}-n${capacity})
-  cortexm_image(${name} ${board} ${library} "${PORT}/main_bench.c" "${PORT}/bench_recording.S")
+  cortexm_image(${name} ${board} ${library} 32 "${PORT}/main_bench.c" "${PORT}/bench_recording.S")
   set_source_files_properties("${PORT}/bench_recording.S" PROPERTIES
     OBJECT_DEPENDS "${PELORUS_BENCH_RECORDING}"
     COMPILE_DEFINITIONS "BENCH_RECORDING=\"${PELORUS_BENCH_RECORDING}\"")
