@@ -1,39 +1,51 @@
 # SPDX-License-Identifier: MIT
-# The textbook filter on OpenBLAS and LAPACKE: a library that the tests hold `world` against, and the
-# program pelorus-textbook, which is the replay with that filter in the place of the library's.
+# The textbook filter: a library that the tests hold whole frames against, on OpenBLAS and LAPACKE or,
+# slower, on plain loops; and where there is OpenBLAS the program pelorus-textbook, which is the replay
+# with that filter in the place of the library's.
+set(pelorus_textbook_dir "${PROJECT_SOURCE_DIR}/tests/textbook")
+set(pelorus_oracle_dir "${PROJECT_SOURCE_DIR}/tests/support")
 
 # Settings and vocabulary are the library's, and so are its public headers; nothing of src/filter is.
 add_library(pelorus-textbook-filter STATIC
-  "${PROJECT_SOURCE_DIR}/textbook/se3.c"
-  "${PROJECT_SOURCE_DIR}/textbook/state.c"
-  "${PROJECT_SOURCE_DIR}/textbook/predict.c"
-  "${PROJECT_SOURCE_DIR}/textbook/observe.c"
-  "${PROJECT_SOURCE_DIR}/textbook/update.c"
-  "${PROJECT_SOURCE_DIR}/textbook/landmarks.c")
+  "${pelorus_textbook_dir}/state.c"
+  "${pelorus_textbook_dir}/transport.c"
+  "${pelorus_textbook_dir}/predict.c"
+  "${pelorus_textbook_dir}/observe.c"
+  "${pelorus_textbook_dir}/search.c"
+  "${pelorus_textbook_dir}/body.c"
+  "${pelorus_textbook_dir}/update.c"
+  "${pelorus_textbook_dir}/landmarks.c"
+  "${pelorus_oracle_dir}/rigid.c"
+  "${pelorus_oracle_dir}/oracle.c"
+  "${pelorus_oracle_dir}/plain_algebra.c"
+  "${pelorus_oracle_dir}/oracle_$<IF:$<TARGET_EXISTS:pelorus_blas>,blas,plain>.c")
 target_include_directories(pelorus-textbook-filter PUBLIC
-  "${PROJECT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/include")
-target_link_libraries(pelorus-textbook-filter PUBLIC pelorus_blas m)
+  "${PROJECT_SOURCE_DIR}/tests" "${PROJECT_SOURCE_DIR}/include")
+target_link_libraries(pelorus-textbook-filter PUBLIC m)
+if(TARGET pelorus_blas)
+  target_link_libraries(pelorus-textbook-filter PUBLIC pelorus_blas)
+endif()
 target_compile_options(pelorus-textbook-filter PRIVATE -ffp-contract=off)
 pelorus_warnings(pelorus-textbook-filter)
 
-if(NOT PELORUS_POSIX_SOURCES)
+if(NOT PELORUS_POSIX_SOURCES OR NOT TARGET pelorus_blas)
   return()
 endif()
 
 # The program: wire, session and replay as they are, settings and texts of the filter, and plr_filter_*
-# from textbook/ in the place of src/filter.
+# from tests/textbook in the place of src/filter.
 file(GLOB pelorus_textbook_session CONFIGURE_DEPENDS
   "${PROJECT_SOURCE_DIR}/src/session/*.c" "${PROJECT_SOURCE_DIR}/src/wire/*.c")
 set(pelorus_textbook_posix ${PELORUS_POSIX_SOURCES})
 list(FILTER pelorus_textbook_posix EXCLUDE REGEX "/(main|program)\\.c$")
 add_executable(pelorus-textbook
-  "${PROJECT_SOURCE_DIR}/textbook/main.c"
-  "${PROJECT_SOURCE_DIR}/textbook/program.c"
-  "${PROJECT_SOURCE_DIR}/textbook/census.c"
-  "${PROJECT_SOURCE_DIR}/textbook/memory.c"
-  "${PROJECT_SOURCE_DIR}/textbook/filter.c"
-  "${PROJECT_SOURCE_DIR}/textbook/frame.c"
-  "${PROJECT_SOURCE_DIR}/textbook/estimate.c"
+  "${pelorus_textbook_dir}/main.c"
+  "${pelorus_textbook_dir}/program.c"
+  "${pelorus_textbook_dir}/census.c"
+  "${pelorus_textbook_dir}/memory.c"
+  "${pelorus_textbook_dir}/filter.c"
+  "${pelorus_textbook_dir}/frame.c"
+  "${pelorus_textbook_dir}/estimate.c"
   "${PROJECT_SOURCE_DIR}/src/filter/settings.c"
   "${PROJECT_SOURCE_DIR}/src/filter/status.c"
   ${pelorus_textbook_session} ${pelorus_textbook_posix})

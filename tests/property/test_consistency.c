@@ -7,7 +7,6 @@
 #include <unity.h>
 
 #include "support/axes.h"
-#include "support/dense_parts.h"
 #include "support/oracle.h"
 #include "support/rig.h"
 #include "support/rigid.h"
@@ -42,7 +41,7 @@ static double squared_error(void) {
     double P[36], T[16], inverse[16], E[16], e[6], weighted[6], sum = 0;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
-    dense_motion(T, &pose);
+    rigid_from_pose(T, &pose);
     rigid_inverse(inverse, T);
     square_multiply(4, inverse, rig.world.T_WB, E);
     logarithm(E, e);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * Whole frames of the filter against the textbook filter in double
- * (support/dense_ekf.h): state and covariance after accumulated predicts, gate,
+ * Whole frames of the filter against the textbook filter
+ * (textbook/textbook.h) in double: state and covariance after accumulated predicts, gate,
  * blocks, retraction, eviction and new landmarks.
  *
  * Built for several block sizes too: all of them must agree with the one gain
@@ -18,14 +18,14 @@
 #include <string.h>
 #include <unity.h>
 
-#include "support/dense_ekf.h"
 #include "support/matrices.h"
 #include "support/scene.h"
+#include "support/twin.h"
 
-enum { STEP_NS = 10000000, TWISTS = 10, FRAMES = 40, FRAGILE_FRAMES = 5 };
+enum { STEP_NS = 10000000, TWISTS = 10, FRAMES = 40, FRAGILE_FRAMES = 5, MOST = 64 };
 
 static plr_filter filter;
-static dense_ekf dense;
+static textbook book;
 static scene world;
 static scene_options options;
 static plr_config config;
@@ -41,7 +41,7 @@ static int note_eviction(void *context, const plr_landmark *landmark) {
 
 void setUp(void) {
     plr_config_default(&config);
-    config.slots = PLR_MAX_LANDMARKS < DENSE_MAX ? PLR_MAX_LANDMARKS : DENSE_MAX;
+    config.slots = PLR_MAX_LANDMARKS < MOST ? PLR_MAX_LANDMARKS : MOST;
     config.start_sigma = 0.01;
     scene_options_default(&options);
     options.most_seen = 24;
@@ -49,6 +49,7 @@ void setUp(void) {
 }
 
 void tearDown(void) {
+    textbook_free(&book);
 }
 
 static bool is_fragile(void) {
@@ -87,7 +88,8 @@ static void begin(void) {
     if (config.mode == PLR_MODE_LOCALIZATION)
         map.source = surveyed;
     scene_start(&world, &options);
-    dense_init(&dense, &world.calibration, &config);
+    textbook_free(&book);
+    TEST_ASSERT_TRUE(textbook_init(&book, &world.calibration, &config, MOST, PLR_MAX_OBSERVATIONS));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, &map));
 }
 
@@ -97,19 +99,26 @@ static void drive(plr_time_ns step_ns) {
     const plr_twist reading = scene_read(&world);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
     scene_move(&world, step_ns);
-    dense_hold(&dense, &reading, (double)step_ns * 1e-9, (double)step_ns * 1e-9);
+    textbook_hold(&book, &reading, (double)step_ns * 1e-9, (double)step_ns * 1e-9);
 }
 
 /* Known landmarks enter the oracle before the frame, as the filter asks for them. */
 static void adopt(const plr_frame *frame) {
     for (unsigned i = 0; i < frame->count; i++) {
         plr_landmark known;
-        bool held = false;
-        for (unsigned k = 0; k < dense.count; k++)
-            held = held || dense.id[k] == frame->observations[i].id;
-        if (!held && surveyed(NULL, frame->observations[i].id, &known))
-            dense_insert_known(&dense, &known);
+        const uint32_t id = frame->observations[i].id;
+        if (textbook_find(&book, id) == book.count && surveyed(NULL, id, &known))
+            TEST_ASSERT_TRUE(textbook_insert_known(&book, &known));
     }
+}
+
+/* New landmarks in the oracle, in the frame's order and while the filter has a slot. */
+static unsigned create(const plr_frame *frame) {
+    const unsigned before = book.count;
+    for (unsigned i = 0; i < frame->count && book.count < config.slots; i++)
+        if (textbook_find(&book, frame->observations[i].id) == book.count)
+            (void)textbook_create(&book, book.count, frame->t_ns, &frame->observations[i]);
+    return book.count - before;
 }
 
 /* One frame in both. What the filter evicts leaves the oracle too. */
@@ -121,14 +130,14 @@ static void look(void) {
     if (config.mode == PLR_MODE_LOCALIZATION)
         adopt(&frame);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &frame, &report));
-    const bool was_pending = dense.pending; /* a frame that does nothing is not rounded either */
-    const dense_report expected = dense_update(&dense, &frame);
-    if (expected.used > 0 || (was_pending && !dense.pending))
-        dense_make_up_for_rounding(&dense, &frame, REAL_EPSILON);
+    const bool was_pending = book.pending; /* a frame that does nothing is not rounded either */
+    const textbook_report expected = textbook_update(&book, frame.t_ns, &frame);
+    if (expected.used > 0 || (was_pending && !book.pending))
+        twin_make_up_for_rounding(&book, &frame, REAL_EPSILON);
     for (unsigned i = 0; i < evictions; i++)
-        dense_remove(&dense, evicted[i]);
+        textbook_remove(&book, textbook_find(&book, evicted[i]));
     const bool adopts = config.mode == PLR_MODE_LOCALIZATION;
-    const unsigned created = adopts ? report.created : dense_create(&dense, &frame);
+    const unsigned created = adopts ? report.created : create(&frame);
     TEST_ASSERT_EQUAL_UINT(expected.matched, report.matched);
     TEST_ASSERT_EQUAL_UINT(expected.gated, report.gated);
     TEST_ASSERT_EQUAL_UINT(expected.used, report.used);
@@ -139,10 +148,10 @@ static void look(void) {
 
 static void compare(unsigned frame) {
     const double own = REAL_EPSILON * (is_fragile() ? 50 : 1);
-    dense_gap gap;
+    twin_gap gap;
     char at[48];
     snprintf(at, sizeof at, "model %d, bias %d, frame %u", config.model, config.bias, frame);
-    TEST_ASSERT_TRUE_MESSAGE(dense_compare(&dense, &filter, &gap), at);
+    TEST_ASSERT_TRUE_MESSAGE(twin_compare(&book, &filter, &gap), at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 500 * own, 0, gap.position_m, at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 50 * own, 0, gap.rotation_rad, at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 100 * own, 0, gap.bias, at);
@@ -290,12 +299,12 @@ static void run_frames_between_twists(void) {
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
             const bool last = k + 1 == TWISTS;
             scene_move(&world, last ? PART_NS : STEP_NS);
-            dense_hold(&dense, &reading, last ? PART_NS * 1e-9 : STEP_NS * 1e-9, STEP_NS * 1e-9);
+            textbook_hold(&book, &reading, last ? PART_NS * 1e-9 : STEP_NS * 1e-9, STEP_NS * 1e-9);
         }
         look();
         compare(frame);
         scene_move(&world, STEP_NS - PART_NS);
-        dense_hold(&dense, &reading, (STEP_NS - PART_NS) * 1e-9, STEP_NS * 1e-9);
+        textbook_hold(&book, &reading, (STEP_NS - PART_NS) * 1e-9, STEP_NS * 1e-9);
     }
 }
 
@@ -316,7 +325,7 @@ static void run_pose_covariance(void) {
             plr_filter copy = filter;
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&copy, world.t_ns, &ahead));
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&copy, P_xi));
-            dense_pose_covariance(&dense, expected);
+            textbook_pose_covariance(&book, expected);
             for (unsigned i = 0; i < 36; i++)
                 TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 1e4 * REAL_EPSILON) *
                                               sqrt(expected[7 * (i / 6)] * expected[7 * (i % 6)]),
@@ -336,15 +345,14 @@ static void run_landmarks(void) {
     run_frames();
     for (unsigned slot = 0; slot < filter.count; slot++) {
         plr_landmark landmark;
-        double p[3], P[9];
-        unsigned i = 0;
+        plr_landmark due;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&filter, slot, &landmark));
-        while (dense.id[i] != landmark.id)
-            i++;
-        dense_landmark(&dense, i, p, P);
-        const double trace = P[0] + P[4] + P[8], rounding = is_fragile() ? 0.05 : 1e-3;
+        textbook_landmark_of(&book, textbook_find(&book, landmark.id), &due);
+        const double *P = due.P_W_m2, trace = P[0] + P[4] + P[8],
+                     rounding = is_fragile() ? 0.05 : 1e-3;
         const double relative = PLR_REAL == 64 ? 1e-8 : rounding;
-        TEST_ASSERT_DOUBLE_WITHIN(30 * relative, 0, largest_difference(p, landmark.p_W_m, 3));
+        TEST_ASSERT_DOUBLE_WITHIN(30 * relative, 0,
+                                  largest_difference(due.p_W_m, landmark.p_W_m, 3));
         TEST_ASSERT_DOUBLE_WITHIN(relative * trace, 0, largest_difference(P, landmark.P_W_m2, 9));
     }
 }
@@ -367,10 +375,10 @@ static void run_known(void) {
                 known.p_W_m[i] = scene_landmark(&world, known.id)[i];
             const plr_status status = plr_filter_insert_known(&filter, &known);
             if (status == PLR_OK)
-                dense_insert_known(&dense, &known);
+                TEST_ASSERT_TRUE(textbook_insert_known(&book, &known));
             else
                 TEST_ASSERT_TRUE(status == PLR_E_EXISTS ||
-                                 (status == PLR_E_FULL && dense.count == config.slots));
+                                 (status == PLR_E_FULL && book.count == config.slots));
         }
         compare(frame);
     }
@@ -394,9 +402,9 @@ static void run_known_between_frames(void) {
             plr_landmark known;
             TEST_ASSERT_TRUE(surveyed(NULL, 103 + 7 * frame, &known));
             if (plr_filter_insert_known(&filter, &known) == PLR_OK)
-                dense_insert_known(&dense, &known);
+                TEST_ASSERT_TRUE(textbook_insert_known(&book, &known));
             scene_move(&world, STEP_NS);
-            dense_hold(&dense, &ahead, STEP_NS * 1e-9, STEP_NS * 1e-9);
+            textbook_hold(&book, &ahead, STEP_NS * 1e-9, STEP_NS * 1e-9);
         }
         look();
         compare(frame);
@@ -427,7 +435,7 @@ static void run_mapping(void) {
             scene_move(&world, STEP_NS);
         scene_pose(&world, &T_WB);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, world.t_ns, &T_WB));
-        dense_move_to(&dense, &T_WB);
+        textbook_move_to(&book, &T_WB);
         look();
         compare(frame);
     }
@@ -454,7 +462,7 @@ static void run_new_pose(void) {
     P_xi[1] = P_xi[6] = 0.004;
     scene_pose(&world, &T_WB);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, world.t_ns, &T_WB, P_xi));
-    dense_set_pose(&dense, &T_WB, P_xi);
+    textbook_set_pose(&book, &T_WB, P_xi);
     for (unsigned frame = 0; frame < FRAGILE_FRAMES; frame++) {
         look();
         compare(frame);

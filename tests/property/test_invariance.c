@@ -6,7 +6,6 @@
 #include <unity.h>
 
 #include "filter/covariance.h"
-#include "support/dense_parts.h"
 #include "support/matrices.h"
 #include "support/rig.h"
 #include "support/rigid.h"
@@ -71,9 +70,9 @@ static void check_body(bool bias) {
     double A[16], B[16], G[16], GA[16];
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &a));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&moved, &b));
-    dense_motion(A, &a);
-    dense_motion(B, &b);
-    dense_motion(G, &start);
+    rigid_from_pose(A, &a);
+    rigid_from_pose(B, &b);
+    rigid_from_pose(G, &start);
     square_multiply(4, G, A, GA);
     TEST_ASSERT_DOUBLE_WITHIN(2000 * REAL_EPSILON + 1e-12, 0, largest_difference(GA, B, 16));
 }

@@ -13,7 +13,7 @@
 #include "linalg/packed.h"
 #include "support/matrices.h"
 #include "support/rig.h"
-#include "textbook/se3.h"
+#include "support/rigid.h"
 #include "textbook/textbook.h"
 
 enum { FRAMES = 40, FRAGILE_FRAMES = 5, MOST = 64, FRAGILE = PLR_REAL == 32 };
@@ -86,7 +86,7 @@ static void compare(unsigned frame) {
     TEST_ASSERT_EQUAL_UINT(book.count, rig.filter.count);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
     memcpy(T, book.T_WB, sizeof T);
-    se3_to_pose(T, &expected);
+    rigid_to_pose(&expected, T);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-10 + 500 * own, 0,
                                       largest_difference(expected.p, pose.p, 3), at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-10 + 50 * own, 0,

@@ -5,17 +5,6 @@
 #include <lapacke.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-/* Memory for n x m numbers, or the end of the program. */
-static double *matrix(unsigned n, unsigned m) {
-    double *A = malloc(((size_t)n * m + 1) * sizeof *A);
-    if (A == NULL) {
-        fprintf(stderr, "oracle: no memory for %u x %u numbers\n", n, m);
-        exit(EXIT_FAILURE);
-    }
-    return A;
-}
 
 /* LAPACK's info < 0 names a wrong argument. */
 static void demand_arguments(const char *routine, lapack_int info) {
@@ -35,13 +24,6 @@ void oracle_gemm(oracle_op op_A, oracle_op op_B, unsigned m, unsigned n, unsigne
                 op_B == ORACLE_PLAIN ? CblasNoTrans : CblasTrans, (int)m, (int)n, (int)k, alpha, A,
                 at_least_1(op_A == ORACLE_PLAIN ? k : m), B,
                 at_least_1(op_B == ORACLE_PLAIN ? n : k), beta, C, at_least_1(n));
-}
-
-void oracle_sandwich(unsigned m, unsigned n, const double *A, const double *P, double *S) {
-    double *AP = matrix(m, n);
-    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, A, P, 0, AP);
-    oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, m, m, n, 1, AP, A, 0, S);
-    free(AP);
 }
 
 bool oracle_cholesky(unsigned n, double *A) {
@@ -65,23 +47,17 @@ bool oracle_solve_spd(unsigned n, unsigned columns, double *A, double *X) {
     return info == 0;
 }
 
-void oracle_eigenvalues(unsigned n, const double *A, double *values) {
-    double *copy = matrix(n, n);
-    memcpy(copy, A, (size_t)n * n * sizeof *copy);
+void oracle_downdate(unsigned n, unsigned m, const double *V, double *P, size_t ld) {
+    cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, (int)n, (int)m, -1, V, at_least_1(n), 1, P,
+                at_least_1((unsigned)ld));
+}
+
+void oracle_eigenvalues_of(unsigned n, double *A, double *values) {
     const lapack_int info =
-        LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'N', 'L', (lapack_int)n, copy, at_least_1(n), values);
+        LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'N', 'L', (lapack_int)n, A, at_least_1(n), values);
     demand_arguments("dsyev", info);
     if (info > 0) {
         fprintf(stderr, "oracle: dsyev did not converge\n");
         exit(EXIT_FAILURE);
     }
-    free(copy);
-}
-
-double oracle_smallest_eigenvalue(unsigned n, const double *A) {
-    double *values = matrix(n, 1);
-    oracle_eigenvalues(n, A, values);
-    const double smallest = values[0];
-    free(values);
-    return smallest;
 }

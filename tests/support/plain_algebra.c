@@ -18,6 +18,13 @@ void plain_gemm(bool transpose_A, bool transpose_B, unsigned m, unsigned n, unsi
     }
 }
 
+void plain_downdate(unsigned n, unsigned m, const double *V, double *P, size_t ld) {
+    for (unsigned k = 0; k < m; k++)
+        for (unsigned i = 0; i < n; i++)
+            for (unsigned j = 0; j <= i; j++)
+                P[i * ld + j] -= V[k * n + i] * V[k * n + j];
+}
+
 bool plain_cholesky(unsigned n, double *A) {
     for (unsigned i = 0; i < n; i++)
         for (unsigned j = 0; j < n; j++) {

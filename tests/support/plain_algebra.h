@@ -9,11 +9,15 @@
 #define PELORUS_TEST_PLAIN_ALGEBRA_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 /* C = alpha op(A) op(B) + beta C: op(A) is m x k, op(B) is k x n, C is m x n. With beta = 0 what
  * stood in C does not matter. */
 void plain_gemm(bool transpose_A, bool transpose_B, unsigned m, unsigned n, unsigned k,
                 double alpha, const double *A, const double *B, double beta, double *C);
+
+/* P <- P - V^T V, of P the lower triangle alone: P is n x n with ld numbers a row, V is m x n. */
+void plain_downdate(unsigned n, unsigned m, const double *V, double *P, size_t ld);
 
 /* L L^T = A in place, the strict upper triangle becomes 0. False if A is not positive definite. */
 bool plain_cholesky(unsigned n, double *A);

@@ -65,6 +65,51 @@ void rigid_inverse(double N[16], const double M[16]) {
         N[12 + j] = j == 3;
 }
 
+void rigid_apply(double y[3], const double M[16], const double x[3]) {
+    const double from[3] = {x[0], x[1], x[2]};
+    for (int i = 0; i < 3; i++)
+        y[i] = M[4 * i] * from[0] + M[4 * i + 1] * from[1] + M[4 * i + 2] * from[2] + M[4 * i + 3];
+}
+
+void rigid_rotation(double R[9], const double M[16]) {
+    for (int i = 0; i < 3; i++)
+        memcpy(R + 3 * i, M + 4 * i, 3 * sizeof *R);
+}
+
+void rigid_rotation_back(double Rt[9], const double M[16]) {
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            Rt[3 * i + j] = M[4 * j + i];
+}
+
+/* R <- R (3 I - R^T R) / 2: Newton's step, which squares what is wrong. */
+void rigid_clean(double M[16]) {
+    double R[9], Rt[9], RtR[9], cleaned[9];
+    rigid_rotation(R, M);
+    rigid_rotation_back(Rt, M);
+    square_multiply(3, Rt, R, RtR);
+    for (int i = 0; i < 9; i++)
+        RtR[i] = (i % 4 == 0 ? 1.5 : 0) - 0.5 * RtR[i];
+    square_multiply(3, R, RtR, cleaned);
+    for (int i = 0; i < 9; i++)
+        M[4 * (i / 3) + i % 3] = cleaned[i];
+}
+
+void rigid_from_pose(double M[16], const plr_pose *pose) {
+    memset(M, 0, 16 * sizeof *M);
+    for (int i = 0; i < 3; i++) {
+        memcpy(M + 4 * i, pose->R + 3 * i, 3 * sizeof *M);
+        M[4 * i + 3] = pose->p[i];
+    }
+    M[15] = 1;
+}
+
+void rigid_to_pose(plr_pose *pose, const double M[16]) {
+    rigid_rotation(pose->R, M);
+    for (int i = 0; i < 3; i++)
+        pose->p[i] = M[4 * i + 3];
+}
+
 void rigid_vee(double xi[6], const double M[16]) {
     for (int i = 0; i < 3; i++)
         xi[i] = M[4 * i + 3];
@@ -78,6 +123,20 @@ void rigid_ad(double ad[36], const double xi[6]) {
     put_skew(ad, 6, 0, 0, xi + 3);
     put_skew(ad, 6, 3, 3, xi + 3);
     put_skew(ad, 6, 0, 3, xi);
+}
+
+void rigid_adjoint(double Ad[36], const double M[16]) {
+    const double p[3] = {M[3], M[7], M[11]};
+    double R[9], S[9] = {0}, SR[9];
+    rigid_rotation(R, M);
+    put_skew(S, 3, 0, 0, p);
+    square_multiply(3, S, R, SR);
+    memset(Ad, 0, 36 * sizeof *Ad);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            Ad[6 * i + j] = Ad[6 * (i + 3) + j + 3] = R[3 * i + j];
+            Ad[6 * i + j + 3] = SR[3 * i + j];
+        }
 }
 
 void rigid_right_jacobian(double Jr[36], const double xi[6]) {

@@ -4,7 +4,6 @@
 #include <string.h>
 #include <unity.h>
 
-#include "support/dense_parts.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rig.h"
@@ -47,7 +46,7 @@ static void demand_pose(const double T[16]) {
     plr_pose pose;
     double got[16];
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
-    dense_motion(got, &pose);
+    rigid_from_pose(got, &pose);
     TEST_ASSERT_DOUBLE_WITHIN(50 * eps, 0, largest_difference(T, got, 16));
 }
 

@@ -12,12 +12,11 @@
 #include "filter/covariance.h"
 #include "filter/gate.h"
 #include "filter/model.h"
-#include "support/dense_parts.h"
-#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
+#include "support/twin.h"
 
 enum { RUNS = 20, LANDMARKS = 5 };
 
@@ -121,9 +120,9 @@ static void test_the_gate_judges_alike(void) {
 }
 
 static void test_how_the_pose_moves_a_point_agrees_with_differences(void) {
-    dense_ekf truth;
+    textbook truth;
     specimen_filter(&body, &chance, PLR_MODEL_BODY, false, 0);
-    specimen_twin(&body, &truth);
+    twin_of_specimen(&truth, &body);
     for (int run = 0; run < RUNS; run++) {
         plr_real s_real[3], J[18];
         double s[3];
@@ -139,7 +138,7 @@ static void test_how_the_pose_moves_a_point_agrees_with_differences(void) {
                 xi[j] = end ? -h : h;
                 rigid_exp(E, xi);
                 square_multiply(4, truth.T_WB, E, T);
-                dense_apply(ends[end], T, s);
+                rigid_apply(ends[end], T, s);
             }
             for (int i = 0; i < 3; i++)
                 TEST_ASSERT_DOUBLE_WITHIN(1e-8 + 100 * eps, (ends[0][i] - ends[1][i]) / (2 * h),

@@ -6,18 +6,18 @@
 #include <unity.h>
 
 #include "filter/model.h"
-#include "support/dense_parts.h"
-#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
+#include "support/twin.h"
+#include "textbook/observe.h"
 
 enum { RUNS = 20, LANDMARKS = 6 };
 
 static const double eps = REAL_EPSILON;
 static plr_filter filter;
-static dense_ekf truth; /* of which only the poses are used here: T_WB, T_CB and Ad_CB in double */
+static textbook truth; /* of which only the poses are used here: T_WB, T_CB and Ad_CB in double */
 static rng chance;
 
 void setUp(void) {
@@ -29,7 +29,7 @@ void tearDown(void) {
 
 static void take_specimen(bool bias, unsigned landmarks) {
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, bias, landmarks);
-    specimen_twin(&filter, &truth);
+    twin_of_specimen(&truth, &filter);
 }
 
 static void point_of(unsigned slot, double q[3]) {
@@ -47,7 +47,7 @@ static void test_observation_agrees_with_differences(void) {
             TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[slot], &lin));
             TEST_ASSERT_FALSE(lin.uses_pose);
             point_of(slot, q);
-            dense_project(&truth.camera, q, z, unused);
+            observe_project3(&truth.camera, q, z, unused);
             to_doubles(got, lin.z, 3);
             TEST_ASSERT_DOUBLE_WITHIN(5000 * eps, 0, largest_difference(z, got, 3));
             TEST_ASSERT_DOUBLE_WITHIN(0, q[2], (double)lin.depth);
@@ -59,8 +59,8 @@ static void test_observation_agrees_with_differences(void) {
                     ahead[i] = q[i] + h * Ji[3 * i + j];
                     behind[i] = q[i] - h * Ji[3 * i + j];
                 }
-                dense_project(&truth.camera, ahead, z_ahead, unused);
-                dense_project(&truth.camera, behind, z_behind, unused);
+                observe_project3(&truth.camera, ahead, z_ahead, unused);
+                observe_project3(&truth.camera, behind, z_behind, unused);
                 /* entries: fx px/rad, and fx b px m */
                 for (int i = 0; i < 3; i++)
                     TEST_ASSERT_DOUBLE_WITHIN(1e-4 + 3e4 * eps,
@@ -122,8 +122,8 @@ static void seen_from(const double xi[6], const double m[3], double q[3]) {
     rigid_exp(E, xi);
     square_multiply(4, truth.T_WB, E, T);
     rigid_inverse(inverse, T);
-    dense_apply(q, inverse, m);
-    dense_apply(q, truth.T_CB, q);
+    rigid_apply(q, inverse, m);
+    rigid_apply(q, truth.T_CB, q);
 }
 
 static void test_a_known_landmark_hangs_on_the_pose_as_differences_say(void) {
@@ -157,7 +157,7 @@ static void test_a_known_landmark_hangs_on_the_pose_as_differences_say(void) {
             }
         }
         double R_WC[9], R_CW[9], J[9], expected[9], P[9];
-        dense_camera_to_world(&truth, R_WC);
+        observe_camera_to_world(&truth, R_WC);
         for (int i = 0; i < 9; i++)
             R_CW[i] = R_WC[3 * (i % 3) + i / 3];
         square_multiply(3, Jw, R_CW, J);
@@ -174,8 +174,8 @@ static void test_a_known_landmark_on_the_camera_or_out_of_range_is_refused(void)
     take_specimen(false, 0);
     known_landmark(&known);
     rigid_inverse(T_BC, truth.T_CB);
-    dense_apply(centre, T_BC, (const double[3]){0});
-    dense_apply(known.p_W_m, truth.T_WB, centre);
+    rigid_apply(centre, T_BC, (const double[3]){0});
+    rigid_apply(known.p_W_m, truth.T_WB, centre);
     TEST_ASSERT_FALSE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
     known.p_W_m[0] += 0.5;
     TEST_ASSERT_TRUE(plr_model_of(&filter)->adopt(&filter, &known, &landmark));
@@ -198,8 +198,8 @@ static void test_place_in_the_world_agrees_with_differences(void) {
             plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &point);
             point_of(slot, q);
             rigid_inverse(T_BC, truth.T_CB);
-            dense_apply(s, T_BC, q);
-            dense_apply(m, truth.T_WB, s);
+            rigid_apply(s, T_BC, q);
+            rigid_apply(m, truth.T_WB, s);
             TEST_ASSERT_DOUBLE_WITHIN(300 * eps, 0, largest_difference(m, point.p_W, 3));
             for (int j = 0; j < 6; j++) {
                 const double h = 1e-6;
@@ -208,14 +208,14 @@ static void test_place_in_the_world_agrees_with_differences(void) {
                     xi[j] = end ? -h : h;
                     rigid_exp(E, xi);
                     square_multiply(4, truth.T_WB, E, T);
-                    dense_apply(ends[end], T, s);
+                    rigid_apply(ends[end], T, s);
                 }
                 for (int i = 0; i < 3; i++)
                     TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 300 * eps, (ends[0][i] - ends[1][i]) / (2 * h),
                                               (double)point.J_pose[6 * i + j]);
             }
             specimen_chart(filter.slots[slot].x, Jw, Ji);
-            dense_camera_to_world(&truth, R_WC);
+            observe_camera_to_world(&truth, R_WC);
             square_multiply(3, R_WC, Ji, J);
             for (int i = 0; i < 9; i++)
                 TEST_ASSERT_DOUBLE_WITHIN(1e4 * eps, J[i], (double)point.J_landmark[i]);

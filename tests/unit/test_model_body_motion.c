@@ -10,18 +10,19 @@
 #include "filter/model.h"
 #include "filter/motion.h"
 #include "linalg/packed.h"
-#include "support/dense_parts.h"
-#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
+#include "support/twin.h"
+#include "textbook/body.h"
+#include "textbook/observe.h"
 
 enum { RUNS = 20, LANDMARKS = 6, STEPS = 5 };
 
 static const double eps = REAL_EPSILON;
 static plr_filter filter;
-static dense_ekf truth; /* of which only the poses are used here: T_WB, T_CB and Ad_CB in double */
+static textbook truth; /* of which only the poses are used here: T_WB, T_CB and Ad_CB in double */
 static rng chance;
 
 void setUp(void) {
@@ -33,7 +34,7 @@ void tearDown(void) {
 
 static void take_specimen(bool bias, unsigned landmarks) {
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, bias, landmarks);
-    specimen_twin(&filter, &truth);
+    twin_of_specimen(&truth, &filter);
 }
 
 static void point_of(unsigned slot, double q[3]) {
@@ -99,13 +100,13 @@ static void carry(const double *before, double (*q)[3], unsigned landmarks, doub
     square_multiply(4, truth.T_CB, drive.estimate, CD_hat);
     square_multiply(4, CD_hat, T_BC, D_hat);
     rigid_inverse(inverse_hat, D_hat);
-    const unsigned first = dense_row(&truth, 0);
+    const unsigned first = textbook_row(&truth, 0);
     for (unsigned s = 0; s < landmarks; s++) {
         double q_true[3], q_hat[3];
         for (int i = 0; i < 3; i++)
             q_true[i] = q[s][i] + before[first + 3 * s + (unsigned)i];
-        dense_apply(q_true, inverse, q_true);
-        dense_apply(q_hat, inverse_hat, q[s]);
+        rigid_apply(q_true, inverse, q_true);
+        rigid_apply(q_hat, inverse_hat, q[s]);
         for (int i = 0; i < 3; i++)
             after[first + 3 * s + (unsigned)i] = q_true[i] - q_hat[i];
     }
@@ -219,7 +220,7 @@ static void test_propagation_moves_the_points_rigidly(void) {
         rigid_inverse(inverse, D_C);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             double expected[3], got[3];
-            dense_apply(expected, inverse, q[slot]);
+            rigid_apply(expected, inverse, q[slot]);
             point_of(slot, got);
             TEST_ASSERT_DOUBLE_WITHIN(300 * eps, 0, largest_difference(expected, got, 3));
         }
@@ -271,38 +272,40 @@ static void random_correction(plr_real *dx, double *same) {
     to_doubles(same, dx, n);
 }
 
-/* Points and transport of the retraction in double, in point errors (support/dense_parts.h):
+/* Points and transport of the retraction in double, in point errors (textbook/body.h):
  * q[i] becomes q+, and T (n x n) what P is multiplied by. */
 static void retract_twin(const double *dx, double (*q)[3], double *T) {
     const unsigned n = plr_covariance_dim(&filter);
     double eta[6], eta_C[6], E[16], back[16], R_back[9], pose[16], pose_back[16], A[36];
     double e[LANDMARKS][3];
+    body_fit fit = {.A = {0}};
     for (unsigned slot = 0; slot < filter.count; slot++) {
         double Jw[9], Ji[9];
         specimen_chart(filter.slots[slot].x, Jw, Ji);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, Ji,
                     dx + plr_covariance_row(&filter, slot), 0, e[slot]);
+        body_fit_add(&truth, &fit, q[slot], e[slot]);
     }
-    dense_common_motion(&truth, filter.count, q, e, dx, eta);
+    body_fit_solve(&fit, dx, eta);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, truth.Ad_CB, eta, 0, eta_C);
     rigid_exp(E, eta_C);
     rigid_inverse(back, E);
-    dense_rotation(R_back, back);
+    rigid_rotation(R_back, back);
     rigid_exp(pose, dx);
     rigid_inverse(pose_back, pose);
-    dense_adjoint(A, pose_back);
+    rigid_adjoint(A, pose_back);
     for (unsigned i = 0; i < plr_covariance_row(&filter, 0); i++)
         T[i * n + i] = 1;
     specimen_put(T, n, 0, 0, 6, 6, A);
     for (unsigned slot = 0; slot < filter.count; slot++) {
         const unsigned row = plr_covariance_row(&filter, slot);
         double K[18], moved[3], J[9], RJ[9];
-        dense_camera_by_pose(&truth, q[slot], K);
+        observe_camera_by_pose(&truth, q[slot], K);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, eta, 1, e[slot]);
-        dense_polar_step(q[slot], e[slot], moved, J);
+        body_polar_step(q[slot], e[slot], moved, J);
         square_multiply(3, R_back, J, RJ);
         specimen_put(T, n, row, row, 3, 3, RJ);
-        dense_apply(q[slot], back, moved);
+        rigid_apply(q[slot], back, moved);
     }
 }
 
@@ -357,7 +360,7 @@ static void test_a_rigid_correction_moves_no_landmark_in_the_world(void) {
             double q[3], K[18], e[3], w[3], Jw[9], Ji[9];
             plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &before[slot]);
             point_of(slot, q);
-            dense_camera_by_pose(&truth, q, K);
+            observe_camera_by_pose(&truth, q, K);
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, 1, K, same, 0, e);
             specimen_chart(filter.slots[slot].x, Jw, Ji);
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, Jw, e, 0, w);

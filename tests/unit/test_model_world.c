@@ -9,18 +9,18 @@
 #include "filter/model.h"
 #include "filter/motion.h"
 #include "linalg/packed.h"
-#include "support/dense_parts.h"
-#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
+#include "support/twin.h"
+#include "textbook/observe.h"
 
 enum { RUNS = 20, LANDMARKS = 6 };
 
 static const double eps = REAL_EPSILON;
 static plr_filter filter;
-static dense_ekf truth; /* of which only the poses are used here */
+static textbook truth; /* of which only the poses are used here */
 static rng chance;
 
 void setUp(void) {
@@ -32,7 +32,7 @@ void tearDown(void) {
 
 static void take_specimen(bool bias, unsigned landmarks) {
     specimen_filter(&filter, &chance, PLR_MODEL_WORLD, bias, landmarks);
-    specimen_twin(&filter, &truth);
+    twin_of_specimen(&truth, &filter);
 }
 
 /* z of the point m if the body is off by xi. */
@@ -41,9 +41,9 @@ static void seen_from(const double xi[6], const double m[3], double z[3]) {
     rigid_exp(E, xi);
     square_multiply(4, truth.T_WB, E, T);
     rigid_inverse(inverse, T);
-    dense_apply(q, inverse, m);
-    dense_apply(q, truth.T_CB, q);
-    dense_project(&truth.camera, q, z, unused);
+    rigid_apply(q, inverse, m);
+    rigid_apply(q, truth.T_CB, q);
+    observe_project3(&truth.camera, q, z, unused);
 }
 
 static void check_column(double ends[2][3], double h, const plr_real *H, unsigned ld) {
@@ -96,8 +96,8 @@ static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
     const double depths_m[] = {0.29, 0, -5};
     for (unsigned i = 0; i < sizeof depths_m / sizeof *depths_m; i++) {
         double m[3] = {0, 0, depths_m[i]};
-        dense_apply(m, T_BC, m);
-        dense_apply(m, truth.T_WB, m);
+        rigid_apply(m, T_BC, m);
+        rigid_apply(m, truth.T_WB, m);
         to_reals(filter.slots[0].x, m, 3);
         TEST_ASSERT_FALSE(plr_model_of(&filter)->linearise(&filter, &filter.slots[0], &lin));
     }
@@ -109,8 +109,8 @@ static void place_from(const double xi[6], const double q[3], double m[3]) {
     rigid_exp(E, xi);
     square_multiply(4, truth.T_WB, E, T);
     rigid_inverse(T_BC, truth.T_CB);
-    dense_apply(m, T_BC, q);
-    dense_apply(m, T, m);
+    rigid_apply(m, T_BC, q);
+    rigid_apply(m, T, m);
 }
 
 static void test_a_new_landmark_copies_the_pose_through_its_jacobian(void) {
@@ -143,7 +143,7 @@ static void test_a_new_landmark_copies_the_pose_through_its_jacobian(void) {
                 TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 300 * eps, (ends[0][i] - ends[1][i]) / (2 * h),
                                           (double)landmark.J_pose[6 * i + j]);
         }
-        dense_camera_to_world(&truth, R_WC);
+        observe_camera_to_world(&truth, R_WC);
         square_multiply(3, R_WC, s, RS);
         oracle_sandwich(3, 3, RS, identity, expected);
         to_doubles(P, landmark.P, 9);

@@ -9,25 +9,24 @@
 #include "filter/covariance.h"
 #include "filter/motion.h"
 #include "linalg/packed.h"
-#include "support/dense_parts.h"
-#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/reseal.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
+#include "support/twin.h"
 
 enum { STEPS = 10, LANDMARKS = 4 };
 
 static const double eps = REAL_EPSILON;
 static plr_filter filter, before;
-static dense_ekf truth;
+static textbook truth;
 static rng chance;
 
 void setUp(void) {
     chance = rng_seeded(51);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
-    specimen_twin(&filter, &truth);
+    twin_of_specimen(&truth, &filter);
 }
 
 void tearDown(void) {
@@ -37,14 +36,14 @@ static void pose_of(double M[16]) {
     plr_pose pose;
     reseal(&filter); /* moved from inside */
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
-    dense_motion(M, &pose);
+    rigid_from_pose(M, &pose);
 }
 
 static void to_motion(double M[16], const plr_real R[9], const plr_real p[3]) {
     plr_pose pose;
     to_doubles(pose.R, R, 9);
     to_doubles(pose.p, p, 3);
-    dense_motion(M, &pose);
+    rigid_from_pose(M, &pose);
 }
 
 /* The same of (I + E, p). */
@@ -166,7 +165,7 @@ static void test_noise_and_bias_jacobian_follow_their_recursions(void) {
             xi[i] = tau * (same[i] - (double)filter.bias[i]);
         rigid_exp(D, xi);
         rigid_inverse(inverse, D);
-        dense_adjoint(A, inverse);
+        rigid_adjoint(A, inverse);
         oracle_sandwich(6, 6, A, Q, next);
         for (int i = 0; i < 6; i++)
             next[7 * i] += (double)variance[i] * tau * tau;

@@ -12,13 +12,13 @@
 #include "filter/gate.h"
 #include "filter/model.h"
 #include "filter/motion.h"
-#include "support/dense_parts.h"
-#include "support/dense_specimen.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/reseal.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
+#include "support/twin.h"
+#include "textbook/observe.h"
 
 /* `MANY` is two whole blocks and a part of one. */
 enum { MANY = 2 * PLR_BLOCK_OBSERVATIONS + 3, RUNS = 5 };
@@ -108,11 +108,11 @@ static void test_the_factor_of_the_noise_is_one_even_where_it_is_singular(void) 
 
 /* G Jr(L z), n x 6: how the noise of n enters the pose and the charts; to be freed. */
 static double *entrance(void) {
-    static dense_ekf camera;
+    static textbook camera;
     const unsigned n = plr_covariance_dim(&filter);
     double L[36], z[6], at_n[6], Jr[36], *GJ = specimen_zeros(n, 6);
     reseal(&filter);
-    specimen_twin(&filter, &camera);
+    twin_of_specimen(&camera, &filter);
     to_doubles(L, motion.L, 36);
     to_doubles(z, motion.z, 6);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, L, z, 0, at_n);
@@ -121,7 +121,7 @@ static double *entrance(void) {
     for (unsigned slot = 0; slot < filter.count; slot++) {
         double q[3], K[18], Jw[9], Ji[9], JK[18];
         to_doubles(q, filter.slots[slot].x, 3);
-        dense_camera_by_pose(&camera, q, K);
+        observe_camera_by_pose(&camera, q, K);
         specimen_chart(filter.slots[slot].x, Jw, Ji);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, Jw, K, 0, JK);
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 6, 1, JK, Jr, 0,

@@ -3,10 +3,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "textbook/se3.h"
+#include "support/rigid.h"
+#include "textbook/body.h"
+#include "textbook/search.h"
 #include "textbook/textbook.h"
 
 enum { POSE_ROWS = 6 };
+
+bool textbook_is_body(const textbook *t) {
+    return t->config.model == PLR_MODEL_BODY;
+}
 
 unsigned textbook_row(const textbook *t, unsigned landmark) {
     return (t->config.bias ? 12U : 6U) + 3 * landmark;
@@ -21,10 +27,17 @@ double textbook_covariance(const textbook *t, unsigned i, unsigned j) {
 }
 
 double textbook_trace(const textbook *t) {
-    double trace = 0;
+    double trace = 0, P_xi[36];
+    textbook_pose_covariance(t, P_xi);
     for (unsigned i = 0; i < textbook_dim(t); i++)
-        trace += t->P[i * t->ld + i];
+        trace += i < POSE_ROWS ? P_xi[7 * i] : t->P[i * t->ld + i];
     return trace;
+}
+
+void textbook_reference(const textbook *t, double T_WB[16]) {
+    double back[16];
+    rigid_inverse(back, t->D);
+    square_multiply(4, t->T_WB, back, T_WB);
 }
 
 unsigned textbook_place(const textbook *t, uint32_t id) {
@@ -39,34 +52,23 @@ unsigned textbook_find(const textbook *t, uint32_t id) {
     return i < t->count && t->landmarks[i].dropped ? t->count : i;
 }
 
-void textbook_landmark_of(const textbook *t, unsigned landmark, plr_landmark *out) {
-    const textbook_landmark *l = &t->landmarks[landmark];
-    const unsigned row = textbook_row(t, landmark);
-    *out = (plr_landmark){.id = l->id,
-                          .times_seen = l->times_seen,
-                          .times_gated = l->times_gated,
-                          .last_seen_ns = l->last_seen_ns,
-                          .known = l->known};
-    memcpy(out->p_W_m, l->m, sizeof out->p_W_m);
-    for (unsigned i = 0; i < 9; i++)
-        out->P_W_m2[i] = textbook_covariance(t, row + i / 3, row + i % 3);
-}
-
 /* ---------------------------------------------------------------- memory */
 
 static size_t dimension(const plr_config *config, unsigned most) {
     return (config->bias ? 12U : 6U) + 3 * (size_t)most;
 }
 
-/* Numbers besides P that depend on the sizes. */
-static size_t work_numbers(size_t n, size_t rows) {
-    return (rows + POSE_ROWS + 3 + 1) * n + rows * rows + rows;
+/* Rows as long as the state besides P: H P, pose, own, correction; and in `body` C, noise, shared and
+ * the blocks, which are as large as three rows. */
+static size_t long_rows(const plr_config *config, size_t rows) {
+    return rows + POSE_ROWS + 3 + 1 + (config->model == PLR_MODEL_BODY ? 3 * 6 + 3 : 0);
 }
 
 size_t textbook_bytes(const plr_config *config, unsigned most, unsigned most_seen) {
     const size_t n = dimension(config, most), rows = TEXTBOOK_ROWS * (size_t)most_seen;
-    return (n * n + work_numbers(n, rows)) * sizeof(double) + most * sizeof(textbook_landmark) +
-           most_seen * sizeof(unsigned);
+    return (n * n + long_rows(config, rows) * n + rows * rows + rows) * sizeof(double) +
+           most * sizeof(textbook_landmark) +
+           most_seen * (sizeof(unsigned) + sizeof(textbook_sighting));
 }
 
 /* n numbers; one at least, so that NULL means that there is no memory. */
@@ -74,17 +76,11 @@ static double *numbers(size_t n) {
     return calloc(n + 1, sizeof(double));
 }
 
-bool textbook_init(textbook *t, const plr_calibration *calibration, const plr_config *config,
-                   unsigned most, unsigned most_seen) {
-    const size_t n = dimension(config, most), rows = TEXTBOOK_ROWS * (size_t)most_seen;
-    memset(t, 0, sizeof *t);
-    t->config = *config;
-    t->camera = *calibration;
-    t->most = most;
-    t->most_seen = most_seen;
-    t->ld = n;
-    t->landmarks = calloc(most + 1U, sizeof *t->landmarks);
-    t->matched = calloc(most_seen + 1U, sizeof *t->matched);
+static bool reserve(textbook *t, size_t n, size_t rows) {
+    const bool body = textbook_is_body(t);
+    t->landmarks = calloc(t->most + 1U, sizeof *t->landmarks);
+    t->matched = calloc(t->most_seen + 1U, sizeof *t->matched);
+    t->sightings = calloc(t->most_seen + 1U, sizeof *t->sightings);
     t->P = numbers(n * n);
     t->rows = numbers(rows * n);
     t->pose = numbers(POSE_ROWS * n);
@@ -92,12 +88,25 @@ bool textbook_init(textbook *t, const plr_calibration *calibration, const plr_co
     t->S = numbers(rows * rows);
     t->innovation = numbers(rows);
     t->correction = numbers(n);
-    if (!t->landmarks || !t->matched || !t->P || !t->rows || !t->pose || !t->own || !t->S ||
-        !t->innovation || !t->correction) {
+    t->C = numbers(body ? 6 * n : 0);
+    t->noise = numbers(body ? 6 * n : 0);
+    t->shared = numbers(body ? 6 * n : 0);
+    t->blocks = numbers(body ? 3 * n : 0);
+    return t->landmarks && t->matched && t->sightings && t->P && t->rows && t->pose && t->own &&
+           t->S && t->innovation && t->correction && t->C && t->noise && t->shared && t->blocks;
+}
+
+bool textbook_init(textbook *t, const plr_calibration *calibration, const plr_config *config,
+                   unsigned most, unsigned most_seen) {
+    const size_t n = dimension(config, most), rows = TEXTBOOK_ROWS * (size_t)most_seen;
+    textbook_stand(t, calibration, config);
+    t->most = most;
+    t->most_seen = most_seen;
+    t->ld = n;
+    if (!reserve(t, n, rows)) {
         textbook_free(t);
         return false;
     }
-    se3_from_pose(&calibration->T_CB, t->T_CB);
     textbook_reset(t);
     return true;
 }
@@ -105,6 +114,7 @@ bool textbook_init(textbook *t, const plr_calibration *calibration, const plr_co
 void textbook_free(textbook *t) {
     free(t->landmarks);
     free(t->matched);
+    free(t->sightings);
     free(t->P);
     free(t->rows);
     free(t->pose);
@@ -112,13 +122,28 @@ void textbook_free(textbook *t) {
     free(t->S);
     free(t->innovation);
     free(t->correction);
+    free(t->C);
+    free(t->noise);
+    free(t->shared);
+    free(t->blocks);
     memset(t, 0, sizeof *t);
 }
 
 /* ---------------------------------------------------------------- start */
 
+static const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+
+void textbook_stand(textbook *t, const plr_calibration *calibration, const plr_config *config) {
+    memset(t, 0, sizeof *t);
+    t->config = *config;
+    t->camera = *calibration;
+    rigid_from_pose(t->T_CB, &calibration->T_CB);
+    rigid_adjoint(t->Ad_CB, t->T_CB);
+    rigid_from_pose(t->T_WB, &identity);
+    rigid_from_pose(t->D, &identity);
+}
+
 void textbook_reset(textbook *t) {
-    static const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
     static const double none[6] = {0};
     const plr_config *c = &t->config;
     const bool given = c->mode == PLR_MODE_MAPPING; /* every pose is, and exactly */
@@ -129,13 +154,15 @@ void textbook_reset(textbook *t) {
         variance[i] = given ? 0 : sigma * sigma;
     }
     t->gate_open = t->diverged = false;
+    t->walked_s = 0;
     textbook_set_pose(t, &identity, P_xi);
     textbook_set_bias(t, none, variance);
 }
 
 void textbook_set_pose(textbook *t, const plr_pose *T_WB, const double P_xi[36]) {
     t->count = 0;
-    se3_from_pose(T_WB, t->T_WB);
+    rigid_from_pose(t->T_WB, T_WB);
+    body_forget_motion(t);
     for (unsigned i = 0; i < textbook_dim(t); i++)
         for (unsigned j = 0; j <= i && j < POSE_ROWS; j++)
             t->P[i * t->ld + j] = i < POSE_ROWS ? P_xi[6 * i + j] : 0;

@@ -2,13 +2,16 @@
 /* What the filter believes, and what it cannot do. */
 #include <string.h>
 
-#include "textbook/se3.h"
+#include "support/rigid.h"
 #include "textbook/the_filter.h"
 
-/* The diagonal block of P that begins at `first`, 6x6. */
-static void block6(unsigned first, double P[36]) {
+/* The biases' covariance of now, 6x6: with the walk that waits for the next frame. */
+static void bias_covariance(double P_b[36]) {
+    const plr_config *c = &the.book.config;
     for (unsigned i = 0; i < 36; i++)
-        P[i] = textbook_covariance(&the.book, first + i / 6, first + i % 6);
+        P_b[i] = textbook_covariance(&the.book, 6 + i / 6, 6 + i % 6);
+    for (unsigned i = 0; i < 6; i++)
+        P_b[7 * i] += the.book.walked_s * (i < 3 ? c->bias_velocity_walk : c->bias_gyro_walk);
 }
 
 plr_time_ns plr_filter_time(const plr_filter *f) {
@@ -20,7 +23,7 @@ plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
     (void)f;
     if (!the.ready)
         return PLR_E_NOT_READY;
-    se3_to_pose(the.book.T_WB, T_WB);
+    rigid_to_pose(T_WB, the.book.T_WB);
     return PLR_OK;
 }
 
@@ -35,7 +38,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     (void)f;
     const plr_status status = is_sound();
     if (status == PLR_OK)
-        block6(0, P_xi);
+        textbook_pose_covariance(&the.book, P_xi);
     return status;
 }
 
@@ -76,7 +79,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
         return PLR_OK;
     memset(P_b, 0, 36 * sizeof *P_b);
     if (the.book.config.bias)
-        block6(6, P_b);
+        bias_covariance(P_b);
     return PLR_OK;
 }
 

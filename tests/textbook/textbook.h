@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: MIT
 /*
- * The course report's filter as the report has it (III.1 to III.14), at full size: one state of pose
- * and ALL landmarks, four rows an observation, all observations of a frame in one gain, in double, on
- * OpenBLAS and LAPACKE. It is the oracle of the tests for the model `world`, and pelorus-textbook.
- * It shares nothing with src/.
+ * The textbook's extended Kalman filter at full size, with either of the project's two models: one
+ * state of pose and ALL landmarks, four rows an observation, all observations of a frame in one gain,
+ * in double, on OpenBLAS and LAPACKE (or plain loops, support/oracle.h). With `world` it is the course
+ * report's filter as the report has it (III.1 to III.14); with `body` (docs/MATH.md 9 to 11) a frame's
+ * motion is found first. It is the oracle of the tests for whole frames, and pelorus-textbook. Of the
+ * library it takes settings and types alone.
  *
- * Errors: pose xi = (rho, theta) on the right, T = T^ Exp(xi); biases; and of a landmark dm in the
- * world. Rows of P: xi (6), db (6, where biases are estimated), then three a landmark. Of P the lower
- * triangle is kept, row by row, `ld` numbers a row.
+ * Errors: pose xi = (rho, theta) on the right, T = T^ Exp(xi); biases; and of a landmark the error of
+ * its point: of m in the world (`world`) or of q in the left camera (`body`). Where the library has
+ * the polar chart, this one stays with points: a linear filter does not depend on the chart, and what
+ * the chart does to a correction is written without its basis (body.h). Rows of P: xi (6), db (6,
+ * where biases are estimated), then three a landmark. Of P the lower triangle is kept, row by row,
+ * `ld` numbers a row.
  *
- * Each function says what it computes; the sources of the equations are in docs/MATH.md 14.
+ * In `body` P is of the state before the motion since the landmarks were last brought up to date; the
+ * motion's error n, T = T^ D Exp(n), is kept beside it with all it has in common with the state.
+ *
+ * Each function says what it computes; the sources of the equations are in docs/MATH.md.
  */
 #ifndef PELORUS_TEXTBOOK_H
 #define PELORUS_TEXTBOOK_H
@@ -23,7 +31,10 @@
 enum { TEXTBOOK_ROWS = 4 }; /* of an observation: uL, vL, uR, vR */
 
 typedef struct textbook_landmark {
-    double m[3]; /* in the world, m */
+    double x[3];   /* `world`: m in the world; `body`: q in the left camera; m */
+    double beyond; /* `body`: the estimate's inverse range less the point's, 1/m: of far points */
+    double closer, d2,
+        norm2; /* `body`: what a frame makes of it before it is corrected (search.h) */
     uint32_t id, times_seen, times_gated;
     plr_time_ns last_seen_ns;
     bool known;    /* from a map */
@@ -34,21 +45,30 @@ typedef struct textbook_landmark {
 typedef struct textbook {
     plr_config config; /* `slots` is not looked at */
     plr_calibration camera;
-    double T_CB[16];
+    double T_CB[16], Ad_CB[36];
 
     double T_WB[16], bias[6];
     unsigned count, most; /* landmarks, and how many there is room for */
     textbook_landmark *landmarks;
     double *P;
     size_t ld;
-    bool gate_open; /* a gate of fixed pixels lets through what the covariance explains */
-    bool diverged;  /* a variance has ceased to be positive */
+    double walked_s; /* since the biases' walk was last added */
+    bool gate_open;  /* a gate of fixed pixels lets through what the covariance explains */
+    bool diverged;   /* a variance has ceased to be positive */
+
+    /* `body`: the motion since P, its error's covariance, and that with the state, ld x 6 */
+    bool pending;
+    double D[16], M[36];
+    double *C;
 
     unsigned most_seen; /* observations in a frame */
-    double *rows;       /* H P: 4 most_seen x ld */
+    double *rows;       /* H P: 4 most_seen x n */
     double *pose, *own; /* rows of P, whole: the pose's six and one landmark's three */
     double *S, *innovation, *correction;
-    unsigned *matched; /* landmark of each observation, count where there is none */
+    double *noise, *shared; /* `body`: n x 6 each */
+    double *blocks;         /* `body`: 3x3 a landmark */
+    unsigned *matched;      /* landmark of each observation, count where there is none */
+    struct textbook_sighting *sightings; /* `body`: most_seen (search.h) */
 } textbook;
 
 /* What a frame came to. */
@@ -57,6 +77,8 @@ typedef struct textbook_report {
     bool failed; /* S could not be factorised: nothing was used */
     double nis;
 } textbook_report;
+
+bool textbook_is_body(const textbook *t);
 
 /* Bytes that textbook_init asks for. */
 size_t textbook_bytes(const plr_config *config, unsigned most, unsigned most_seen);
@@ -67,6 +89,9 @@ bool textbook_init(textbook *t, const plr_calibration *calibration, const plr_co
                    unsigned most, unsigned most_seen);
 void textbook_free(textbook *t);
 
+/* Camera, settings and identity alone, without memory: for what only asks about poses. */
+void textbook_stand(textbook *t, const plr_calibration *calibration, const plr_config *config);
+
 /* As after init, in the memory that it has. */
 void textbook_reset(textbook *t);
 
@@ -76,15 +101,16 @@ void textbook_set_pose(textbook *t, const plr_pose *T_WB, const double P_xi[36])
 /* Sets the bias and its variances. Before any landmark. */
 void textbook_set_bias(textbook *t, const double mean[6], const double variance[6]);
 
-/* III.8, III.14: T <- T Exp(s (u - b)), P <- F P F^T + W, s `seconds` of an interval of the reading.
- * W is sigma^2 s interval, or with noise = step sigma^2 s / interval. */
+/* III.8, III.14: T <- T Exp(s (u - b)), P <- F P F^T + W, s `seconds` of an interval of the reading; in
+ * `body` the motion's error alone. W is sigma^2 s interval, or with noise = step sigma^2 s / interval. */
 void textbook_hold(textbook *t, const plr_twist *twist, double seconds, double interval);
 
 /* T <- T_WB, exactly. */
 void textbook_move_to(textbook *t, const plr_pose *T_WB);
 
 /* III.5, III.10: match, gate, and one gain for all that passed, by the observations of landmarks that
- * it holds. Ids may stand once in a frame; it has at most `most_seen` observations. */
+ * it holds. Ids may stand once in a frame; it has at most `most_seen` observations. The biases' walk
+ * is added before. In `body` a frame that uses nothing and makes no landmark leaves the motion pending. */
 textbook_report textbook_update(textbook *t, plr_time_ns t_ns, const plr_frame *frame);
 
 /* A new landmark from pixels (Sigma_m of III-F, or from their noise); `at` is its place in the
@@ -99,6 +125,9 @@ bool textbook_is_worth_a_landmark(const plr_config *config, const plr_calibratio
 /* A landmark of known place and covariance. False if there is no room. */
 bool textbook_insert_known(textbook *t, const plr_landmark *known);
 
+/* Takes a landmark out of the state: its rows and columns of P. */
+void textbook_remove(textbook *t, unsigned landmark);
+
 /* The place of an id among the landmarks that are not dropped, or among all; count if it is not
  * there. */
 unsigned textbook_find(const textbook *t, uint32_t id);
@@ -107,7 +136,13 @@ unsigned textbook_place(const textbook *t, uint32_t id);
 /* Landmark in the world. */
 void textbook_landmark_of(const textbook *t, unsigned landmark, plr_landmark *out);
 
-/* Rows of P in use; the first row of a landmark; P(i, j); its trace. */
+/* The pose's covariance now, whatever motion is pending, 6x6. */
+void textbook_pose_covariance(const textbook *t, double P_xi[36]);
+
+/* The pose at which P stands: before the motion that is pending. */
+void textbook_reference(const textbook *t, double T_WB[16]);
+
+/* Rows of P in use; the first row of a landmark; P(i, j); its trace, with the pose's part of now. */
 unsigned textbook_dim(const textbook *t);
 unsigned textbook_row(const textbook *t, unsigned landmark);
 double textbook_covariance(const textbook *t, unsigned i, unsigned j);

@@ -4,14 +4,15 @@
  *
  *     mu <- mu + V^T (L^-1 r),    P <- P - V^T V = (I - K H) P,
  *
- * the latter by a rank-k update of the lower triangle (dsyrk). */
-#include <cblas.h>
-#include <lapacke.h>
+ * the latter by a rank-k update of the lower triangle (dsyrk). Where the prior's mean is not zero
+ * (`body`: the frame is linearised elsewhere), r is less what H makes of it. */
 #include <math.h>
 #include <string.h>
 
+#include "support/oracle.h"
+#include "support/rigid.h"
+#include "textbook/body.h"
 #include "textbook/observe.h"
-#include "textbook/se3.h"
 #include "textbook/textbook.h"
 
 enum { POSE = 6, ROWS = TEXTBOOK_ROWS, COLUMNS = OBSERVE_COLUMNS };
@@ -46,29 +47,30 @@ static double distance2(const textbook *t, const double *S, const double r[ROWS]
     memcpy(y, r, sizeof y);
     for (int i = 0; i < ROWS; i++)
         A[(ROWS + 1) * i] += t->config.pixel_sigma_px * t->config.pixel_sigma_px;
-    if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', ROWS, 1, A, ROWS, y, 1) != 0)
+    if (!oracle_solve_spd(ROWS, 1, A, y))
         return (double)INFINITY;
     for (int i = 0; i < ROWS; i++)
         sum += r[i] * y[i];
     return sum;
 }
 
-/* docs/MATH.md 8. */
-static bool passes(const textbook *t, unsigned landmark, const observe_line *line, double *d2) {
-    const plr_config *c = &t->config;
+/* docs/MATH.md 8; where the search for the motion has judged already, its verdict. */
+static bool passes(const textbook *t, unsigned landmark, const observe_line *line, bool judged,
+                   double *d2) {
+    const textbook_landmark *l = &t->landmarks[landmark];
     double S[ROWS * ROWS], norm2 = 0;
+    if (judged) {
+        *d2 = l->d2;
+        return isfinite(l->d2) && observe_accepts(t, l->d2, l->norm2);
+    }
     predicted(t, landmark, line, S);
     for (int i = 0; i < ROWS; i++) {
         norm2 += line->r[i] * line->r[i];
-        if (!t->landmarks[landmark].known &&
-            !(S[(ROWS + 1) * i] <= t->camera.fx_px * t->camera.fx_px))
+        if (!l->known && !(S[(ROWS + 1) * i] <= t->camera.fx_px * t->camera.fx_px))
             return false;
     }
     *d2 = distance2(t, S, line->r);
-    const bool likely = isfinite(*d2) && (c->gate_d2 <= 0 || *d2 <= c->gate_d2);
-    if (c->gate_residual_px > 0)
-        return norm2 <= c->gate_residual_px * c->gate_residual_px || (t->gate_open && likely);
-    return likely;
+    return observe_accepts(t, *d2, norm2);
 }
 
 /* ---------------------------------------------------------------- H P */
@@ -77,33 +79,38 @@ static bool passes(const textbook *t, unsigned landmark, const observe_line *lin
 static void whole_rows(const textbook *t, unsigned n, unsigned first, unsigned count,
                        double *rows) {
     for (unsigned r = 0; r < count; r++)
-        memcpy(rows + r * t->ld, t->P + (first + r) * t->ld, (first + r + 1) * sizeof *rows);
+        memcpy(rows + r * (size_t)n, t->P + (first + r) * t->ld, (first + r + 1) * sizeof *rows);
     for (unsigned j = first + 1; j < n; j++) {
         const double *row = t->P + j * t->ld;
         for (unsigned r = 0; r < count && first + r < j; r++)
-            rows[r * t->ld + j] = row[first + r];
+            rows[r * (size_t)n + j] = row[first + r];
     }
 }
 
-/* Four rows of H P, n long. The landmark's three rows of P are put together in `own`, 3 x ld. */
+/* Four rows of H P, n long. The landmark's three rows of P are put together in `own`. */
 static void project(const textbook *t, unsigned n, unsigned landmark, const observe_line *line,
-                    double *own, double *out) {
-    const int ld = (int)t->ld;
-    whole_rows(t, n, textbook_row(t, landmark), 3, own);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, ROWS, (int)n, POSE, 1, line->H, COLUMNS,
-                t->pose, ld, 0, out, ld);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, ROWS, (int)n, 3, 1, line->H + POSE,
-                COLUMNS, own, ld, 1, out, ld);
+                    double *out) {
+    memset(out, 0, ROWS * (size_t)n * sizeof *out);
+    whole_rows(t, n, textbook_row(t, landmark), 3, t->own);
+    for (unsigned r = 0; r < ROWS; r++)
+        for (unsigned c = textbook_is_body(t) ? POSE : 0; c < COLUMNS; c++) {
+            const double h = line->H[COLUMNS * r + c];
+            const double *row =
+                c < POSE ? t->pose + c * (size_t)n : t->own + (c - POSE) * (size_t)n;
+            for (unsigned j = 0; j < n; j++)
+                out[r * (size_t)n + j] += h * row[j];
+        }
 }
 
 /* Rows of S = H P H^T + R that belong to one observation: (H P) times its H^T. */
-static void stack_S(textbook *t, unsigned m, unsigned at, unsigned landmark,
+static void stack_S(textbook *t, unsigned n, unsigned m, unsigned at, unsigned landmark,
                     const observe_line *line) {
     for (unsigned i = 0; i < m; i++)
         for (unsigned r = 0; r < ROWS; r++) {
             double sum = 0;
             for (unsigned c = 0; c < COLUMNS; c++)
-                sum += t->rows[i * t->ld + state_row(t, landmark, c)] * line->H[COLUMNS * r + c];
+                sum +=
+                    t->rows[i * (size_t)n + state_row(t, landmark, c)] * line->H[COLUMNS * r + c];
             t->S[i * m + at + r] = sum;
         }
     for (unsigned r = 0; r < ROWS; r++)
@@ -116,15 +123,18 @@ static void stack_S(textbook *t, unsigned m, unsigned at, unsigned landmark,
 static void retract(textbook *t) {
     const double *d = t->correction;
     double D[16], moved[16];
-    se3_exp(d, D);
-    se3_multiply(t->T_WB, D, moved);
+    if (textbook_is_body(t))
+        body_retract(t);
+    else
+        for (unsigned l = 0; l < t->count; l++)
+            for (unsigned i = 0; i < 3; i++)
+                t->landmarks[l].x[i] += d[textbook_row(t, l) + i];
+    rigid_exp(D, d);
+    square_multiply(4, t->T_WB, D, moved);
     memcpy(t->T_WB, moved, sizeof moved);
-    se3_clean(t->T_WB);
+    rigid_clean(t->T_WB);
     for (unsigned i = 0; t->config.bias && i < 6; i++)
         t->bias[i] += d[POSE + i];
-    for (unsigned l = 0; l < t->count; l++)
-        for (unsigned i = 0; i < 3; i++)
-            t->landmarks[l].m[i] += d[textbook_row(t, l) + i];
 }
 
 static bool is_sound(const textbook *t, unsigned n) {
@@ -135,55 +145,71 @@ static bool is_sound(const textbook *t, unsigned n) {
 }
 
 /* m rows of H P, S and r are stacked. False if S is not positive: then nothing is changed. */
-static bool apply(textbook *t, unsigned n, unsigned m) {
-    const int ld = (int)t->ld, rows = (int)m;
-    if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', rows, t->S, rows) != 0)
+static bool gain(textbook *t, unsigned n, unsigned m) {
+    if (!oracle_cholesky(m, t->S))
         return false;
-    cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, rows, (int)n, 1,
-                t->S, rows, t->rows, ld);
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, rows, t->S, rows,
-                t->innovation, 1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, rows, (int)n, 1, t->rows, ld, t->innovation, 1, 0,
-                t->correction, 1);
-    cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, (int)n, rows, -1, t->rows, ld, 1, t->P, ld);
-    if (is_sound(t, n))
-        retract(t);
-    else
-        t->diverged = true;
+    oracle_solve_lower(m, n, t->S, t->rows);
+    oracle_solve_lower(m, 1, t->S, t->innovation);
+    oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, 1, m, 1, t->rows, t->innovation, 1,
+                t->correction);
+    oracle_downdate(n, m, t->rows, t->P, t->ld);
+    t->diverged = !is_sound(t, n);
     return true;
+}
+
+/* r - H mean: the mean is that of the pose's and the landmark's errors before the frame. */
+static void subtract_prior(const textbook *t, unsigned landmark, observe_line *line) {
+    double beyond[3];
+    body_beyond(&t->landmarks[landmark], beyond);
+    for (unsigned r = 0; r < ROWS; r++)
+        for (unsigned c = 0; c < COLUMNS; c++)
+            line->r[r] -= line->H[COLUMNS * r + c] * (t->correction[state_row(t, landmark, c)] +
+                                                      (c < POSE ? 0 : beyond[c - POSE]));
 }
 
 /* Matches and gates one observation, and stacks it if it passes. */
 static void take(textbook *t, unsigned n, const plr_observation *seen, unsigned landmark,
-                 unsigned *passed, textbook_report *report) {
+                 bool judged, unsigned *passed, textbook_report *report) {
     textbook_landmark *l = &t->landmarks[landmark];
-    double *out = t->rows + (size_t)(ROWS * *passed) * t->ld, d2 = 0;
+    double *out = t->rows + ROWS * *passed * (size_t)n, d2 = 0;
     observe_line line;
     report->matched++;
     l->times_seen++;
-    l->rejected = !observe_linearise(t, landmark, seen, &line) || !passes(t, landmark, &line, &d2);
+    l->rejected = true;
+    if (!t->pending && observe_linearise(t, landmark, seen, &line)) {
+        if (textbook_is_body(t))
+            subtract_prior(t, landmark, &line);
+        l->rejected = !passes(t, landmark, &line, judged, &d2);
+    }
     if (l->rejected) {
         report->gated++;
         l->times_gated++;
         return;
     }
-    project(t, n, landmark, &line, t->own, out);
+    project(t, n, landmark, &line, out);
     memcpy(t->innovation + ROWS * *passed, line.r, sizeof line.r);
     report->nis += d2;
     ++*passed;
 }
 
-textbook_report textbook_update(textbook *t, plr_time_ns t_ns, const plr_frame *frame) {
-    textbook_report report = {0};
-    const unsigned n = textbook_dim(t);
+/* The biases' walk since it was last added: without the correlation that arises meanwhile. */
+static void walk(textbook *t) {
+    for (unsigned i = POSE; i < textbook_row(t, 0); i++)
+        t->P[i * (t->ld + 1)] +=
+            t->walked_s * (i < POSE + 3 ? t->config.bias_velocity_walk : t->config.bias_gyro_walk);
+    t->walked_s = 0;
+}
+
+/* Matches, gates and stacks a frame's observations; returns how many have passed. */
+static unsigned stack_frame(textbook *t, unsigned n, plr_time_ns t_ns, const plr_frame *frame,
+                            bool judged, textbook_report *report) {
     unsigned passed = 0, at = 0;
-    whole_rows(t, n, 0, POSE, t->pose);
     for (unsigned i = 0; i < frame->count; i++) {
         t->matched[i] = textbook_find(t, frame->observations[i].id);
         if (t->matched[i] == t->count)
             continue;
         t->landmarks[t->matched[i]].last_seen_ns = t_ns;
-        take(t, n, &frame->observations[i], t->matched[i], &passed, &report);
+        take(t, n, &frame->observations[i], t->matched[i], judged, &passed, report);
     }
     for (unsigned i = 0; i < frame->count; i++) {
         observe_line line;
@@ -191,11 +217,25 @@ textbook_report textbook_update(textbook *t, plr_time_ns t_ns, const plr_frame *
         if (landmark == t->count || t->landmarks[landmark].rejected)
             continue;
         (void)observe_linearise(t, landmark, &frame->observations[i], &line); /* as before */
-        stack_S(t, ROWS * passed, ROWS * at++, landmark, &line);
+        stack_S(t, n, ROWS * passed, ROWS * at++, landmark, &line);
     }
-    if (passed == 0)
-        return report;
-    report.failed = !apply(t, n, ROWS * passed);
+    return passed;
+}
+
+textbook_report textbook_update(textbook *t, plr_time_ns t_ns, const plr_frame *frame) {
+    textbook_report report = {0};
+    const unsigned n = textbook_dim(t);
+    bool judged = false;
+    memset(t->correction, 0, n * sizeof *t->correction);
+    if (textbook_is_body(t))
+        judged = body_catch_up(t, frame);
+    if (!t->pending)
+        walk(t);
+    whole_rows(t, n, 0, POSE, t->pose);
+    const unsigned passed = stack_frame(t, n, t_ns, frame, judged, &report);
+    report.failed = passed > 0 && !gain(t, n, ROWS * passed);
     report.used = report.failed || t->diverged ? 0 : passed;
+    if (!t->pending && !t->diverged)
+        retract(t);
     return report;
 }

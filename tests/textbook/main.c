@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /*
- * pelorus-textbook: the course report's filter at full size, over a recording. Reads the recording
+ * pelorus-textbook: the textbook's filter at full size, over a recording. Reads the recording
  * twice: first to see how many landmarks there will be, and so how much memory it needs; then as
  * pelorus-replay does, whose program it is but for the filter.
  */
@@ -62,14 +62,6 @@ static int reserve(const replay_options *o, const census *c, const plr_config *c
     return REPLAY_EXIT_OK;
 }
 
-/* What the textbook does not have. */
-static int check_settings(const plr_config *config) {
-    if (config->model != PLR_MODEL_WORLD && config->mode != PLR_MODE_DEAD_RECKONING)
-        return usage_error("the textbook knows the model of the course report alone: give --model "
-                           "world or --preset course; pelorus-replay has the other");
-    return REPLAY_EXIT_OK;
-}
-
 /* The first reading. A recording of which nothing can be made is for the second to explain. */
 static int look_ahead(const replay_options *o, census *c) {
     plr_config config;
@@ -92,8 +84,7 @@ static int look_ahead(const replay_options *o, census *c) {
     map_in_free(&map);
     if (!mapped)
         return usage_error(problem);
-    const int status = check_settings(&config);
-    return status == REPLAY_EXIT_OK && !o->print_config ? reserve(o, c, &config) : status;
+    return o->print_config ? REPLAY_EXIT_OK : reserve(o, c, &config);
 }
 
 int main(int argc, char **argv) {

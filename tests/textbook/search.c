@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include "support/dense_first.h"
+#include "textbook/search.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "support/dense_parts.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
+#include "textbook/body.h"
+#include "textbook/observe.h"
 
-enum { TRIALS = 4, FEW = 3 };
+enum { TRIALS = 4, FEW = 3, BIAS = 6 };
 
 /* Below this share of a pixel's variance an observation says nothing of a range. */
 static const double least_range_share = 0.02;
@@ -16,24 +17,13 @@ static const double least_range_share = 0.02;
 static const double huber_limit = 2.5, least_promise = 0.1, least_rest = 0.05;
 static const double share_of_bias = 1e-4, zero_column = 1e-6;
 
-/* A landmark that the frame sees. */
-typedef struct sight {
-    unsigned landmark;
-    const plr_observation *o;
-    double V[18], P[9];   /* correlation of its point with nu, 3x6; covariance once nu is known */
-    bool in_front;        /* at the point looked at last */
-    double J[9], S[9];    /* d z / d q, and S = J P J^T + R, there */
-    double a[18], rho[3]; /* d z / d nu and residual, whitened */
-    double weight, cost, best_S[9];
-    double at_zero; /* d2 by the twists alone; infinite if there is no place to linearise */
-    double voice;
-} sight;
+typedef textbook_sighting sight;
 
 typedef struct search {
-    const dense_ekf *e;
+    const textbook *t;
     const double *L;
     unsigned count;
-    sight sights[DENSE_MAX];
+    sight *sights;
 } search;
 
 /* |z|^2 + sum rho, and its normal equations. */
@@ -64,14 +54,13 @@ static void factorise(const double M[36], double L[36]) {
     }
 }
 
-void dense_motion_prior(const dense_ekf *e, double L[36]) {
-    const unsigned n = dense_dim(e);
+void search_prior(const textbook *t, double L[36]) {
     double M[36], P_b[36], C_b[36], X[36], by_bias[36] = {0};
-    memcpy(M, e->M, sizeof M);
-    if (e->config.bias) { /* Cov(n, b) P_bb^-1 Cov(b, n) is what n has from the biases */
+    memcpy(M, t->M, sizeof M);
+    if (t->config.bias) { /* Cov(n, b) P_bb^-1 Cov(b, n) is what n has from the biases */
         for (unsigned i = 0; i < 36; i++)
-            P_b[i] = e->P[(DENSE_BIAS + i / 6) * n + DENSE_BIAS + i % 6];
-        memcpy(C_b, e->C + 6 * DENSE_BIAS, sizeof C_b);
+            P_b[i] = textbook_covariance(t, BIAS + i / 6, BIAS + i % 6);
+        memcpy(C_b, t->C + 6 * BIAS, sizeof C_b);
         memcpy(X, C_b, sizeof X);
         if (oracle_solve_spd(6, 6, P_b, X))
             oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 6, 6, share_of_bias, C_b, X, 0,
@@ -97,35 +86,36 @@ static void camera_motion(const search *s, const double z[6], double back[16], d
     rigid_exp(E, n);
     rigid_right_jacobian(Jr, n);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 6, 6, 1, Jr, s->L, 0, JL);
-    square_multiply(4, s->e->D, E, D);
-    rigid_inverse(T_BC, s->e->T_CB);
-    square_multiply(4, s->e->T_CB, D, CD);
+    square_multiply(4, s->t->D, E, D);
+    rigid_inverse(T_BC, s->t->T_CB);
+    square_multiply(4, s->t->T_CB, D, CD);
     square_multiply(4, CD, T_BC, D_C);
     rigid_inverse(back, D_C);
 }
 
 static void look(const search *s, sight *at, const double z[6], const double back[16],
                  const double JL[36]) {
-    const dense_ekf *e = s->e;
-    const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
-    double q[3], seen[3], Dz[9], R[9], K[18], KJL[18], L_S[9];
-    dense_apply(q, back, e->x[at->landmark]);
-    at->in_front = q[2] >= e->config.min_depth_m;
+    const textbook *t = s->t;
+    const double s2 = t->config.pixel_sigma_px * t->config.pixel_sigma_px;
+    double q[3], seen[3], Dz[9], R[9], K[18], KJL[18], L_S[9], beyond[3];
+    rigid_apply(q, back, t->landmarks[at->landmark].x);
+    at->in_front = q[2] >= t->config.min_depth_m;
     if (!at->in_front)
         return;
-    dense_project(&e->camera, q, seen, Dz);
-    dense_rotation(R, back);
+    observe_project3(&t->camera, q, seen, Dz);
+    rigid_rotation(R, back);
     square_multiply(3, Dz, R, at->J);
     oracle_sandwich(3, 3, at->J, at->P, at->S);
     for (unsigned i = 0; i < 3; i++)
         at->S[4 * i] += i == 2 ? s2 / 2 : s2;
-    dense_camera_by_pose(e, q, K);
+    observe_camera_by_pose(t, q, K);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 6, 1, K, JL, 0, KJL);
     double JV[18], pixels[3] = {(double)at->o->uL_px, (double)at->o->uR_px,
                                 ((double)at->o->vL_px + (double)at->o->vR_px) / 2};
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, at->J, at->V, 0, JV);
+    body_beyond(&t->landmarks[at->landmark], beyond);
     for (unsigned i = 0; i < 3; i++)
-        at->rho[i] = pixels[i] - seen[i] - dot(JV + 6 * i, z, 6);
+        at->rho[i] = pixels[i] - seen[i] - dot(JV + 6 * i, z, 6) - dot(at->J + 3 * i, beyond, 3);
     memcpy(at->a, JV, sizeof JV);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, Dz, KJL, 1, at->a);
     memcpy(L_S, at->S, sizeof L_S);
@@ -253,8 +243,8 @@ static double distance2(const sight *at, const double A[36], const double b[6], 
 /* What the twists alone say: no observation in A and b. */
 static void judge_at_zero(const search *s, sight *at) {
     static const double none[36] = {0};
-    const double s2 = s->e->config.pixel_sigma_px * s->e->config.pixel_sigma_px;
-    const double limit = s->e->camera.fx_px * s->e->camera.fx_px;
+    const double s2 = s->t->config.pixel_sigma_px * s->t->config.pixel_sigma_px;
+    const double limit = s->t->camera.fx_px * s->t->camera.fx_px;
     double L_S[9], La[18];
     at->at_zero = (double)INFINITY;
     if (!at->in_front) {
@@ -266,7 +256,7 @@ static void judge_at_zero(const search *s, sight *at) {
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, L_S, at->a, 0, La);
     for (unsigned r = 0; r < 3; r++)
         if (at->S[4 * r] + dot(La + 6 * r, La + 6 * r, 6) - (r == 2 ? s2 / 2 : s2) > limit &&
-            !s->e->known[at->landmark]) {
+            !s->t->landmarks[at->landmark].known) {
             at->voice = 0;
             return;
         }
@@ -310,8 +300,8 @@ static double judge(const sight *at, const sum *best, bool found) {
 
 /* -mu^T (P J^T S^-1 r) / r^2: the change of inverse range that the observation alone makes; none where
  * what is left uncertain of the range moves the disparity by little. */
-static double change_of_inverse_range(const dense_ekf *e, const sight *at) {
-    const double *q = e->x[at->landmark];
+static double change_of_inverse_range(const textbook *t, const sight *at) {
+    const double *q = t->landmarks[at->landmark].x;
     const double range2 = dot(q, q, 3), range = sqrt(range2);
     const double mu[3] = {q[0] / range, q[1] / range, q[2] / range};
     double S[9], L_S[9], r[3], JP[9], moved[3], along[3], sideways[3];
@@ -319,7 +309,7 @@ static double change_of_inverse_range(const dense_ekf *e, const sight *at) {
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, at->P, mu, 0, sideways);
     const double disparity = along[0] - along[1];
     if (!(disparity * disparity * dot(mu, sideways, 3) >
-          least_range_share * e->config.pixel_sigma_px * e->config.pixel_sigma_px))
+          least_range_share * t->config.pixel_sigma_px * t->config.pixel_sigma_px))
         return 0;
     memcpy(L_S, at->S, sizeof L_S);
     memcpy(S, at->S, sizeof S);
@@ -331,44 +321,61 @@ static double change_of_inverse_range(const dense_ekf *e, const sight *at) {
     return -dot(mu, moved, 3) / range2;
 }
 
-static bool is_accepted(const dense_ekf *e, const sight *at, double d2) {
-    const double s2 = e->config.pixel_sigma_px * e->config.pixel_sigma_px;
-    const double gap = (double)at->o->vL_px - (double)at->o->vR_px;
-    return isfinite(d2) &&
-           (e->config.gate_d2 <= 0 || d2 + gap * gap / (2 * s2) <= e->config.gate_d2);
+/* The squared norm of the four residuals at the point looked at last. */
+static double residual_norm2(const textbook *t, const sight *at) {
+    const double s2 = t->config.pixel_sigma_px * t->config.pixel_sigma_px;
+    double L_S[9], r[3];
+    memcpy(L_S, at->S, sizeof L_S);
+    (void)oracle_cholesky(3, L_S);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, L_S, at->rho, 0, r);
+    /* vL and vR lie half their gap to both sides of v */
+    return dot(r, r, 3) + r[2] * r[2] + s2 * observe_row_gap2(t, at->o);
 }
 
 /* ---------------------------------------------------------------- all of it */
 
 static void prepare(search *s, unsigned landmark, const plr_observation *o) {
-    const dense_ekf *e = s->e;
-    const unsigned n = dense_dim(e), row = dense_row(e, landmark);
+    const textbook *t = s->t;
+    const unsigned row = textbook_row(t, landmark);
     sight *at = &s->sights[s->count++];
     memset(at, 0, sizeof *at);
     at->landmark = landmark;
     at->o = o;
-    at->voice = e->known[landmark] ? 0 : 1;
+    at->voice = t->landmarks[landmark].known ? 0 : 1;
     for (unsigned r = 0; r < 3; r++) {
-        memcpy(at->V + 6 * r, e->C + 6 * (row + r), 6 * sizeof *at->V);
+        memcpy(at->V + 6 * r, t->C + 6 * (row + r), 6 * sizeof *at->V);
         solve_lower(s->L, at->V + 6 * r);
     }
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
-            at->P[3 * r + c] = e->P[(row + r) * n + row + c] - dot(at->V + 6 * r, at->V + 6 * c, 6);
+            at->P[3 * r + c] =
+                textbook_covariance(t, row + r, row + c) - dot(at->V + 6 * r, at->V + 6 * c, 6);
     for (unsigned r = 0; r < 3; r++) /* of no point yet: any measure will do */
         at->best_S[4 * r] = 1;
 }
 
-void dense_find_motion(const dense_ekf *e, const plr_frame *frame, dense_first *first) {
+/* None can be checked by the others: the twists' prediction says who may speak. */
+static void hush_outliers(search *s) {
+    for (unsigned i = 0; i < s->count; i++)
+        if (!observe_accepts(s->t, s->sights[i].at_zero, 0))
+            s->sights[i].voice = 0;
+}
+
+/* Those of the frame that are in the state. */
+static void gather(search *s, const plr_frame *frame) {
+    for (unsigned i = 0; i < frame->count; i++) {
+        const unsigned landmark = textbook_find(s->t, frame->observations[i].id);
+        if (landmark < s->t->count)
+            prepare(s, landmark, &frame->observations[i]);
+    }
+}
+
+void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
     static const double zero[6] = {0};
-    search s = {.e = e, .L = first->L};
+    search s = {.t = t, .L = result->L, .sights = t->sightings};
     sum best;
     unsigned voices = 0;
-    for (unsigned i = 0; i < frame->count; i++) {
-        const unsigned landmark = dense_find(e, frame->observations[i].id);
-        if (landmark < e->count)
-            prepare(&s, landmark, &frame->observations[i]);
-    }
+    gather(&s, frame);
     (void)evaluate(&s, zero, &best);
     accept(&s);
     for (unsigned i = 0; i < s.count; i++) {
@@ -376,24 +383,22 @@ void dense_find_motion(const dense_ekf *e, const plr_frame *frame, dense_first *
         voices += s.sights[i].voice > 0;
     }
     const bool found = voices >= FEW;
-    if (!found) { /* none can be checked by the others: the twists' prediction says who may speak */
-        for (unsigned i = 0; i < s.count; i++)
-            if (!(e->config.gate_d2 <= 0 || s.sights[i].at_zero <= e->config.gate_d2))
-                s.sights[i].voice = 0;
+    if (!found) {
+        hush_outliers(&s);
         (void)evaluate(&s, zero, &best);
         accept(&s);
     }
     if (voices > 0)
         descend(&s, &best);
-    memcpy(first->z, best.z, sizeof first->z);
-    first->judged = true;
+    memcpy(result->z, best.z, sizeof result->z);
     for (unsigned i = 0; i < s.count; i++) {
         const sight *at = &s.sights[i];
-        const double d2 = judge(at, &best, found);
-        first->d2[at->landmark] = d2;
-        if (!is_accepted(e, at, d2))
+        textbook_landmark *l = &t->landmarks[at->landmark];
+        l->d2 = judge(at, &best, found) + observe_row_gap2(t, at->o);
+        l->norm2 = residual_norm2(t, at);
+        if (!isfinite(l->d2) || !observe_accepts(t, l->d2, l->norm2))
             continue;
-        first->accepted++;
-        first->closer[at->landmark] = change_of_inverse_range(e, at);
+        result->accepted++;
+        l->closer = change_of_inverse_range(t, at);
     }
 }
