@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus-textbook`: the course report's filter at full size, beside the replay."""
+"""`pelorus-textbook`: either model with every landmark kept, beside the replay."""
 
 from __future__ import annotations
 
@@ -44,8 +44,12 @@ def textbook(*arguments: str | Path, stdin: bytes = b"") -> Result:
     [
         COURSE,
         (*COURSE, "--landmark-prior", "correlated", "--gate-residual", "0"),
-        ("--model", "world", "--max-depth", "30", "--bias", "on", "--bias-gyro-walk", "0"),
+        ("--model", "world", "--max-depth", "30", "--bias", "on"),
         (*COURSE, "--mode", "dead_reckoning"),
+        (),
+        ("--bias", "off", "--max-depth", "20"),
+        ("--gate-residual", "20"),
+        ("--mode", "dead_reckoning"),
     ],
 )
 def test_with_slots_for_all_the_replay_computes_the_same(
@@ -56,8 +60,8 @@ def test_with_slots_for_all_the_replay_computes_the_same(
     summaries = []
     for program in (TEXTBOOK, "pelorus-replay-f64"):
         way = tmp_path / f"{program}.tum"
-        slots = ("--slots", "256", "--bias-velocity-walk", "0")
-        result = run(path, *options, *slots, "--json", "--trajectory", way, program=program)
+        slots = ("--slots", "256", "--json", "--trajectory", way)
+        result = run(path, *options, *slots, program=program)
         assert result.status == OK, result.stderr
         summaries.append(result.summary)
         ways.append(read_tum(way))
@@ -80,9 +84,10 @@ def test_no_landmark_leaves_it(record: Record, tmp_path: Path) -> None:
     assert "every landmark kept" in textbook(path, *COURSE).stdout
 
 
-def test_known_landmarks_locate_it(record: Record) -> None:
+@pytest.mark.parametrize("model", [COURSE, ("--model", "body")])
+def test_known_landmarks_locate_it(record: Record, model: tuple[str, ...]) -> None:
     path = record([header(), *known(), *drive()[1:]])
-    options = (*COURSE, "--mode", "localization", "--json")
+    options = (*model, "--mode", "localization", "--json")
     mine, theirs = textbook(path, *options).summary, run(path, *options).summary
     assert mine["used"] == theirs["used"] > 0
     assert mine["err0_m"] == pytest.approx(theirs["err0_m"], abs=1e-3)
@@ -115,7 +120,6 @@ def test_the_memory_is_told_first_and_refused_where_it_is_not_there(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ((), "--model world or --preset course"),
         ((*COURSE, "--save-state", "s.state"), "keeps no states"),
         ((*COURSE, "--load-state", "s.state"), "keeps no states"),
         ((*COURSE, "--preset", "cuorse"), "course"),

@@ -99,6 +99,29 @@ static void test_eigenvalues_are_the_oracles_and_add_up_to_the_trace(void) {
     }
 }
 
+/* The lower triangle alone, with gaps between the rows that stay as they are. */
+static void test_a_downdate_is_the_oracles(void) {
+    enum { LD = MOST + 2 };
+    for (unsigned n = 1; n <= MOST; n++) {
+        const unsigned m = 1 + (n * 7) % MOST;
+        double V[MOST * MOST], P[MOST * LD], oracles[MOST * LD], before[MOST * LD],
+            VtV[MOST * MOST];
+        rng_normals(&chance, 1, V, m * n);
+        rng_normals(&chance, 1, P, MOST * LD);
+        memcpy(before, P, sizeof P);
+        memcpy(oracles, P, sizeof P);
+        plain_downdate(n, m, V, P, LD);
+        oracle_downdate(n, m, V, oracles, LD);
+        plain_gemm(true, false, n, n, m, 1, V, V, 0, VtV);
+        for (unsigned i = 0; i < MOST; i++)
+            for (unsigned j = 0; j < LD; j++) {
+                const double due = before[i * LD + j] - (i < n && j <= i ? VtV[i * n + j] : 0);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13, due, P[i * LD + j]);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13, due, oracles[i * LD + j]);
+            }
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_products_are_the_oracles);
@@ -106,5 +129,6 @@ int main(void) {
     RUN_TEST(test_a_cholesky_factor_gives_the_matrix_back);
     RUN_TEST(test_solutions_fulfil_their_equations);
     RUN_TEST(test_eigenvalues_are_the_oracles_and_add_up_to_the_trace);
+    RUN_TEST(test_a_downdate_is_the_oracles);
     return UNITY_END();
 }
