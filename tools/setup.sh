@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # shellcheck shell=bash
 # What tools/demo.sh and tools/test.sh share: installing what is missing, the Python environment,
-# building. Sourced, not run. Works on Debian 12 and Ubuntu 22.04 or later; elsewhere it names what
+# building. Sourced, not run. Works on Debian 12 and Ubuntu 24.04 or later; elsewhere it names what
 # is missing and stops.
 
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -104,8 +104,8 @@ note_foreign_system() {
 ensure_python() {
     local lock=$ROOT/tools/requirements.lock stamp=$VENV/pelorus-installed-from
     local wanted
-    python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' ||
-        die "Python $(python3 -V 2>&1 | cut -d' ' -f2) is too old: 3.10 or later is needed"
+    python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+        die "Python $(python3 -V 2>&1 | cut -d' ' -f2) is too old: 3.11 or later is needed"
     wanted="$ROOT $(python3 -V) $(cat "$lock" "$ROOT/tools/pyproject.toml" | sha256sum)"
     if [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then
         echo 'Python environment: up to date'

@@ -25,6 +25,9 @@ SUBCOMMANDS = [
     ("evaluate",),
     ("simulate",),
     ("report",),
+    ("map",),
+    ("course",),
+    ("convert", "map"),
     ("stream",),
     ("compare",),
 ]
@@ -53,6 +56,24 @@ def test_the_package_runs_as_a_module_and_errors_go_to_stderr(tmp_path: Path) ->
     assert done.stdout == ""
     assert done.stderr.startswith("error: ")
     assert "absent.plr: cannot be read" in done.stderr
+
+
+NOT_ON_WINDOWS = ("fcntl", "grp", "pty", "pwd", "resource", "termios", "tty")
+BLOCKED = """
+import sys
+for name in {names!r}:
+    sys.modules[name] = None  # importing it raises ImportError, as where there is none
+from pelorus.cli import main
+sys.exit(main({arguments!r}))
+"""
+
+
+@pytest.mark.parametrize("command", SUBCOMMANDS, ids=" ".join)
+def test_every_command_starts_where_there_is_no_termios(command: tuple[str, ...]) -> None:
+    program = BLOCKED.format(names=NOT_ON_WINDOWS, arguments=[*command, "--help"])
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr.decode()
+    assert f"pelorus {' '.join(command)}" in done.stdout.decode()
 
 
 def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> None:

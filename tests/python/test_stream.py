@@ -34,6 +34,7 @@ from pelorus.robot import link
 from pelorus.robot.compare import desktop_poses
 from pelorus.robot.flight_log import FlightLog
 from pelorus.robot.link import Link, LinkClosed
+from pelorus.robot.serial import open_serial
 from pelorus.robot.status import STATUSES, refusal
 from pelorus.robot.stream import Streamer
 from replay_drive import BIN, FRAMES, drive, encode, log_of, run
@@ -161,7 +162,7 @@ def test_a_frame_too_long_for_the_board_is_answered_and_told_in_words(
 
 def test_a_serial_device_is_made_raw_at_the_asked_speed() -> None:
     ours, theirs = os.openpty()
-    opened = link.serial(Path(os.ttyname(theirs)), 115200)
+    opened = open_serial(Path(os.ttyname(theirs)), 115200)
     inputs, outputs, control, local, speed_in, speed_out, _ = termios.tcgetattr(theirs)
     assert (speed_in, speed_out) == (termios.B115200, termios.B115200)
     assert not inputs & (termios.ICRNL | termios.IXON | termios.ISTRIP | termios.INPCK)
@@ -178,7 +179,7 @@ def test_a_serial_device_is_made_raw_at_the_asked_speed() -> None:
 
 def test_every_byte_value_goes_through_a_serial_device_unchanged() -> None:
     ours, theirs = os.openpty()
-    opened = link.serial(Path(os.ttyname(theirs)), 921600)
+    opened = open_serial(Path(os.ttyname(theirs)), 921600)
     every = bytes(range(256))
     assert opened.exchange(every) == b""  # no echo
     assert os.read(ours, 1024) == every
@@ -192,7 +193,7 @@ def test_every_byte_value_goes_through_a_serial_device_unchanged() -> None:
 def test_what_waits_in_a_serial_device_from_before_is_dropped() -> None:
     ours, theirs = os.openpty()
     os.write(ours, b"old news\n")
-    opened = link.serial(Path(os.ttyname(theirs)), 921600)
+    opened = open_serial(Path(os.ttyname(theirs)), 921600)
     assert opened.exchange(b"", 0.1) == b""
     opened.close()
     os.close(ours)
@@ -265,7 +266,7 @@ def test_a_device_that_does_not_take_the_speed_is_refused(
     before = len(os.listdir("/proc/self/fd"))
     monkeypatch.setattr(termios, "tcsetattr", lambda *_: None)
     with pytest.raises(PelorusError, match=r"/dev/pts/\d+: cannot do 921600 baud"):
-        link.serial(Path(os.ttyname(theirs)), 921600)
+        open_serial(Path(os.ttyname(theirs)), 921600)
     assert len(os.listdir("/proc/self/fd")) == before
     os.close(ours)
     os.close(theirs)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 
 import typer
@@ -11,14 +11,14 @@ import typer
 from pelorus.frames import TwistTiming
 
 
-class Fix(str, Enum):
+class Fix(StrEnum):
     """Whether a converter mends what it finds."""
 
     AUTO = "auto"
     NONE = "none"
 
 
-class Timing(str, Enum):
+class Timing(StrEnum):
     """The twist timings of HEADER by name."""
 
     START = "start"
@@ -30,7 +30,7 @@ class Timing(str, Enum):
         return TwistTiming[self.name]
 
 
-class TimingOrAuto(str, Enum):
+class TimingOrAuto(StrEnum):
     """As Timing, or decided from the data."""
 
     AUTO = "auto"

@@ -47,8 +47,10 @@ def _open(target: str, scheme: str, rest: str) -> Link:
         if host and port.isdecimal() and 0 < int(port) < 65536:
             return link.tcp(host, int(port))
     if scheme == "serial" and rest:
+        from pelorus.robot.serial import open_serial  # noqa: PLC0415 - Windows has no termios
+
         device, _, baud = rest.rpartition(":")
         if device and baud.isdecimal():
-            return link.serial(Path(device), int(baud))
-        return link.serial(Path(rest), BAUD)
+            return open_serial(Path(device), int(baud))
+        return open_serial(Path(rest), BAUD)
     raise PelorusError(f"--to {target!r}: no such target; it may be {FORMS}")
