@@ -24,7 +24,6 @@ recording=${2-}
     die "no board $board; there are: $(cd "$ROOT/port/cortex_m/boards" && echo */ | tr -d /)"
 [ -z "$recording" ] || [ -r "$recording" ] || die "$recording: cannot be read"
 [ -z "$recording" ] || recording=$(realpath "$recording")
-ROBOT=$ROOT/build/robot
 
 heading 'Set-up'
 ensure_packages "${PACKAGES_BUILD[@]}" \
@@ -34,10 +33,7 @@ ensure_python
 heading "Building: firmware for $board, and this machine's replay"
 mkdir -p "$LOGS" "$ROOT/out"
 build() {
-    cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" \
-        --toolchain "$ROOT/port/cortex_m/toolchain.cmake" -DCMAKE_BUILD_TYPE=None \
-        -DPELORUS_MAVLINK=ON -DPython3_EXECUTABLE="$VENV/bin/python" &&
-        cmake --build "$ROBOT" -j "$JOBS" --target "pelorus-$board-n32" &&
+    build_robot "pelorus-$board-n32" &&
         build_preset release -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=OFF
 }
 if ! build >"$LOGS/robot-demo-build.log" 2>&1; then

@@ -131,3 +131,24 @@ build_preset() {
         cmake --preset "$preset" -DPython3_EXECUTABLE="$VENV/bin/python" "$@" &&
         cmake --build --preset "$preset" -j "$JOBS")
 }
+
+# build_replays NAME [CMAKE OPTION...]: of a preset pelorus-replay and pelorus-replay-f64 alone.
+build_replays() {
+    local preset=$1
+    shift
+    (cd "$ROOT" && cmake --preset "$preset" "$@" &&
+        cmake --build --preset "$preset" -j "$JOBS" --target pelorus-replay pelorus-replay-f64)
+}
+
+# build_robot TARGET...: firmware, in build/robot: images of every capacity, and the bench images that
+# docs/SIZES.md is measured on, are targets of one build, so that each library is compiled once.
+ROBOT=$ROOT/build/robot
+build_robot() {
+    mkdir -p "$ROBOT"
+    "$VENV/bin/python" -m pelorus.robot.sizes recording "$ROBOT/bench.plr" &&
+        cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \
+            --toolchain "$ROOT/port/cortex_m/toolchain.cmake" \
+            -DPELORUS_MAVLINK=ON -DPython3_EXECUTABLE="$VENV/bin/python" \
+            '-DPELORUS_CAPACITIES=8;16;32;64' -DPELORUS_BENCH_RECORDING="$ROBOT/bench.plr" &&
+        cmake --build "$ROBOT" -j "$JOBS" --target "$@"
+}

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """What the tests on emulated boards share. tests/target/run.sh builds what they need and calls them
-with --board, --robot (the firmware's build folder) and --desktops (folders with the desktop's
-replay, built in the ways whose bits must agree).
+with --boards (every test is asked of each), --robot (the firmware's build folder) and --desktops
+(folders with the desktop's replay, built in the ways whose bits must agree).
 """
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.wire import read_file
 
+LONGEST = ("test_bits", "test_new_board")
 HANG_S = 1800.0  # nothing is awaited by the clock: only what hangs is ended
 
 
@@ -30,15 +32,20 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(emulators, "STOP_S", HANG_S)
 
 
+def pytest_configure() -> None:
+    """What a shell starts in the background ignores Ctrl-C, and so would what the tests start."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--board", required=True)
+    parser.addoption("--boards", nargs="+", required=True)
     parser.addoption("--robot", type=Path, required=True)
     parser.addoption("--desktops", type=Path, nargs="*", default=[])
 
 
 @pytest.fixture(scope="session")
 def board(request: pytest.FixtureRequest) -> str:
-    return str(request.config.getoption("--board"))
+    return str(request.param)
 
 
 @pytest.fixture(scope="session")
@@ -66,15 +73,23 @@ def link(emulator: Emulator) -> Iterator[Link]:
 
 @pytest.fixture(scope="session")
 def drive(robot: Path) -> list[Message]:
-    """The simulated drive, without its END."""
-    frames, counts = read_file(robot / "recordings" / "simulated.plr")
+    """A drive that costs a board little, without its END: where not the filter is asked about."""
+    frames, counts = read_file(robot / "recordings" / "light" / "drive.plr")
     assert counts.clean
     return [frame.message for frame in frames[:-1]]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """One test for each recording that recordings.py could make."""
+    """Each test for each board, and one for each recording that recordings.py could make."""
+    if "board" in metafunc.fixturenames:
+        boards = metafunc.config.getoption("--boards")
+        metafunc.parametrize("board", boards, indirect=True, scope="session")
     if "recording" in metafunc.fixturenames:
         folder = Path(metafunc.config.getoption("--robot")) / "recordings"
         paths = sorted(folder.glob("*.plr"))
         metafunc.parametrize("recording", paths, ids=[path.stem for path in paths])
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whole drives first: at the end every processor has something to do."""
+    items.sort(key=lambda item: item.path.stem not in LONGEST)

@@ -3,8 +3,9 @@
 
 usage: recordings.py FOLDER [--long]
 
-The simulated one always; Starry Night, 0027 and 03 where $PELORUS_DATA has them: 200 steps, 30 and
-30 frames of them, with --long the whole of all three. What is there already is kept.
+The simulated ones always, of which those in FOLDER/light cost a board little; Starry Night, 0027
+and 03 where $PELORUS_DATA has them: 200 steps, 30 and 30 frames of them, with --long the whole of
+all three. What is there already is kept.
 """
 
 from __future__ import annotations
@@ -19,8 +20,16 @@ from pelorus.wire import Writer, read_file
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
-SIMULATION = ("simulate", "{out}", "--seed", "7", "--duration", "15")
-REAL = {
+SIMULATION: tuple[str, ...] = ("simulate", "{out}", "--seed", "7", "--duration", "8")
+LIGHT: dict[str, tuple[str, ...]] = {
+    "drive": (*SIMULATION, "--observations", "10", "--speed", "1", "--twist-rate", "50"),
+    # So long that it is under way whenever a busy machine comes to interrupting it.
+    "endless": (
+        *("simulate", "{out}", "--duration", "1200", "--twist-rate", "10"),
+        *("--observations", "5", "--landmarks", "200"),
+    ),
+}
+REAL: dict[str, tuple[tuple[str, ...], str, int]] = {
     "starry-night": (
         ("convert", "starry-night", "{in}", "{out}"),
         "starry-night/dataset3.mat",
@@ -58,9 +67,12 @@ def main() -> None:
     """See the module's text."""
     folder = Path(sys.argv[1])
     (folder / "whole").mkdir(parents=True, exist_ok=True)
-    simulated = folder / "simulated.plr"
-    if not simulated.exists():
-        pelorus(SIMULATION, simulated, simulated)
+    (folder / "light").mkdir(exist_ok=True)
+    made: dict[Path, tuple[str, ...]] = {folder / "simulated.plr": SIMULATION}
+    made.update({folder / "light" / f"{name}.plr": words for name, words in LIGHT.items()})
+    for simulated, words in made.items():
+        if not simulated.exists():
+            pelorus(words, simulated, simulated)
     for name, (words, path, frames) in REAL.items():
         source, whole, part = DATA / path, folder / "whole" / f"{name}.plr", folder / f"{name}.plr"
         if not source.exists():

@@ -23,7 +23,6 @@ from pelorus.frames import Message, Pose
 from pelorus.robot.compare import digest
 from pelorus.robot.emulator import MACHINES, Emulator
 from pelorus.robot.stream import Streamer
-from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import Counts, Writer, read_file
 from recordings import first_frames
 
@@ -44,13 +43,9 @@ def short_drive(drive: list[Message], tmp_path_factory: pytest.TempPathFactory) 
     return path
 
 
-@pytest.fixture(scope="module")
-def endless_drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """So long that it is under way whenever a busy machine comes to interrupting it."""
-    path = tmp_path_factory.mktemp("stream") / "endless.plr"
-    options = Options(duration_s=1200.0, twist_rate_hz=10.0, observations=5, landmarks=200)
-    simulate(options).recording.write(path)
-    return path
+@pytest.fixture(scope="session")
+def endless_drive(robot: Path) -> Path:
+    return robot / "recordings" / "light" / "endless.plr"
 
 
 @pytest.fixture(scope="module")

@@ -44,7 +44,10 @@ INSTRUCTIONS_PER_SECOND = 1_000_000_000  # -icount shift=0: one a nanosecond
 
 
 def write_recording(target: Path) -> None:
-    """Two drives one after the other: every frame of 20 observations, then the busiest possible."""
+    """Two drives one after the other: every frame of 20 observations, then the busiest possible.
+
+    A file that holds them already is left alone: images are made of it.
+    """
     parts = []
     for observations in (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS):
         part = target.with_suffix(f".{observations}.plr")
@@ -58,7 +61,9 @@ def write_recording(target: Path) -> None:
                 writer.write(message)
             writer.end()
         parts.append(part)
-    target.write_bytes(b"".join(part.read_bytes() for part in parts))
+    content = b"".join(part.read_bytes() for part in parts)
+    if not target.exists() or target.read_bytes() != content:
+        target.write_bytes(content)
     for part in parts:
         part.unlink()
 
