@@ -140,15 +140,19 @@ build_replays() {
         cmake --build --preset "$preset" -j "$JOBS" --target pelorus-replay pelorus-replay-f64)
 }
 
-# build_robot TARGET...: firmware, in build/robot: images of every capacity, and the bench images that
-# docs/SIZES.md is measured on, are targets of one build, so that each library is compiled once.
+# build_robot TARGET...: firmware, in build/robot. Images of every capacity, and the bench images that
+# docs/SIZES.md is measured on (target bench), come out of one build: each library is compiled once.
 ROBOT=$ROOT/build/robot
 build_robot() {
+    local options=()
     mkdir -p "$ROBOT"
-    "$VENV/bin/python" -m pelorus.robot.sizes recording "$ROBOT/bench.plr" &&
-        cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \
-            --toolchain "$ROOT/port/cortex_m/toolchain.cmake" \
-            -DPELORUS_MAVLINK=ON -DPython3_EXECUTABLE="$VENV/bin/python" \
-            '-DPELORUS_CAPACITIES=8;16;32;64' -DPELORUS_BENCH_RECORDING="$ROBOT/bench.plr" &&
+    case " $* " in *' bench '*)
+        "$VENV/bin/python" -m pelorus.robot.sizes recording "$ROBOT/bench.plr" || return 1
+        options=('-DPELORUS_CAPACITIES=8;16;32;64' -DPELORUS_BENCH_RECORDING="$ROBOT/bench.plr")
+        ;;
+    esac
+    cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \
+        --toolchain "$ROOT/port/cortex_m/toolchain.cmake" -DPELORUS_MAVLINK=ON \
+        -DPython3_EXECUTABLE="$VENV/bin/python" "${options[@]+"${options[@]}"}" &&
         cmake --build "$ROBOT" -j "$JOBS" --target "$@"
 }

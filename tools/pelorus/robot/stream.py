@@ -43,7 +43,7 @@ BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
 QUIET_S = 0.3
 GREETING_S = 3.0  # a board may be in the middle of something
-WARNING = 1  # severity of a TEXT
+WARNING, ERROR = 1, 2  # severity of a TEXT
 END_AGAIN_S = 1.0
 STATE_S = 15.0  # a save takes as long as the flash: seconds
 UNANSWERED_MAX = 5  # in a row: then nobody is there
@@ -197,9 +197,14 @@ class Streamer:
         self.outcome.unanswered += 1
         self._unanswered_in_a_row += 1
         if self._unanswered_in_a_row >= UNANSWERED_MAX:
+            faults = [text.text for text in self.outcome.texts if text.severity == ERROR]
             raise PelorusError(
                 f"{self._link.what}: {UNANSWERED_MAX} frames in a row without an answer; "
-                "is the board running the firmware, at this baud rate?"
+                + (
+                    f"the board said: {faults[-1]}"
+                    if faults
+                    else "is the board running the firmware, at this baud rate?"
+                )
             )
 
     def _await_state(self, state: State) -> None:
