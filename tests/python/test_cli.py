@@ -42,8 +42,8 @@ def test_every_help_shows_an_example(pelorus: Run, command: tuple[str, ...]) -> 
 
 def test_the_commands_and_the_version_are_there(pelorus: Run) -> None:
     text = pelorus("--help").out
-    for module in COMMANDS:
-        assert module.__name__.rsplit(".", 1)[1] in text
+    for command in COMMANDS:
+        assert command in text
     assert pelorus("--version").out.strip() == f"pelorus {__version__}"
     assert pelorus("no-such-command").status == 2
     assert pelorus("info").status == 2

@@ -7,6 +7,7 @@ with --boards (every test is asked of each), --robot (the firmware's build folde
 from __future__ import annotations
 
 import signal
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -32,8 +33,10 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(emulators, "STOP_S", HANG_S)
 
 
-def pytest_configure() -> None:
-    """What a shell starts in the background ignores Ctrl-C, and so would what the tests start."""
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "once: about the host; one board is enough")
+    config.addinivalue_line("markers", "boards(*names): for these boards alone")
+    # What a shell starts in the background ignores Ctrl-C, and so would what the tests start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -83,6 +86,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Each test for each board, and one for each recording that recordings.py could make."""
     if "board" in metafunc.fixturenames:
         boards = metafunc.config.getoption("--boards")
+        only = metafunc.definition.get_closest_marker("boards")
+        if only is not None:
+            boards = [board for board in boards if board in only.args]
+        elif metafunc.definition.get_closest_marker("once"):
+            which = zlib.crc32(metafunc.definition.name.encode())  # so that each is taken for some
+            boards = [boards[which % len(boards)]]
         metafunc.parametrize("board", boards, indirect=True, scope="session")
     if "recording" in metafunc.fixturenames:
         folder = Path(metafunc.config.getoption("--robot")) / "recordings"

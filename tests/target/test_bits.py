@@ -14,7 +14,7 @@ from pelorus.wire import read_file
 
 SLOTS, OBSERVATIONS = 32, 128  # of the images and of the desktop's builds
 FULL = -10  # plr_status
-FLOAT64_BOARD = "mps2_an500"
+FLOAT64_BOARD = "mps2_an500"  # the M7's FPU has it
 
 
 def board_poses(board: str, image: Path, recording: Path) -> list[Pose]:
@@ -56,9 +56,8 @@ def test_float32(
     same_bits(desktop, board_poses(board, firmware, recording))
 
 
+@pytest.mark.boards(FLOAT64_BOARD)
 def test_float64(request: pytest.FixtureRequest, board: str, robot: Path, recording: Path) -> None:
-    if board != FLOAT64_BOARD:
-        pytest.skip("an image in float64 is made for the M7 alone: it has the FPU for it")
     desktop = desktop_all_equal(request, recording, "pelorus-replay-f64")
     image = robot / "images" / f"pelorus-{board}-n{SLOTS}-f64.elf"
     same_bits(desktop, board_poses(board, image, recording))

@@ -152,6 +152,7 @@ def test_a_board_on_a_wire_computes_the_same_bits(
     assert_same_bits(done, log, program)
 
 
+@pytest.mark.once
 @BOTH
 def test_a_board_that_goes_away_leaves_a_log_that_replays_to_its_bits(
     behind: Behind, board: str, firmware: Path, endless_drive: Path, program: Path, tmp_path: Path
@@ -180,6 +181,7 @@ def test_a_board_that_goes_away_leaves_a_log_that_replays_to_its_bits(
     assert len(ours) - len(robots) <= 1  # the frame that was under way
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "terminate"])
 def test_a_drive_that_is_ended_by_hand_says_how_far_it_came_and_leaves_no_emulator(
     board: str, firmware: Path, endless_drive: Path, tmp_path: Path, asked: signal.Signals
@@ -203,6 +205,7 @@ def test_a_drive_that_is_ended_by_hand_says_how_far_it_came_and_leaves_no_emulat
     assert poses_in(log)[1].clean
 
 
+@pytest.mark.once
 def test_an_emulator_that_dies_is_told_as_such(
     board: str, firmware: Path, endless_drive: Path, tmp_path: Path
 ) -> None:
@@ -234,6 +237,7 @@ def wait_for_poses(log: Path, count: int, sender: subprocess.Popen[str]) -> None
     pytest.fail("the drive did not come so far")
 
 
+@pytest.mark.once
 def test_a_log_that_is_sent_to_the_board_again_gives_its_bits_again(
     board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
 ) -> None:
@@ -246,6 +250,7 @@ def test_a_log_that_is_sent_to_the_board_again_gives_its_bits_again(
     assert digest(poses_in(second)[0]) == digest(poses_in(first)[0])
 
 
+@pytest.mark.once
 def test_the_log_of_a_drive_is_taken_by_info_replay_and_report(
     board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
 ) -> None:
@@ -262,6 +267,7 @@ def test_the_log_of_a_drive_is_taken_by_info_replay_and_report(
     assert (out / "report.html").stat().st_size > 10_000
 
 
+@pytest.mark.once
 def test_the_log_of_a_drive_compares_equal_and_one_other_bit_does_not(
     board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
 ) -> None:

@@ -1,34 +1,49 @@
 # SPDX-License-Identifier: MIT
 """The command `pelorus`. Each command lives in its own file under pelorus/commands.
 
-To add one: write commands/NAME.py with a function `register(app)` and name it in COMMANDS.
+To add one: write commands/NAME.py with a function `register(app)` and name it in COMMANDS. Only
+the command that is called is imported: plotting takes longer to load than most of them to run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterable, Sequence
+from importlib import import_module
 
 import typer
 from rich.markup import escape
 
 from pelorus import __version__
-from pelorus.commands import compare, convert, course, evaluate, info, map, report, simulate, stream
 from pelorus.console import err, out
 from pelorus.errors import PelorusError
 
-COMMANDS = (convert, info, evaluate, simulate, report, map, course, stream, compare)
-
-app = typer.Typer(
-    name="pelorus",
-    help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
-    epilog="Example:  pelorus simulate drive.plr  &&  pelorus info drive.plr",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
+COMMANDS = (
+    "convert",
+    "info",
+    "evaluate",
+    "simulate",
+    "report",
+    "map",
+    "course",
+    "stream",
+    "compare",
 )
 
-for _command in COMMANDS:
-    _command.register(app)
+
+def _app(commands: Iterable[str]) -> typer.Typer:
+    app = typer.Typer(
+        name="pelorus",
+        help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
+        epilog="Example:  pelorus simulate drive.plr  &&  pelorus info drive.plr",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        callback=_options,
+    )
+    for command in commands:
+        import_module(f"pelorus.commands.{command}").register(app)
+    return app
 
 
 def _show_version(wanted: bool) -> None:
@@ -37,7 +52,6 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     version: bool = typer.Option(
         False, "--version", help="Print the version.", callback=_show_version, is_eager=True
@@ -48,8 +62,10 @@ def _options(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; 0, or 1 after an error that was told, or 2 if the call makes no sense."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    app = _app(words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS)
     try:
-        app(args=None if arguments is None else list(arguments), prog_name="pelorus")
+        app(args=words, prog_name="pelorus")
     except PelorusError as error:
         err.print(f"[bold red]error:[/] {escape(str(error))}")
         return 1
