@@ -57,7 +57,14 @@ typedef struct plr_slot {
     uint32_t last_frame; /* number of the frame that saw it last */
     uint32_t print;      /* of the pixels that it was seen at last */
     plr_time_ns last_seen_ns;
+    plr_real lean[3],
+        lean_variance; /* fading sum of its whitened innovations; and what its variance
+                                        would be if they were white */
     uint8_t known;
+    uint8_t strays;    /* 1: they were not; the point moves */
+    uint8_t chances;   /* times it began anew */
+    uint16_t accepted; /* frames that used it since it was born, or began anew */
+    uint16_t rejected; /* successive frames that matched it in vain */
 } plr_slot;
 
 /* Motion since the covariance was last brought up to date: xi+ = Ad(D^-1) xi + B db + N(0, Q). */

@@ -9,6 +9,7 @@
 #include "filter/model.h"
 #include "filter/polar.h"
 #include "filter/slots.h"
+#include "filter/tracks.h"
 #include "lie/se3.h"
 #include "linalg/dense.h"
 #include "linalg/small.h"
@@ -336,8 +337,8 @@ static void judge_at_zero(plr_search *s, unsigned i) {
 /* d^2 of an observation by what all the others say: with h = a (I + J)^-1 a^T and the weight w that it
  * had in J, e^T [(I - w h)(I + (1 - w) h)]^-1 e. `rest` is the least share left to the others. */
 static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_real dz[6],
-                         plr_real *rest) {
-    plr_real X[18], e[3], h[9], M[6 + PLR_KERNEL_MARGIN] = {0};
+                         plr_real e[3], plr_real *rest) {
+    plr_real X[18], h[9], M[6 + PLR_KERNEL_MARGIN] = {0};
     const plr_real w = at->weight;
     for (unsigned r = 0; r < 3; r++) {
         e[r] = at->rho[r];
@@ -385,18 +386,22 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U, cons
     const plr_sighting *at = &s->sightings[i];
     const plr_observation *o = observation_of(s, i);
     const plr_real row_gap = (plr_real)o->vL_px - (plr_real)o->vR_px;
-    plr_real d2 = at->at_zero, rest;
+    plr_real d2 = at->at_zero, e[3], rest = 0;
     if (!(d2 >= 0))
         return false;
     if (found) {
-        const plr_real by_others = left_out(at, U, dz, &rest);
+        const plr_real by_others = left_out(at, U, dz, e, &rest);
         d2 = rest >= LEAST_REST ? by_others : d2;
     }
     d2 += row_gap * row_gap / (PLR_R(2) * par->pixel_variance);
     const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i, row_gap));
-    if (accepted)
-        *nis += (float)d2;
-    return accepted;
+    plr_slot *slot = &s->f->slots[s->f->work.slot_of[s->f->work.used[i]]];
+    if (accepted && rest >= LEAST_REST)
+        plr_track_add(slot, e);
+    if (!accepted || slot->strays)
+        return false;
+    *nis += (float)d2;
+    return true;
 }
 
 /* Have so many observations little weight that another motion may fit them better? */

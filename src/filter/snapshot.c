@@ -139,7 +139,13 @@ static const plr_field slot_fields[] = {
     OF_SLOT(last_frame, PLR_FIELD_U32, 1),
     OF_SLOT(print, PLR_FIELD_U32, 1),
     OF_SLOT(last_seen_ns, PLR_FIELD_U64, 1),
+    OF_SLOT(lean, PLR_FIELD_REAL, 3),
+    OF_SLOT(lean_variance, PLR_FIELD_REAL, 1),
     OF_SLOT(known, PLR_FIELD_FLAG, 1),
+    OF_SLOT(strays, PLR_FIELD_FLAG, 1),
+    OF_SLOT(chances, PLR_FIELD_U8, 1),
+    OF_SLOT(accepted, PLR_FIELD_U16, 1),
+    OF_SLOT(rejected, PLR_FIELD_U16, 1),
 };
 
 /* n elements of P, which are carried here and not computed with: row i is i + 1 long. */

@@ -17,6 +17,7 @@
 #include "filter/motion_first.h"
 #include "filter/order.h"
 #include "filter/slots.h"
+#include "filter/tracks.h"
 #include "linalg/small.h"
 
 /* ---------------------------------------------------------------- cleaning and order */
@@ -148,9 +149,9 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         if (slot == PLR_NO_SLOT)
             continue;
         report->matched++;
+        plr_track_count(&f->slots[slot], w->gain[k] < 0);
         if (w->gain[k] < 0) {
             report->gated++;
-            f->slots[slot].times_gated++;
             continue;
         }
         w->used[used++] = (uint16_t)k;
@@ -232,13 +233,26 @@ static bool makes_landmarks(const plr_filter *f) {
     return f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
 }
 
+/* A slot is free; z from is_worth_a_landmark. */
+static void append_new(plr_filter *f, uint32_t id, plr_real z[3]) {
+    plr_real q[3], Dq[9], S_q[9];
+    plr_new_landmark landmark;
+    const plr_real missing = stand_at_some_distance(f, z);
+    plr_stereo_back_project(q, Dq, &f->par.camera, z);
+    initial_factor(f, Dq, S_q);
+    plr_model_of(f)->initialise(f, q, S_q, &landmark);
+    plr_slots_append(f, id, false, &landmark);
+    /* inverse range is disparity over focal length and baseline, along the ray */
+    f->slots[f->count - 1].beyond =
+        missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (f->par.camera.fx * f->par.camera.baseline);
+}
+
 static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
                            plr_frame_events *events, plr_report *report) {
     const bool makes = makes_landmarks(f);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
-        plr_real z[3], q[3], Dq[9], S_q[9];
-        plr_new_landmark landmark;
+        plr_real z[3];
         if (f->work.slot_of[k] != PLR_NO_SLOT)
             continue;
         if (!makes || !is_worth_a_landmark(f, o, z)) {
@@ -249,14 +263,7 @@ static void initialise_new(plr_filter *f, const plr_frame *frame, unsigned n,
             report->no_room++;
             continue;
         }
-        const plr_real missing = stand_at_some_distance(f, z);
-        plr_stereo_back_project(q, Dq, &f->par.camera, z);
-        initial_factor(f, Dq, S_q);
-        plr_model_of(f)->initialise(f, q, S_q, &landmark);
-        plr_slots_append(f, o->id, false, &landmark);
-        /* inverse range is disparity over focal length and baseline, along the ray */
-        f->slots[f->count - 1].beyond =
-            missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (f->par.camera.fx * f->par.camera.baseline);
+        append_new(f, o->id, z);
         report->created++;
     }
     if (!makes) /* those that found no slot are counted as such already */
@@ -276,6 +283,30 @@ static void unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
     }
     for (unsigned k = 0; k < n; k++)
         w->slot_of[k] = plr_slots_find(f, frame->observations[w->order[k]].id);
+}
+
+/* Where most of a frame agrees, a landmark that does not agree for long is the one that is wrong, and begins
+ * anew where it is seen now. */
+static void begin_anew(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
+    plr_workspace *w = &f->work;
+    const bool may = f->config.model == PLR_MODEL_BODY && makes_landmarks(f);
+    if (!may || 2 * report->gated >= report->matched)
+        return;
+    for (unsigned k = 0; k < n; k++) {
+        const plr_observation *o = &frame->observations[w->order[k]];
+        plr_real z[3];
+        if (w->slot_of[k] == PLR_NO_SLOT || w->gain[k] >= 0)
+            continue;
+        const unsigned slot = plr_slots_find(f, o->id); /* one that began anew has moved another */
+        const plr_slot before = f->slots[slot];
+        if (!plr_track_may_begin_anew(&before) || !is_worth_a_landmark(f, o, z))
+            continue;
+        plr_motion_settle(f);
+        plr_slots_remove(f, slot);
+        append_new(f, o->id, z);
+        plr_track_begin_anew(&f->slots[f->count - 1], &before);
+        report->created++;
+    }
 }
 
 /* Is there anything in this frame that needs landmarks and covariance to stand where the body is? If
@@ -354,6 +385,8 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
         if (events.locked) {
             plr_motion_settle(f);
             unlock(f, frame, n);
+        } else {
+            begin_anew(f, frame, n, report);
         }
         initialise_new(f, frame, n, &events, report);
     }

@@ -267,7 +267,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t health_at = frames_at + 4 + 6 + 4 + 144 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
     const uint32_t slots_at = totals_at + 56 + 56;
-    const uint32_t id_at = slots_at + 4 * real, slot = 4 * real + 29;
+    const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
     start(&driven);
     drive(&driven, NULL, 5);
     const uint32_t dim = 12 + 3 * driven.count;
