@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
 SIMULATION: tuple[str, ...] = ("simulate", "{out}", "--seed", "7", "--duration", "8")
 LIGHT: dict[str, tuple[str, ...]] = {
-    "drive": (*SIMULATION, "--observations", "10", "--speed", "1", "--twist-rate", "50"),
+    "drive": (*SIMULATION, "--observations", "6", "--speed", "1", "--twist-rate", "50"),
     # So long that it is under way whenever a busy machine comes to interrupting it.
     "endless": (
         *("simulate", "{out}", "--duration", "1200", "--twist-rate", "10"),

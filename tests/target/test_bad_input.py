@@ -25,9 +25,9 @@ from pelorus.robot.stream import Streamer
 from pelorus.wire import DELIMITER, Reader, encode, read_file
 from recordings import first_frames
 
-FRAMES = 40
+FRAMES = 24
 SLOTS = 32
-RATE = 0.0015  # of bytes; of a STEREO's 220 or so, every third frame is hit
+RATE = 0.0025  # of bytes; of a STEREO's 130 or so, every third frame is hit
 UNKNOWN_KINDS = (0, 77, 200, 255)
 FOREIGN, NOT_READY = -16, -13  # plr_status
 FUZZ = Path(__file__).resolve().parents[1] / "fuzz"

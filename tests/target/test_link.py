@@ -15,7 +15,7 @@ from pelorus.robot.stream import BOOT_WORDS, Streamer
 from pelorus.wire import Reader, encode
 from recordings import first_frames
 
-FRAMES = 40
+FRAMES = 24
 NOT_READY, MODE = -13, -9  # plr_status
 SHORT_S = 1.0  # where no answer can come
 HANG_S = 1800.0

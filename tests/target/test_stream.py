@@ -26,7 +26,7 @@ from pelorus.robot.stream import Streamer
 from pelorus.wire import Counts, Writer, read_file
 from recordings import first_frames
 
-FRAMES = 40
+FRAMES = 24
 PATIENCE_S = 1800.0  # against hangs
 LOOK_AGAIN_S = 0.02
 
@@ -260,7 +260,7 @@ def test_the_log_of_a_drive_is_taken_by_info_replay_and_report(
     assert_same_bits(done, log, program)
     info = pelorus("info", log)
     assert info.returncode == 0, info.stderr
-    assert re.search(r"^POSE +40 *$", info.stdout, re.M)
+    assert re.search(rf"^POSE +{FRAMES} *$", info.stdout, re.M)
     assert "no damage" in info.stdout
     report = pelorus("report", log, "--out", out, "--bin", program.parent)
     assert report.returncode == 0, report.stderr
