@@ -25,7 +25,6 @@ void setUp(void) {
     rig.config.model = PLR_MODEL_WORLD;
     rig.config.slots = MOST;
     rig.config.start_sigma = 0.01;
-    rig.config.bias_velocity_walk = rig.config.bias_gyro_walk = 0; /* see begin */
     rig.options.most_seen = 24;
 }
 
@@ -33,7 +32,6 @@ void tearDown(void) {
     textbook_free(&book);
 }
 
-/* The filter lets biases walk once a frame, the textbook at every twist: no walk here. */
 static void begin(void) {
     rig_begin();
     textbook_free(&book);
