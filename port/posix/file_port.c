@@ -96,6 +96,8 @@ static bool refill(file_port *port) {
                        : fetch_raw(port, port->buffer, sizeof port->buffer);
     if (n == COMPRESSED_DAMAGED)
         port->read_problem = "its compression is damaged: zstd -t FILE tells where";
+    else if (n == COMPRESSED_CUT && port->count == 0)
+        port->read_problem = "is compressed by zstd and cut off before its first bytes come out";
     else if (n == COMPRESSED_CUT)
         port->cut = true;
     port->at = 0;

@@ -302,6 +302,17 @@ def test_a_grid_of_absurd_size_is_refused_with_a_size_that_would_do(
     assert grid.log_odds.size > 1e6  # and not needlessly coarse
 
 
+def test_a_long_drive_gets_coarser_cells_rather_than_a_refusal() -> None:
+    """Landmarks certain to a millimetre ask for 5 cm: over 600 m squared that is too much."""
+    far = AHEAD + moved(600, 600, 0)
+    messages = result([landmark(7, AHEAD, 8)])
+    messages += [frame(9, [8]), pose(9, far - moved(10, 3, 0)), landmark(8, far, 9)]
+    grid = drawn(messages, resolution_m=None)
+    assert drawn(result([landmark(7, AHEAD, 8)]), resolution_m=None).resolution_m == 0.05
+    assert grid.resolution_m == 0.2
+    assert grid.landmarks == 2
+
+
 def test_a_result_without_landmarks_is_refused(
     pelorus: Command, write: Write, tmp_path: Path
 ) -> None:

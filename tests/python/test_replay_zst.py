@@ -89,6 +89,15 @@ def test_one_that_was_cut_is_used_as_far_as_it_goes(record: Record, tmp_path: Pa
 
 
 @with_library
+def test_one_of_which_nothing_is_left_is_not_called_empty(record: Record, tmp_path: Path) -> None:
+    path = tmp_path / "cut.plr.zst"
+    path.write_bytes(packed(record(drive(300))).read_bytes()[:40])
+    result = run(path)
+    assert result.status == RECORDING
+    assert "cut off before its first bytes come out" in result.stderr
+
+
+@with_library
 def test_damage_is_told(record: Record, tmp_path: Path) -> None:
     content = bytearray(packed(record(drive(300))).read_bytes())
     content[4:9] = b"\xff" * 5

@@ -36,7 +36,9 @@ def map_(
         ..., "--out", metavar="DIR", help="Where map.pgm, map.yaml and map.png go."
     ),
     resolution: float | None = typer.Option(
-        None, metavar="M", help="Side of a cell; else as fine as the landmarks are certain."
+        None,
+        metavar="M",
+        help="Side of a cell; else as fine as the landmarks are certain and a long drive allows.",
     ),
     height: tuple[float, float] | None = typer.Option(
         None,

@@ -113,10 +113,11 @@ def occupancy(seen: Sightings, wish: Wish) -> Grid:
             f"others lie outside {band.low_m:g} to {band.high_m:g} m about the body or beyond "
             f"{wish.range_m:g} m; widen --height or --range"
         )
-    resolution = wish.resolution_m or _resolution(spread[stands])
     path = flat(looked_at, seen.poses.p)
     points = flat(looked_at, seen.landmarks_W)
-    sheet = _Sheet.around(seen, np.concatenate((path, points[stands])), resolution)
+    shown = np.concatenate((path, points[stands]))
+    resolution = wish.resolution_m or _resolution(spread[stands], shown)
+    sheet = _Sheet.around(seen, shown, resolution)
     free = _free(sheet, seen, _Rays(looked_at, up, points, spread, sure, band), wish.range_m)
     occupied = _occupied(sheet, points[stands], spread[stands])
     log_odds = np.minimum(occupied, OCCUPIED) - np.minimum(free, FREE_MOST)
@@ -155,10 +156,23 @@ def _along(covariance: Floats, direction: Floats) -> Floats:
     return np.asarray(np.sqrt(np.einsum("ni,nij,nj->n", direction, covariance, direction)))
 
 
-def _resolution(spread: Floats) -> float:
-    """As fine as half of the landmarks are certain, in steps."""
+def _resolution(spread: Floats, points: Floats) -> float:
+    """As fine as half of the landmarks are certain and as a long drive allows, in steps."""
     sigma = float(np.median(np.sqrt(np.linalg.eigvalsh(spread)[:, 1])))
-    return next((step for step in RESOLUTIONS_M if step >= sigma), RESOLUTIONS_M[-1])
+    fine = (step for step in RESOLUTIONS_M if step >= sigma)
+    return next((step for step in fine if _cells(points, step) <= CELLS_MOST), RESOLUTIONS_M[-1])
+
+
+def _extent(points: Floats, step: float) -> tuple[Floats, Floats]:
+    """The sheet's lower corner, and how many cells it has in width and height."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    border = max(BORDER * float((high - low).max()), BORDER_CELLS * step)
+    low = np.floor((low - border) / step) * step
+    return low, np.ceil((high + border - low) / step)
+
+
+def _cells(points: Floats, step: float) -> float:
+    return float(np.prod(_extent(points, step)[1]))
 
 
 class _Sheet(NamedTuple):
@@ -170,10 +184,7 @@ class _Sheet(NamedTuple):
 
     @classmethod
     def around(cls, seen: Sightings, points: Floats, step: float) -> _Sheet:
-        low, high = points.min(axis=0), points.max(axis=0)
-        border = max(BORDER * float((high - low).max()), BORDER_CELLS * step)
-        low = np.floor((low - border) / step) * step
-        width, height = np.ceil((high + border - low) / step)
+        low, (width, height) = _extent(points, step)
         if width * height > CELLS_MOST:
             coarser = step * np.sqrt(width * height / CELLS_MOST)
             raise PelorusError(
