@@ -69,8 +69,6 @@ static const char *fault(const plr_landmark *l) {
     }
     if (trace <= 0)
         return "it has no covariance (all zeros); a result of --out has one";
-    if (trace >= PLR_WIRE_UNKNOWN_VARIANCE)
-        return "its covariance is that of a filter that has diverged";
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < i; j++)
             if (P[3 * i + j] * P[3 * i + j] > P[4 * i] * P[4 * j] * (1 + 1e-9))
@@ -97,6 +95,21 @@ static void choose(samples *list) {
             landmarks[kept++].known = true;
         }
     list->count = kept;
+}
+
+/* Points of which it is not known where they are (from 1000 km on): too far away to have a distance, or of
+ * a filter that has diverged. They would locate nobody. What is not finite is not left out: it is wrong. */
+static void leave_out_unknown(map_in *map) {
+    plr_landmark *landmarks = map->landmarks.items;
+    size_t kept = 0;
+    for (size_t i = 0; i < map->landmarks.count; i++) {
+        const double *P = landmarks[i].P_W_m2, trace = P[0] + P[4] + P[8];
+        if (isfinite(trace) && trace >= PLR_WIRE_UNKNOWN_VARIANCE)
+            map->left_out++;
+        else
+            landmarks[kept++] = landmarks[i];
+    }
+    map->landmarks.count = kept;
 }
 
 static int by_id(const void *a, const void *b) {
@@ -136,6 +149,9 @@ static bool check_file(const map_in *map, const desk *d, char *problem) {
         return say(problem, map->path, "is not a Pelorus file: give a result of --out");
     if (map->header.version_major == 0)
         return say(problem, map->path, "has no HEADER, so its axes are not known");
+    if (map->landmarks.count == 0 && map->left_out > 0)
+        return say(problem, map->path,
+                   "holds no landmark whose place is known: has the filter that made it diverged?");
     if (map->landmarks.count == 0)
         return say(problem, map->path,
                    "holds no landmark: give a result of --out, of a drive in slam or mapping");
@@ -163,6 +179,7 @@ bool map_in_read(map_in *map, const char *path, char problem[PROBLEM_SIZE]) {
     }
     read_all(map, d);
     choose(&map->landmarks);
+    leave_out_unknown(map);
     const bool good = check_file(map, d, problem) && check_landmarks(map, problem);
     file_port_close(&d->port);
     free(d);

@@ -19,6 +19,8 @@ typedef struct map_in {
     const char *path;  /* NULL: none is wanted */
     plr_header header; /* version_major 0: the file has none */
     samples landmarks; /* plr_landmark, ascending by id */
+    unsigned
+        left_out; /* whose place is not known: their variance is PLR_WIRE_UNKNOWN_VARIANCE or more */
 } map_in;
 
 /* Reads and checks the whole file; NULL: no map. On false, `problem` says what is wrong, of which

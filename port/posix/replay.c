@@ -53,6 +53,10 @@ static void on_started(void *context) {
     if (config->mode != PLR_MODE_LOCALIZATION && config->known_map == 0)
         complaints_say(&run->complaints, "the map of --map-in is not asked for: give --mode "
                                          "localization, or --known-map on");
+    if (run->map_in.left_out > 0)
+        complaints_say(&run->complaints,
+                       "landmarks of --map-in whose place is not known (a sigma of "
+                       "1000 km or more) are left out");
     if (map_in_is_of_another_camera(&run->map_in, &run->session.header))
         complaints_say(&run->complaints, "the map of --map-in was made with another camera: its "
                                          "ids must be those of this recording's front end");

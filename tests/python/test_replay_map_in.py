@@ -30,6 +30,7 @@ from replay_drive import (
 HALF = 320  # steps: once round the circle
 SLOTS = ("--slots", "256")
 LOCALIZE = (*SLOTS, "--mode", "localization")
+ROUND = np.array([1.0, 0, 1, 0, 0, 1])  # 1 m^2 along each axis
 
 
 @pytest.fixture
@@ -126,6 +127,7 @@ def spoiled(**changes: object) -> Change:
             "its determinant is negative",
         ),
         (lambda _: [], "holds no landmark"),
+        (spoiled(covariance=2.0**40 * ROUND), "no landmark whose place is known"),
     ],
 )
 def test_a_map_that_cannot_be_is_refused(
@@ -140,6 +142,19 @@ def test_a_map_that_cannot_be_is_refused(
     assert words in result.stderr
     assert "map.plr" in result.stderr
     assert not way.exists()
+
+
+def test_a_landmark_whose_place_is_not_known_is_left_out(record: Record, tmp_path: Path) -> None:
+    """As one at max-range, whose inverse range may be zero: its sigma is thousands of km."""
+    far = replace(known()[0], id=9999, p_W_m=np.array([1e5, 0, 0]), covariance=1e13 * ROUND)
+    path = record([header(), *known(), far]).rename(tmp_path / "map.plr")
+    plain = record([header(), *known()]).rename(tmp_path / "plain.plr")
+    result = run(record(drive()), *LOCALIZE, "--map-in", path, "--json")
+    assert "whose place is not known" in result.stderr
+    assert result.status == OK
+    wanted = run(record(drive()), *LOCALIZE, "--map-in", plain, "--json").summary
+    assert result.summary["err0_m"] == wanted["err0_m"]
+    assert result.summary["used"] == wanted["used"] > 0
 
 
 def test_a_file_that_is_no_map_is_refused(record: Record, tmp_path: Path) -> None:
