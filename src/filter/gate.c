@@ -51,7 +51,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
     if (!plr_model_of(f)->linearise(f, &f->slots[slot], &lin))
         return verdict;
 
-    plr_real S[6 + PLR_KERNEL_MARGIN] = {0}, r[3];
+    plr_real S[6], r[3];
     plr_covariance_innovation(f, slot, &lin, S);
     if (f->work.noise.open)
         plr_covariance_add_open_noise(f, slot, &lin, S);
@@ -59,10 +59,10 @@ plr_verdict plr_gate_judge(const plr_filter *f, unsigned slot, const plr_observa
         return verdict;
     for (unsigned i = 0; i < PLR_ROWS; i++)
         S[plr_upper_row(PLR_ROWS, i)] += plr_gate_noise(f, i);
-    if (!plr_cholesky_upper(PLR_ROWS, S))
+    if (!plr_cholesky3(S))
         return verdict;
     plr_gate_innovation(r, seen, &lin);
-    plr_solve_upper_transposed(PLR_ROWS, 1, S, r, 1);
+    plr_solve3_transposed(1, S, r);
     const plr_real row_gap = (plr_real)seen->vL_px - (plr_real)seen->vR_px;
     verdict.d2 = plr_dot3(r, r) + row_gap * row_gap / (PLR_R(2) * f->par.pixel_variance);
     verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];

@@ -8,45 +8,35 @@
 #include "linalg/packed.h"
 
 enum {
-    LANES = 4, /* sums side by side: some processors add them at once */
+    LANES = 8, /* sums side by side: some processors add them at once */
     HEAD = (PLR_POSE_DIM + PLR_BIAS_DIM) * (PLR_POSE_DIM + PLR_BIAS_DIM + 1) / 2
 };
 
 /* ---------------------------------------------------------------- sums */
 
-/* Of memory: `plain` is a sum of its words, by which a change of one word is seen for sure; `placed`
- * adds up the sums on the way, by which words that changed places, or change together, are. */
+/* Of memory, word by word. Each sum is turned before the next word enters, so that it depends on the
+ * order; and of two words that differ the sums differ, so that a change of one word is seen for sure. */
 typedef struct plr_sum {
-    uint32_t plain, placed;
+    uint32_t lane[LANES];
 } plr_sum;
 
-/* Of two numbers that differ, the results do too. */
-static uint32_t step(uint32_t sum, uint32_t word) {
-    sum = (sum ^ word) * 0x9E3779B1U;
-    return sum ^ sum >> 15;
-}
-
-static void put_in(plr_sum *sum, plr_sum more) {
-    sum->plain = step(sum->plain, more.plain);
-    sum->placed = step(sum->placed, more.placed);
+static inline uint32_t turned(uint32_t sum) {
+    return sum >> 7 | sum << 25;
 }
 
 static void add(plr_sum *sum, const void *memory, size_t bytes) {
     const unsigned char *at = memory;
-    uint32_t plain[LANES] = {0}, placed[LANES] = {0}, word[LANES];
-    for (; bytes >= sizeof word; bytes -= sizeof word, at += sizeof word) {
-        memcpy(word, at, sizeof word);
+    plr_sum now = *sum;
+    uint32_t word[LANES] = {0};
+    for (; bytes >= sizeof word; bytes -= sizeof word, at += sizeof word)
         for (unsigned lane = 0; lane < LANES; lane++) {
-            plain[lane] += word[lane];
-            placed[lane] += plain[lane];
+            memcpy(word, at + lane * sizeof *word, sizeof *word);
+            now.lane[lane] = turned(now.lane[lane]) + word[0];
         }
-    }
     memset(word, 0, sizeof word);
     memcpy(word, at, bytes);
-    for (unsigned lane = 0; lane < LANES; lane++) {
-        const plr_sum of_lane = {plain[lane] + word[lane], placed[lane] + plain[lane] + word[lane]};
-        put_in(sum, of_lane);
-    }
+    for (unsigned lane = 0; lane < LANES; lane++)
+        sum->lane[lane] = turned(now.lane[lane]) + word[lane];
 }
 
 /* The members from one offset to another. */
@@ -54,31 +44,42 @@ static void add_between(plr_sum *sum, const plr_filter *f, size_t from, size_t t
     add(sum, (const unsigned char *)f + from, to - from);
 }
 
-static uint64_t both(plr_sum sum) {
-    return (uint64_t)sum.placed << 32 | sum.plain;
+/* Of two numbers that differ, the results do too. */
+static uint32_t step(uint32_t mixed, uint32_t word) {
+    mixed = (mixed ^ word) * 0x9E3779B1U;
+    return mixed ^ mixed >> 15;
+}
+
+static uint64_t mixed(const plr_sum *sum) {
+    uint32_t low = 0, high = 0;
+    for (unsigned lane = 0; lane < LANES; lane++) {
+        low = step(low, sum->lane[lane]);
+        high = step(high, sum->lane[LANES - 1 - lane]);
+    }
+    return (uint64_t)high << 32 | low;
 }
 
 static uint64_t constant_sum(const plr_filter *f) {
-    plr_sum sum = {0, 0};
+    plr_sum sum = {{0}};
     add_between(&sum, f, offsetof(plr_filter, config), offsetof(plr_filter, t_ns));
-    return both(sum);
+    return mixed(&sum);
 }
 
 static uint64_t small_sum(const plr_filter *f) {
     const size_t used = plr_packed_row(plr_covariance_dim(f));
-    plr_sum sum = {0, 0};
+    plr_sum sum = {{0}};
     add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
     add(&sum, f->P, (used < HEAD ? used : HEAD) * sizeof *f->P);
     add_between(&sum, f, offsetof(plr_filter, frame_number), offsetof(plr_filter, guard));
-    return both(sum);
+    return mixed(&sum);
 }
 
 static uint64_t large_sum(const plr_filter *f) {
-    plr_sum sum = {0, 0};
+    plr_sum sum = {{0}};
     add(&sum, f->slots, f->count * sizeof *f->slots);
     add(&sum, &f->consistency, sizeof f->consistency);
     add(&sum, f->P, plr_packed_row(plr_covariance_dim(f)) * sizeof *f->P);
-    return both(sum);
+    return mixed(&sum);
 }
 
 /* ---------------------------------------------------------------- ranges */

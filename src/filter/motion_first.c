@@ -139,7 +139,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_moti
     plr_linearisation lin;
     plr_polar chart;
     plr_real R[9], q[3], J[9], A[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
-    plr_real S[6 + PLR_KERNEL_MARGIN] = {0};
+    plr_real S[6];
     memcpy(q, slot->x, sizeof q);
     plr_se3_move_back(q, E, p);
     plr_se3_rotation(R, E);
@@ -153,7 +153,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_moti
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++)
             S[k++] = full[3 * c + r] + (r == c ? plr_gate_noise(s->f, r) : PLR_R(0));
-    if (!plr_cholesky_upper(3, S))
+    if (!plr_cholesky3(S))
         return false;
     plr_gemm_nn(3, 6, 3, J, 3, at->V, 6, dz, 6);
     plr_gemm_nn(3, 1, 6, dz, 6, m->z, 1, shift, 1);
@@ -164,11 +164,11 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_applied_moti
     for (unsigned r = 0; r < 3; r++)
         at->rho[r] -= shift[r];
     memcpy(at->a, dz, sizeof at->a);
-    plr_solve_upper_transposed(3, 6, S, at->a, 6);
-    plr_solve_upper_transposed(3, 1, S, at->rho, 1);
+    plr_solve3_transposed(6, S, at->a);
+    plr_solve3_transposed(1, S, at->rho);
     at->closer = 0;
     if (depends_on_observation(s->f, J, at->P)) {
-        plr_solve_upper_transposed(3, 3, S, JP, 3);
+        plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->closer = plr_dot3(column, at->rho);
     }
@@ -181,7 +181,7 @@ static plr_real in_best_measure(const plr_sighting *at, unsigned bank) {
     const plr_real *now = at->U[1 - bank];
     plr_real r[3] = {now[0] * at->rho[0], PLR_FMA(now[3], at->rho[1], now[1] * at->rho[0]),
                      PLR_FMA(now[5], at->rho[2], PLR_FMA(now[4], at->rho[1], now[2] * at->rho[0]))};
-    plr_solve_upper_transposed(3, 1, at->U[bank], r, 1);
+    plr_solve3_transposed(1, at->U[bank], r);
     return plr_dot3(r, r);
 }
 
@@ -304,7 +304,7 @@ static void descend(plr_search *s, plr_search_point *best) {
 static void judge_at_zero(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     const plr_real *U = at->U[s->bank];
-    plr_real M[6 + PLR_KERNEL_MARGIN] = {0}, x[3];
+    plr_real M[6], x[3];
     plr_real limit = s->f->par.camera.fx * s->f->par.camera.fx;
     bool basis = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
@@ -323,12 +323,12 @@ static void judge_at_zero(plr_search *s, unsigned i) {
         basis = basis && sum - plr_gate_noise(s->f, r) <= limit;
     }
     at->at_zero = -1;
-    if ((!basis && !slot_of(s, i)->known) || !plr_cholesky_upper(3, M)) {
+    if ((!basis && !slot_of(s, i)->known) || !plr_cholesky3(M)) {
         at->voice = 0;
         return;
     }
     memcpy(x, at->rho, sizeof x);
-    plr_solve_upper_transposed(3, 1, M, x, 1);
+    plr_solve3_transposed(1, M, x);
     at->at_zero = plr_dot3(x, x);
     const plr_real root = U[0] * U[3] * U[5] * M[0] * M[3] * M[5];
     at->gain = root * root;
@@ -338,7 +338,7 @@ static void judge_at_zero(plr_search *s, unsigned i) {
  * had in J, e^T [(I - w h)(I + (1 - w) h)]^-1 e. `rest` is the least share left to the others. */
 static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_real dz[6],
                          plr_real e[3], plr_real *rest) {
-    plr_real X[18], h[9], M[6 + PLR_KERNEL_MARGIN] = {0};
+    plr_real X[18], h[9], M[6];
     const plr_real w = at->weight;
     for (unsigned r = 0; r < 3; r++) {
         e[r] = at->rho[r];
@@ -361,12 +361,12 @@ static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_re
                    w * (PLR_R(1) - w) * hh;
         }
     *rest = 0;
-    if (!plr_cholesky_upper(3, M))
+    if (!plr_cholesky3(M))
         return 0;
     *rest = M[0] < M[3] ? M[0] : M[3];
     *rest = *rest < M[5] ? *rest : M[5];
     *rest *= *rest;
-    plr_solve_upper_transposed(3, 1, M, e, 1);
+    plr_solve3_transposed(1, M, e);
     return plr_dot3(e, e);
 }
 

@@ -81,4 +81,40 @@ static inline bool plr_is_finite(plr_real x) {
     return x - x == 0;
 }
 
+/* U^T U = S in place: S is 3x3, packed upper (0,0) (0,1) (0,2) (1,1) (1,2) (2,2). False, with S spoiled,
+ * if a pivot is not a positive finite number. The steps of plr_cholesky_upper(3, S), without loops. */
+static inline bool plr_cholesky3(plr_real S[6]) {
+    if (!(S[0] > 0) || !plr_is_finite(S[0]))
+        return false;
+    plr_real inverse = PLR_R(1) / PLR_SQRT(S[0]);
+    S[0] *= inverse;
+    S[1] *= inverse;
+    S[2] *= inverse;
+    S[3] = PLR_FMA(-S[1], S[1], S[3]);
+    S[4] = PLR_FMA(-S[1], S[2], S[4]);
+    if (!(S[3] > 0) || !plr_is_finite(S[3]))
+        return false;
+    inverse = PLR_R(1) / PLR_SQRT(S[3]);
+    S[3] *= inverse;
+    S[4] *= inverse;
+    S[5] = PLR_FMA(-S[4], S[4], PLR_FMA(-S[2], S[2], S[5]));
+    if (!(S[5] > 0) || !plr_is_finite(S[5]))
+        return false;
+    S[5] *= PLR_R(1) / PLR_SQRT(S[5]);
+    return true;
+}
+
+/* X <- U^-T X: U is 3x3, packed upper; X is 3 x n. The steps of plr_solve_upper_transposed(3, n, U, X,
+ * n). */
+static inline void plr_solve3_transposed(unsigned n, const plr_real U[6], plr_real *X) {
+    const plr_real by0 = PLR_R(1) / U[0], by1 = PLR_R(1) / U[3], by2 = PLR_R(1) / U[5];
+    for (unsigned c = 0; c < n; c++) {
+        const plr_real x0 = X[c] * by0;
+        const plr_real x1 = PLR_FMA(-U[1], x0, X[n + c]) * by1;
+        X[c] = x0;
+        X[n + c] = x1;
+        X[2 * n + c] = PLR_FMA(-U[4], x1, PLR_FMA(-U[2], x0, X[2 * n + c])) * by2;
+    }
+}
+
 #endif

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+#include "filter/search.h"
+
+#include <string.h>
+
+#include "camera/stereo.h"
+#include "filter/covariance.h"
+#include "filter/gate.h"
+#include "filter/model.h"
+#include "filter/polar.h"
+#include "lie/se3.h"
+#include "linalg/dense.h"
+#include "linalg/small.h"
+
+enum { TRIALS = 4 }; /* of a better point; the start and a return to the best one come on top */
+
+/* Huber's limit on a whitened residual of three rows: beyond it an observation pulls no harder. */
+#define HUBER PLR_R(2.5)
+/* A step that promises less of the sum is not worth its evaluation. */
+#define SMALL_GAIN PLR_R(0.1)
+
+static plr_real huber(plr_real d2) {
+    return d2 <= HUBER * HUBER ? d2 : PLR_R(2) * HUBER * PLR_SQRT(d2) - HUBER * HUBER;
+}
+
+/* What does not change while nu is sought. */
+static void prepare(plr_search *s, unsigned i) {
+    plr_filter *f = s->f;
+    plr_sighting *at = &s->sightings[i];
+    const unsigned slot = f->work.slot_of[f->work.used[i]];
+    plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, s->prior.K, at->V);
+    plr_covariance_landmark(f, slot, at->P);
+    for (unsigned r = 0; r < 3; r++)
+        for (unsigned c = 0; c < 3; c++)
+            for (unsigned k = 0; k < 6; k++)
+                at->P[3 * r + c] = PLR_FMA(-at->V[6 * r + k], at->V[6 * c + k], at->P[3 * r + c]);
+}
+
+/* How the pixels of a landmark at q0, which the camera's motion (R, p) brings to q, depend on the chart
+ * at q0: J = Dz R^T Ji(q0), 3x3. As in model_body.c the products that vanish, here Dz q in the rows uL
+ * and v, are left out. */
+static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
+                          const plr_real p[3], const plr_real q[3], const plr_real Dz[9],
+                          plr_real J[9]) {
+    plr_real DzRt[9];
+    plr_mat3_mul_nt(DzRt, Dz, R);
+    for (int row = 0; row < 3; row++) {
+        const plr_real along = row == 1 ? camera->fx * camera->baseline / q[2] : PLR_R(0);
+        for (int column = 0; column < 2; column++) {
+            const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
+            J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, n);
+        }
+        J[3 * row + 2] = -chart->r * (along + plr_dot3(DzRt + 3 * row, p));
+    }
+}
+
+/* How q depends on nu, 3x6: [-I | [q]x] N, N = Ad(T_CB) JL. */
+static void point_by_motion(const plr_real q[3], const plr_real N[36], plr_real dq[18]) {
+    for (unsigned k = 0; k < 6; k++) {
+        const plr_real turn[3] = {N[18 + k], N[24 + k], N[30 + k]};
+        plr_real way[3];
+        plr_cross3(way, q, turn);
+        for (unsigned i = 0; i < 3; i++)
+            dq[6 * i + k] = way[i] - N[6 * i + k];
+    }
+}
+
+/* Does a single observation still make a part of what is known of a landmark's range? Of one that
+ * has been seen often, the uncertainty is nearly all the camera's, common to all, and moving each by
+ * itself would shift them against the pose. */
+static bool depends_on_observation(const plr_filter *f, const plr_real J[9], const plr_real P[9]) {
+    const plr_real by_range = J[2] - J[5];
+    return by_range * by_range * P[8] > PLR_R(0.02) * f->par.pixel_variance;
+}
+
+/* The camera's motion at a point of the search. */
+typedef struct plr_camera_step {
+    plr_real z[6];
+    plr_real R[9], E[9], p[3]; /* R = I + E */
+    plr_real N[36];            /* how nu moves the camera: Ad(T_CB) JL, 6x6 */
+} plr_camera_step;
+
+static void step_to(const plr_search *s, const plr_real z[6], plr_camera_step *step) {
+    plr_applied_motion m;
+    plr_motion_at(s->f, &s->prior, z, &m);
+    plr_camera_motion(step->E, step->p, &s->f->par.camera, m.E, m.p);
+    plr_se3_rotation(step->R, step->E);
+    memcpy(step->z, z, sizeof step->z);
+    memset(step->N, 0, sizeof step->N);
+    plr_gemm_nn(6, 6, 6, s->f->par.Ad_CB, 6, m.JL, 6, step->N, 6);
+}
+
+/* One observation at a point: U of the trial bank, a and rho. False where nothing can be said. */
+static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
+    const plr_camera *camera = &s->f->par.camera;
+    const plr_slot *slot = plr_search_slot(s, i);
+    plr_sighting *at = &s->sightings[i];
+    plr_linearisation lin;
+    plr_polar chart;
+    plr_real q[3], Dz[9], J[9], dq[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
+    plr_real S[6];
+    memcpy(q, slot->x, sizeof q);
+    plr_se3_move_back(q, step->E, step->p);
+    if (!(q[2] >= s->f->par.min_depth))
+        return false;
+    plr_polar_at(&chart, slot->x);
+    plr_stereo_project(lin.z, camera, q);
+    plr_stereo_jacobian(Dz, camera, q);
+    differentiate(camera, &chart, step->R, step->p, q, Dz, J);
+    plr_mat3_mul(JP, J, at->P);
+    plr_mat3_mul_nt(full, JP, J);
+    for (unsigned r = 0, k = 0; r < 3; r++)
+        for (unsigned c = r; c < 3; c++)
+            S[k++] = full[3 * c + r] + (r == c ? plr_gate_noise(s->f, r) : PLR_R(0));
+    if (!plr_cholesky3(S))
+        return false;
+    plr_gemm_nn(3, 6, 3, J, 3, at->V, 6, dz, 6);
+    plr_gemm_nn(3, 1, 6, dz, 6, step->z, 1, shift, 1);
+    for (unsigned r = 0; r < 3; r++)
+        shift[r] = PLR_FMA(J[3 * r + 2], slot->beyond, shift[r]);
+    point_by_motion(q, step->N, dq);
+    plr_gemm_nn(3, 6, 3, Dz, 3, dq, 6, dz, 6);
+    plr_gate_innovation(at->rho, plr_search_observation(s, i), &lin);
+    for (unsigned r = 0; r < 3; r++)
+        at->rho[r] -= shift[r];
+    memcpy(at->a, dz, sizeof at->a);
+    plr_solve3_transposed(6, S, at->a);
+    plr_solve3_transposed(1, S, at->rho);
+    at->closer = 0;
+    if (depends_on_observation(s->f, J, at->P)) {
+        plr_solve3_transposed(3, S, JP);
+        const plr_real column[3] = {JP[2], JP[5], JP[8]};
+        at->closer = plr_dot3(column, at->rho);
+    }
+    memcpy(at->U[1 - s->bank], S, sizeof at->U[0]);
+    return true;
+}
+
+/* |U^-T r|^2 with U of the best point, where r = U'^T rho is the residual of the one on trial. */
+static plr_real in_best_measure(const plr_sighting *at, unsigned bank) {
+    const plr_real *now = at->U[1 - bank];
+    plr_real r[3] = {now[0] * at->rho[0], PLR_FMA(now[3], at->rho[1], now[1] * at->rho[0]),
+                     PLR_FMA(now[5], at->rho[2], PLR_FMA(now[4], at->rho[1], now[2] * at->rho[0]))};
+    plr_solve3_transposed(1, at->U[bank], r);
+    return plr_dot3(r, r);
+}
+
+/* J += w a^T a, b += w a^T rho */
+static void gather(const plr_sighting *at, plr_search_point *point) {
+    plr_real *J = point->J;
+    for (unsigned k = 0; k < 6; k++) {
+        const plr_real column[3] = {at->a[k], at->a[6 + k], at->a[12 + k]};
+        point->b[k] = PLR_FMA(at->weight, plr_dot3(column, at->rho), point->b[k]);
+        for (unsigned l = k; l < 6; l++, J++) {
+            const plr_real other[3] = {at->a[l], at->a[6 + l], at->a[12 + l]};
+            *J = PLR_FMA(at->weight, plr_dot3(column, other), *J);
+        }
+    }
+}
+
+void plr_search_prepare(plr_search *s) {
+    for (unsigned i = 0; i < s->count; i++)
+        prepare(s, i);
+}
+
+/* All observations at nu = z. Returns by how much the sum is larger than at the best point, in that
+ * point's measure. An observation that falls behind the camera is left out of the comparison. */
+static plr_real evaluate(plr_search *s, const plr_real z[6], plr_search_point *point) {
+    plr_camera_step step;
+    plr_real change = 0;
+    step_to(s, z, &step);
+    memset(point, 0, sizeof *point);
+    memcpy(point->z, z, sizeof point->z);
+    point->cost = plr_norm2_of_6(z);
+    for (unsigned i = 0; i < s->count; i++) {
+        plr_sighting *at = &s->sightings[i];
+        at->weight = 0;
+        at->lost = !evaluate_one(s, i, &step);
+        if (at->lost) {
+            memcpy(at->U[1 - s->bank], at->U[s->bank], sizeof at->U[0]);
+            continue;
+        }
+        const plr_real d2 = plr_dot3(at->rho, at->rho);
+        at->weight = at->voice * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
+        if (!(at->voice > 0))
+            continue;
+        point->cost += huber(d2);
+        change += huber(in_best_measure(at, s->bank)) - at->cost;
+        gather(at, point);
+    }
+    return change;
+}
+
+/* Makes the point evaluated last the best one. */
+static void accept(plr_search *s) {
+    s->bank = 1 - s->bank;
+    for (unsigned i = 0; i < s->count; i++)
+        s->sightings[i].cost = huber(plr_dot3(s->sightings[i].rho, s->sightings[i].rho));
+}
+
+void plr_search_go_to(plr_search *s, const plr_real z[6], plr_search_point *best) {
+    (void)evaluate(s, z, best);
+    accept(s);
+}
+
+bool plr_search_factorise(const plr_search_point *point, plr_real damping,
+                          plr_real U[21 + PLR_KERNEL_MARGIN]) {
+    memcpy(U, point->J, sizeof point->J);
+    for (unsigned k = 0; k < 6; k++) {
+        plr_real *diagonal = U + plr_upper_row(6, k);
+        *diagonal = PLR_FMA(damping, PLR_R(1) + *diagonal, PLR_R(1) + *diagonal);
+    }
+    return plr_cholesky_upper(6, U);
+}
+
+plr_real plr_search_step(const plr_search_point *point, const plr_real *U, plr_real dz[6]) {
+    plr_real gradient[6], promise = 0;
+    for (unsigned k = 0; k < 6; k++)
+        gradient[k] = dz[k] = point->b[k] - point->z[k];
+    plr_solve_upper_transposed(6, 1, U, dz, 1);
+    plr_solve_upper(6, U, dz);
+    for (unsigned k = 0; k < 6; k++)
+        promise = PLR_FMA(dz[k], gradient[k], promise);
+    return promise;
+}
+
+/* May a motion be off by L z? As far as a retraction can follow. */
+static bool is_within_reach(const plr_search *s, const plr_real z[6]) {
+    static const plr_real way2 = 1e6, turn2 = 4;
+    plr_real n[6] = {0};
+    plr_gemm_nn(6, 1, 6, s->prior.L, 6, z, 1, n, 1);
+    return plr_dot3(n, n) <= way2 && plr_dot3(n + 3, n + 3) <= turn2;
+}
+
+void plr_search_descend(plr_search *s, plr_search_point *best) {
+    plr_search_point trial;
+    plr_real U[21 + PLR_KERNEL_MARGIN], damping = 0;
+    bool at_best = true;
+    for (int i = 0; i < TRIALS; i++) {
+        plr_real z[6], dz[6];
+        if (!plr_search_factorise(best, damping, U) ||
+            !(plr_search_step(best, U, dz) >= SMALL_GAIN))
+            break;
+        for (unsigned k = 0; k < 6; k++)
+            z[k] = best->z[k] + dz[k];
+        at_best = false;
+        if (is_within_reach(s, z)) {
+            const plr_real change =
+                evaluate(s, z, &trial) + plr_norm2_of_6(z) - plr_norm2_of_6(best->z);
+            if (change < 0) {
+                *best = trial;
+                accept(s);
+                at_best = true;
+                damping *= PLR_R(0.1);
+                continue;
+            }
+        }
+        damping = damping > 0 ? PLR_R(10) * damping : PLR_R(0.01);
+    }
+    if (!at_best) { /* a and rho are those of a point that was not taken */
+        const plr_search_point kept = *best;
+        plr_search_go_to(s, kept.z, best);
+    }
+}
+
+void plr_search_from_zero(plr_search *s, plr_search_point *best) {
+    static const plr_real zero[6] = {0};
+    plr_search_prepare(s);
+    plr_search_go_to(s, zero, best);
+}
