@@ -83,14 +83,19 @@ static void test_what_no_call_looks_at_may_be_changed(void) {
     rig_drive(3);
 }
 
-/* A chain of changes that a plain sum would not see. */
+/* Which a plain sum would not see: neighbours, and words that enter the same of the sums side by side. */
 static void test_words_that_change_places_are_found(void) {
-    const plr_real x = rig.filter.P[100];
-    TEST_ASSERT_FALSE(x <= rig.filter.P[104] && x >= rig.filter.P[104]);
-    rig.filter.P[100] = rig.filter.P[104];
-    rig.filter.P[104] = x;
     const plr_frame nothing = {.t_ns = rig.world.t_ns, .budget = PLR_NO_BUDGET};
-    TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED, plr_filter_update(&rig.filter, &nothing, NULL));
+    plr_real *P = rig.filter.P + 60;
+    for (unsigned apart = 1; apart <= 16; apart++) {
+        const plr_real x = P[0], y = P[apart];
+        TEST_ASSERT_FALSE(x <= y && x >= y);
+        P[0] = y;
+        P[apart] = x;
+        TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED, plr_filter_update(&rig.filter, &nothing, NULL));
+        P[0] = x;
+        P[apart] = y;
+    }
 }
 
 /* ---------------------------------------------------------------- what is refused */
