@@ -20,14 +20,30 @@ typedef struct plr_block {
     plr_real E[6 * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
 } plr_block;
 
-/* sum = H_a x: x is a vector over the state. */
-static plr_real apply_row(const plr_block *block, unsigned a, unsigned r, const plr_real *x) {
+/* out = H_a x, three rows: x is a vector over the state. */
+static inline void apply(const plr_block *block, unsigned a, const plr_real *x, plr_real out[3]) {
     const plr_linearisation *lin = &block->lin[a];
-    plr_real sum = plr_dot3(lin->H_landmark + 3 * r, x + block->row_of[a]);
-    if (lin->uses_pose)
+    plr_mat3_vec(out, lin->H_landmark, x + block->row_of[a]);
+    if (!lin->uses_pose)
+        return;
+    for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned c = 0; c < PLR_POSE_DIM; c++)
-            sum = PLR_FMA(lin->H_pose[6 * r + c], x[c], sum);
-    return sum;
+            out[r] = PLR_FMA(lin->H_pose[6 * r + c], x[c], out[r]);
+}
+
+/* S = H (P H^T) + R, packed upper, from the rows of (P H^T)^T. */
+static void fill_S(const plr_filter *f, const plr_block *block, plr_real *S) {
+    const unsigned rows = PLR_ROWS * block->count;
+    for (unsigned i = 0; i < rows; i++) {
+        const plr_real *PHt = f->work.Vt + i * block->ld;
+        plr_real own[3];
+        apply(block, i / PLR_ROWS, PHt, own);
+        own[i % PLR_ROWS] += plr_gate_noise(f, i % PLR_ROWS);
+        for (unsigned r = i % PLR_ROWS; r < PLR_ROWS; r++)
+            *S++ = own[r];
+        for (unsigned b = i / PLR_ROWS + 1; b < block->count; b++, S += PLR_ROWS)
+            apply(block, b, PHt, S);
+    }
 }
 
 /* Linearises the block's observations; fills rows of (P H^T)^T, S and y in the workspace. */
@@ -42,21 +58,18 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
         block->row_of[a] = plr_covariance_row(f, slot);
         plr_covariance_project(f, slot, lin, w->Vt + PLR_ROWS * a * block->ld, block->ld);
 
-        plr_real r[3];
+        plr_real r[3], Hx[3];
         plr_gate_innovation(r, &observations[w->order[used[a]]], lin);
-        for (unsigned i = 0; i < PLR_ROWS; i++) {
-            w->y[PLR_ROWS * a + i] = r[i] - apply_row(block, a, i, w->dx);
-            for (unsigned k = 0; w->noise.open && k < 6; k++)
-                block->E[6 * (PLR_ROWS * a + i) + k] =
-                    apply_row(block, a, i, w->noise.Wt + k * block->ld);
+        apply(block, a, w->dx, Hx);
+        for (unsigned i = 0; i < PLR_ROWS; i++)
+            w->y[PLR_ROWS * a + i] = r[i] - Hx[i];
+        for (unsigned k = 0; w->noise.open && k < 6; k++) {
+            apply(block, a, w->noise.Wt + k * block->ld, Hx);
+            for (unsigned i = 0; i < PLR_ROWS; i++)
+                block->E[6 * (PLR_ROWS * a + i) + k] = Hx[i];
         }
     }
-    const unsigned rows = PLR_ROWS * block->count;
-    plr_real *S = w->S;
-    for (unsigned i = 0; i < rows; i++)
-        for (unsigned j = i; j < rows; j++)
-            *S++ = apply_row(block, j / PLR_ROWS, j % PLR_ROWS, w->Vt + i * block->ld) +
-                   (i == j ? plr_gate_noise(f, i % PLR_ROWS) : PLR_R(0));
+    fill_S(f, block, w->S);
 }
 
 /* What the block tells of the motion's noise, with E = U^-T H W and y = U^-T (r - H dx):
