@@ -141,8 +141,8 @@ typedef struct plr_workspace {
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
                PLR_KERNEL_MARGIN]; /* packed upper triangle */
     plr_real y[PLR_BLOCK_ROWS];
-    plr_real dx[PLR_MAX_STATE];
-    plr_real diagonal[PLR_MAX_STATE];       /* of P, as a block would leave it */
+    plr_real dx[PLR_MAX_LD];
+    plr_real diagonal[PLR_MAX_LD];          /* of P, as a block would leave it */
     plr_noise noise;                        /* of the motion that this frame applies */
     plr_real gain[PLR_MAX_OBSERVATIONS];    /* how much order[k] would tell; see gate.h */
     uint16_t order[PLR_MAX_OBSERVATIONS];   /* good observations of the frame, by id */

@@ -11,13 +11,15 @@
 #include "linalg/dense.h"
 #include "linalg/small.h"
 
+enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
+
 /* One block of observations, stacked: S = H P H^T + R and y = r - H dx. */
 typedef struct plr_block {
     unsigned count;
     unsigned n, ld;                          /* dimension of the state; between rows of V^T */
     unsigned row_of[PLR_BLOCK_OBSERVATIONS]; /* first row of each landmark in the state */
     plr_linearisation lin[PLR_BLOCK_OBSERVATIONS];
-    plr_real E[6 * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
+    plr_real E[WIDE * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
 } plr_block;
 
 /* out = H_a x, three rows: x is a vector over the state. */
@@ -66,29 +68,37 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
         for (unsigned k = 0; w->noise.open && k < 6; k++) {
             apply(block, a, w->noise.Wt + k * block->ld, Hx);
             for (unsigned i = 0; i < PLR_ROWS; i++)
-                block->E[6 * (PLR_ROWS * a + i) + k] = Hx[i];
+                block->E[WIDE * (PLR_ROWS * a + i) + k] = Hx[i];
         }
     }
     fill_S(f, block, w->S);
 }
 
 /* What the block tells of the motion's noise, with E = U^-T H W and y = U^-T (r - H dx):
- * Lambda += E^T E, eta += E^T y, W -= V E. */
-static void inform_noise(plr_filter *f, plr_block *block, unsigned rows) {
-    plr_workspace *w = &f->work;
-    plr_real *Lambda = w->noise.Lambda, column[PLR_BLOCK_ROWS];
+ * Lambda += E^T E, eta += E^T y. */
+static void inform_noise(plr_noise *noise, const plr_block *block, const plr_real *y,
+                         unsigned rows) {
+    plr_real *Lambda = noise->Lambda;
     for (unsigned k = 0; k < 6; k++) {
         for (unsigned r = 0; r < rows; r++)
-            w->noise.eta[k] = PLR_FMA(block->E[6 * r + k], w->y[r], w->noise.eta[k]);
+            noise->eta[k] = PLR_FMA(block->E[WIDE * r + k], y[r], noise->eta[k]);
         for (unsigned l = k; l < 6; l++, Lambda++)
             for (unsigned r = 0; r < rows; r++)
-                *Lambda = PLR_FMA(block->E[6 * r + k], block->E[6 * r + l], *Lambda);
+                *Lambda = PLR_FMA(block->E[WIDE * r + k], block->E[WIDE * r + l], *Lambda);
     }
-    for (unsigned k = 0; k < 6; k++) {
-        for (unsigned r = 0; r < rows; r++)
-            column[r] = -block->E[6 * r + k];
-        plr_combine_rows(block->ld, rows, column, w->Vt, block->ld, w->noise.Wt + k * block->ld);
-    }
+}
+
+/* W -= V E and dx += V y, as seven rows of one product: -y stands beside E. */
+static void move_state(plr_filter *f, plr_block *block, unsigned rows) {
+    plr_workspace *w = &f->work;
+    plr_real *Wt = w->noise.Wt, *beyond = w->diagonal;
+    const size_t ld = block->ld;
+    for (unsigned r = 0; r < rows; r++)
+        block->E[WIDE * r + 6] = -w->y[r];
+    plr_real *const first[4] = {Wt, Wt + ld, Wt + 2 * ld, Wt + 3 * ld};
+    plr_real *const last[4] = {Wt + 4 * ld, Wt + 5 * ld, w->dx, beyond};
+    plr_subtract_four_rows(block->ld, rows, block->E, WIDE, w->Vt, ld, first);
+    plr_subtract_four_rows(block->ld, rows, block->E + 4, WIDE, w->Vt, ld, last);
 }
 
 /* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but the
@@ -103,11 +113,13 @@ static bool apply_block(plr_filter *f, plr_block *block, bool *factorised) {
     plr_solve_upper_transposed(rows, 1, w->S, w->y, 1);
     if (!plr_covariance_subtract(f, rows))
         return false;
-    plr_combine_rows(block->n, rows, w->y, w->Vt, block->ld, w->dx);
-    if (w->noise.open) {
-        plr_solve_upper_transposed(rows, 6, w->S, block->E, 6);
-        inform_noise(f, block, rows);
+    if (!w->noise.open) {
+        plr_combine_rows(block->n, rows, w->y, w->Vt, block->ld, w->dx);
+        return true;
     }
+    plr_solve_upper_transposed(rows, 6, w->S, block->E, WIDE);
+    inform_noise(&w->noise, block, w->y, rows);
+    move_state(f, block, rows);
     return true;
 }
 

@@ -156,3 +156,13 @@ void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
         for (unsigned k = 0; k < depth; k++)
             x[j] = PLR_FMA(a[k], X[k * ldx + j], x[j]);
 }
+
+void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
+                            const plr_real *V, size_t ldv, plr_real *const X[4]) {
+    plr_tile_factors factors = {.U = A, .W = V, .to_next_U = lda, .to_next_W = ldv};
+    for (unsigned j = 0; j < n; j += STRIP) {
+        plr_real *const at[PLR_TILE_ROWS] = {X[0] + j, X[1] + j, X[2] + j, X[3] + j};
+        plr_tile_subtract(depth, factors, at, at);
+        factors.W += STRIP;
+    }
+}

@@ -62,4 +62,10 @@ void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x);
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, const plr_real *X, size_t ldx,
                       plr_real *x);
 
+/* X_r -= sum_k A(k, r) V_k for four rows X_r, r = 0 .. 3: V is depth x n with leading dimension ldv, A is
+ * depth x 4 with leading dimension lda, depth >= 2, n a multiple of PLR_TILE_COLUMNS. Of each element the
+ * steps are those of plr_combine_rows. */
+void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
+                            const plr_real *V, size_t ldv, plr_real *const X[4]);
+
 #endif
