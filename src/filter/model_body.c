@@ -21,24 +21,32 @@
  * large number from itself, which float32 would leave to rounding for a point a kilometre away.
  */
 
+/* row = [way turn] Ad, Ad = [R, C; 0, R]; turn may be NULL for zeros. */
+static inline void times_adjoint(plr_real row[6], const plr_real way[3], const plr_real *turn,
+                                 const plr_real Ad[36]) {
+    for (int j = 0; j < 6; j++)
+        row[j] = PLR_FMA(way[2], Ad[12 + j], PLR_FMA(way[1], Ad[6 + j], way[0] * Ad[j]));
+    for (int j = 3; j < 6 && turn; j++)
+        row[j] = PLR_FMA(turn[2], Ad[30 + j],
+                         PLR_FMA(turn[1], Ad[24 + j], PLR_FMA(turn[0], Ad[18 + j], row[j])));
+}
+
 /* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q.
  * Jw [-I | [q]x] = [ -N^T / r | N^T [mu]x ; mu^T / r^2 | 0 ]. */
 static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, plr_real J[18]) {
     const plr_real inverse = PLR_R(1) / chart->r;
-    plr_real K[18] = {0};
+    plr_real way[3];
     for (int row = 0; row < 2; row++) {
         const plr_real n[3] = {chart->N[row], chart->N[2 + row], chart->N[4 + row]};
         plr_real turn[3];
         plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
-        for (int j = 0; j < 3; j++) {
-            K[6 * row + j] = -n[j] * inverse;
-            K[6 * row + 3 + j] = turn[j];
-        }
+        for (int j = 0; j < 3; j++)
+            way[j] = -n[j] * inverse;
+        times_adjoint(J + 6 * row, way, turn, f->par.Ad_CB);
     }
     for (int j = 0; j < 3; j++)
-        K[12 + j] = chart->mu[j] * inverse * inverse;
-    memset(J, 0, 18 * sizeof *J);
-    plr_gemm_nn(3, 6, 6, K, 6, f->par.Ad_CB, 6, J, 6);
+        way[j] = chart->mu[j] * inverse * inverse;
+    times_adjoint(J + 12, way, NULL, f->par.Ad_CB);
 }
 
 /* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): a chart's error carried along a rigid motion.
@@ -236,20 +244,18 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
  * pose's correction xi: most of that may concern the way here, which no landmark in sight shares. A
  * bearing counts as its angle, an inverse range as the disparity that it makes. Known landmarks have
  * no voice: they stand in the world, and what moves them in the camera is the pose, while what the
- * errors of a map have in common by chance is no motion. */
-static void common_motion(const plr_filter *f, const plr_real *dx, plr_real eta[6]) {
+ * errors of a map have in common by chance is no motion. J becomes chart_by_body_twist of every slot. */
+static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J, plr_real eta[6]) {
     const plr_real baseline = f->par.camera.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
     plr_rigid_fit fit;
     plr_rigid_fit_clear(&fit);
-    for (unsigned slot = 0; slot < f->count; slot++) {
+    for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
         plr_polar chart;
-        plr_real J[18];
-        if (f->slots[slot].known)
-            continue;
         plr_polar_at(&chart, f->slots[slot].x);
         chart_by_body_twist(f, &chart, J);
-        plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
+        if (!f->slots[slot].known)
+            plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
     }
     plr_rigid_fit_solve(&fit, dx, eta);
 }
@@ -265,19 +271,18 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     plr_real R_xi[9], p_xi[3], A[36], eta[6], eta_C[6] = {0}, E_C[9], R_C[9], p_C[3];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
-    common_motion(f, dx, eta);
+    plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot, of 72 at least */
+    common_motion(f, dx, J, eta);
     plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, eta, 1, eta_C, 1);
     plr_se3_expm1(E_C, p_C, eta_C);
     plr_se3_rotation(R_C, E_C);
 
     unsigned cut = 0;
-    plr_real *F = f->work.Vt;
-    for (unsigned slot = 0; slot < f->count; slot++) {
+    for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, there, to;
-        plr_real J[18], M[4], w[3], rigid[9];
+        plr_real M[4], w[3], rigid[9];
         plr_polar_at(&from, s->x);
-        chart_by_body_twist(f, &from, J);
         memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
