@@ -141,11 +141,14 @@ static inline void transport_block(const plr_real *restrict F, const plr_real *r
                                    plr_real *restrict r0, plr_real *restrict r1,
                                    plr_real *restrict r2) {
     const plr_real X[9] = {r0[0], r0[1], r0[2], r1[0], r1[1], r1[2], r2[0], r2[1], r2[2]};
-    plr_real FX[9];
-    plr_mat3_mul(FX, F, X);
-    plr_mat3_vec(r0, G, FX);
-    plr_mat3_vec(r1, G, FX + 3);
-    plr_mat3_vec(r2, G, FX + 6);
+    const plr_real g[9] = {G[0], G[1], G[2], G[3], G[4], G[5], G[6], G[7], G[8]};
+    plr_real FX[3]; /* a row at a time: X, G and this fit into the registers of a small FPU */
+    plr_mat3_tvec(FX, X, F);
+    plr_mat3_vec(r0, g, FX);
+    plr_mat3_tvec(FX, X, F + 3);
+    plr_mat3_vec(r1, g, FX);
+    plr_mat3_tvec(FX, X, F + 6);
+    plr_mat3_vec(r2, g, FX);
 }
 
 /* X <- F X, 3xn, in three rows of P. */
