@@ -138,10 +138,11 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
     const unsigned n = plr_covariance_dim(f);
     if (!f->work.noise.open)
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
-    for (unsigned at = 0; at < count && !f->diverged; at += PLR_BLOCK_OBSERVATIONS) {
-        plr_block block = {.n = n, .ld = plr_covariance_ld(f), .count = count - at};
-        if (block.count > PLR_BLOCK_OBSERVATIONS)
-            block.count = PLR_BLOCK_OBSERVATIONS;
+    unsigned blocks = (count + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
+    for (; blocks > 0 && !f->diverged; blocks--) {
+        plr_block block = {.n = n, .ld = plr_covariance_ld(f)};
+        block.count =
+            (count - at + blocks - 1) / blocks; /* alike: the cost grows with the square */
         bool factorised;
         stack_block(f, observations, f->work.used + at, &block);
         if (apply_block(f, &block, &factorised))
@@ -150,6 +151,7 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
             result.failed_blocks++;
         else
             plr_filter_diverge(f);
+        at += block.count;
     }
     result.moved = f->work.noise.open;
     memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
