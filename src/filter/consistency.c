@@ -203,10 +203,6 @@ static void in_sigmas(const plr_real L[36], const plr_real n[6], plr_real v[6]) 
     }
 }
 
-static plr_real norm2(const plr_real x[6]) {
-    return plr_dot3(x, x) + plr_dot3(x + 3, x + 3);
-}
-
 static void contradict(plr_filter *f) {
     f->totals.contradictions++;
     f->consistency.contradicted = f->consistency.drifting = 1;
@@ -223,7 +219,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         in_sigmas(believed->L, n, own);
         carry_apart(f, applied, n, own, 0);
         contradict(f);
-        c->excess = norm2(own);
+        c->excess = plr_norm2_of_6(own);
         return;
     }
     for (unsigned k = 0, at = 0; k < 6; k++)
@@ -372,7 +368,7 @@ static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
 /* C = s d d^T, and a share of it to all sides, for d itself is not known any better; s is what of d the
  * twists' own noise does not explain, for that is in P already. */
 static void covariance_of(const plr_filter *f, const plr_real d[6], plr_real C[36]) {
-    const plr_real sigmas2 = norm2(f->consistency.apart_sigmas);
+    const plr_real sigmas2 = plr_norm2_of_6(f->consistency.apart_sigmas);
     const plr_real noise = f->consistency.apart_noise;
     const plr_real s = sigmas2 > noise ? PLR_R(1) - noise / sigmas2 : PLR_R(0);
     const plr_real way = SIDEWAYS * SIDEWAYS * plr_dot3(d, d);
@@ -385,7 +381,7 @@ static void covariance_of(const plr_filter *f, const plr_real d[6], plr_real C[3
 /* Both stories have agreed for long enough: what lies between them becomes a part of P. */
 static void settle(plr_filter *f) {
     plr_consistency *c = &f->consistency;
-    if (norm2(c->apart) > 0) {
+    if (plr_norm2_of_6(c->apart) > 0) {
         plr_real C[36];
         covariance_of(f, c->apart, C);
         plr_covariance_widen_pose(f, C);

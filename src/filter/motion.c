@@ -206,10 +206,6 @@ void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const p
     plr_gemm_nn(6, 6, 6, Jr, 6, applied->L, 6, applied->JL, 6);
 }
 
-static bool is_zero6(const plr_real x[6]) {
-    return plr_dot3(x, x) + plr_dot3(x + 3, x + 3) <= 0;
-}
-
 void plr_motion_drop(plr_filter *f) {
     if (f->config.bias)
         plr_covariance_add_bias_walk(f, f->par.bias_velocity_walk * f->motion.seconds,
@@ -218,7 +214,7 @@ void plr_motion_drop(plr_filter *f) {
 }
 
 void plr_motion_apply(plr_filter *f, const plr_applied_motion *applied) {
-    if (!is_zero6(applied->z)) {
+    if (plr_norm2_of_6(applied->z) > 0) {
         plr_real n[6] = {0};
         plr_gemm_nn(6, 1, 6, applied->L, 6, applied->z, 1, n, 1);
         plr_motion_correct_pose(f, n);

@@ -16,6 +16,11 @@ static inline plr_real plr_dot3(const plr_real a[3], const plr_real b[3]) {
     return PLR_FMA(a[2], b[2], PLR_FMA(a[1], b[1], a[0] * b[0]));
 }
 
+/* x^T x of six numbers */
+static inline plr_real plr_norm2_of_6(const plr_real x[6]) {
+    return plr_dot3(x, x) + plr_dot3(x + 3, x + 3);
+}
+
 /* c = a x b; c may not be a or b */
 static inline void plr_cross3(plr_real c[3], const plr_real a[3], const plr_real b[3]) {
     c[0] = PLR_FMA(a[1], b[2], -(a[2] * b[1]));
