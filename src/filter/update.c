@@ -287,7 +287,8 @@ static void unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
 
 /* Where most of a frame agrees, a landmark that does not agree for long is the one that is wrong, and begins
  * anew where it is seen now. */
-static void begin_anew(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
+static void begin_anew(plr_filter *f, const plr_frame *frame, unsigned n,
+                       const plr_report *report) {
     plr_workspace *w = &f->work;
     const bool may = f->config.model == PLR_MODEL_BODY && makes_landmarks(f);
     if (!may || 2 * report->gated >= report->matched)
@@ -305,7 +306,6 @@ static void begin_anew(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         plr_slots_remove(f, slot);
         append_new(f, o->id, z);
         plr_track_begin_anew(&f->slots[f->count - 1], &before);
-        report->created++;
     }
 }
 

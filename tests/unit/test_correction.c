@@ -170,11 +170,14 @@ static void test_a_block_that_cannot_be_factorised_leaves_the_estimate(void) {
 
 /* The spoilt landmark is in the second block: the first is a valid posterior and stays. */
 static void test_blocks_beside_a_failed_one_are_applied(void) {
+    const unsigned blocks = (MANY + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS;
+    const unsigned first = (MANY + blocks - 1) / blocks; /* as alike as they can be */
+    const unsigned second = (MANY - first + blocks - 2) / (blocks - 1);
     take_specimen(PLR_MODEL_BODY, false);
-    spoil(PLR_BLOCK_OBSERVATIONS);
+    spoil(first);
     const plr_correction correction = plr_correct(&filter, seen, MANY);
     TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
-    TEST_ASSERT_EQUAL_UINT(MANY - PLR_BLOCK_OBSERVATIONS, correction.applied);
+    TEST_ASSERT_EQUAL_UINT(MANY - second, correction.applied);
 }
 
 /* An indefinite P whose diagonal looks healthy: the subtraction takes more than there is. */
