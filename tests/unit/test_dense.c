@@ -7,6 +7,7 @@
 
 #include "linalg/dense.h"
 #include "linalg/packed.h"
+#include "linalg/small.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/random.h"
@@ -234,8 +235,82 @@ static void test_solve_agrees_with_openblas_and_has_the_bits_of_plain_loops(void
             solve_against_oracle(&r, k, n);
 }
 
+/* ---------------------------------------------------------------- three rows, four rows */
+
+/* A random S = A A^T + I / 8, packed upper. */
+static void random_positive3(rng *r, plr_real S[6 + PLR_KERNEL_MARGIN]) {
+    plr_real A[9];
+    memset(S, 0, (6 + PLR_KERNEL_MARGIN) * sizeof *S);
+    for (unsigned i = 0; i < 9; i++)
+        A[i] = (plr_real)rng_normal(r);
+    for (unsigned i = 0, at = 0; i < 3; i++)
+        for (unsigned j = i; j < 3; j++, at++) {
+            S[at] = PLR_R(0.125) * (i == j ? PLR_R(1) : PLR_R(0));
+            for (unsigned k = 0; k < 3; k++)
+                S[at] += A[3 * i + k] * A[3 * j + k];
+        }
+}
+
+static void test_three_rows_without_loops_have_the_bits_of_the_general_kernels(void) {
+    rng r = rng_seeded(31);
+    for (unsigned run = 0; run < 200; run++) {
+        const unsigned n = 1 + rng_below(&r, 7);
+        plr_real U[6 + PLR_KERNEL_MARGIN], U3[6], X[21], X3[21];
+        random_positive3(&r, U);
+        memcpy(U3, U, sizeof U3);
+        for (unsigned i = 0; i < 3 * n; i++)
+            X[i] = X3[i] = (plr_real)rng_normal(&r);
+        TEST_ASSERT_TRUE(plr_cholesky_upper(3, U));
+        TEST_ASSERT_TRUE(plr_cholesky3(U3));
+        TEST_ASSERT_EQUAL_MEMORY(U, U3, sizeof U3);
+        plr_solve_upper_transposed(3, n, U, X, n);
+        plr_solve3_transposed(n, U3, X3);
+        TEST_ASSERT_EQUAL_MEMORY(X, X3, 3 * n * sizeof *X);
+    }
+}
+
+static void test_three_rows_refuse_what_the_general_kernel_refuses(void) {
+    rng r = rng_seeded(32);
+    for (unsigned at = 0; at < 6; at++)
+        for (unsigned kind = 0; kind < 3; kind++) {
+            const plr_real wrong[3] = {PLR_R(-1e3), (plr_real)NAN, (plr_real)INFINITY};
+            plr_real U[6 + PLR_KERNEL_MARGIN], U3[6];
+            random_positive3(&r, U);
+            U[at] = wrong[kind];
+            memcpy(U3, U, sizeof U3);
+            TEST_ASSERT_FALSE(plr_cholesky_upper(3, U));
+            TEST_ASSERT_FALSE(plr_cholesky3(U3));
+        }
+}
+
+static void test_four_rows_together_have_the_bits_of_one_after_the_other(void) {
+    enum { ROWS = 30, TILES = 3, N = TILES * PLR_TILE_COLUMNS };
+    static plr_real A[8 * ROWS], V[ROWS * N], X[4][N], expected[4][N];
+    rng r = rng_seeded(33);
+    for (unsigned depth = 2; depth <= ROWS; depth++) {
+        for (unsigned i = 0; i < 8 * ROWS; i++)
+            A[i] = (plr_real)rng_normal(&r);
+        for (unsigned i = 0; i < ROWS * N; i++)
+            V[i] = (plr_real)rng_normal(&r);
+        for (unsigned row = 0; row < 4; row++) {
+            plr_real minus[ROWS];
+            for (unsigned j = 0; j < N; j++)
+                X[row][j] = expected[row][j] = (plr_real)rng_normal(&r);
+            for (unsigned k = 0; k < depth; k++)
+                minus[k] = -A[8 * k + row];
+            plr_combine_rows(N, depth, minus, V, N, expected[row]);
+        }
+        plr_real *const rows[4] = {X[0], X[1], X[2], X[3]};
+        plr_subtract_four_rows(N, depth, A, 8, V, N, rows);
+        TEST_ASSERT_EQUAL_MEMORY(expected, X, sizeof X);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_three_rows_without_loops_have_the_bits_of_the_general_kernels);
+    RUN_TEST(test_three_rows_refuse_what_the_general_kernel_refuses);
+    RUN_TEST(test_four_rows_together_have_the_bits_of_one_after_the_other);
     RUN_TEST(test_gemm_agrees_with_openblas_and_both_forms_bit_for_bit);
     RUN_TEST(test_sandwich_agrees_with_openblas_and_is_symmetric_to_the_bit);
     RUN_TEST(test_cholesky_agrees_with_lapack);
