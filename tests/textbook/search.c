@@ -383,11 +383,10 @@ void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
         voices += s.sights[i].voice > 0;
     }
     const bool found = voices >= FEW;
-    if (!found) {
+    if (!found)
         hush_outliers(&s);
-        (void)evaluate(&s, zero, &best);
-        accept(&s);
-    }
+    (void)evaluate(&s, zero, &best); /* once more, with those alone that have a voice */
+    accept(&s);
     if (voices > 0)
         descend(&s, &best);
     memcpy(result->z, best.z, sizeof result->z);
