@@ -22,7 +22,9 @@ static const option table[] = {
     {{"gate", "PROBABILITY|off", "gate-d2 as a chi-square probability, for example 0.99"},
      OPTION_SETTING,
      0},
-    {{"preset", "course", "the course report's hyperparameters (III-F), under all others"},
+    {{"preset", "course",
+      "the course report's hyperparameters (III-F) with limits of ours, 30 m and 20 px; under all "
+      "others"},
      OPTION_SETTING,
      0},
     {{"start", "truth|identity|recorded", "initial pose; else START, first TRUTH, or identity"},
