@@ -21,8 +21,9 @@ from pelorus.wire import Writer, read_file
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
 SIMULATION: tuple[str, ...] = ("simulate", "{out}", "--seed", "7", "--duration", "8")
+# What costs an emulated board most is a byte on its UART: few observations, few twists.
 LIGHT: dict[str, tuple[str, ...]] = {
-    "drive": (*SIMULATION, "--observations", "6", "--speed", "1", "--twist-rate", "50"),
+    "drive": (*SIMULATION, "--observations", "6", "--speed", "1", "--twist-rate", "20"),
     # So long that it is under way whenever a busy machine comes to interrupting it.
     "endless": (
         *("simulate", "{out}", "--duration", "1200", "--twist-rate", "10"),

@@ -128,6 +128,8 @@ def run_bench(board: str, image: Path) -> Bench:
             if not piece:
                 raise PelorusError(f"{image}: silent for {BENCH_S:.0f} s. {emulator.trouble()}")
             text += piece
+            if said := re.search(rb"error: (.*)\n", text):
+                raise PelorusError(f"{image}: {said[1].decode().strip()}")
         link.close()
     first, *lines, last = text.decode().splitlines()
     sizes = fields(first.removeprefix("size "))
