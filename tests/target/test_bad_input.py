@@ -27,6 +27,7 @@ from recordings import first_frames
 
 FRAMES = 24
 SLOTS = 32
+STUCK = 15  # messages, five frames
 RATE = 0.0025  # of bytes; of a STEREO's 130 or so, every third frame is hit
 UNKNOWN_KINDS = (0, 77, 200, 255)
 FOREIGN, NOT_READY = -16, -13  # plr_status
@@ -265,9 +266,9 @@ def test_time_stamps_that_stand_still_are_refused_as_on_the_desktop(
     times = [m.t_ns for m in messages[:half] if isinstance(m, Twist | Stereo)]
     stuck = [
         replace(message, t_ns=times[-1]) if isinstance(message, Twist | Stereo) else message
-        for message in messages[half : half + 60]
+        for message in messages[half : half + STUCK]
     ]
-    stream = frames_of([*messages[:half], *stuck, *messages[half + 60 :]])
+    stream = frames_of([*messages[:half], *stuck, *messages[half + STUCK :]])
     board = boards_answers(link, [stream])
     assert computed(board) == computed(desktops_answers(program, stream, tmp_path))
     assert refusals(board)
