@@ -213,7 +213,7 @@ joined
 # --- the desktop ---------------------------------------------------------------------------------
 
 step 'build: gcc' build_preset release "${strict[@]}" && step 'test: gcc' run_ctest build
-step 'test: Python' "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" tests/python
+step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" tests/python
 
 if [ $extent != quick ]; then
     clang=$(command -v clang-14 || command -v clang)

@@ -49,9 +49,10 @@ build_all() {
         build_desktop clang-O2 "$clang" -O2 x86-64-v3
 }
 
-# One queue for the tests of all boards. One process more than processors: some tests wait for silence.
+# One queue for the tests of all boards. One process more than processors, for some tests wait for silence.
+# CI: pytest cuts no reason short.
 test_boards() {
-    timeout "$BOARD_SECONDS" "$VENV/bin/python" -m pytest -rfEs -q -p no:cacheprovider \
+    CI=true timeout "$BOARD_SECONDS" "$VENV/bin/python" -m pytest -rfEs -q -p no:cacheprovider \
         -n $((JOBS + 1)) --maxschedchunk 1 --durations 20 \
         "$ROOT/tests/target" --boards "${BOARDS[@]}" --robot "$ROBOT" \
         --desktops "$ROBOT"/desktop-gcc-O3 "$ROBOT"/desktop-clang-O2 >"$OUTPUT" 2>&1

@@ -28,7 +28,10 @@ STORE = (
     r"plr_state_store_\w+|look_\w+|reads\w*|(write|read)_slot|erases|programs\w*|flushes|take|give"
 )
 SESSION = r"plr_session_step|apply_twist|predict|update|plr_take_\w+|refuse_frame"
-FILTER = r"plr_(filter|correct|gate|motion|slots)\w*|process|initialise_new|adopt_known|gate_each"
+FILTER = (
+    r"plr_(filter|correct|gate|motion|slots)\w*|process|initialise_new|append_new|adopt_known"
+    r"|gate_each"
+)
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
     (r"plr_frame_out_\w+", ("write_to_port", "send")),
