@@ -23,8 +23,7 @@ static const option table[] = {
      OPTION_SETTING,
      0},
     {{"preset", "course",
-      "the course report's hyperparameters (III-F) with limits of ours, 30 m and 20 px; under all "
-      "others"},
+      "the course report's settings (III-F), under all others; 30 m and 20 px are our limits"},
      OPTION_SETTING,
      0},
     {{"start", "truth|identity|recorded", "initial pose; else START, first TRUTH, or identity"},
