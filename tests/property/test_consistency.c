@@ -12,12 +12,7 @@
 #include "support/rigid.h"
 
 /* In a slow build fewer drives, and with them wider bounds. */
-enum {
-    RUNS = PELORUS_SLOW_BUILD ? 4 : 20,
-    WORLD_RUNS = PELORUS_SLOW_BUILD ? 10 : 20, /* what is to be far off takes more of them */
-    FRAMES = 150,
-    DOF = 6
-};
+enum { RUNS = PELORUS_SLOW_BUILD ? 4 : 20, FRAMES = 150, DOF = 6 };
 
 void setUp(void) {
     rig_set_up();
@@ -65,7 +60,7 @@ static void bounds(unsigned n, double *low, double *high) {
 }
 
 /* Mean squared error per degree of freedom at the end of a drive, over seeds. */
-static double mean_squared_error(plr_model_kind model, bool bias, unsigned runs) {
+static double mean_squared_error(plr_model_kind model, bool bias) {
     double sum = 0;
     rig.config.model = (uint8_t)model;
     rig.config.bias = bias;
@@ -75,7 +70,7 @@ static double mean_squared_error(plr_model_kind model, bool bias, unsigned runs)
     rig.config.gate_d2 = 25; /* wide: what it cuts off is missing in the errors */
     rig.options.landmarks = 300;
     rig.options.most_seen = 20;
-    for (uint64_t seed = 1; seed <= runs; seed++) {
+    for (uint64_t seed = 1; seed <= RUNS; seed++) {
         rng chance = rng_seeded(seed + 1000);
         rig.options.seed = seed;
         rng_normals(&chance, bias ? rig.config.bias_velocity_sigma_mps : 0, rig.options.bias, 3);
@@ -84,7 +79,7 @@ static double mean_squared_error(plr_model_kind model, bool bias, unsigned runs)
         rig_drive(FRAMES);
         sum += squared_error();
     }
-    return sum / (DOF * runs);
+    return sum / (DOF * RUNS);
 }
 
 static void demand_consistent(double mean) {
@@ -97,20 +92,19 @@ static void demand_consistent(double mean) {
 }
 
 static void test_body_knows_how_wrong_it_is(void) {
-    demand_consistent(mean_squared_error(PLR_MODEL_BODY, false, RUNS));
+    demand_consistent(mean_squared_error(PLR_MODEL_BODY, false));
 }
 
 static void test_body_with_biases_knows_how_wrong_it_is(void) {
-    demand_consistent(mean_squared_error(PLR_MODEL_BODY, true, RUNS));
+    demand_consistent(mean_squared_error(PLR_MODEL_BODY, true));
 }
 
 static void test_world_believes_more_than_it_knows(void) {
     double low, high;
     if (PLR_REAL == 32)
         TEST_IGNORE_MESSAGE("world is not for float32: docs/NUMERICS.md");
-    bounds(WORLD_RUNS, &low, &high);
-    TEST_ASSERT_GREATER_THAN_DOUBLE(1.2 * high,
-                                    mean_squared_error(PLR_MODEL_WORLD, false, WORLD_RUNS));
+    bounds(RUNS, &low, &high);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(1.2 * high, mean_squared_error(PLR_MODEL_WORLD, false));
 }
 
 int main(void) {
