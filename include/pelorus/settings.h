@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The settings of a filter, and the one table that names them. The replay's options, its config
- * files and the CONFIG frame all go through the table, so a setting has the same name, number,
- * limits and default everywhere.
+ * The settings of a filter, with unit, limits, default and advice for each, and the table that
+ * names them. The replay's options, its config files and the CONFIG frame all use the table, so a
+ * setting has the same name, number, limits and default everywhere.
  */
 #ifndef PELORUS_SETTINGS_H
 #define PELORUS_SETTINGS_H
@@ -13,69 +13,178 @@
 extern "C" {
 #endif
 
+/* How landmarks are stored, and how the error of the state is defined: docs/MATH.md 2. */
 typedef enum plr_model_kind {
-    PLR_MODEL_BODY = 0, /* landmarks in the camera, polar, invariant: consistent; the default */
-    PLR_MODEL_WORLD = 1 /* landmarks in the world, the course report's; float64 only in earnest */
+    PLR_MODEL_BODY = 0, /* relative to the camera, as bearing and inverse range, in an invariant
+                           filter: consistent; choose this one */
+    PLR_MODEL_WORLD = 1 /* as points of the world, like a textbook's EKF: overconfident; for
+                           comparison, and in float64 builds only */
 } plr_model_kind;
 
 typedef enum plr_mode {
     PLR_MODE_SLAM = 0,          /* pose and landmarks are estimated together */
-    PLR_MODE_MAPPING = 1,       /* every frame's pose is given, exactly */
-    PLR_MODE_LOCALIZATION = 2,  /* landmarks come from a map source alone */
-    PLR_MODE_DEAD_RECKONING = 3 /* twists alone */
+    PLR_MODE_MAPPING = 1,       /* every frame's pose is given as exact; landmarks are estimated */
+    PLR_MODE_LOCALIZATION = 2,  /* all landmarks come from the map source; the pose is estimated */
+    PLR_MODE_DEAD_RECKONING = 3 /* the pose follows the twists; observations are not used */
 } plr_mode;
 
+/* The interval for which the twist reading taken at t_j is valid. */
 typedef enum plr_twist_timing {
-    PLR_TWIST_START = 0, /* the reading at t_j holds on [t_j, t_j+1) */
-    PLR_TWIST_END = 1,   /* the reading at t_j holds on (t_j-1, t_j] */
-    PLR_TWIST_MID = 2    /* the mean of two successive readings holds between them */
+    PLR_TWIST_START = 0, /* from t_j to the next reading */
+    PLR_TWIST_END = 1,   /* from the previous reading to t_j */
+    PLR_TWIST_MID = 2    /* between two readings their mean is valid */
 } plr_twist_timing;
 
+/* What velocity_sigma and gyro_sigma are standard deviations of. */
 typedef enum plr_noise_kind {
-    PLR_NOISE_TWIST = 0, /* velocity_sigma and gyro_sigma are those of one reading */
-    PLR_NOISE_STEP = 1   /* they are the displacement's, in m and rad, for every step (III.8's W) */
+    PLR_NOISE_TWIST = 0, /* one twist reading, m/s and rad/s */
+    PLR_NOISE_STEP = 1   /* the displacement between two readings, m and rad, however long the step
+                            takes: the matrix W in equation III.8 of the course report */
 } plr_noise_kind;
 
+/* The error of a new landmark in the model `world`. */
 typedef enum plr_landmark_prior {
-    PLR_PRIOR_CORRELATED = 0, /* a new landmark's error is the pose's too: what is true */
-    PLR_PRIOR_INDEPENDENT = 1 /* it is landmark_sigma_m alone, the report's Sigma_m; `world` only */
+    PLR_PRIOR_CORRELATED = 0, /* contains the error of the pose it was seen from: correct */
+    PLR_PRIOR_INDEPENDENT = 1 /* landmark_sigma_m alone, unrelated to the pose: what the course
+                                 report does (its Sigma_m) */
 } plr_landmark_prior;
 
-/* Defaults and limits stand in the table of src/filter/settings.c, which plr_setting_at shows.
+/* The settings of a filter. Fill it by plr_config_default and change what your robot needs: usually
+ * the three noise sigmas and twist_timing.
  *
- * min_disparity_px = 0: in `body`, without max_depth_m, a new landmark may have any disparity that noise
- * leaves of a point at infinity, some pixels below zero too. Above 0 it is a hard limit, and chooses
- * far landmarks by their noise: speed and biases then lean to one side. */
+ * Above each field stands its row in the table: name, unit, default and limits (both included).
+ * The table is in src/filter/settings.c; tests/layering/settings.py compares this text with it.
+ *
+ * Within the limits four combinations are refused too: min_depth_m not below max_range_m;
+ * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior in
+ * the model `body`; the independent landmark_prior without landmark_sigma_m. */
 typedef struct plr_config {
-    uint8_t model;          /* plr_model_kind */
-    uint8_t mode;           /* plr_mode */
-    uint8_t twist_timing;   /* plr_twist_timing */
-    uint8_t noise;          /* plr_noise_kind */
-    uint8_t bias;           /* 1: twist biases are estimated */
-    uint8_t known_map;      /* 1: slam asks the map source too when it meets an unknown id */
-    uint8_t landmark_prior; /* plr_landmark_prior; independent needs `world` and landmark_sigma_m */
-    uint16_t slots;         /* landmarks in use, 1 to PLR_MAX_LANDMARKS */
+    /* Setting model: one of plr_model_kind, default PLR_MODEL_BODY. */
+    uint8_t model;
 
-    double pixel_sigma_px;          /* one coordinate of one pixel */
-    double velocity_sigma[3];       /* m/s of one reading (m with noise = step), body x, y, z */
-    double gyro_sigma[3];           /* rad/s of one reading (rad with noise = step), x, y, z */
-    double bias_velocity_sigma_mps; /* prior */
-    double bias_gyro_sigma_radps;   /* prior */
-    double bias_velocity_walk;      /* (m/s)^2/s, variance added per second */
-    double bias_gyro_walk;          /* (rad/s)^2/s */
+    /* Setting mode: one of plr_mode, default PLR_MODE_SLAM. */
+    uint8_t mode;
 
-    double gate_d2;          /* largest squared Mahalanobis distance (4 d.o.f.); 0: gate off */
-    double gate_residual_px; /* the course's gate instead: largest norm of the four residuals;
-                                0: not used */
-    double min_disparity_px; /* of a new landmark; 0: see above */
-    double max_depth_m;      /* of a new landmark; 0: no limit */
-    double max_row_gap_px;   /* |vL - vR| of a new landmark; 0: no limit */
-    double min_depth_m;      /* predicted depth below which an observation is rejected */
-    double start_sigma;      /* m and rad: initial pose, where no covariance is given */
-    double landmark_sigma_m; /* of a new landmark's position per axis; 0: from the pixels */
-    double max_range_m;      /* no landmark stands further, whatever its inverse range */
-    double max_gap_s;        /* a longer pause in the data is refused with PLR_E_GAP */
-    double twist_delay_s;    /* the session holds twists back so long for a late camera */
+    /* Setting twist-timing: one of plr_twist_timing, default PLR_TWIST_START.
+     * END for odometry that reports what it has just counted; START where the reading is a sample
+     * of the velocity or a command; MID for samples of a velocity that changes smoothly. A wrong
+     * choice shifts the motion in time by up to one interval. */
+    uint8_t twist_timing;
+
+    /* Setting noise: one of plr_noise_kind, default PLR_NOISE_TWIST.
+     * TWIST for sensors; STEP only to repeat the figures of the course report. */
+    uint8_t noise;
+
+    /* Setting bias: 0 or 1, default 1.
+     * 1: constant errors of the twists (6 numbers) are estimated as well. 0 saves time and memory;
+     * choose it only where the twists have no such errors. */
+    uint8_t bias;
+
+    /* Setting known-map: 0 or 1, default 0.
+     * 1: in the mode slam, an unknown id is first looked up in the map source. (In localization it
+     * always is.) */
+    uint8_t known_map;
+
+    /* Setting landmark-prior: one of plr_landmark_prior, default PLR_PRIOR_CORRELATED. */
+    uint8_t landmark_prior;
+
+    /* Setting slots: 1 to PLR_MAX_LANDMARKS, default 100 or PLR_MAX_LANDMARKS, the smaller.
+     * Landmarks in the state at once. More are more accurate; the time that an observation costs
+     * grows with the square of their number. Choose about as many as the tracker follows at once
+     * (docs/NUMERICS.md 11). */
+    uint16_t slots;
+
+    /* Setting pixel-sigma [px]: 1e-3 to 1e3, default 2.
+     * Standard deviation of one pixel coordinate. Measure it: the scatter of tracked points about
+     * where they should be, usually 0.5 to 5. If health says NIS_HIGH it is too small, NIS_LOW too
+     * large. In mapping, use the scatter about the given poses (docs/NUMERICS.md 12). */
+    double pixel_sigma_px;
+
+    /* Setting velocity-sigma [m/s]: 0 to 1e3, default 0.1.
+     * Standard deviation of a velocity reading along the body's x, y and z axes; m with noise STEP.
+     * Include slip: a wheeled robot needs more across than along. */
+    double velocity_sigma[3];
+
+    /* Setting gyro-sigma [rad/s]: 0 to 1e2, default 0.01.
+     * Standard deviation of a rate reading about the body's x, y and z axes; rad with noise STEP.
+     * Take the gyro's noise at the rate of its readings, plus vibration. */
+    double gyro_sigma[3];
+
+    /* Setting bias-velocity-sigma [m/s]: 0 to 1e2, default 0.03.
+     * Standard deviation of the velocity bias at the start, before anything is known of it. Too
+     * small shows as the reason BIAS_OFF_PRIOR. */
+    double bias_velocity_sigma_mps;
+
+    /* Setting bias-gyro-sigma [rad/s]: 0 to 10, default 0.01.
+     * The same of the gyro bias: its data sheet's bias after calibration. */
+    double bias_gyro_sigma_radps;
+
+    /* Setting bias-velocity-walk [(m/s)^2/s]: 0 to 1e2, default 1e-8.
+     * Variance that the velocity bias gains in a second. 0: the bias is constant. A bias that
+     * changes by d in t seconds needs about d^2 / t. */
+    double bias_velocity_walk;
+
+    /* Setting bias-gyro-walk [(rad/s)^2/s]: 0 to 1e2, default 1e-10.
+     * The same of the gyro bias. */
+    double bias_gyro_walk;
+
+    /* Setting gate-d2: 0 to 1e12, default 13.276704135987622.
+     * Observations with a larger squared Mahalanobis distance (4 degrees of freedom) are rejected.
+     * The default is the 99 % point of chi-square; 9.488 is 95 %, 18.467 is 99.9 %. 0: no gate. */
+    double gate_d2;
+
+    /* Setting gate-residual [px]: 0 to 1e4, default 0.
+     * Above 0: the course report's gate in place of gate-d2. Rejects an observation whose four
+     * residuals (uL, vL, uR, vR) have a larger norm. It does not know how uncertain the prediction
+     * is: use it only for comparison. */
+    double gate_residual_px;
+
+    /* Setting min-disparity [px]: 0 to 1e4, default 0.
+     * A new landmark needs at least this disparity. 0 in the model `body` without max-depth: any
+     * disparity that pixel noise may give a point at infinity, slightly negative ones included.
+     * Leave it at 0: a limit above 0 selects far points by their noise, which biases speed. */
+    double min_disparity_px;
+
+    /* Setting max-depth [m]: 0 to 1e6, default 0.
+     * Greatest depth of a new landmark; 0: no limit. Leave it at 0 in the model `body`; `world`
+     * needs a limit; the preset plr_config_course has 30 m. */
+    double max_depth_m;
+
+    /* Setting max-row-gap [px]: 0 to 1e4, default 2.
+     * Greatest |vL - vR| of a new landmark; 0: no limit. In a rectified pair the two rows agree but
+     * for noise, of 1.4 times pixel-sigma: a larger gap is a wrong match, but a limit below 4 times
+     * pixel-sigma also turns good matches away. */
+    double max_row_gap_px;
+
+    /* Setting min-depth [m]: 0.01 to 1e3, default 0.3.
+     * Observations of a point that is predicted nearer than this are rejected, and no landmark is
+     * created there. Choose the shortest distance at which both cameras see and focus a point. */
+    double min_depth_m;
+
+    /* Setting start-sigma [m and rad]: 1e-9 to 1e3, default 1e-4.
+     * Standard deviation of each component of the start pose, where no covariance is given with it.
+     * Keep it small where the start is the origin of the world by definition. */
+    double start_sigma;
+
+    /* Setting landmark-sigma [m]: 0 to 1e3, default 0.
+     * Standard deviation of a new landmark on each axis, in the model `world` only. 0: computed
+     * from pixel-sigma, which is correct; above 0 for comparison with the course report. */
+    double landmark_sigma_m;
+
+    /* Setting max-range [m]: 1 to 1e6, default 1e5.
+     * No landmark is placed beyond this distance: further points are all alike to the camera. */
+    double max_range_m;
+
+    /* Setting max-gap [s]: 1e-3 to 60, default 2.
+     * A reading or frame further ahead than this is refused with PLR_E_GAP. Choose the longest
+     * pause over which the last twist may still be taken as valid. */
+    double max_gap_s;
+
+    /* Setting twist-delay [s]: 0 to 10, default 0.
+     * Used by plr_session alone: it holds each twist for this long, so that a frame which arrives
+     * later than newer twists is still processed in order of time. Choose the camera's delay from
+     * shutter to message. At most PLR_SESSION_HELD_TWISTS are held. */
+    double twist_delay_s;
 } plr_config;
 
 /* How a setting's value is written. */
@@ -107,12 +216,13 @@ const plr_setting *plr_setting_at(unsigned index);
 const plr_setting *plr_setting_by_id(uint8_t id);
 const plr_setting *plr_setting_by_name(const char *name);
 
-/* A setting may have three numbers, for the axes x, y and z of the body: velocity-sigma, gyro-sigma.
- * Its own row sets all three, and gets x; y and z have rows behind it that set one alone. The row of an
- * axis, 0 to 2; NULL for a setting of one number. */
+/* The row of one axis (0 to 2: x, y, z of the body) of a setting that has three numbers; these are
+ * velocity-sigma and gyro-sigma. NULL for a setting of one number. The setting's own row sets all
+ * three axes and reads x; further rows set y and z alone, so apply them after it. */
 const plr_setting *plr_setting_axis(const plr_setting *setting, unsigned axis);
 
-/* For the row of a y or z axis: the setting that sets it too. NULL for all others. */
+/* For the row of a y or z axis: the setting whose own row sets all three axes. NULL for all other
+ * rows. */
 const plr_setting *plr_setting_of_axis(const plr_setting *setting);
 
 /* The value of a setting as a number (switches 0 or 1, choices their number). */
@@ -124,14 +234,16 @@ plr_status plr_config_set(plr_config *config, const plr_setting *setting, double
 /* Every setting at its default. */
 void plr_config_default(plr_config *config);
 
-/* The course report's hyperparameters (III-F): world model, bias off, start timing, landmark
- * variance 2 m^2, uncorrelated with the pose, pose variance 5e-4, pixel variance 5 px^2, motion
- * variance 1e-3 a step, and a gate on the norm of the four residuals. The report leaves out far
- * landmarks and large residuals without naming a limit; 30 m and 20 px are ours. */
+/* The hyperparameters in section III-F of the course report (docs/COURSE.md): world model, no bias,
+ * start timing, landmark variance 2 m^2, uncorrelated with the pose, pose variance 5e-4, pixel
+ * variance 5 px^2, motion variance 1e-3 a step, and a gate on the norm of the four residuals. The
+ * report leaves out far landmarks and large residuals without naming a limit; 30 m and 20 px are
+ * this project's choice. */
 void plr_config_course(plr_config *config);
 
-/* PLR_OK, or PLR_E_CONFIG with the offending row in *culprit (which may be NULL). Also refuses
- * combinations that make no sense; the row is then the one to change. */
+/* PLR_OK, or PLR_E_CONFIG with the offending row in *culprit (which may be NULL). Refuses values
+ * outside their limits, and the combinations listed above plr_config; *culprit is then the row to
+ * change. PLR_E_ARGUMENT: no config. */
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit);
 
 #ifdef __cplusplus
