@@ -29,6 +29,9 @@ static const plr_real keeps[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 #define CONTRADICTED PLR_R(40)
 #define SHARE_OF_WAY PLR_R(0.15)
 #define LEAST_WAY    PLR_R(0.004) /* m a frame */
+/* By how much of the statistic: at a third of it the twists' pull still shortens the way by 3 %, and twice
+ * as much would follow a scene that moves with its whole weight. */
+#define WIDENING PLR_R(0.5)
 /* What one frame said outright against the twists holds for the next ones too, fading. */
 #define EXCESS_KEEPS PLR_R(0.8)
 /* How well the way between two stories is known, beside its own direction. */
@@ -79,7 +82,7 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
     if (!f->consistency.contradicted)
         return;
     const plr_real fast = fast_statistic(f), excess = f->consistency.excess;
-    const plr_real factor = PLR_R(1) + (fast > excess ? fast : excess) / PLR_R(6);
+    const plr_real factor = PLR_R(1) + (fast > excess ? fast : excess) * WIDENING;
     f->consistency.excess *= EXCESS_KEEPS;
     for (unsigned i = 0; i < 36; i++)
         f->motion.Q[i] *= factor;
@@ -185,9 +188,8 @@ static bool differs_much(const plr_consistency_window *w, const plr_real L[36],
     plr_gemm_nn(6, 1, 6, L, 6, mean, 1, n, 1);
     for (unsigned k = 0; k < 6; k++)
         n[k] /= PLR_R(1) + keeps[0]; /* of sums over frames to the mean of a frame */
-    const plr_real *E = applied->E;
-    const plr_real turn[3] = {PLR_R(0.5) * (E[7] - E[5]), PLR_R(0.5) * (E[2] - E[6]),
-                              PLR_R(0.5) * (E[3] - E[1])};
+    plr_real turn[3];
+    plr_turn_of(turn, applied->E);
     const plr_real way = SHARE_OF_WAY * PLR_SQRT(plr_dot3(applied->p, applied->p)) + LEAST_WAY;
     const plr_real angle = SHARE_OF_WAY * PLR_SQRT(plr_dot3(turn, turn)) + LEAST_TURN;
     return plr_dot3(n, n) > way * way || plr_dot3(n + 3, n + 3) > angle * angle;
@@ -232,23 +234,28 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         in_own_sigmas(applied->L, believed->L, J, b);
     if (!estimate(J, b, own, V))
         return;
+    plr_real way[6] = {0};
     if (c->contradicted || c->drifting) {
         by_vision_alone(own, V, n);
-        plr_real way[6] = {0};
         plr_gemm_nn(6, 1, 6, believed->L, 6, n, 1, way, 1);
         carry_apart(f, applied, way, own, trace(V));
+    } else if (c->doubtful) { /* what came apart before stays so until it is settled */
+        static const plr_real none[6] = {0};
+        carry_apart(f, applied, none, none, 0);
     }
     for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
         if (w < FAST_WINDOWS || !c->contradicted)
             fade_in(&c->windows[w], keeps[w], own, V);
     const plr_real fast = fast_statistic(f), slow = statistic(&c->windows[FAST_WINDOWS]);
     const plr_real most = fast > slow ? fast : slow;
-    if (!c->drifting && most > DIFFERS) { /* what has come apart until now */
+    if (!c->contradicted && !c->drifting && most > DIFFERS) { /* what has come apart until now */
         const plr_consistency_window *w = &c->windows[slow > fast ? FAST_WINDOWS : 1];
-        memset(c->apart, 0, sizeof c->apart);
-        plr_gemm_nn(6, 1, 6, believed->L, 6, w->sum, 1, c->apart, 1);
-        memcpy(c->apart_sigmas, w->sum, sizeof c->apart_sigmas);
-        c->apart_noise = trace(w->variance);
+        plr_gemm_nn(6, 1, 6, believed->L, 6, w->sum, 1, way, 1);
+        for (unsigned k = 0; k < 6; k++) {
+            c->apart[k] += way[k];
+            c->apart_sigmas[k] += w->sum[k];
+        }
+        c->apart_noise += trace(w->variance);
     }
     c->drifting = most > DIFFERS || (c->drifting && most > AGREES);
     const bool much = differs_much(&c->windows[0], believed->L, applied);
@@ -283,10 +290,10 @@ static uint32_t print_of(const plr_observation *o) {
 static bool has_moved(plr_filter *f) {
     plr_consistency *c = &f->consistency;
     const plr_motion *m = &f->motion;
-    const plr_real turn[3] = {m->E[7] - m->E[5], m->E[2] - m->E[6], m->E[3] - m->E[1]};
-    plr_real sum = 0;
+    plr_real turn[3], sum = 0;
+    plr_turn_of(turn, m->E);
     for (unsigned k = 0; k < 6; k++) {
-        const plr_real way = c->still_way[k] + (k < 3 ? m->p[k] : PLR_R(0.5) * turn[k - 3]);
+        const plr_real way = c->still_way[k] + (k < 3 ? m->p[k] : turn[k - 3]);
         const plr_real variance = c->still_variance[k] + m->Q[7 * k];
         if (variance > 0)
             sum += way * way / variance;
@@ -320,9 +327,10 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
     }
     const plr_motion *m =
         &f->motion; /* this picture is used: what moved until now is not pending */
-    const plr_real turn[3] = {m->E[7] - m->E[5], m->E[2] - m->E[6], m->E[3] - m->E[1]};
+    plr_real turn[3];
+    plr_turn_of(turn, m->E);
     for (unsigned k = 0; k < 6; k++) {
-        c->still_way[k] += k < 3 ? m->p[k] : PLR_R(0.5) * turn[k - 3];
+        c->still_way[k] += k < 3 ? m->p[k] : turn[k - 3];
         c->still_variance[k] += m->Q[7 * k];
     }
     return false;
@@ -414,7 +422,7 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
 void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]) {
     const plr_motion *m = &f->motion;
     plr_real R[9], A[36], d[6] = {0};
-    if (!f->consistency.contradicted && !f->consistency.drifting)
+    if (!(plr_norm2_of_6(f->consistency.apart) > 0))
         return;
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);

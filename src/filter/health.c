@@ -23,6 +23,8 @@ enum {
 
 /* Reasons that leave the estimate as good as it should be. */
 #define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW)
+/* Reasons of a filter that looks; dead reckoning does without by design. */
+#define OF_SIGHT (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)
 /* Reasons by which the pose is lost. */
 #define LOST (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES)
 
@@ -151,7 +153,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
     }
     const plr_time_ns now = t_ns > f->t_ns ? t_ns : f->t_ns;
     const bool looks = f->config.mode != PLR_MODE_DEAD_RECKONING;
-    health->reasons = f->reasons;
+    health->reasons = looks ? f->reasons : f->reasons & ~(uint32_t)OF_SIGHT;
     health->seconds_without_frame = seconds_if(f->last_frame_ns != 0, f->last_frame_ns, now);
     health->seconds_without_use = seconds_if(f->last_use_ns != 0, f->last_use_ns, now);
     health->seconds_without_twist = seconds_if(f->reading_valid, f->reading_ns, now);

@@ -21,6 +21,13 @@ static inline plr_real plr_norm2_of_6(const plr_real x[6]) {
     return plr_dot3(x, x) + plr_dot3(x + 3, x + 3);
 }
 
+/* The turn of a small rotation I + E: half of what is skew in it, rad. */
+static inline void plr_turn_of(plr_real turn[3], const plr_real E[9]) {
+    turn[0] = PLR_R(0.5) * (E[7] - E[5]);
+    turn[1] = PLR_R(0.5) * (E[2] - E[6]);
+    turn[2] = PLR_R(0.5) * (E[3] - E[1]);
+}
+
 /* c = a x b; c may not be a or b */
 static inline void plr_cross3(plr_real c[3], const plr_real a[3], const plr_real b[3]) {
     c[0] = PLR_FMA(a[1], b[2], -(a[2] * b[1]));

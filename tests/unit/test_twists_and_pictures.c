@@ -142,6 +142,29 @@ static void test_a_slip_is_told_within_five_frames(void) {
 
 /* Noise settings are never quite true: what differs by more than its noise, and by little, is said, and
  * the twists keep their word. */
+static void test_a_second_slip_adds_to_what_the_first_left_unsettled(void) {
+    enum { AGREEING = 36 }; /* the windows are clear again after 29, and 15 later it is settled */
+    double apart = 0;
+    for (int slips = 0; slips < 3; slips++) {
+        for (int k = 0; k < 30; k++) {
+            add_slip();
+            (void)judge();
+            /* a way behind grows: 20 cm a frame, but for the few until it is told */
+            TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(apart, -(double)filter.consistency.apart[0]);
+            apart = -(double)filter.consistency.apart[0];
+        }
+        for (int k = 0; k < AGREEING && slips < 2; k++) {
+            add_agreement();
+            (void)judge();
+        }
+        TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.doubtful); /* not settled yet */
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.9 * 90 * WAY_M, apart);
+    plr_real P[36] = {0};
+    plr_consistency_cover(&filter, P);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.9 * apart * apart, (double)P[0]);
+}
+
 static void test_a_small_difference_is_said_and_widens_nothing(void) {
     const double nu[6] = {3}; /* 3 cm in a frame of 20 */
     plr_motion before;
@@ -342,6 +365,7 @@ int main(void) {
     RUN_TEST(test_under_noise_each_window_is_chi_square_of_six);
     RUN_TEST(test_noise_is_not_told);
     RUN_TEST(test_a_slip_is_told_within_five_frames);
+    RUN_TEST(test_a_second_slip_adds_to_what_the_first_left_unsettled);
     RUN_TEST(test_a_small_difference_is_said_and_widens_nothing);
     RUN_TEST(test_twists_that_are_contradicted_are_believed_less);
     RUN_TEST(test_the_covariance_covers_both_stories);
