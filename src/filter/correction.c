@@ -55,8 +55,9 @@ static void stack_block(plr_filter *f, const plr_observation *observations, cons
     for (unsigned a = 0; a < block->count; a++) {
         const unsigned slot = w->slot_of[used[a]];
         plr_linearisation *lin = &block->lin[a];
-        (void)plr_model_of(f)->linearise(f, &f->slots[slot],
-                                         lin); /* the gate has seen it succeed */
+        if (!plr_model_of(f)->linearise(f, &f->slots[slot], lin))
+            memset(lin, 0,
+                   sizeof *lin); /* the motion has brought it beside the camera: it says nothing */
         block->row_of[a] = plr_covariance_row(f, slot);
         plr_covariance_project(f, slot, lin, w->Vt + PLR_ROWS * a * block->ld, block->ld);
 
@@ -93,8 +94,10 @@ static void move_state(plr_filter *f, plr_block *block, unsigned rows) {
     plr_workspace *w = &f->work;
     plr_real *Wt = w->noise.Wt, *beyond = w->diagonal;
     const size_t ld = block->ld;
-    for (unsigned r = 0; r < rows; r++)
+    for (unsigned r = 0; r < rows; r++) {
         block->E[WIDE * r + 6] = -w->y[r];
+        block->E[WIDE * r + 7] = 0;
+    }
     plr_real *const first[4] = {Wt, Wt + ld, Wt + 2 * ld, Wt + 3 * ld};
     plr_real *const last[4] = {Wt + 4 * ld, Wt + 5 * ld, w->dx, beyond};
     plr_subtract_four_rows(block->ld, rows, block->E, WIDE, w->Vt, ld, first);
@@ -140,10 +143,12 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
     unsigned blocks = (count + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
     for (; blocks > 0 && !f->diverged; blocks--) {
-        plr_block block = {.n = n, .ld = plr_covariance_ld(f)};
+        plr_block block; /* not initialised: that would cost as much as a row of S */
+        bool factorised;
+        block.n = n;
+        block.ld = plr_covariance_ld(f);
         block.count =
             (count - at + blocks - 1) / blocks; /* alike: the cost grows with the square */
-        bool factorised;
         stack_block(f, observations, f->work.used + at, &block);
         if (apply_block(f, &block, &factorised))
             result.applied += block.count;

@@ -226,7 +226,8 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     if (!f->config.bias)
         return;
     plr_real *Vt = f->work.Vt;
-    memset(Vt, 0, 6 * ld * sizeof *Vt);
+    for (unsigned k = 0; k < 6; k++)
+        memset(Vt + k * ld + n, 0, (ld - n) * sizeof *Vt);
     for (unsigned i = 0; i < n; i++) {
         plr_real v[6];
         plr_covariance_motion_share(f, i, 1, motion->K, v);

@@ -88,10 +88,13 @@ static void keep_off(plr_real q[3]) {
 
 /* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
 static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size_t ld) {
-    memset(Wt, 0, 6 * ld * sizeof *Wt);
-    for (unsigned i = 0; i < 6; i++)
-        for (unsigned k = 0; k < 6; k++)
+    const unsigned n = plr_covariance_dim(f), first = plr_covariance_row(f, 0);
+    for (unsigned k = 0; k < 6; k++) {
+        for (unsigned i = 0; i < 6; i++)
             Wt[k * ld + i] = JL[6 * i + k];
+        memset(Wt + k * ld + 6, 0, (first - 6) * sizeof *Wt); /* it moves no bias */
+        memset(Wt + k * ld + n, 0, (ld - n) * sizeof *Wt);
+    }
     for (unsigned slot = 0; slot < f->count; slot++) {
         const unsigned row = plr_covariance_row(f, slot);
         plr_polar chart;
@@ -132,7 +135,7 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_se3_rotation(R, E);
 
     plr_real *F = f->work.Vt, most_left = 0;
-    memset(f->work.dx, 0, plr_covariance_dim(f) * sizeof *f->work.dx);
+    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, to;

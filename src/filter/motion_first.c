@@ -235,8 +235,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
             f->work.used[s.count] = (uint16_t)k;
-            memset(&s.sightings[s.count], 0, sizeof *s.sightings);
-            s.sightings[s.count++].voice = f->slots[f->work.slot_of[k]].known ? 0 : 1;
+            plr_search_add(&s, f->slots[f->work.slot_of[k]].known ? 0 : 1);
         }
     plr_search_from_zero(&s, &best);
     const unsigned voices = judge_all_at_zero(&s, &best);
@@ -248,7 +247,6 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     if (first->found)
         (void)plr_search_step(&best, U, dz);
     plr_motion_at(f, &s.prior, best.z, &first->motion);
-    memset(f->work.noise.closer, 0, f->count * sizeof *f->work.noise.closer);
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);

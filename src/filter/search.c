@@ -158,6 +158,14 @@ static void gather(const plr_sighting *at, plr_search_point *point) {
     }
 }
 
+void plr_search_add(plr_search *s, plr_real voice) {
+    static const plr_real any_measure[6] = {1, 0, 0, 1, 0, 1};
+    plr_sighting *at = &s->sightings[s->count++];
+    memcpy(at->U[s->bank], any_measure, sizeof at->U[0]);
+    at->voice = voice;
+    at->cost = 0;
+}
+
 void plr_search_prepare(plr_search *s) {
     for (unsigned i = 0; i < s->count; i++)
         prepare(s, i);

@@ -55,6 +55,9 @@ static inline const plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
     return &s->f->slots[w->slot_of[w->used[i]]];
 }
 
+/* One more sighting, of the observation work.used[s->count], of which no point is known yet. */
+void plr_search_add(plr_search *s, plr_real voice);
+
 /* What of the sightings hangs on s->prior and not on nu. */
 void plr_search_prepare(plr_search *s);
 
