@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The stereo camera as the filter computes with it. Part of the state, not for direct use: the
- * caller's calibration is plr_calibration in types.h. */
+/* The stereo camera in the filter's precision. Internal to the filter; a caller describes the
+ * camera by plr_calibration in types.h. */
 #ifndef PELORUS_CAMERA_H
 #define PELORUS_CAMERA_H
 

@@ -2,10 +2,10 @@
 /*
  * Compile-time configuration: precision, capacities, fused multiply-add.
  *
- * Every value has a default here and may be overridden on the compiler's command line (CMake does
- * that through options of the same names). Two translation units that share a filter must agree on
- * all of them: plr_filter_init and plr_session_init refuse a caller who does not. This is the only
- * file of the library in which preprocessor conditions stand.
+ * Every value has a default here and can be set on the compiler's command line (CMake has options
+ * of the same names). All translation units that share a filter must use the same values;
+ * plr_filter_init and plr_session_init refuse a caller that was compiled with others. Preprocessor
+ * conditions occur in this file alone.
  */
 #ifndef PELORUS_CONFIG_H
 #define PELORUS_CONFIG_H
@@ -19,39 +19,46 @@ extern "C" {
 /* Version, major << 16 | minor << 8 | patch; plr_version() has it as text. */
 #define PLR_VERSION_NUMBER 0x000100
 
-/* Counts the changes after which a filter computes other bits; part of the build fingerprint, so that
- * a log tells whether its robot computed as this source does. tests/golden asks for it. */
+/* Increases with every change of the source that changes the bits of a result. It is part of the
+ * build fingerprint, so a log shows whether it was made by the same arithmetic as this source's.
+ * tests/golden fails if the bits change and this number does not. */
 #define PLR_ARITHMETIC 4
 
-/* Bits of a real: 32 (float, the main road) or 64 (double). */
+/* Precision of the filter's arithmetic: 32 (float; default) or 64 (double). float is tested to be
+ * as accurate for the model `body` (docs/NUMERICS.md) and takes half the RAM; choose 64 for the
+ * model `world`. */
 #ifndef PLR_REAL
 #define PLR_REAL 32
 #endif
 
-/* Most landmarks that a filter can hold, 1 to 1024. RAM grows with its square: see docs/SIZES.md.
- * A config may use fewer (setting `slots`). */
+/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 20 KB
+ * for 16 landmarks, 44 KB for 32 (docs/SIZES.md has more). The setting `slots` can use fewer. */
 #ifndef PLR_MAX_LANDMARKS
 #define PLR_MAX_LANDMARKS 32
 #endif
 
-/* Most observations in one frame, 1 to 4096. Four bytes of RAM each; more are refused. */
+/* Most observations in one frame: 1 to 4096, default 128. A frame with more is refused, so choose
+ * the most that the tracker can send. Each takes about 10 bytes of RAM in the filter, and 40 in a
+ * session. */
 #ifndef PLR_MAX_OBSERVATIONS
 #define PLR_MAX_OBSERVATIONS 128
 #endif
 
-/* Observations processed at once in an update. The bits of a result depend on it, therefore it is
- * part of the build fingerprint; 8 in every image that the project makes. 1 to 16. */
+/* Observations processed at once in an update: 1 to 16, default 8. More need more workspace. Results
+ * depend on it in their last bits, so it is part of the build fingerprint: leave it at 8 unless you
+ * build everything, robot and desk, yourself. */
 #ifndef PLR_BLOCK_OBSERVATIONS
 #define PLR_BLOCK_OBSERVATIONS 8
 #endif
 
-/* 1: an exact fused multiply-add of our own instead of the processor's: slower, the same bits. For
- * processors without the instruction. */
+/* 0 (default) or 1. 1: fused multiply-add is computed in software instead of by the processor's
+ * instruction; slower, the same bits. For processors without that instruction. */
 #ifndef PLR_PORTABLE
 #define PLR_PORTABLE 0
 #endif
 
-/* Columns of the tile that the update's kernel keeps in registers. It changes the speed, no bit. */
+/* Columns of the tile that the update's kernel keeps in registers: 1 to 16, default 16 with AVX,
+ * else 4. It changes the speed, and no bit of a result. */
 #ifndef PLR_TILE_COLUMNS
 #if defined(__AVX__)
 #define PLR_TILE_COLUMNS 16
@@ -81,7 +88,7 @@ extern "C" {
 
 #if PLR_REAL == 32
 typedef float plr_real;
-/* round(a b + c), with a single rounding in float32. */
+/* a b + c with a single rounding, in float32. */
 #if PLR_PORTABLE
 float plr_fmaf_exact(float a, float b, float c);
 #define PLR_FMA(a, b, c) plr_fmaf_exact((a), (b), (c))
@@ -93,7 +100,8 @@ float plr_fmaf_exact(float a, float b, float c);
 #define PLR_EPSILON         1.1920928955078125e-7F
 #elif PLR_REAL == 64
 typedef double plr_real;
-/* float64 rounds twice on every target: not all of them fuse it. */
+/* In float64 product and sum are rounded separately on every target, because not all have the fused
+ * instruction for it. */
 #define PLR_FMA(a, b, c)    ((a) * (b) + (c))
 #define PLR_SQRT(x)         __builtin_sqrt(x)
 #define PLR_SMALLEST_NORMAL 2.2250738585072014e-308
@@ -113,18 +121,19 @@ enum {
     PLR_BLOCK_ROWS = PLR_ROWS * PLR_BLOCK_OBSERVATIONS,
     PLR_WORK_ROWS = PLR_BLOCK_ROWS > 24 ? PLR_BLOCK_ROWS : 24, /* a predict needs 4 x 6 */
     PLR_MAX_STATE = PLR_POSE_DIM + PLR_BIAS_DIM + PLR_LANDMARK_DIM * PLR_MAX_LANDMARKS,
-    PLR_MAX_LD = (PLR_MAX_STATE + 15) / 16 * 16, /* whole tiles, whatever their width */
-    PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond its end */
+    PLR_MAX_LD = (PLR_MAX_STATE + 15) / 16 * 16, /* a multiple of every tile width */
+    PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond the end of a matrix */
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
 };
 
-/* What the layout of a filter or a session hangs on, as one translation unit was compiled, and how
- * large it is there. Every init hands over the caller's; the library refuses what is not its own. */
+/* What the memory layout of a filter or session depends on, as one translation unit was compiled,
+ * and its size there in bytes. Every init passes the caller's to the library, which refuses values
+ * that differ from its own. */
 typedef struct plr_sizes {
     uint32_t bytes, real, landmarks, observations, block;
 } plr_sizes;
 
-/* Those of the translation unit that calls it. */
+/* The sizes of the translation unit that calls this, for a struct of so many bytes. */
 static inline plr_sizes plr_sizes_here(uint32_t bytes) {
     plr_sizes sizes;
     sizes.bytes = bytes;

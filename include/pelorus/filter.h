@@ -11,15 +11,17 @@
  *     plr_filter_pose(&filter, &pose);
  *
  * Time is an argument: the filter has no clock. Every call runs a bounded number of steps, whatever
- * its data; the bounds are in docs/SIZES.md. Two filters can live side by side; one filter is not
- * thread-safe: calls on it must not overlap. A call that is refused (status < 0) changes nothing but
- * the counts of what was refused, and a question changes nothing at all: asked or not, the bits to
- * come are the same.
- * Every call first looks whether the filter's memory is as the last one left it; if not, it returns
- * PLR_E_DAMAGED, and so do all that follow, until an init.
+ * its data; the bounds are in docs/SIZES.md. A program may have several filters. One filter is not
+ * thread-safe: calls on it must not overlap.
  *
- * Errors are on the right: T = T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in
- * rad; b = b^ + db. Covariances are of these. Source of the equations: docs/MATH.md.
+ * A refused call (status < 0) changes nothing but the counts of refused calls. A function that
+ * takes a const filter changes nothing at all: whether you call it or not, later results have the
+ * same bits. Every call first checks that the filter's memory is as the previous call left it; if
+ * not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
+ *
+ * The error of a pose is defined on its right side: with T the true pose and T^ the estimate,
+ * T = T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias
+ * is db = b - b^. Covariances are those of xi and db. Source of the equations: docs/MATH.md.
  */
 #ifndef PELORUS_FILTER_H
 #define PELORUS_FILTER_H
@@ -34,105 +36,115 @@ extern "C" {
 
 /* --- life --- */
 
-/* What plr_filter_init calls, with the sizes of whoever calls it. */
+/* plr_filter_init for a caller whose compiled-in sizes are given; use plr_filter_init. */
 plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibration,
                                  const plr_config *config, const plr_map *map,
                                  const plr_sizes *caller);
 
 /* Prepares a filter: pose identity with covariance start_sigma^2 I, bias 0 with its prior, no
- * landmarks, clock not started (the first twist or frame starts it). `map` may be NULL: no sink, no
+ * landmarks, time not set (the first twist or frame sets it). `map` may be NULL: no sink, no
  * source. All three are copied, so they need not outlive the call.
  * PLR_E_ARGUMENT null pointer; PLR_E_CONFIG, see plr_config_check; PLR_E_CALIBRATION focal length
- * or baseline not positive, or T_CB not a rigid motion, or a number of them beyond 1e6;
+ * or baseline not positive, or T_CB not a rigid motion, or one of these numbers beyond 1e6;
  * PLR_E_MODE localization without a source; PLR_E_CPU the processor flushes subnormals to zero;
- * PLR_E_SIZE the caller was compiled with other sizes than the library: nothing is written.
- * After any other error the filter refuses every call with PLR_E_NOT_READY. */
+ * PLR_E_SIZE the caller was compiled with other sizes than the library: nothing is written. After
+ * any other error the filter refuses every call with PLR_E_NOT_READY. */
 static inline plr_status plr_filter_init(plr_filter *f, const plr_calibration *calibration,
                                          const plr_config *config, const plr_map *map) {
     const plr_sizes here = plr_sizes_here(sizeof(plr_filter));
     return plr_filter_init_sized(f, calibration, config, map, &here);
 }
 
-/* Back to the state after plr_filter_init, with all counters at zero. */
+/* Returns the filter to its state after plr_filter_init, with all counts at zero. */
 plr_status plr_filter_reset(plr_filter *f);
 
-/* Sets the pose from outside (start, or re-localise): P_xi[36] is the covariance of (rho, theta),
- * NULL for start_sigma^2 I. Landmarks are dropped without going to the sink: what they were tied to
- * is gone. Bias and its covariance stay. Starts the clock, or sets it: t_ns may be anything.
- * Counted in plr_filter_totals().resets, once the clock has been started.
+/* Sets the pose and the time, at the start or later. P_xi[36] is the covariance of (rho, theta),
+ * 6x6; NULL: start_sigma^2 I. All landmarks are dropped and not handed to the sink, because their
+ * positions belong to the old pose. Bias and its covariance stay. t_ns may be earlier or later than
+ * the filter's time. Counted in plr_filter_totals().resets, except where it is the first to set the
+ * time.
  * PLR_E_NOT_FINITE; PLR_E_ARGUMENT if R is not a rotation or P_xi not symmetric and positive;
  * PLR_E_RANGE beyond 1e9 m or a variance of 1e12; PLR_E_MODE in mapping. */
 plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB,
                                const double *P_xi);
 
-/* Sets mean and variances of the bias prior, 6 each: (b_v, b_w). Only before the first twist and the
- * first frame. PLR_E_MODE if bias is off, in mapping, or after those; PLR_E_NOT_FINITE;
- * PLR_E_ARGUMENT a negative variance; PLR_E_RANGE a bias beyond 1e4 or a variance beyond 1e12. */
+/* Sets mean and variances of the bias prior, 6 each: (b_v, b_w), m/s and rad/s. Only before the
+ * first twist and the first frame.
+ * PLR_E_MODE if bias is off, in mapping, or after those; PLR_E_NOT_FINITE; PLR_E_ARGUMENT a
+ * negative variance; PLR_E_RANGE a bias beyond 1e4 or a variance beyond 1e12. */
 plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *variance);
 
 /* --- measurements --- */
 
-/* A twist reading at t_ns; what interval it stands for is the setting twist_timing. Costs the same
- * for any number of landmarks. In mapping it is checked, and otherwise ignored.
- * PLR_E_TIME not later than the last reading, or older than the last frame; PLR_E_GAP further ahead
- * than max_gap; PLR_E_NOT_FINITE; PLR_E_RANGE more than pi rad or 1 km in one step, be it this one
- * or, by this reading, one as long as the last. */
+/* A twist reading taken at t_ns; the setting twist_timing says for which interval it is valid.
+ * Moves the pose to t_ns. Takes the same time for any number of landmarks. In mapping the reading
+ * is checked but not used.
+ * PLR_E_TIME not later than the last reading, or earlier than the last frame; PLR_E_GAP more than
+ * max_gap_s ahead; PLR_E_NOT_FINITE; PLR_E_RANGE the step to t_ns, or a next step of the same
+ * length with this reading, would be more than pi rad or 1 km. */
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist);
 
-/* mapping only: the body's pose at t_ns, taken as exact. The landmarks are carried along. The first
- * one starts the map. PLR_E_MODE, PLR_E_TIME, PLR_E_NOT_FINITE, PLR_E_ARGUMENT (not a rotation),
- * PLR_E_RANGE (beyond 1e9 m). */
+/* mapping only: sets the body's pose at t_ns, which is taken as exact; the landmarks keep their
+ * place in the world. The first call sets the time.
+ * PLR_E_MODE, PLR_E_TIME, PLR_E_NOT_FINITE, PLR_E_ARGUMENT (not a rotation), PLR_E_RANGE (beyond
+ * 1e9 m). */
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB);
 
-/* A stereo frame: predict up to its time, match, find the motion, gate, update, retract, evict,
- * initialise, judge health. The order of the observations changes no bit. Single observations that are malformed are left out and
- * counted. `report` (may be NULL) is filled in any case.
- * PLR_E_LATE older than the last predict; PLR_E_GAP; PLR_E_RANGE the last reading cannot be held so
- * long; PLR_E_ARGUMENT more than PLR_MAX_OBSERVATIONS; PLR_E_MODE in mapping, when
- * plr_filter_move_to has not been called for this time.
- * Should a variance cease to be positive, the filter keeps the pose, drops the landmarks, widens the
- * covariance and goes on with this frame's: PLR_OK, and reasons NOT_POSITIVE and RECOVERED. */
+/* A stereo frame: predicts the pose at its time with the last twist, matches observations to
+ * landmarks by id, gates them, corrects the state, and makes landmarks of new ids, evicting others
+ * where no slot is free. The order of the observations does not change the result. Malformed
+ * observations are left out and counted. `report` (may be NULL) is filled in any case.
+ * PLR_E_LATE earlier than the filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_RANGE the
+ * prediction would be more than pi rad or 1 km; PLR_E_ARGUMENT more than PLR_MAX_OBSERVATIONS;
+ * PLR_E_MODE in mapping, when plr_filter_move_to has not been called for this time.
+ * If a variance is no longer positive, the filter keeps the pose, enlarges its covariance, drops
+ * the landmarks and starts again with those of this frame: PLR_OK, reasons NOT_POSITIVE and
+ * RECOVERED. */
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report);
 
-/* --- estimate; valid at plr_filter_time() --- */
+/* --- estimate at the time plr_filter_time() --- */
 
-/* Time of the estimate: that of the last twist or frame. */
+/* Time of the estimate: that of the last accepted twist or frame. */
 plr_time_ns plr_filter_time(const plr_filter *f);
 
-/* T_WB. */
+/* The pose of the body in the world, T_WB. */
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB);
 
-/* Covariance of (rho, theta), 6x6, m and rad. While vision contradicts the twists it reaches from one
- * story to the other (docs/MATH.md 17). */
+/* Covariance of the pose's error (rho, theta), 6x6, m and rad. While vision contradicts the twists
+ * it is enlarged so that it covers the pose by vision and the pose by twists (docs/MATH.md 17). */
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi);
 
-/* u - b: the last reading without its estimated bias. */
+/* Velocity of the body: the last twist reading minus the estimated bias. */
 plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity);
 
-/* Its covariance, 6x6: that of the reading plus that of the bias. */
+/* Covariance of that velocity, 6x6, in the order (v, w): the reading's plus the bias's. */
 plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u);
 
-/* (b_v, b_w), 6, and its covariance, 6x6. Zeros while bias is off. `P_b` may be NULL. */
+/* The bias (b_v, b_w) of the twists, 6 numbers, m/s and rad/s, and its covariance, 6x6. Zeros while
+ * the setting bias is off. `P_b` may be NULL. */
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b);
 
-/* Trace of the whole covariance (mixed units: a trend, not a quantity); 0 where it cannot be told. */
+/* Trace of the covariance of the whole state. It adds different units, so only its trend means
+ * anything. 0 if the filter is not initialised or damaged. */
 double plr_filter_trace(const plr_filter *f);
 
 /* --- landmarks --- */
 
-/* How many the state holds. */
+/* Landmarks in the state. */
 unsigned plr_filter_landmark_count(const plr_filter *f);
 
-/* Landmark in slot 0 to count - 1, in the world, with covariance. The covariance is what is left of pose and landmark: where those are uncertain by metres
- * and it by centimetres, float32 may leave a variance below zero by rounding; the map sink's is the
- * same. PLR_E_ARGUMENT beyond the last slot. */
+/* The landmark in a slot, 0 to count - 1: position in the world, m, with covariance. That
+ * covariance is a small difference of larger ones: where pose and landmark are uncertain by metres
+ * and it is a matter of centimetres, rounding in float32 may leave a negative variance. The map
+ * sink gets the same numbers.
+ * PLR_E_ARGUMENT beyond the last slot. */
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark);
 
-/* Puts a landmark of known world position and covariance into the state. Its
- * error is taken as independent of the state's: a landmark that was evicted and is inserted again
- * is counted twice (docs/MATH.md). PLR_E_EXISTS; PLR_E_FULL; PLR_E_ARGUMENT covariance not positive;
- * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e9 m or a variance of 1e12, or (`body`) it lies on the
- * camera or beyond max_range. */
+/* Puts a landmark of known world position and covariance into the state. Its error is assumed to be
+ * independent of the state's. That is wrong for a landmark which this filter has evicted before:
+ * its information is then counted twice (docs/MATH.md).
+ * PLR_E_EXISTS; PLR_E_FULL; PLR_E_ARGUMENT covariance not positive; PLR_E_NOT_FINITE; PLR_E_RANGE
+ * beyond 1e9 m or a variance of 1e12, or (`body`) it lies on the camera or beyond max_range. */
 plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark);
 
 /* Hands every landmark to the map sink and drops it; those that the sink refuses stay.
@@ -141,65 +153,67 @@ plr_status plr_filter_flush_map(plr_filter *f);
 
 /* --- saved state --- */
 
-/* Most bytes that a state is handed over in at once. */
+/* Most bytes of a saved state in one call of a sink or source. */
 enum { PLR_STATE_CHUNK = 64 };
 
-/* Takes the next n bytes, 1 to PLR_STATE_CHUNK. 0 = taken; anything else: a failure. */
+/* Stores the next n bytes of a state, 1 to PLR_STATE_CHUNK. Returns 0, or anything else for a
+ * failure. */
 typedef int (*plr_state_sink)(void *context, const uint8_t *bytes, uint32_t n);
 
-/* Copies n bytes, 1 to PLR_STATE_CHUNK, from `offset` bytes after the state's beginning. 0 = done;
- * anything else: a failure. It is asked in order, from the beginning to the end, and all of it
+/* Copies n bytes, 1 to PLR_STATE_CHUNK, from `offset` bytes after the beginning of a saved state.
+ * Returns 0, or anything else for a failure. A restore reads the state from beginning to end,
  * twice. */
 typedef int (*plr_state_source)(void *context, uint32_t offset, uint8_t *bytes, uint32_t n);
 
-/* Hands the whole state to a sink, in little-endian bytes that depend on no compiler:
- * docs/STATE-FORMAT.md. Restored, it goes on with the same bits as if nothing had been. The filter
- * is not changed. The bytes carry no checksum: that is for whoever keeps them, as
- * plr_state_store_save does. `sink` NULL: only tells whether the state can be saved.
- * PLR_E_DIVERGED and PLR_E_NOT_FINITE: such a state is worth nothing; PLR_E_IO the sink failed.
- * After an error what the sink has got is no state. */
+/* Writes the whole state to a sink, as little-endian bytes that do not depend on the compiler:
+ * docs/STATE-FORMAT.md. A filter that is restored from them computes the same bits as one that was
+ * never interrupted. The bytes contain no checksum; plr_state_store_save adds one. `sink` NULL:
+ * only checks whether the state can be saved.
+ * PLR_E_DIVERGED, PLR_E_NOT_FINITE the state is not usable; PLR_E_IO the sink failed. After an
+ * error discard what the sink has received. */
 plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *context);
 
-/* Bytes of a saved state that holds so many landmarks; with plr_filter_config(f)->slots, the most it
- * can come to. 0 if there can be no such state. */
+/* Bytes of a saved state with this number of landmarks; plr_filter_config(f)->slots gives the
+ * largest size. 0 if the filter is not initialised or cannot hold so many. */
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks);
 
-/* Brings back a state of `length` bytes. The filter must have been initialised with the calibration
- * and the settings that the state was saved under; map sink and source are those given then. The
- * state is read twice: first it is looked at, then taken.
- * PLR_E_FOREIGN another build, other settings or another camera; PLR_E_CORRUPT no state, too short
- * or too long, or numbers that no filter holds; PLR_E_IO the source failed. A refusal changes
- * nothing, unless the source gave other bytes, or failed, at the second reading: then the filter is
- * as after plr_filter_reset. */
+/* Restores a state of `length` bytes. The filter must have been initialised with the calibration
+ * and settings that it had when the state was saved; map sink and source are those of that
+ * initialisation. The state is read twice: first it is checked, then it replaces the filter's.
+ * PLR_E_FOREIGN saved by another build, with other settings or another camera; PLR_E_CORRUPT not a
+ * state, too short or too long, or with numbers that no filter can have; PLR_E_IO the source
+ * failed. After an error the filter is unchanged, unless the source failed or gave other bytes in
+ * the second reading: then it is as after plr_filter_reset. */
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,
                               void *context);
 
-/* Goes on at t_ns of whatever clock there is now, after an interruption in which no twist was heard:
- * the body stands where it stood, but for an unknown motion of mean 0 and covariance P_moved[36], of
- * (rho, theta); NULL: it has not moved at all. Landmarks stay, and their correlation with the pose.
- * PLR_E_MODE P_moved in mapping, or nothing has begun yet; PLR_E_NOT_FINITE; PLR_E_RANGE;
- * PLR_E_ARGUMENT P_moved not symmetric and positive. */
+/* Continues after an interruption without twists, for example after a restore. The filter's time
+ * becomes t_ns, of any clock. The pose stays where it is, and its covariance grows by P_moved[36],
+ * 6x6, of (rho, theta), m^2 and rad^2: how far the body may have moved meanwhile. NULL: it has not
+ * moved. Landmarks stay, with their correlation with the pose.
+ * PLR_E_MODE P_moved in mapping, or no twist, frame or pose was ever accepted; PLR_E_NOT_FINITE;
+ * PLR_E_RANGE; PLR_E_ARGUMENT P_moved not symmetric and positive. */
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved);
 
 /* --- what happened --- */
 
-/* How it stands at t_ns, with or without a frame: ask it as often as the pose is used. To the reasons
- * of the last frame it adds what no report can tell: NO_FRAMES and NO_OBSERVATIONS after a second,
- * NO_TWISTS where readings were refused or the last one is older than three of their intervals and
- * 50 ms. t_ns before the filter's own time counts as that. Changes nothing. PLR_E_DAMAGED,
- * PLR_E_NOT_READY: `health` says DIVERGED. */
+/* The filter's health at t_ns, which need not be the time of a frame: call it whenever you use the
+ * pose. To the reasons of the last frame it adds NO_FRAMES and NO_OBSERVATIONS when there was none
+ * for a second, and NO_TWISTS when readings were refused or the last one is older than 50 ms and
+ * than three intervals between readings. A t_ns before plr_filter_time() counts as that time.
+ * PLR_E_DAMAGED, PLR_E_NOT_READY: `health` is filled too and says DIVERGED. */
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
 
-/* Counts since init or reset. */
+/* Copies the counts since init or reset. */
 plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals);
 
-/* The setting table's values in force. */
+/* The settings that the filter was initialised with. */
 const plr_config *plr_filter_config(const plr_filter *f);
 
-/* A sentence for a status: what went wrong and what would be right. Never NULL. */
+/* A sentence about a status: what is wrong and how to correct it. Never NULL. */
 const char *plr_status_text(plr_status status);
 
-/* A phrase for a single bit of plr_report.reasons; one for a health. Never NULL. */
+/* A phrase that explains a single bit of plr_report.reasons, or a health. Never NULL. */
 const char *plr_reason_text(plr_reason reason);
 const char *plr_health_text(plr_health health);
 

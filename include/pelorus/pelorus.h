@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-/* Pelorus: a stereo visual-inertial SLAM filter. This is the whole of the filter's interface; the
- * frame format is in wire.h, the loop in session.h, the port in port.h. */
+/* Pelorus: a stereo visual-inertial SLAM filter. Includes the complete interface of the filter.
+ * Separate headers: the frame format of recordings and links in wire.h, a main loop over such a
+ * link in session.h, what that loop needs of the machine in port.h, saved states in
+ * state_store.h. */
 #ifndef PELORUS_PELORUS_H
 #define PELORUS_PELORUS_H
 

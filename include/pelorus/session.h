@@ -10,11 +10,11 @@
  *         plr_session_step(&session);                   // at most one message, bounded time
  *
  * A session takes HEADER, CONFIG, LANDMARK (known) and START, or STATE (restore) in its place, then
- * TWIST, TRUTH and STEREO, and among them STATE (save), then END (docs/REPLAY-FORMAT.md). It answers
- * with the CONFIG in force, after each frame POSE and REPORT, LANDMARK for what leaves the state,
- * TEXT for what a human should know, END. Nothing that arrives stops it: what it cannot use is
- * answered with a REPORT that says what was refused (subject) and why (status), and counted. After
- * END it waits for the next HEADER.
+ * TWIST, TRUTH and STEREO, and among them STATE (save), then END (docs/REPLAY-FORMAT.md). It
+ * answers with the CONFIG in force, after each frame POSE and REPORT, LANDMARK for what leaves the
+ * state, TEXT for what a human should know, END. Nothing that arrives stops it: what it cannot use
+ * is answered with a REPORT that says what was refused (subject) and why (status), and counted.
+ * After END it waits for the next HEADER.
  *
  * Settings in force: override (an option) over CONFIG over HEADER over default. Once data has
  * arrived neither HEADER nor CONFIG can change anything: the same ones again are ignored, others
@@ -85,7 +85,8 @@ typedef struct plr_frame_result {
  * Pointers hold until the function returns. */
 typedef struct plr_session_observer {
     void *context;
-    /* The filter is about to get its first data; plr_filter_config(&session->filter) is in force. */
+    /* The filter is about to get its first data; plr_filter_config(&session->filter) is in
+     * force. */
     void (*started)(void *context);
     void (*frame)(void *context, const plr_frame_result *result);
     /* Every pose that is computed: after each frame, and after twists if they are sent. */
@@ -93,8 +94,8 @@ typedef struct plr_session_observer {
     void (*truth)(void *context, const plr_truth *truth);
     void (*landmark)(void *context, const plr_landmark_message *landmark);
     void (*text)(void *context, const plr_text *text); /* the session's own */
-    /* A message was refused. (Frames that are no message: PLR_STEP_SKIPPED.) `culprit` is the setting
-     * to change, NULL where it is not one. */
+    /* A message was refused. (Frames that are no message: PLR_STEP_SKIPPED.) `culprit` is the
+     * setting to change, NULL where it is not one. */
     void (*refused)(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                     const plr_setting *culprit);
 } plr_session_observer;

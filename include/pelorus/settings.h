@@ -56,8 +56,8 @@ typedef enum plr_landmark_prior {
  * The table is in src/filter/settings.c; tests/layering/settings.py compares this text with it.
  *
  * Within the limits four combinations are refused too: min_depth_m not below max_range_m;
- * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior in
- * the model `body`; the independent landmark_prior without landmark_sigma_m. */
+ * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
+ * in the model `body`; the independent landmark_prior without landmark_sigma_m. */
 typedef struct plr_config {
     /* Setting model: one of plr_model_kind, default PLR_MODEL_BODY. */
     uint8_t model;

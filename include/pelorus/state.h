@@ -17,7 +17,8 @@
 extern "C" {
 #endif
 
-/* Where landmarks go to and come from. Both functions may be NULL. They must not call the filter. */
+/* Where landmarks go to and come from. Both functions may be NULL. They must not call the
+ * filter. */
 typedef struct plr_map {
     void *context;
     /* Takes an evicted landmark. 0 = taken; anything else: the filter keeps the landmark. */
@@ -77,8 +78,8 @@ typedef struct plr_motion {
     uint8_t noisy;       /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
 
-/* Sums over frames that fade: of nu, how the motion differed from the twists in their sigmas, and of
- * the covariance that it should have had. */
+/* Sums over frames that fade: of nu, how the motion differed from the twists in their sigmas, and
+ * of the covariance that it should have had. */
 typedef struct plr_consistency_window {
     plr_real sum[6];
     plr_real variance[21]; /* 6x6, packed upper triangle */

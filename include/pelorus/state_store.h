@@ -56,18 +56,18 @@ uint32_t plr_state_store_needs(const plr_state_store *store, const plr_filter *f
 
 /* Saves the filter, which is not changed. After an error the state that was saved before is still
  * there, and the newest. `saved` may be NULL; it is filled in any case.
- * PLR_E_FULL a slot could not hold this filter with all its landmarks: nothing is written, and it is
- * said at the first save, not when the map has grown; PLR_E_IO the device fails, or does not give
- * back what was programmed; else what plr_filter_save says. */
+ * PLR_E_FULL a slot could not hold this filter with all its landmarks: nothing is written, and it
+ * is said at the first save, not when the map has grown; PLR_E_IO the device fails, or does not
+ * give back what was programmed; else what plr_filter_save says. */
 plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f,
                                 plr_stored_state *saved);
 
 /* Brings back the newest state that is whole. The filter must have been initialised as it was when
  * the state was saved; on an error it is as it was before, but as after plr_filter_reset if the
- * device gave other bytes while they were taken over. `found` may be NULL; it is filled in any case.
- * PLR_E_NOT_READY nothing was ever saved here; PLR_E_CORRUPT what was saved is damaged, in both
- * slots; PLR_E_FOREIGN the newest state is of another version, build, calibration or setting: an
- * older one of our own is not taken for it; PLR_E_IO. */
+ * device gave other bytes while they were taken over. `found` may be NULL; it is filled in any
+ * case. PLR_E_NOT_READY nothing was ever saved here; PLR_E_CORRUPT what was saved is damaged, in
+ * both slots; PLR_E_FOREIGN the newest state is of another version, build, calibration or setting:
+ * an older one of our own is not taken for it; PLR_E_IO. */
 plr_status plr_state_store_restore(plr_state_store *store, plr_filter *f, plr_stored_state *found);
 
 #ifdef __cplusplus

@@ -44,8 +44,9 @@ enum {
     PLR_WIRE_MAX_TEXT = 240
 };
 
-/* On the diagonal of a POSE's covariances: the filter knows none, as one that had diverged did before
- * it could recover. 2^40, the same in both precisions, and more than any variance that is accepted. */
+/* On the diagonal of a POSE's covariances: the filter knows none, as one that had diverged did
+ * before it could recover. 2^40, the same in both precisions, and more than any variance that is
+ * accepted. */
 #define PLR_WIRE_UNKNOWN_VARIANCE 1099511627776.0
 
 /* Bytes of a body that holds n observations: the buffer that a reader needs for them. */
