@@ -44,9 +44,9 @@ extern "C" {
 #define PLR_MAX_OBSERVATIONS 128
 #endif
 
-/* Observations processed at once in an update: 1 to 16, default 8. More need more workspace. Results
- * depend on it in their last bits, so it is part of the build fingerprint: leave it at 8 unless you
- * build everything, robot and desk, yourself. */
+/* Observations processed at once in an update: 1 to 16, default 8. More need more workspace.
+ * Results depend on it in their last bits, so it is part of the build fingerprint: leave it at 8
+ * unless you build everything, robot and desk, yourself. */
 #ifndef PLR_BLOCK_OBSERVATIONS
 #define PLR_BLOCK_OBSERVATIONS 8
 #endif

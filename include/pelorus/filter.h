@@ -199,8 +199,8 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
 
 /* The filter's health at t_ns, which need not be the time of a frame: call it whenever you use the
  * pose. To the reasons of the last frame it adds NO_FRAMES and NO_OBSERVATIONS when there was none
- * for a second, and NO_TWISTS when readings were refused or the last one is older than 50 ms and
- * than three intervals between readings. A t_ns before plr_filter_time() counts as that time.
+ * for a second, and NO_TWISTS when readings were refused or the last one is older than three
+ * intervals between readings plus 50 ms. A t_ns before plr_filter_time() counts as that time.
  * PLR_E_DAMAGED, PLR_E_NOT_READY: `health` is filled too and says DIVERGED. */
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
 

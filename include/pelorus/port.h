@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 /*
- * What the session needs of the machine it runs on: bytes in, bytes out, and, where there is one,
- * a clock. A new board supplies these functions and nothing else: docs/PORTING.md.
+ * What a session needs of the machine it runs on: bytes in, bytes out and, where there is one, a
+ * clock. A new board supplies these functions and nothing else: docs/PORTING.md.
  *
- * Each function gets the `context` that stands beside it; two sessions on two ports can live side
- * by side. None of them may call the session back, and none may wait for long: the session's loop
- * is as alive as its port. What a function returns is written down here, and everything else that
- * it might do (short reads, lost or damaged bytes, a clock that stalls or jumps) the session
- * survives.
+ * Each function is called with the `context` of its struct, so a program may have several sessions
+ * on several ports. None of them may call the session, and none may wait for long, because the
+ * session does nothing while it waits. The session tolerates short reads, lost or damaged bytes,
+ * and a clock that stops or jumps.
  */
 #ifndef PELORUS_PORT_H
 #define PELORUS_PORT_H
@@ -19,24 +18,25 @@
 extern "C" {
 #endif
 
-/* What plr_port.read returns besides a number of bytes. */
+/* What plr_port.read returns if it returns no bytes. */
 enum {
-    PLR_PORT_NOTHING = 0, /* no byte now; later perhaps */
-    PLR_PORT_CLOSED = -1, /* the stream has ended: a file's end, a closed connection */
+    PLR_PORT_NOTHING = 0, /* no byte is there now */
+    PLR_PORT_CLOSED = -1, /* there will be no more: end of a file, closed connection */
     PLR_PORT_FAILED = -2  /* the machine reports a failure */
 };
 
-/* Bytes and time. */
+/* Link, clock and watchdog. */
 typedef struct plr_port {
     void *context; /* handed to every function; may be NULL */
 
-    /* Copies up to n bytes (n is 1 to 256), as many as are there now. Returns their number, 1 to n,
-     * or one of the above. Does not wait on a board; on a desktop it may. */
+    /* Copies up to n received bytes (n is 1 to 256), as many as are there now. Returns their
+     * number, 1 to n, or one of the values above. On a board it must not wait; on a desktop it
+     * may. */
     int (*read)(void *context, uint8_t *bytes, size_t n);
 
-    /* Takes all n bytes (n is 1 to 256) and returns 0, or gives up and returns anything else. A
-     * link that is cut gives up within a bounded time: the frame is lost and counted, the loop
-     * goes on. NULL: there is no output. */
+    /* Sends or queues all n bytes (n is 1 to 256) and returns 0. On failure returns anything else,
+     * within a bounded time: the session counts the message as lost and continues. NULL: there is
+     * no output. */
     int (*write)(void *context, const uint8_t *bytes, size_t n);
 
     /* Nanoseconds of a clock whose zero does not matter. It measures how long a frame takes, for
@@ -44,32 +44,32 @@ typedef struct plr_port {
      * are reported as 0 and a deadline cannot be kept. */
     uint64_t (*now_ns)(void *context);
 
-    /* Called when there was nothing to read: sleep until the next interrupt (WFI), or do nothing.
-     * NULL: the session spins. */
+    /* Called when there was nothing to read. It may sleep until the next interrupt (WFI). NULL: the
+     * session returns at once. */
     void (*idle)(void *context);
 
-    /* Called once in every step, whatever it met: tells a watchdog that the loop is alive. NULL:
-     * there is none. */
+    /* Called once in every plr_session_step: tells a watchdog that the loop runs. NULL: there is no
+     * watchdog. */
     void (*feed_watchdog)(void *context);
 } plr_port;
 
 /* Storage that survives a power cut: a flash sector, a file. Offsets and lengths are in bytes from
- * the device's start. Every function returns 0, or a negative number for a failure. Reading back
- * what was erased and not programmed gives any value, but always the same. */
+ * the device's start. Every function returns 0, or a negative number for a failure. Bytes that are
+ * erased and not programmed may read as any value, but every time as the same one. */
 typedef struct plr_block_device {
     void *context;         /* handed to every function; may be NULL */
     uint32_t size;         /* of the whole device; a multiple of erase_size */
     uint32_t erase_size;   /* smallest erasable unit; a multiple of program_size */
     uint32_t program_size; /* smallest programmable unit, 1 to 256 */
 
-    /* Any offset and length inside the device. */
+    /* Reads n bytes at any offset inside the device. */
     int (*read)(void *context, uint32_t offset, uint8_t *bytes, uint32_t n);
 
-    /* Offset and length are multiples of program_size, inside what was erased before. May be cut
-     * by a power failure at any byte: what is then there is undefined. */
+    /* Writes n bytes. Offset and length are multiples of program_size, in an erased place. If the
+     * power fails meanwhile, these bytes may hold anything. */
     int (*program)(void *context, uint32_t offset, const uint8_t *bytes, uint32_t n);
 
-    /* Offset and length are multiples of erase_size. */
+    /* Erases n bytes. Offset and length are multiples of erase_size. */
     int (*erase)(void *context, uint32_t offset, uint32_t n);
 } plr_block_device;
 

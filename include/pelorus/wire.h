@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 /*
- * The frame format: one for file, wire and flash. docs/REPLAY-FORMAT.md gives every byte.
+ * The frame format of recordings and links. docs/REPLAY-FORMAT.md describes every byte.
  *
- * A reader takes bytes as they come and gives messages; what is damaged, unknown, malformed or too
- * long is skipped and counted. A writer takes messages and gives bytes to a function. Neither
- * allocates; neither knows the filter. Numbers are double on this side, whatever the frame holds.
+ * A reader turns received bytes into messages; frames that are damaged, unknown, malformed or too
+ * long are skipped and counted. A writer turns messages into bytes and passes them to a function.
+ * Neither allocates memory or depends on the filter. Messages hold numbers as double, also where
+ * the frame has float32.
  */
 #ifndef PELORUS_WIRE_H
 #define PELORUS_WIRE_H
@@ -44,15 +45,15 @@ enum {
     PLR_WIRE_MAX_TEXT = 240
 };
 
-/* On the diagonal of a POSE's covariances: the filter knows none, as one that had diverged did
- * before it could recover. 2^40, the same in both precisions, and more than any variance that is
- * accepted. */
+/* A value on the diagonal of a POSE's covariances that means "not known". 2^40: exact in both
+ * precisions, and larger than any variance that the filter accepts. */
 #define PLR_WIRE_UNKNOWN_VARIANCE 1099511627776.0
 
-/* Bytes of a body that holds n observations: the buffer that a reader needs for them. */
+/* Bytes of a STEREO with n observations: the buffer that a reader needs for it. */
 #define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))
 
-/* The least buffer of a reader: it holds every other kind, of which a CONFIG may be the longest. */
+/* The smallest buffer of a reader: enough for all kinds but STEREO, of which CONFIG is the
+ * longest. */
 #define PLR_WIRE_MIN_BUFFER (PLR_WIRE_OVERHEAD + 11 + 9 * PLR_WIRE_MAX_SETTINGS)
 
 typedef enum plr_body_axes {
@@ -62,16 +63,17 @@ typedef enum plr_body_axes {
 } plr_body_axes;
 
 typedef struct plr_header {
-    uint8_t version_major, version_minor;     /* as read; a writer always writes its own */
-    uint8_t body_axes;                        /* plr_body_axes */
-    uint8_t twist_timing;                     /* plr_twist_timing */
+    uint8_t version_major, version_minor; /* as read; a writer ignores them, and writes its own */
+    uint8_t body_axes;                    /* plr_body_axes */
+    uint8_t twist_timing;                 /* plr_twist_timing */
     uint16_t image_width_px, image_height_px; /* 0: unknown */
     plr_calibration calibration;
-    /* Suggestions, negative where there is none. */
+    /* Values that the recorder suggests for settings (settings.h); negative: no suggestion. */
     double pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps;
     double bias_velocity_sigma_mps, bias_gyro_sigma_radps;
-    double bias_velocity_walk, bias_gyro_walk;
-    /* Of the body's x, y and z, where they differ; 0 or negative: as for all axes above. */
+    double bias_velocity_walk, bias_gyro_walk; /* (m/s)^2/s, (rad/s)^2/s */
+    /* Along the body's x, y and z, where they differ; 0 or negative: the value for all axes
+     * above. */
     double velocity_sigma_axes_mps[3], gyro_sigma_axes_radps[3];
     char name[PLR_WIRE_NAME_SIZE];
 } plr_header;
@@ -82,7 +84,7 @@ typedef struct plr_wire_setting {
 } plr_wire_setting;
 
 typedef struct plr_config_message {
-    uint32_t build_fingerprint; /* 0: wanted settings, not a build's echo */
+    uint32_t build_fingerprint; /* 0: a request for settings; else the settings that a build uses */
     uint16_t max_landmarks, max_observations;
     uint8_t block_observations;
     uint8_t real_bytes;
@@ -94,8 +96,8 @@ typedef struct plr_start {
     plr_time_ns t_ns;
     plr_pose T_WB;
     bool has_covariance, has_bias;
-    double P_xi[21]; /* packed */
-    double bias[6], bias_variance[6];
+    double P_xi[21]; /* covariance of (rho, theta): lower triangle, row by row; m^2, rad^2 */
+    double bias[6], bias_variance[6]; /* (b_v, b_w), m/s and rad/s */
 } plr_start;
 
 typedef struct plr_twist_message {
@@ -109,33 +111,33 @@ typedef struct plr_truth {
 } plr_truth;
 
 typedef enum plr_landmark_role {
-    PLR_LANDMARK_KNOWN = 0,
-    PLR_LANDMARK_EVICTED = 1,
-    PLR_LANDMARK_FINAL = 2
+    PLR_LANDMARK_KNOWN = 0,   /* an input: its position is given */
+    PLR_LANDMARK_EVICTED = 1, /* an output: it left the filter */
+    PLR_LANDMARK_FINAL = 2    /* an output: it was in the filter at END */
 } plr_landmark_role;
 
 typedef struct plr_landmark_message {
     uint8_t role;          /* plr_landmark_role */
-    plr_landmark landmark; /* times_gated is not sent; known is set from the role; of P_W_m2 the
-                              lower triangle is sent */
+    plr_landmark landmark; /* the frame has no times_gated, and only the lower triangle of P_W_m2; a
+                              reader sets known from the role */
 } plr_landmark_message;
 
 typedef struct plr_pose_message {
     plr_time_ns t_ns;
-    uint8_t real_bytes; /* 4 or 8: the precision of the filter, and of the frame (but for p) */
-    bool after_update;  /* after a STEREO; else after a TWIST */
-    uint16_t reset_count;
+    uint8_t real_bytes;   /* 4 or 8: precision of the filter and of the frame (p is always 8) */
+    bool after_update;    /* true: after a STEREO; false: after a TWIST */
+    uint16_t reset_count; /* times the pose may have jumped: plr_health_state.resets, modulo 2^16 */
     plr_pose T_WB;
-    double P_xi[21]; /* packed */
+    double P_xi[21]; /* covariance of (rho, theta): lower triangle, row by row; m^2, rad^2 */
     plr_twist velocity;
-    double bias[6];
-    double P_u[21]; /* packed, of (v, w) */
+    double bias[6]; /* (b_v, b_w), m/s and rad/s */
+    double P_u[21]; /* covariance of velocity, in the order (v, w); packed like P_xi */
 } plr_pose_message;
 
 typedef struct plr_report_message {
     uint8_t subject; /* plr_kind of the message that it answers */
     plr_report report;
-    uint32_t update_us;
+    uint32_t update_us; /* time that the frame took, us; 0 without a clock */
 } plr_report_message;
 
 typedef enum plr_severity {
@@ -146,25 +148,27 @@ typedef enum plr_severity {
 
 typedef struct plr_text {
     uint8_t severity;                 /* plr_severity */
-    char text[PLR_WIRE_MAX_TEXT + 1]; /* closed by zero; a reader cuts what is longer */
+    char text[PLR_WIRE_MAX_TEXT + 1]; /* UTF-8, ends with a zero; a reader cuts longer texts */
 } plr_text;
 
+/* How many frames of each kind, and of all kinds, the sender has written before this one. */
 typedef struct plr_end {
     uint32_t twists, stereos, truths, landmarks, frames;
 } plr_end;
 
 typedef enum plr_state_action { PLR_STATE_SAVE = 1, PLR_STATE_RESTORE = 2 } plr_state_action;
 
-/* Asks for the filter's state to be kept, or to be brought back after a power cut. */
+/* A request to save the filter's state, or to restore it after a power cut. */
 typedef struct plr_state_message {
-    plr_time_ns t_ns; /* RESTORE: when the drive goes on; SAVE: the sender's, for the answer */
-    uint8_t action;   /* plr_state_action */
-    double moved_variance[6]; /* RESTORE: how far the body may have moved meanwhile: variances of
-                                 (rho, theta), m^2 and rad^2; zeros: it stood still */
+    plr_time_ns
+        t_ns; /* RESTORE: the time at which the drive continues; SAVE: repeated in the answer */
+    uint8_t action;           /* plr_state_action */
+    double moved_variance[6]; /* RESTORE: how far the body may have moved since the save: variances
+                                 of (rho, theta), m^2 and rad^2; zeros: it stood still */
 } plr_state_message;
 
-/* One message. A frame's observations point into the reader's array: they hold until the next
- * call on the reader. */
+/* One message. The observations of a STEREO that was read are in the reader's array, and valid
+ * until the next call on the reader. */
 typedef struct plr_message {
     plr_kind kind;
     uint16_t sequence;
@@ -191,20 +195,20 @@ typedef struct plr_reader_counts {
     uint32_t frames;    /* good ones */
     uint32_t damaged;   /* CRC, stuffing or length wrong */
     uint32_t unknown;   /* kind not known */
-    uint32_t malformed; /* CRC good, payload too short or contradicting itself */
-    uint32_t too_long;  /* CRC good, did not fit the buffer or the observation array */
-    uint32_t missing;   /* gaps in the sequence, in frames: the damaged and the lost */
+    uint32_t malformed; /* CRC good, payload too short or with an impossible value */
+    uint32_t too_long;  /* CRC good, larger than the buffer or the observation array */
+    uint32_t missing;   /* frames that the sequence numbers show to be missing, damaged ones too */
 } plr_reader_counts;
 
-/* What the last call on a reader met. */
+/* The result of plr_reader_feed. */
 typedef enum plr_read_event {
-    PLR_READ_MORE = 0,    /* all bytes are taken, no frame is complete */
+    PLR_READ_MORE = 0,    /* all bytes were used, and no frame is complete */
     PLR_READ_MESSAGE = 1, /* a good message */
-    PLR_READ_SKIPPED = 2, /* a frame was skipped; .skipped_why and .skipped_at tell more */
-    PLR_READ_FUTURE = 3   /* a HEADER of a higher major version: nothing more can be read */
+    PLR_READ_SKIPPED = 2, /* a frame was skipped: see .skipped_why and .skipped_at */
+    PLR_READ_FUTURE = 3   /* a HEADER of a later major version: nothing more can be read */
 } plr_read_event;
 
-/* Why a frame was skipped: the count that it went into. */
+/* Why a frame was skipped; each is a count in plr_reader_counts. */
 typedef enum plr_skip {
     PLR_SKIP_NONE = 0,
     PLR_SKIP_DAMAGED = 1,
@@ -213,7 +217,7 @@ typedef enum plr_skip {
     PLR_SKIP_TOO_LONG = 4
 } plr_skip;
 
-/* Stuffing in progress. */
+/* State of the byte stuffing (COBS) between two bytes. For the library alone. */
 typedef struct plr_cobs_decoder {
     uint8_t code; /* of the current block, 0 before the first */
     uint8_t left; /* data bytes until the next code byte */
@@ -224,7 +228,7 @@ typedef struct plr_cobs_encoder {
     uint8_t fill;       /* bytes of the open block with its code byte; 0: no block is open */
 } plr_cobs_encoder;
 
-/* `counts` and `skipped_*` are for the caller to read; the rest is the reader's own. */
+/* A caller may read `counts` and `skipped_*`; the rest is for the library alone. */
 typedef struct plr_reader {
     plr_reader_counts counts;
     uint64_t skipped_at;  /* byte offset at which the last skipped frame began */
@@ -236,34 +240,36 @@ typedef struct plr_reader {
     plr_observation *observations;
     unsigned max_observations;
     plr_cobs_decoder cobs;
-    size_t length; /* bytes of the body so far, as far as they fit */
-    uint32_t crc;  /* of the whole body so far, whether it fits or not */
-    bool overrun;  /* it does not */
-    bool future;
+    size_t length; /* bytes of the body in the buffer */
+    uint32_t crc;  /* of all bytes of the body so far, those that did not fit included */
+    bool overrun;  /* the body is longer than the buffer */
+    bool future;   /* a HEADER of a later major version was read */
     uint16_t next_sequence;
     uint64_t frame_start; /* byte offset at which the current frame began */
 } plr_reader;
 
 /* Prepares a reader over the caller's buffer (at least PLR_WIRE_MIN_BUFFER bytes) and observation
- * array. PLR_E_ARGUMENT if the buffer is smaller or a pointer is null; without observations
+ * array.
+ * PLR_E_ARGUMENT if the buffer is smaller or a pointer is null; without observations
  * (max_observations 0) that pointer may be null, and every STEREO that holds some is too long. */
 plr_status plr_reader_init(plr_reader *r, uint8_t *buffer, size_t buffer_size,
                            plr_observation *observations, unsigned max_observations);
 
-/* Takes bytes up to the end of the next frame, and tells in *taken how many. Call again with the
- * rest. *message is filled on PLR_READ_MESSAGE; otherwise its kind is PLR_KIND_NONE and the rest
- * means nothing, but on the first PLR_READ_FUTURE it is a HEADER of which only the version is set.
- * After that the reader takes every byte, gives PLR_READ_FUTURE again, and reads nothing.
- * Bounded by n and the frame's length. No pointer may be null, but `bytes` where n is 0. */
+/* Processes bytes up to the end of the next frame, and sets *taken to their number. Call it again
+ * with the rest. On PLR_READ_MESSAGE *message is filled. On the first PLR_READ_FUTURE it is a
+ * HEADER of which only the version is set; every later call uses all bytes, reads nothing and
+ * returns PLR_READ_FUTURE. Otherwise message->kind is PLR_KIND_NONE and the rest is undefined. Time
+ * is bounded by n and the frame's length. No pointer may be null, except `bytes` where n is 0. */
 plr_read_event plr_reader_feed(plr_reader *r, const uint8_t *bytes, size_t n, size_t *taken,
                                plr_message *message);
 
-/* True if the stream stopped in the middle of a frame: what a truncated file looks like. */
+/* True if the bytes so far end in the middle of a frame; at the end of a file: it is truncated. */
 bool plr_reader_mid_frame(const plr_reader *r);
 
 /* --- writing --- */
 
-/* Takes n bytes, 1 to 255: 0 = all taken, else a failure, which the writer returns as PLR_E_IO. */
+/* Sends n bytes, 1 to 255. Returns 0, or anything else for a failure; the writer then returns
+ * PLR_E_IO. */
 typedef int (*plr_write_function)(void *context, const uint8_t *bytes, size_t n);
 
 typedef struct plr_writer {
@@ -273,24 +279,24 @@ typedef struct plr_writer {
     uint32_t crc;
     plr_cobs_encoder cobs;
     plr_status status; /* of the frame in progress */
-    bool torn;         /* the last frame failed: the next begins with a delimiter */
-    plr_end counts;    /* what an END will tell: the frames that were wholly written */
+    bool torn;         /* the last frame failed: the next one begins with a delimiter */
+    plr_end counts;    /* for END: the frames that were written completely */
 } plr_writer;
 
-/* Prepares a writer; `context` is handed to the function and may be null. PLR_E_ARGUMENT if another
- * pointer is. */
+/* Prepares a writer; `context` is handed to the function and may be null.
+ * PLR_E_ARGUMENT if another pointer is. */
 plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *context);
 
-/* Writes one message as a frame, with the writer's own sequence number; message->sequence is not
- * looked at. A HEADER's version and END's counts are the writer's own. PLR_E_ARGUMENT if the
- * message contradicts itself (nothing is written). PLR_E_IO if the function failed: the message is
- * lost and its sequence number used up, so that a reader counts it as missing; the next frame
- * begins with a delimiter of its own and is whole again. */
+/* Writes one message as a frame. The writer supplies the sequence number, the version of a HEADER
+ * and the counts of an END; those in *message are ignored.
+ * PLR_E_ARGUMENT the message holds an impossible value: nothing is written. PLR_E_IO the function
+ * failed: the message is lost, and a reader counts it as missing. The next frame then begins with a
+ * delimiter, so that it can be read. */
 plr_status plr_writer_put(plr_writer *w, const plr_message *message);
 
 /* --- parts, for tests and other links --- */
 
-/* CRC-32 as in zlib; start with crc = 0 and hand the result back in for more bytes. */
+/* CRC-32 as in zlib. Start with crc = 0; to continue, pass the last result. */
 uint32_t plr_crc32(uint32_t crc, const uint8_t *bytes, size_t n);
 
 #ifdef __cplusplus
