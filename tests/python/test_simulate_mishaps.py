@@ -16,7 +16,8 @@ from pelorus.frames import Header, Kind, Message, Stereo, Twist
 from pelorus.recording import Recording
 from pelorus.se3 import Floats
 from pelorus.simulation import scene
-from pelorus.simulation.mishaps import Mishaps, Span
+from pelorus.simulation.mishaps import Mishaps
+from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.tracks import triangulate
 

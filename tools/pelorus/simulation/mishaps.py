@@ -12,82 +12,71 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.errors import PelorusError
 from pelorus.frames import Camera
 from pelorus.motion import Times
 from pelorus.se3 import Floats, Poses
+from pelorus.simulation import settings
 from pelorus.simulation.drive import rotate
+from pelorus.simulation.settings import (
+    FINITE,
+    NOT_NEGATIVE,
+    PERCENT,
+    SHARE,
+    Rule,
+    Span,
+    require,
+    setting,
+)
 from pelorus.tracks import Tracks
 
 Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Span:
-    """A part of the drive: from a time on, for so long; 0: to the end."""
-
-    from_s: float = 0.0
-    for_s: float = 0.0
-
-    def holds(self, t_ns: Times) -> Flags:
-        t_s = np.asarray(t_ns, np.float64) * 1e-9
-        end_s = self.from_s + self.for_s if self.for_s else np.inf
-        return np.asarray((t_s >= self.from_s) & (t_s < end_s))
-
-
-@dataclass(frozen=True)
 class Mishaps:
-    """The names are those of the command's options; without them nothing goes wrong."""
+    """Without them nothing goes wrong."""
 
-    slip: float = 1.0  # factor on what the wheels and the gyro say
-    slip_span: Span = Span()
-    dead_encoder: Span | None = None  # the linear velocity reads zero
-    twist_delay_s: float = 0.0
-    frozen: Span | None = None  # the camera repeats its last frame
-    track_drift: float = 0.0  # px / sqrt(s)
-    moving: float = 0.0  # share of the landmarks
-    moving_speed_mps: float = 0.0
-    convoy: float = 0.0  # share of the body's own motion that they make
-    moving_span: Span = Span()
-    jump_m: float = 0.0
-    jump_at_s: float = 0.0
-    baseline_error_percent: float = 0.0
-    focal_error_percent: float = 0.0
+    twist_delay_s: float = setting(
+        0.0, "Twists stand so much later in the file than their time: behind newer frames.", "S"
+    )
+    slip: float = setting(
+        1.0,
+        "All readings are multiplied by it.",
+        "FACTOR",
+        Rule(NOT_NEGATIVE.holds, "a factor, not negative"),
+    )
+    slip_span: Span = setting(Span(), "It begins then.")
+    dead_encoder: Span | None = setting(None, "From then on the linear velocity reads zero.")
+    frozen: Span | None = setting(None, "From then on the camera repeats its last frame.")
+    track_drift: float = setting(
+        0.0,
+        "Tracks wander off their landmark: sigma in px after a second, growing as the root.",
+        "PX",
+    )
+    moving: float = setting(0.0, "Share of the landmarks that move.", "SHARE", SHARE)
+    moving_speed_mps: float = setting(0.0, "All of them, one way, level.", "M/S", FINITE)
+    convoy: float = setting(
+        0.0, "They move along with the robot, at this share of its speed.", "SHARE", FINITE
+    )
+    moving_span: Span = setting(Span(), "It begins then.")
+    jump_m: float = setting(
+        0.0, "The robot is set aside to its left, and no twist tells of it.", "M", FINITE
+    )
+    jump_at_s: float = setting(0.0, "When it is.", "S")
+    baseline_error_percent: float = setting(
+        0.0, "The true baseline is so much larger than the header's.", "PERCENT", PERCENT
+    )
+    focal_error_percent: float = setting(
+        0.0, "The true focal length is so much larger than the header's.", "PERCENT", PERCENT
+    )
 
     def check(self) -> None:
         """Refuse what makes no sense, by the option's name."""
-        _require("slip", self.slip, 0 <= self.slip < np.inf, "a factor, not negative")
-        _require("moving", self.moving, 0 <= self.moving <= 1, "a fraction from 0 to 1")
-        for name, value in (
-            ("track-drift", self.track_drift),
-            ("twist-delay", self.twist_delay_s),
-            ("jump-at", self.jump_at_s),
-        ):
-            _require(name, value, 0 <= value < np.inf, "a finite number, not negative")
-        for name, value in (
-            ("moving-speed", self.moving_speed_mps),
-            ("convoy", self.convoy),
-            ("jump", self.jump_m),
-        ):
-            _require(name, value, bool(np.isfinite(value)), "a finite number")
-        for name, value in (
-            ("baseline-error", self.baseline_error_percent),
-            ("focal-error", self.focal_error_percent),
-        ):
-            _require(name, value, -50 <= value <= 50, "a number of percent from -50 to 50")
-        for name, span in (
-            ("slip", self.slip_span),
-            ("dead-encoder", self.dead_encoder or Span()),
-            ("frozen", self.frozen or Span()),
-            ("moving", self.moving_span),
-        ):
-            for word, value in (("from", span.from_s), ("for", span.for_s)):
-                due = "a number of seconds, not negative"
-                _require(f"{name}-{word}", value, 0 <= value < np.inf, due)
+        settings.check(self)
         going = bool(self.moving_speed_mps or self.convoy)
         due = "--moving-speed or --convoy, which say how they move"
-        _require("moving", self.moving, going or not self.moving, due)
-        _require("moving", self.moving, bool(self.moving) or not going, "the share that moves")
+        require("moving", self.moving, going or not self.moving, due)
+        require("moving", self.moving, bool(self.moving) or not going, "the share that moves")
 
     def true_camera(self, told: Camera) -> Camera:
         """The camera that makes the images, where the HEADER tells of another."""
@@ -144,11 +133,6 @@ class Mishaps:
 
 
 NO_MISHAPS = Mishaps()
-
-
-def _require(option: str, given: float, good: bool, due: str) -> None:
-    if not good:
-        raise PelorusError(f"--{option} is {given}: {due} is due")
 
 
 class Drift:

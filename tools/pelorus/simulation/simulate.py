@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.console import progress
-from pelorus.errors import PelorusError
 from pelorus.frames import (
     OBSERVATIONS_MAX,
     BodyAxes,
@@ -23,9 +22,17 @@ from pelorus.frames import (
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Floats, Poses
-from pelorus.simulation import scene, sensors
+from pelorus.simulation import scene, sensors, settings
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
 from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
+from pelorus.simulation.settings import (
+    AT_LEAST_ONE,
+    BELOW_ONE,
+    POSITIVE,
+    Rule,
+    require,
+    setting,
+)
 from pelorus.tracks import Indices, Tracks
 
 FRAMES_MAX = 1_000_000
@@ -34,65 +41,77 @@ PEAK_TURN = 1.7  # the peak of the turn rate over its mean, and some roll and pi
 
 @dataclass(frozen=True)
 class Options:
-    """What can be chosen; the names are those of the command's options."""
+    """What can be chosen of a drive."""
 
-    seed: int = 1
-    duration_s: float = 60.0
-    frame_rate_hz: float = 10.0
-    twist_rate_hz: float = 100.0
-    twist_timing: TwistTiming = TwistTiming.START
-    speed_mps: float = 3.0
-    lap_s: float = 40.0
-    parked: bool = False
-    landmarks: int = 800
-    observations: int = 60
-    range_m: float = 30.0
-    min_depth_m: float = 0.0
-    max_depth_m: float = 0.0
-    baseline_m: float = scene.CAMERA.baseline_m
-    keep_ids: bool = False
-    known: bool = False
-    known_sigma_m: float = 0.01
-    loss: float = 0.01
-    pixel_sigma_px: float = 1.0
-    velocity_sigma_mps: float = 0.05
-    gyro_sigma_radps: float = 0.01
-    bias_velocity_sigma_mps: float = 0.05
-    bias_gyro_sigma_radps: float = 0.005
-    bias_velocity_walk: float = 0.0
-    bias_gyro_walk: float = 0.0
-    outliers: float = 0.02
-    drop: float = 0.01
-    camera_delay_s: float = 0.0
+    seed: int = setting(
+        1,
+        "The same seed gives the same bytes.",
+        rule=Rule(lambda x: x >= 0, "a whole number, not negative"),
+    )
+    duration_s: float = setting(60.0, "Length of the drive.", "S", POSITIVE)
+    frame_rate_hz: float = setting(10.0, "Stereo frames.", "HZ", POSITIVE)
+    twist_rate_hz: float = setting(
+        100.0, "Twists: a whole multiple of the frame rate.", "HZ", POSITIVE
+    )
+    twist_timing: TwistTiming = setting(TwistTiming.START, "When a twist reading holds.", rule=None)
+    speed_mps: float = setting(3.0, "Mean speed.", "M/S")
+    lap_s: float = setting(40.0, "Time of a lap.", "S", POSITIVE)
+    parked: bool = setting(False, "Stand still: neither --speed nor --lap moves it.")
+    landmarks: int = setting(800, "Landmarks along the way.", rule=AT_LEAST_ONE)
+    observations: int = setting(
+        60,
+        "Most observations of a frame.",
+        rule=Rule(lambda x: 0 < x <= OBSERVATIONS_MAX, f"1 to {OBSERVATIONS_MAX}"),
+    )
+    min_depth_m: float = setting(
+        0.0,
+        "None is seen nearer; 0: as they come. A far scene: --min-depth 50 --max-depth 400.",
+        "M",
+    )
+    max_depth_m: float = setting(
+        0.0, "None is seen farther, and --range gives way; 0: --range.", "M"
+    )
+    baseline_m: float = setting(scene.CAMERA.baseline_m, "Of the stereo camera.", "M", POSITIVE)
+    range_m: float = setting(30.0, "How far is seen.", "M", POSITIVE)
+    keep_ids: bool = setting(False, "A landmark seen again has its old id: loops close.")
+    known: bool = setting(False, "Write the landmarks as known ones (implies --keep-ids).")
+    known_sigma_m: float = setting(
+        0.01, "Standard deviation to be told of known landmarks.", "M", POSITIVE
+    )
+    loss: float = setting(0.01, "Probability a frame that a track breaks.", rule=BELOW_ONE)
+    pixel_sigma_px: float = setting(1.0, "Noise of a pixel.", "PX")
+    velocity_sigma_mps: float = setting(0.05, "Noise of a linear velocity, each axis.", "M/S")
+    gyro_sigma_radps: float = setting(0.01, "Noise of an angular velocity, each axis.", "RAD/S")
+    bias_velocity_sigma_mps: float = setting(0.05, "The linear bias is drawn with it.", "M/S")
+    bias_gyro_sigma_radps: float = setting(0.005, "The angular bias is drawn with it.", "RAD/S")
+    bias_velocity_walk: float = setting(
+        0.0, "Variance that the linear bias gains, (m/s)^2 a second."
+    )
+    bias_gyro_walk: float = setting(
+        0.0, "Variance that the angular bias gains, (rad/s)^2 a second."
+    )
+    outliers: float = setting(0.02, "Fraction of observations that are wrong.", rule=BELOW_ONE)
+    drop: float = setting(0.01, "Fraction of frames that are lost.", rule=BELOW_ONE)
+    camera_delay_s: float = setting(
+        0.0, "Frames stand so much later in the file than their time, as off a slow camera.", "S"
+    )
     mishaps: Mishaps = NO_MISHAPS
 
     def check(self) -> None:
         """Refuse what makes no sense, by the option's name."""
-        for name in ("duration_s", "frame_rate_hz", "twist_rate_hz", "lap_s", "range_m"):
-            self._require(name, getattr(self, name) > 0, "a positive number")
-        self._require("baseline_m", self.baseline_m > 0, "a positive number")
-        for name in ("loss", "outliers", "drop"):
-            self._require(name, 0 <= getattr(self, name) < 1, "a fraction from 0 to below 1")
-        for name in vars(self):
-            number = getattr(self, name)
-            if isinstance(number, float):
-                self._require(name, 0 <= number < np.inf, "a finite number, not negative")
-        self._require("landmarks", self.landmarks > 0, "at least 1")
-        self._require("known_sigma_m", self.known_sigma_m > 0, "a positive number")
-        self._require(
-            "observations", 0 < self.observations <= OBSERVATIONS_MAX, f"1 to {OBSERVATIONS_MAX}"
-        )
+        settings.check(self)
         deeper = not self.max_depth_m or self.max_depth_m > self.min_depth_m
-        self._require("max_depth_m", deeper, "more than --min-depth")
+        require("max_depth_m", self.max_depth_m, deeper, "more than --min-depth")
         self.mishaps.check()
-        self._require("seed", self.seed >= 0, "a whole number, not negative")
         ratio = self.twist_rate_hz / self.frame_rate_hz
-        self._require(
-            "twist_rate_hz", round(ratio) == ratio >= 1, "a whole multiple of the frame rate"
-        )
-        self._require("duration_s", self.frames <= FRAMES_MAX, f"at most {FRAMES_MAX} frames")
+        whole = round(ratio) == ratio >= 1
+        due = "a whole multiple of the frame rate"
+        require("twist_rate_hz", self.twist_rate_hz, whole, due)
+        short = self.frames <= FRAMES_MAX
+        require("duration_s", self.duration_s, short, f"at most {FRAMES_MAX} frames")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
-        self._require("lap_s", turn < TURN_MAX_RAD, f"at most {TURN_MAX_RAD} rad a twist")
+        due = f"at most {TURN_MAX_RAD} rad a twist"
+        require("lap_s", self.lap_s, turn < TURN_MAX_RAD, due)
 
     @property
     def depths(self) -> scene.Depths:
@@ -121,14 +140,6 @@ class Options:
     def lookahead_s(self) -> float:
         """So far beyond its end the drive must have landmarks, for there it looks."""
         return min(self.range_m / self.speed_mps, self.lap_s) if self.speed_mps else 0.0
-
-    def _require(self, name: str, good: bool, due: str) -> None:
-        if not good:
-            option = name
-            for unit in ("_s", "_hz", "_mps", "_radps", "_px", "_m"):
-                option = option.removesuffix(unit)
-            given = getattr(self, name)
-            raise PelorusError(f"--{option.replace('_', '-')} is {given}: {due} is due")
 
 
 class _Chances:
