@@ -8,11 +8,9 @@ from pathlib import Path
 import pytest
 from pelorus.errors import PelorusError
 from pelorus.frames import Message
+from pelorus.replay import Programs, find_programs
 from pelorus.report.comparison import Comparison
-from pelorus.report.replay import Programs, find_programs
-from pelorus.report.results import carry_out
-from pelorus.report.runs import plan_runs
-from pelorus.report.subject import read_subject
+from pelorus.report.results import carry_out, plan_runs, read_subject
 from replay_drive import BIN, encode
 
 SETTINGS = ("--pixel-sigma", "0.5")

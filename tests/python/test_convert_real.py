@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drives import with_turned_axes
-from pelorus import figures, kitti, road
+from pelorus import evaluation, kitti, road
 from pelorus.converters import ece276a, matlab
 from pelorus.faults.mend import mend
 from pelorus.frames import BodyAxes, TwistTiming
@@ -76,9 +76,9 @@ def test_a_kitti_pose_file_reads_as_rigid_poses(real: Callable[[str], Path]) -> 
     assert np.allclose(poses.R @ np.swapaxes(poses.R, 1, 2), np.eye(3), atol=1e-12)
 
 
-def dead_reckoning(recording: Recording) -> figures.Figures:
+def dead_reckoning(recording: Recording) -> evaluation.Figures:
     count = len(recording.truth_t_ns)
-    return figures.figures(recording.dead_reckoning().at(slice(0, count)), recording.truth)
+    return evaluation.figures(recording.dead_reckoning().at(slice(0, count)), recording.truth)
 
 
 def test_dead_reckoning_of_starry_night_is_the_designs(real: Callable[[str], Path]) -> None:

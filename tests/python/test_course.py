@@ -14,9 +14,9 @@ from drives import clean, npz_arrays, with_stale_tracks
 from pelorus import road
 from pelorus.converters import ece276a
 from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
-from pelorus.grid.sightings import messages_of
-from pelorus.report.whole_map import LANDMARK_SIGMA, MIN_DISPARITY, traces
+from pelorus.report.comparison import LANDMARK_SIGMA, MIN_DISPARITY, traces
 from pelorus.settings import SETTINGS
+from pelorus.wire import messages_of
 from PIL import Image
 from replay_drive import BIN, ROOT, drive, encode, header
 from report_runs import built_programs

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from converted import Run, messages_of
 from drives import clean
-from pelorus import figures, road, se3
+from pelorus import evaluation, road, se3
 from pelorus.frames import Header, Truth
 from pelorus.se3 import Floats, Poses
 from pelorus.trajectory import Trajectory, read_truth, read_tum, write_tum
@@ -52,7 +52,7 @@ def evaluate(pelorus: Run, *arguments: Any) -> dict[str, float]:
 
 def test_the_same_path_in_another_world_has_no_error() -> None:
     by = se3.exp(np.array([100.0, -20, 5]), np.array([0.3, -1.2, 2.0]))
-    found = figures.figures(moved(winding(), by), winding())
+    found = evaluation.figures(moved(winding(), by), winding())
     assert found.err0_m < 1e-10
     assert found.ate_m < 1e-10
     assert found.rot_deg < 1e-5
@@ -65,7 +65,7 @@ def test_a_constant_turn_of_the_estimate_is_an_error_of_its_angle() -> None:
     truth = winding()
     R = truth.R @ se3.so3_exp(np.array([0, 0, a]))
     R[0] = truth.R[0]
-    found = figures.figures(Poses(R, truth.p), truth)
+    found = evaluation.figures(Poses(R, truth.p), truth)
     assert found.rot_deg == pytest.approx(3.0 * np.sqrt((COUNT - 1) / COUNT))
     assert found.err0_m < 1e-10
 
@@ -76,7 +76,7 @@ def test_a_first_heading_that_is_off_swings_the_path_and_the_fit_takes_it_back()
     truth = straight()
     R = truth.R.copy()
     R[0] = se3.so3_exp(np.array([0, 0, a]))
-    found = figures.figures(Poses(R, truth.p), truth)
+    found = evaluation.figures(Poses(R, truth.p), truth)
     k = np.arange(COUNT)
     assert found.err0_m == pytest.approx(2 * np.sin(a / 2) * np.sqrt(np.mean(k**2)))
     assert found.rot_deg == pytest.approx(10.0 * np.sqrt((COUNT - 1) / COUNT))
@@ -86,7 +86,7 @@ def test_a_first_heading_that_is_off_swings_the_path_and_the_fit_takes_it_back()
 def test_a_scale_is_not_fitted() -> None:
     """A line 1 % too long: err0 grows from the start, ate from the middle."""
     truth, estimate = straight(), straight(1.01)
-    found = figures.figures(estimate, truth)
+    found = evaluation.figures(estimate, truth)
     k = np.arange(COUNT)
     assert found.err0_m == pytest.approx(0.01 * np.sqrt(np.mean(k**2)))
     assert found.ate_m == pytest.approx(0.01 * np.std(k))
@@ -97,14 +97,14 @@ def test_the_rigid_fit_is_the_least_squares_one_and_never_a_mirror() -> None:
     source = CHANCE.normal(size=(50, 3)) * [10, 5, 0.01]
     by = se3.exp(np.array([1.0, 2, 3]), np.array([0.5, 1.0, -0.7]))
     target = source @ by.R.T + by.p + CHANCE.normal(0, 0.1, (50, 3))
-    fit = figures.rigid_fit(source, target)
+    fit = evaluation.rigid_fit(source, target)
     assert np.linalg.det(fit.R) == pytest.approx(1.0)
-    best = figures.rms(se3.apply(fit, source) - target)
+    best = evaluation.rms(se3.apply(fit, source) - target)
     for _ in range(200):
         step = se3.exp(CHANCE.normal(0, 0.01, 3), CHANCE.normal(0, 0.01, 3))
-        assert figures.rms(se3.apply(se3.compose(step, fit), source) - target) >= best
+        assert evaluation.rms(se3.apply(se3.compose(step, fit), source) - target) >= best
     mirrored = source * [1, 1, -1]
-    assert np.linalg.det(figures.rigid_fit(source, mirrored).R) == pytest.approx(1.0)
+    assert np.linalg.det(evaluation.rigid_fit(source, mirrored).R) == pytest.approx(1.0)
 
 
 def test_poses_are_matched_by_time_each_once(tmp_path: Path, pelorus: Run) -> None:
@@ -298,7 +298,7 @@ def test_a_step_that_changes_is_told_in_the_body_s_own_axes() -> None:
     turns = np.stack((np.zeros(50), np.zeros(50), 0.1 * np.arange(50)), axis=-1)
     circle = Poses(se3.so3_exp(turns), 10 * np.stack((np.sin(turns[:, 2]), -np.cos(turns[:, 2]),
                                                       np.zeros(50)), axis=-1))  # fmt: skip
-    assert figures.step_change(circle) == pytest.approx(0, abs=1e-12)
+    assert evaluation.step_change(circle) == pytest.approx(0, abs=1e-12)
     shaken = Poses(np.tile(np.eye(3), (50, 1, 1)), np.zeros((50, 3)))
     shaken.p[::2, 0] = 0.5
-    assert figures.step_change(shaken) == pytest.approx(1.0)
+    assert evaluation.step_change(shaken) == pytest.approx(1.0)

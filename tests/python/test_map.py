@@ -15,8 +15,9 @@ from pelorus.errors import PelorusError
 from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
 from pelorus.grid import files
 from pelorus.grid.occupancy import Band, Grid, Wish, occupancy
-from pelorus.grid.sightings import Sightings, messages_of, sightings
+from pelorus.grid.sightings import Sightings, sightings
 from pelorus.packed import pack_symmetric
+from pelorus.wire import messages_of
 from PIL import Image
 from replay_drive import BIN, drive, encode, header, known
 from replay_drive import run as run_replay

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import figures as reference
+from pelorus import evaluation as reference
 from pelorus import settings
 from pelorus.frames import (
     Config,

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pelorus.evaluation import assess
 from pelorus.frames import Report
-from pelorus.report.accuracy import assess
 from pelorus.report.results import read_frames, read_poses
 from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
-from pelorus import map_error, se3
+from pelorus import evaluation, se3
 from pelorus.errors import PelorusError
+from pelorus.evaluation import assess, nees_per_dof
 from pelorus.frames import Landmark, Pose, Role, Stereo, Truth
 from pelorus.packed import pack_symmetric, unpack_symmetric
-from pelorus.report import gallery, verdict
-from pelorus.report.accuracy import assess, nees_per_dof
+from pelorus.replay import Outputs, Programs
+from pelorus.report import pictures, words
 from pelorus.report.comparison import Comparison
-from pelorus.report.replay import Outputs, Programs
 from pelorus.report.results import read_frames, read_map, read_poses
 from pelorus.trajectory import Trajectory, read_tum
 from PIL import Image
@@ -131,13 +131,12 @@ def test_a_refused_frame_has_no_estimate_but_its_counts(tmp_path: Path) -> None:
     assert table["used"].tolist() == [4, 7]
 
 
-def test_a_map_without_landmarks_is_empty(tmp_path: Path) -> None:
-    path = tmp_path / "map.ply"
-    path.write_text("ply\nformat ascii 1.0\nend_header\n")
-    assert read_map(path).p_W_m.shape == (0, 3)
-    path.write_text("ply\nend_header\n1 2 3 7 1 9 0.5\n")
-    assert read_map(path).p_W_m.tolist() == [[1, 2, 3]]
-    assert read_map(path).sigma_m.tolist() == [0.5]
+def test_a_map_without_landmarks_is_empty() -> None:
+    known = Landmark(3, np.array([4.0, 5, 6]), np.ones(6), Role.KNOWN)
+    assert read_map([known]).p_W_m.shape == (0, 3)
+    made = Landmark(7, np.array([1.0, 2, 3]), np.array([0.5, 9, 0.25, 9, 9, 0]), Role.EVICTED)
+    assert read_map([known, made]).p_W_m.tolist() == [[1, 2, 3]]
+    assert read_map([known, made]).sigma_m.tolist() == [0.5]
 
 
 # --- the runs -------------------------------------------------------------------------------------
@@ -177,7 +176,7 @@ def test_report_leaves_page_pictures_and_runs(
     said = pelorus("report", path, "--out", out, "--bin", programs.float32.parent)
     assert said.status == 0, said.err
     assert pictures_in(out) == WITH_TRUTH
-    assert set(gallery.NAMES) == WITH_TRUTH
+    assert set(pictures.NAMES) == WITH_TRUTH
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == len(WITH_TRUTH) - 1  # hero is for a README
     assert not re.search(r"(src|href)=\"(?!data:)", page)
@@ -275,7 +274,7 @@ def lines_with(found: Comparison, **changes: Any) -> str:
     body = found.main
     other = replace(body, summary=body.summary | changes)
     runs = [other if run is body else run for run in found.runs]
-    return "\n".join(line for line in verdict.verdicts(Comparison(found.subject, runs)))
+    return "\n".join(line for line in words.verdicts(Comparison(found.subject, runs)))
 
 
 def test_verdicts_name_what_is_off(tmp_path: Path, programs: Programs) -> None:
@@ -297,12 +296,12 @@ def test_verdicts_say_when_a_run_diverged_and_whether_its_gate_is_inert(
 ) -> None:
     found = compared(recorded(tmp_path, drive()), programs)
     reasons = found.main.frames["reasons"]
-    reasons[12:] = verdict.NOT_POSITIVE
+    reasons[12:] = words.NOT_POSITIVE
     assert found.main.frames.t_ns[12] - t_ns(0) == 1_200_000_000
     assert "body: diverged at t = 1.2 s" in lines_with(found)
-    reasons[:] = verdict.GATE_INERT
+    reasons[:] = words.GATE_INERT
     assert "body: gate inert in 40 frames" in lines_with(found)
-    reasons[:] = verdict.GATE_LOCKED
+    reasons[:] = words.GATE_LOCKED
     assert "body: gate locked in 40 frames" in lines_with(found)
 
 
@@ -311,7 +310,7 @@ def test_reasons_are_those_of_the_library(name: str) -> None:
     types = (ROOT / "include" / "pelorus" / "types.h").read_text(encoding="utf-8")
     bit = re.search(rf"PLR_REASON_{name} = 1 << (\d+)", types)
     assert bit is not None
-    assert getattr(verdict, name) == 1 << int(bit.group(1))
+    assert getattr(words, name) == 1 << int(bit.group(1))
 
 
 def test_a_bias_that_is_suggested_and_not_estimated_is_told(
@@ -354,14 +353,14 @@ def test_a_map_is_compared_in_the_estimates_world_and_by_its_covariance() -> Non
     truth = [Landmark(k, p) for k, p in enumerate(points)]
     mine = se3.apply(A, points) + 0.1 * chance.normal(size=(400, 3)) @ root.T
     result = [Landmark(k, p, packed, Role.FINAL) for k, p in enumerate(mine)]
-    found = map_error.compare(
+    found = evaluation.compare_maps(
         [*truth, *result, Landmark(999, mine[0], packed, Role.FINAL)], truth, A
     )
     assert found is not None
     assert found.landmarks == 400
     assert found.map_nees == pytest.approx(1, abs=0.15)
     assert found.map_rms_m == pytest.approx(0.1 * np.sqrt(np.trace(root @ root.T)), rel=0.1)
-    assert map_error.compare(truth, truth, A) is None  # known ones are no result
+    assert evaluation.compare_maps(truth, truth, A) is None  # known ones are no result
 
 
 def test_evaluate_compares_the_map_of_a_result(pelorus: Command, tmp_path: Path) -> None:

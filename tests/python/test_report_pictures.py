@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pelorus import style
 from pelorus.frames import BodyAxes
-from pelorus.report import bands, gallery, plane, style, top_view
-from pelorus.report.replay import Programs
+from pelorus.grid import plane
+from pelorus.replay import Programs
+from pelorus.report import pictures, top_view
 from pelorus.se3 import Poses
 from replay_drive import drive, known
 from report_runs import built_programs, compared, recorded
@@ -91,21 +93,23 @@ def test_equal_metres_are_equal_pixels(tmp_path: Path, programs: Programs) -> No
 
 def test_every_picture_has_labelled_axes(tmp_path: Path, programs: Programs) -> None:
     found = compared(recorded(tmp_path, drive()), programs, "--bias", "on")
-    for picture in gallery.pictures(found):
+    for picture in pictures.pictures(found):
         figure = picture.draw()
         labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
         labels += [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
         assert len(labels) >= 2, picture.name
         for label in labels:
             assert "(" in label or label == "NEES / 6", f"{picture.name}: {label} has no unit"
-    assert "bias" in {picture.name for picture in gallery.pictures(found)}
+    assert "bias" in {picture.name for picture in pictures.pictures(found)}
 
 
 def test_limits_show_every_error_and_as_much_of_the_band_as_lets_it_be_seen() -> None:
-    assert bands.limits(np.array([0.0, -2.0]), np.array([1.0, 1.0])) == pytest.approx((-2.2, 2.2))
-    wide = bands.limits(np.array([0.01]), np.array([1e6]))
-    assert wide[1] == pytest.approx(0.01 * bands.BAND_MAX * bands.HEADROOM)
-    assert bands.limits(np.zeros(3), np.zeros(3)) == (-1.0, 1.0)
+    assert pictures.limits(np.array([0.0, -2.0]), np.array([1.0, 1.0])) == pytest.approx(
+        (-2.2, 2.2)
+    )
+    wide = pictures.limits(np.array([0.01]), np.array([1e6]))
+    assert wide[1] == pytest.approx(0.01 * pictures.BAND_MAX * pictures.HEADROOM)
+    assert pictures.limits(np.zeros(3), np.zeros(3)) == (-1.0, 1.0)
 
 
 def test_a_logarithmic_axis_ignores_the_few_smallest_values() -> None:

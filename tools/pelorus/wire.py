@@ -248,6 +248,15 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
     return received, reader.counts
 
 
+def messages_of(path: Path) -> list[Message]:
+    """What a recording holds, without its damaged frames; it must have a HEADER."""
+    if not path.is_file():
+        raise PelorusError(f"{path}: there is no such file")
+    received, _ = read_file(path)
+    header_of(received, path)
+    return [frame.message for frame in received]
+
+
 def header_of(received: list[Received], path: Path) -> Header:
     """The first HEADER; without one nothing in the recording has a meaning."""
     for frame in received:

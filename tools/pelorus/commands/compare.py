@@ -15,7 +15,7 @@ from pelorus.flight.difference import Difference, Sizes
 from pelorus.flight.judge import Desk, Judgement, Verdict, judge, of_this_version, verdict_of
 from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.frames import Config
-from pelorus.report.replay import find_programs
+from pelorus.replay import find_programs
 from pelorus.robot.status import STATUSES, condition
 
 LOSSES_SHOWN = 5

@@ -16,8 +16,8 @@ from pelorus.commands.choices import replay_options
 from pelorus.console import out
 from pelorus.errors import PelorusError
 from pelorus.packed_file import bare_name
-from pelorus.report.replay import find_programs
-from pelorus.report.subject import Subject, read_subject
+from pelorus.replay import find_programs
+from pelorus.report.results import Subject, read_subject
 from pelorus.trajectory import read_truth
 
 if TYPE_CHECKING:
@@ -146,8 +146,8 @@ def _runs(folder: Path, subject: Subject) -> Path:
 
 
 def _publish(trials: list[Trial], folder: Path) -> None:
+    from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.course import pictures, table  # noqa: PLC0415 - as above
-    from pelorus.report import style  # noqa: PLC0415 - as above
 
     text = table.markdown(trials)
     style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)

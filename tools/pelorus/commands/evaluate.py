@@ -11,13 +11,13 @@ from pathlib import Path
 import typer
 from rich.table import Table
 
-from pelorus import figures, map_error, road, se3
+from pelorus import evaluation, road, se3
 from pelorus.console import out
 from pelorus.errors import PelorusError
 from pelorus.frames import Message
-from pelorus.grid.sightings import messages_of
 from pelorus.report.results import read_poses
 from pelorus.trajectory import Trajectory, is_recording, read_truth, read_tum
+from pelorus.wire import messages_of
 
 MEANING = {
     "err0_m": "RMS position error, first poses aligned",
@@ -87,15 +87,17 @@ def evaluate(
     elif truth is not None:
         reference = read_truth(truth, times, recording)
         tolerance_ns = round(tolerance * 1e9)
-        if not map_error.is_mapping(result):  # the poses are the reference's
-            found = asdict(figures.compare(estimate, reference, tolerance_ns, (trajectory, truth)))
+        if not evaluation.is_mapping(result):  # the poses are the reference's
+            found = asdict(
+                evaluation.compare(estimate, reference, tolerance_ns, (trajectory, truth))
+            )
         found |= _map(result, truth, estimate, reference, tolerance_ns)
         if not found:
             raise PelorusError(
                 f"{trajectory}: its poses were given (mode mapping), and {truth} knows none of its "
                 "landmarks: there is nothing to compare"
             )
-    found["step_change_m"] = figures.step_change(estimate.poses)
+    found["step_change_m"] = evaluation.step_change(estimate.poses)
     if as_json:
         typer.echo(json.dumps(found))
     else:
@@ -110,15 +112,15 @@ def _map(
     tolerance_ns: int,
 ) -> dict[str, float]:
     """Of the landmarks that the truth's recording, or the result itself, knows."""
-    known = map_error.known_in(messages_of(truth)) if is_recording(truth) else []
-    known = known or map_error.known_in(result)
-    mine, theirs = figures.match(estimate, reference, tolerance_ns)
+    known = evaluation.known_in(messages_of(truth)) if is_recording(truth) else []
+    known = known or evaluation.known_in(result)
+    mine, theirs = evaluation.match(estimate, reference, tolerance_ns)
     if not len(mine):
         return {}
     start = se3.compose(
         estimate.poses.at(int(mine[0])), se3.inverse(reference.poses.at(int(theirs[0])))
     )
-    found = map_error.compare(result, known, start)
+    found = evaluation.compare_maps(result, known, start)
     return {} if found is None else asdict(found)
 
 

@@ -16,8 +16,9 @@ from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.grid import files, occupancy
 from pelorus.grid.occupancy import Band, Grid, Wish
-from pelorus.grid.sightings import Sightings, is_result, messages_of, sightings
-from pelorus.report.replay import Outputs, find_programs, replay
+from pelorus.grid.sightings import Sightings, is_result, sightings
+from pelorus.replay import Outputs, find_programs, replay
+from pelorus.wire import messages_of
 
 
 def register(parent: typer.Typer) -> None:
@@ -107,8 +108,8 @@ def _seen(source: Path, options: list[str], programs: Path | None) -> Sightings:
 
 
 def _publish(grid: Grid, title: str, folder: Path) -> None:
+    from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.grid import picture  # noqa: PLC0415 - matplotlib loads slowly
-    from pelorus.report import style  # noqa: PLC0415 - as above
 
     files.write(folder, grid, lambda path: style.save(lambda: picture.draw(grid, title), path))
 

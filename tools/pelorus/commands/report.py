@@ -13,11 +13,9 @@ from rich.table import Table
 from pelorus.commands.choices import replay_options
 from pelorus.console import out, progress
 from pelorus.errors import PelorusError
-from pelorus.report import overview
-from pelorus.report.replay import find_programs
-from pelorus.report.results import carry_out
-from pelorus.report.runs import plan_runs
-from pelorus.report.subject import read_subject
+from pelorus.replay import find_programs
+from pelorus.report import words
+from pelorus.report.results import carry_out, plan_runs, read_subject
 
 if TYPE_CHECKING:
     from pelorus.report.comparison import Comparison
@@ -71,28 +69,29 @@ def _made(folder: Path) -> Path:
 
 
 def _publish(compared: Comparison, folder: Path) -> None:
-    from pelorus.report import gallery, page, style, verdict  # noqa: PLC0415 - as above
+    from pelorus import style  # noqa: PLC0415 - as above
+    from pelorus.report import page, pictures  # noqa: PLC0415 - as above
 
-    for name in gallery.NAMES:  # of an earlier report: not every recording has all of them
+    for name in pictures.NAMES:  # of an earlier report: not every recording has all of them
         (folder / f"{name}.png").unlink(missing_ok=True)
     drawn = []
-    for picture in progress(gallery.pictures(compared), "drawing"):
+    for picture in progress(pictures.pictures(compared), "drawing"):
         path = folder / f"{picture.name}.png"
         style.save(picture.draw, path)
         drawn.append((picture, path))
-    lines = verdict.verdicts(compared)
+    lines = words.verdicts(compared)
     page.write(folder / PAGE, compared, lines, drawn)
     _tell(compared, lines, folder / PAGE)
 
 
 def _tell(compared: Comparison, lines: list[str], page: Path) -> None:
     table = Table(box=None, pad_edge=False)
-    for title in overview.titles(compared):
+    for title in words.titles(compared):
         name = title == "run"
         table.add_column(title, justify="left" if name else "right", no_wrap=name, overflow="fold")
     table.columns[0].min_width = max(len(run.name) for run in compared.runs)
     for run in compared.runs:
-        table.add_row(*overview.row(compared, run))
+        table.add_row(*words.row(compared, run))
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")

@@ -9,8 +9,8 @@ import numpy as np
 
 from pelorus.course.pictures import NAMES
 from pelorus.course.trial import Trial
-from pelorus.figures import step_change
-from pelorus.report.overview import NONE, number
+from pelorus.evaluation import step_change
+from pelorus.report.words import NONE, number
 from pelorus.se3 import Floats
 
 TITLES = (

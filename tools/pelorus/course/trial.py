@@ -10,18 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import figures, road
+from pelorus import evaluation, road
 from pelorus.console import progress
 from pelorus.errors import PelorusError
-from pelorus.figures import Figures
-from pelorus.grid.sightings import messages_of, sightings
-from pelorus.report import plane
-from pelorus.report.comparison import COURSE, Comparison
-from pelorus.report.replay import Programs
-from pelorus.report.results import Run, carry_out
-from pelorus.report.runs import plan_runs
-from pelorus.report.subject import Subject
-from pelorus.report.whole_map import Traces
+from pelorus.evaluation import Figures
+from pelorus.grid import plane
+from pelorus.grid.sightings import sightings
+from pelorus.replay import Programs
+from pelorus.report.comparison import COURSE, Comparison, Traces
+from pelorus.report.results import Run, Subject, carry_out, plan_runs
 from pelorus.road import RoadFit
 from pelorus.se3 import Floats, apply
 
@@ -62,7 +59,7 @@ class Trial:
         if truth is None:
             return {}
         names = (self.subject.path, self.subject.path)
-        return {run.name: figures.compare(run.trajectory, truth, 0, names) for run in self.runs}
+        return {run.name: evaluation.compare(run.trajectory, truth, 0, names) for run in self.runs}
 
     @cached_property
     def road_fits(self) -> dict[str, RoadFit]:
@@ -93,9 +90,9 @@ class Trial:
 
     def scatter(self, name: str) -> Floats:
         """(n, 2): the landmarks of a run that are near and certain enough to be drawn."""
-        log = self.compared.run(name).log
+        run = self.compared.run(name)
         try:
-            seen = sightings(log, messages_of(log))
+            seen = sightings(run.log, run.messages)
         except PelorusError:  # no landmarks: nothing to draw
             return np.empty((0, 2))
         distance = np.linalg.norm(seen.landmarks_W - seen.camera_W[seen.last_frame], axis=1)

@@ -14,7 +14,7 @@ from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
 from pelorus.flight.log import NOWHERE, Frame, Log, Loss, Part, frames_of
 from pelorus.frames import Config, Header, Message
-from pelorus.report.replay import Programs
+from pelorus.replay import Programs
 from pelorus.robot.compare import desktop_log, write_recording
 from pelorus.settings import describe
 

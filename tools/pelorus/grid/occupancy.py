@@ -27,9 +27,9 @@ from scipy.special import expit, ndtr
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.frames import BodyAxes
+from pelorus.grid import plane
+from pelorus.grid.plane import Plane
 from pelorus.grid.sightings import Sightings
-from pelorus.report import plane
-from pelorus.report.plane import Plane
 from pelorus.se3 import Floats
 from pelorus.tracks import Indices
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3, wire
+from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
 from pelorus.motion import Times
@@ -49,15 +49,6 @@ class Sightings:
 def is_result(messages: list[Message]) -> bool:
     """Whether a filter has been here: it leaves poses after stereo frames."""
     return any(isinstance(m, Pose) and m.after_stereo for m in messages)
-
-
-def messages_of(path: Path) -> list[Message]:
-    """All good frames."""
-    if not path.is_file():
-        raise PelorusError(f"{path}: there is no such file")
-    received, _ = wire.read_file(path)
-    wire.header_of(received, path)
-    return [frame.message for frame in received]
 
 
 def sightings(path: Path, messages: list[Message]) -> Sightings:

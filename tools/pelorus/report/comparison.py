@@ -1,23 +1,90 @@
 # SPDX-License-Identifier: MIT
-"""All runs over one recording, beside the truth where there is one."""
+"""All runs over one recording, beside the truth where there is one.
+
+The trace of the whole map's covariance is the course report's figure 2. The course's state holds
+every landmark of the recording from the first frame on. Ours holds those in its slots, and what the
+report draws is put together from what it leaves behind:
+
+- the state's own trace, pose and landmarks in the slots, of each frame;
+- a landmark that has left keeps the covariance with which it left (its LANDMARK frame);
+- one that was not seen yet stands at its prior, 3 landmark-sigma^2: 6 m^2 with the report's
+  Sigma_m = 2 I, which also stands in where landmarks start from the pixels.
+
+Seen means: with a disparity of which a landmark could be made. What was seen and never taken, for
+it was too far off, is no part of the map and of the sum.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
-from pelorus import map_error
+import numpy as np
+
+from pelorus import evaluation, style
 from pelorus.errors import PelorusError
+from pelorus.evaluation import Accuracy, MapFigures, assess
+from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo
 from pelorus.grid.occupancy import Grid, Wish, occupancy
-from pelorus.grid.sightings import messages_of, sightings
-from pelorus.map_error import MapFigures
+from pelorus.grid.sightings import sightings
 from pelorus.motion import Times
-from pelorus.report import style
-from pelorus.report.accuracy import Accuracy, assess
-from pelorus.report.results import Run
-from pelorus.report.subject import Subject
-from pelorus.report.whole_map import Traces, traces
+from pelorus.report.results import DIAGONAL, Run, Subject
 from pelorus.se3 import Floats
+
+PRIOR_VARIANCE_M2 = 2.0  # Sigma_m of the report, an axis
+MIN_DISPARITY, LANDMARK_SIGMA = 17, 22  # the settings' ids
+
+
+class Traces(NamedTuple):
+    """After each frame: of the state as it is, of the whole map; NaN where P is broken."""
+
+    t_ns: Times
+    active: Floats
+    whole: Floats
+    ids: int  # landmarks of the recording
+
+
+def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
+    """From a result's messages and the state's trace at the frames' times."""
+    least_px = _in_force(messages, MIN_DISPARITY, 0.0)
+    sigma_m = _in_force(messages, LANDMARK_SIGMA, 0.0)
+    prior = 3 * (sigma_m**2 or PRIOR_VARIANCE_M2)
+    ids = set[int]()
+    for message in messages:
+        if isinstance(message, Stereo):
+            ids.update(message.ids.tolist())
+    known = dict(zip(t_ns.tolist(), active.tolist(), strict=True))
+    seen, left = set[int](), dict[int, float]()
+    out: list[tuple[int, float, float]] = []
+    for message in messages:
+        if isinstance(message, Stereo):
+            disparity = message.pixels[:, 0] - message.pixels[:, 2]
+            now = message.ids[disparity >= least_px].tolist()
+            seen.update(now)
+            for id in now:  # it is back in the state, or too far off to come back
+                left.pop(id, None)
+        elif isinstance(message, Landmark) and message.role == Role.EVICTED:
+            left[message.id] = float(message.covariance[list(DIAGONAL)].sum())
+        elif isinstance(message, Report) and message.subject == Kind.STEREO:
+            state = known.get(message.t_ns, np.nan)
+            unseen = prior * (len(ids) - len(seen))
+            out.append((message.t_ns, state, state + sum(left.values()) + unseen))
+    columns = np.array(out).reshape(-1, 3)
+    times = np.array([row[0] for row in out], np.int64)
+    return Traces(times, columns[:, 1], columns[:, 2], len(ids))
+
+
+def _in_force(messages: Sequence[Message], id: int, otherwise: float) -> float:
+    """The value of a setting."""
+    values = [
+        m.settings[id]
+        for m in messages
+        if isinstance(m, Config) and m.build_fingerprint and id in m.settings
+    ]
+    return values[-1] if values else otherwise
+
 
 MAIN = "body"  # the default model: what the report is about
 COURSE = "course"
@@ -49,9 +116,8 @@ class Comparison:
     @cached_property
     def grid(self) -> Grid | None:
         """The map that the main run made; None where nothing stands in it."""
-        log = self.main.log
         try:
-            return occupancy(sightings(log, messages_of(log)), Wish())
+            return occupancy(sightings(self.main.log, self.main.messages), Wish())
         except PelorusError:
             return None
 
@@ -65,14 +131,14 @@ class Comparison:
 
     def _map_error(self, run: Run) -> MapFigures | None:
         accuracy = self.accuracy.get(run.name)
-        A = accuracy.A if accuracy else map_error.UNMOVED
-        return map_error.compare(messages_of(run.log), self.subject.known, A)
+        A = accuracy.A if accuracy else evaluation.UNMOVED
+        return evaluation.compare_maps(run.messages, self.subject.known, A)
 
     @cached_property
     def whole_map(self) -> Traces:
         """Of the course's filter, whose landmarks have their covariance in metres."""
         run = self.run(COURSE)
-        return traces(messages_of(run.log), run.frames.t_ns, run.frames["trace"])
+        return traces(run.messages, run.frames.t_ns, run.frames["trace"])
 
     @cached_property
     def origin_ns(self) -> int:

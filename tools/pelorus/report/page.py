@@ -10,9 +10,9 @@ from html import escape
 from pathlib import Path
 
 from pelorus.errors import PelorusError
-from pelorus.report import overview
+from pelorus.report import words
 from pelorus.report.comparison import Comparison
-from pelorus.report.gallery import Picture
+from pelorus.report.pictures import Picture
 from pelorus.report.results import Run
 
 STYLE = """
@@ -76,11 +76,9 @@ def _facts(compared: Comparison) -> str:
 
 
 def _table(compared: Comparison) -> str:
-    head = "".join(f"<th>{escape(title)}</th>" for title in overview.titles(compared))
+    head = "".join(f"<th>{escape(title)}</th>" for title in words.titles(compared))
     rows = "\n".join(
-        "<tr>"
-        + "".join(f"<td>{escape(cell)}</td>" for cell in overview.row(compared, run))
-        + "</tr>"
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in words.row(compared, run)) + "</tr>"
         for run in compared.runs
     )
     return f'<div class="wide"><table>\n<tr>{head}</tr>\n{rows}\n</table></div>'

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What a run left behind, read into arrays."""
+"""What a report is made of: the recording itself, and what each run of a filter left behind."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,16 +13,81 @@ import numpy as np
 
 from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Pose
+from pelorus.evaluation import known_in
+from pelorus.frames import Header, Landmark, Message, Pose, Role, Truth
 from pelorus.motion import Times
 from pelorus.packed import unpack_symmetric
-from pelorus.report.replay import Outputs, replay
-from pelorus.report.runs import Plan
+from pelorus.replay import Outputs, Programs, depth_limit_m, replay
 from pelorus.se3 import Floats, Poses
-from pelorus.trajectory import Trajectory
+from pelorus.trajectory import Trajectory, truth_of
+
+
+@dataclass(frozen=True)
+class Subject:
+    """`truth` holds the poses at STEREO times; `known` landmarks lie in the truth's world."""
+
+    path: Path
+    header: Header
+    truth: Trajectory | None
+    known: list[Landmark]
+
+    @property
+    def known_W_m(self) -> Floats:
+        """(n, 3)."""
+        return np.array([landmark.p_W_m for landmark in self.known]).reshape(-1, 3)
+
+    @property
+    def title(self) -> str:
+        return self.header.name or self.path.name
+
+
+def read_subject(path: Path) -> Subject:
+    """Read a recording; PelorusError where there is nothing to report on."""
+    messages = wire.messages_of(path)
+    header = next(m for m in messages if isinstance(m, Header))
+    truth = _truth(path) if any(isinstance(m, Truth) for m in messages) else None
+    return Subject(path, header, truth, known_in(messages))
+
+
+def _truth(path: Path) -> Trajectory | None:
+    """None where no TRUTH has a frame's time: the verdict says that there is nothing to compare."""
+    try:
+        return truth_of(path)
+    except PelorusError:
+        return None
+
+
+WORLD_DEPTH_M = 60.0  # the world model must leave far points out
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One run: the name is also that of its files."""
+
+    name: str
+    program: Path
+    options: tuple[str, ...]
+
+
+def plan_runs(programs: Programs, recording: Path, settings: Sequence[str]) -> list[Plan]:
+    """The runs in the order of the table.
+
+    `settings` hold for all but `course`, whose preset is the whole point of it.
+    """
+    world = (*settings, "--model", "world")
+    if depth_limit_m(programs.float64, recording, world) == 0:
+        world = (*world, "--max-depth", f"{WORLD_DEPTH_M:g}")
+    dead_reckoning = (*settings, "--mode", "dead_reckoning")
+    return [
+        Plan("dead-reckoning", programs.float32, dead_reckoning),
+        Plan("body", programs.float32, (*settings, "--model", "body")),
+        Plan("course", programs.float64, ("--preset", "course")),
+        Plan("world", programs.float64, world),
+    ]
+
 
 POSE_SIZE = 6
-MAP_COLUMNS = 7  # x y z id role times_seen sigma
+DIAGONAL = (0, 2, 5)  # of a packed 3 x 3
 
 
 class Points(NamedTuple):
@@ -65,6 +131,7 @@ class Run:
     trajectory: Trajectory
     covariance: Floats
     landmarks: Points
+    messages: list[Message]  # of its log
     log: Path
 
     @property
@@ -81,9 +148,19 @@ def carry_out(plan: Plan, recording: Path, folder: Path) -> Run:
     """Replay the recording as planned, leave the files in the folder, and read them."""
     outputs = Outputs.named(folder, plan.name)
     summary, said = replay(plan.program, recording, plan.options, outputs)
-    trajectory, covariance = read_poses(outputs.log)
-    table, landmarks = read_frames(outputs.frames), read_map(outputs.map)
-    return Run(plan, summary, said, table, trajectory, covariance, landmarks, outputs.log)
+    messages = wire.messages_of(outputs.log)
+    trajectory, covariance = _poses(outputs.log, messages)
+    return Run(
+        plan,
+        summary,
+        said,
+        read_frames(outputs.frames),
+        trajectory,
+        covariance,
+        read_map(messages),
+        messages,
+        outputs.log,
+    )
 
 
 def read_poses(log: Path) -> tuple[Trajectory, Floats]:
@@ -91,12 +168,11 @@ def read_poses(log: Path) -> tuple[Trajectory, Floats]:
 
     NaN where the filter has diverged and knows none.
     """
-    received, _ = wire.read_file(log)
-    poses = [
-        frame.message
-        for frame in received
-        if isinstance(frame.message, Pose) and frame.message.after_stereo
-    ]
+    return _poses(log, wire.messages_of(log))
+
+
+def _poses(log: Path, messages: Sequence[Message]) -> tuple[Trajectory, Floats]:
+    poses = [m for m in messages if isinstance(m, Pose) and m.after_stereo]
     if not poses:
         raise PelorusError(f"{log}: holds no pose after a stereo frame")
     t_ns = np.array([pose.t_ns for pose in poses], np.int64)
@@ -127,12 +203,9 @@ def _nanoseconds(seconds: str) -> int:
     return int(seconds.replace(".", ""))
 
 
-def read_map(path: Path) -> Points:
-    """The vertices of an ASCII PLY."""
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
-    rows = [line.split() for line in lines[lines.index("end_header") + 1 :]]
-    numbers = np.array(rows, float).reshape(-1, MAP_COLUMNS)
-    return Points(numbers[:, :3], numbers[:, -1])
+def read_map(messages: Sequence[Message]) -> Points:
+    """The landmarks that a filter left behind, evicted and final."""
+    made = [m for m in messages if isinstance(m, Landmark) and m.role != Role.KNOWN]
+    variances = np.array([m.covariance[list(DIAGONAL)] for m in made]).reshape(-1, 3)
+    places = np.array([m.p_W_m for m in made]).reshape(-1, 3)
+    return Points(places, np.sqrt(variances.mean(axis=1)))

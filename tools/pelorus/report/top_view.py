@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pelorus import se3
-from pelorus.report import plane
+from pelorus.grid import plane
+from pelorus.grid.plane import Plane
 from pelorus.report.comparison import MAIN, Comparison
-from pelorus.report.plane import Plane
-from pelorus.report.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 from pelorus.se3 import Floats
+from pelorus.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 
 MARGIN = 0.15  # of the larger side
 STRAY = 0.75  # a run may widen the picture by so much of the larger side, then it leaves it

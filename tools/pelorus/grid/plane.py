@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From where the trajectories are looked at."""
+"""From where trajectories and landmarks are looked at."""
 
 from __future__ import annotations
 

@@ -48,17 +48,16 @@ def _environment() -> Path | None:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What one run writes: runs/NAME.tum, .csv, .ply, .plr, .json."""
+    """What one run writes: runs/NAME.tum, .csv, .plr, .json."""
 
     trajectory: Path
     frames: Path
-    map: Path
     log: Path
     summary: Path
 
     @classmethod
     def named(cls, folder: Path, name: str) -> Outputs:
-        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "ply", "plr", "json")))
+        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "plr", "json")))
 
 
 def replay(
@@ -67,7 +66,7 @@ def replay(
     """Run the filter; its summary, and what it had to say on the way."""
     wanted = [
         *("--trajectory", str(outputs.trajectory), "--frames", str(outputs.frames)),
-        *("--map", str(outputs.map), "--out", str(outputs.log), "--json"),
+        *("--out", str(outputs.log), "--json"),
     ]
     stdout, stderr = _call(program, recording, [*options, *wanted])
     try:
