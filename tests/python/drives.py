@@ -13,6 +13,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.tracks import Tracks, project, triangulate
+from scipy.spatial.transform import Rotation
 
 FORWARD_RIGHT_DOWN = np.diag([1.0, -1.0, -1.0])
 QUIET = Options(
@@ -133,7 +134,7 @@ def mat_arrays(recording: Recording, time_first: bool = True) -> dict[str, Any]:
         "t": recording.frame_t_ns[None, :count] * 1e-9,
         "v_vk_vk_i": np.hstack((recording.v_B_mps.T, extra)),
         "w_vk_vk_i": np.hstack((recording.w_B_radps.T, extra)),
-        "theta_vk_i": np.hstack((se3.so3_log(recording.truth.R).T, extra)),
+        "theta_vk_i": np.hstack((Rotation.from_matrix(recording.truth.R).as_rotvec().T, extra)),
         "r_i_vk_i": np.hstack((recording.truth.p.T, extra)),
         "fu": camera.fx_px,
         "fv": camera.fy_px,

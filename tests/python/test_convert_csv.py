@@ -17,6 +17,7 @@ from pelorus import se3
 from pelorus.converters import csv as csv_converter
 from pelorus.frames import BodyAxes, Header, Stereo, Truth, Twist, TwistTiming
 from pelorus.recording import Recording
+from scipy.spatial.transform import Rotation
 
 
 def write_csv(path: Path, columns: dict[str, Any]) -> Path:
@@ -42,7 +43,10 @@ def csv_files(folder: Path, recording: Recording) -> list[Any]:
         "id": tracks.id[shuffled].tolist(),
         "t_ns": recording.frame_t_ns[tracks.frame[shuffled]].tolist(),
     }
-    p, q = recording.truth.p.T.tolist(), se3.quaternion(recording.truth.R).T.tolist()
+    p, q = (
+        recording.truth.p.T.tolist(),
+        Rotation.from_matrix(recording.truth.R).as_quat().T.tolist(),
+    )
     poses = dict(zip(("px_m", "py_m", "pz_m", "qx", "qy", "qz", "qw"), p + q, strict=True))
     truth = {"t_s": [f"{t / 1e9:.9f}" for t in recording.truth_t_ns], **poses}
     T_BC = se3.inverse(recording.T_CB)

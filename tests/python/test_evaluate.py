@@ -15,6 +15,7 @@ from pelorus import evaluation, road, se3
 from pelorus.frames import Header, Truth
 from pelorus.se3 import Floats, Poses
 from pelorus.trajectory import Trajectory, read_truth, read_tum, write_tum
+from scipy.spatial.transform import Rotation
 
 COUNT = 200
 CHANCE = np.random.default_rng(9)
@@ -31,7 +32,9 @@ def winding() -> Poses:
     """A path that leaves its plane, turning all the way."""
     k = np.arange(COUNT)
     p = np.stack((30 * np.sin(k / 20), 20 * np.cos(k / 33), 0.1 * k), axis=-1)
-    return Poses(se3.so3_exp(np.stack((0.01 * k, 0.003 * k, 0.02 * k), axis=-1)), p)
+    return Poses(
+        Rotation.from_rotvec(np.stack((0.01 * k, 0.003 * k, 0.02 * k), axis=-1)).as_matrix(), p
+    )
 
 
 def moved(T: Poses, by: Poses) -> Poses:
@@ -63,7 +66,7 @@ def test_a_constant_turn_of_the_estimate_is_an_error_of_its_angle() -> None:
     """Behind the first pose all rotations are off by a, all positions right."""
     a = np.radians(3.0)
     truth = winding()
-    R = truth.R @ se3.so3_exp(np.array([0, 0, a]))
+    R = truth.R @ Rotation.from_rotvec(np.array([0, 0, a])).as_matrix()
     R[0] = truth.R[0]
     found = evaluation.figures(Poses(R, truth.p), truth)
     assert found.rot_deg == pytest.approx(3.0 * np.sqrt((COUNT - 1) / COUNT))
@@ -75,7 +78,7 @@ def test_a_first_heading_that_is_off_swings_the_path_and_the_fit_takes_it_back()
     a = np.radians(10.0)
     truth = straight()
     R = truth.R.copy()
-    R[0] = se3.so3_exp(np.array([0, 0, a]))
+    R[0] = Rotation.from_rotvec(np.array([0, 0, a])).as_matrix()
     found = evaluation.figures(Poses(R, truth.p), truth)
     k = np.arange(COUNT)
     assert found.err0_m == pytest.approx(2 * np.sin(a / 2) * np.sqrt(np.mean(k**2)))
@@ -193,8 +196,10 @@ def test_a_trajectory_on_the_road_is_found_there_wherever_it_lies(
     tmp_path: Path, pelorus: Run
 ) -> None:
     flat = np.concatenate((town(), np.zeros((len(town()), 1))), axis=1)
-    tilt = se3.so3_exp(np.radians([7.0, 0, 0]))
-    by = Poses(tilt @ se3.so3_exp(np.array([0, 0, 2.0])), np.array([500.0, -300, 40]))
+    tilt = Rotation.from_rotvec(np.radians([7.0, 0, 0])).as_matrix()
+    by = Poses(
+        tilt @ Rotation.from_rotvec(np.array([0, 0, 2.0])).as_matrix(), np.array([500.0, -300, 40])
+    )
     poses = Poses(np.tile(np.eye(3), (len(flat), 1, 1)), se3.apply(by, flat))
     estimate = save(tmp_path / "x.tum", poses, np.arange(1, len(flat) + 1) * 10**8)
     found = evaluate(pelorus, estimate, "--road", save_road(tmp_path / "road.csv", town()))
@@ -296,8 +301,9 @@ def test_a_recording_without_truth_is_no_reference(tmp_path: Path, pelorus: Run)
 def test_a_step_that_changes_is_told_in_the_body_s_own_axes() -> None:
     """A circle at an even pace is as calm as a straight way; a shake is what it is."""
     turns = np.stack((np.zeros(50), np.zeros(50), 0.1 * np.arange(50)), axis=-1)
-    circle = Poses(se3.so3_exp(turns), 10 * np.stack((np.sin(turns[:, 2]), -np.cos(turns[:, 2]),
-                                                      np.zeros(50)), axis=-1))  # fmt: skip
+    sine, cosine = np.sin(turns[:, 2]), np.cos(turns[:, 2])
+    way = 10 * np.stack((sine, -cosine, np.zeros(50)), axis=-1)
+    circle = Poses(Rotation.from_rotvec(turns).as_matrix(), way)
     assert evaluation.step_change(circle) == pytest.approx(0, abs=1e-12)
     shaken = Poses(np.tile(np.eye(3), (50, 1, 1)), np.zeros((50, 3)))
     shaken.p[::2, 0] = 0.5

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from pelorus import se3
 from pelorus.errors import PelorusError
@@ -68,7 +69,7 @@ def figures(estimate: Poses, truth: Poses) -> Figures:
     """Pose k of one against pose k of the other."""
     start = se3.compose(estimate.at(0), se3.inverse(truth.at(0)))
     aligned = se3.compose(start, truth)
-    turn = se3.so3_log(np.swapaxes(estimate.R, 1, 2) @ aligned.R)
+    turn = Rotation.from_matrix(np.swapaxes(estimate.R, 1, 2) @ aligned.R).as_rotvec()
     fitted = se3.apply(rigid_fit(truth.p, estimate.p), truth.p)
     return Figures(
         err0_m=rms(estimate.p - aligned.p),

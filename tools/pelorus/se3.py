@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Rigid motions in float64. All functions take stacks: leading axes are free.
+"""Rigid motions in float64, one or a stack of them.
 
-A pose is a pair (R, p): R (..., 3, 3), p (..., 3) in metres; twists are (rho, theta), metres and
-radians. Exp and Log are those of SE(3) (Barfoot, State Estimation for Robotics, chapter 7).
+A pose is a pair (R, p), in metres: the very numbers that a file has and that the simulator made.
+scipy's RigidTransform would round them, for it passes through quaternions; Exp and Log of SE(3) are
+its own (Barfoot, State Estimation for Robotics, chapter 7). Twists are (rho, theta), metres and
+radians.
 """
 
 from __future__ import annotations
@@ -11,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 Floats = NDArray[np.float64]
-SERIES_BELOW_RAD = 1e-2  # below it the closed coefficients lose digits to cancellation
 
 
 class Poses(NamedTuple):
@@ -37,50 +38,16 @@ def skew(x: ArrayLike) -> Floats:
     return out - np.swapaxes(out, -1, -2)
 
 
-def _coefficients(angle: Floats) -> tuple[Floats, Floats, Floats]:
-    """sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3."""
-    small = angle < SERIES_BELOW_RAD
-    a = np.where(small, 1.0, angle)
-    s = angle * angle
-    return (
-        np.where(small, 1 - s / 6 * (1 - s / 20 * (1 - s / 42)), np.sin(a) / a),
-        np.where(small, 0.5 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56))), (1 - np.cos(a)) / a**2),
-        np.where(small, (1 - s / 20 * (1 - s / 42 * (1 - s / 72))) / 6, (a - np.sin(a)) / a**3),
-    )
-
-
-def so3_exp(theta: ArrayLike) -> Floats:
-    """Rotation vector, rad (..., 3) -> rotation matrix (..., 3, 3)."""
-    theta = np.asarray(theta, float)
-    a, b, _ = _coefficients(np.linalg.norm(theta, axis=-1)[..., None, None])
-    hat = skew(theta)
-    return np.asarray(np.eye(3) + a * hat + b * (hat @ hat))
-
-
-def so3_log(R: ArrayLike) -> Floats:
-    """Rotation matrix (..., 3, 3) -> rotation vector, rad (..., 3)."""
-    R = np.asarray(R, float)
-    flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec()
-    return np.asarray(flat.reshape(R.shape[:-1]))
-
-
 def exp(rho: ArrayLike, theta: ArrayLike) -> Poses:
     """Exp(rho, theta) = (Exp theta, V rho)."""
-    rho, theta = np.asarray(rho, float), np.asarray(theta, float)
-    _, b, c = _coefficients(np.linalg.norm(theta, axis=-1)[..., None, None])
-    hat = skew(theta)
-    V = np.eye(3) + b * hat + c * (hat @ hat)
-    return Poses(so3_exp(theta), np.einsum("...ij,...j->...i", V, rho))
+    T = RigidTransform.from_exp_coords(np.concatenate((theta, rho), axis=-1))
+    return Poses(T.rotation.as_matrix(), T.translation)
 
 
 def log(T: Poses) -> Floats:
     """The twist (..., 6) in the order (rho, theta) with Exp of it = T."""
-    theta = so3_log(T.R)
-    _, b, c = _coefficients(np.linalg.norm(theta, axis=-1)[..., None, None])
-    hat = skew(theta)
-    V = np.eye(3) + b * hat + c * (hat @ hat)
-    rho = np.linalg.solve(V, T.p[..., None])[..., 0]
-    return np.concatenate((rho, theta), axis=-1)
+    rigid = RigidTransform.from_components(T.p, Rotation.from_matrix(T.R))
+    return np.roll(rigid.as_exp_coords(), 3, axis=-1)  # scipy's order is (theta, rho)
 
 
 def inverse(T: Poses) -> Poses:
@@ -104,15 +71,3 @@ def nearest_rotation(M: ArrayLike) -> Floats:
     u, _, vt = np.linalg.svd(np.asarray(M, float))
     u[..., :, 2] *= np.linalg.det(u @ vt)[..., None]
     return np.asarray(u @ vt)
-
-
-def quaternion(R: ArrayLike) -> Floats:
-    """(..., 3, 3) -> (..., 4) in the order x y z w."""
-    R = np.asarray(R, float)
-    flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat()
-    return np.asarray(flat.reshape(*R.shape[:-2], 4))
-
-
-def from_quaternion(q: ArrayLike) -> Floats:
-    """(n, 4) in the order x y z w -> (n, 3, 3)."""
-    return np.asarray(Rotation.from_quat(np.asarray(q, float)).as_matrix())

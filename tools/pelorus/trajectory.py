@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from pelorus import foreign, kitti, packed_file, se3, wire
+from pelorus import foreign, kitti, packed_file, wire
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Stereo, Truth
@@ -52,12 +53,12 @@ def read_tum(path: Path) -> Trajectory:
         raise ForeignFileError(
             path, "the quaternion's norm is not 1", at=f"line {rows[wrong[0]].line}"
         )
-    return Trajectory(t_ns, Poses(se3.from_quaternion(numbers[:, 3:]), numbers[:, :3]))
+    return Trajectory(t_ns, Poses(Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3]))
 
 
 def write_tum(path: Path, trajectory: Trajectory) -> None:
     """Nine decimals of a second, so that times survive."""
-    quaternions = se3.quaternion(trajectory.poses.R)
+    quaternions = Rotation.from_matrix(trajectory.poses.R).as_quat()
     lines = [
         f"{t // 10**9}.{t % 10**9:09d} " + " ".join(f"{x:.9f}" for x in (*p, *q))
         for t, p, q in zip(trajectory.t_ns.tolist(), trajectory.poses.p, quaternions, strict=True)

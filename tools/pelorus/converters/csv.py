@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from pelorus import calibration, se3
+from pelorus import calibration
 from pelorus.converters import twist_noise
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
@@ -105,4 +106,6 @@ def _truth(path: Path) -> tuple[Times, Poses]:
             "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
             at=f"row {int(off.argmax()) + 2}",
         )
-    return t_ns, Poses(se3.from_quaternion(quaternions), table.numbers("px_m", "py_m", "pz_m"))
+    return t_ns, Poses(
+        Rotation.from_quat(quaternions).as_matrix(), table.numbers("px_m", "py_m", "pz_m")
+    )

@@ -14,8 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from pelorus import arrays, se3
+from pelorus import arrays
 from pelorus.arrays import Arrays
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
@@ -74,7 +75,7 @@ def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:
         name=header_name(file.path.stem),
     )
     v, w = (_first(file, key, count) for key in ("v_vk_vk_i", "w_vk_vk_i"))
-    truth = Poses(se3.so3_exp(rotation_vectors), position)
+    truth = Poses(Rotation.from_rotvec(rotation_vectors).as_matrix(), position)
     return Recording(header, t_ns, v, w, t_ns, tracks, t_ns, truth)
 
 
