@@ -13,7 +13,7 @@ import pytest
 from converted import Run
 from pelorus import wire
 from pelorus.frames import BodyAxes, Header, Landmark, Role, Truth, Twist
-from pelorus.packed import unpack_symmetric
+from pelorus.layout import unpack_symmetric
 from replay_drive import drive, encode, header, log_of, points, truth
 from replay_drive import run as run_replay
 

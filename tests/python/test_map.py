@@ -16,7 +16,7 @@ from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Ster
 from pelorus.grid import files
 from pelorus.grid.occupancy import Band, Grid, Wish, occupancy
 from pelorus.grid.sightings import Sightings, sightings
-from pelorus.packed import pack_symmetric
+from pelorus.layout import pack_symmetric
 from pelorus.wire import messages_of
 from PIL import Image
 from replay_drive import BIN, drive, encode, header, known

@@ -18,7 +18,7 @@ from pelorus import evaluation, se3
 from pelorus.errors import PelorusError
 from pelorus.evaluation import assess, nees_per_dof
 from pelorus.frames import Landmark, Pose, Role, Stereo, Truth
-from pelorus.packed import pack_symmetric, unpack_symmetric
+from pelorus.layout import pack_symmetric, unpack_symmetric
 from pelorus.replay import Outputs, Programs
 from pelorus.report import pictures, words
 from pelorus.report.comparison import Comparison

@@ -23,7 +23,6 @@ from pelorus.frames import (
     Header,
     Kind,
     Landmark,
-    MalformedPayload,
     Message,
     Noise,
     Pose,
@@ -38,6 +37,7 @@ from pelorus.frames import (
     Truth,
     Twist,
 )
+from pelorus.layout import MalformedPayload
 from pelorus.wire import Counts, Reader, Received, VersionError, Writer
 
 CHANCE = np.random.default_rng(11)

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import Config, Landmark, Message, Role
+from pelorus.layout import unpack_symmetric
 from pelorus.motion import Times
-from pelorus.packed import unpack_symmetric
 from pelorus.se3 import Floats, Poses
 from pelorus.trajectory import Trajectory
 

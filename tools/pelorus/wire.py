@@ -17,7 +17,8 @@ from typing import BinaryIO, NamedTuple
 
 from pelorus import cobs, packed_file
 from pelorus.errors import PelorusError
-from pelorus.frames import KINDS, End, Header, Kind, MalformedPayload, Message
+from pelorus.frames import KINDS, End, Header, Kind, Message
+from pelorus.layout import MalformedPayload
 
 VERSION_MAJOR = 1
 DELIMITER = b"\0"

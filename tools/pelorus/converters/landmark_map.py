@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from pelorus import foreign, wire
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Landmark, Role
-from pelorus.frames.filter import UNKNOWN_VARIANCE
+from pelorus.frames import UNKNOWN_VARIANCE, Header, Landmark, Role
+from pelorus.layout import pack_symmetric, unpack_symmetric
 from pelorus.motion import Times
-from pelorus.packed import pack_symmetric, unpack_symmetric
 from pelorus.recording import Recording
 from pelorus.se3 import Floats
 from pelorus.table import Table

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from pelorus.flight.log import Frame
-from pelorus.frames import Floats, Pose, Report
+from pelorus.frames import Pose, Report
+from pelorus.layout import Floats
 
 POSE_WORDS = {
     "t_ns": "time",

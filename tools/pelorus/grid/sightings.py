@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
+from pelorus.layout import unpack_symmetric
 from pelorus.motion import Times
-from pelorus.packed import unpack_symmetric
 from pelorus.se3 import Floats, Poses
 from pelorus.tracks import Indices
 

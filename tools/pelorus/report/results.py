@@ -15,8 +15,8 @@ from pelorus import wire
 from pelorus.errors import PelorusError
 from pelorus.evaluation import known_in
 from pelorus.frames import Header, Landmark, Message, Pose, Role, Truth
+from pelorus.layout import unpack_symmetric
 from pelorus.motion import Times
-from pelorus.packed import unpack_symmetric
 from pelorus.replay import Outputs, Programs, depth_limit_m, replay
 from pelorus.se3 import Floats, Poses
 from pelorus.trajectory import Trajectory, truth_of

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Floats, Kind, Message, State, StateAction, Stereo, Truth, Twist
+from pelorus.frames import Kind, Message, State, StateAction, Stereo, Truth, Twist
+from pelorus.layout import Floats
 
 Data = Twist | Truth | Stereo
 
