@@ -26,6 +26,18 @@ QUIET = Options(
     pixel_sigma_px=0.5,
 )
 
+PERFECT = Options(  # no noise, no bias, and every track lasts
+    pixel_sigma_px=0.0,
+    velocity_sigma_mps=0.0,
+    gyro_sigma_radps=0.0,
+    bias_velocity_sigma_mps=0.0,
+    bias_gyro_sigma_radps=0.0,
+    outliers=0.0,
+    drop=0.0,
+    loss=0.0,
+    duration_s=20.0,
+)
+
 
 @cache
 def clean(seed: int = 1, **changes: Any) -> Recording:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from converted import Run, messages_of
+from drives import PERFECT
 from pelorus import motion, se3, wire
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Kind, Landmark, Role, Stereo, TwistTiming
@@ -18,18 +19,6 @@ from pelorus.simulation import drive, scene
 from pelorus.simulation.simulate import Options, Simulation, simulate
 from pelorus.tracks import project
 from scipy.linalg import expm
-
-PERFECT = Options(
-    pixel_sigma_px=0.0,
-    velocity_sigma_mps=0.0,
-    gyro_sigma_radps=0.0,
-    bias_velocity_sigma_mps=0.0,
-    bias_gyro_sigma_radps=0.0,
-    outliers=0.0,
-    drop=0.0,
-    loss=0.0,
-    duration_s=20.0,
-)
 
 
 def exact_pixels(simulation: Simulation) -> Floats:

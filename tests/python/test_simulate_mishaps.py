@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import drives
 import numpy as np
 import pytest
 from converted import Run, messages_of
@@ -21,17 +22,7 @@ from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.tracks import triangulate
 
-PERFECT = Options(
-    duration_s=12.0,
-    pixel_sigma_px=0.0,
-    velocity_sigma_mps=0.0,
-    gyro_sigma_radps=0.0,
-    bias_velocity_sigma_mps=0.0,
-    bias_gyro_sigma_radps=0.0,
-    outliers=0.0,
-    drop=0.0,
-    keep_ids=True,
-)
+PERFECT = replace(drives.PERFECT, duration_s=12.0, loss=Options.loss, keep_ids=True)
 NOISY = Options(duration_s=6.0)
 
 

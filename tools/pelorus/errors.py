@@ -1,6 +1,30 @@
 # SPDX-License-Identifier: MIT
 """The one exception that the commands turn into a message and an exit status."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class PelorusError(Exception):
     """Says what is wrong, where, and what would be right."""
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Where the system does not let a file be written, say which and why."""
+    try:
+        yield
+    except OSError as error:
+        raise PelorusError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def made(folder: Path) -> Path:
+    """The folder, which is there from now on."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PelorusError(f"{folder}: cannot be made: {error.strerror}") from error
+    return folder

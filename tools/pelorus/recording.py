@@ -14,7 +14,7 @@ import numpy as np
 
 from pelorus import motion, packed_file, se3
 from pelorus.console import progress
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, writing
 from pelorus.frames import Header, Landmark, Message, Stereo, Text, Truth, Twist
 from pelorus.motion import Times
 from pelorus.se3 import Floats, Poses
@@ -104,15 +104,14 @@ class Recording:
         self._check(path)
         part = path.with_name(path.name + ".part")
         try:
-            with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
-                writer = Writer(stream)
-                for message in progress(self.messages(), "writing", len(self)):
-                    writer.write(message)
-                writer.end()
-            size = part.stat().st_size
-            part.replace(path)
-        except OSError as error:
-            raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
+            with writing(path):
+                with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
+                    writer = Writer(stream)
+                    for message in progress(self.messages(), "writing", len(self)):
+                        writer.write(message)
+                    writer.end()
+                size = part.stat().st_size
+                part.replace(path)
         finally:  # after a good end it has its own name
             with suppress(OSError):
                 part.unlink(missing_ok=True)

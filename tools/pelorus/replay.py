@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pelorus import packed_file
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, writing
 
 SOURCE_ROOT = Path(__file__).resolve().parents[3]
 USUAL_FOLDER = Path("build/bin")
@@ -71,11 +71,10 @@ def replay(
     stdout, stderr = _call(program, recording, [*options, *wanted])
     try:
         summary = json.loads(stdout)
-        outputs.summary.write_text(stdout, encoding="utf-8")
     except json.JSONDecodeError as error:
         raise PelorusError(f"{program}: its summary is no JSON: {error}") from error
-    except OSError as error:
-        raise PelorusError(f"{outputs.summary}: cannot be written: {error.strerror}") from error
+    with writing(outputs.summary):
+        outputs.summary.write_text(stdout, encoding="utf-8")
     return summary, [line for line in stderr.splitlines() if line.strip()]
 
 

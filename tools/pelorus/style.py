@@ -12,7 +12,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pelorus.errors import PelorusError
+from pelorus.errors import writing
 from pelorus.motion import Times
 from pelorus.se3 import Floats
 
@@ -103,8 +103,5 @@ def seconds(t_ns: Times, origin_ns: int) -> Floats:
 
 def save(draw: Callable[[], Figure], path: Path) -> None:
     """Draw and write a PNG."""
-    try:
-        with rc_context(LOOK):
-            draw().savefig(path, format="png", pil_kwargs={"optimize": True})
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with writing(path), rc_context(LOOK):
+        draw().savefig(path, format="png", pil_kwargs={"optimize": True})

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import foreign, kitti, packed_file, wire
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, writing
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Stereo, Truth
 from pelorus.motion import Times
@@ -63,10 +63,8 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
         f"{t // 10**9}.{t % 10**9:09d} " + " ".join(f"{x:.9f}" for x in (*p, *q))
         for t, p, q in zip(trajectory.t_ns.tolist(), trajectory.poses.p, quaternions, strict=True)
     ]
-    try:
+    with writing(path):
         path.write_text("\n".join(lines) + "\n", encoding="ascii")
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:

@@ -10,6 +10,13 @@ import typer
 
 from pelorus.frames import TwistTiming
 
+SETTINGS = typer.Option(
+    [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
+)
+PROGRAMS = typer.Option(
+    None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
+)
+
 
 class Fix(StrEnum):
     """Whether a converter mends what it finds."""

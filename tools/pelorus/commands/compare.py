@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 from rich.markup import escape
 
+from pelorus.commands.choices import PROGRAMS
 from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, Sizes
@@ -43,9 +44,7 @@ def compare(
         metavar="LOG.plr",
         help="A log of inputs and outputs: of `pelorus stream --record` or `pelorus-replay --out`.",
     ),
-    programs: Path | None = typer.Option(
-        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
-    ),
+    programs: Path | None = PROGRAMS,
     start: str | None = typer.Option(
         None,
         metavar="|".join(STARTS),

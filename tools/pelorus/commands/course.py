@@ -12,9 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus import road
-from pelorus.commands.choices import replay_options
+from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, made, writing
 from pelorus.packed_file import bare_name
 from pelorus.replay import find_programs
 from pelorus.report.results import Subject, read_subject
@@ -54,9 +54,7 @@ def course(
         help="Settings of dead reckoning and of Pelorus, not of the course's filter; once for all "
         "recordings, or once for each, in their order.",
     ),
-    settings: list[str] = typer.Option(
-        [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
-    ),
+    settings: list[str] = SETTINGS,
     changes: list[str] = typer.Option(
         [],
         "--course",
@@ -64,9 +62,7 @@ def course(
         help="Change the course's filter, to try its claims: gate=off, landmark-sigma=0.1, "
         "max-depth=60; repeatable.",
     ),
-    programs: Path | None = typer.Option(
-        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
-    ),
+    programs: Path | None = PROGRAMS,
 ) -> None:
     """Make the course report's figures and its comparison, from the recordings alone.
 
@@ -82,7 +78,11 @@ def course(
     found_programs = find_programs(programs)
     trials = [
         trial.carry_out_trial(
-            subject, reference, found_programs, trial.Options(ours, changed), _runs(folder, subject)
+            subject,
+            reference,
+            found_programs,
+            trial.Options(ours, changed),
+            made(folder / "runs" / bare_name(subject.path)),
         )
         for (subject, reference), ours in zip(pairs, options, strict=True)
     ]
@@ -136,15 +136,6 @@ def _references(
     return out_pairs
 
 
-def _runs(folder: Path, subject: Subject) -> Path:
-    runs = folder / "runs" / bare_name(subject.path)
-    try:
-        runs.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PelorusError(f"{runs}: cannot be made: {error.strerror}") from error
-    return runs
-
-
 def _publish(trials: list[Trial], folder: Path) -> None:
     from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.course import pictures, table  # noqa: PLC0415 - as above
@@ -152,10 +143,8 @@ def _publish(trials: list[Trial], folder: Path) -> None:
     text = table.markdown(trials)
     style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)
     style.save(lambda: pictures.figure_2(trials), folder / FIGURE_2)
-    try:
+    with writing(folder / TABLE):
         (folder / TABLE).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise PelorusError(f"{folder / TABLE}: cannot be written: {error.strerror}") from error
     shown = Table(box=None, pad_edge=False)
     for k, title in enumerate(table.TITLES[: -table.TRACES]):
         shown.add_column(title, justify="left" if k < 2 else "right", no_wrap=k < 2)

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from pelorus.commands.choices import replay_options
+from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.grid import files, occupancy
@@ -53,12 +53,8 @@ def map_(
     config: Path | None = typer.Option(
         None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
     ),
-    settings: list[str] = typer.Option(
-        [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
-    ),
-    programs: Path | None = typer.Option(
-        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
-    ),
+    settings: list[str] = SETTINGS,
+    programs: Path | None = PROGRAMS,
 ) -> None:
     """Draw the map of a drive: where it is free, where something stands.
 

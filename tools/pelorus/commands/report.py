@@ -10,9 +10,9 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import replay_options
+from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, progress
-from pelorus.errors import PelorusError
+from pelorus.errors import made
 from pelorus.replay import find_programs
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject
@@ -38,12 +38,8 @@ def report(
     config: Path | None = typer.Option(
         None, metavar="FILE", help="Settings of all runs but course, as pelorus-replay takes them."
     ),
-    settings: list[str] = typer.Option(
-        [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
-    ),
-    programs: Path | None = typer.Option(
-        None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
-    ),
+    settings: list[str] = SETTINGS,
+    programs: Path | None = PROGRAMS,
 ) -> None:
     """Replay a recording four ways, and draw what came out.
 
@@ -52,20 +48,12 @@ def report(
     """
     subject = read_subject(recording)
     plans = plan_runs(find_programs(programs), recording, replay_options(config, settings))
-    runs_folder = _made(folder / "runs")
+    runs_folder = made(folder / "runs")
     runs = [carry_out(plan, recording, runs_folder) for plan in progress(plans, "replaying")]
 
     from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
 
     _publish(Comparison(subject, runs), folder)
-
-
-def _made(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PelorusError(f"{folder}: cannot be made: {error.strerror}") from error
-    return folder
 
 
 def _publish(compared: Comparison, folder: Path) -> None:

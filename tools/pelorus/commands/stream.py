@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from pelorus import packed_file
 from pelorus.console import err, out
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, writing
 from pelorus.frames import Kind, Message, Pose
 from pelorus.robot.compare import Comparison, desktop_poses, digest, replay_program
 from pelorus.robot.emulator import MACHINES
@@ -156,10 +156,8 @@ def _log_file(path: Path | None) -> Iterator[BinaryIO | None]:
     if path is None:
         yield None
         return
-    try:
+    with writing(path):
         stream = packed_file.create(path, packed_file.is_packed(path), live=True)
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
     try:
         yield stream
     finally:

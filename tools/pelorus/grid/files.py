@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.errors import PelorusError
+from pelorus.errors import writing
 from pelorus.grid.occupancy import Band, Grid
 
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.25
@@ -76,13 +76,12 @@ def write(folder: Path, grid: Grid, draw: Callable[[Path], None]) -> None:
     }
     parts = {name: folder / f"{name}.part" for name in makers}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, make in makers.items():
-            make(parts[name])
-        for name, part in parts.items():
-            part.replace(folder / name)
-    except OSError as error:
-        raise PelorusError(f"{folder}: cannot be written: {error.strerror or error}") from error
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, make in makers.items():
+                make(parts[name])
+            for name, part in parts.items():
+                part.replace(folder / name)
     finally:
         for part in parts.values():
             if part.is_file():

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from pelorus.errors import PelorusError
+from pelorus.errors import writing
 from pelorus.report import words
 from pelorus.report.comparison import Comparison
 from pelorus.report.pictures import Picture
@@ -57,10 +57,8 @@ def write(
         _commands(compared.runs),
         "</body>\n</html>\n",
     ]
-    try:
+    with writing(path):
         path.write_text("\n".join(parts), encoding="utf-8")
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _facts(compared: Comparison) -> str:
