@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drives import with_turned_axes
-from pelorus import evaluation, kitti, road
+from pelorus import evaluation, road, trajectory
 from pelorus.converters import ece276a, matlab
 from pelorus.faults.mend import mend
 from pelorus.frames import BodyAxes, TwistTiming
@@ -71,7 +71,7 @@ def test_starry_night_has_none_of_the_faults(real: Callable[[str], Path]) -> Non
 
 
 def test_a_kitti_pose_file_reads_as_rigid_poses(real: Callable[[str], Path]) -> None:
-    poses = kitti.read_poses(real("truth/kitti-odometry-07.txt"))
+    poses = trajectory.read_kitti(real("truth/kitti-odometry-07.txt"))
     assert len(poses.p) == 1101
     assert np.allclose(poses.R @ np.swapaxes(poses.R, 1, 2), np.eye(3), atol=1e-12)
 

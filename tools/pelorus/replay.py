@@ -68,7 +68,7 @@ def replay(
         *("--trajectory", str(outputs.trajectory), "--frames", str(outputs.frames)),
         *("--out", str(outputs.log), "--json"),
     ]
-    stdout, stderr = _call(program, recording, [*options, *wanted])
+    stdout, stderr = run_program(program, recording, [*options, *wanted])
     try:
         summary = json.loads(stdout)
     except json.JSONDecodeError as error:
@@ -80,7 +80,7 @@ def replay(
 
 def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> float:
     """The max-depth that would be in force, 0 for none: the program knows its own config files."""
-    stdout, _ = _call(program, recording, [*options, "--print-config"])
+    stdout, _ = run_program(program, recording, [*options, "--print-config"])
     for line in stdout.splitlines():
         name, _, value = line.partition("=")
         if name.strip() == SETTINGS_MAX_DEPTH:
@@ -88,7 +88,8 @@ def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> flo
     raise PelorusError(f"{program}: --print-config names no {SETTINGS_MAX_DEPTH}")
 
 
-def _call(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, str]:
+def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple[str, str]:
+    """What it printed on both streams. PelorusError, with its words, where it did not end well."""
     name, unpacked = packed_file.for_program(recording)
     command = [str(program), name, *options]
     try:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import foreign, kitti, packed_file, wire
+from pelorus import foreign, packed_file, se3, wire
 from pelorus.errors import PelorusError, writing
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Stereo, Truth
@@ -104,13 +104,42 @@ def truth_of(path: Path) -> Trajectory:
     return Trajectory(t_ns, Poses(R, np.array([used[t].p_WB_m for t in t_ns.tolist()])))
 
 
+def read_kitti(path: Path) -> Poses:
+    """C_k, left camera k to world: a row of 12 numbers each, [R | p] row by row.
+
+    Rotations are re-orthonormalised: the files hold 7 digits.
+    """
+    rows = foreign.rows(path)
+    if len(rows[0].cells) != KITTI_COLUMNS:
+        raise ForeignFileError(
+            path,
+            f"has {len(rows[0].cells)} cells",
+            at=f"line {rows[0].line}",
+            due=f"{KITTI_COLUMNS} numbers are due ([R | p])",
+        )
+    numbers = foreign.numbers(path, rows, KITTI_COLUMNS)
+    matrices = numbers.reshape(-1, 3, 4)
+    R = matrices[:, :, :3]
+    off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    if off.max() > 1e-2:
+        at = f"line {rows[int(off.argmax())].line}"
+        raise ForeignFileError(path, "holds no rotation", at=at, due="[R | p] is due, row by row")
+    return Poses(se3.nearest_rotation(R), matrices[:, :, 3])
+
+
+def body_poses(camera_poses: Poses, T_CB: Poses) -> Poses:
+    """T_k = T_CB^-1 C_0^-1 C_k T_CB: the body's poses, the first one is the origin."""
+    from_first = se3.compose(se3.inverse(camera_poses.at(0)), camera_poses)
+    return se3.compose(se3.compose(se3.inverse(T_CB), from_first), T_CB)
+
+
 def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory:
-    poses = kitti.read_poses(path)
+    poses = read_kitti(path)
     if recording is not None:
         received, _ = wire.read_file(recording)
         header: Header = wire.header_of(received, recording)
         t_ns = np.array(sorted(_frame_times(received)), np.int64)
-        poses = kitti.body_poses(poses, Poses(header.R_CB, header.t_CB_m))
+        poses = body_poses(poses, Poses(header.R_CB, header.t_CB_m))
         whose = recording
     elif times is not None:
         t_ns = _times(times, foreign.rows(times))

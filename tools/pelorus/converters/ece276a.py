@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import arrays, kitti, se3
+from pelorus import arrays, se3, trajectory
 from pelorus.arrays import Arrays
 from pelorus.converters import twist_noise
 from pelorus.faults import axes, stale, timing
@@ -94,11 +94,11 @@ def _extrinsic(file: Arrays) -> Poses:
 
 def with_truth(recording: Recording, path: Path) -> Recording:
     """KITTI poses of the left camera; row k belongs to frame k. Fewer rows than frames are fine."""
-    poses = kitti.read_poses(path)
+    poses = trajectory.read_kitti(path)
     frames = len(recording.frame_t_ns)
     if len(poses.p) > frames:
         raise ForeignFileError(
             path, f"{len(poses.p)} poses for {frames} frames", due="at most one each is due"
         )
-    body = kitti.body_poses(poses, recording.T_CB)
+    body = trajectory.body_poses(poses, recording.T_CB)
     return recording.with_truth(recording.frame_t_ns[: len(poses.p)], body)

@@ -4,16 +4,14 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pelorus import packed_file
 from pelorus.errors import PelorusError
 from pelorus.frames import OBSERVATIONS_MAX, Kind, Message, Pose, Stereo
-from pelorus.robot.emulator import SOURCE_ROOT
+from pelorus.replay import SOURCE_ROOT, run_program
 from pelorus.wire import Writer, read_file
 
 REPLAYS = {4: Path("build/bin/pelorus-replay"), 8: Path("build/bin/pelorus-replay-f64")}
@@ -75,14 +73,7 @@ def desktop_log(recording: Path, program: Path, options: Sequence[str] = ()) -> 
     """Replay a recording on this machine: its inputs and what the filter answered."""
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         answers = Path(folder) / "answers.plr"
-        name, unpacked = packed_file.for_program(recording)
-        command = [str(program), name, "--quiet", *options, "--out", str(answers)]
-        try:
-            done = subprocess.run(command, input=unpacked, capture_output=True, check=False)
-        except OSError as error:
-            raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
-        if done.returncode != 0:
-            raise PelorusError(f"{program} failed on {recording}: {done.stderr.decode().strip()}")
+        run_program(program, recording, ["--quiet", *options, "--out", str(answers)])
         received, _ = read_file(answers)
     return [frame.message for frame in received]
 
