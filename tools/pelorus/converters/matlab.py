@@ -75,7 +75,8 @@ def _read(file: Arrays, twist_timing: TwistTiming) -> Recording:
         name=header_name(file.path.stem),
     )
     v, w = (_first(file, key, count) for key in ("v_vk_vk_i", "w_vk_vk_i"))
-    truth = Poses(Rotation.from_rotvec(rotation_vectors).as_matrix(), position)
+    turns = Rotation.from_rotvec(rotation_vectors.copy())  # which takes no read-only array
+    truth = Poses(turns.as_matrix(), position)
     return Recording(header, t_ns, v, w, t_ns, tracks, t_ns, truth)
 
 
