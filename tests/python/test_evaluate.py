@@ -13,7 +13,8 @@ from converted import Run, messages_of
 from drives import clean
 from pelorus import evaluation, road, se3
 from pelorus.frames import Header, Truth
-from pelorus.se3 import Floats, Poses
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory, read_truth, read_tum, write_tum
 from scipy.spatial.transform import Rotation
 

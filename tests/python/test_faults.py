@@ -18,8 +18,8 @@ from drives import (
 from pelorus.faults import axes, lever, stale, timing
 from pelorus.faults.mend import mend
 from pelorus.frames import BodyAxes, TwistTiming
+from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.se3 import Floats
 
 SEEDS = [1, 2]
 STALE = range(7, 590, 9)

@@ -14,7 +14,7 @@ from drives import PERFECT
 from pelorus import motion, se3, wire
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Kind, Landmark, Role, Stereo, TwistTiming
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 from pelorus.simulation import drive, scene
 from pelorus.simulation.simulate import Options, Simulation, simulate
 from pelorus.tracks import project

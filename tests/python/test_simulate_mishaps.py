@@ -14,8 +14,8 @@ from converted import Run, messages_of
 from pelorus import se3, wire
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Kind, Message, Stereo, Twist
+from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.se3 import Floats
 from pelorus.simulation import scene
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span

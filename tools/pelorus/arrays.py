@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pelorus import foreign
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Camera
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 
 ORTHOGONAL_TOLERANCE = 1e-3
 SECONDS_MAX = 9e9  # below 2^63 ns

@@ -12,7 +12,8 @@ from pelorus import arrays, foreign, se3
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import BodyAxes, Header, Noise, TwistTiming, header_name
-from pelorus.se3 import Floats, Poses
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
 
 CAMERA = ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m")
 OPTIONAL = ("image_width_px", "image_height_px", "body_axes", "twist_timing", "noise", "name")

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import Config, Landmark, Message, Role
-from pelorus.layout import unpack_symmetric
+from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory
 
 POSES_MIN = 3  # three points fix a rigid fit

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pelorus import matfile
 from pelorus.errors import PelorusError
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 
 TEXT_BYTES_MAX = 1 << 30
 JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred

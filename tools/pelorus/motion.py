@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from pelorus import se3
 from pelorus.frames import TwistTiming
-from pelorus.se3 import Floats, Poses
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
 
 Times = NDArray[np.int64]
 

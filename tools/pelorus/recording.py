@@ -16,8 +16,9 @@ from pelorus import motion, packed_file, se3
 from pelorus.console import progress
 from pelorus.errors import PelorusError, writing
 from pelorus.frames import Header, Landmark, Message, Stereo, Text, Truth, Twist
+from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 from pelorus.wire import Writer
 

@@ -19,7 +19,7 @@ from pelorus import foreign
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 
 ROAD_STEP_M = 1.0  # the road's points are interpolated to this spacing
 EVERY = 5  # one pose in five is compared

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-Floats = NDArray[np.float64]
+from pelorus.layout import Floats
 
 
 class Poses(NamedTuple):

@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pelorus.errors import writing
+from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.se3 import Floats
 
 RHO = "\N{GREEK SMALL LETTER RHO}"
 THETA = "\N{GREEK SMALL LETTER THETA}"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pelorus import arrays, foreign
 from pelorus.foreign import ForeignFileError
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 
 DIGITS_MAX = 19  # 2^63 has as many
 SHOWN_MAX = 40

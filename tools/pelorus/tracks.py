@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import OBSERVATIONS_MAX, Camera
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 
 Indices = NDArray[np.intp]
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.console import progress
 from pelorus.frames import Camera
-from pelorus.se3 import Floats, Poses
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
 from pelorus.tracks import Indices, Tracks, project, triangulate
 
 DISPARITY_MIN_PX = 1.0  # below it a triangulated depth means little

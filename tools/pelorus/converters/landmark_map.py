@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from pelorus import foreign, wire
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import UNKNOWN_VARIANCE, Header, Landmark, Role
-from pelorus.layout import pack_symmetric, unpack_symmetric
+from pelorus.layout import Floats, pack_symmetric, unpack_symmetric
 from pelorus.motion import Times
 from pelorus.recording import Recording
-from pelorus.se3 import Floats
 from pelorus.table import Table
 from pelorus.tracks import Tracks
 

@@ -22,8 +22,9 @@ from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
+from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 
 BY_AXIS = [name for name in vars(Noise()) if name.split("_")[2] in ("x", "y", "z")]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pelorus.course.trial import Trial
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 from pelorus.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
 
 NAMES = {

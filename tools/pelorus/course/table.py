@@ -10,8 +10,8 @@ import numpy as np
 from pelorus.course.pictures import NAMES
 from pelorus.course.trial import Trial
 from pelorus.evaluation import step_change
+from pelorus.layout import Floats
 from pelorus.report.words import NONE, number
-from pelorus.se3 import Floats
 
 TITLES = (
     "recording",

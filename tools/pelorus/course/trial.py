@@ -16,11 +16,12 @@ from pelorus.errors import PelorusError
 from pelorus.evaluation import Figures
 from pelorus.grid import plane
 from pelorus.grid.sightings import sightings
+from pelorus.layout import Floats
 from pelorus.replay import Programs
 from pelorus.report.comparison import COURSE, Comparison, Traces
 from pelorus.report.results import Run, Subject, carry_out, plan_runs
 from pelorus.road import RoadFit
-from pelorus.se3 import Floats, apply
+from pelorus.se3 import apply
 
 RUNS = ("dead-reckoning", "course", "body")
 SKIP_M = 45.0  # the digitised road begins later than the drive

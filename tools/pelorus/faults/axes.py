@@ -16,8 +16,9 @@ from pelorus import se3
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
 from pelorus.frames import BodyAxes
+from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.visual_motion import SeenPairs, seen_pairs
 
 LAG = 5

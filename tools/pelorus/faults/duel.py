@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 
 TOO_FEW = "too few common tracks to judge"
 

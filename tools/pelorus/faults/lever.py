@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from pelorus import visual_motion
 from pelorus.faults.finding import Finding
 from pelorus.frames import TwistTiming
+from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
 
 LAG = 3

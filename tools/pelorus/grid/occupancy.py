@@ -30,7 +30,7 @@ from pelorus.frames import BodyAxes
 from pelorus.grid import plane
 from pelorus.grid.plane import Plane
 from pelorus.grid.sightings import Sightings
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 from pelorus.tracks import Indices
 
 FREE, FREE_MOST = 0.45, 2.0

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus.frames import BodyAxes
-from pelorus.se3 import Floats, Poses
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
 
 AXES = "xyz"
 # The axes to the right and up of a picture whose viewer looks down on the axis named: right x up

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.errors import PelorusError
 from pelorus.frames import BodyAxes, Header, Landmark, Message, Pose, Role, Stereo
-from pelorus.layout import unpack_symmetric
+from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.tracks import Indices
 
 SIGMA_LEAST_M = 0.01  # nobody knows a point better: the frames round, the corner of a house is none

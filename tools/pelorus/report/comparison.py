@@ -29,9 +29,9 @@ from pelorus.evaluation import Accuracy, MapFigures, assess
 from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
+from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.report.results import DIAGONAL, Run, Subject
-from pelorus.se3 import Floats
 
 PRIOR_VARIANCE_M2 = 2.0  # Sigma_m of the report, an axis
 MIN_DISPARITY, LANDMARK_SIGMA = 17, 22  # the settings' ids

@@ -14,10 +14,10 @@ from scipy.stats import chi2
 
 from pelorus.grid import picture
 from pelorus.grid.files import heights
+from pelorus.layout import Floats
 from pelorus.report import top_view
 from pelorus.report.comparison import COURSE, MAIN, Comparison
 from pelorus.report.results import POSE_SIZE, Run
-from pelorus.se3 import Floats
 from pelorus.style import (
     BLACK,
     BLUE,

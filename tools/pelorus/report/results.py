@@ -15,10 +15,10 @@ from pelorus import wire
 from pelorus.errors import PelorusError
 from pelorus.evaluation import known_in
 from pelorus.frames import Header, Landmark, Message, Pose, Role, Truth
-from pelorus.layout import unpack_symmetric
+from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
 from pelorus.replay import Outputs, Programs, depth_limit_m, replay
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory, truth_of
 
 

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from pelorus import se3
 from pelorus.grid import plane
 from pelorus.grid.plane import Plane
+from pelorus.layout import Floats
 from pelorus.report.comparison import MAIN, Comparison
-from pelorus.se3 import Floats
 from pelorus.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 
 MARGIN = 0.15  # of the larger side

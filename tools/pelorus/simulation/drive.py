@@ -9,8 +9,9 @@ import numpy as np
 
 from pelorus import motion
 from pelorus.frames import TwistTiming
+from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 
 SERIES_TERMS = 9  # of the exponential map: exact to rounding up to 1 rad a step
 TURN_MAX_RAD = 1.0

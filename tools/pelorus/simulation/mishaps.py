@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.frames import Camera
+from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.simulation import settings
 from pelorus.simulation.drive import rotate
 from pelorus.simulation.settings import (

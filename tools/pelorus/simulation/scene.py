@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.frames import Camera
-from pelorus.se3 import Floats, Poses
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
 from pelorus.simulation.drive import rotate
 
 CAMERA = Camera(fx_px=420.0, fy_px=420.0, cx_px=320.0, cy_px=240.0, baseline_m=0.2)

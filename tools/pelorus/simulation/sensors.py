@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.se3 import Floats
+from pelorus.layout import Floats
 from pelorus.simulation.scene import IMAGE_PX, View
 
 OUTLIER_DISPARITY_MAX_PX = 60.0

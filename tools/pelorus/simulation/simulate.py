@@ -19,9 +19,10 @@ from pelorus.frames import (
     TwistTiming,
     header_name,
 )
+from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
-from pelorus.se3 import Floats, Poses
+from pelorus.se3 import Poses
 from pelorus.simulation import scene, sensors, settings
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
 from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
