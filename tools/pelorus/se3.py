@@ -2,7 +2,7 @@
 """Rigid motions in float64, one or a stack of them.
 
 A pose is a pair (R, p), in metres: the very numbers that a file has and that the simulator made.
-scipy's RigidTransform would round them, for it passes through quaternions; Exp and Log of SE(3) are
+scipy's RigidTransform changes four of five rotations in the last bit. Exp and Log of SE(3) are
 its own (Barfoot, State Estimation for Robotics, chapter 7). Twists are (rho, theta), metres and
 radians.
 """
