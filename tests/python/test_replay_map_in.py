@@ -146,7 +146,9 @@ def test_a_map_that_cannot_be_is_refused(
 
 def test_a_landmark_whose_place_is_not_known_is_left_out(record: Record, tmp_path: Path) -> None:
     """As one at max-range, whose inverse range may be zero: its sigma is thousands of km."""
-    far = replace(known()[0], id=9999, p_W_m=np.array([1e5, 0, 0]), covariance=1e13 * ROUND)
+    first = known()[0]
+    assert isinstance(first, Landmark)
+    far = replace(first, id=9999, p_W_m=np.array([1e5, 0, 0]), covariance=1e13 * ROUND)
     path = record([header(), *known(), far]).rename(tmp_path / "map.plr")
     plain = record([header(), *known()]).rename(tmp_path / "plain.plr")
     result = run(record(drive()), *LOCALIZE, "--map-in", path, "--json")
