@@ -85,7 +85,7 @@ def with_stale_tracks(recording: Recording, frames: range) -> tuple[Recording, i
         noise = tracks.pixels[later] - np.round(tracks.pixels[later])  # some, and always the same
         pixels[later] = project(camera, q) + noise
         pixels[now] = old
-    return replace(recording, tracks=tracks.with_pixels(pixels)), repeated
+    return replace(recording, tracks=replace(tracks, pixels=pixels)), repeated
 
 
 def at_rest(frames: int = 80) -> Recording:

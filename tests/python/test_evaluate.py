@@ -15,7 +15,7 @@ from pelorus import evaluation, road, se3
 from pelorus.frames import Header, Truth
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
-from pelorus.trajectory import Trajectory, read_truth, read_tum, write_tum
+from pelorus.trajectory import read_truth, read_tum
 from scipy.spatial.transform import Rotation
 
 COUNT = 200
@@ -43,7 +43,13 @@ def moved(T: Poses, by: Poses) -> Poses:
 
 
 def save(path: Path, poses: Poses, t_ns: Any = TIMES) -> Path:
-    write_tum(path, Trajectory(np.asarray(t_ns), poses))
+    """As pelorus-replay --trajectory writes it, with nine decimals."""
+    q = Rotation.from_matrix(poses.R).as_quat()
+    rows = zip(np.asarray(t_ns).tolist(), np.hstack((poses.p, q)).tolist(), strict=True)
+    lines = [
+        f"{t // 10**9}.{t % 10**9:09d} " + " ".join(f"{x:.9f}" for x in row) for t, row in rows
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
     return path
 
 

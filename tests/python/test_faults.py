@@ -84,7 +84,7 @@ def test_a_track_that_repeats_alone_is_no_stale_frame() -> None:
     half = pairs.second[::2]
     pixels = tracks.pixels.copy()
     pixels[half] = pixels[pairs.first[::2]]
-    _, finding = stale.mend(replace(recording, tracks=tracks.with_pixels(pixels)))
+    _, finding = stale.mend(replace(recording, tracks=replace(tracks, pixels=pixels)))
     assert not finding.found
     assert "single repeats" in finding.evidence
 

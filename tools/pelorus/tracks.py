@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -71,9 +71,6 @@ class Tracks:
 
     def with_ids(self, id: NDArray[np.int64]) -> Tracks:
         return self.from_rows(self.frame_count, self.frame, id, self.pixels)
-
-    def with_pixels(self, pixels: Floats) -> Tracks:
-        return replace(self, pixels=pixels)
 
     def counts(self) -> NDArray[np.int64]:
         """Observations of each frame."""

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import foreign, packed_file, se3, wire
-from pelorus.errors import PelorusError, writing
+from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Stereo, Truth
 from pelorus.motion import Times
@@ -54,17 +54,6 @@ def read_tum(path: Path) -> Trajectory:
             path, "the quaternion's norm is not 1", at=f"line {rows[wrong[0]].line}"
         )
     return Trajectory(t_ns, Poses(Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3]))
-
-
-def write_tum(path: Path, trajectory: Trajectory) -> None:
-    """Nine decimals of a second, so that times survive."""
-    quaternions = Rotation.from_matrix(trajectory.poses.R).as_quat()
-    lines = [
-        f"{t // 10**9}.{t % 10**9:09d} " + " ".join(f"{x:.9f}" for x in (*p, *q))
-        for t, p, q in zip(trajectory.t_ns.tolist(), trajectory.poses.p, quaternions, strict=True)
-    ]
-    with writing(path):
-        path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:
