@@ -68,7 +68,7 @@ sys.exit(main({arguments!r}))
 """
 
 
-@pytest.mark.parametrize("command", SUBCOMMANDS, ids=" ".join)
+@pytest.mark.parametrize("command", [(), *SUBCOMMANDS], ids=" ".join)
 def test_every_command_starts_where_there_is_no_termios(command: tuple[str, ...]) -> None:
     program = BLOCKED.format(names=NOT_ON_WINDOWS, arguments=[*command, "--help"])
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
