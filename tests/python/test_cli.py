@@ -64,16 +64,17 @@ import sys
 for name in {names!r}:
     sys.modules[name] = None  # importing it raises ImportError, as where there is none
 from pelorus.cli import main
-sys.exit(main({arguments!r}))
+for command in {commands!r}:
+    assert main([*command, "--help"]) == 0, command
 """
 
 
-@pytest.mark.parametrize("command", [(), *SUBCOMMANDS], ids=" ".join)
-def test_every_command_starts_where_there_is_no_termios(command: tuple[str, ...]) -> None:
-    program = BLOCKED.format(names=NOT_ON_WINDOWS, arguments=[*command, "--help"])
+def test_every_command_starts_where_there_is_no_termios() -> None:
+    program = BLOCKED.format(names=NOT_ON_WINDOWS, commands=[(), *SUBCOMMANDS])
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode()
-    assert f"pelorus {' '.join(command)}" in done.stdout.decode()
+    for command in SUBCOMMANDS:
+        assert f"Usage: pelorus {' '.join(command)} " in done.stdout.decode()
 
 
 def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> None:
