@@ -48,16 +48,17 @@ def _environment() -> Path | None:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What one run writes: runs/NAME.tum, .csv, .plr, .json."""
+    """What one run writes: runs/NAME.tum, .csv, .ply, .plr, .json."""
 
     trajectory: Path
     frames: Path
+    map: Path  # to be looked at: what is computed with comes from the log
     log: Path
     summary: Path
 
     @classmethod
     def named(cls, folder: Path, name: str) -> Outputs:
-        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "plr", "json")))
+        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "ply", "plr", "json")))
 
 
 def replay(
@@ -66,7 +67,7 @@ def replay(
     """Run the filter; its summary, and what it had to say on the way."""
     wanted = [
         *("--trajectory", str(outputs.trajectory), "--frames", str(outputs.frames)),
-        *("--out", str(outputs.log), "--json"),
+        *("--map", str(outputs.map), "--out", str(outputs.log), "--json"),
     ]
     stdout, stderr = run_program(program, recording, [*options, *wanted])
     try:
