@@ -129,7 +129,8 @@ typedef struct plr_noise {
     plr_real Lambda[21 + PLR_KERNEL_MARGIN];                    /* 6x6, packed upper triangle */
     plr_real eta[PLR_POSE_DIM];
     plr_real z[PLR_POSE_DIM];           /* the value of nu at which the motion was linearised */
-    plr_real closer[PLR_MAX_LANDMARKS]; /* expected change of each slot's inverse range, 1/m */
+    plr_real spread[PLR_POSE_DIM];      /* variances of the motion's own six numbers; 0: known */
+    plr_real closer[PLR_MAX_LANDMARKS]; /* from each inverse range to where it is linearised, 1/m */
     uint8_t open;                       /* 1: W belongs to the covariance and is not in P yet */
 } plr_noise;
 

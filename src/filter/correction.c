@@ -139,8 +139,10 @@ static bool is_sane(const plr_filter *f, unsigned n) {
 plr_correction plr_correct(plr_filter *f, const plr_observation *observations, unsigned count) {
     plr_correction result = {0};
     const unsigned n = plr_covariance_dim(f);
-    if (!f->work.noise.open)
+    if (!f->work.noise.open) { /* no motion has been applied */
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
+        memset(f->work.noise.spread, 0, sizeof f->work.noise.spread);
+    }
     unsigned blocks = (count + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
     for (; blocks > 0 && !f->diverged; blocks--) {
         plr_block block; /* not initialised: that would cost as much as a row of S */

@@ -103,6 +103,11 @@ void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9
     get_block(f, s, 3, s, 3, P_ll);
 }
 
+plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot) {
+    const unsigned row = plr_covariance_row(f, slot) + 2;
+    return f->P[plr_packed_at(row, row)];
+}
+
 double plr_covariance_trace(const plr_filter *f) {
     const unsigned n = plr_covariance_dim(f);
     double trace = 0;

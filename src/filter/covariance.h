@@ -44,6 +44,9 @@ void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_p
 /* A landmark's own block, 3x3. */
 void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]);
 
+/* The variance of a landmark's third number: in `body` its inverse range. */
+plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot);
+
 double plr_covariance_trace(const plr_filter *f);
 
 /* False if a variance is negative or not finite. */

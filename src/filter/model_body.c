@@ -108,23 +108,26 @@ static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size
     }
 }
 
-/* Moves a landmark along its ray to where the frame's observation is about to put it; what follows is
- * linearised there. Returns what is left between that point and the estimate, as inverse range: the
- * state's correction begins with it. */
+/* Moves a landmark along its ray to where it is linearised (vantage.h). The estimate stays what it was:
+ * returns how far it is from that point, as inverse range. */
 static plr_real bring_closer(plr_filter *f, unsigned slot) {
     plr_slot *s = &f->slots[slot];
     const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
     const plr_real wanted = s->beyond + f->work.noise.closer[slot];
     plr_real ratio = PLR_FMA(wanted, range, PLR_R(1)); /* of inverse ranges */
     const plr_real farthest = f->par.min_inverse_range * range;
-    ratio = ratio < PLR_R(0.5) ? PLR_R(0.5) : ratio > PLR_R(2) ? PLR_R(2) : ratio;
     ratio = ratio < farthest ? farthest : ratio > nearest ? nearest : ratio;
     const plr_real step = (PLR_R(1) - ratio) / ratio;
     for (int i = 0; i < 3; i++)
         s->x[i] = PLR_FMA(step, s->x[i], s->x[i]);
-    const plr_real left = s->beyond - (ratio - PLR_R(1)) / range;
-    s->beyond = 0;
-    return left;
+    return s->beyond - (ratio - PLR_R(1)) / range;
+}
+
+/* The variances of J n, which limit what the landmarks may have moved together (common_motion). */
+static void note_spread(plr_filter *f, const plr_real JL[36]) {
+    for (unsigned k = 0; k < 6; k++)
+        f->work.noise.spread[k] =
+            plr_dot3(JL + 6 * k, JL + 6 * k) + plr_dot3(JL + 6 * k + 3, JL + 6 * k + 3);
 }
 
 static unsigned body_retract(plr_filter *f, const plr_real *dx);
@@ -146,10 +149,12 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
         keep_off(s->x);
         plr_polar_at(&to, s->x);
         carry_chart(F + 9 * slot, &to, R, p, &from);
-        for (unsigned i = 0; i < 3; i++)
+        for (unsigned i = 0; i < 2; i++)
             f->work.dx[plr_covariance_row(f, slot) + i] = left * F[9 * slot + 3 * i + 2];
+        s->beyond = left * F[9 * slot + 8];
     }
     plr_real A[36];
+    note_spread(f, motion->JL);
     plr_se3_rotation(R, motion->E);
     plr_se3_adjoint_inverse(A, R, motion->p);
     plr_covariance_transport(f, A, F);
@@ -251,6 +256,7 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
 static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J, plr_real eta[6]) {
     const plr_real baseline = f->par.camera.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
+    const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
     plr_rigid_fit fit;
     plr_rigid_fit_clear(&fit);
     for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
@@ -260,7 +266,7 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J, 
         if (!f->slots[slot].known)
             plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
     }
-    plr_rigid_fit_solve(&fit, dx, eta);
+    plr_rigid_fit_solve(&fit, dx, f->work.noise.spread, angle2, eta);
 }
 
 /*
@@ -290,7 +296,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
                 w[i] = PLR_FMA(-J[6 * i + k], eta[k], w[i]);
-        w[2] += s->beyond; /* 0 where the motion has taken it in */
+        w[2] += s->beyond;
         cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_se3_move_back(s->x, E_C, p_C);
         plr_polar_at(&to, s->x);

@@ -7,6 +7,7 @@
 #include "filter/search.h"
 #include "filter/slots.h"
 #include "filter/tracks.h"
+#include "filter/vantage.h"
 #include "linalg/dense.h"
 #include "linalg/small.h"
 
@@ -247,10 +248,13 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     if (first->found)
         (void)plr_search_step(&best, U, dz);
     plr_motion_at(f, &s.prior, best.z, &first->motion);
+    const plr_real usual = plr_vantage_usual(f);
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);
-        if (accepted)
-            f->work.noise.closer[plr_search_slot(&s, i) - f->slots] = s.sightings[i].closer;
+        const plr_slot *slot = plr_search_slot(&s, i);
+        if (accepted && !slot->known)
+            f->work.noise.closer[slot - f->slots] =
+                plr_vantage_offset(slot, usual, s.sightings[i].closer, s.sightings[i].left);
     }
 }

@@ -2,7 +2,8 @@
 /*
  * What a frame's corrections of the landmarks have in common: the rigid motion eta, a twist of the
  * body, that minimises
- *     sum_i |w_i - J_i eta|^2_W + |eta - xi|^2_(s diag A),   A = sum_i J_i^T W J_i, s = 0.1:
+ *     sum_i |w_i - J_i eta|^2_W + |eta - xi|^2_(s diag A) + a sum_k eta_k^2 / spread_k,
+ *     A = sum_i J_i^T W J_i, s = 0.1:
  * w_i are the corrections in their charts, J_i says how a twist enters there, and W weighs the parts
  * as the image shows them. Where the landmarks say little, the correction xi of the pose decides, and
  * where none has a voice, xi alone.
@@ -19,6 +20,7 @@
 typedef struct plr_rigid_fit {
     plr_real A[21 + PLR_KERNEL_MARGIN]; /* 6x6, upper triangle packed row by row */
     plr_real b[6];                      /* sum_i J_i^T W w_i */
+    unsigned voices;
 } plr_rigid_fit;
 
 void plr_rigid_fit_clear(plr_rigid_fit *fit);
@@ -27,8 +29,9 @@ void plr_rigid_fit_clear(plr_rigid_fit *fit);
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[18], const plr_real w[3],
                        const plr_real W[3]);
 
-/* eta, 6; xi itself if A cannot be factorised or eta turns by more than a correction may. Spends the
- * fit. */
-void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], plr_real eta[6]);
+/* eta, 6; xi itself if no landmark has a voice, if A cannot be factorised, or if eta turns by more than a
+ * correction may. `noise` is a, what a unit of W scatters by. Spends the fit. */
+void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], const plr_real spread[6],
+                         plr_real noise, plr_real eta[6]);
 
 #endif

@@ -127,10 +127,12 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_solve3_transposed(6, S, at->a);
     plr_solve3_transposed(1, S, at->rho);
     at->closer = 0;
+    at->left = at->P[8];
     if (depends_on_observation(s->f, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->closer = plr_dot3(column, at->rho);
+        at->left -= plr_dot3(column, column);
     }
     memcpy(at->U[1 - s->bank], S, sizeof at->U[0]);
     return true;

@@ -18,6 +18,7 @@ typedef struct plr_sighting {
     plr_real a[18];     /* U^-T dz/dnu, 3x6, at the point evaluated last */
     plr_real rho[3];    /* U^-T r there */
     plr_real closer;    /* P J^T S^-1 r: by how much the observation changes its inverse range */
+    plr_real left;      /* the variance of the inverse range after that */
     plr_real weight;    /* Huber's: 1, and less for a large residual */
     plr_real cost;      /* Huber's rho at the best point */
     plr_real at_zero;   /* d^2 around the twists' prediction; negative: no place to linearise */

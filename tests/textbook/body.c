@@ -141,11 +141,11 @@ static void camera_back(const textbook *t, const double D[16], double back[16], 
     rigid_rotation(R_back, back);
 }
 
-/* Brings a landmark along its ray to where it is linearised. J is the stretch, e what that leaves of the
- * prior as an error of the point. */
-static void bring_closer(const textbook *t, textbook_landmark *l, double J[9], double e[3]) {
+/* Brings a landmark along its ray to where it is linearised; the estimate stays, beyond that point. J is
+ * the stretch. */
+static void bring_closer(const textbook *t, textbook_landmark *l, double J[9]) {
     const double r = norm3(l->x);
-    double ratio = fmin(2, fmax(0.5, 1 + (l->beyond + l->closer) * r)); /* of inverse ranges */
+    double ratio = 1 + (l->beyond + l->closer) * r; /* of inverse ranges */
     ratio = fmin(r / min_range, fmax(r / t->config.max_range_m, ratio));
     double along[3], moved[3];
     for (int k = 0; k < 3; k++)
@@ -153,8 +153,16 @@ static void bring_closer(const textbook *t, textbook_landmark *l, double J[9], d
     body_polar_step(l->x, along, moved, J);
     memcpy(l->x, moved, sizeof moved);
     l->beyond -= (ratio - 1) / r;
-    body_beyond(l, e);
-    l->beyond = 0;
+}
+
+/* Splits an error of a point into the part across its ray, which stays in e, and that along it, as an
+ * inverse range. */
+static void split_error(textbook_landmark *l, double e[3]) {
+    const double r = norm3(l->x);
+    const double along = (l->x[0] * e[0] + l->x[1] * e[1] + l->x[2] * e[2]) / r;
+    for (int k = 0; k < 3; k++)
+        e[k] -= along * l->x[k] / r;
+    l->beyond = -along / (r * r);
 }
 
 /* Landmarks along with a motion D of the body: `blocks` takes how their errors go, `correction` what
@@ -164,15 +172,16 @@ static void move_landmarks(textbook *t, const double D[16]) {
     camera_back(t, D, back, R_back);
     for (unsigned i = 0; i < t->count; i++) {
         textbook_landmark *l = &t->landmarks[i];
-        double J[9], e[3];
-        bring_closer(t, l, J, e);
+        double J[9], beyond[3], *e = t->correction + textbook_row(t, i);
+        bring_closer(t, l, J);
+        body_beyond(l, beyond);
         rigid_apply(l->x, back, l->x);
         const double range = norm3(l->x);
         for (int k = 0; range < min_range && k < 3; k++) /* the camera has run into it */
             l->x[k] = range > 0 ? l->x[k] * min_range / range : (k == 2 ? min_range : 0);
         square_multiply(3, R_back, J, t->blocks + 9 * (size_t)i);
-        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R_back, e, 0,
-                    t->correction + textbook_row(t, i));
+        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R_back, beyond, 0, e);
+        split_error(l, e);
     }
 }
 
@@ -186,6 +195,7 @@ static bool is_left(const textbook *t) {
 
 static void clear_correction(textbook *t) {
     memset(t->correction, 0, textbook_dim(t) * sizeof *t->correction);
+    memset(t->spread, 0, sizeof t->spread);
 }
 
 void body_move(textbook *t, const double D[16]) {
@@ -218,17 +228,20 @@ static void turn_shared(textbook *t, const double A[36]) {
  *   mean <- F mean - G n,  P <- F P F^T + F Cov(x, n) G^T + (...)^T + G L L^T G^T,  G = G_0 Jr(n). */
 static void apply_motion(textbook *t, const search_result *found) {
     const unsigned n = textbook_dim(t);
-    double motion[6], E[16], T[16], D[16], Jr[36], M[36], A[36], back[16], K[18];
+    double motion[6], E[16], T[16], D[16], Jr[36], M[36], JMJ[36], A[36], back[16], K[18];
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, found->L, found->z, 0, motion);
     oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, 6, 6, 6, 0.5, found->L, found->L, 0, M);
     rigid_exp(E, motion);
     rigid_right_jacobian(Jr, motion);
+    oracle_sandwich(6, 6, Jr, M, JMJ);
     square_multiply(4, t->T_WB, E, T);
     memcpy(t->T_WB, T, sizeof T);
     square_multiply(4, t->D, E, D);
     rigid_inverse(back, D);
     rigid_adjoint(A, back);
     clear_correction(t);
+    for (unsigned k = 0; k < 6; k++)
+        t->spread[k] = 2 * JMJ[7 * k];
     move_landmarks(t, D);
     memset(t->noise, 0, 6 * (size_t)n * sizeof *t->noise);
     memcpy(t->noise, Jr, sizeof Jr);
@@ -288,6 +301,7 @@ void body_settle(textbook *t) {
 void body_fit_add(const textbook *t, body_fit *fit, const double q[3], const double e[3]) {
     const double r2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2], baseline = t->camera.baseline_m;
     double K[18], W[9], WK[18];
+    fit->heard = true;
     for (unsigned k = 0; k < 9; k++) {
         const double along = q[k / 3] * q[k % 3] / r2; /* mu mu^T */
         W[k] = ((k % 4 == 0) - along) / r2 + baseline * baseline * along / (r2 * r2);
@@ -298,13 +312,14 @@ void body_fit_add(const textbook *t, body_fit *fit, const double q[3], const dou
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 1, 3, 1, WK, e, 1, fit->b);
 }
 
-void body_fit_solve(body_fit *fit, const double xi[6], double eta[6]) {
+void body_fit_solve(const textbook *t, body_fit *fit, const double xi[6], double eta[6]) {
+    const double angle = t->config.pixel_sigma_px / t->camera.fx_px;
     for (unsigned k = 0; k < 6; k++) {
         const double weight = 0.1 * fit->A[7 * k] + 1e-12;
         eta[k] = fit->b[k] + weight * xi[k];
-        fit->A[7 * k] += weight;
+        fit->A[7 * k] += weight + angle * angle / (t->spread[k] + 1e-20);
     }
-    if (!oracle_solve_spd(6, 1, fit->A, eta))
+    if (!fit->heard || !oracle_solve_spd(6, 1, fit->A, eta))
         memcpy(eta, xi, 6 * sizeof *eta);
 }
 
@@ -337,7 +352,7 @@ void body_retract(textbook *t) {
     for (unsigned i = 0; i < t->count; i++)
         if (!t->landmarks[i].known)
             body_fit_add(t, &fit, t->landmarks[i].x, d + textbook_row(t, i));
-    body_fit_solve(&fit, d, eta);
+    body_fit_solve(t, &fit, d, eta);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, t->Ad_CB, eta, 0, eta_C);
     rigid_exp(E, eta_C);
     rigid_inverse(back, E);

@@ -299,15 +299,16 @@ static double judge(const sight *at, const sum *best, bool found) {
 }
 
 /* -mu^T (P J^T S^-1 r) / r^2: the change of inverse range that the observation alone makes; none where
- * what is left uncertain of the range moves the disparity by little. */
-static double change_of_inverse_range(const textbook *t, const sight *at) {
+ * what is left uncertain of the range moves the disparity by little. `left` is its variance after that. */
+static double change_of_inverse_range(const textbook *t, const sight *at, double *left) {
     const double *q = t->landmarks[at->landmark].x;
     const double range2 = dot(q, q, 3), range = sqrt(range2);
     const double mu[3] = {q[0] / range, q[1] / range, q[2] / range};
-    double S[9], L_S[9], r[3], JP[9], moved[3], along[3], sideways[3];
+    double S[9], L_S[9], r[3], JP[9], moved[3], along[3], sideways[3], Jp[3];
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, at->J, mu, 0, along);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, at->P, mu, 0, sideways);
     const double disparity = along[0] - along[1];
+    *left = dot(mu, sideways, 3) / (range2 * range2);
     if (!(disparity * disparity * dot(mu, sideways, 3) >
           least_range_share * t->config.pixel_sigma_px * t->config.pixel_sigma_px))
         return 0;
@@ -316,9 +317,51 @@ static double change_of_inverse_range(const textbook *t, const sight *at) {
     (void)oracle_cholesky(3, L_S);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, L_S, at->rho, 0, r);
     (void)oracle_solve_spd(3, 1, S, r);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, at->J, sideways, 0, Jp);
+    oracle_solve_lower(3, 1, L_S, Jp);
+    *left -= dot(Jp, Jp, 3) / (range2 * range2);
     square_multiply(3, at->J, at->P, JP);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 3, 1, 3, 1, JP, r, 0, moved);
     return -dot(mu, moved, 3) / range2;
+}
+
+static double inverse_range(const textbook_landmark *l) {
+    return 1 / sqrt(dot(l->x, l->x, 3)) + l->beyond;
+}
+
+/* What inverse ranges usually are: u with u (u - mean) = 1 / sum w, mean = sum w / r / sum w and
+ * w = 1 / (variance + u^2), in three rounds, of which the first one has a single observation's variance
+ * for u^2. */
+static double usual_inverse_range(const textbook *t) {
+    const double by_range = t->camera.fx_px * t->camera.baseline_m / t->config.pixel_sigma_px;
+    const double least = 1 / t->config.max_range_m;
+    double usual = sqrt(least * least + 2 / (by_range * by_range));
+    for (int round = 0; round < 3; round++) {
+        double weights = 0, mean = 0;
+        for (unsigned i = 0; i < t->count; i++) {
+            const textbook_landmark *l = &t->landmarks[i];
+            const unsigned row = textbook_row(t, i);
+            double along2 = 0; /* variance along the ray, times the range squared */
+            for (unsigned k = 0; k < 9; k++)
+                along2 +=
+                    l->x[k / 3] * l->x[k % 3] * textbook_covariance(t, row + k / 3, row + k % 3);
+            const double weight = 1 / (along2 / pow(dot(l->x, l->x, 3), 3) + usual * usual);
+            weights += weight;
+            mean += weight * inverse_range(l);
+        }
+        mean /= weights;
+        usual = fmax(least, mean / 2 + sqrt(mean * mean / 4 + 1 / weights));
+    }
+    return usual;
+}
+
+/* From the estimate to where a landmark is linearised: as near to the usual inverse range as two sigmas
+ * about what the observation makes of the estimate allow. */
+static double way_to_vantage(const textbook *t, const sight *at, double usual) {
+    const textbook_landmark *l = &t->landmarks[at->landmark];
+    double left;
+    const double change = change_of_inverse_range(t, at, &left), sigmas = 2 * sqrt(fmax(0, left));
+    return l->known ? 0 : fmin(fmax(usual - inverse_range(l), change - sigmas), change + sigmas);
 }
 
 /* The squared norm of the four residuals at the point looked at last. */
@@ -390,6 +433,7 @@ void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
     if (voices > 0)
         descend(&s, &best);
     memcpy(result->z, best.z, sizeof result->z);
+    const double usual = usual_inverse_range(t);
     for (unsigned i = 0; i < s.count; i++) {
         const sight *at = &s.sights[i];
         textbook_landmark *l = &t->landmarks[at->landmark];
@@ -398,6 +442,6 @@ void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
         if (!isfinite(l->d2) || !observe_accepts(t, l->d2, l->norm2))
             continue;
         result->accepted++;
-        l->closer = change_of_inverse_range(t, at);
+        l->closer = way_to_vantage(t, at, usual);
     }
 }

@@ -4,7 +4,7 @@
  * (docs/MATH.md 10): the least of |z|^2 + sum rho(|residual|^2) over the motions D Exp(L z), by
  * Levenberg and Marquardt, with each landmark's own covariance. In double and in errors of points; an
  * observation is left out by adding up all the others. What it finds of each landmark that the frame
- * sees goes into the landmark: `closer`, by how much its inverse range is changed before (1/m), d2
+ * sees goes into the landmark: `closer`, from its inverse range to where it is linearised (1/m), d2
  * without what the rows of an image differ by, and norm2, the squared residual.
  */
 #ifndef PELORUS_TEXTBOOK_SEARCH_H

@@ -66,6 +66,7 @@ typedef struct textbook {
     double *pose, *own; /* rows of P, whole: the pose's six and one landmark's three */
     double *S, *innovation, *correction;
     double *noise, *shared; /* `body`: n x 6 each */
+    double spread[6];       /* `body`: variances of the motion that this frame has applied */
     double *blocks;         /* `body`: 3x3 a landmark */
     unsigned *matched;      /* landmark of each observation, count where there is none */
     struct textbook_sighting *sightings; /* `body`: most_seen (search.h) */

@@ -12,6 +12,9 @@
 enum { RUNS = 200, MOST = 12 };
 
 static const plr_real W[3] = {1, 1, PLR_R(0.04)};
+/* Of the motion that the landmarks may share: anything, or close to nothing. */
+static const plr_real free_motion[6] = {1e9F, 1e9F, 1e9F, 1e9F, 1e9F, 1e9F}, no_motion[6];
+static const plr_real noise = PLR_R(1e-4); /* of w, squared */
 static rng chance;
 
 void setUp(void) {
@@ -29,7 +32,7 @@ static void draw(plr_real *x, double *same, size_t n, double sigma) {
 
 /* The normal equations in double. */
 static void solve_twin(unsigned count, double (*J)[18], double (*w)[3], const double *xi,
-                       double *eta) {
+                       const double *spread, double *eta) {
     double A[36] = {0}, b[6] = {0};
     for (unsigned i = 0; i < count; i++)
         for (unsigned row = 0; row < 3; row++)
@@ -42,7 +45,7 @@ static void solve_twin(unsigned count, double (*J)[18], double (*w)[3], const do
     for (unsigned k = 0; k < 6; k++) {
         const double weight = 0.1 * A[7 * k] + 1e-12;
         eta[k] = b[k] + weight * xi[k];
-        A[7 * k] += weight;
+        A[7 * k] += weight + (double)noise / (spread[k] + 1e-20);
     }
     TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, A, eta));
 }
@@ -50,8 +53,8 @@ static void solve_twin(unsigned count, double (*J)[18], double (*w)[3], const do
 static void test_it_solves_the_normal_equations(void) {
     for (int run = 0; run < RUNS; run++) {
         const unsigned count = 1 + rng_below(&chance, MOST);
-        double J[MOST][18], w[MOST][3], xi[6], expected[6], got[6];
-        plr_real J_real[18], w_real[3], xi_real[6], eta[6];
+        double J[MOST][18], w[MOST][3], xi[6], spread[6], expected[6], got[6];
+        plr_real J_real[18], w_real[3], xi_real[6], spread_real[6], eta[6];
         plr_rigid_fit fit;
         plr_rigid_fit_clear(&fit);
         for (unsigned i = 0; i < count; i++) {
@@ -60,8 +63,12 @@ static void test_it_solves_the_normal_equations(void) {
             plr_rigid_fit_add(&fit, J_real, w_real, W);
         }
         draw(xi_real, xi, 6, 0.1);
-        plr_rigid_fit_solve(&fit, xi_real, eta);
-        solve_twin(count, J, w, xi, expected);
+        for (int k = 0; k < 6; k++) {
+            spread_real[k] = PLR_R(1e-4) * (plr_real)rng_below(&chance, 10);
+            spread[k] = (double)spread_real[k];
+        }
+        plr_rigid_fit_solve(&fit, xi_real, spread_real, noise, eta);
+        solve_twin(count, J, w, xi, spread, expected);
         to_doubles(got, eta, 6);
         /* A tenth of the diagonal on top keeps the condition below some hundreds. */
         TEST_ASSERT_DOUBLE_WITHIN(3000 * REAL_EPSILON, 0, largest_difference(expected, got, 6));
@@ -84,7 +91,7 @@ static void test_what_all_have_in_common_with_the_pose_is_found_exactly(void) {
                     w[row] += J[6 * row + k] * xi[k];
             plr_rigid_fit_add(&fit, J, w, W);
         }
-        plr_rigid_fit_solve(&fit, xi, eta);
+        plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
         to_doubles(got, eta, 6);
         TEST_ASSERT_DOUBLE_WITHIN(1000 * REAL_EPSILON, 0, largest_difference(same, got, 6));
     }
@@ -102,10 +109,39 @@ static void test_landmarks_that_stay_outvote_the_pose(void) {
         draw(J, ignored, 18, 1);
         plr_rigid_fit_add(&fit, J, still, W);
     }
-    plr_rigid_fit_solve(&fit, xi, eta);
+    plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
     /* eta = (A + 0.1 diag A)^-1 0.1 diag A xi, and A is nearly diagonal */
     for (int k = 0; k < 6; k++)
         TEST_ASSERT_DOUBLE_WITHIN(0.2, 0, (double)eta[k] / 3);
+}
+
+/* Points so far away that a pixel's noise looks like metres: how far the body may have moved is known
+ * better than that. */
+static void test_far_points_do_not_move_further_together_than_the_body_may_have_moved(void) {
+    const plr_real xi[6] = {0}, narrow[6] = {1e-6F, 1e-6F, 1e-6F, 1e-6F, 1e-6F, 1e-6F};
+    double longest = 0;
+    for (int limited = 0; limited < 2; limited++) {
+        plr_real eta[6];
+        plr_rigid_fit fit;
+        plr_rigid_fit_clear(&fit);
+        for (unsigned i = 0; i < 20; i++) {
+            plr_real J[18] = {0}, w[3];
+            double ignored[6];
+            draw(J, ignored, 3, 0.005); /* inverse ranges */
+            draw(J + 6, ignored, 3, 0.005);
+            draw(J + 3, ignored, 3, 1);
+            draw(J + 9, ignored, 3, 1);
+            draw(w, ignored, 3, 0.01);
+            plr_rigid_fit_add(&fit, J, w, W);
+        }
+        plr_rigid_fit_solve(&fit, xi, limited ? narrow : free_motion, noise, eta);
+        const double way = sqrt((double)(eta[0] * eta[0] + eta[1] * eta[1] + eta[2] * eta[2]));
+        if (limited)
+            TEST_ASSERT_LESS_THAN_DOUBLE(1e-3, way); /* its sigma */
+        else
+            longest = way;
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.1, longest);
 }
 
 static void test_without_landmarks_and_after_an_accident_it_is_the_pose(void) {
@@ -113,7 +149,7 @@ static void test_without_landmarks_and_after_an_accident_it_is_the_pose(void) {
     plr_real eta[6], J[18] = {0};
     plr_rigid_fit fit;
     plr_rigid_fit_clear(&fit);
-    plr_rigid_fit_solve(&fit, xi, eta);
+    plr_rigid_fit_solve(&fit, xi, no_motion, noise, eta);
     for (int k = 0; k < 6; k++)
         TEST_ASSERT_DOUBLE_WITHIN(10 * REAL_EPSILON, (double)xi[k], (double)eta[k]);
 
@@ -121,11 +157,11 @@ static void test_without_landmarks_and_after_an_accident_it_is_the_pose(void) {
     J[3] = J[10] = J[17] = 1;
     plr_rigid_fit_clear(&fit);
     plr_rigid_fit_add(&fit, J, huge, W);
-    plr_rigid_fit_solve(&fit, xi, eta);
+    plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
     TEST_ASSERT_TRUE(same_bits(xi, eta, 6));
     plr_rigid_fit_clear(&fit);
     plr_rigid_fit_add(&fit, J, nothing, W);
-    plr_rigid_fit_solve(&fit, xi, eta);
+    plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
     TEST_ASSERT_TRUE(same_bits(xi, eta, 6));
 }
 
@@ -134,6 +170,7 @@ int main(void) {
     RUN_TEST(test_it_solves_the_normal_equations);
     RUN_TEST(test_what_all_have_in_common_with_the_pose_is_found_exactly);
     RUN_TEST(test_landmarks_that_stay_outvote_the_pose);
+    RUN_TEST(test_far_points_do_not_move_further_together_than_the_body_may_have_moved);
     RUN_TEST(test_without_landmarks_and_after_an_accident_it_is_the_pose);
     return UNITY_END();
 }

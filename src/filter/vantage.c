@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "filter/vantage.h"
+
+#include "filter/covariance.h"
+#include "linalg/small.h"
+
+enum { PASSES = 3 };
+
+/* So many sigmas an estimate may well be off. */
+#define WITHIN PLR_R(2)
+
+static plr_real inverse_range(const plr_slot *slot) {
+    return slot->beyond + PLR_R(1) / PLR_SQRT(plr_dot3(slot->x, slot->x));
+}
+
+/*
+ * mean = sum w_i / r_i / sum w_i with w_i = 1 / (P_i + spread): an inverse range is positive, and of what
+ * is positive and has the mean u the least is assumed if it scatters by u too, so spread = u^2, and u^2 is
+ * first taken to be what a single observation leaves of a landmark. The mean of noise may be negative:
+ * u (u - mean) = its variance, which is the mean itself where that is well above its sigma, and that sigma
+ * where the mean is zero.
+ */
+plr_real plr_vantage_usual(const plr_filter *f) {
+    const plr_real least = f->par.min_inverse_range;
+    const plr_real by_range = f->par.camera.fx * f->par.camera.baseline;
+    plr_real spread =
+        PLR_FMA(least, least, PLR_R(2) * f->par.pixel_variance / (by_range * by_range));
+    plr_real usual = least;
+    for (unsigned pass = 0; pass < PASSES && f->count > 0; pass++) {
+        plr_real weights = 0, sum = 0;
+        for (unsigned slot = 0; slot < f->count; slot++) {
+            const plr_real variance = plr_covariance_of_range(f, slot);
+            const plr_real weight = PLR_R(1) / ((variance > 0 ? variance : 0) + spread);
+            weights += weight;
+            sum = PLR_FMA(weight, inverse_range(&f->slots[slot]), sum);
+        }
+        const plr_real mean = sum / weights;
+        usual = PLR_R(0.5) * (mean + PLR_SQRT(PLR_FMA(mean, mean, PLR_R(4) / weights)));
+        usual = usual > least ? usual : least;
+        spread = usual * usual;
+    }
+    return usual;
+}
+
+plr_real plr_vantage_offset(const plr_slot *slot, plr_real usual, plr_real change,
+                            plr_real variance) {
+    const plr_real known_to = variance > 0 ? WITHIN * PLR_SQRT(variance) : 0;
+    const plr_real off = usual - inverse_range(slot);
+    if (off < change - known_to)
+        return change - known_to;
+    return off > change + known_to ? change + known_to : off;
+}
