@@ -149,8 +149,10 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
         keep_off(s->x);
         plr_polar_at(&to, s->x);
         carry_chart(F + 9 * slot, &to, R, p, &from);
-        for (unsigned i = 0; i < 2; i++)
-            f->work.dx[plr_covariance_row(f, slot) + i] = left * F[9 * slot + 3 * i + 2];
+        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
+        dx[0] = left * F[9 * slot + 2];
+        dx[1] = left * F[9 * slot + 5];
+        dx[2] = 0;
         s->beyond = left * F[9 * slot + 8];
     }
     plr_real A[36];

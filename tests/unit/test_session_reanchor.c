@@ -146,7 +146,8 @@ static void check_jump(double to_s) {
         const double speed = i < 3 ? 1 + 0.1 : 0.2 + 0.01; /* m/s, rad/s: true and sigma */
         const double limit = i < 3 ? 1e6 : 3.2898681336964528;
         const double expected = before[i] + fmin(pow(speed * gap, 2), limit);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-3 * expected, expected, after[i]);
+        /* it goes by its own speed, which is right to 2 mm/s of 1.1 m/s */
+        TEST_ASSERT_DOUBLE_WITHIN(4e-3 * expected, expected, after[i]);
     }
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_LANDMARK, &answer));
     TEST_ASSERT_EQUAL_UINT8(PLR_LANDMARK_EVICTED, answer.as.landmark.role);
