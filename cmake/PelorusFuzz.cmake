@@ -29,11 +29,12 @@ endif()
 # little room: evicting and refusing for want of it are within reach of short inputs, and runs are
 # fast.
 function(pelorus_fuzz_program name)
-  add_executable(${name} "${PROJECT_SOURCE_DIR}/tests/fuzz/${name}.c" ${PELORUS_SOURCES})
+  add_executable(${name} "${PROJECT_SOURCE_DIR}/tests/fuzz/${name}.c"
+    "${PROJECT_SOURCE_DIR}/tests/support/assertions.c" ${PELORUS_SOURCES})
   target_include_directories(${name} PRIVATE
     "${PROJECT_SOURCE_DIR}/include" "${PROJECT_SOURCE_DIR}/src" "${PROJECT_SOURCE_DIR}/tests")
   target_compile_definitions(${name} PRIVATE
-    PLR_REAL=32 PLR_MAX_LANDMARKS=12 PLR_MAX_OBSERVATIONS=32
+    PLR_ASSERTIONS=1 PLR_REAL=32 PLR_MAX_LANDMARKS=12 PLR_MAX_OBSERVATIONS=32
     PLR_BLOCK_OBSERVATIONS=${PLR_BLOCK_OBSERVATIONS} PLR_PORTABLE=$<BOOL:${PLR_PORTABLE}>)
   pelorus_arithmetic(${name})
   pelorus_warnings(${name})

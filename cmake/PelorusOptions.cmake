@@ -23,6 +23,9 @@ endif()
 set(PELORUS_ARCH "${pelorus_default_arch}" CACHE STRING
   "-march of the library: x86-64-v3, native, ...; empty: the compiler's; unused if PLR_PORTABLE")
 
+option(PLR_ASSERTIONS "Every library checks its own assumptions, as the tests' libraries always do; the same bits"
+  OFF)
+
 # CMake 3.21's PROJECT_IS_TOP_LEVEL: inside another project only the library is wanted.
 option(PELORUS_BUILD_REPLAY "Build pelorus-replay" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_BUILD_TESTS "Build the tests and benches" ${PROJECT_IS_TOP_LEVEL})

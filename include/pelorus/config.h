@@ -5,7 +5,7 @@
  * Every value has a default here and can be set on the compiler's command line (CMake has options
  * of the same names). All translation units that share a filter must use the same values;
  * plr_filter_init and plr_session_init refuse a caller that was compiled with others. Preprocessor
- * conditions occur in this file alone.
+ * conditions occur here and in assertions.h alone.
  */
 #ifndef PELORUS_CONFIG_H
 #define PELORUS_CONFIG_H

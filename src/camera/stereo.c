@@ -3,8 +3,10 @@
 
 #include "lie/se3.h"
 #include "linalg/small.h"
+#include "pelorus/assertions.h"
 
 void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real q[3]) {
+    PLR_ASSERT(q[2] < 0 || q[2] > 0);
     const plr_real inverse = PLR_R(1) / q[2];
     z[0] = PLR_FMA(camera->fx * q[0], inverse, camera->cx);
     z[1] = PLR_FMA(camera->fx * (q[0] - camera->baseline), inverse, camera->cx);
@@ -12,6 +14,7 @@ void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real 
 }
 
 void plr_stereo_jacobian(plr_real Dz[9], const plr_camera *camera, const plr_real q[3]) {
+    PLR_ASSERT(q[2] < 0 || q[2] > 0);
     const plr_real inverse = PLR_R(1) / q[2];
     const plr_real fx = camera->fx * inverse, fy = camera->fy * inverse;
     const plr_real rows[9] = {
@@ -24,6 +27,7 @@ void plr_stereo_jacobian(plr_real Dz[9], const plr_camera *camera, const plr_rea
 
 void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *camera,
                              const plr_real z[3]) {
+    PLR_ASSERT(z[0] - z[1] > 0);
     const plr_real inverse = PLR_R(1) / (z[0] - z[1]);
     const plr_real scale = camera->baseline * inverse; /* m per px in x */
     const plr_real aspect = camera->fx / camera->fy;

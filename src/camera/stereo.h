@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 /*
- * The rectified stereo pair (course report III.1 to III.3), as pure functions.
+ * Projection of a rectified stereo pair (course report III.1 to III.3, docs/MATH.md 7). Every
+ * result depends on the arguments alone.
  *
  * A point q = (x, y, z) in the left camera (x right, y down, z forward) is seen at
  *   uL = fx x / z + cx,  uR = fx (x - baseline) / z + cx,  vL = vR = fy y / z + cy.
- * vL and vR carry the same information, so a filter uses three rows, in this order everywhere:
- *   (uL, uR, v) with v = (vL + vR) / 2, variances s^2, s^2, s^2 / 2. That is exact.
+ * vL and vR measure the same quantity, so the filter uses their mean. An observation has three
+ * rows, everywhere in this order: (uL, uR, v) with v = (vL + vR) / 2, and variances s^2, s^2, s^2 /
+ * 2 for a pixel sigma s. No information is lost by this.
  */
 #ifndef PLR_CAMERA_STEREO_H
 #define PLR_CAMERA_STEREO_H
@@ -29,7 +31,8 @@ void plr_camera_from_body(plr_real q[3], const plr_camera *camera, const plr_rea
 /* s = R_CB^T (q - t_CB): left camera to body. */
 void plr_camera_to_body(plr_real s[3], const plr_camera *camera, const plr_real q[3]);
 
-/* D_C = T_CB D T_CB^-1: the body's motion D = (I + E, p), as the camera makes it. */
+/* D_C = (I + E_C, p_C) = T_CB D T_CB^-1: the camera's motion while the body moves by D = (I + E,
+ * p). */
 void plr_camera_motion(plr_real E_C[9], plr_real p_C[3], const plr_camera *camera,
                        const plr_real E[9], const plr_real p[3]);
 

@@ -3,6 +3,7 @@
 
 #include "lie/so3.h"
 #include "linalg/small.h"
+#include "pelorus/assertions.h"
 
 /* Writes a 3x3 block of a 6x6 matrix. */
 static void put_block(plr_real A[36], int row, int column, const plr_real B[9]) {
@@ -106,6 +107,7 @@ void plr_se3_move_back(plr_real x[3], const plr_real E[9], const plr_real p[3]) 
 
 void plr_se3_inverse_point(plr_real y[3], const plr_real R[9], const plr_real p[3],
                            const plr_real x[3]) {
+    PLR_ASSERT(y != x);
     const plr_real offset[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
     plr_mat3_tvec(y, R, offset);
 }

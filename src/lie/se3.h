@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * SE(3), with tangent vectors xi = (rho, theta): translation first. A motion is a pair (R, p) that
- * brings x to R x + p. 6x6 matrices act on (rho, theta), row by row.
+ * Rigid motions, SE(3), with tangent vectors xi = (rho, theta): translation first, m and rad. A
+ * motion is a pair (R, p) that maps x to R x + p. 6x6 matrices act on (rho, theta) and are stored
+ * row by row.
  */
 #ifndef PLR_LIE_SE3_H
 #define PLR_LIE_SE3_H
@@ -11,7 +12,7 @@
 /* (R, p) = Exp(xi): p = (I + b [theta]x + c [theta]x^2) rho. Course report III.8. */
 void plr_se3_exp(plr_real R[9], plr_real p[3], const plr_real xi[6]);
 
-/* The same with E = R - I, to the relative precision of xi. */
+/* The same with E = R - I in place of R: see plr_so3_expm1. */
 void plr_se3_expm1(plr_real E[9], plr_real p[3], const plr_real xi[6]);
 
 /* Ad(T) = [R, [p]x R; 0, R]. */
@@ -31,8 +32,8 @@ void plr_se3_append(plr_real E[9], plr_real p[3], const plr_real dE[9], const pl
 /* R = I + E */
 void plr_se3_rotation(plr_real R[9], const plr_real E[9]);
 
-/* x <- T^-1 x = x + (E^T (x - p) - p) for T = (I + E, p): the point is rounded once, at the end, and a
- * small motion does not stretch what it moves. */
+/* x <- T^-1 x = x + (E^T (x - p) - p) for T = (I + E, p). The change is computed by itself and the
+ * point rounded only once, so that many small motions do not change its distance. */
 void plr_se3_move_back(plr_real x[3], const plr_real E[9], const plr_real p[3]);
 
 /* y = T^-1 x = R^T (x - p); y may not be x. */

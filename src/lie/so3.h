@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 /*
- * SO(3): the exponential and its Jacobians, by series of fixed length. No library function takes
- * part, so every target computes the same bits. Accurate to rounding for |theta| <= pi.
+ * Rotations, SO(3): the exponential and the coefficients of its Jacobians, by power series of fixed
+ * length. No function of a mathematics library is used, so every target computes the same bits.
+ * Accurate to rounding for |theta| <= pi rad.
  */
 #ifndef PLR_LIE_SO3_H
 #define PLR_LIE_SO3_H
 
 #include "pelorus/config.h"
 
-/* The coefficients that SO(3) and SE(3) share, as functions of t = |theta|. */
+/* The coefficients that the formulas of SO(3) and SE(3) need, as functions of t = |theta|. */
 typedef struct plr_so3_series {
     plr_real a; /* sin t / t */
     plr_real b; /* (1 - cos t) / t^2 */
@@ -23,15 +24,15 @@ void plr_so3_series_at(plr_so3_series *s, plr_real theta2);
 /* R = Exp(theta) = I + a [theta]x + b [theta]x^2 (Rodrigues). */
 void plr_so3_exp(plr_real R[9], const plr_real theta[3]);
 
-/* E = Exp(theta) - I, to the relative precision of theta: what a small turn changes is not rounded at
- * the size of 1. */
+/* E = Exp(theta) - I, with the relative precision of theta: for a small rotation, Exp(theta) itself
+ * would be rounded in units of 1. */
 void plr_so3_expm1(plr_real E[9], const plr_real theta[3]);
 
-/* E <- E' with I + E' = (I + E) (3 I - (I + E)^T (I + E)) / 2, in small numbers throughout. */
+/* plr_so3_orthonormalise of R = I + E, computed from the small numbers of E without forming R. */
 void plr_so3_orthonormalise_small(plr_real E[9]);
 
-/* R <- R (3 I - R^T R) / 2: one Newton step towards the nearest rotation. What a frame of rounding
- * has put wrong is squared away. */
+/* R <- R (3 I - R^T R) / 2: one Newton step towards the nearest rotation. It squares the error, so
+ * one step a frame removes what rounding has added. */
 void plr_so3_orthonormalise(plr_real R[9]);
 
 #endif

@@ -26,6 +26,7 @@ enum { STRIP = PLR_TILE_COLUMNS };
 static inline void reduce_strip(unsigned k, const plr_real *restrict U, unsigned i,
                                 const plr_real *restrict y, size_t down,
                                 const plr_real *restrict from, plr_real *restrict x) {
+    PLR_ASSERT(i > 0 && i < k);
     const plr_real *u = U + i; /* (0, i), then down the column */
     const plr_real first = -*u;
     plr_real sum[STRIP];
@@ -121,6 +122,7 @@ static void solve_column(unsigned k, const plr_real *restrict U, plr_real *X, si
 
 void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_real *X,
                                 size_t ldx) {
+    PLR_ASSERT(ldx >= n);
     unsigned j = 0;
     for (; j + STRIP <= n; j += STRIP)
         solve_strip(k, U, X + j, ldx);
@@ -139,6 +141,7 @@ void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x) {
 
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
                       const plr_real *restrict X, size_t ldx, plr_real *restrict x) {
+    PLR_ASSERT(ldx >= n || depth < 2);
     unsigned j = 0;
     for (; depth > 0 && j + STRIP <= n; j += STRIP) {
         const plr_real *restrict row = X + j;
@@ -159,6 +162,8 @@ void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
 
 void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
                             const plr_real *V, size_t ldv, plr_real *const X[4]) {
+    PLR_ASSERT(depth >= 2 && n % PLR_TILE_COLUMNS == 0);
+    PLR_ASSERT(lda >= 4 && ldv >= n);
     plr_tile_factors factors = {.U = A, .W = V, .to_next_U = lda, .to_next_W = ldv};
     for (unsigned j = 0; j < n; j += STRIP) {
         plr_real *const at[PLR_TILE_ROWS] = {X[0] + j, X[1] + j, X[2] + j, X[3] + j};

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
  * Dense matrices, row by row, with a leading dimension (elements from one row to the next).
- * Kernels are in axpy form: an accumulator starts at the element that it changes and k ascends, so
- * blocked, plain and vectorised code agree bit for bit.
+ * Every kernel adds the products for one element of the result in the same order: it starts with
+ * the element's old value and k ascends. Therefore blocked, plain and vectorised code agree bit for
+ * bit.
  */
 #ifndef PLR_LINALG_DENSE_H
 #define PLR_LINALG_DENSE_H
@@ -10,13 +11,15 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 
-/* C += A B. A is m x k, B is k x n, C is m x n and overlaps neither. Inlined, since nearly all uses
- * have small sizes that the compiler knows. */
+/* C += A B. A is m x k, B is k x n, C is m x n and overlaps neither. Inlined, because in
+ * nearly all uses the sizes are small constants. */
 static inline void plr_gemm_nn(unsigned m, unsigned n, unsigned k, const plr_real *restrict A,
                                size_t lda, const plr_real *restrict B, size_t ldb,
                                plr_real *restrict C, size_t ldc) {
+    PLR_ASSERT(lda >= k && ldb >= n && ldc >= n);
     for (unsigned i = 0; i < m; i++)
         for (unsigned l = 0; l < k; l++) {
             const plr_real a = A[i * lda + l];
@@ -29,6 +32,7 @@ static inline void plr_gemm_nn(unsigned m, unsigned n, unsigned k, const plr_rea
 static inline void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_real *restrict A,
                                size_t lda, const plr_real *restrict B, size_t ldb,
                                plr_real *restrict C, size_t ldc) {
+    PLR_ASSERT(lda >= k && ldb >= k && ldc >= n);
     for (unsigned i = 0; i < m; i++)
         for (unsigned j = 0; j < n; j++) {
             plr_real sum = C[i * ldc + j];
@@ -41,15 +45,16 @@ static inline void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_rea
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 
-/* Where (i, i) of an n x n matrix stands whose upper triangle is packed row by row: (0,0) (0,1) ...
- * (0,n-1) (1,1) ... */
+/* Index of element (i, i) of an n x n matrix whose upper triangle is packed row by row: (0,0) (0,1)
+ * ... (0,n-1) (1,1) ...; i <= n. */
 static inline size_t plr_upper_row(unsigned n, unsigned i) {
+    PLR_ASSERT(i <= n);
     return (size_t)i * n - (size_t)i * (i - 1U) / 2;
 }
 
-/* U^T U = S in place: the upper triangle of S, n x n, packed row by row. False, with S spoiled, if a
- * pivot is not a positive finite number. The memory behind S must be readable for PLR_KERNEL_MARGIN
- * elements. */
+/* Cholesky: replaces the upper triangle of S, n x n, packed row by row, by U with U^T U = S. False
+ * if a pivot is not a positive finite number; S is then destroyed. PLR_KERNEL_MARGIN elements after
+ * the end of S must be readable. */
 bool plr_cholesky_upper(unsigned n, plr_real *S);
 
 /* X <- U^-T X: U is k x k, packed upper; X is k x n with leading dimension ldx. */
@@ -62,9 +67,9 @@ void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x);
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, const plr_real *X, size_t ldx,
                       plr_real *x);
 
-/* X_r -= sum_k A(k, r) V_k for four rows X_r, r = 0 .. 3: V is depth x n with leading dimension ldv, A is
- * depth x 4 with leading dimension lda, depth >= 2, n a multiple of PLR_TILE_COLUMNS. Of each element the
- * steps are those of plr_combine_rows. */
+/* X_r -= sum_k A(k, r) V_k for four rows X_r of n elements, r = 0 .. 3: V is depth x n with leading
+ * dimension ldv, A is depth x 4 with leading dimension lda, depth >= 2, n a multiple of
+ * PLR_TILE_COLUMNS. Same order of operations, and so the same bits, as plr_combine_rows. */
 void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
                             const plr_real *V, size_t ldv, plr_real *const X[4]);
 

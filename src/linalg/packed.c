@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "linalg/tile.h"
+#include "pelorus/assertions.h"
 
 enum { ROWS = PLR_TILE_ROWS, COLUMNS = PLR_TILE_COLUMNS };
 
@@ -30,6 +31,7 @@ static void subtract_cut_tile(unsigned n, unsigned i, unsigned j, unsigned depth
 
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P) {
+    PLR_ASSERT(ld >= n);
     if (depth < 2) {
         plr_packed_subtract_plain(n, depth, Ut, Wt, ld, P);
         return;
@@ -54,6 +56,7 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
 
 void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *restrict Ut,
                                     size_t ld, const plr_real *restrict P, plr_real *restrict d) {
+    PLR_ASSERT(ld >= n);
     for (unsigned j = 0; j < n; j += COLUMNS) {
         const unsigned width = n - j < COLUMNS ? n - j : COLUMNS;
         plr_real sum[COLUMNS] = {0};

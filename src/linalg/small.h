@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * Vectors of 3 and matrices of 3x3, row by row. Everything is inlined: these are too small for a
- * call. Sums run from left to right in fused steps, so that every target computes the same bits.
+ * Vectors of 3 and matrices of 3x3, row by row. Everything is inlined, because a call would take
+ * longer than the work. Sums are written as fused multiply-adds in a fixed order, so that every
+ * target computes the same bits.
  */
 #ifndef PLR_LINALG_SMALL_H
 #define PLR_LINALG_SMALL_H
@@ -9,6 +10,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 
 /* a^T b */
@@ -30,6 +32,7 @@ static inline void plr_turn_of(plr_real turn[3], const plr_real E[9]) {
 
 /* c = a x b; c may not be a or b */
 static inline void plr_cross3(plr_real c[3], const plr_real a[3], const plr_real b[3]) {
+    PLR_ASSERT(c != a && c != b);
     c[0] = PLR_FMA(a[1], b[2], -(a[2] * b[1]));
     c[1] = PLR_FMA(a[2], b[0], -(a[0] * b[2]));
     c[2] = PLR_FMA(a[0], b[1], -(a[1] * b[0]));
@@ -37,30 +40,35 @@ static inline void plr_cross3(plr_real c[3], const plr_real a[3], const plr_real
 
 /* y = A x; y may not be x */
 static inline void plr_mat3_vec(plr_real y[3], const plr_real A[9], const plr_real x[3]) {
+    PLR_ASSERT(y != x);
     for (int i = 0; i < 3; i++)
         y[i] = plr_dot3(A + 3 * i, x);
 }
 
 /* y = A^T x; y may not be x */
 static inline void plr_mat3_tvec(plr_real y[3], const plr_real A[9], const plr_real x[3]) {
+    PLR_ASSERT(y != x);
     for (int i = 0; i < 3; i++)
         y[i] = PLR_FMA(A[6 + i], x[2], PLR_FMA(A[3 + i], x[1], A[i] * x[0]));
 }
 
 /* C = A B; C may not be A or B */
 static inline void plr_mat3_mul(plr_real C[9], const plr_real A[9], const plr_real B[9]) {
+    PLR_ASSERT(C != A && C != B);
     for (int i = 0; i < 3; i++)
         plr_mat3_tvec(C + 3 * i, B, A + 3 * i);
 }
 
 /* C = A B^T; C may not be A or B */
 static inline void plr_mat3_mul_nt(plr_real C[9], const plr_real A[9], const plr_real B[9]) {
+    PLR_ASSERT(C != A && C != B);
     for (int i = 0; i < 3; i++)
         plr_mat3_vec(C + 3 * i, B, A + 3 * i);
 }
 
 /* C = A^T B; C may not be A or B */
 static inline void plr_mat3_mul_tn(plr_real C[9], const plr_real A[9], const plr_real B[9]) {
+    PLR_ASSERT(C != A && C != B);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             C[3 * i + j] = PLR_FMA(A[6 + i], B[6 + j], PLR_FMA(A[3 + i], B[3 + j], A[i] * B[j]));
@@ -68,6 +76,7 @@ static inline void plr_mat3_mul_tn(plr_real C[9], const plr_real A[9], const plr
 
 /* T = A^T; T may not be A */
 static inline void plr_mat3_transpose(plr_real T[9], const plr_real A[9]) {
+    PLR_ASSERT(T != A);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             T[3 * i + j] = A[3 * j + i];
@@ -93,8 +102,9 @@ static inline bool plr_is_finite(plr_real x) {
     return x - x == 0;
 }
 
-/* U^T U = S in place: S is 3x3, packed upper (0,0) (0,1) (0,2) (1,1) (1,2) (2,2). False, with S spoiled,
- * if a pivot is not a positive finite number. The steps of plr_cholesky_upper(3, S), without loops. */
+/* Cholesky: replaces S, 3x3, packed upper (0,0) (0,1) (0,2) (1,1) (1,2) (2,2), by U with U^T U = S.
+ * False if a pivot is not a positive finite number; S is then destroyed. The same bits as
+ * plr_cholesky_upper(3, S), without loops. */
 static inline bool plr_cholesky3(plr_real S[6]) {
     if (!(S[0] > 0) || !plr_is_finite(S[0]))
         return false;
@@ -116,8 +126,8 @@ static inline bool plr_cholesky3(plr_real S[6]) {
     return true;
 }
 
-/* X <- U^-T X: U is 3x3, packed upper; X is 3 x n. The steps of plr_solve_upper_transposed(3, n, U, X,
- * n). */
+/* X <- U^-T X: U is 3x3, packed upper; X is 3 x n. The same bits as
+ * plr_solve_upper_transposed(3, n, U, X, n). */
 static inline void plr_solve3_transposed(unsigned n, const plr_real U[6], plr_real *X) {
     const plr_real by0 = PLR_R(1) / U[0], by1 = PLR_R(1) / U[3], by2 = PLR_R(1) / U[5];
     for (unsigned c = 0; c < n; c++) {

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 /*
- * The innermost loops of an update: a tile of the result, PLR_TILE_ROWS x PLR_TILE_COLUMNS, stays in
- * the processor's registers while one row after the other of the two factors passes by. Inlined
- * where it is used. The two forms of a row's step are there so that the compiler knows what is not
- * aliased, and the negations stand outside of them, where its vectoriser does not stumble over them.
+ * The innermost loops of an update. A tile of the result, PLR_TILE_ROWS x PLR_TILE_COLUMNS, stays
+ * in the processor's registers while the rows of the two factors are read one after another.
+ * Inlined where it is used. plr_tile_add and plr_tile_accumulate differ only in what the compiler
+ * may assume about overlap; they take the factor with its sign, because gcc vectorises a loop
+ * without the negation better.
  */
 #ifndef PLR_LINALG_TILE_H
 #define PLR_LINALG_TILE_H
 
 #include <stddef.h>
 
+#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 
 enum { PLR_TILE_ROWS = 4 };
@@ -37,8 +39,8 @@ static inline void plr_tile_scale(plr_real *restrict to, plr_real u, const plr_r
         to[c] = u * w[c];
 }
 
-/* Where the factors stand: row 0 of U and of W, and how far it is to the next one. In a packed upper
- * triangle each row is by one element nearer than the one before: shrink is 1; else 0. */
+/* The current row of U and of W, and the number of elements to the next one. In a packed upper
+ * triangle that number decreases by one from row to row: shrink is 1; otherwise 0. */
 typedef struct plr_tile_factors {
     const plr_real *U, *W;
     size_t to_next_U, to_next_W;
@@ -51,12 +53,13 @@ static inline void plr_tile_next(plr_tile_factors *at) {
     at->to_next_U -= at->shrink;
 }
 
-/* to[r][c] = from[r][c] - sum_k U(k, r) W(k, c), k = 0 .. depth-1, depth >= 2; to[r] may be from[r].
- * The first step reads `from` and the last one writes `to`: a copy in and out would cost as much as
- * a few steps. */
+/* to[r][c] = from[r][c] - sum_k U(k, r) W(k, c), k = 0 .. depth-1, depth >= 2; to[r] may be
+ * from[r]. The first step reads `from` and the last one writes `to`: separate copies would take the
+ * time of a few steps. */
 static inline void plr_tile_subtract(unsigned depth, plr_tile_factors at,
                                      plr_real *const from[PLR_TILE_ROWS],
                                      plr_real *const to[PLR_TILE_ROWS]) {
+    PLR_ASSERT(depth >= 2);
     plr_tile_row a0, a1, a2, a3;
     plr_tile_add(a0, -at.U[0], at.W, from[0]);
     plr_tile_add(a1, -at.U[1], at.W, from[1]);

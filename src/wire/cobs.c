@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "wire/cobs.h"
 
+#include "pelorus/assertions.h"
+
 enum { DELIMITER = 0, FULL_BLOCK = 0xFF };
 
 plr_cobs_step plr_cobs_decode(plr_cobs_decoder *d, uint8_t stuffed, uint8_t *data) {
@@ -35,7 +37,8 @@ void plr_cobs_begin(plr_cobs_encoder *e) {
 }
 
 unsigned plr_cobs_encode(plr_cobs_encoder *e, uint8_t data) {
-    if (e->fill == 0) /* a full block went before; it is not the last after all */
+    PLR_ASSERT(e->fill < FULL_BLOCK); /* a full one was sent, and is not open any more */
+    if (e->fill == 0)                 /* a full block went before; it is not the last after all */
         e->fill = 1;
     if (data != 0) {
         e->block[e->fill++] = data;
@@ -49,6 +52,7 @@ unsigned plr_cobs_encode(plr_cobs_encoder *e, uint8_t data) {
 }
 
 unsigned plr_cobs_end(plr_cobs_encoder *e) {
+    PLR_ASSERT(e->fill < FULL_BLOCK);
     unsigned n = e->fill;
     e->block[0] = e->fill;
     e->block[n] = DELIMITER;

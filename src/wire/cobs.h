@@ -11,30 +11,31 @@
 
 #include "pelorus/wire.h"
 
-/* What a stuffed byte came to. */
+/* What one received (stuffed) byte means. */
 typedef enum plr_cobs_step {
-    PLR_COBS_NOTHING, /* a code byte without a zero before it */
+    PLR_COBS_NOTHING, /* no data: a code byte that stands for no zero */
     PLR_COBS_BYTE,    /* a byte of data */
-    PLR_COBS_END,     /* the delimiter behind a whole frame */
-    PLR_COBS_BROKEN,  /* the delimiter within a block */
-    PLR_COBS_EMPTY    /* a delimiter without a frame */
+    PLR_COBS_END,     /* the delimiter after a complete frame */
+    PLR_COBS_BROKEN,  /* a delimiter inside a block: bytes are missing */
+    PLR_COBS_EMPTY    /* a delimiter without a frame before it */
 } plr_cobs_step;
 
-/* Takes one stuffed byte; *data is set on PLR_COBS_BYTE only. A delimiter makes ready for the next
- * frame. Start with a decoder of zeros. */
+/* Decodes one stuffed byte; *data is set on PLR_COBS_BYTE only. After a delimiter the decoder is
+ * ready for the next frame. Initialise it with zeros. */
 plr_cobs_step plr_cobs_decode(plr_cobs_decoder *d, uint8_t stuffed, uint8_t *data);
 
 /* True between a frame's first byte and its delimiter. */
 bool plr_cobs_in_frame(const plr_cobs_decoder *d);
 
-/* Makes ready for a frame. */
+/* Starts a frame. */
 void plr_cobs_begin(plr_cobs_encoder *e);
 
-/* Takes one byte of data. Returns how many bytes of e->block are now to be sent, 0 to 255; after
- * that the block is the encoder's again. */
+/* Encodes one byte of data. Returns how many bytes of e->block must now be sent, 0 to 255; the next
+ * call overwrites them. */
 unsigned plr_cobs_encode(plr_cobs_encoder *e, uint8_t data);
 
-/* Ends the frame: the bytes of e->block still to be sent, the delimiter last, 1 to 255. */
+/* Ends the frame. Returns how many bytes of e->block must be sent, 1 to 255; the delimiter is
+ * last. */
 unsigned plr_cobs_end(plr_cobs_encoder *e);
 
 #endif

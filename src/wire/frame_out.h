@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-/* The outside of a frame on its way out: checksum, stuffing, delimiter. A failure of the writer's
- * function is kept in w->status; nothing more of the frame is sent after it. */
+/* Sends the body of a frame with checksum, stuffing and delimiter. If the writer's function fails,
+ * w->status says so and the rest of the frame is not sent. */
 #ifndef PELORUS_WIRE_FRAME_OUT_H
 #define PELORUS_WIRE_FRAME_OUT_H
 
 #include "pelorus/wire.h"
 
-/* Begins a frame; if the last one failed, with a delimiter that ends what there is of it. */
+/* Begins a frame. If the last frame failed, first sends a delimiter that ends its remains. */
 void plr_frame_out_begin(plr_writer *w);
 
-/* n more bytes of the body. */
+/* Sends n more bytes of the body. */
 void plr_frame_out_put(plr_writer *w, const uint8_t *bytes, size_t n);
 
-/* Appends the checksum and the delimiter. Returns whether the whole frame was sent. */
+/* Sends the checksum and the delimiter. PLR_OK, or PLR_E_IO if any part of the frame failed. */
 plr_status plr_frame_out_end(plr_writer *w);
 
 #endif

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The payload of every kind: which field at which place. One function each, run in any direction of
- * a pass; docs/REPLAY-FORMAT.md has the same layouts as tables. A message is written to by READ
- * alone.
+ * The order of the fields in the payload of every kind of message, one function for each. The same
+ * function reads, writes or checks a message, depending on the pass (pass.h); only READ changes it.
+ * docs/REPLAY-FORMAT.md has the same layouts as tables.
  */
 #ifndef PELORUS_WIRE_LAYOUT_H
 #define PELORUS_WIRE_LAYOUT_H

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "wire/pass.h"
 
+#include "pelorus/assertions.h"
 #include "wire/bytes.h"
 #include "wire/frame_out.h"
 
@@ -87,6 +88,7 @@ static void pass_f32_of_f64(plr_pass *p, double *value) {
 }
 
 void plr_pass_reals(plr_pass *p, double *values, unsigned n, unsigned real_bytes) {
+    PLR_ASSERT(real_bytes == 4 || real_bytes == 8 || p->fault != PLR_FAULT_NONE);
     if (real_bytes == 8) {
         plr_pass_f64s(p, values, n);
         return;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /*
- * A pass goes through a message's fields in the order of the wire. Its direction decides what that
- * does: READ fills the fields from a payload, WRITE sends them, CHECK touches nothing and finds
- * out whether WRITE would be right. So every layout (layout.h) is written down once.
+ * A pass visits the fields of a message in the order of its frame. READ fills the fields from a
+ * payload, WRITE sends them, CHECK only finds out whether the message can be written. So one
+ * function a message (layout.h) serves all three.
  *
- * A fault stays: what is read after it is zero, and the message is not to be used.
+ * The first fault is kept: what is read after it is zero, and the message must not be used.
  */
 #ifndef PELORUS_WIRE_PASS_H
 #define PELORUS_WIRE_PASS_H
@@ -41,33 +41,34 @@ void plr_pass_fail(plr_pass *p, plr_fault fault);
 /* Records PLR_FAULT_MALFORMED unless `holds`. */
 void plr_pass_require(plr_pass *p, bool holds);
 
-/* One number, of the type's own width on the wire. */
+/* One number, with as many bytes in the frame as its type has. */
 void plr_pass_u8(plr_pass *p, uint8_t *value);
 void plr_pass_u16(plr_pass *p, uint16_t *value);
 void plr_pass_u32(plr_pass *p, uint32_t *value);
 void plr_pass_u64(plr_pass *p, uint64_t *value);
 void plr_pass_f32(plr_pass *p, float *value);
 
-/* n numbers, f64 on the wire. */
+/* n numbers, each 8 bytes in the frame (f64). */
 void plr_pass_f64s(plr_pass *p, double *values, unsigned n);
 
-/* n numbers, on the wire of `real_bytes` bytes each: 4 or 8. Rounded to nearest for f32; what is
- * beyond its range becomes infinite. */
+/* n numbers, each of `real_bytes` bytes in the frame: 4 (f32) or 8 (f64). For f32 they are rounded
+ * to nearest; a number beyond its range becomes infinite. */
 void plr_pass_reals(plr_pass *p, double *values, unsigned n, unsigned real_bytes);
 
-/* A u8 from 0 to `last`; else malformed. */
+/* A u8 from 0 to `last`; a larger one is PLR_FAULT_MALFORMED. */
 void plr_pass_choice(plr_pass *p, uint8_t *value, uint8_t last);
 
-/* A u8: bit 0 and bit 1. `second` may be null. Bits unknown here are ignored, and written as 0. */
+/* A u8 whose bits 0 and 1 are two flags. `second` may be null. The other bits are ignored when read
+ * and written as 0. */
 void plr_pass_flags(plr_pass *p, bool *first, bool *second);
 
-/* A u8 that has no meaning yet: ignored, and written as 0. */
+/* A u8 without a meaning yet: ignored when read, written as 0. */
 void plr_pass_reserved(plr_pass *p);
 
-/* Bytes of text before the closing zero; `size` if there is none. */
+/* Length of a text of at most `size` bytes that may end with a zero. */
 size_t plr_pass_text_length(const char *text, size_t size);
 
-/* `length` bytes of text; text[length] = 0 is put behind what is read. */
+/* `length` bytes of text. READ adds a closing zero, text[length]. */
 void plr_pass_text(plr_pass *p, char *text, size_t length);
 
 #endif

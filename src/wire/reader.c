@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "pelorus/assertions.h"
 #include "wire/bytes.h"
 #include "wire/cobs.h"
 #include "wire/layout.h"
@@ -30,6 +31,7 @@ static void count_missing(plr_reader *r, uint16_t sequence) {
 
 /* The message of a body whose checksum is good. */
 static plr_fault decode(plr_reader *r, plr_message *message) {
+    PLR_ASSERT(r->length >= PLR_WIRE_OVERHEAD && r->length <= r->buffer_size);
     uint16_t sequence = (uint16_t)plr_bytes_get(r->buffer + AT_SEQUENCE, 2);
     count_missing(r, sequence);
     if (r->overrun)
@@ -106,6 +108,7 @@ static plr_cobs_step take_byte(plr_reader *r, uint8_t stuffed) {
 
 plr_read_event plr_reader_feed(plr_reader *r, const uint8_t *bytes, size_t n, size_t *taken,
                                plr_message *message) {
+    PLR_ASSERT(r->buffer && (bytes || n == 0));
     message->kind = PLR_KIND_NONE;
     if (r->future) {
         r->counts.bytes += n;

@@ -28,6 +28,7 @@ FOLDERS: dict[str, set[str]] = {
     "session": {"session", "filter", "wire"},
 }
 FILTER_HEADERS = {
+    "assertions.h",
     "config.h",
     "camera.h",
     "types.h",
@@ -37,15 +38,16 @@ FILTER_HEADERS = {
     "pelorus.h",
 }
 HEADERS: dict[str, set[str]] = {
-    "linalg": {"config.h"},
-    "lie": {"config.h"},
-    "camera": {"config.h", "types.h", "camera.h"},
+    "linalg": {"assertions.h", "config.h"},
+    "lie": {"assertions.h", "config.h"},
+    "camera": {"assertions.h", "config.h", "types.h", "camera.h"},
     "filter": FILTER_HEADERS,
-    "wire": {"types.h", "wire.h"},
+    "wire": {"assertions.h", "types.h", "wire.h"},
     "session": FILTER_HEADERS | {"wire.h", "port.h", "session.h", "state_store.h"},
 }
 # What a public header may include of its siblings: wire.h must stay free of the filter.
 SIBLINGS: dict[str, set[str]] = {
+    "assertions.h": set(),
     "config.h": set(),
     "types.h": set(),
     "camera.h": {"config.h", "types.h"},
@@ -128,10 +130,11 @@ def check_layers(root: Path) -> Iterator[Breach]:
 
 
 def check_conditions(root: Path) -> Iterator[Breach]:
-    """`#if` stands in config.h alone; elsewhere only include guards and `extern "C"`."""
-    config = root / "include/pelorus/config.h"
+    """`#if` stands where the build is configured, in config.h and for PLR_ASSERT in assertions.h;
+    elsewhere only include guards and `extern "C"`."""
+    configuration = {root / "include/pelorus" / name for name in ("assertions.h", "config.h")}
     paths = [*(root / "src").rglob("*.[ch]"), *(root / "include").rglob("*.h")]
-    for path in sorted(set(paths) - {config}):
+    for path in sorted(set(paths) - configuration):
         guard = "PELORUS_" if "include" in path.relative_to(root).parts else "PLR_"
         guards = 0
         for number, line in code_lines(path):
