@@ -17,7 +17,7 @@ extern const char board_name[];
 /* Sets up clocks, pins, the UART of the link and its interrupt. Every wait in it is bounded. */
 void board_init(void);
 
-/* What the core runs at, after board_init. */
+/* The core's clock frequency after board_init. */
 uint32_t board_core_hz(void);
 
 /* Starts the hardware watchdog (about two seconds; longer than the longest erase of the storage, if
@@ -25,11 +25,11 @@ uint32_t board_core_hz(void);
 void board_watchdog_start(void);
 void board_watchdog_feed(void);
 
-/* Where the filter's state survives a power cut: fills in the device. False: there is no such place.
- * Its functions are bounded, and feed the watchdog if they take long. */
+/* Where the filter's state survives a power cut: fills in the device. False: there is no such
+ * place. Its functions are bounded, and feed the watchdog if they take long. */
 bool board_storage(plr_block_device *device);
 
-/* How the link runs: 8 data bits, no parity, 1 stop bit. */
+/* Speed of the link: 8 data bits, no parity, 1 stop bit. */
 enum { BOARD_BAUD = 921600 };
 
 #endif

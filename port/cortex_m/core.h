@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The registers that every Cortex-M4, M7 and M55 has, and the few instructions that C has no word
- * for. Addresses and bits: Armv7-M and Armv8-M Architecture Reference Manuals, System Control Space.
+ * The registers that every Cortex-M4, M7 and M55 has, and the few instructions that cannot be
+ * written in C. Addresses and bits: Armv7-M and Armv8-M Architecture Reference Manuals, System
+ * Control Space.
  */
 #ifndef PELORUS_CORTEX_M_CORE_H
 #define PELORUS_CORTEX_M_CORE_H
@@ -49,7 +50,7 @@ static inline void core_irq_on(void) {
     __asm volatile("cpsie i" ::: "memory");
 }
 
-/* Masks interrupts and tells what was in force, for core_irq_restore. */
+/* Masks interrupts and returns the previous mask, for core_irq_restore. */
 static inline uint32_t core_irq_save(void) {
     uint32_t primask;
     __asm volatile("mrs %0, primask\n\tcpsid i" : "=r"(primask)::"memory");
@@ -66,7 +67,7 @@ static inline void core_wait_for_interrupt(void) {
     __asm volatile("dsb\n\twfi" ::: "memory");
 }
 
-/* What was written is there before what follows. */
+/* Completes all writes before the next instruction. */
 static inline void core_write_barrier(void) {
     __asm volatile("dsb" ::: "memory");
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * What happens when the processor cannot go on: a TEXT frame of severity error tells what and
- * where, over the link, by polling; then the board is reset. What happened is kept over the reset,
- * for the boot message.
+ * Handles processor faults: sends a TEXT frame of severity error over the link, by polling, that
+ * says what happened and where; then resets the board. The description survives the reset, for the
+ * boot message.
  */
 #ifndef PELORUS_CORTEX_M_FAULT_H
 #define PELORUS_CORTEX_M_FAULT_H

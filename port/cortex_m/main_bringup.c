@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The first image for a new board: no filter, only what it will stand on. It takes lines of text
- * over the link and answers each with one. Type `hello`, and the board says hello if startup, clock,
- * UART and interrupts work. The other words prove what is hard to prove later: docs/PORTING.md.
+ * The first image for a new board: no filter, only what it needs. It reads lines of text from the
+ * link and answers each with one. Type `hello`: an answer shows that startup, clock, UART and
+ * interrupts work. The other words test what is hard to test later: docs/PORTING.md.
  */
 #include <string.h>
 
@@ -43,7 +43,8 @@ static void say_stack(void) {
     text_add_number(&answer, stack_size());
 }
 
-/* The product of 1 + 2^-12 with itself, less what a rounded product would leave: 2^-24 if fused. */
+/* (1 + 2^-12)^2 minus the same product rounded to float: 2^-24 if multiply and add are fused, else
+ * 0. */
 static void say_fused(void) {
     volatile float a = 1.0F + 0x1p-12F;
     volatile float c = -(1.0F + 0x1p-11F);

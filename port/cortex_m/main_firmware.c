@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What is flashed: the session, over the link, for ever. */
+/* The firmware: runs a session over the link until the board is reset. */
 #include <string.h>
 
 #include "board.h"
@@ -22,12 +22,12 @@ static plr_session session;
 static plr_landmark known[KNOWN_LANDMARKS];
 static plr_state_store store;
 
-/* The first frame of a life: who speaks, which build, and why it started. A host that meets it in
- * mid-flight knows that the board has lost its state. */
+/* The first frame after a reset: name of the board, build, and reason of the start. A host that
+ * receives it during a drive knows that the board has lost its state. */
 static void announce(void) {
     static plr_message message;
     static text words;
-    const uint8_t delimiter = 0; /* ends what the last life may have left open */
+    const uint8_t delimiter = 0; /* ends a frame that the reset may have cut */
     (void)serial_write(&serial_link, &delimiter, 1);
     text_clear(&words);
     text_add(&words, "pelorus ");

@@ -4,8 +4,8 @@
  * serial_panic. There are two: the link, which the session talks over, and telemetry, which only
  * sends.
  *
- * When the link's receive ring is full, its interrupt is switched off until there is room: nothing
- * is thrown away that the sender's side could still hold back. docs/PORTING.md, "Flow control".
+ * When the link's receive ring is full, its interrupt is switched off until there is room, so that
+ * a sender with flow control waits and no byte is lost. docs/PORTING.md, "Flow control".
  */
 #ifndef PELORUS_CORTEX_M_SERIAL_H
 #define PELORUS_CORTEX_M_SERIAL_H

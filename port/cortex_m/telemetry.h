@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-/* The second output: what an autopilot reads, on the second UART. telemetry_mavlink.c is it;
- * telemetry_none.c stands in for it where the image is built without. */
+/* The second output, on the second UART: messages for an autopilot. Implemented by
+ * telemetry_mavlink.c, or by telemetry_none.c where the image is built without it. */
 #ifndef PELORUS_CORTEX_M_TELEMETRY_H
 #define PELORUS_CORTEX_M_TELEMETRY_H
 
 #include "pelorus/session.h"
 
-/* What the session is to show its frames to. Its HEADER tells the body's axes. */
+/* The observer to give the session. The session's HEADER has the body's axes. */
 plr_session_observer telemetry_observer(plr_session *session);
 
 #endif

@@ -5,8 +5,9 @@
  *
  * A recording's body axes are its own (HEADER.body_axes). With M = diag(1, -1, -1) for
  * forward-left-up and I for forward-right-down, vectors of the body are M v, of the world M p, and
- * the rotation is M R M: the world is turned as the body is, so a world whose z is up becomes one
- * whose z is down. It is LOCAL_FRD, not NED: which way its x points is the START's affair.
+ * the rotation is M R M: the world's axes change like the body's, so a world whose z is up becomes
+ * one whose z is down. It is LOCAL_FRD and not NED, because the direction of its x depends on the
+ * START.
  */
 #ifndef PELORUS_MAVLINK_ODOMETRY_H
 #define PELORUS_MAVLINK_ODOMETRY_H

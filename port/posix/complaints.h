@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* What was wrong with the recording, on stderr: where, what, why. Of each sort the first few are
- * told; all are counted. */
+/* Messages on stderr about faults of the recording: where, what, why. Of each kind only the first
+ * few are printed; all are counted. */
 #ifndef PELORUS_POSIX_COMPLAINTS_H
 #define PELORUS_POSIX_COMPLAINTS_H
 
@@ -36,7 +36,7 @@ void complaints_skipped(complaints *c, const plr_reader *reader);
 /* Anything else about the recording. */
 void complaints_say(const complaints *c, const char *words);
 
-/* How many more there were than were told. */
+/* Prints how many more there were. */
 void complaints_end(const complaints *c);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-/* Does this processor have what the library was built for? Everything in this folder is built for
- * the family's baseline, so that the question can be asked before the library is called. */
+/* Checks that this processor has the instructions that the library was built for. Everything in
+ * this folder is built for any processor of the family, so that the check can run before the
+ * library. */
 #ifndef PELORUS_POSIX_CPU_H
 #define PELORUS_POSIX_CPU_H
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /*
- * A map that comes back in (--map-in): the landmarks of an earlier result, as known ones.
+ * Option --map-in: the landmarks of an earlier result are used as known ones.
  *
- * A map is a .plr whose LANDMARK messages say where points are and how well that is known: the flight
- * log of --out (roles evicted and final), or, where it has none of those, known ones. Positions are in
- * that drive's world, so the drive that takes it must begin in the same one.
+ * A map is a .plr whose LANDMARK messages say where points are and how well that is known: the
+ * flight log of --out (roles evicted and final), or, where it has none of those, known ones.
+ * Positions are in that drive's world, so the drive that takes it must begin in the same one.
  */
 #ifndef PELORUS_POSIX_MAP_IN_H
 #define PELORUS_POSIX_MAP_IN_H

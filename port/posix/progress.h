@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* A line on the terminal that shows how far the replay is. Nothing where stderr is no terminal. */
+/* A progress line on the terminal; nothing if stderr is not a terminal. */
 #ifndef PELORUS_POSIX_PROGRESS_H
 #define PELORUS_POSIX_PROGRESS_H
 
@@ -17,7 +17,7 @@ void progress_begin(progress *p, bool wanted, uint64_t total_bytes);
 /* Draws the line anew, at most ten times a second. */
 void progress_show(progress *p, uint64_t bytes, uint64_t frames);
 
-/* Takes the line away: before other words are printed, and at the end. */
+/* Removes the line: call it before anything else is printed, and at the end. */
 void progress_clear(const progress *p);
 
 #endif

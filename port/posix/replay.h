@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* pelorus-replay: a recording through the session, with what a desk wants to know about it. */
+/* pelorus-replay: runs the session over a recording and evaluates the result. */
 #ifndef PELORUS_POSIX_REPLAY_H
 #define PELORUS_POSIX_REPLAY_H
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* An output file: opened before anything is computed, so that a path that cannot be written is told
- * at once, and checked to its last byte. */
+/* An output file. It is opened before anything is computed, so that a path that cannot be written
+ * is reported at once, and every write is checked. */
 #ifndef PELORUS_POSIX_RESULT_FILE_H
 #define PELORUS_POSIX_RESULT_FILE_H
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What a replay came to: collected frame by frame, told at the end to a human or as JSON. */
+/* The result of a replay: collected frame by frame, printed at the end as text or as JSON. */
 #ifndef PELORUS_POSIX_SUMMARY_H
 #define PELORUS_POSIX_SUMMARY_H
 
@@ -37,7 +37,8 @@ void summary_add_frame(summary *s, const plr_frame_result *result);
 void summary_print(summary *s, const plr_session *session, const char *path);
 void summary_print_json(summary *s, const plr_session *session, const char *path);
 
-/* The figures that both print. In mapping the poses are given: nothing is told of their accuracy. */
+/* The figures that both print. None about the accuracy of poses in mapping, where they are
+ * given. */
 typedef struct summary_figures {
     evaluation_figures truth;
     map_figures map;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-/* Was anything useful done with the recording? If not: why, on stderr, and which exit status. */
+/* Decides whether the replay gave a useful result; if not, prints why on stderr and chooses the
+ * exit status. */
 #ifndef PELORUS_POSIX_VERDICT_H
 #define PELORUS_POSIX_VERDICT_H
 
 #include "posix/setting_list.h"
 #include "posix/summary.h"
 
-/* What the run met, besides what the session and the summary tell. */
+/* Events of the run that are not in the session or the summary. */
 typedef struct outcome {
     bool started;             /* the filter took data */
     bool future;              /* a HEADER of a later version */

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 /*
- * Do twists and pictures tell the same story? Each frame says how the motion differed from what the
- * twists had announced, in sigmas of their own noise (nu). Over windows that fade, and in single
- * frames, that must look like noise. Where it does not, the twists are believed less, the pose's
- * covariance covers both stories, and health says so until they agree again (docs/MATH.md 17).
+ * Do twists and pictures agree? Each frame gives nu, the difference between the motion seen in the
+ * pictures and the one by the twists, in units of the twists' sigmas. In single frames, and in sums
+ * in which older frames count less, nu must look like white noise. Where it does not, the twists
+ * get less weight, the pose's covariance is enlarged to cover the poses by twists and by pictures,
+ * and health says so until the two agree again (docs/MATH.md 17).
  */
 #ifndef PLR_FILTER_CONSISTENCY_H
 #define PLR_FILTER_CONSISTENCY_H
@@ -13,29 +14,31 @@
 #include "filter/motion.h"
 #include "pelorus/types.h"
 
-/* Nothing seen yet, everything in agreement. */
+/* Start: no frame seen, no disagreement. */
 void plr_consistency_clear(plr_filter *f);
 
-/* Q <- what the twists' noise must be taken for in this frame: more, as long as they are contradicted.
- * Call it before plr_motion_prior; `believed` receives the prior as the twists' own sigmas have it. */
+/* Enlarges the twists' noise Q of this frame as long as they are contradicted. Call it before
+ * plr_motion_prior. `believed` receives the prior with the original Q. */
 void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed);
 
-/* A frame's motion was found to differ from the twists by nu: prior N(0, I) in units of applied->L,
- * information Lambda (6x6 packed) with the prior. `outright`: this very frame contradicts them. */
+/* Adds the result of a frame: nu with prior N(0, I), in units of applied->L, and its information
+ * Lambda, 6x6 packed upper triangle, prior included. `outright`: this frame contradicts the twists
+ * by itself. */
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_applied_motion *applied, const plr_real nu[6],
                          const plr_real Lambda[21], bool outright);
 
-/* True if this picture was sent before: most of the matched observations have the pixels of the frame
- * before, to the bit, while the twists have moved the body since by more than their noise. Call it once
- * a frame, after matching. */
+/* True if the frame repeats the previous picture: most matched observations have exactly the same
+ * pixels, while the twists report a motion of more than their noise. Call it once a frame, after
+ * matching. */
 bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n);
 
-/* Takes in the counts of a frame; returns the reasons that they give. */
+/* Adds the counts of a frame; returns bits of plr_reason. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);
 
-/* Adds to the pose's covariance, as long as a contradiction lasts, what reaches from one story to the
- * other: d d^T of the way d between them, and a share of it to all sides. P_xi, 6x6, is of now. */
+/* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers
+ * the poses by twists and by pictures: by d d^T, where d is the difference between the two, and by
+ * a part of |d|^2 in all directions. */
 void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]);
 
 #endif

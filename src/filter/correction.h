@@ -5,20 +5,20 @@
 
 #include "pelorus/state.h"
 
-/* What the blocks came to. */
+/* The result of all blocks. */
 typedef struct plr_correction {
     unsigned applied;       /* observations in blocks that were applied */
     unsigned failed_blocks; /* left out: S could not be factorised */
-    unsigned cut;           /* landmark corrections stopped at the limits of range */
-    plr_real nu[6];         /* of the motion's noise, in its own sigmas: what came out */
-    plr_real Lambda[21];    /* the information on it, with the prior */
+    unsigned cut;           /* landmark corrections limited: PLR_REASON_RANGE_LIMITED */
+    plr_real nu[6];         /* estimated noise of the motion, in units of its sigmas */
+    plr_real Lambda[21];    /* information about nu, prior included: 6x6, packed upper triangle */
     bool moved;             /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
-/* Takes the observations work.used[0..count-1] (positions in work.order), all linearised at the
- * current estimate, and moves the estimate once. Marks the filter diverged, leaving the valid
- * posterior of the blocks before, where a variance would cease to be positive or the correction
- * makes no sense. */
+/* Applies the observations work.used[0..count-1] (positions in work.order). All are linearised at
+ * the current estimate, and the estimate is corrected once, at the end. If a variance would not be
+ * positive or the correction is not finite, the filter is marked as diverged and keeps the result
+ * of the blocks before. */
 plr_correction plr_correct(plr_filter *f, const plr_observation *observations, unsigned count);
 
 #endif

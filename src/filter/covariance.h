@@ -57,24 +57,27 @@ bool plr_covariance_is_positive(const plr_filter *f);
 /* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
 void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F);
 
-/* Splits what the motion and the biases have in common off P: with C = P_(:,b) B^T and nu = L^-1 n,
+/* Takes the part of P that is correlated with the motion's noise out of P and into W: with
+ * C = P_(:,b) B^T and nu = L^-1 n,
  *   P -= (C L^-T) (C L^-T)^T,  W += C L^-T,  Lambda = I,  eta = -z,  dx = C L^-T z,
- * so that the state is x + W (nu - z) with x and nu independent. W^T (6 x dim, leading dimension
- * plr_covariance_ld) holds the motion's own part already. */
+ * so that the state is x + W (nu - z) with x and nu independent. Before the call W^T (6 x dim,
+ * leading dimension plr_covariance_ld) must hold the motion's direct effect. */
 void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
 
-/* Takes the noise back: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T and dx += W Lambda^-1 eta.
- * nu (6; may be NULL) is what came out: z + Lambda^-1 eta. Nothing where no noise is open. */
+/* The reverse, after the observations: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T and
+ * dx += W Lambda^-1 eta. nu (6; may be NULL) receives the estimate z + Lambda^-1 eta. Does nothing
+ * if plr_covariance_open_noise was not called. */
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]);
 
-/* V = C L^-T = P_(:,b) K^T of some rows of the state, rows x 6: their correlation with nu. */
+/* V = C L^-T = P_(:,b) K^T for `rows` rows of the state from `row` on, rows x 6: their covariance
+ * with nu. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
                                  const plr_real K[36], plr_real *V);
 
 /* The pose's rows alone: xi <- A xi + B db + N(0, Q). */
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion);
 
-/* The bias variances grow by velocity (first three) and gyro (last three). */
+/* Adds `velocity` to the first three bias variances and `gyro` to the last three. */
 void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyro);
 
 /* --- update --- */
@@ -83,23 +86,22 @@ void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyr
 void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
                                plr_real S[6]);
 
-/* S += (H W)(H W)^T, 3x3 packed: the share of the motion's open noise, before any block. */
+/* S += (H W)(H W)^T, 3x3 packed: the part of the innovation covariance that is still in W. Only
+ * before the first block. */
 void plr_covariance_add_open_noise(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
                                    plr_real S[6]);
 
-/* Three rows of (P H^T)^T, each dim long, and zeros up to the leading dimension ld. */
+/* Three rows of (P H^T)^T, each of dim elements, then zeros up to the leading dimension ld. */
 void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
                             plr_real *rows, size_t ld);
 
-/* P -= V V^T, V^T being depth x dim in the workspace, with the leading dimension
- * plr_covariance_ld. False, and nothing changed, if a variance
- * would cease to be positive. */
+/* P -= V V^T, where V^T is depth x dim in the workspace with leading dimension plr_covariance_ld.
+ * False, and nothing is changed, if a variance would not be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
-/* The variances of the landmarks that a frame saw grow by a few roundings, P_ii *= 1 + 8
- * epsilon: more than the roundings of the updates between can take away. Without it they add up for as
- * long as a robot stands still and measures the same landmarks, and P ceases to be a covariance
- * (docs/NUMERICS.md 1). */
+/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than rounding in the updates can
+ * have removed. Without it rounding errors add up while a robot stands still and measures the same
+ * landmarks, until P is no longer positive (docs/NUMERICS.md 1). */
 void plr_covariance_make_up_for_rounding(plr_filter *f);
 
 /* --- slots --- */

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The fields of a struct as little-endian bytes, one after another without gaps: what is stored does
- * not depend on a compiler's padding or on the processor's byte order. A layout is a table of fields
- * and is written down once; it can be written, read, and compared.
+ * The fields of a struct as little-endian bytes, one after another without gaps: what is stored
+ * does not depend on a compiler's padding or on the processor's byte order. A layout is a table of
+ * fields and is written down once; it can be written, read, and compared.
  *
  * Numbers are copied bit by bit. One that is not finite, and a flag that is neither 0 nor 1, is
  * refused in both directions.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What the files of the filter share and no caller sees. */
+/* Constants and functions that several files of the filter use; not for callers. */
 #ifndef PLR_FILTER_INTERNAL_H
 #define PLR_FILTER_INTERNAL_H
 
@@ -7,10 +7,11 @@
 
 #include "pelorus/filter.h"
 
-/* In a filter that was initialised. */
+/* plr_filter.magic of an initialised filter. */
 #define PLR_FILTER_MAGIC 0x504C5231U
 
-/* Beyond these a number is a fault of its sender, and products of it overflow in float32. */
+/* Larger inputs are refused: they are errors of the sender, and products of them overflow in
+ * float32. */
 #define PLR_MAX_POSITION 1e9  /* m */
 #define PLR_MAX_BIAS     1e4  /* m/s, rad/s */
 #define PLR_MAX_VARIANCE 1e12 /* m^2, rad^2, ... */
@@ -20,20 +21,20 @@ static inline plr_real plr_seconds(plr_time_ns ns) {
     return (plr_real)((double)ns * 1e-9);
 }
 
-/* No reading says anything of now: the body is taken to stand. Reading less bias is 0. */
+/* Forgets the last twist reading: the body is assumed to stand still, reading - bias = 0. */
 void plr_filter_forget_reading(plr_filter *f);
 
-/* A refused call in the totals. */
+/* Counts a refused call in the totals. */
 void plr_filter_count_refusal(plr_filter *f, plr_status status);
 
-/* Notes the pose's covariance of a frame that is in order. */
+/* Stores the pose's covariance after a good frame, for plr_filter_recover. */
 void plr_filter_keep_for_recovery(plr_filter *f);
 
-/* Brings what was noted up to the end of the motion that is about to be applied. */
+/* Adds the motion that is about to be applied to the stored covariance. */
 void plr_filter_carry_recovery(plr_filter *f);
 
-/* After a divergence: the pose stays, with the covariance that it had when all was in order and that of
- * the motion since; landmarks are dropped, biases go back to their prior's covariance. */
+/* After a divergence: keeps the pose, sets its covariance to the stored one, drops the landmarks,
+ * and sets the biases' covariance to their prior's. */
 void plr_filter_recover(plr_filter *f);
 
 /* Finite and within the limits, with a covariance that is symmetric and positive. */

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT
 /*
- * Is the filter's memory as the last call left it? A stray write, a flipped bit or a stack that grew
- * into it must not become a crash, a NaN or a pose that is believed.
+ * Detects that something else has written to the filter's memory between two calls: a stray write,
+ * a flipped bit, a stack that grew into it. It must not lead to a crash, a NaN or a wrong pose.
  *
- * Sums are kept of what never changes after init (settings, map, parameters, model), of the small
- * state that every call changes (times, pose, bias, motion, counts, the pose's and biases' rows of P),
- * and of all slots and the whole of P, which a frame changes. A change within one aligned 32-bit word
- * is found for sure, any other almost surely. A call that changes something ends by sealing it anew.
- * The workspace belongs to the call that runs, and is not looked at.
+ * There are three checksums: `constant`, of what never changes after init (settings, map,
+ * parameters, model); `small`, of what every call changes (times, pose, bias, motion, counts, the
+ * pose's and biases' rows of P); `large`, of all slots and the whole of P, which a frame changes. A
+ * change within one aligned 32-bit word is always found, any other with near certainty. The
+ * functions `look` compare a checksum with the memory; a call that changes memory ends with a
+ * `seal`, which computes it anew. The workspace has no checksum, because its contents are not used
+ * by later calls.
  *
  * Cost: three or four instructions a word; twice a frame over P, twice a call over the small state.
- * Once damage is found the sums stay wrong, so that every later call is refused too, until an init; or
- * a reset, if what never changes is sound.
+ * Once damage is found the checksums stay wrong, so that every later call is refused too, until an
+ * init; or until a reset, if the constant part is undamaged.
  */
 #ifndef PLR_FILTER_GUARD_H
 #define PLR_FILTER_GUARD_H

@@ -7,7 +7,7 @@
 
 #include "pelorus/state.h"
 
-/* What a frame met besides its counts. */
+/* Events of a frame that are not counts in its report. */
 typedef struct plr_frame_events {
     bool sink_failed;
     bool locked;
@@ -15,13 +15,13 @@ typedef struct plr_frame_events {
     unsigned cut;
 } plr_frame_events;
 
-/* Counts this frame; true if the gate rejected at least 80 % of at least 5 matches in 10 successive
- * frames, and again after each 10 more. */
+/* Adds this frame; true if in each of the last 10 frames the gate rejected at least 80 % of at
+ * least 5 matches. While that lasts, true again after every 10 frames. */
 bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report);
 
-/* True from a lock, or from the tenth frame without one used observation, until a frame is seen
- * again: a gate of fixed pixels does not know how uncertain the pose has become, and would be wrong
- * for ever. */
+/* True after plr_health_gate_is_locked, or after ten frames without a used observation, until one
+ * is used again. The gate gate-residual then accepts by gate-d2: a limit in pixels does not grow
+ * with the pose's uncertainty, and would reject everything for ever. */
 bool plr_health_fixed_gate_is_open(const plr_filter *f);
 
 /* Fills health and reasons of a frame that was processed. */

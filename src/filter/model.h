@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * A model: where landmarks live, and how the state's error is defined. The rest of the filter does
- * not know which one runs. Two exist: `body` (model_body.c) and `world` (model_world.c).
+ * A model: how landmarks are stored, and how the error of the state is defined. The rest of the
+ * filter is the same for both models: `body` (model_body.c) and `world` (model_world.c).
  */
 #ifndef PLR_FILTER_MODEL_H
 #define PLR_FILTER_MODEL_H
@@ -38,37 +38,42 @@ typedef struct plr_world_point {
 struct plr_model {
     const char *name;
 
-    /* Applies a motion to landmarks and covariance. T_WB has moved already. `body` leaves its noise in
-     * work.noise, open; `world` puts it into P. */
+    /* Applies a motion to landmarks and covariance; T_WB has been moved before. `body` keeps the
+     * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
     void (*propagate)(plr_filter *f, const plr_applied_motion *motion);
 
-    /* Predicts an observation of a slot. False if the point lies nearer than min_depth in front of
-     * the camera: no basis for a linearisation. */
+    /* Predicts the observation of a slot, with its derivatives. False if the point is nearer than
+     * min_depth_m in front of the camera, where a linearisation means nothing. */
     bool (*linearise)(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin);
 
-    /* A new landmark from its pixels: q in the camera, with covariance S_q S_q^T (3x3). A factor,
-     * for the product itself would drown a far point's bearing in the rounding of its range. */
+    /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
+     * S_q is passed, because for a far point the product is so large along the ray that rounding
+     * would destroy what it says across the ray. */
     void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 
-    /* A landmark of known place in the world. False if this place cannot be represented. */
+    /* Makes a landmark from a known position in the world. False if the model cannot represent
+     * it. */
     bool (*adopt)(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark);
 
-    /* Moves the landmarks by dx (dim long), of which the pose has its share before or after, and
-     * transports P. Returns how many landmark corrections had to be cut at the limits of range. */
+    /* Applies a correction dx of the whole state (plr_covariance_dim elements) to the landmarks,
+     * and transports P to the new estimate. The caller corrects pose and bias. Returns how many
+     * landmark corrections were limited: PLR_REASON_RANGE_LIMITED. */
     unsigned (*retract)(plr_filter *f, const plr_real *dx);
 
-    /* Where a landmark is in the world. */
+    /* The position of a landmark in the world. */
     void (*in_world)(const plr_filter *f, const plr_slot *slot, plr_world_point *point);
 };
 
-/* J = R_WB [I | -[s]x], 3x6: how the pose's error moves a point that stands at s in the body. */
+/* J = R_WB [I | -[s]x], 3x6: derivative of a point's world position by the pose's error (rho,
+ * theta), where s is the point in the body, m. */
 void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3], plr_real J[18]);
 
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 
-/* By number: a pointer in RAM could be made to point anywhere. */
+/* The filter holds the model's number and not its address: a damaged pointer could lead
+ * anywhere. */
 static inline const struct plr_model *plr_model_of(const plr_filter *f) {
     return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
 }

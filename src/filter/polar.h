@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * The polar chart at a point q (docs/MATH.md 5): two bearing angles and inverse range,
- * w = (N^T mu-change, change of 1/r), with r = |q|, mu = q / r, N(mu) a 3x2 orthonormal basis of the
- * plane orthogonal to mu. Far points are nearly Gaussian in it.
+ * w = (N^T mu-change, change of 1/r), with r = |q|, mu = q / r, N(mu) a 3x2 orthonormal basis of
+ * the plane orthogonal to mu. Far points are nearly Gaussian in it.
  */
 #ifndef PLR_FILTER_POLAR_H
 #define PLR_FILTER_POLAR_H
@@ -35,8 +35,8 @@ void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart);
  * q, the chart's point, goes there by what is added to it: a small step is rounded at its own size.
  * *result is the chart at the new point, M = N(mu+)^T Exp(a) N(mu) (2x2) the transport of the
  * bearing part. Where 1/r+ would be below min_inverse_range the point stays there, and *beyond (0
- * elsewhere) is what is left of w_3. Returns true where w had to be cut: a bearing change over 1 rad, a
- * range under PLR_MIN_RANGE, or no number. */
+ * elsewhere) is what is left of w_3. Returns true where w had to be cut: a bearing change over 1
+ * rad, a range under PLR_MIN_RANGE, or no number. */
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
                        const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
                        plr_real *beyond);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * What a frame's corrections of the landmarks have in common: the rigid motion eta, a twist of the
- * body, that minimises
+ * The rigid motion that is common to a frame's corrections of all landmarks: eta, a twist of the
+ * body, (rho, theta), that minimises
  *     sum_i |w_i - J_i eta|^2_W + |eta - xi|^2_(s diag A) + a sum_k eta_k^2 / spread_k,
  *     A = sum_i J_i^T W J_i, s = 0.1:
  * w_i are the corrections in their charts, J_i says how a twist enters there, and W weighs the parts

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The search for a frame's motion (docs/MATH.md 10): nu ~ N(0, I) of the motion D Exp(L nu) at which
- * |nu|^2 + sum of rho(|U_i^-T r_i|^2) is least, by Levenberg's and Marquardt's steps with a bounded number
- * of evaluations. Each observation's landmark stands in with its own 3x3 covariance.
+ * The search for a frame's motion (docs/MATH.md 10): nu ~ N(0, I) of the motion D Exp(L nu) at
+ * which |nu|^2 + sum of rho(|U_i^-T r_i|^2) is least, by Levenberg's and Marquardt's steps with a
+ * bounded number of evaluations. rho is Huber's function. Of the covariance each landmark's 3x3
+ * block is used.
  */
 #ifndef PLR_FILTER_SEARCH_H
 #define PLR_FILTER_SEARCH_H
@@ -12,7 +13,7 @@
 
 /* One matched observation. */
 typedef struct plr_sighting {
-    plr_real V[18];     /* what the landmark shares with nu by the biases: P_(i,b) B^T L^-T, 3x6 */
+    plr_real V[18];     /* covariance of landmark and nu by the biases: P_(i,b) B^T L^-T, 3x6 */
     plr_real P[9];      /* the landmark's covariance once nu is known */
     plr_real U[2][6];   /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
     plr_real a[18];     /* U^-T dz/dnu, 3x6, at the point evaluated last */
@@ -65,8 +66,8 @@ void plr_search_prepare(plr_search *s);
 /* Prepares all sightings for s->prior, and evaluates nu = 0: the best point so far. */
 void plr_search_from_zero(plr_search *s, plr_search_point *best);
 
-/* From the best point downhill: a bounded number of trials, each taken only if the sum falls. At the end
- * all sightings stand at the best point. */
+/* From the best point downhill: a bounded number of trials, each taken only if the sum falls. At
+ * the end all sightings stand at the best point. */
 void plr_search_descend(plr_search *s, plr_search_point *best);
 
 /* All sightings at nu = z, which becomes the best point. */
@@ -76,7 +77,8 @@ void plr_search_go_to(plr_search *s, const plr_real z[6], plr_search_point *best
 bool plr_search_factorise(const plr_search_point *point, plr_real damping,
                           plr_real U[21 + PLR_KERNEL_MARGIN]);
 
-/* The step from a point towards the least sum, from its factor. Returns what it promises of the sum. */
+/* The step from a point towards the least sum, from its factor. Returns what it promises of the
+ * sum. */
 plr_real plr_search_step(const plr_search_point *point, const plr_real *U, plr_real dz[6]);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-/* The landmark slots: an array, dense from 0, so that time follows the active count. What has to leave
- * a full one is the landmark longest unseen, not the one that came first (docs/MATH.md 13). */
+/* The landmark slots: an array whose first `count` elements are in use, so that time depends on
+ * their number. If it is full, the landmark that was not seen for the longest time is evicted
+ * (docs/MATH.md 13). */
 #ifndef PLR_FILTER_SLOTS_H
 #define PLR_FILTER_SLOTS_H
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * Each landmark's track against its own past. A gate looks at one frame: a point that moves a little in
- * each, or drifts with its tracker, passes it every time, is pulled along by its landmark and pulls the
- * pose with it. Its innovations lean to one side, though, where those of a point that stands are white
+ * Detects landmarks that move, from their innovations over many frames. A gate looks at one frame:
+ * a point that moves a little in each passes it every time, its landmark follows it, and the pose
+ * is pulled along. But its innovations have a mean, where those of a point at rest are white noise
  * (docs/MATH.md 17).
  */
 #ifndef PLR_FILTER_TRACKS_H
@@ -12,18 +12,20 @@
 
 #include "pelorus/state.h"
 
-/* Takes in what an accepted observation said beside all others: e, 3 rows, whitened. Sets `strays` where
- * the innovations lean to one side by more than noise would: the point moves. */
+/* Adds the whitened innovation e, 3 rows, of an accepted observation, predicted from all other
+ * observations. Sets `strays` if the mean of the innovations is larger than noise explains: the
+ * point moves. */
 void plr_track_add(plr_slot *slot, const plr_real e[3]);
 
 /* A frame matched the landmark and the gate let it through, or did not. */
 void plr_track_count(plr_slot *slot, bool rejected);
 
-/* True where the landmark was rejected in so many successive frames that it is the landmark that may be
- * wrong: it was born from an outlier, or its point has moved and stands again. */
+/* True if the landmark was rejected in so many successive frames that its position may be wrong: it
+ * was initialised from an outlier, or its point has moved and is at rest again. */
 bool plr_track_may_begin_anew(const plr_slot *slot);
 
-/* What a landmark that began anew keeps of the one before: its counts, and twice the patience. */
+/* For a landmark that is initialised again: keeps the counts of the one before, and doubles the
+ * number of rejections that it needs the next time. */
 void plr_track_begin_anew(plr_slot *slot, const plr_slot *before);
 
 #endif

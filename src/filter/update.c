@@ -414,9 +414,10 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     return plr_motion_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
-/* The interval by which a held reading's noise is charged from h0 to h1 seconds after it came. Its
- * error stays the same, so after h seconds it has cost sigma^2 max(tau, h) h: within its interval tau
- * the usual share, beyond it, when twists fail to come, what a constant error does. */
+/* The interval to give plr_motion_step, which adds the variance sigma^2 interval (h1 - h0), where the
+ * last reading is used from h0 to h1 seconds after it was taken. The error of one reading is constant,
+ * so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau between
+ * readings by the usual sigma^2 tau h, and later, when twists fail to come, to sigma^2 h^2. */
 static plr_real held_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     const plr_real tau = f->interval_s;
     if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)

@@ -33,7 +33,7 @@ void plr_take_header(plr_session *s) {
     const plr_header *header = &s->in.as.header;
     plr_send_echo(s);
     if (s->phase != PLR_PHASE_WAITING && same_header(header, &s->header))
-        return; /* said again */
+        return; /* the same HEADER again changes nothing */
     if (s->phase == PLR_PHASE_RUNNING) {
         plr_send_refusal(s, PLR_KIND_HEADER, 0, PLR_E_MODE, NULL);
         return;
@@ -139,6 +139,6 @@ void plr_take_landmark(plr_session *s) {
 }
 
 void plr_take_text(plr_session *s) {
-    if (!s->is_log) /* a log's lines are said again by this session */
+    if (!s->is_log) /* in a log they are outputs of a filter, and this session makes its own */
         plr_send_echo(s);
 }

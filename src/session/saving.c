@@ -152,7 +152,7 @@ static plr_status restore(plr_session *s, const plr_state_message *wanted, plr_r
     plr_status status = may_restore(s, wanted->moved_variance);
     if (status != PLR_OK)
         return status;
-    s->phase = PLR_PHASE_READY; /* said again, it is done again */
+    s->phase = PLR_PHASE_READY; /* a repeated STATE restores again */
     s->started = s->restored = false;
     if (!plr_begin_filter(s))
         return PLR_E_CONFIG;
