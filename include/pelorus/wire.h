@@ -160,8 +160,7 @@ typedef enum plr_state_action { PLR_STATE_SAVE = 1, PLR_STATE_RESTORE = 2 } plr_
 
 /* A request to save the filter's state, or to restore it after a power cut. */
 typedef struct plr_state_message {
-    plr_time_ns
-        t_ns; /* RESTORE: the time at which the drive continues; SAVE: repeated in the answer */
+    plr_time_ns t_ns;         /* RESTORE: when the drive continues; SAVE: repeated in the answer */
     uint8_t action;           /* plr_state_action */
     double moved_variance[6]; /* RESTORE: how far the body may have moved since the save: variances
                                  of (rho, theta), m^2 and rad^2; zeros: it stood still */
