@@ -31,7 +31,7 @@ from replay_drive import (
 FRAMES = 60
 DEGRADED, LOST = 1, 2  # plr_health
 NOT_POSITIVE, RECOVERED = 1 << 10, 1 << 18  # plr_reason
-OPTIONS = ("--model", "world", "--start-sigma", "100")
+OPTIONS = ("--model", "world", "--start-sigma", "30")
 
 
 def replay(folder: Path, *options: str) -> Result:
