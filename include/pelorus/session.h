@@ -34,6 +34,7 @@
 
 #include "pelorus/filter.h"
 #include "pelorus/port.h"
+#include "pelorus/session_parts.h"
 #include "pelorus/state_store.h"
 #include "pelorus/wire.h"
 
@@ -66,10 +67,7 @@ typedef enum plr_output {
 } plr_output;
 
 enum {
-    PLR_SESSION_HELD_TWISTS = 64, /* most twists that wait because of the setting twist-delay */
-    PLR_SESSION_CHUNK = 256,      /* most bytes read from the port at once */
-    PLR_SESSION_AGREEING = 3, /* messages that must agree before the session follows a clock that
-                                     has jumped: src/session/reanchor.h */
+    PLR_SESSION_CHUNK = 256, /* most bytes read from the port at once */
     PLR_SESSION_BODY = PLR_WIRE_STEREO_BODY(PLR_MAX_OBSERVATIONS) > PLR_WIRE_MIN_BUFFER
                            ? PLR_WIRE_STEREO_BODY(PLR_MAX_OBSERVATIONS)
                            : PLR_WIRE_MIN_BUFFER /* bytes of the longest frame */
@@ -142,39 +140,8 @@ typedef struct plr_session_totals {
     uint32_t not_sent;      /* messages that could not be written to the port */
 } plr_session_totals;
 
-/* Twists that wait because of the setting twist-delay: a ring, oldest first. */
-typedef struct plr_held_twists {
-    unsigned first, count;
-    plr_twist_message twists[PLR_SESSION_HELD_TWISTS];
-} plr_held_twists;
-
-/* Landmarks of known position, ascending by id. */
-typedef struct plr_known_map {
-    plr_landmark *landmarks;
-    unsigned count, capacity;
-} plr_known_map;
-
-/* Detects a jump of the sender's clock: src/session/reanchor.h. */
-typedef struct plr_clock_watch {
-    unsigned agreeing;
-    plr_time_ns last_ns;
-} plr_clock_watch;
-
-/* The measured cost of an observation: src/session/budget.h. */
-typedef struct plr_budget {
-    uint64_t deadline_ns;
-    uint64_t cost_ns;      /* per observation; 0: not known yet */
-    uint64_t recent_ns[2]; /* in each of the last two frames; 0: none yet */
-} plr_budget;
-
-typedef enum plr_session_phase {
-    PLR_PHASE_WAITING = 0, /* for a HEADER */
-    PLR_PHASE_READY = 1,   /* for data */
-    PLR_PHASE_RUNNING = 2
-} plr_session_phase;
-
-/* A caller may read `filter`, `totals`, `phase`, `header`, `known`, `init_failed`, `in` (the last
- * message), `reader.counts` and `reader.skipped_*`; the rest is for the library alone. */
+/* A caller may read `filter`, `totals`, `phase`, `header`, `known`, `in` (the last message),
+ * `reader.counts` and `reader.skipped_*`; the rest is for the library alone. */
 typedef struct plr_session {
     plr_filter filter;
     plr_session_totals totals;
@@ -197,9 +164,7 @@ typedef struct plr_session {
 
     plr_config_message wanted; /* the valid settings of the CONFIGs */
     bool is_log;               /* the input contains the outputs of a filter too */
-    bool start_known, started; /* a START was given; the pose has been set */
-    bool restored;             /* a state was restored, and no data has come since */
-    bool init_failed; /* settings or calibration were refused: data is refused until they change */
+    bool start_pending;        /* `start` sets the pose when its time has come */
     plr_start start;
     uint32_t start_resets;
     plr_held_twists held;

@@ -144,7 +144,7 @@ static void on_refused_state(replay *run, plr_time_ns t_ns, plr_status status) {
 static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                        const plr_setting *culprit) {
     replay *run = context;
-    if (run->session.init_failed && run->outcome.init_status == PLR_OK) {
+    if (run->session.phase == PLR_PHASE_REJECTED && run->outcome.init_status == PLR_OK) {
         run->outcome.init_status = status; /* told at the end */
         if (culprit != NULL)
             snprintf(run->outcome.culprit, sizeof run->outcome.culprit, "%s", culprit->name);
@@ -250,7 +250,8 @@ static bool take_step(replay *run) {
     case PLR_STEP_MESSAGE:
         break;
     }
-    if (run->outcome.started && !run->session.restored) /* a STATE may ask for it once more */
+    /* restored: a STATE may ask for it once more */
+    if (run->outcome.started && run->session.phase != PLR_PHASE_RESTORED)
         storage_begin(&run->storage);
     const bool foreign = counts->frames == 0 && counts->bytes > FOREIGN_BYTES;
     progress_show(&run->progress, counts->bytes, run->summary.frames);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/budget.h"
 
+#include "pelorus/config.h"
+
 void plr_budget_init(plr_budget *budget, uint32_t deadline_us) {
     budget->deadline_ns = (uint64_t)deadline_us * 1000u;
     budget->cost_ns = 0;

@@ -16,7 +16,7 @@
 #ifndef PLR_SESSION_BUDGET_H
 #define PLR_SESSION_BUDGET_H
 
-#include "pelorus/session.h"
+#include "pelorus/session_parts.h"
 
 /* deadline_us = 0: no limit. */
 void plr_budget_init(plr_budget *budget, uint32_t deadline_us);

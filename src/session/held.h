@@ -9,7 +9,7 @@
 #ifndef PLR_SESSION_HELD_H
 #define PLR_SESSION_HELD_H
 
-#include "pelorus/session.h"
+#include "pelorus/session_parts.h"
 
 void plr_held_init(plr_held_twists *held);
 

@@ -3,7 +3,7 @@
 #ifndef PLR_SESSION_KNOWN_MAP_H
 #define PLR_SESSION_KNOWN_MAP_H
 
-#include "pelorus/session.h"
+#include "pelorus/session_parts.h"
 
 void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capacity);
 

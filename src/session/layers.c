@@ -89,11 +89,15 @@ static void forget_axes(plr_config_message *wanted, const plr_setting *whole) {
     wanted->count = kept;
 }
 
-plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
+bool plr_layers_allow(const plr_wire_setting *values, unsigned count) {
     plr_config scratch;
     const plr_setting *culprit;
     plr_config_default(&scratch);
-    if (apply_values(&scratch, &value, 1, &culprit) != PLR_OK)
+    return apply_values(&scratch, values, count, &culprit) == PLR_OK;
+}
+
+plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
+    if (!plr_layers_allow(&value, 1))
         return PLR_E_CONFIG;
     forget_axes(wanted, plr_setting_by_id(value.id));
     unsigned i = 0;

@@ -3,7 +3,8 @@
 #ifndef PLR_SESSION_LAYERS_H
 #define PLR_SESSION_LAYERS_H
 
-#include "pelorus/session.h"
+#include "pelorus/filter.h"
+#include "pelorus/wire.h"
 
 /* The layers above the default. */
 typedef struct plr_layers {
@@ -18,6 +19,9 @@ typedef struct plr_layers {
  * those of a reading. PLR_E_CONFIG, with the row in *culprit, where the result makes no sense. */
 plr_status plr_layers_compose(plr_config *config, const plr_layers *layers,
                               const plr_setting **culprit);
+
+/* True if each value is of a setting, and within its limits. */
+bool plr_layers_allow(const plr_wire_setting *values, unsigned count);
 
 /* Adds a CONFIG's value to the wanted ones, or replaces it. PLR_E_CONFIG if no setting has this id
  * or the value is outside its limits: then nothing changes. */

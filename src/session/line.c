@@ -9,20 +9,20 @@ void plr_line_begin(plr_text *line, plr_severity severity) {
 }
 
 /* The length of UTF-8 text when it is cut to `room` bytes: never inside a character. */
-static size_t whole_characters(const char *words, size_t room) {
+static size_t whole_characters(const char *added, size_t room) {
     size_t n = 0;
-    while (n < room && words[n] != '\0')
+    while (n < room && added[n] != '\0')
         n++;
-    if (words[n] != '\0')
-        while (n > 0 && ((unsigned char)words[n] & 0xC0u) == 0x80u)
+    if (added[n] != '\0')
+        while (n > 0 && ((unsigned char)added[n] & 0xC0u) == 0x80u)
             n--;
     return n;
 }
 
-void plr_line_words(plr_text *line, const char *words) {
+void plr_line_text(plr_text *line, const char *added) {
     const size_t at = strlen(line->text);
-    const size_t n = whole_characters(words, PLR_WIRE_MAX_TEXT - at);
-    memcpy(line->text + at, words, n);
+    const size_t n = whole_characters(added, PLR_WIRE_MAX_TEXT - at);
+    memcpy(line->text + at, added, n);
     line->text[at + n] = '\0';
 }
 
@@ -35,10 +35,11 @@ static void put_digits(plr_text *line, uint64_t number, unsigned width) {
         digits[--at] = (char)('0' + number % 10u);
         number /= 10u;
     }
-    plr_line_words(line, digits + at);
+    plr_line_text(line, digits + at);
 }
 
-void plr_line_count(plr_text *line, uint64_t number) {
+void plr_line_count(plr_text *line, const char *before, uint64_t number) {
+    plr_line_text(line, before);
     put_digits(line, number, 1);
 }
 
@@ -53,22 +54,22 @@ static void put_decimal(plr_text *line, uint32_t digits, unsigned decimals) {
         unit *= 10u;
     put_digits(line, digits / unit, 1);
     if (decimals > 0) {
-        plr_line_words(line, ".");
+        plr_line_text(line, ".");
         put_digits(line, digits % unit, decimals);
     }
 }
 
 void plr_line_number(plr_text *line, double number) {
     if (number != number) {
-        plr_line_words(line, "NaN");
+        plr_line_text(line, "NaN");
         return;
     }
     if (number < 0) {
-        plr_line_words(line, "-");
+        plr_line_text(line, "-");
         number = -number;
     }
     if (number > 1.7e308) {
-        plr_line_words(line, "infinity");
+        plr_line_text(line, "infinity");
         return;
     }
     int exponent = 0; /* number 10^exponent was asked for, with number in [1, 10) */
@@ -83,20 +84,18 @@ void plr_line_number(plr_text *line, double number) {
         digits /= 10u;
         exponent++;
     }
-    if (exponent >= 0 && exponent <= 5) {
-        put_decimal(line, digits, (unsigned)(5 - exponent));
-    } else if (exponent < 0 && exponent >= -4) {
+    if (exponent >= -4 && exponent <= 5) {
         put_decimal(line, digits, (unsigned)(5 - exponent));
     } else {
         put_decimal(line, digits, 5);
-        plr_line_words(line, exponent < 0 ? "e-" : "e+");
+        plr_line_text(line, exponent < 0 ? "e-" : "e+");
         put_digits(line, (uint64_t)(exponent < 0 ? -exponent : exponent), 2);
     }
 }
 
 void plr_line_time(plr_text *line, plr_time_ns t_ns) {
     put_digits(line, t_ns / 1000000000u, 1);
-    plr_line_words(line, ".");
+    plr_line_text(line, ".");
     put_digits(line, t_ns / 1000000u % 1000u, 3);
-    plr_line_words(line, " s");
+    plr_line_text(line, " s");
 }

@@ -9,10 +9,10 @@
 /* Empties it. */
 void plr_line_begin(plr_text *line, plr_severity severity);
 
-void plr_line_words(plr_text *line, const char *words);
+void plr_line_text(plr_text *line, const char *added);
 
-/* A whole number. */
-void plr_line_count(plr_text *line, uint64_t number);
+/* A whole number, and the text before it. */
+void plr_line_count(plr_text *line, const char *before, uint64_t number);
 
 /* Six significant digits at most, like printf's %g, with an exponent outside 1e-4 to 1e6. */
 void plr_line_number(plr_text *line, double number);

@@ -14,17 +14,8 @@ static bool all_within(const double *x, unsigned n, double limit) {
     return true;
 }
 
-bool plr_plausible_twist(const plr_twist *twist) {
-    return all_within(twist->v_B_mps, 3, SPEED_MPS) && all_within(twist->w_B_radps, 3, RATE_RADPS);
-}
-
 bool plr_plausible_pose(const plr_pose *pose) {
     return all_within(pose->p, 3, POSITION_M);
-}
-
-bool plr_plausible_start(const plr_start *start) {
-    return plr_plausible_pose(&start->T_WB) &&
-           (!start->has_covariance || all_within(start->P_xi, 21, VARIANCE));
 }
 
 bool plr_plausible_bias(const plr_start *start) {
@@ -36,6 +27,21 @@ bool plr_plausible_variance(const double *variance, unsigned n) {
     return all_within(variance, n, VARIANCE);
 }
 
-bool plr_plausible_landmark(const plr_landmark *landmark) {
-    return all_within(landmark->p_W_m, 3, POSITION_M) && all_within(landmark->P_W_m2, 9, VARIANCE);
+bool plr_plausible_message(const plr_message *message) {
+    const plr_twist *twist = &message->as.twist.twist;
+    const plr_start *start = &message->as.start;
+    const plr_landmark *landmark = &message->as.landmark.landmark;
+    switch (message->kind) {
+    case PLR_KIND_TWIST:
+        return all_within(twist->v_B_mps, 3, SPEED_MPS) &&
+               all_within(twist->w_B_radps, 3, RATE_RADPS);
+    case PLR_KIND_START:
+        return plr_plausible_pose(&start->T_WB) &&
+               (!start->has_covariance || all_within(start->P_xi, 21, VARIANCE));
+    case PLR_KIND_LANDMARK:
+        return all_within(landmark->p_W_m, 3, POSITION_M) &&
+               all_within(landmark->P_W_m2, 9, VARIANCE);
+    default:
+        return true;
+    }
 }

@@ -17,15 +17,14 @@
 
 #include "pelorus/wire.h"
 
-bool plr_plausible_twist(const plr_twist *twist);
+/* A TWIST; a START's pose and, where it is given, its covariance; a LANDMARK. Of other kinds true. */
+bool plr_plausible_message(const plr_message *message);
+
 bool plr_plausible_pose(const plr_pose *pose);
 
-/* Pose and, where it is given, its covariance; the bias prior apart. */
-bool plr_plausible_start(const plr_start *start);
+/* A START's bias prior. */
 bool plr_plausible_bias(const plr_start *start);
 
 bool plr_plausible_variance(const double *variance, unsigned n);
-
-bool plr_plausible_landmark(const plr_landmark *landmark);
 
 #endif

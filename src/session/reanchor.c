@@ -85,15 +85,15 @@ static void know_nothing(double P[36]) {
     }
 }
 
-static void tell(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
+static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_text *line = &s->out.as.text;
     plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_words(line, "the clock jumped from ");
+    plr_line_text(line, "the clock jumped from ");
     plr_line_time(line, from_ns);
-    plr_line_words(line, " to ");
+    plr_line_text(line, " to ");
     plr_line_time(line, to_ns);
-    plr_line_words(line, ", further than max-gap; three messages agree, so it is followed: "
-                         "landmarks leave, the pose stays with a wider covariance");
+    plr_line_text(line, ", further than max-gap; three messages agree, so it is followed: "
+                        "landmarks leave, the pose stays with a wider covariance");
     plr_send_text(s);
 }
 
@@ -113,17 +113,24 @@ static plr_status carry_pose(plr_filter *f, plr_time_ns t_ns, double seconds) {
     return status;
 }
 
-plr_status plr_reanchor(plr_session *s, plr_time_ns t_ns) {
+static plr_status reanchor(plr_session *s, plr_time_ns t_ns) {
     plr_filter *f = &s->filter;
     const plr_time_ns from_ns = plr_filter_time(f);
     const double seconds = (double)distance_ns(from_ns, t_ns) * 1e-9;
 
-    (void)plr_filter_flush_map(f); /* the session's sink takes all */
+    (void)plr_filter_flush_map(f); /* the session's sink accepts all */
     const bool mapping = plr_filter_config(f)->mode == PLR_MODE_MAPPING;
     const plr_status status = mapping ? plr_filter_reset(f) : carry_pose(f, t_ns, seconds);
     if (status == PLR_OK) {
         s->totals.reanchored++;
-        tell(s, from_ns, t_ns);
+        report(s, from_ns, t_ns);
     }
     return status;
+}
+
+bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status) {
+    const double max_gap_s = plr_filter_config(&s->filter)->max_gap_s;
+    return plr_clock_watch_note(&s->watch, t_ns, status, plr_filter_time(&s->filter),
+                                (plr_time_ns)(max_gap_s * 1e9 + 0.5)) &&
+           reanchor(s, t_ns) == PLR_OK;
 }

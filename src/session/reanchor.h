@@ -21,7 +21,7 @@
  *
  *   In mapping every pose is given, so there the filter just begins anew.
  *
- * The third message is then taken. It is counted, and told in a TEXT.
+ * The third message is then used. The jump is counted, and a TEXT reports it.
  */
 #ifndef PLR_SESSION_REANCHOR_H
 #define PLR_SESSION_REANCHOR_H
@@ -30,12 +30,14 @@
 
 void plr_clock_watch_init(plr_clock_watch *watch);
 
-/* What the filter, whose estimate is at filter_ns, said to a message of t_ns. True if the new time
- * is to be believed now. */
+/* Notes what the filter, whose estimate is at filter_ns, answered to a message of t_ns. True if the
+ * new time is to be believed now. */
 bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status status,
                           plr_time_ns filter_ns, plr_time_ns max_gap_ns);
 
-/* Takes the estimate to t_ns as described above. */
-plr_status plr_reanchor(plr_session *s, plr_time_ns t_ns);
+/* After the filter answered data of time t_ns with that status: carries the estimate to t_ns, as
+ * described above, if the new time is to be believed now. True if it did: the filter will accept
+ * the same data. */
+bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status);
 
 #endif

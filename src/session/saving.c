@@ -4,20 +4,20 @@
 #include <string.h>
 
 #include "pelorus/state_store.h"
-#include "session/begin.h"
-#include "session/inputs.h"
 #include "session/line.h"
+#include "session/phase.h"
 #include "session/plausible.h"
 #include "session/reanchor.h"
 #include "session/send.h"
+#include "session/start.h"
 
-/* ---------------------------------------------------------------- telling */
+/* ---------------------------------------------------------------- answers */
 
 /* Why not, where the status alone would not say it. */
-static const char *words(const plr_session *s, plr_state_action action, plr_status status) {
+static const char *reason(const plr_session *s, plr_state_action action, plr_status status) {
     if (s->options.store == NULL)
         return "there is no storage here";
-    if (status == PLR_E_MODE && action == PLR_STATE_RESTORE && s->phase == PLR_PHASE_RUNNING)
+    if (status == PLR_E_MODE && action == PLR_STATE_RESTORE && s->phase >= PLR_PHASE_STARTING)
         return "a drive is under way; END ends it";
     if (status == PLR_E_NOT_READY && action == PLR_STATE_SAVE)
         return "no data was taken yet, so there is nothing to save";
@@ -31,47 +31,45 @@ static const char *words(const plr_session *s, plr_state_action action, plr_stat
     return plr_status_text(status);
 }
 
-static void refuse(plr_session *s, plr_state_action action, plr_time_ns t_ns, plr_status status) {
+void plr_saving_refuse(plr_session *s, plr_state_action action, plr_time_ns t_ns,
+                       plr_status status) {
     plr_text *line = &s->out.as.text;
     plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_words(line, action == PLR_STATE_SAVE ? "state not saved: " : "state not restored: ");
-    plr_line_words(line, words(s, action, status));
+    plr_line_text(line, action == PLR_STATE_SAVE ? "state not saved: " : "state not restored: ");
+    plr_line_text(line, reason(s, action, status));
     if (status == PLR_E_FULL) {
-        plr_line_words(line, ": it has ");
-        plr_line_count(line, s->options.store->device.size);
-        plr_line_words(line, " bytes, and ");
-        plr_line_count(line, plr_state_store_needs(s->options.store, &s->filter));
-        plr_line_words(line, " are needed");
+        plr_line_count(line, ": it has ", s->options.store->device.size);
+        plr_line_count(line, " bytes, and ", plr_state_store_needs(s->options.store, &s->filter));
+        plr_line_text(line, " are needed");
     }
     plr_send_text(s);
     plr_send_refusal(s, PLR_KIND_STATE, t_ns, status, NULL);
 }
 
-/* "generation 3, 17 landmarks, 8612 bytes, of 12.345 s", and the slots that are damaged. */
-static void tell(plr_session *s, const char *what, const plr_stored_state *stored,
-                 plr_time_ns of_ns) {
+/* "state saved: generation 3, 17 landmarks, 8612 bytes, of 12.345 s", and whether the other slot is
+ * damaged; of_ns is the time of the state, t_ns that of the REPORT. */
+static void answer(plr_session *s, const char *what, const plr_stored_state *stored,
+                   plr_time_ns of_ns, plr_time_ns t_ns) {
     plr_text *line = &s->out.as.text;
     plr_line_begin(line, PLR_SEVERITY_INFO);
-    plr_line_words(line, what);
-    plr_line_words(line, ": generation ");
-    plr_line_count(line, stored->generation);
-    plr_line_words(line, ", ");
-    plr_line_count(line, plr_filter_landmark_count(&s->filter));
-    plr_line_words(line, " landmarks, ");
-    plr_line_count(line, stored->length);
-    plr_line_words(line, " bytes, of ");
+    plr_line_text(line, what);
+    plr_line_count(line, ": generation ", stored->generation);
+    plr_line_count(line, ", ", plr_filter_landmark_count(&s->filter));
+    plr_line_count(line, " landmarks, ", stored->length);
+    plr_line_text(line, " bytes, of ");
     plr_line_time(line, of_ns);
     if (stored->damaged > 0)
-        plr_line_words(line, "; the other slot holds a damaged one");
+        plr_line_text(line, "; the other slot holds a damaged one");
     plr_send_text(s);
+    plr_send_answer(s, PLR_KIND_STATE, t_ns, PLR_OK);
 }
 
 /* ---------------------------------------------------------------- save */
 
-/* Some data was taken: without any, a save would push out a state that is worth something. */
+/* Some data was used: without any, a save would push out a state that is worth something. */
 static bool has_data(const plr_session *s) {
     plr_totals totals;
-    return s->phase == PLR_PHASE_RUNNING && plr_filter_totals(&s->filter, &totals) == PLR_OK &&
+    return plr_filter_totals(&s->filter, &totals) == PLR_OK &&
            (totals.twists > 0 || totals.frames > 0);
 }
 
@@ -81,21 +79,13 @@ void plr_saving_save(plr_session *s, plr_time_ns t_ns) {
     if (s->options.store != NULL)
         status = has_data(s) ? plr_state_store_save(s->options.store, &s->filter, &saved)
                              : PLR_E_NOT_READY;
-    if (status != PLR_OK) {
-        refuse(s, PLR_STATE_SAVE, t_ns, status);
-        return;
-    }
-    tell(s, "state saved", &saved, plr_filter_time(&s->filter));
-    plr_send_answer(s, PLR_KIND_STATE, t_ns, PLR_OK);
+    if (status == PLR_OK)
+        answer(s, "state saved", &saved, plr_filter_time(&s->filter), t_ns);
+    else
+        plr_saving_refuse(s, PLR_STATE_SAVE, t_ns, status);
 }
 
 /* ---------------------------------------------------------------- restore */
-
-/* What came of a restore. */
-typedef struct plr_restored {
-    plr_stored_state stored;
-    plr_time_ns of_ns; /* time of the state as it was saved */
-} plr_restored;
 
 static plr_status check_moved(const double variance[6]) {
     for (unsigned i = 0; i < 6; i++) {
@@ -127,87 +117,70 @@ static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6
     return plr_filter_resume(f, t_ns, moved ? P : NULL);
 }
 
+/* What STATE asks for, or PLR_START_SAVED; without an error, *of_ns is the time of the saved state. */
+static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_variance[6],
+                       plr_stored_state *stored, plr_time_ns *of_ns) {
+    if (s->options.store == NULL)
+        return PLR_E_MODE;
+    plr_status status = plr_state_store_restore(s->options.store, &s->filter, stored);
+    if (status != PLR_OK)
+        return status;
+    *of_ns = plr_filter_time(&s->filter);
+    status = go_on(&s->filter, t_ns, moved_variance);
+    if (status != PLR_OK)
+        (void)plr_filter_reset(&s->filter);
+    return status;
+}
+
 /* The restored state is the start: nothing that came before it sets the pose. */
-static void take_as_start(plr_session *s) {
-    plr_totals totals;
-    if (plr_filter_totals(&s->filter, &totals) == PLR_OK)
-        s->start_resets = plr_send_resets(&totals);
-    s->start_known = false;
-    s->started = true;
+static void start_from_state(plr_session *s, plr_phase_event event) {
+    plr_send_resets_from_here(s);
+    s->start_pending = false;
+    plr_phase_change(&s->phase, event);
     plr_clock_watch_init(&s->watch);
     memset(&s->last, 0, sizeof s->last);
     s->last.t_ns = UINT64_MAX; /* no frame of this session: the next one is not its double */
 }
 
-static plr_status may_restore(const plr_session *s, const double variance[6]) {
-    if (s->phase == PLR_PHASE_WAITING)
-        return PLR_E_NOT_READY;
-    if (s->options.store == NULL || (s->phase == PLR_PHASE_RUNNING && !s->restored))
+/* On an error the session waits for another start. */
+static plr_status restore(plr_session *s, const plr_state_message *wanted, plr_stored_state *stored,
+                          plr_time_ns *of_ns) {
+    if (s->options.store == NULL)
         return PLR_E_MODE;
-    return check_moved(variance);
-}
-
-/* What STATE asks for; on an error the session waits for another start. */
-static plr_status restore(plr_session *s, const plr_state_message *wanted, plr_restored *r) {
-    plr_status status = may_restore(s, wanted->moved_variance);
+    const plr_status status = check_moved(wanted->moved_variance);
     if (status != PLR_OK)
         return status;
-    s->phase = PLR_PHASE_READY; /* a repeated STATE restores again */
-    s->started = s->restored = false;
-    if (!plr_begin_filter(s))
+    plr_phase_change(&s->phase, PLR_EVENT_RESTORE);
+    if (s->phase == PLR_PHASE_REJECTED || plr_start_filter(s) != PLR_OK)
         return PLR_E_CONFIG;
-    status = plr_state_store_restore(s->options.store, &s->filter, &r->stored);
-    if (status != PLR_OK)
-        return status;
-    r->of_ns = plr_filter_time(&s->filter);
-    return go_on(&s->filter, wanted->t_ns, wanted->moved_variance);
+    return load(s, wanted->t_ns, wanted->moved_variance, stored, of_ns);
 }
 
-static void take_restore(plr_session *s) {
+void plr_saving_restore(plr_session *s) {
     const plr_state_message wanted = s->in.as.state;
-    plr_restored r;
-    const plr_status status = restore(s, &wanted, &r);
+    plr_stored_state stored;
+    plr_time_ns of_ns = 0;
+    const plr_status status = restore(s, &wanted, &stored, &of_ns);
     if (status == PLR_OK) {
-        plr_begin_announce(s);
-        take_as_start(s);
-        s->restored = true;
+        plr_start_announce(s);
+        start_from_state(s, PLR_EVENT_RESTORED);
     }
     plr_send_echo(s); /* behind the CONFIG in force, as data: a log of it can be replayed */
-    if (status != PLR_OK) {
-        refuse(s, PLR_STATE_RESTORE, wanted.t_ns, status);
-        return;
-    }
-    tell(s, "state restored", &r.stored, r.of_ns);
-    plr_send_answer(s, PLR_KIND_STATE, wanted.t_ns, PLR_OK);
+    if (status == PLR_OK)
+        answer(s, "state restored", &stored, of_ns, wanted.t_ns);
+    else
+        plr_saving_refuse(s, PLR_STATE_RESTORE, wanted.t_ns, status);
 }
 
-void plr_take_state(plr_session *s) {
-    if (s->in.as.state.action == PLR_STATE_RESTORE) {
-        take_restore(s);
-        return;
-    }
-    plr_send_echo(s);
-    plr_saving_save(s, s->in.as.state.t_ns);
-}
-
-void plr_saving_load(plr_session *s, plr_time_ns t_ns) {
+void plr_saving_restore_at_start(plr_session *s, plr_time_ns t_ns) {
     static const double stood_still[6];
-    plr_filter *f = &s->filter;
-    plr_restored r;
-    plr_status status = PLR_E_MODE;
-    if (s->options.store != NULL)
-        status = plr_state_store_restore(s->options.store, f, &r.stored);
-    if (status == PLR_OK) {
-        r.of_ns = plr_filter_time(f);
-        status = go_on(f, t_ns, stood_still);
-        if (status != PLR_OK)
-            (void)plr_filter_reset(f);
-    }
+    plr_stored_state stored;
+    plr_time_ns of_ns = 0;
+    const plr_status status = load(s, t_ns, stood_still, &stored, &of_ns);
     if (status != PLR_OK) {
-        refuse(s, PLR_STATE_RESTORE, t_ns, status);
+        plr_saving_refuse(s, PLR_STATE_RESTORE, t_ns, status);
         return;
     }
-    take_as_start(s);
-    tell(s, "state restored", &r.stored, r.of_ns);
-    plr_send_answer(s, PLR_KIND_STATE, t_ns, PLR_OK);
+    start_from_state(s, PLR_EVENT_POSE);
+    answer(s, "state restored", &stored, of_ns, t_ns);
 }

@@ -22,12 +22,20 @@
 
 #include "pelorus/session.h"
 
-/* Saves the filter as it is. Twists that are held back are not part of it. `t_ns` is what the
- * REPORT tells. */
+/* STATE (save): saves the filter as it is, and answers. Twists that are held back are not part of
+ * it. `t_ns` is that of the REPORT. */
 void plr_saving_save(plr_session *s, plr_time_ns t_ns);
 
-/* PLR_START_SAVED, before the first data of time t_ns, with a filter that runs: brings the state
- * back, with a body that has not moved. */
-void plr_saving_load(plr_session *s, plr_time_ns t_ns);
+/* STATE (restore), which is s->in, where no drive is under way: restores, echoes it behind the
+ * CONFIG in force, and answers. */
+void plr_saving_restore(plr_session *s);
+
+/* PLR_START_SAVED, before the first data of time t_ns, with an initialised filter: restores the
+ * state, with a body that has not moved, and answers. */
+void plr_saving_restore_at_start(plr_session *s, plr_time_ns t_ns);
+
+/* Answers that a save or restore is refused. */
+void plr_saving_refuse(plr_session *s, plr_state_action action, plr_time_ns t_ns,
+                       plr_status status);
 
 #endif

@@ -53,21 +53,26 @@ static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
     return plr_filter_bias(f, pose->bias, NULL) == PLR_OK;
 }
 
-uint32_t plr_send_resets(const plr_totals *totals) {
-    return totals->resets + totals->widened;
+/* A controller must not take the jump of a reset for motion. */
+static uint32_t resets(const plr_filter *f) {
+    plr_totals totals;
+    return plr_filter_totals(f, &totals) == PLR_OK ? totals.resets + totals.widened : 0;
+}
+
+void plr_send_resets_from_here(plr_session *s) {
+    s->start_resets = resets(&s->filter);
 }
 
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
     plr_pose_message *pose = &s->out.as.pose;
-    plr_totals totals;
     s->out.kind = PLR_KIND_POSE;
     memset(pose, 0, sizeof *pose);
-    if (plr_filter_totals(&s->filter, &totals) != PLR_OK || !describe_pose(pose, &s->filter))
+    if (!describe_pose(pose, &s->filter))
         return NULL;
     pose->t_ns = plr_filter_time(&s->filter);
     pose->real_bytes = (uint8_t)sizeof(plr_real);
     pose->after_update = after_update;
-    pose->reset_count = (uint16_t)(plr_send_resets(&totals) - s->start_resets);
+    pose->reset_count = (uint16_t)(resets(&s->filter) - s->start_resets);
     put(s, after_update ? PLR_OUTPUT_POSE : PLR_OUTPUT_TWIST_POSE, &s->out);
     if (s->options.observer.pose != NULL)
         s->options.observer.pose(s->options.observer.context, pose);
@@ -108,18 +113,20 @@ void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_st
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
 }
 
-void plr_send_known(plr_session *s, const plr_landmark *landmark) {
-    s->out.kind = PLR_KIND_LANDMARK;
-    s->out.as.landmark.role = PLR_LANDMARK_KNOWN;
-    s->out.as.landmark.landmark = *landmark;
-    put(s, PLR_OUTPUT_ECHO, &s->out);
-}
-
-void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
+static void put_landmark(plr_session *s, uint32_t bit, plr_landmark_role role,
+                         const plr_landmark *landmark) {
     s->out.kind = PLR_KIND_LANDMARK;
     s->out.as.landmark.role = (uint8_t)role;
     s->out.as.landmark.landmark = *landmark;
-    put(s, PLR_OUTPUT_LANDMARK, &s->out);
+    put(s, bit, &s->out);
+}
+
+void plr_send_known(plr_session *s, const plr_landmark *landmark) {
+    put_landmark(s, PLR_OUTPUT_ECHO, PLR_LANDMARK_KNOWN, landmark);
+}
+
+void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
+    put_landmark(s, PLR_OUTPUT_LANDMARK, role, landmark);
     if (s->options.observer.landmark != NULL)
         s->options.observer.landmark(s->options.observer.context, &s->out.as.landmark);
 }

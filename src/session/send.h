@@ -16,8 +16,8 @@ void plr_send_config(plr_session *s);
 /* The estimate at the filter's time. Holds until the next plr_send_*; NULL if there is none. */
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 
-/* What the reset counter of a POSE counts: a controller must not take the jump for motion. */
-uint32_t plr_send_resets(const plr_totals *totals);
+/* From here on a POSE counts its resets. */
+void plr_send_resets_from_here(plr_session *s);
 
 /* The report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);

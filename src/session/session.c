@@ -3,28 +3,19 @@
 
 #include <string.h>
 
-#include "session/begin.h"
-#include "session/inputs.h"
+#include "session/data.h"
+#include "session/input.h"
+#include "session/layers.h"
+#include "session/phase.h"
 #include "session/saving.h"
 #include "session/send.h"
+#include "session/start.h"
 
 void plr_session_options_default(plr_session_options *options) {
     memset(options, 0, sizeof *options);
     options->start = PLR_START_AUTO;
     options->output = PLR_OUTPUT_CONFIG | PLR_OUTPUT_POSE | PLR_OUTPUT_REPORT |
                       PLR_OUTPUT_LANDMARK | PLR_OUTPUT_TEXT | PLR_OUTPUT_END;
-}
-
-static plr_status check_overrides(const plr_session_options *options) {
-    plr_config config;
-    plr_config_default(&config);
-    for (unsigned i = 0; i < options->override_count; i++) {
-        const plr_setting *setting = plr_setting_by_id(options->overrides[i].id);
-        if (setting == NULL ||
-            plr_config_set(&config, setting, options->overrides[i].value) != PLR_OK)
-            return PLR_E_CONFIG;
-    }
-    return PLR_OK;
 }
 
 static int write_to_port(void *context, const uint8_t *bytes, size_t n) {
@@ -44,13 +35,12 @@ plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
         (options->map_count > 0 && options->map == NULL) ||
         options->map_count > options->known_capacity)
         return PLR_E_ARGUMENT;
-    if (check_overrides(options) != PLR_OK)
+    if (!plr_layers_allow(options->overrides, options->override_count))
         return PLR_E_CONFIG;
     memset(s, 0, sizeof *s);
     s->port = *port;
     s->options = *options;
-    s->phase = PLR_PHASE_WAITING;
-    plr_begin_anew(s);
+    plr_start_clear(s); /* and the phase is PLR_PHASE_WAITING, which is 0 */
     plr_status status =
         plr_reader_init(&s->reader, s->body, sizeof s->body, s->observations, PLR_MAX_OBSERVATIONS);
     if (status == PLR_OK)
@@ -83,15 +73,16 @@ static void refuse_future(plr_session *s) {
     plr_send_refusal(s, PLR_KIND_HEADER, 0, PLR_E_FOREIGN, NULL);
 }
 
-static plr_step take_bytes(plr_session *s) {
-    size_t taken = 0;
+static plr_step feed_reader(plr_session *s) {
+    size_t used = 0;
     const plr_read_event event = plr_reader_feed(&s->reader, s->chunk + s->chunk_at,
-                                                 s->chunk_count - s->chunk_at, &taken, &s->in);
-    s->chunk_at += (unsigned)taken;
+                                                 s->chunk_count - s->chunk_at, &used, &s->in);
+    s->chunk_at += (unsigned)used;
     switch (event) {
     case PLR_READ_MESSAGE:
         s->last_skip = PLR_SKIP_NONE;
-        if (!plr_take_message(s))
+        plr_input_handle(s);
+        if (s->in.kind != PLR_KIND_END)
             return PLR_STEP_MESSAGE;
         plr_session_finish(s);
         return PLR_STEP_ENDED;
@@ -124,19 +115,19 @@ plr_step plr_session_step(plr_session *s) {
         s->chunk_at = 0;
         s->chunk_count = (unsigned)count;
     }
-    return take_bytes(s);
+    return feed_reader(s);
 }
 
 void plr_session_finish(plr_session *s) {
-    if (s->phase == PLR_PHASE_RUNNING) {
+    if (s->phase >= PLR_PHASE_STARTING) {
         plr_landmark landmark;
-        plr_take_all_held(s);
+        plr_data_apply_held(s, UINT64_MAX);
         if ((s->options.output & PLR_OUTPUT_STATE) != 0)
             plr_saving_save(s, plr_filter_time(&s->filter));
         for (unsigned slot = 0; slot < plr_filter_landmark_count(&s->filter); slot++)
             if (plr_filter_landmark(&s->filter, slot, &landmark) == PLR_OK)
                 plr_send_landmark(s, PLR_LANDMARK_FINAL, &landmark);
     }
-    s->phase = PLR_PHASE_WAITING;
+    plr_phase_change(&s->phase, PLR_EVENT_END);
     plr_send_end(s);
 }

@@ -5,7 +5,44 @@
 
 #include <string.h>
 
-#include "session/state_header.h"
+#include "pelorus/wire.h"
+#include "wire/bytes.h"
+
+/* ---------------------------------------------------------------- header: docs/STATE-FORMAT.md */
+
+typedef struct slot_header {
+    uint64_t generation;
+    uint32_t length, crc; /* of the state */
+} slot_header;
+
+enum { STORE_VERSION = 1, MAGIC = 0, VERSION = 4, GENERATION = 8, LENGTH = 16, CRC = 20, OWN = 24 };
+
+static const uint8_t magic[4] = {'P', 'L', 'R', 'S'};
+
+static void write_header(uint8_t bytes[PLR_STORE_HEADER], const slot_header *header) {
+    memcpy(bytes + MAGIC, magic, sizeof magic);
+    plr_bytes_put(bytes + VERSION, 4, STORE_VERSION);
+    plr_bytes_put(bytes + GENERATION, 8, header->generation);
+    plr_bytes_put(bytes + LENGTH, 4, header->length);
+    plr_bytes_put(bytes + CRC, 4, header->crc);
+    plr_bytes_put(bytes + OWN, 4, plr_crc32(0, bytes, OWN));
+}
+
+/* PLR_OK; PLR_E_NOT_READY the bytes are no header at all; PLR_E_CORRUPT one that is damaged;
+ * PLR_E_FOREIGN of another version: only the generation is set. */
+static plr_status read_header(const uint8_t bytes[PLR_STORE_HEADER], slot_header *header) {
+    memset(header, 0, sizeof *header);
+    if (memcmp(bytes + MAGIC, magic, sizeof magic) != 0)
+        return PLR_E_NOT_READY;
+    if (plr_bytes_get(bytes + OWN, 4) != plr_crc32(0, bytes, OWN))
+        return PLR_E_CORRUPT;
+    header->generation = plr_bytes_get(bytes + GENERATION, 8);
+    if (plr_bytes_get(bytes + VERSION, 4) != STORE_VERSION)
+        return PLR_E_FOREIGN;
+    header->length = (uint32_t)plr_bytes_get(bytes + LENGTH, 4);
+    header->crc = (uint32_t)plr_bytes_get(bytes + CRC, 4);
+    return PLR_OK;
+}
 
 /* ---------------------------------------------------------------- geometry */
 
@@ -48,16 +85,16 @@ uint32_t plr_state_store_needs(const plr_state_store *store, const plr_filter *f
 
 /* ---------------------------------------------------------------- looking */
 
-static bool reads(const plr_state_store *store, uint32_t offset, uint8_t *bytes, uint32_t n) {
+static bool read_bytes(const plr_state_store *store, uint32_t offset, uint8_t *bytes, uint32_t n) {
     return store->device.read(store->device.context, offset, bytes, n) == 0;
 }
 
 /* CRC of n bytes at an offset of the device; false if they cannot be read. */
-static bool reads_crc(plr_state_store *store, uint32_t offset, uint32_t n, uint32_t *crc) {
+static bool read_crc(plr_state_store *store, uint32_t offset, uint32_t n, uint32_t *crc) {
     *crc = 0;
     while (n > 0) {
         const uint32_t piece = n < PLR_STORE_BUFFER ? n : PLR_STORE_BUFFER;
-        if (!reads(store, offset, store->buffer, piece))
+        if (!read_bytes(store, offset, store->buffer, piece))
             return false;
         *crc = plr_crc32(*crc, store->buffer, piece);
         offset += piece;
@@ -68,17 +105,17 @@ static bool reads_crc(plr_state_store *store, uint32_t offset, uint32_t n, uint3
 
 /* What one slot holds. PLR_OK a whole state; PLR_E_FOREIGN a whole header of another version, of
  * which only the generation is known; PLR_E_NOT_READY nothing; PLR_E_CORRUPT; PLR_E_IO. */
-static plr_status look_into(plr_state_store *store, unsigned slot, plr_state_header *header) {
+static plr_status look_into(plr_state_store *store, unsigned slot, slot_header *header) {
     uint8_t bytes[PLR_STORE_HEADER];
     uint32_t crc;
-    if (!reads(store, slot_start(store, slot), bytes, sizeof bytes))
+    if (!read_bytes(store, slot_start(store, slot), bytes, sizeof bytes))
         return PLR_E_IO;
-    const plr_status status = plr_state_header_read(bytes, header);
+    const plr_status status = read_header(bytes, header);
     if (status != PLR_OK)
         return status;
     if (header->length == 0 || header->length > store->slot_size - header_space(store))
         return PLR_E_CORRUPT;
-    if (!reads_crc(store, slot_start(store, slot) + header_space(store), header->length, &crc))
+    if (!read_crc(store, slot_start(store, slot) + header_space(store), header->length, &crc))
         return PLR_E_IO;
     return crc == header->crc ? PLR_OK : PLR_E_CORRUPT;
 }
@@ -86,7 +123,7 @@ static plr_status look_into(plr_state_store *store, unsigned slot, plr_state_hea
 /* Both slots, and which of them is the newest whole one. */
 typedef struct plr_store_view {
     plr_status status[PLR_STORE_SLOTS];
-    plr_state_header header[PLR_STORE_SLOTS];
+    slot_header header[PLR_STORE_SLOTS];
     int newest; /* slot, or -1 */
 } plr_store_view;
 
@@ -106,7 +143,7 @@ static void look_around(plr_state_store *store, plr_store_view *view) {
 }
 
 /* `stored` may be NULL. */
-static void describe(plr_stored_state *stored, unsigned slot, const plr_state_header *header) {
+static void describe(plr_stored_state *stored, unsigned slot, const slot_header *header) {
     if (!stored)
         return;
     stored->generation = header->generation;
@@ -125,16 +162,16 @@ typedef struct plr_store_writer {
     uint32_t length, crc;
 } plr_store_writer;
 
-static bool programs(const plr_state_store *store, uint32_t offset, uint32_t n) {
+static bool program(const plr_state_store *store, uint32_t offset, uint32_t n) {
     return store->device.program(store->device.context, offset, store->buffer, n) == 0;
 }
 
 /* Programs the buffer, padded with zeros to whole units. */
-static bool flushes(plr_store_writer *writer) {
+static bool flush(plr_store_writer *writer) {
     plr_state_store *store = writer->store;
     const uint32_t n = rounded_up(writer->fill, store->device.program_size);
     memset(store->buffer + writer->fill, 0, n - writer->fill);
-    if (n > 0 && !programs(store, writer->at, n))
+    if (n > 0 && !program(store, writer->at, n))
         return false;
     writer->at += n;
     writer->fill = 0;
@@ -142,7 +179,7 @@ static bool flushes(plr_store_writer *writer) {
 }
 
 /* A plr_state_sink. */
-static int take(void *context, const uint8_t *bytes, uint32_t n) {
+static int append_state(void *context, const uint8_t *bytes, uint32_t n) {
     plr_store_writer *writer = context;
     writer->crc = plr_crc32(writer->crc, bytes, n);
     writer->length += n;
@@ -153,14 +190,14 @@ static int take(void *context, const uint8_t *bytes, uint32_t n) {
         writer->fill += piece;
         bytes += piece;
         n -= piece;
-        if (writer->fill == writer->room && !flushes(writer))
+        if (writer->fill == writer->room && !flush(writer))
             return -1;
     }
     return 0;
 }
 
 /* Block by block from the start: the old header goes first. */
-static bool erases(const plr_state_store *store, uint32_t offset, uint32_t n) {
+static bool erase_blocks(const plr_state_store *store, uint32_t offset, uint32_t n) {
     const uint32_t block = store->device.erase_size;
     for (uint32_t done = 0; done < n; done += block)
         if (store->device.erase(store->device.context, offset + done, block) != 0)
@@ -168,12 +205,12 @@ static bool erases(const plr_state_store *store, uint32_t offset, uint32_t n) {
     return true;
 }
 
-static bool programs_header(plr_state_store *store, unsigned slot, const plr_state_header *header) {
+static bool program_header(plr_state_store *store, unsigned slot, const slot_header *header) {
     uint8_t back[PLR_STORE_HEADER];
     memset(store->buffer, 0, header_space(store));
-    plr_state_header_write(store->buffer, header);
-    return programs(store, slot_start(store, slot), header_space(store)) &&
-           reads(store, slot_start(store, slot), back, sizeof back) &&
+    write_header(store->buffer, header);
+    return program(store, slot_start(store, slot), header_space(store)) &&
+           read_bytes(store, slot_start(store, slot), back, sizeof back) &&
            memcmp(back, store->buffer, sizeof back) == 0;
 }
 
@@ -183,15 +220,15 @@ static plr_status write_slot(plr_state_store *store, unsigned slot, uint64_t gen
     const uint32_t start = slot_start(store, slot), state = start + header_space(store);
     plr_store_writer writer = {.store = store, .at = state, .room = PLR_STORE_BUFFER / unit * unit};
     uint32_t crc;
-    if (!erases(store, start, occupied(store, plr_filter_saved_size(f, f->count))))
+    if (!erase_blocks(store, start, occupied(store, plr_filter_saved_size(f, f->count))))
         return PLR_E_IO;
-    const plr_status status = plr_filter_save(f, take, &writer);
+    const plr_status status = plr_filter_save(f, append_state, &writer);
     if (status != PLR_OK)
         return status;
-    if (!flushes(&writer) || !reads_crc(store, state, writer.length, &crc) || crc != writer.crc)
+    if (!flush(&writer) || !read_crc(store, state, writer.length, &crc) || crc != writer.crc)
         return PLR_E_IO;
-    const plr_state_header header = {generation, writer.length, writer.crc};
-    if (!programs_header(store, slot, &header))
+    const slot_header header = {generation, writer.length, writer.crc};
+    if (!program_header(store, slot, &header))
         return PLR_E_IO;
     describe(saved, slot, &header);
     return PLR_OK;
@@ -218,7 +255,7 @@ plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f,
 
 /* ---------------------------------------------------------------- restore */
 
-/* A restore in progress: the CRC is taken once more, of the very bytes that the filter takes. */
+/* A restore in progress: the CRC is taken once more, of the very bytes that the filter reads. */
 typedef struct plr_store_reader {
     const plr_state_store *store;
     uint32_t state; /* where the state begins on the device */
@@ -226,19 +263,19 @@ typedef struct plr_store_reader {
 } plr_store_reader;
 
 /* A plr_state_source. */
-static int give(void *context, uint32_t offset, uint8_t *bytes, uint32_t n) {
+static int read_state(void *context, uint32_t offset, uint8_t *bytes, uint32_t n) {
     plr_store_reader *reader = context;
-    if (!reads(reader->store, reader->state + offset, bytes, n))
+    if (!read_bytes(reader->store, reader->state + offset, bytes, n))
         return -1;
     reader->crc = plr_crc32(offset == 0 ? 0 : reader->crc, bytes, n);
     return 0;
 }
 
-static plr_status read_slot(plr_state_store *store, unsigned slot, const plr_state_header *header,
+static plr_status read_slot(plr_state_store *store, unsigned slot, const slot_header *header,
                             plr_filter *f) {
     plr_store_reader reader = {.store = store,
                                .state = slot_start(store, slot) + header_space(store)};
-    const plr_status status = plr_filter_restore(f, header->length, give, &reader);
+    const plr_status status = plr_filter_restore(f, header->length, read_state, &reader);
     if (status != PLR_OK || reader.crc == header->crc)
         return status;
     (void)plr_filter_reset(f);
@@ -246,7 +283,7 @@ static plr_status read_slot(plr_state_store *store, unsigned slot, const plr_sta
 }
 
 /* Why there is no whole state: the worst that was found. */
-static plr_status nothing_found(const plr_store_view *view) {
+static plr_status worst_of(const plr_store_view *view) {
     plr_status worst = PLR_E_NOT_READY;
     for (unsigned slot = 0; slot < PLR_STORE_SLOTS; slot++)
         if (view->status[slot] == PLR_E_IO || worst == PLR_E_NOT_READY)
@@ -265,7 +302,7 @@ plr_status plr_state_store_restore(plr_state_store *store, plr_filter *f, plr_st
         if (view.status[slot] == PLR_E_CORRUPT || view.status[slot] == PLR_E_IO)
             found->damaged++;
     if (view.newest < 0)
-        return nothing_found(&view);
+        return worst_of(&view);
     const unsigned slot = (unsigned)view.newest;
     if (view.status[slot] != PLR_OK)
         return view.status[slot];

@@ -43,8 +43,22 @@ HEADERS: dict[str, set[str]] = {
     "camera": {"assertions.h", "config.h", "types.h", "camera.h"},
     "filter": FILTER_HEADERS,
     "wire": {"assertions.h", "types.h", "wire.h"},
-    "session": FILTER_HEADERS | {"wire.h", "port.h", "session.h", "state_store.h"},
+    "session": FILTER_HEADERS
+    | {"wire.h", "port.h", "session.h", "session_parts.h", "state_store.h"},
 }
+# The files of src/session, from the lowest to the highest: each may include those above it here.
+# The first ones are parts, which do not know the session that they are part of.
+SESSION_PARTS = (
+    "line",
+    "plausible",
+    "known_map",
+    "held",
+    "budget",
+    "layers",
+    "phase",
+    "state_store",
+)
+SESSION_FILES = (*SESSION_PARTS, "send", "reanchor", "start", "saving", "data", "input", "session")
 # What a public header may include of its siblings: wire.h must stay free of the filter.
 SIBLINGS: dict[str, set[str]] = {
     "assertions.h": set(),
@@ -57,7 +71,8 @@ SIBLINGS: dict[str, set[str]] = {
     "pelorus.h": FILTER_HEADERS - {"pelorus.h"},
     "wire.h": {"types.h"},
     "port.h": {"types.h"},
-    "session.h": FILTER_HEADERS | {"wire.h", "port.h", "state_store.h"},
+    "session_parts.h": {"wire.h"},
+    "session.h": FILTER_HEADERS | {"wire.h", "port.h", "session_parts.h", "state_store.h"},
     "state_store.h": {"filter.h", "port.h"},
 }
 # No heap, no stdio, no mathematics: what is left of the standard library.
@@ -65,6 +80,8 @@ STANDARD = {"float.h", "limits.h", "stdbool.h", "stddef.h", "stdint.h", "string.
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 CONDITION = re.compile(r"^\s*#\s*(if|ifdef|ifndef|elif)\b\s*(.*)")
+TABLE_ROW = re.compile(r"^ {4}\[(?:PLR_KIND_)?(\w+)\]\s*= \{\{([A-Z, ]+)\}", re.MULTILINE)
+SETS_PHASE = re.compile(r"(->|\.)phase\s*=[^=]")
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 
 
@@ -127,6 +144,41 @@ def check_layers(root: Path) -> Iterator[Breach]:
                 yield Breach(path, number, f"<{name}> is not for a public header")
             if not system and name.removeprefix("pelorus/") not in SIBLINGS.get(path.name, set()):
                 yield Breach(path, number, f'{path.name} may not include "{name}"')
+
+
+def check_session(root: Path) -> Iterator[Breach]:
+    """In src/session too includes point one way, and one function changes the phase."""
+    rank = {name: index for index, name in enumerate(SESSION_FILES)}
+    for path in sorted((root / "src" / "session").glob("*.[ch]")):
+        if path.stem not in rank:
+            yield Breach(path, 1, f"a file without a place: add it to SESSION_FILES in {__file__}")
+            continue
+        for number, _, name in includes(path):
+            folder, _, file = name.partition("/")
+            below = rank.get(Path(file).stem, len(rank)) < rank[path.stem]
+            own = Path(file).stem == path.stem
+            if folder == "session" and not below and not own:
+                yield Breach(path, number, f'an arrow upward: {path.stem} lies below "{name}"')
+            if name == "pelorus/session.h" and path.stem in SESSION_PARTS:
+                yield Breach(path, number, "a part of the session does not see it: session_parts.h")
+        for number, line in code_lines(path):
+            if SETS_PHASE.search(line):
+                yield Breach(path, number, "the phase is changed by plr_phase_change alone")
+
+
+def check_session_table(root: Path) -> Iterator[Breach]:
+    """docs/REPLAY-FORMAT.md shows the table of phases and kinds that the session goes by."""
+    page = root / "docs" / "REPLAY-FORMAT.md"
+    text = (root / "src" / "session" / "input.c").read_text(encoding="utf-8")
+    names = {"LANDMARK": "LANDMARK (known)", "RESTORE": "STATE (restore)", "STATE": "STATE (save)"}
+    rows = TABLE_ROW.findall(text)
+    lines = page.read_text(encoding="utf-8").splitlines()
+    if not rows:
+        yield Breach(page, 1, "the table of src/session/input.c is not found")
+    for kind, rules in rows:
+        shown = " | ".join([names.get(kind, kind), *rules.lower().replace(" ", "").split(",")])
+        if f"| {shown} |" not in lines:
+            yield Breach(page, 1, f"src/session/input.c says otherwise: | {shown} |")
 
 
 def check_conditions(root: Path) -> Iterator[Breach]:
@@ -193,6 +245,8 @@ def check_textbook_is_another(root: Path) -> Iterator[Breach]:
 
 CHECKS = (
     check_layers,
+    check_session,
+    check_session_table,
     check_conditions,
     check_lengths,
     check_licence_lines,

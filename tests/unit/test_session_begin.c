@@ -104,11 +104,11 @@ static void test_settings_that_contradict_refuse_the_data_until_they_are_mended(
     TEST_ASSERT_EQUAL_INT(PLR_KIND_CONFIG, refused_kind);
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, refused_status);
     TEST_ASSERT_NOT_NULL(refused_setting);
-    TEST_ASSERT_EQUAL_INT(PLR_PHASE_READY, session.phase);
+    TEST_ASSERT_EQUAL_INT(PLR_PHASE_REJECTED, session.phase);
     desk_send(drive_config("landmark-sigma", 0));
     desk_send(drive_twist(0.1));
     desk_run();
-    TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
+    TEST_ASSERT_EQUAL_INT(PLR_PHASE_STARTING, session.phase);
 }
 
 static void check_calibration_refused(plr_message header) {
@@ -124,7 +124,7 @@ static void check_calibration_refused(plr_message header) {
     desk_send(drive_header());
     desk_send(drive_twist(0.1));
     desk_run();
-    TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
+    TEST_ASSERT_EQUAL_INT(PLR_PHASE_STARTING, session.phase);
 }
 
 static void test_a_calibration_without_sense_is_refused_and_a_better_one_taken(void) {

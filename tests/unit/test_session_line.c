@@ -25,27 +25,27 @@ static const char *number(double x) {
 }
 
 static void test_words_are_joined_and_the_severity_kept(void) {
-    plr_line_words(&line, "one ");
-    plr_line_words(&line, "two");
+    plr_line_text(&line, "one ");
+    plr_line_text(&line, "two");
     TEST_ASSERT_EQUAL_STRING("one two", line.text);
     TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_WARNING, line.severity);
 }
 
 static void test_counts_are_printed_in_full(void) {
-    plr_line_count(&line, 0);
-    plr_line_words(&line, " ");
-    plr_line_count(&line, UINT64_MAX);
+    plr_line_count(&line, "", 0);
+    plr_line_text(&line, " ");
+    plr_line_count(&line, "", UINT64_MAX);
     TEST_ASSERT_EQUAL_STRING("0 18446744073709551615", line.text);
 }
 
 static void test_what_does_not_fit_is_cut_at_a_whole_character(void) {
     for (int i = 0; i < 100; i++)
-        plr_line_words(&line, "\xc3\xa9_"); /* three bytes: 240 is 80 of them */
+        plr_line_text(&line, "\xc3\xa9_"); /* three bytes: 240 is 80 of them */
     TEST_ASSERT_EQUAL_size_t(240, strlen(line.text));
     plr_line_begin(&line, PLR_SEVERITY_INFO);
     for (int i = 0; i < 239; i++)
-        plr_line_words(&line, "x");
-    plr_line_words(&line, "\xc3\xa9");
+        plr_line_text(&line, "x");
+    plr_line_text(&line, "\xc3\xa9");
     TEST_ASSERT_EQUAL_size_t(239, strlen(line.text));
 }
 

@@ -20,14 +20,21 @@ from pelorus.errors import PelorusError
 # Who calls through a pointer, and what it may reach: patterns of function names. Of the session's
 # observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
-MAP = ("take_evicted", "ask_known")
+MAP = ("send_evicted", "find_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
 TELEMETRY = "send_odometry"
 DEVICE = r"(ram|flash)_(read|program|erase)"
 STORE = (
-    r"plr_state_store_\w+|look_\w+|reads\w*|(write|read)_slot|erases|programs\w*|flushes|take|give"
+    r"plr_state_store_\w+|look_\w+|read_(bytes|crc|slot|state)|write_slot|erase_blocks|program\w*"
+    r"|flush|append_state"
 )
-SESSION = r"plr_session_step|apply_twist|predict|update|plr_take_\w+|refuse_frame"
+SESSION = r"plr_session_step|feed_reader|apply_twist|predict|update|use_frame|answer|plr_data_\w+"
+HANDLERS = (
+    r"plr_start_(begin|change_settings|add_landmark)",
+    r"plr_data_use_\w+",
+    r"plr_saving_restore",
+    r"save|compare_counts",
+)
 FILTER = (
     r"plr_(filter|correct|gate|motion|slots)\w*|process|initialise_new|append_new|adopt_known"
     r"|gate_each"
@@ -36,10 +43,11 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
     (r"plr_frame_out_\w+", ("write_to_port", "send")),
     (STORE, (DEVICE,)),
-    (r"plr_fields_\w+", ("take", "give")),
+    (r"plr_fields_\w+", ("append_state", "read_state")),
     (r"write_to_port", PORT),
     (SESSION, (*PORT, TELEMETRY)),
-    (r"plr_begin_\w+|plr_send_\w+", ()),
+    (r"plr_input_handle", HANDLERS),
+    (r"plr_start_\w+|plr_send_\w+|echo", ()),
     (FILTER, MODEL + MAP),
 )
 

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
-/* TWIST, STEREO, TRUTH: what the filter lives on. */
+#include "session/data.h"
+
 #include <string.h>
 
-#include "session/begin.h"
 #include "session/budget.h"
 #include "session/held.h"
-#include "session/inputs.h"
 #include "session/line.h"
+#include "session/phase.h"
 #include "session/plausible.h"
 #include "session/reanchor.h"
+#include "session/saving.h"
 #include "session/send.h"
+#include "session/start.h"
 
 static uint64_t now_ns(const plr_session *s) {
     return s->port.now_ns != NULL ? s->port.now_ns(s->port.context) : 0;
@@ -21,16 +23,20 @@ static uint64_t elapsed_ns(const plr_session *s, uint64_t since) {
     return now > since ? now - since : 0;
 }
 
-static plr_time_ns to_ns(double seconds) {
-    return (plr_time_ns)(seconds * 1e9 + 0.5);
-}
+/* --- the first data --- */
 
-/* What the filter said to data of time t_ns. True if the clock's jump was followed, so that the
- * same data will be taken now. */
-static bool follow_jump(plr_session *s, plr_time_ns t_ns, plr_status status) {
-    const plr_time_ns max_gap_ns = to_ns(plr_filter_config(&s->filter)->max_gap_s);
-    return plr_clock_watch_note(&s->watch, t_ns, status, plr_filter_time(&s->filter), max_gap_ns) &&
-           plr_reanchor(s, t_ns) == PLR_OK;
+void plr_data_begin(plr_session *s, plr_time_ns t_ns) {
+    if (plr_start_filter(s) != PLR_OK)
+        return;
+    plr_phase_change(&s->phase, PLR_EVENT_FILTER);
+    plr_start_announce(s);
+    plr_start_set_bias(s);
+    if (s->options.start == PLR_START_SAVED)
+        plr_saving_restore_at_start(s, t_ns);
+    if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
+        s->start_pending = false; /* every pose is given there */
+        plr_phase_change(&s->phase, PLR_EVENT_POSE);
+    }
 }
 
 /* --- TWIST --- */
@@ -43,9 +49,9 @@ static plr_status predict(plr_session *s, const plr_twist_message *twist) {
 }
 
 static void apply_twist(plr_session *s, const plr_twist_message *twist) {
-    plr_begin_at(s, twist->t_ns);
+    plr_start_apply_until(s, twist->t_ns);
     plr_status status = predict(s, twist);
-    if (follow_jump(s, twist->t_ns, status))
+    if (plr_reanchor_follow(s, twist->t_ns, status))
         status = predict(s, twist);
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_TWIST, twist->t_ns, status, NULL);
@@ -53,22 +59,16 @@ static void apply_twist(plr_session *s, const plr_twist_message *twist) {
         (void)plr_send_pose(s, false);
 }
 
-static void take_held_until(plr_session *s, plr_time_ns t_ns) {
+void plr_data_apply_held(plr_session *s, plr_time_ns until_ns) {
     plr_twist_message twist;
-    while (plr_held_pop_until(&s->held, t_ns, &twist))
+    while (plr_held_pop_until(&s->held, until_ns, &twist))
         apply_twist(s, &twist);
 }
 
-void plr_take_all_held(plr_session *s) {
-    plr_twist_message twist;
-    while (plr_held_pop(&s->held, &twist))
-        apply_twist(s, &twist);
-}
-
-static void hold(plr_session *s, const plr_twist_message *twist, plr_time_ns delay_ns) {
+static void delay_twist(plr_session *s, const plr_twist_message *twist, plr_time_ns delay_ns) {
     plr_twist_message due;
     if (plr_held_contradicts(&s->held, twist->t_ns))
-        plr_take_all_held(s);
+        plr_data_apply_held(s, UINT64_MAX);
     if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
         s->totals.held_short++;
         apply_twist(s, &due);
@@ -78,21 +78,12 @@ static void hold(plr_session *s, const plr_twist_message *twist, plr_time_ns del
         apply_twist(s, &due);
 }
 
-void plr_take_twist(plr_session *s) {
+void plr_data_use_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
-    const bool running = plr_begin_running(s);
-    plr_send_echo(s);
-    if (!running) {
-        plr_send_refusal(s, PLR_KIND_TWIST, twist->t_ns, PLR_E_NOT_READY, NULL);
-        return;
-    }
-    if (!plr_plausible_twist(&twist->twist)) {
-        plr_send_refusal(s, PLR_KIND_TWIST, twist->t_ns, PLR_E_RANGE, NULL);
-        return;
-    }
-    const plr_time_ns delay_ns = to_ns(plr_filter_config(&s->filter)->twist_delay_s);
+    const double delay_s = plr_filter_config(&s->filter)->twist_delay_s;
+    const plr_time_ns delay_ns = (plr_time_ns)(delay_s * 1e9 + 0.5);
     if (delay_ns > 0)
-        hold(s, twist, delay_ns);
+        delay_twist(s, twist, delay_ns);
     else
         apply_twist(s, twist);
 }
@@ -107,7 +98,8 @@ static plr_status update(plr_session *s, const plr_frame *frame, plr_report *rep
     return status;
 }
 
-static void refuse_frame(plr_session *s, const plr_frame *frame, plr_status status) {
+void plr_data_refuse_frame(plr_session *s, plr_status status) {
+    const plr_frame *frame = &s->in.as.stereo;
     plr_report report;
     memset(&report, 0, sizeof report);
     report.t_ns = frame->t_ns;
@@ -119,14 +111,14 @@ static void refuse_frame(plr_session *s, const plr_frame *frame, plr_status stat
         s->options.observer.frame(s->options.observer.context, &result);
 }
 
-static void tell_divergence(plr_session *s) {
+static void report_divergence(plr_session *s) {
     if (!(s->last.reasons & PLR_REASON_RECOVERED))
         return;
     plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR);
-    plr_line_words(&s->out.as.text, "the filter diverged at ");
+    plr_line_text(&s->out.as.text, "the filter diverged at ");
     plr_line_time(&s->out.as.text, s->last.t_ns);
-    plr_line_words(&s->out.as.text, ": a variance was not positive; it goes on from its pose, "
-                                    "and the landmarks were dropped");
+    plr_line_text(&s->out.as.text, ": a variance was not positive; it goes on from its pose, "
+                                   "and the landmarks were dropped");
     plr_send_text(s);
 }
 
@@ -156,20 +148,16 @@ static bool is_repeated(const plr_session *s, const plr_frame *frame) {
            s->last.t_ns == frame->t_ns;
 }
 
-static void process(plr_session *s, const plr_frame *frame) {
-    if (is_repeated(s, frame)) {
-        refuse_frame(s, frame, PLR_E_TIME);
-        return;
-    }
+static void use_frame(plr_session *s, const plr_frame *frame) {
     uint64_t update_ns;
     plr_report report;
     plr_status status = update(s, frame, &report, &update_ns);
-    if (follow_jump(s, frame->t_ns, status))
+    if (plr_reanchor_follow(s, frame->t_ns, status))
         status = update(s, frame, &report, &update_ns);
     if (status != PLR_OK && status != PLR_E_DIVERGED) {
         if (status == PLR_E_MODE)
             s->totals.without_truth++;
-        refuse_frame(s, frame, status);
+        plr_data_refuse_frame(s, status);
         return;
     }
     if (status != PLR_OK)
@@ -178,32 +166,36 @@ static void process(plr_session *s, const plr_frame *frame) {
     learn(s, update_ns);
     answer(s, frame, update_ns + s->predict_ns);
     s->predict_ns = 0;
-    tell_divergence(s);
+    report_divergence(s);
 }
 
-void plr_take_stereo(plr_session *s) {
-    plr_frame *frame = &s->in.as.stereo;
+void plr_data_limit_frame(plr_session *s) {
     const uint16_t budget = plr_budget_next(&s->budget);
-    const bool running = plr_begin_running(s);
-    if (s->port.now_ns != NULL && budget < frame->budget)
-        frame->budget = budget;
-    plr_send_echo(s);
-    if (running)
-        take_held_until(s, frame->t_ns);
-    if (running && plr_begin_frame(s, frame->t_ns))
-        process(s, frame);
+    if (s->port.now_ns != NULL && budget < s->in.as.stereo.budget)
+        s->in.as.stereo.budget = budget;
+}
+
+void plr_data_use_stereo(plr_session *s) {
+    const plr_frame *frame = &s->in.as.stereo;
+    plr_data_apply_held(s, frame->t_ns);
+    if (s->phase == PLR_PHASE_STARTING)
+        plr_start_choose(s, frame->t_ns);
+    if (s->phase == PLR_PHASE_STARTING)
+        plr_data_refuse_frame(s, PLR_E_NOT_READY);
+    else if (is_repeated(s, frame))
+        plr_data_refuse_frame(s, PLR_E_TIME);
     else
-        refuse_frame(s, frame, PLR_E_NOT_READY);
+        use_frame(s, frame);
 }
 
 /* --- TRUTH --- */
 
-/* mapping: the pose is taken as it is. */
+/* mapping: the pose is used as it is. */
 static void move_to(plr_session *s, const plr_truth *truth) {
     plr_status status = PLR_E_RANGE;
     if (plr_plausible_pose(&truth->T_WB))
         status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);
-    if (follow_jump(s, truth->t_ns, status))
+    if (plr_reanchor_follow(s, truth->t_ns, status))
         status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_TRUTH, truth->t_ns, status, NULL);
@@ -211,23 +203,25 @@ static void move_to(plr_session *s, const plr_truth *truth) {
 
 /* True if the pose starts from the first TRUTH, and this is it. */
 static bool starts_here(const plr_session *s) {
-    return !s->started && !s->start_known &&
+    return s->phase == PLR_PHASE_STARTING && !s->start_pending &&
            (s->options.start == PLR_START_AUTO || s->options.start == PLR_START_TRUTH);
 }
 
-void plr_take_truth(plr_session *s) {
+void plr_data_use_truth(plr_session *s) {
     const plr_truth *truth = &s->in.as.truth;
-    const bool running = plr_begin_running(s);
-    plr_send_echo(s);
-    if (s->options.observer.truth != NULL)
-        s->options.observer.truth(s->options.observer.context, truth);
-    if (!running)
-        return; /* a reference needs no filter: it is not refused */
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
-        take_held_until(s, truth->t_ns);
+        plr_data_apply_held(s, truth->t_ns);
         move_to(s, truth);
     } else if (starts_here(s)) {
-        take_held_until(s, truth->t_ns);
-        plr_begin_set_pose(s, PLR_KIND_TRUTH, truth->t_ns, &truth->T_WB, NULL);
+        plr_data_apply_held(s, truth->t_ns);
+        plr_start_set_pose(s, PLR_KIND_TRUTH, truth->t_ns, &truth->T_WB, NULL);
     }
+}
+
+/* --- START among the data --- */
+
+void plr_data_use_start(plr_session *s) {
+    s->start = s->in.as.start;
+    plr_data_apply_held(s, UINT64_MAX);
+    plr_start_apply(s);
 }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+/* The parts that a session is made of. A caller needs their size, and may read the phase. */
+#ifndef PELORUS_SESSION_PARTS_H
+#define PELORUS_SESSION_PARTS_H
+
+#include "pelorus/wire.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+    PLR_SESSION_HELD_TWISTS = 64, /* most twists that wait because of the setting twist-delay */
+    PLR_SESSION_AGREEING = 3 /* messages that must agree before the session follows a clock that
+                                has jumped: src/session/reanchor.h */
+};
+
+/* Where a session is. What leads from one phase to another, and what each kind of message does in
+ * each of them: docs/REPLAY-FORMAT.md, "What a session does with a message". */
+typedef enum plr_session_phase {
+    PLR_PHASE_WAITING = 0, /* for a HEADER */
+    PLR_PHASE_READY,    /* for settings, START, known landmarks; the first data starts the filter */
+    PLR_PHASE_REJECTED, /* HEADER and settings make no filter: data is refused until they do */
+    /* from here on the filter runs */
+    PLR_PHASE_STARTING, /* and its start pose is not set yet */
+    PLR_PHASE_RESTORED, /* a STATE brought the saved state back, and no data has come since */
+    PLR_PHASE_RUNNING,  /* from its start pose */
+    PLR_PHASES
+} plr_session_phase;
+
+/* Twists that wait because of the setting twist-delay: a ring, oldest first. */
+typedef struct plr_held_twists {
+    unsigned first, count;
+    plr_twist_message twists[PLR_SESSION_HELD_TWISTS];
+} plr_held_twists;
+
+/* Landmarks of known position, ascending by id. */
+typedef struct plr_known_map {
+    plr_landmark *landmarks;
+    unsigned count, capacity;
+} plr_known_map;
+
+/* Detects a jump of the sender's clock: src/session/reanchor.h. */
+typedef struct plr_clock_watch {
+    unsigned agreeing;
+    plr_time_ns last_ns;
+} plr_clock_watch;
+
+/* The measured cost of an observation: src/session/budget.h. */
+typedef struct plr_budget {
+    uint64_t deadline_ns;
+    uint64_t cost_ns;      /* per observation; 0: not known yet */
+    uint64_t recent_ns[2]; /* in each of the last two frames; 0: none yet */
+} plr_budget;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+#include "session/input.h"
+
+#include "session/data.h"
+#include "session/line.h"
+#include "session/phase.h"
+#include "session/plausible.h"
+#include "session/saving.h"
+#include "session/send.h"
+#include "session/start.h"
+
+/* --- END --- */
+
+/* ", 10 of 12 TWIST" if that is how many arrived. */
+static bool add_missing(plr_text *line, const char *what, uint32_t sent, uint32_t received) {
+    if (sent == received)
+        return false;
+    plr_line_count(line, ", ", received);
+    plr_line_count(line, " of ", sent);
+    plr_line_text(line, what);
+    return true;
+}
+
+/* END says how many there were. */
+static void compare_counts(plr_session *s) {
+    const plr_end *end = &s->in.as.end;
+    const plr_session_totals *received = &s->totals;
+    plr_text *line = &s->out.as.text;
+    plr_line_begin(line, PLR_SEVERITY_WARNING);
+    plr_line_text(line, "the recording is not complete: not everything arrived");
+    bool differs = add_missing(line, " TWIST", end->twists, received->twists);
+    differs |= add_missing(line, " STEREO", end->stereos, received->stereos);
+    differs |= add_missing(line, " TRUTH", end->truths, received->truths);
+    differs |= add_missing(line, " LANDMARK", end->landmarks, received->landmarks);
+    if (differs)
+        plr_send_text(s);
+}
+
+/* --- the table --- */
+
+/* What happens to a message. All but those of IGNORE are echoed, into a flight log. */
+typedef enum plr_rule {
+    IGNORE = 0, /* nothing */
+    ECHO,       /* no more than that */
+    EARLY,      /* refused: PLR_E_NOT_READY */
+    LATE,       /* refused: PLR_E_MODE */
+    SAME,       /* refused: PLR_E_MODE; ignored if it says what is in force already */
+    NEW,        /* used; ignored if it says what is in force already */
+    FIRST,      /* leads to another phase, whose rule then holds */
+    KEEP,       /* kept until its time comes */
+    USE         /* used */
+} plr_rule;
+
+static void save(plr_session *s) {
+    plr_saving_save(s, s->in.as.state.t_ns);
+}
+
+enum { RESTORE = PLR_KIND_STATE + 1, ROWS };
+
+/* docs/REPLAY-FORMAT.md shows it too. What other filters computed (POSE, REPORT, LANDMARK of another
+ * role) is ignored everywhere: row PLR_KIND_NONE. */
+/* clang-format off */
+static const struct {
+    uint8_t rules[PLR_PHASES];
+    void (*use)(plr_session *s);
+} table[ROWS] = {
+    /*                      WAITING READY  REJECTED STARTING RESTORED RUNNING */
+    [PLR_KIND_HEADER]   = {{USE,    NEW,   NEW,     SAME,    SAME,    SAME}, plr_start_begin},
+    [PLR_KIND_CONFIG]   = {{EARLY,  USE,   USE,     SAME,    SAME,    SAME}, plr_start_change_settings},
+    [PLR_KIND_LANDMARK] = {{EARLY,  USE,   USE,     USE,     USE,     USE},  plr_start_add_landmark},
+    [PLR_KIND_START]    = {{EARLY,  KEEP,  KEEP,    KEEP,    ECHO,    USE},  plr_data_use_start},
+    [RESTORE]           = {{EARLY,  USE,   USE,     LATE,    USE,     LATE}, plr_saving_restore},
+    [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_twist},
+    [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_stereo},
+    [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_data_use_truth},
+    [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
+    [PLR_KIND_TEXT]     = {{ECHO,   ECHO,  ECHO,    ECHO,    ECHO,    ECHO}, NULL},
+    [PLR_KIND_END]      = {{USE,    USE,   USE,     USE,     USE,     USE},  compare_counts},
+};
+/* clang-format on */
+
+static unsigned row_of(const plr_message *in) {
+    if (in->kind == PLR_KIND_STATE && in->as.state.action == PLR_STATE_RESTORE)
+        return RESTORE;
+    const bool computed =
+        in->kind == PLR_KIND_LANDMARK && in->as.landmark.role != PLR_LANDMARK_KNOWN;
+    return computed ? PLR_KIND_NONE : in->kind;
+}
+
+/* --- each message --- */
+
+static plr_time_ns time_of(const plr_message *in) {
+    switch (in->kind) {
+    case PLR_KIND_START:
+        return in->as.start.t_ns;
+    case PLR_KIND_TWIST:
+        return in->as.twist.t_ns;
+    case PLR_KIND_STEREO:
+        return in->as.stereo.t_ns;
+    case PLR_KIND_TRUTH:
+        return in->as.truth.t_ns;
+    case PLR_KIND_LANDMARK:
+        return in->as.landmark.landmark.last_seen_ns;
+    case PLR_KIND_STATE:
+        return in->as.state.t_ns;
+    default:
+        return 0;
+    }
+}
+
+/* A CONFIG in force tells a flight log from a recording. */
+static bool is_in_force(const plr_message *in) {
+    return in->kind == PLR_KIND_CONFIG && in->as.config.build_fingerprint != 0;
+}
+
+static void count(plr_session *s) {
+    s->totals.twists += s->in.kind == PLR_KIND_TWIST;
+    s->totals.stereos += s->in.kind == PLR_KIND_STEREO;
+    s->totals.truths += s->in.kind == PLR_KIND_TRUTH;
+    s->totals.landmarks += s->in.kind == PLR_KIND_LANDMARK;
+    s->is_log = s->is_log || is_in_force(&s->in);
+}
+
+/* What this session says itself is not echoed: CONFIG in force, END, a log's TEXT. A restore that is
+ * used is echoed later. */
+static void echo(plr_session *s, unsigned row, plr_rule rule) {
+    const bool own = is_in_force(&s->in) || row == PLR_KIND_END ||
+                     (row == PLR_KIND_TEXT && s->is_log) || (row == RESTORE && rule == USE);
+    if (!own)
+        plr_send_echo(s);
+    if (row == PLR_KIND_TRUTH && s->options.observer.truth != NULL)
+        s->options.observer.truth(s->options.observer.context, &s->in.as.truth);
+}
+
+/* What is wrong with a message, if anything. Of one that came too early, what would be wrong with it
+ * later comes first. */
+static plr_status check(const plr_session *s, unsigned row, plr_rule rule) {
+    const plr_status plausible = plr_plausible_message(&s->in) ? PLR_OK : PLR_E_RANGE;
+    if (rule == LATE || (rule == SAME && !plr_start_in_force(s)))
+        return PLR_E_MODE;
+    if (rule != EARLY)
+        return plausible;
+    if (row == PLR_KIND_STATE && s->options.store == NULL)
+        return PLR_E_MODE;
+    return row == PLR_KIND_LANDMARK && plausible != PLR_OK ? plausible : PLR_E_NOT_READY;
+}
+
+static void refuse(plr_session *s, plr_status status) {
+    const plr_message *in = &s->in;
+    if (in->kind == PLR_KIND_STEREO)
+        plr_data_refuse_frame(s, status);
+    else if (in->kind == PLR_KIND_STATE)
+        plr_saving_refuse(s, (plr_state_action)in->as.state.action, time_of(in), status);
+    else
+        plr_send_refusal(s, in->kind, time_of(in), status, NULL);
+}
+
+/* The first data after a HEADER, or after a restore. */
+static void lead_on(plr_session *s) {
+    plr_phase_change(&s->phase, PLR_EVENT_DATA);
+    if (s->phase == PLR_PHASE_READY)
+        plr_data_begin(s, time_of(&s->in));
+}
+
+void plr_input_handle(plr_session *s) {
+    const unsigned row = row_of(&s->in);
+    count(s);
+    if (table[row].rules[s->phase] == FIRST)
+        lead_on(s);
+    const plr_rule rule = (plr_rule)table[row].rules[s->phase];
+    if (rule == IGNORE)
+        return;
+    if (row == PLR_KIND_STEREO)
+        plr_data_limit_frame(s);
+    echo(s, row, rule);
+    const plr_status status = check(s, row, rule);
+    if (status != PLR_OK)
+        refuse(s, status);
+    else if (rule == USE || (rule == NEW && !plr_start_in_force(s)))
+        table[row].use(s);
+    else if (rule == KEEP)
+        plr_start_keep(s);
+}

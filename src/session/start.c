@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+#include "session/start.h"
+
+#include <string.h>
+
+#include "session/budget.h"
+#include "session/held.h"
+#include "session/known_map.h"
+#include "session/layers.h"
+#include "session/line.h"
+#include "session/phase.h"
+#include "session/plausible.h"
+#include "session/reanchor.h"
+#include "session/send.h"
+
+void plr_start_clear(plr_session *s) {
+    const uint32_t not_sent = s->totals.not_sent;
+    memset(&s->totals, 0, sizeof s->totals);
+    s->totals.not_sent = not_sent;
+    memset(&s->wanted, 0, sizeof s->wanted);
+    memset(&s->last, 0, sizeof s->last);
+    s->is_log = s->start_pending = false;
+    s->start.has_bias = false;
+    s->start_resets = 0;
+    s->predict_ns = 0;
+    plr_held_init(&s->held);
+    plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
+    for (unsigned i = 0; i < s->options.map_count; i++)
+        (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */
+    plr_clock_watch_init(&s->watch);
+    plr_budget_init(&s->budget, s->options.deadline_us);
+}
+
+/* --- HEADER, CONFIG, START, LANDMARK --- */
+
+static bool same_axes(const double a[3], const double b[3]) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/* Everything that an estimate depends on; the name and the image size are not that. */
+static bool same_header(const plr_header *a, const plr_header *b) {
+    return memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
+           a->body_axes == b->body_axes && a->twist_timing == b->twist_timing &&
+           a->pixel_sigma_px == b->pixel_sigma_px &&
+           a->velocity_sigma_mps == b->velocity_sigma_mps &&
+           a->gyro_sigma_radps == b->gyro_sigma_radps &&
+           same_axes(a->velocity_sigma_axes_mps, b->velocity_sigma_axes_mps) &&
+           same_axes(a->gyro_sigma_axes_radps, b->gyro_sigma_axes_radps) &&
+           a->bias_velocity_sigma_mps == b->bias_velocity_sigma_mps &&
+           a->bias_gyro_sigma_radps == b->bias_gyro_sigma_radps &&
+           a->bias_velocity_walk == b->bias_velocity_walk && a->bias_gyro_walk == b->bias_gyro_walk;
+}
+
+bool plr_start_in_force(const plr_session *s) {
+    return s->in.kind == PLR_KIND_CONFIG
+               ? plr_layers_agree(&s->in.as.config, plr_filter_config(&s->filter))
+               : same_header(&s->in.as.header, &s->header);
+}
+
+void plr_start_begin(plr_session *s) {
+    plr_start_clear(s);
+    s->header = s->in.as.header;
+    plr_phase_change(&s->phase, PLR_EVENT_HEADER);
+}
+
+static void say(plr_session *s, plr_severity severity, const char *text) {
+    plr_line_begin(&s->out.as.text, severity);
+    plr_line_text(&s->out.as.text, text);
+    plr_send_text(s);
+}
+
+static void report_setting(plr_session *s, plr_wire_setting given, const plr_setting *setting) {
+    plr_text *line = &s->out.as.text;
+    plr_line_begin(line, PLR_SEVERITY_WARNING);
+    plr_line_text(line, "CONFIG: ");
+    if (setting == NULL) {
+        plr_line_count(line, "setting ", given.id);
+        plr_line_text(line, " is not known here, and left out");
+    } else {
+        plr_line_text(line, setting->name);
+        plr_line_text(line, " = ");
+        plr_line_number(line, given.value);
+        plr_line_text(line, " is not within ");
+        plr_line_number(line, setting->minimum);
+        plr_line_text(line, " to ");
+        plr_line_number(line, setting->maximum);
+        plr_line_text(line, ", and left out");
+    }
+    plr_send_text(s);
+}
+
+void plr_start_change_settings(plr_session *s) {
+    const plr_config_message *config = &s->in.as.config;
+    plr_phase_change(&s->phase, PLR_EVENT_SETTINGS);
+    for (unsigned i = 0; i < config->count; i++) {
+        const plr_setting *setting = plr_setting_by_id(config->settings[i].id);
+        if (plr_layers_want(&s->wanted, config->settings[i]) == PLR_OK)
+            continue;
+        plr_send_refusal(s, PLR_KIND_CONFIG, 0, PLR_E_CONFIG, setting);
+        report_setting(s, config->settings[i], setting);
+    }
+    if (config->build_fingerprint != 0 && config->build_fingerprint != plr_build_fingerprint())
+        say(s, PLR_SEVERITY_INFO,
+            "this log comes from another build (precision, capacity or version): the settings are "
+            "taken, the bits may differ");
+}
+
+void plr_start_keep(plr_session *s) {
+    const plr_start_choice choice = s->options.start;
+    s->start = s->in.as.start;
+    s->start_pending =
+        choice == PLR_START_SAVED || choice == PLR_START_AUTO || choice == PLR_START_RECORDED;
+}
+
+void plr_start_add_landmark(plr_session *s) {
+    const plr_landmark *landmark = &s->in.as.landmark.landmark;
+    const plr_status status = plr_known_map_add(&s->known, landmark);
+    if (status != PLR_OK)
+        plr_send_refusal(s, PLR_KIND_LANDMARK, landmark->last_seen_ns, status, NULL);
+}
+
+/* --- the filter --- */
+
+/* plr_map.sink: always accepts. A cut link must not fill the state with landmarks that nobody wants;
+ * what the port refuses is counted in totals.not_sent. */
+static int send_evicted(void *context, const plr_landmark *landmark) {
+    plr_send_landmark(context, PLR_LANDMARK_EVICTED, landmark);
+    return 0;
+}
+
+/* plr_map.source; the context of both is the session. */
+static bool find_known(void *context, uint32_t id, plr_landmark *landmark) {
+    plr_session *s = context;
+    return plr_known_map_source(&s->known, id, landmark);
+}
+
+static bool asks_for_known(const plr_config *config) {
+    return config->mode == PLR_MODE_LOCALIZATION || config->known_map != 0;
+}
+
+static void warn_about(plr_session *s, const plr_config *config) {
+    if (config->model == PLR_MODEL_WORLD && sizeof(plr_real) == sizeof(float) &&
+        config->mode != PLR_MODE_DEAD_RECKONING && config->mode != PLR_MODE_MAPPING)
+        say(s, PLR_SEVERITY_WARNING,
+            "model = world breaks down in float32 if points are far (max-depth helps), the "
+            "start is uncertain or the drive is long: take the float64 build, or model = body");
+    if (asks_for_known(config) && s->known.count == 0)
+        say(s, PLR_SEVERITY_WARNING,
+            "known landmarks are asked for, and none was given: LANDMARK (known) must come "
+            "before the data");
+}
+
+static plr_status init_filter(plr_session *s, const plr_setting **culprit) {
+    const plr_layers layers = {&s->header, &s->wanted, s->options.overrides,
+                               s->options.override_count};
+    plr_config config;
+    plr_status status = plr_layers_compose(&config, &layers, culprit);
+    if (status != PLR_OK)
+        return status;
+    const plr_map map = {s, send_evicted, asks_for_known(&config) ? find_known : NULL};
+    return plr_filter_init(&s->filter, &s->header.calibration, &config, &map);
+}
+
+plr_status plr_start_filter(plr_session *s) {
+    const plr_setting *culprit = NULL;
+    const plr_status status = init_filter(s, &culprit);
+    if (status != PLR_OK) {
+        plr_phase_change(&s->phase, PLR_EVENT_REJECTED);
+        plr_send_refusal(s, status == PLR_E_CONFIG ? PLR_KIND_CONFIG : PLR_KIND_HEADER, 0, status,
+                         culprit);
+    }
+    return status;
+}
+
+void plr_start_announce(plr_session *s) {
+    plr_send_config(s);
+    for (unsigned i = 0; i < s->options.map_count; i++)
+        plr_send_known(s, &s->options.map[i]);
+    if (s->options.observer.started != NULL)
+        s->options.observer.started(s->options.observer.context);
+    warn_about(s, plr_filter_config(&s->filter));
+}
+
+/* --- the start pose --- */
+
+void plr_start_set_bias(plr_session *s) {
+    if (!s->start.has_bias || plr_filter_config(&s->filter)->bias == 0)
+        return;
+    plr_status status = PLR_E_RANGE;
+    if (plr_plausible_bias(&s->start))
+        status = plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance);
+    if (status != PLR_OK)
+        plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
+}
+
+void plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, const plr_pose *T_WB,
+                        const double *P_xi) {
+    plr_status status = PLR_E_RANGE;
+    if (plr_plausible_pose(T_WB))
+        status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
+    if (status != PLR_OK) {
+        plr_send_refusal(s, subject, t_ns, status, NULL);
+        return;
+    }
+    plr_clock_watch_init(&s->watch);
+    if (s->phase == PLR_PHASE_STARTING)
+        plr_send_resets_from_here(s);
+    plr_phase_change(&s->phase, PLR_EVENT_POSE);
+}
+
+void plr_start_apply(plr_session *s) {
+    double P[36];
+    for (unsigned i = 0, k = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++, k++)
+            P[6 * i + j] = P[6 * j + i] = s->start.P_xi[k];
+    s->start_pending = false;
+    plr_start_set_pose(s, PLR_KIND_START, s->start.t_ns, &s->start.T_WB,
+                       s->start.has_covariance ? P : NULL);
+}
+
+void plr_start_apply_until(plr_session *s, plr_time_ns t_ns) {
+    if (s->start_pending && t_ns >= s->start.t_ns)
+        plr_start_apply(s);
+}
+
+void plr_start_choose(plr_session *s, plr_time_ns t_ns) {
+    plr_start_apply_until(s, t_ns);
+    if (s->start_pending) { /* it lies behind the first frame */
+        s->start_pending = false;
+        plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, PLR_E_TIME, NULL);
+    }
+    if (s->options.start == PLR_START_AUTO || s->options.start == PLR_START_IDENTITY)
+        plr_phase_change(&s->phase, PLR_EVENT_POSE);
+}
