@@ -6,10 +6,8 @@
 #include "session/budget.h"
 #include "session/held.h"
 #include "session/line.h"
-#include "session/phase.h"
 #include "session/plausible.h"
 #include "session/reanchor.h"
-#include "session/saving.h"
 #include "session/send.h"
 #include "session/start.h"
 
@@ -21,22 +19,6 @@ static uint64_t now_ns(const plr_session *s) {
 static uint64_t elapsed_ns(const plr_session *s, uint64_t since) {
     const uint64_t now = now_ns(s);
     return now > since ? now - since : 0;
-}
-
-/* --- the first data --- */
-
-void plr_data_begin(plr_session *s, plr_time_ns t_ns) {
-    if (plr_start_filter(s) != PLR_OK)
-        return;
-    plr_phase_change(&s->phase, PLR_EVENT_FILTER);
-    plr_start_announce(s);
-    plr_start_set_bias(s);
-    if (s->options.start == PLR_START_SAVED)
-        plr_saving_restore_at_start(s, t_ns);
-    if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
-        s->start_pending = false; /* every pose is given there */
-        plr_phase_change(&s->phase, PLR_EVENT_POSE);
-    }
 }
 
 /* --- TWIST --- */

@@ -5,9 +5,6 @@
 
 #include "pelorus/session.h"
 
-/* The first data after a HEADER, of time t_ns: starts the filter. */
-void plr_data_begin(plr_session *s, plr_time_ns t_ns);
-
 /* With a filter that runs. */
 void plr_data_use_twist(plr_session *s);
 void plr_data_use_stereo(plr_session *s);

@@ -132,8 +132,8 @@ static void echo(plr_session *s, unsigned row, plr_rule rule) {
         s->options.observer.truth(s->options.observer.context, &s->in.as.truth);
 }
 
-/* What is wrong with a message, if anything. Of one that came too early, what would be wrong with it
- * later comes first. */
+/* What is wrong with a message, if anything. A save without storage and a landmark that is none are
+ * refused for that wherever they come. */
 static plr_status check(const plr_session *s, unsigned row, plr_rule rule) {
     const plr_status plausible = plr_plausible_message(&s->in) ? PLR_OK : PLR_E_RANGE;
     if (rule == LATE || (rule == SAME && !plr_start_in_force(s)))
@@ -155,18 +155,29 @@ static void refuse(plr_session *s, plr_status status) {
         plr_send_refusal(s, in->kind, time_of(in), status, NULL);
 }
 
-/* The first data after a HEADER, or after a restore. */
-static void lead_on(plr_session *s) {
-    plr_phase_change(&s->phase, PLR_EVENT_DATA);
-    if (s->phase == PLR_PHASE_READY)
-        plr_data_begin(s, time_of(&s->in));
+/* The first data after a HEADER starts the filter. */
+static void start(plr_session *s) {
+    if (plr_start_filter(s) != PLR_OK)
+        return;
+    plr_phase_change(&s->phase, PLR_EVENT_FILTER);
+    plr_start_announce(s);
+    plr_start_set_bias(s);
+    if (s->options.start == PLR_START_SAVED)
+        plr_saving_restore_at_start(s, time_of(&s->in));
+    if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
+        s->start_pending = false; /* every pose is given there */
+        plr_phase_change(&s->phase, PLR_EVENT_POSE);
+    }
 }
 
 void plr_input_handle(plr_session *s) {
     const unsigned row = row_of(&s->in);
     count(s);
-    if (table[row].rules[s->phase] == FIRST)
-        lead_on(s);
+    if (table[row].rules[s->phase] == FIRST) {
+        plr_phase_change(&s->phase, PLR_EVENT_DATA);
+        if (s->phase == PLR_PHASE_READY)
+            start(s);
+    }
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
     if (rule == IGNORE)
         return;

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "session/plausible.h"
+
 void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capacity) {
     map->landmarks = memory;
     map->count = 0;
@@ -22,15 +24,8 @@ static unsigned lower_bound(const plr_known_map *map, uint32_t id) {
     return low;
 }
 
-static bool all_finite(const double *x, unsigned n) {
-    for (unsigned i = 0; i < n; i++)
-        if (!(x[i] - x[i] == 0))
-            return false;
-    return true;
-}
-
 plr_status plr_known_map_add(plr_known_map *map, const plr_landmark *landmark) {
-    if (!all_finite(landmark->p_W_m, 3) || !all_finite(landmark->P_W_m2, 9))
+    if (!plr_plausible_finite(landmark->p_W_m, 3) || !plr_plausible_finite(landmark->P_W_m2, 9))
         return PLR_E_NOT_FINITE;
     const unsigned at = lower_bound(map, landmark->id);
     if (at < map->count && map->landmarks[at].id == landmark->id)
@@ -45,15 +40,11 @@ plr_status plr_known_map_add(plr_known_map *map, const plr_landmark *landmark) {
     return PLR_OK;
 }
 
-const plr_landmark *plr_known_map_find(const plr_known_map *map, uint32_t id) {
-    const unsigned at = lower_bound(map, id);
-    return at < map->count && map->landmarks[at].id == id ? &map->landmarks[at] : NULL;
-}
-
 bool plr_known_map_source(void *context, uint32_t id, plr_landmark *landmark) {
-    const plr_landmark *found = plr_known_map_find(context, id);
-    if (found == NULL)
-        return false;
-    *landmark = *found;
-    return true;
+    const plr_known_map *map = context;
+    const unsigned at = lower_bound(map, id);
+    const bool found = at < map->count && map->landmarks[at].id == id;
+    if (found)
+        *landmark = map->landmarks[at];
+    return found;
 }

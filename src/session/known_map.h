@@ -11,10 +11,7 @@ void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capac
  * PLR_E_EXISTS a landmark of this id; PLR_E_FULL. */
 plr_status plr_known_map_add(plr_known_map *map, const plr_landmark *landmark);
 
-/* The landmark of that id, by binary search; NULL if there is none. */
-const plr_landmark *plr_known_map_find(const plr_known_map *map, uint32_t id);
-
-/* plr_map.source over a plr_known_map as context. */
+/* plr_map.source over a plr_known_map as context: the landmark of that id, by binary search. */
 bool plr_known_map_source(void *context, uint32_t id, plr_landmark *landmark);
 
 #endif

@@ -7,6 +7,12 @@ static bool is_finite(double x) {
     return x - x == 0;
 }
 
+bool plr_plausible_finite(const double *x, unsigned n) {
+    while (n > 0 && is_finite(x[n - 1]))
+        n--;
+    return n == 0;
+}
+
 static bool all_within(const double *x, unsigned n, double limit) {
     for (unsigned i = 0; i < n; i++)
         if (is_finite(x[i]) && (x[i] > limit || x[i] < -limit))

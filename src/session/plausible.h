@@ -25,6 +25,9 @@ bool plr_plausible_pose(const plr_pose *pose);
 /* A START's bias prior. */
 bool plr_plausible_bias(const plr_start *start);
 
+/* Every one of n numbers is finite. */
+bool plr_plausible_finite(const double *x, unsigned n);
+
 bool plr_plausible_variance(const double *variance, unsigned n);
 
 #endif

@@ -113,21 +113,13 @@ void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_st
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
 }
 
-static void put_landmark(plr_session *s, uint32_t bit, plr_landmark_role role,
-                         const plr_landmark *landmark) {
+void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
+    const bool computed = role != PLR_LANDMARK_KNOWN;
     s->out.kind = PLR_KIND_LANDMARK;
     s->out.as.landmark.role = (uint8_t)role;
     s->out.as.landmark.landmark = *landmark;
-    put(s, bit, &s->out);
-}
-
-void plr_send_known(plr_session *s, const plr_landmark *landmark) {
-    put_landmark(s, PLR_OUTPUT_ECHO, PLR_LANDMARK_KNOWN, landmark);
-}
-
-void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
-    put_landmark(s, PLR_OUTPUT_LANDMARK, role, landmark);
-    if (s->options.observer.landmark != NULL)
+    put(s, computed ? PLR_OUTPUT_LANDMARK : PLR_OUTPUT_ECHO, &s->out);
+    if (computed && s->options.observer.landmark != NULL)
         s->options.observer.landmark(s->options.observer.context, &s->out.as.landmark);
 }
 

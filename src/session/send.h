@@ -30,9 +30,8 @@ void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_sta
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                       const plr_setting *culprit);
 
-/* A landmark of options.map, as an echo: with it a flight log can be replayed without the map. */
-void plr_send_known(plr_session *s, const plr_landmark *landmark);
-
+/* One that the filter computed; or a known one, of options.map, as an echo: with it a flight log can
+ * be replayed without the map. */
 void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark);
 
 /* A line, built with session/line.h in s->out.as.text. */

@@ -175,7 +175,7 @@ plr_status plr_start_filter(plr_session *s) {
 void plr_start_announce(plr_session *s) {
     plr_send_config(s);
     for (unsigned i = 0; i < s->options.map_count; i++)
-        plr_send_known(s, &s->options.map[i]);
+        plr_send_landmark(s, PLR_LANDMARK_KNOWN, &s->options.map[i]);
     if (s->options.observer.started != NULL)
         s->options.observer.started(s->options.observer.context);
     warn_about(s, plr_filter_config(&s->filter));

@@ -41,10 +41,10 @@ static void test_landmarks_in_any_order_are_all_found_and_no_others(void) {
         given[id] = true;
     }
     for (uint32_t id = 0; id < 1000; id++) {
-        const plr_landmark *found = plr_known_map_find(&map, id);
-        TEST_ASSERT_EQUAL(given[id], found != NULL);
-        if (found != NULL)
-            TEST_ASSERT_EQUAL_DOUBLE(id, found->p_W_m[0]);
+        plr_landmark found;
+        TEST_ASSERT_EQUAL(given[id], plr_known_map_source(&map, id, &found));
+        if (given[id])
+            TEST_ASSERT_EQUAL_DOUBLE(id, found.p_W_m[0]);
     }
     for (unsigned i = 1; i < map.count; i++)
         TEST_ASSERT_TRUE(memory[i - 1].id < memory[i].id);
@@ -56,13 +56,13 @@ static void test_a_full_map_refuses_new_ids_and_stays_as_it_is(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_FULL, add(7));
     TEST_ASSERT_EQUAL_INT(PLR_E_EXISTS, add(8));
     TEST_ASSERT_EQUAL_UINT(CAPACITY, map.count);
-    TEST_ASSERT_NULL(plr_known_map_find(&map, 7));
+    TEST_ASSERT_FALSE(plr_known_map_source(&map, 7, &memory[0]));
 }
 
 static void test_a_map_without_memory_is_full(void) {
     plr_known_map_init(&map, NULL, 10);
     TEST_ASSERT_EQUAL_INT(PLR_E_FULL, add(1));
-    TEST_ASSERT_NULL(plr_known_map_find(&map, 1));
+    TEST_ASSERT_FALSE(plr_known_map_source(&map, 1, &memory[0]));
 }
 
 static void test_numbers_that_are_not_finite_are_refused(void) {
