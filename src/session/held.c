@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/held.h"
 
+#include "pelorus/assertions.h"
+
 void plr_held_init(plr_held_twists *held) {
     held->first = 0;
     held->count = 0;
@@ -15,6 +17,7 @@ static const plr_twist_message *newest(const plr_held_twists *held) {
 }
 
 void plr_held_push(plr_held_twists *held, const plr_twist_message *twist) {
+    PLR_ASSERT(!plr_held_full(held));
     held->twists[(held->first + held->count) % PLR_SESSION_HELD_TWISTS] = *twist;
     held->count++;
 }

@@ -22,13 +22,13 @@ void plr_held_push(plr_held_twists *held, const plr_twist_message *twist);
  * and what is held is due. False for an empty ring. */
 bool plr_held_contradicts(const plr_held_twists *held, plr_time_ns t_ns);
 
-/* Takes the oldest twist if it is at most at t_ns; false if there is none such. */
+/* Removes the oldest twist, *twist, if it is at most at t_ns; false if there is none such. */
 bool plr_held_pop_until(plr_held_twists *held, plr_time_ns t_ns, plr_twist_message *twist);
 
-/* Takes the oldest twist if the newest is at least delay_ns ahead of it. */
+/* Removes the oldest twist if the newest is at least delay_ns ahead of it. */
 bool plr_held_pop_due(plr_held_twists *held, plr_time_ns delay_ns, plr_twist_message *twist);
 
-/* Takes the oldest twist; false if there is none. */
+/* Removes the oldest twist; false if there is none. */
 bool plr_held_pop(plr_held_twists *held, plr_twist_message *twist);
 
 #endif

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/input.h"
 
+#include "pelorus/assertions.h"
+
 #include "session/data.h"
 #include "session/line.h"
 #include "session/phase.h"
@@ -46,7 +48,7 @@ typedef enum plr_rule {
     LATE,       /* refused: PLR_E_MODE */
     SAME,       /* refused: PLR_E_MODE; ignored if it says what is in force already */
     NEW,        /* used; ignored if it says what is in force already */
-    FIRST,      /* leads to another phase, whose rule then holds */
+    FIRST,      /* leads to another phase, whose rule then applies */
     KEEP,       /* kept until its time comes */
     USE         /* used */
 } plr_rule;
@@ -108,7 +110,7 @@ static plr_time_ns time_of(const plr_message *in) {
     }
 }
 
-/* A CONFIG in force tells a flight log from a recording. */
+/* A flight log contains one, a recording does not. */
 static bool is_in_force(const plr_message *in) {
     return in->kind == PLR_KIND_CONFIG && in->as.config.build_fingerprint != 0;
 }
@@ -165,7 +167,7 @@ static void start(plr_session *s) {
     if (s->options.start == PLR_START_SAVED)
         plr_saving_restore_at_start(s, time_of(&s->in));
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
-        s->start_pending = false; /* every pose is given there */
+        s->start_pending = false; /* every pose comes as a TRUTH there */
         plr_phase_change(&s->phase, PLR_EVENT_POSE);
     }
 }
@@ -179,6 +181,7 @@ void plr_input_handle(plr_session *s) {
             start(s);
     }
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
+    PLR_ASSERT(rule != FIRST);
     if (rule == IGNORE)
         return;
     if (row == PLR_KIND_STEREO)

@@ -12,7 +12,7 @@ static void suggest(plr_config *config, const char *name, double value) {
         (void)plr_config_set(config, plr_setting_by_name(name), value);
 }
 
-/* An axis of which nothing is told has what is told for all of them. */
+/* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
     const plr_setting *setting = plr_setting_by_name(name);
     for (unsigned axis = 0; axis < 3; axis++) {
@@ -45,7 +45,8 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
     }
 }
 
-/* The row of the first value that no setting allows, else NULL; *status tells. */
+/* PLR_E_CONFIG if a setting does not allow its value, with the first such setting in *culprit; NULL
+ * if there is none of its id. */
 static plr_status apply_values(plr_config *config, const plr_wire_setting *values, unsigned count,
                                const plr_setting **culprit) {
     for (unsigned i = 0; i < count; i++) {

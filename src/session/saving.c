@@ -104,7 +104,7 @@ static bool follows(const plr_filter *f, plr_time_ns t_ns) {
 }
 
 /* Sets the clock to t_ns, and allows for what may have moved. Where nothing lies between, the last
- * reading still holds, and the next bits are those of a drive that was never interrupted. */
+ * reading still applies, and the next bits are those of a drive that was never interrupted. */
 static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6]) {
     double P[36] = {0};
     bool moved = false;

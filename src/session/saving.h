@@ -13,7 +13,7 @@
  *
  * After a restore the drive goes on at the message's t_ns, and the body may have moved as it says. If
  * it has not moved, and t_ns follows on the saved time within max-gap, nothing lies between: the last
- * reading holds, and the bits are those of a drive that was never interrupted.
+ * reading applies, and the bits are those of a drive that was never interrupted.
  *
  * A restore that is refused leaves the session as it was before: ready for CONFIG, START and data.
  */

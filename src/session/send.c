@@ -29,7 +29,7 @@ static void pack6(double packed[21], const double full[36]) {
             packed[k++] = full[6 * i + j];
 }
 
-/* A covariance as the filter gives it; where it has diverged and gives none, one that says so. */
+/* The filter's covariance; where it has diverged and has none, PLR_WIRE_UNKNOWN_VARIANCE. */
 static bool describe_covariance(double packed[21], double P[36], plr_status status) {
     if (status == PLR_E_DIVERGED) {
         memset(P, 0, 36 * sizeof *P);
@@ -53,7 +53,7 @@ static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
     return plr_filter_bias(f, pose->bias, NULL) == PLR_OK;
 }
 
-/* A controller must not take the jump of a reset for motion. */
+/* A controller must not mistake the jump of a reset for motion. */
 static uint32_t resets(const plr_filter *f) {
     plr_totals totals;
     return plr_filter_totals(f, &totals) == PLR_OK ? totals.resets + totals.widened : 0;

@@ -13,7 +13,7 @@ void plr_send_echo(plr_session *s);
 /* The settings in force, and the build. */
 void plr_send_config(plr_session *s);
 
-/* The estimate at the filter's time. Holds until the next plr_send_*; NULL if there is none. */
+/* The estimate at the filter's time. Valid until the next plr_send_*; NULL if there is none. */
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 
 /* From here on a POSE counts its resets. */

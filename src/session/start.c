@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
 #include "session/budget.h"
 #include "session/held.h"
 #include "session/known_map.h"
@@ -162,6 +163,7 @@ static plr_status init_filter(plr_session *s, const plr_setting **culprit) {
 }
 
 plr_status plr_start_filter(plr_session *s) {
+    PLR_ASSERT(s->phase == PLR_PHASE_READY);
     const plr_setting *culprit = NULL;
     const plr_status status = init_filter(s, &culprit);
     if (status != PLR_OK) {

@@ -27,7 +27,7 @@ void plr_start_add_landmark(plr_session *s);
  * has been refused, and the phase is PLR_PHASE_REJECTED. */
 plr_status plr_start_filter(plr_session *s);
 
-/* The filter is about to take data: sends the CONFIG in force. */
+/* Before the first data reaches the filter: sends the CONFIG in force and the map, and warns. */
 void plr_start_announce(plr_session *s);
 
 /* The bias that a START gave, whatever the pose starts from. */

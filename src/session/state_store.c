@@ -103,7 +103,7 @@ static bool read_crc(plr_state_store *store, uint32_t offset, uint32_t n, uint32
     return true;
 }
 
-/* What one slot holds. PLR_OK a whole state; PLR_E_FOREIGN a whole header of another version, of
+/* What one slot contains. PLR_OK a whole state; PLR_E_FOREIGN a whole header of another version, of
  * which only the generation is known; PLR_E_NOT_READY nothing; PLR_E_CORRUPT; PLR_E_IO. */
 static plr_status look_into(plr_state_store *store, unsigned slot, slot_header *header) {
     uint8_t bytes[PLR_STORE_HEADER];
@@ -255,7 +255,7 @@ plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f,
 
 /* ---------------------------------------------------------------- restore */
 
-/* A restore in progress: the CRC is taken once more, of the very bytes that the filter reads. */
+/* A restore in progress: the CRC is computed once more, of the very bytes that the filter reads. */
 typedef struct plr_store_reader {
     const plr_state_store *store;
     uint32_t state; /* where the state begins on the device */
