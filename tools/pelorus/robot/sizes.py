@@ -289,7 +289,7 @@ def _title(names: str) -> str:
 
 # The search for a frame's motion takes one to six evaluations: frames of the same counts may be so
 # far apart.
-SPREAD_LIMIT = 1.3
+SPREAD_LIMIT = 1.1
 
 TEMPLATE = """# What it costs
 
