@@ -13,7 +13,9 @@ enum { RUNS = 200, MOST = 12 };
 
 static const plr_real W[3] = {1, 1, PLR_R(0.04)};
 /* Of the motion that the landmarks may share: anything, or close to nothing. */
-static const plr_real free_motion[6] = {1e9F, 1e9F, 1e9F, 1e9F, 1e9F, 1e9F}, no_motion[6];
+static const plr_real free_motion[6] = {PLR_R(1e9), PLR_R(1e9), PLR_R(1e9),
+                                        PLR_R(1e9), PLR_R(1e9), PLR_R(1e9)},
+                      no_motion[6];
 static const plr_real noise = PLR_R(1e-4); /* of w, squared */
 static rng chance;
 
@@ -118,7 +120,8 @@ static void test_landmarks_that_stay_outvote_the_pose(void) {
 /* Points so far away that a pixel's noise looks like metres: how far the body may have moved is known
  * better than that. */
 static void test_far_points_do_not_move_further_together_than_the_body_may_have_moved(void) {
-    const plr_real xi[6] = {0}, narrow[6] = {1e-6F, 1e-6F, 1e-6F, 1e-6F, 1e-6F, 1e-6F};
+    const plr_real xi[6] = {0}, narrow[6] = {PLR_R(1e-6), PLR_R(1e-6), PLR_R(1e-6),
+                                             PLR_R(1e-6), PLR_R(1e-6), PLR_R(1e-6)};
     double longest = 0;
     for (int limited = 0; limited < 2; limited++) {
         plr_real eta[6];
