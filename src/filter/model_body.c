@@ -126,8 +126,7 @@ static plr_real bring_closer(plr_filter *f, unsigned slot) {
 /* The variances of J n, which limit what the landmarks may have moved together (common_motion). */
 static void note_spread(plr_filter *f, const plr_real JL[36]) {
     for (unsigned k = 0; k < 6; k++)
-        f->work.noise.spread[k] =
-            plr_dot3(JL + 6 * k, JL + 6 * k) + plr_dot3(JL + 6 * k + 3, JL + 6 * k + 3);
+        f->work.noise.spread[k] = plr_norm2_of_6(JL + 6 * k);
 }
 
 static unsigned body_retract(plr_filter *f, const plr_real *dx);

@@ -104,9 +104,8 @@ static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_re
 /* The squared norm of the four residuals at the point evaluated last, for the course's gate. */
 static plr_real residual_norm2(const plr_search *s, unsigned i, plr_real row_gap) {
     const plr_sighting *at = &s->sightings[i];
-    const plr_real *U = at->U[s->bank];
-    const plr_real r[3] = {U[0] * at->rho[0], PLR_FMA(U[3], at->rho[1], U[1] * at->rho[0]),
-                           PLR_FMA(U[5], at->rho[2], PLR_FMA(U[4], at->rho[1], U[2] * at->rho[0]))};
+    plr_real r[3];
+    plr_multiply3_transposed(r, at->U[s->bank], at->rho);
     /* vL and vR lie half the gap to both sides of v */
     return plr_dot3(r, r) + r[2] * r[2] + PLR_R(0.5) * row_gap * row_gap;
 }
@@ -126,7 +125,7 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U, cons
     }
     d2 += row_gap * row_gap / (PLR_R(2) * par->pixel_variance);
     const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i, row_gap));
-    plr_slot *slot = &s->f->slots[s->f->work.slot_of[s->f->work.used[i]]];
+    plr_slot *slot = plr_search_slot(s, i);
     if (accepted && rest >= LEAST_REST)
         plr_track_add(slot, e);
     if (!accepted || slot->strays)

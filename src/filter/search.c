@@ -140,9 +140,8 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
 
 /* |U^-T r|^2 with U of the best point, where r = U'^T rho is the residual of the one on trial. */
 static plr_real in_best_measure(const plr_sighting *at, unsigned bank) {
-    const plr_real *now = at->U[1 - bank];
-    plr_real r[3] = {now[0] * at->rho[0], PLR_FMA(now[3], at->rho[1], now[1] * at->rho[0]),
-                     PLR_FMA(now[5], at->rho[2], PLR_FMA(now[4], at->rho[1], now[2] * at->rho[0]))};
+    plr_real r[3];
+    plr_multiply3_transposed(r, at->U[1 - bank], at->rho);
     plr_solve3_transposed(1, at->U[bank], r);
     return plr_dot3(r, r);
 }
@@ -181,7 +180,6 @@ static plr_real evaluate(plr_search *s, const plr_real z[6], plr_search_point *p
     step_to(s, z, &step);
     memset(point, 0, sizeof *point);
     memcpy(point->z, z, sizeof point->z);
-    point->cost = plr_norm2_of_6(z);
     for (unsigned i = 0; i < s->count; i++) {
         plr_sighting *at = &s->sightings[i];
         at->weight = 0;
@@ -194,7 +192,6 @@ static plr_real evaluate(plr_search *s, const plr_real z[6], plr_search_point *p
         at->weight = at->voice * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
         if (!(at->voice > 0))
             continue;
-        point->cost += huber(d2);
         change += huber(in_best_measure(at, s->bank)) - at->cost;
         gather(at, point);
     }

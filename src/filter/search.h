@@ -39,10 +39,9 @@ typedef struct plr_search {
     plr_applied_motion prior;
 } plr_search;
 
-/* The sum |z|^2 + sum of Huber's rho(|U^-T r|^2) at a point, and its derivatives. */
+/* A point nu = z, and what the derivatives of |z|^2 + sum of Huber's rho(|U^-T r|^2) there are made of. */
 typedef struct plr_search_point {
     plr_real z[6];
-    plr_real cost;
     plr_real J[21 + PLR_KERNEL_MARGIN]; /* sum of w a^T a, packed upper */
     plr_real b[6];                      /* sum of w a^T rho */
 } plr_search_point;
@@ -52,7 +51,7 @@ static inline const plr_observation *plr_search_observation(const plr_search *s,
     return &s->frame->observations[w->order[w->used[i]]];
 }
 
-static inline const plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
+static inline plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
     const plr_workspace *w = &s->f->work;
     return &s->f->slots[w->slot_of[w->used[i]]];
 }

@@ -126,6 +126,14 @@ static inline bool plr_cholesky3(plr_real S[6]) {
     return true;
 }
 
+/* y = U^T x: U is 3x3, packed upper; y may not be x. */
+static inline void plr_multiply3_transposed(plr_real y[3], const plr_real U[6],
+                                            const plr_real x[3]) {
+    y[0] = U[0] * x[0];
+    y[1] = PLR_FMA(U[3], x[1], U[1] * x[0]);
+    y[2] = PLR_FMA(U[5], x[2], PLR_FMA(U[4], x[1], U[2] * x[0]));
+}
+
 /* X <- U^-T X: U is 3x3, packed upper; X is 3 x n. The same bits as
  * plr_solve_upper_transposed(3, n, U, X, n). */
 static inline void plr_solve3_transposed(unsigned n, const plr_real U[6], plr_real *X) {

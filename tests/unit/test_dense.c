@@ -266,6 +266,12 @@ static void test_three_rows_without_loops_have_the_bits_of_the_general_kernels(v
         plr_solve_upper_transposed(3, n, U, X, n);
         plr_solve3_transposed(n, U3, X3);
         TEST_ASSERT_EQUAL_MEMORY(X, X3, 3 * n * sizeof *X);
+        plr_real x[3] = {X[0], X[n], X[2 * n]}, y[3];
+        plr_multiply3_transposed(y, U3, x);
+        plr_solve3_transposed(1, U3, y); /* and back */
+        for (unsigned i = 0; i < 3; i++)
+            TEST_ASSERT_DOUBLE_WITHIN(1e3 * eps * (1 + fabs((double)x[0]) + fabs((double)x[1])),
+                                      (double)x[i], (double)y[i]);
     }
 }
 
