@@ -35,7 +35,7 @@ endif()
 # The program: wire, session and replay as they are, settings and texts of the filter, and plr_filter_*
 # from tests/textbook in the place of src/filter.
 file(GLOB pelorus_textbook_session CONFIGURE_DEPENDS
-  "${PROJECT_SOURCE_DIR}/src/session/*.c" "${PROJECT_SOURCE_DIR}/src/wire/*.c")
+  "${PROJECT_SOURCE_DIR}/src/session/*.c" "${PROJECT_SOURCE_DIR}/src/record/*.c")
 set(pelorus_textbook_posix ${PELORUS_POSIX_SOURCES})
 list(FILTER pelorus_textbook_posix EXCLUDE REGEX "/(main|program)\\.c$")
 add_executable(pelorus-textbook
@@ -46,8 +46,8 @@ add_executable(pelorus-textbook
   "${pelorus_textbook_dir}/filter.c"
   "${pelorus_textbook_dir}/frame.c"
   "${pelorus_textbook_dir}/estimate.c"
-  "${PROJECT_SOURCE_DIR}/src/filter/settings.c"
-  "${PROJECT_SOURCE_DIR}/src/filter/status.c"
+  "${PROJECT_SOURCE_DIR}/src/record/settings.c"
+  "${PROJECT_SOURCE_DIR}/src/record/words.c"
   ${pelorus_textbook_session} ${pelorus_textbook_posix})
 target_include_directories(pelorus-textbook PRIVATE
   "${PROJECT_SOURCE_DIR}/src" "${PROJECT_SOURCE_DIR}/port")

@@ -53,7 +53,7 @@ typedef enum plr_landmark_prior {
  * the three noise sigmas and twist_timing.
  *
  * Above each field stands its row in the table: name, unit, default and limits (both included).
- * The table is in src/filter/settings.c; tests/layering/settings.py compares this text with it.
+ * The table is in src/record/settings.c; tests/layering/settings.py compares this text with it.
  *
  * Within the limits four combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior

@@ -3,11 +3,12 @@
 
 #include <string.h>
 
-#include "filter/covariance.h"
-#include "filter/slots.h"
-#include "lie/se3.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "state/covariance.h"
+#include "state/motion.h"
+#include "state/slots.h"
 
 enum {
     FAST_WINDOWS = 2,    /* they decide whether the twists are believed */

@@ -11,8 +11,8 @@
 
 #include <stdbool.h>
 
-#include "filter/motion.h"
 #include "pelorus/types.h"
+#include "state/motion.h"
 
 /* Start: no frame seen, no disagreement. */
 void plr_consistency_clear(plr_filter *f);

@@ -3,13 +3,14 @@
 
 #include <string.h>
 
-#include "filter/covariance.h"
 #include "filter/gate.h"
-#include "filter/model.h"
-#include "filter/motion.h"
-#include "filter/rigid_fit.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/small.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
+#include "state/pose.h"
+#include "state/rigid_fit.h"
 
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
 
@@ -173,7 +174,7 @@ plr_correction plr_correct(plr_filter *f, const plr_observation *observations, u
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
             f->bias[i] += f->work.dx[PLR_POSE_DIM + i];
     result.cut = plr_model_of(f)->retract(f, f->work.dx);
-    plr_motion_correct_pose(f, f->work.dx);
+    plr_pose_correct(f, f->work.dx);
     plr_covariance_make_up_for_rounding(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);

@@ -3,11 +3,12 @@
  * that first bring landmarks and covariance up to the pose. */
 #include <string.h>
 
-#include "filter/covariance.h"
+#include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/motion.h"
-#include "filter/slots.h"
+#include "state/covariance.h"
+#include "state/motion.h"
+#include "state/slots.h"
 
 static bool ready(const plr_filter *f) {
     return f && f->magic == PLR_FILTER_MAGIC;
@@ -16,6 +17,12 @@ static bool ready(const plr_filter *f) {
 static void to_double(double *y, const plr_real *x, unsigned n) {
     for (unsigned i = 0; i < n; i++)
         y[i] = (double)x[i];
+}
+
+/* The pose's covariance now, enlarged while vision contradicts the twists. */
+static void pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
+    plr_motion_pose_covariance(f, P_xi);
+    plr_consistency_cover(f, P_xi);
 }
 
 plr_time_ns plr_filter_time(const plr_filter *f) {
@@ -42,7 +49,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     if (f->diverged)
         return PLR_E_DIVERGED;
     plr_real P[36];
-    plr_motion_pose_covariance(f, P);
+    pose_covariance(f, P);
     to_double(P_xi, P, 36);
     return PLR_OK;
 }
@@ -116,7 +123,7 @@ double plr_filter_trace(const plr_filter *f) {
     plr_covariance_pose(f, P); /* the pose's and the biases' variances are those of now */
     for (int i = 0; i < 6; i++)
         trace -= (double)P[7 * i];
-    plr_motion_pose_covariance(f, P);
+    pose_covariance(f, P);
     if (f->config.bias) {
         plr_real before[36];
         plr_covariance_bias(f, before);

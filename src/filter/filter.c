@@ -5,14 +5,14 @@
 #include <string.h>
 
 #include "filter/consistency.h"
-#include "filter/covariance.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/model.h"
-#include "filter/motion.h"
-#include "lie/se3.h"
-#include "lie/so3.h"
-#include "linalg/small.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "math/so3.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
 
 /* ---------------------------------------------------------------- init */
 
@@ -185,16 +185,12 @@ void plr_filter_forget_reading(plr_filter *f) {
     memcpy(f->reading, f->bias, sizeof f->reading);
 }
 
-void plr_filter_count_refusal(plr_filter *f, plr_status status) {
+plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
     if (status == PLR_E_LATE)
         f->totals.late++;
     else
         f->totals.refused++;
     plr_guard_seal(f);
-}
-
-static plr_status refuse(plr_filter *f, plr_status status) {
-    plr_filter_count_refusal(f, status);
     return status;
 }
 
@@ -227,16 +223,16 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     if (sound != PLR_OK)
         return sound;
     if (f->config.mode == PLR_MODE_MAPPING)
-        return refuse(f, PLR_E_MODE);
+        return plr_filter_refuse(f, PLR_E_MODE);
     const plr_status status = check_pose(T_WB);
     if (status != PLR_OK)
-        return refuse(f, status);
+        return plr_filter_refuse(f, status);
     if (P_xi && !plr_all_finite(P_xi, 36))
-        return refuse(f, PLR_E_NOT_FINITE);
+        return plr_filter_refuse(f, PLR_E_NOT_FINITE);
     if (P_xi && !plr_all_within(P_xi, 36, PLR_MAX_VARIANCE))
-        return refuse(f, PLR_E_RANGE);
+        return plr_filter_refuse(f, PLR_E_RANGE);
     if (P_xi && !plr_is_covariance(P_xi, 6))
-        return refuse(f, PLR_E_ARGUMENT);
+        return plr_filter_refuse(f, PLR_E_ARGUMENT);
 
     double P_start[36];
     start_covariance(f, P_start);
@@ -269,14 +265,14 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
         return sound;
     if (!f->config.bias || f->totals.twists > 0 || f->totals.frames > 0 ||
         f->config.mode == PLR_MODE_MAPPING)
-        return refuse(f, PLR_E_MODE);
+        return plr_filter_refuse(f, PLR_E_MODE);
     if (!plr_all_finite(mean, 6) || !plr_all_finite(variance, 6))
-        return refuse(f, PLR_E_NOT_FINITE);
+        return plr_filter_refuse(f, PLR_E_NOT_FINITE);
     if (!plr_all_within(mean, 6, PLR_MAX_BIAS) || !plr_all_within(variance, 6, PLR_MAX_VARIANCE))
-        return refuse(f, PLR_E_RANGE);
+        return plr_filter_refuse(f, PLR_E_RANGE);
     for (int i = 0; i < 6; i++)
         if (variance[i] < 0)
-            return refuse(f, PLR_E_ARGUMENT);
+            return plr_filter_refuse(f, PLR_E_ARGUMENT);
     set_bias_prior(f, mean, variance);
     plr_filter_forget_reading(f);
     plr_guard_seal_whole(f);
@@ -290,12 +286,12 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     if (sound != PLR_OK)
         return sound;
     if (f->config.mode != PLR_MODE_MAPPING)
-        return refuse(f, PLR_E_MODE);
+        return plr_filter_refuse(f, PLR_E_MODE);
     const plr_status status = check_pose(T_WB);
     if (status != PLR_OK)
-        return refuse(f, status);
+        return plr_filter_refuse(f, status);
     if (f->clock_started && t_ns <= f->t_ns)
-        return refuse(f, PLR_E_TIME);
+        return plr_filter_refuse(f, PLR_E_TIME);
     if (!f->clock_started) {
         put_pose(f, t_ns, T_WB);
         plr_guard_seal(f);
@@ -304,88 +300,6 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     plr_real R[9];
     get_rotation(R, T_WB);
     plr_motion_jump(f, t_ns, R, T_WB->p);
-    plr_guard_seal(f);
-    return PLR_OK;
-}
-
-/* ---------------------------------------------------------------- twists */
-
-/* The twist that holds over the step that ends with this reading. */
-static void twist_of_step(const plr_filter *f, const plr_real reading[6], plr_real held[6]) {
-    const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
-    for (int i = 0; i < 6; i++)
-        held[i] = timing == PLR_TWIST_END     ? reading[i]
-                  : timing == PLR_TWIST_START ? f->reading[i]
-                                              : PLR_R(0.5) * (f->reading[i] + reading[i]);
-}
-
-static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
-    if (!f->clock_started)
-        return PLR_OK;
-    if ((f->reading_valid && t_ns <= f->reading_ns) || t_ns < f->t_ns)
-        return PLR_E_TIME;
-    return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
-}
-
-/* Could the reading itself be held for as long as readings are? With timing start it is not before
- * the next one comes, and by then it would block that one and all that follow. */
-static plr_status check_reading(const plr_filter *f, const plr_real reading[6], plr_real interval) {
-    const plr_real first = PLR_R(1e-3); /* there is no interval yet */
-    plr_real seconds = interval > 0 ? interval : first;
-    if (f->interval_s > 0 && f->interval_s < seconds) /* a pause says nothing about the next one */
-        seconds = f->interval_s;
-    return plr_motion_check(f, reading, seconds);
-}
-
-static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
-                         plr_real interval) {
-    memcpy(f->reading, reading, sizeof f->reading);
-    f->reading_ns = t_ns;
-    f->reading_valid = 1;
-    f->interval_s = interval;
-    f->totals.twists++;
-}
-
-static plr_status refuse_twist(plr_filter *f, plr_status status) {
-    f->totals.twists_refused++;
-    return refuse(f, status);
-}
-
-plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
-    if (!f || !twist)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
-    if (sound != PLR_OK)
-        return sound;
-    if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
-        return refuse_twist(f, PLR_E_NOT_FINITE);
-
-    plr_real reading[6], held[6];
-    for (int i = 0; i < 3; i++) {
-        reading[i] = (plr_real)twist->v_B_mps[i];
-        reading[3 + i] = (plr_real)twist->w_B_radps[i];
-        if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
-            return refuse_twist(f, PLR_E_RANGE);
-    }
-    if (f->config.mode == PLR_MODE_MAPPING) {
-        f->totals.twists++;
-        plr_guard_seal(f);
-        return PLR_OK;
-    }
-    const plr_status in_time = check_time(f, t_ns);
-    if (in_time != PLR_OK)
-        return refuse_twist(f, in_time);
-    twist_of_step(f, reading, held);
-    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
-    if (plr_motion_check(f, held, seconds) != PLR_OK ||
-        check_reading(f, reading, interval) != PLR_OK)
-        return refuse_twist(f, PLR_E_RANGE);
-    if (seconds > 0)
-        plr_motion_step(f, t_ns, held, seconds, interval);
-    f->t_ns = t_ns;
-    f->clock_started = 1;
-    take_reading(f, t_ns, reading, interval);
     plr_guard_seal(f);
     return PLR_OK;
 }

@@ -24,8 +24,8 @@ static inline plr_real plr_seconds(plr_time_ns ns) {
 /* Forgets the last twist reading: the body is assumed to stand still, reading - bias = 0. */
 void plr_filter_forget_reading(plr_filter *f);
 
-/* Counts a refused call in the totals. */
-void plr_filter_count_refusal(plr_filter *f, plr_status status);
+/* Counts a refused call in the totals, and returns its status. */
+plr_status plr_filter_refuse(plr_filter *f, plr_status status);
 
 /* Stores the pose's covariance after a good frame, for plr_filter_recover. */
 void plr_filter_keep_for_recovery(plr_filter *f);

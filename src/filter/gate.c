@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "filter/gate.h"
 
-#include "filter/covariance.h"
 #include "filter/health.h"
-#include "filter/model.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/small.h"
+#include "state/covariance.h"
+#include "state/model.h"
 
 void plr_gate_innovation(plr_real r[3], const plr_observation *seen, const plr_linearisation *lin) {
     r[0] = (plr_real)seen->uL_px - lin->z[0];

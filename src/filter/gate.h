@@ -5,8 +5,8 @@
 
 #include <stdbool.h>
 
-#include "filter/model.h"
 #include "pelorus/state.h"
+#include "state/model.h"
 
 /* The gate's result for one observation. */
 typedef struct plr_verdict {

@@ -3,9 +3,9 @@
 
 #include <string.h>
 
-#include "filter/covariance.h"
 #include "filter/filter_internal.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
 
 enum {
     LANES = 8, /* sums side by side: some processors add them at once */

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /* Landmarks as the caller sees them: in the world, in and out. */
-#include "filter/covariance.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/model.h"
-#include "filter/slots.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/slots.h"
 
 unsigned plr_filter_landmark_count(const plr_filter *f) {
     return f && plr_guard_look(f) == PLR_OK ? f->count : 0;

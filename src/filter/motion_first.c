@@ -5,11 +5,12 @@
 
 #include "filter/gate.h"
 #include "filter/search.h"
-#include "filter/slots.h"
 #include "filter/tracks.h"
 #include "filter/vantage.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/small.h"
+#include "state/motion.h"
+#include "state/slots.h"
 
 enum {
     FEW = 3, /* fewer points say nothing that could be checked */

@@ -7,8 +7,8 @@
 #ifndef PLR_FILTER_MOTION_FIRST_H
 #define PLR_FILTER_MOTION_FIRST_H
 
-#include "filter/motion.h"
 #include "pelorus/state.h"
+#include "state/motion.h"
 
 /* The estimate of the motion D Exp(L nu), nu ~ N(0, I). */
 typedef struct plr_motion_first {

@@ -3,12 +3,12 @@
 #include <string.h>
 
 #include "filter/consistency.h"
-#include "filter/covariance.h"
 #include "filter/filter_internal.h"
-#include "filter/motion.h"
-#include "lie/se3.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "state/covariance.h"
+#include "state/motion.h"
 
 static void pack(plr_filter *f, const plr_real P[36]) {
     for (unsigned i = 0, at = 0; i < 6; i++)

@@ -3,11 +3,6 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 
-static plr_status refuse(plr_filter *f, plr_status status) {
-    plr_filter_count_refusal(f, status);
-    return status;
-}
-
 static plr_status check_moved(const plr_filter *f, const double *P_moved) {
     if (!f->clock_started || (P_moved && f->config.mode == PLR_MODE_MAPPING))
         return PLR_E_MODE;
@@ -28,7 +23,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
         return sound;
     const plr_status status = check_moved(f, P_moved);
     if (status != PLR_OK)
-        return refuse(f, status);
+        return plr_filter_refuse(f, status);
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* one of before says nothing of now */
     f->last_frame_ns = f->last_use_ns = 0;

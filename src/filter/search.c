@@ -3,14 +3,16 @@
 
 #include <string.h>
 
-#include "camera/stereo.h"
-#include "filter/covariance.h"
 #include "filter/gate.h"
-#include "filter/model.h"
-#include "filter/polar.h"
-#include "lie/se3.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "sensor/stereo.h"
+#include "state/camera.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
+#include "state/polar.h"
 
 enum { TRIALS = 4 }; /* of a better point; the start and a return to the best one come on top */
 

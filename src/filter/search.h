@@ -8,8 +8,8 @@
 #ifndef PLR_FILTER_SEARCH_H
 #define PLR_FILTER_SEARCH_H
 
-#include "filter/motion.h"
 #include "pelorus/state.h"
+#include "state/motion.h"
 
 /* One matched observation. */
 typedef struct plr_sighting {

@@ -3,11 +3,11 @@
  * The filter's state as bytes and back: docs/STATE-FORMAT.md. What init derives from settings and
  * calibration is not carried, but compared: a state belongs to the filter that it was taken from.
  */
-#include "filter/covariance.h"
-#include "filter/fields.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "record/fields.h"
+#include "state/covariance.h"
 
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U

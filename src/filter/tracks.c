@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/tracks.h"
 
-#include "linalg/small.h"
+#include "math/small.h"
 
 enum {
     PATIENCE = 8, /* frames, the first time */

@@ -5,20 +5,22 @@
  */
 #include <string.h>
 
-#include "camera/stereo.h"
 #include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/health.h"
-#include "filter/model.h"
-#include "filter/motion.h"
 #include "filter/motion_first.h"
-#include "filter/order.h"
-#include "filter/slots.h"
+#include "filter/predict.h"
 #include "filter/tracks.h"
-#include "linalg/small.h"
+#include "math/order.h"
+#include "math/small.h"
+#include "process/twist.h"
+#include "sensor/stereo.h"
+#include "state/model.h"
+#include "state/motion.h"
+#include "state/slots.h"
 
 /* ---------------------------------------------------------------- cleaning and order */
 
@@ -302,7 +304,7 @@ static void begin_anew(plr_filter *f, const plr_frame *frame, unsigned n,
         const plr_slot before = f->slots[slot];
         if (!plr_track_may_begin_anew(&before) || !is_worth_a_landmark(f, o, z))
             continue;
-        plr_motion_settle(f);
+        plr_predict_settle(f);
         plr_slots_remove(f, slot);
         append_new(f, o->id, z);
         plr_track_begin_anew(&f->slots[f->count - 1], &before);
@@ -338,7 +340,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
         (void)choose(f, frame, n, report);
         return correction;
     }
-    plr_motion_apply(f, &first.motion);
+    plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
     correction = plr_correct(f, frame->observations, choose(f, frame, n, report));
@@ -355,7 +357,7 @@ static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, uns
     if (f->motion.pending) {
         plr_applied_motion motion;
         plr_motion_prior(f, &motion);
-        plr_motion_apply(f, &motion);
+        plr_predict_apply(f, &motion);
     }
     if (f->diverged)
         return none;
@@ -383,7 +385,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     if (!f->diverged) {
         events.locked = plr_health_gate_is_locked(f, report);
         if (events.locked) {
-            plr_motion_settle(f);
+            plr_predict_settle(f);
             unlock(f, frame, n);
         } else {
             begin_anew(f, frame, n, report);
@@ -411,29 +413,7 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
         return PLR_E_LATE;
     if (frame->t_ns - f->t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_motion_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
-}
-
-/* The interval to give plr_motion_step, which adds the variance sigma^2 interval (h1 - h0), where the
- * last reading is used from h0 to h1 seconds after it was taken. The error of one reading is constant,
- * so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau between
- * readings by the usual sigma^2 tau h, and later, when twists fail to come, to sigma^2 h^2. */
-static plr_real held_interval(const plr_filter *f, plr_real h0, plr_real h1) {
-    const plr_real tau = f->interval_s;
-    if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
-        return tau > 0 ? tau : h1 - h0;
-    return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
-}
-
-static void predict_to(plr_filter *f, plr_time_ns t_ns) {
-    if (f->clock_started && t_ns > f->t_ns) {
-        const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
-        const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
-        const plr_real interval = held_interval(f, h0, h1);
-        plr_motion_step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
-    }
-    f->t_ns = t_ns;
-    f->clock_started = 1;
+    return plr_twist_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report) {
@@ -453,17 +433,17 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     r->status = check(f, frame);
     if (r->status != PLR_OK) {
         f->totals.frames_refused++;
-        plr_filter_count_refusal(f, r->status);
+        (void)plr_filter_refuse(f, r->status);
         plr_health_after_refusal(f, r);
         return r->status;
     }
-    predict_to(f, frame->t_ns);
+    plr_predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
     if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
         process(f, frame, r);
     } else {
-        plr_motion_settle(f);
+        plr_predict_settle(f);
         if (f->diverged)
             plr_filter_recover(f);
     }

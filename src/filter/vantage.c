@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "filter/vantage.h"
 
-#include "filter/covariance.h"
-#include "linalg/small.h"
+#include "math/small.h"
+#include "state/covariance.h"
 
 enum { PASSES = 3 };
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "pelorus/wire.h"
-#include "wire/bytes.h"
+#include "record/bytes.h"
 
 /* ---------------------------------------------------------------- header: docs/STATE-FORMAT.md */
 

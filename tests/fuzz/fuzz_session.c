@@ -23,7 +23,7 @@
 #include <string.h>
 
 #include "pelorus/session.h"
-#include "wire/cobs.h"
+#include "record/cobs.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

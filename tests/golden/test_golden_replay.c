@@ -12,9 +12,9 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
 #include "pelorus/filter.h"
 #include "pelorus/wire.h"
+#include "state/covariance.h"
 #include "support/axes.h"
 
 enum { BUFFER = PLR_WIRE_STEREO_BODY(256), LINE = 320, MOST_KNOWN = 200 };

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Compares what include/pelorus/settings.h says above each field of plr_config (name, unit, limits,
-default) with the table in src/filter/settings.c, which is what the code accepts.
+default) with the table in src/record/settings.c, which is what the code accepts.
 
 usage: settings.py PROJECT_ROOT
 """
@@ -101,7 +101,7 @@ def main() -> int:
         print(__doc__, file=sys.stderr)
         return 2
     root = Path(sys.argv[1]).resolve()
-    source = (root / "src/filter/settings.c").read_text(encoding="utf-8")
+    source = (root / "src/record/settings.c").read_text(encoding="utf-8")
     text = (root / "include/pelorus/settings.h").read_text(encoding="utf-8")
     struct = text[text.index("typedef struct plr_config {") : text.index("} plr_config;")]
     table, header = from_table(source), from_header(struct)

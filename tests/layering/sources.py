@@ -18,14 +18,15 @@ from pathlib import Path
 LONGEST_FILE = 600
 LONG_FILE = 400
 
-# Folders of src/ that a folder of src/ may include, and the public headers that it may see.
+# Folders of src/ that a folder of src/ may include, from the lowest room to the highest.
 FOLDERS: dict[str, set[str]] = {
-    "linalg": {"linalg"},
-    "lie": {"lie", "linalg"},
-    "camera": {"camera", "lie", "linalg"},
-    "filter": {"filter", "camera", "lie", "linalg"},
-    "wire": {"wire"},
-    "session": {"session", "filter", "wire"},
+    "math": {"math"},
+    "record": {"record"},
+    "state": {"state", "math"},
+    "process": {"process", "state", "math"},
+    "sensor": {"sensor", "state", "math"},
+    "filter": {"filter", "sensor", "process", "state", "record", "math"},
+    "session": {"session", "filter", "record"},
 }
 FILTER_HEADERS = {
     "assertions.h",
@@ -37,12 +38,14 @@ FILTER_HEADERS = {
     "filter.h",
     "pelorus.h",
 }
+# The public headers that a folder of src/ may see.
 HEADERS: dict[str, set[str]] = {
-    "linalg": {"assertions.h", "config.h"},
-    "lie": {"assertions.h", "config.h"},
-    "camera": {"assertions.h", "config.h", "types.h", "camera.h"},
+    "math": {"assertions.h", "config.h"},
+    "record": FILTER_HEADERS | {"wire.h"},
+    "state": FILTER_HEADERS - {"filter.h", "pelorus.h"},
+    "process": FILTER_HEADERS - {"filter.h", "pelorus.h"},
+    "sensor": FILTER_HEADERS - {"filter.h", "pelorus.h"},
     "filter": FILTER_HEADERS,
-    "wire": {"assertions.h", "types.h", "wire.h"},
     "session": FILTER_HEADERS
     | {"wire.h", "port.h", "session.h", "session_parts.h", "state_store.h"},
 }

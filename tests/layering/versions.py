@@ -14,7 +14,7 @@ from pathlib import Path
 
 VERSION = {
     "CMakeLists.txt": r"project\(pelorus VERSION ([0-9.]+)",
-    "src/filter/status.c": r'plr_version\(void\) {\s*return "([0-9.]+)"',
+    "src/record/words.c": r'plr_version\(void\) {\s*return "([0-9.]+)"',
     "tools/pelorus/__init__.py": r'__version__ = "([0-9.]+)"',
 }
 ARITHMETIC = {

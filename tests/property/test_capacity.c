@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/rig.h"
 #include "support/specimens.h"

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/scene.h"
 #include "support/specimens.h"

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/rig.h"
 #include "support/rigid.h"

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rig.h"

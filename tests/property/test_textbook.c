@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "linalg/packed.h"
+#include "math/packed.h"
 #include "support/matrices.h"
 #include "support/rig.h"
 #include "support/rigid.h"

@@ -42,7 +42,7 @@ EchoFunction = Callable[[bytes], Echo]
 @pytest.fixture(scope="session")
 def echo(tmp_path_factory: pytest.TempPathFactory) -> EchoFunction:
     program = tmp_path_factory.mktemp("wire") / "wire_echo"
-    sources = [*sorted((ROOT / "src/wire").glob("*.c")), ROOT / "tests/support/wire_echo.c"]
+    sources = [*sorted((ROOT / "src/record").glob("*.c")), ROOT / "tests/support/wire_echo.c"]
     compiler = shlex.split(os.environ.get("CC", "cc"))
     includes = [f"-I{ROOT / 'include'}", f"-I{ROOT / 'src'}"]
     subprocess.run(

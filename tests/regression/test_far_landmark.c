@@ -6,10 +6,11 @@
  */
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "filter/motion.h"
-#include "linalg/packed.h"
+#include "filter/predict.h"
+#include "math/packed.h"
 #include "pelorus/pelorus.h"
+#include "state/covariance.h"
+#include "state/motion.h"
 
 static plr_filter filter;
 
@@ -52,7 +53,7 @@ static void test_a_point_three_kilometres_away_keeps_its_bearing_through_birth_a
 
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 2, &ahead));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 100000000, &ahead));
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_UINT8(0, filter.diverged);
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&filter));
 }

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
+#include "state/covariance.h"
 #include "support/random.h"
 #include "support/rig.h"
 

@@ -8,8 +8,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/slots.h"
 #include "filter/tracks.h"
+#include "state/slots.h"
 #include "support/rig.h"
 
 enum { OUTLIER_ID = 7777, FRAMES_TO_CATCH = 60, FRAMES_TO_BEGIN_ANEW = 12 };

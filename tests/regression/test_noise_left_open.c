@@ -8,8 +8,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
 #include "support/reseal.h"
 #include "support/rig.h"
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/specimens.h"
 

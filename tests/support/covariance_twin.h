@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* A filter's covariance beside a dense matrix in double, over several sizes: what the tests of
- * src/filter/covariance.c have in common. */
+ * src/state/covariance.c have in common. */
 #ifndef PELORUS_TEST_COVARIANCE_TWIN_H
 #define PELORUS_TEST_COVARIANCE_TWIN_H
 

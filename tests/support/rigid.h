@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
  * SE(3) in double from first principles: 4x4 matrices, row by row, and power series, no closed form.
- * Slow, and independent of src/lie. Tangent vectors are (rho, theta).
+ * Slow, and independent of src/math. Tangent vectors are (rho, theta).
  */
 #ifndef PELORUS_TEST_RIGID_H
 #define PELORUS_TEST_RIGID_H

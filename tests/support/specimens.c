@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "filter/covariance.h"
-#include "filter/model.h"
-#include "filter/polar.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/polar.h"
 #include "support/matrices.h"
 #include "support/reseal.h"
 #include "support/rigid.h"

@@ -4,8 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
 
 static bool call_fails(state_bytes *state, uint32_t n) {
     if (n > state->most_at_once)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
  * Frames in memory. wire_frame() builds one from its parts straight from the format's page and
- * shares no code with src/wire: what it gives may be wrong on purpose.
+ * shares no code with src/record: what it gives may be wrong on purpose.
  */
 #ifndef PELORUS_TEST_WIRE_FRAMES_H
 #define PELORUS_TEST_WIRE_FRAMES_H

@@ -3,12 +3,12 @@
 #include <string.h>
 #include <unity.h>
 
-#include "camera/stereo.h"
-#include "linalg/dense.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/small.h"
+#include "record/bytes.h"
+#include "record/cobs.h"
+#include "sensor/stereo.h"
 #include "support/assertions.h"
-#include "wire/bytes.h"
-#include "wire/cobs.h"
 
 enum { N = PLR_TILE_COLUMNS };
 

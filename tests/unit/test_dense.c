@@ -5,9 +5,9 @@
 #include <string.h>
 #include <unity.h>
 
-#include "linalg/dense.h"
-#include "linalg/packed.h"
-#include "linalg/small.h"
+#include "math/dense.h"
+#include "math/packed.h"
+#include "math/small.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/random.h"

@@ -4,8 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
 #include "support/axes.h"
 #include "support/matrices.h"
 #include "support/oracle.h"

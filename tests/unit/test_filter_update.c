@@ -5,9 +5,9 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
 #include "filter/gate.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/reseal.h"
 #include "support/rig.h"

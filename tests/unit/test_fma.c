@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "linalg/fma.h"
+#include "math/fma.h"
 #include "support/random.h"
 
 void setUp(void) {

@@ -5,10 +5,10 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
 #include "filter/gate.h"
-#include "filter/model.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
+#include "state/covariance.h"
+#include "state/model.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/specimens.h"

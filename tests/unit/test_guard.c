@@ -6,7 +6,7 @@
 #include <unity.h>
 
 #include "filter/guard.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
 #include "support/rig.h"
 #include "support/state_bytes.h"
 

@@ -2,16 +2,16 @@
 /*
  * Where the two models must agree: at one linearisation point they are linearly equivalent,
  * H_world A = H_body with A the map from body errors to world errors (MATH 12), and so are their
- * innovation covariances, if P_world = A P_body A^T. Also src/filter/model.c, on which A rests.
+ * innovation covariances, if P_world = A P_body A^T. Also src/state/model.c, on which A rests.
  */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
 #include "filter/gate.h"
-#include "filter/model.h"
+#include "state/covariance.h"
+#include "state/model.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"

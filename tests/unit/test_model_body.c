@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/model.h"
+#include "state/model.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"

@@ -6,10 +6,13 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "filter/model.h"
-#include "filter/motion.h"
-#include "linalg/packed.h"
+#include "filter/predict.h"
+#include "math/packed.h"
+#include "process/twist.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
+#include "state/pose.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
@@ -72,7 +75,7 @@ static void drive_filter(void) {
         to_reals(reading, drive.twist[k], 6);
         to_doubles(drive.twist[k], reading, 6);
         drive.seconds[k] = (double)PLR_R(0.02);
-        plr_motion_step(&filter, filter.t_ns + 20000000, reading, PLR_R(0.02), PLR_R(0.02));
+        plr_twist_step(&filter, filter.t_ns + 20000000, reading, PLR_R(0.02), PLR_R(0.02));
     }
     to_doubles(drive.bias, filter.bias, 6);
     displacement((const double[6]){0}, drive.estimate);
@@ -176,7 +179,7 @@ static void check_propagate(bool bias) {
         point_of(slot, q[slot]);
     double *P = specimen_covariance(&filter), *Ji = charts(false);
     drive_filter();
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_UINT(LANDMARKS, filter.count);
 
     double *F = carry_jacobian(q, LANDMARKS), *Jw = charts(true);
@@ -211,7 +214,7 @@ static void test_propagation_moves_the_points_rigidly(void) {
         for (unsigned slot = 0; slot < LANDMARKS; slot++)
             point_of(slot, q[slot]);
         drive_filter();
-        plr_motion_settle(&filter);
+        plr_predict_settle(&filter);
         carry(zero, q, LANDMARKS, after);
         double T_BC[16], CD[16], D_C[16], inverse[16];
         rigid_inverse(T_BC, truth.T_CB);
@@ -247,8 +250,8 @@ static void test_a_landmark_that_the_camera_meets_is_kept_off_it(void) {
     square_multiply(4, CD, T_BC, D_C);
     for (int i = 0; i < 3; i++) /* where the camera will be */
         filter.slots[LANDMARKS - 1].x[i] = (plr_real)D_C[4 * i + 3];
-    plr_motion_settle(&filter);
-    plr_motion_settle(&without);
+    plr_predict_settle(&filter);
+    plr_predict_settle(&without);
     TEST_ASSERT_EQUAL_UINT(LANDMARKS, filter.count);
     point_of(LANDMARKS - 1, q);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]));
@@ -377,7 +380,7 @@ static void test_a_rigid_correction_moves_no_landmark_in_the_world(void) {
             to_reals(dx + plr_covariance_row(&filter, slot), w, 3);
         }
         (void)plr_model_of(&filter)->retract(&filter, dx);
-        plr_motion_correct_pose(&filter, dx);
+        plr_pose_correct(&filter, dx);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             plr_model_of(&filter)->in_world(&filter, &filter.slots[slot], &after);
             /* w_3 is rounded as a part of 1/r: r^2 times that, with r up to 35 m */
@@ -463,7 +466,7 @@ static void test_far_points_keep_the_variance_of_their_bearing(void) {
             filter.motion.E[3 * i + j] = (plr_real)(D[4 * i + j] - (i == j));
     }
     filter.motion.pending = 1;
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_UINT(1, filter.count);
     double *P = specimen_covariance(&filter);
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, (P[6 * 9 + 6] + P[7 * 9 + 7]) / (2 * bearing));

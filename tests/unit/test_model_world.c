@@ -5,10 +5,11 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "filter/model.h"
-#include "filter/motion.h"
-#include "linalg/packed.h"
+#include "filter/predict.h"
+#include "math/packed.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
@@ -187,7 +188,7 @@ static void test_motion_moves_no_landmark_and_no_landmark_block(void) {
     double *P = specimen_covariance(&filter);
     const unsigned n = plr_covariance_dim(&filter);
     specimen_motion(&filter, &chance, &filter.motion);
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_MEMORY(before, filter.slots, sizeof before);
     double *after = specimen_covariance(&filter);
     for (unsigned i = 12; i < n; i++)

@@ -6,9 +6,12 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "filter/motion.h"
-#include "linalg/packed.h"
+#include "filter/predict.h"
+#include "math/packed.h"
+#include "process/twist.h"
+#include "state/covariance.h"
+#include "state/motion.h"
+#include "state/pose.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/reseal.h"
@@ -76,7 +79,7 @@ static void test_cleared_motion_is_none(void) {
 
 static plr_status check(double v, double w, double seconds) {
     const plr_real reading[6] = {(plr_real)v, 0, 0, 0, (plr_real)w, 0};
-    return plr_motion_check(&filter, reading, (plr_real)seconds);
+    return plr_twist_check(&filter, reading, (plr_real)seconds);
 }
 
 static void test_a_step_holds_up_to_pi_and_a_kilometre(void) {
@@ -111,7 +114,7 @@ static void test_steps_move_the_pose_by_exponentials(void) {
         rigid_exp(D, xi);
         square_multiply(4, T, D, next);
         memcpy(T, next, sizeof T);
-        plr_motion_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     pose_of(got);
     TEST_ASSERT_DOUBLE_WITHIN(30 * STEPS * eps, 0, largest_difference(T, got, 16));
@@ -127,7 +130,7 @@ static void test_far_from_the_origin_small_steps_are_not_lost(void) {
         filter.R_WB[i] = i % 4 == 0;
     filter.p_WB[0] = 1e4;
     for (int k = 0; k < 10000; k++)
-        plr_motion_step(&filter, filter.t_ns + 10000000, creep, PLR_R(0.01), PLR_R(0.01));
+        plr_twist_step(&filter, filter.t_ns + 10000000, creep, PLR_R(0.01), PLR_R(0.01));
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1e4 + 1, filter.p_WB[0]);
 }
 
@@ -138,7 +141,7 @@ static void test_the_motion_accumulates_as_a_product(void) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
-        plr_motion_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     pose_of(end);
     rigid_inverse(inverse, start);
@@ -174,7 +177,7 @@ static void test_noise_and_bias_jacobian_follow_their_recursions(void) {
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 6, 6, 1, A, B, 0, next);
         for (int i = 0; i < 36; i++)
             B[i] = next[i] - tau * Jr[i];
-        plr_motion_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     double got_Q[36], got_B[36];
     to_doubles(got_Q, filter.motion.Q, 36);
@@ -190,7 +193,7 @@ static void test_bias_jacobian_agrees_with_differences(void) {
     for (int k = 0; k < STEPS; k++) {
         plr_real reading[6];
         random_reading(reading, twists[k]);
-        plr_motion_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     for (int j = 0; j < 6; j++) {
         double D[3][16];
@@ -226,7 +229,7 @@ static double charged(plr_noise_kind noise, double part_s, int parts) {
     filter.config.noise = (uint8_t)noise;
     filter.par.velocity_variance[0] = PLR_R(4);
     for (int k = 0; k < parts; k++)
-        plr_motion_step(&filter, filter.t_ns + 1000000, standing, (plr_real)part_s, PLR_R(0.1));
+        plr_twist_step(&filter, filter.t_ns + 1000000, standing, (plr_real)part_s, PLR_R(0.1));
     return (double)filter.motion.Q[0];
 }
 
@@ -278,7 +281,7 @@ static void test_a_correction_is_an_exponential_on_the_right(void) {
     to_doubles(same, xi, 6);
     rigid_exp(D, same);
     square_multiply(4, start, D, expected);
-    plr_motion_correct_pose(&filter, xi);
+    plr_pose_correct(&filter, xi);
     pose_of(got);
     TEST_ASSERT_DOUBLE_WITHIN(50 * eps, 0, largest_difference(expected, got, 16));
 }
@@ -287,7 +290,7 @@ static void test_a_correction_makes_the_rotation_one_again(void) {
     const plr_real none[6] = {0};
     for (int i = 0; i < 9; i++)
         filter.R_WB[i] *= PLR_R(1.0001);
-    plr_motion_correct_pose(&filter, none);
+    plr_pose_correct(&filter, none);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 10 * eps, 0, distance_from_rotation()); /* 1e-4 squared */
 }
 
@@ -295,7 +298,7 @@ static void test_a_correction_makes_the_rotation_one_again(void) {
 static void test_the_rotation_stays_one_through_an_hour_of_steps(void) {
     const plr_real turning[6] = {PLR_R(1), 0, 0, PLR_R(0.1), PLR_R(-0.3), PLR_R(0.5)};
     for (int k = 0; k < 360000; k++)
-        plr_motion_step(&filter, filter.t_ns + 10000000, turning, PLR_R(0.01), PLR_R(0.01));
+        plr_twist_step(&filter, filter.t_ns + 10000000, turning, PLR_R(0.01), PLR_R(0.01));
     TEST_ASSERT_DOUBLE_WITHIN(10 * eps, 0, distance_from_rotation());
 }
 
@@ -306,7 +309,7 @@ static void drive(void) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
-        plr_motion_step(&filter, filter.t_ns + 10000000, reading, PLR_R(0.01), PLR_R(0.01));
+        plr_twist_step(&filter, filter.t_ns + 10000000, reading, PLR_R(0.01), PLR_R(0.01));
     }
 }
 
@@ -330,7 +333,7 @@ static void check_pose_covariance(plr_model_kind model, bool bias) {
     before = filter;
     plr_motion_pose_covariance(&filter, on_the_side);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     plr_covariance_pose(&filter, settled);
     to_doubles(a, on_the_side, 36);
     to_doubles(b, settled, 36);
@@ -347,10 +350,10 @@ static void test_pose_covariance_on_the_side_is_the_settled_one(void) {
 
 static void test_settling_clears_the_motion_and_is_done_once(void) {
     drive();
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_UINT8(0, filter.motion.pending);
     before = filter;
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
 }
 
@@ -360,7 +363,7 @@ static void test_settling_charges_the_walk_of_the_bias(void) {
     filter.par.bias_gyro_walk = PLR_R(0.125);
     plr_covariance_bias(&filter, was);
     drive();
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     plr_covariance_bias(&filter, is);
     const double seconds = 0.01 * STEPS;
     for (int i = 0; i < 6; i++)
@@ -371,7 +374,7 @@ static void test_settling_charges_the_walk_of_the_bias(void) {
 static void test_a_variance_that_is_lost_marks_the_filter_diverged(void) {
     filter.P[plr_packed_at(14, 14)] = (plr_real)-1e3;
     drive();
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
     TEST_ASSERT_EQUAL_UINT64(filter.t_ns, filter.totals.diverged_ns);
 }
@@ -380,7 +383,7 @@ static void test_a_diverged_filter_is_not_settled(void) {
     drive();
     plr_filter_diverge(&filter);
     before = filter;
-    plr_motion_settle(&filter);
+    plr_predict_settle(&filter);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
 }
 

@@ -8,10 +8,11 @@
 #include <unity.h>
 
 #include "filter/correction.h"
-#include "filter/covariance.h"
 #include "filter/gate.h"
-#include "filter/model.h"
-#include "filter/motion.h"
+#include "filter/predict.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/reseal.h"
@@ -156,13 +157,13 @@ static void check_open_and_close(noise_kind kind, bool bias, bool shifted) {
     const plr_motion pending = filter.motion;
     const plr_filter before = filter;
     filter.motion.noisy = 0; /* the transport alone */
-    plr_motion_apply(&filter, &motion);
+    plr_predict_apply(&filter, &motion);
     filter.motion = pending;
     double *expected = specimen_covariance(&filter);
     add_motion(expected, bias);
 
     filter = before;
-    plr_motion_apply(&filter, &motion);
+    plr_predict_apply(&filter, &motion);
     TEST_ASSERT_EQUAL_UINT8(1, filter.work.noise.open);
     plr_real nu[6];
     plr_covariance_close_noise(&filter, nu);
@@ -281,7 +282,7 @@ static void check_update(noise_kind kind, bool bias, bool shifted) {
     static plr_observation seen[MANY];
     static plr_filter before;
     take_specimen(kind, bias, shifted);
-    plr_motion_apply(&filter, &motion);
+    plr_predict_apply(&filter, &motion);
     const unsigned count = shifted ? MANY : 1 + rng_below(&chance, MANY);
     for (unsigned slot = 0; slot < count; slot++) {
         const float u = (float)rng_normal(&chance), v = (float)rng_normal(&chance);

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/order.h"
+#include "math/order.h"
 #include "support/random.h"
 
 enum { MOST = 300 };

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "linalg/packed.h"
+#include "math/packed.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/random.h"

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/polar.h"
+#include "state/polar.h"
 #include "support/matrices.h"
 #include "support/random.h"
 #include "support/rigid.h"

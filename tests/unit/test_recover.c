@@ -7,8 +7,9 @@
 #include <unity.h>
 
 #include "filter/filter_internal.h"
-#include "filter/motion.h"
-#include "linalg/packed.h"
+#include "filter/predict.h"
+#include "math/packed.h"
+#include "state/motion.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/reseal.h"
@@ -101,7 +102,7 @@ static void test_the_covariance_is_the_last_good_one_and_that_of_the_motion_sinc
         plr_real Q[36];
         memcpy(Q, rig.filter.motion.Q, sizeof Q);
         if (applied) { /* it comes out only after the motion has been taken into P */
-            plr_motion_settle(&rig.filter);
+            plr_predict_settle(&rig.filter);
             TEST_ASSERT_EQUAL_UINT8(0, rig.filter.motion.pending);
         }
         break_covariance();

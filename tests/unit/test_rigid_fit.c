@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/rigid_fit.h"
+#include "state/rigid_fit.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/random.h"

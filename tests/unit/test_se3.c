@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "lie/se3.h"
+#include "math/se3.h"
 #include "support/matrices.h"
 #include "support/random.h"
 #include "support/rigid.h"

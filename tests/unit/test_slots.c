@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
-#include "filter/slots.h"
+#include "state/covariance.h"
+#include "state/slots.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/specimens.h"

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <unity.h>
 
-#include "linalg/small.h"
+#include "math/small.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/random.h"

@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "lie/so3.h"
-#include "linalg/small.h"
+#include "math/small.h"
+#include "math/so3.h"
 #include "support/matrices.h"
 #include "support/random.h"
 #include "support/rigid.h"

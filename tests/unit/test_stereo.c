@@ -4,7 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
-#include "camera/stereo.h"
+#include "sensor/stereo.h"
+#include "state/camera.h"
 #include "support/matrices.h"
 #include "support/random.h"
 

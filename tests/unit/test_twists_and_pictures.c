@@ -6,8 +6,9 @@
 #include <unity.h>
 
 #include "filter/consistency.h"
-#include "linalg/dense.h"
-#include "linalg/packed.h"
+#include "math/dense.h"
+#include "math/packed.h"
+#include "state/motion.h"
 #include "support/matrices.h"
 #include "support/reseal.h"
 #include "support/rig.h"

@@ -4,10 +4,10 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/covariance.h"
 #include "filter/vantage.h"
-#include "linalg/packed.h"
+#include "math/packed.h"
 #include "pelorus/filter.h"
+#include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/random.h"
 

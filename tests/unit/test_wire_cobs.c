@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Consistent Overhead Byte Stuffing. */
-#include "wire/cobs.h"
+#include "record/cobs.h"
 
 #include <string.h>
 #include <unity.h>

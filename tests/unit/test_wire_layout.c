@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* The payload of every kind against docs/REPLAY-FORMAT.md: the place of each field, and what is
  * too short, too long, or beyond what the page lists. */
-#include "wire/layout.h"
+#include "record/layout.h"
 
 #include <string.h>
 #include <unity.h>

@@ -91,7 +91,7 @@ def verdict_of(judgements: Sequence[Judgement]) -> Verdict:
 
 
 def fingerprint(version: str, arithmetic: int, build: Config) -> int:
-    """plr_build_fingerprint (src/filter/status.c): what a build of that version would say."""
+    """plr_build_fingerprint (src/record/words.c): what a build of that version would say."""
     major, minor, patch = (int(number) for number in version.split("."))
     capacities = (build.max_landmarks, build.max_observations, build.block_observations)
     value = FNV_OFFSET

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+/* The motion between frames: readings carry the pose on, and a frame lets landmarks and covariance
+ * follow. */
+#include "filter/predict.h"
+
+#include <string.h>
+
+#include "filter/filter_internal.h"
+#include "filter/guard.h"
+#include "math/dense.h"
+#include "math/small.h"
+#include "process/twist.h"
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/motion.h"
+#include "state/pose.h"
+
+/* ---------------------------------------------------------------- applying what is accumulated */
+
+void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
+    if (plr_norm2_of_6(applied->z) > 0) {
+        plr_real n[6] = {0};
+        plr_gemm_nn(6, 1, 6, applied->L, 6, applied->z, 1, n, 1);
+        plr_pose_correct(f, n);
+    }
+    plr_model_of(f)->propagate(f, applied);
+    plr_filter_carry_recovery(f);
+    plr_motion_drop(f);
+    if (!plr_covariance_is_positive(f))
+        plr_filter_diverge(f);
+}
+
+void plr_predict_settle(plr_filter *f) {
+    plr_applied_motion applied;
+    if (!f->motion.pending || f->diverged)
+        return;
+    plr_motion_prior(f, &applied);
+    plr_predict_apply(f, &applied);
+    if (!f->work.noise.open)
+        return;
+    plr_covariance_close_noise(f, NULL);
+    (void)plr_model_of(f)->retract(f, f->work.dx); /* landmarks beyond infinity go back there */
+}
+
+/* The interval to give plr_twist_step, which adds the variance sigma^2 interval (h1 - h0), where the
+ * last reading is used from h0 to h1 seconds after it was taken. The error of one reading is constant,
+ * so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau between
+ * readings by the usual sigma^2 tau h, and later, when twists fail to come, to sigma^2 h^2. */
+static plr_real held_interval(const plr_filter *f, plr_real h0, plr_real h1) {
+    const plr_real tau = f->interval_s;
+    if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
+        return tau > 0 ? tau : h1 - h0;
+    return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
+}
+
+void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
+    if (f->clock_started && t_ns > f->t_ns) {
+        const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
+        const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
+        const plr_real interval = held_interval(f, h0, h1);
+        plr_twist_step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
+    }
+    f->t_ns = t_ns;
+    f->clock_started = 1;
+}
+
+/* ---------------------------------------------------------------- twists */
+
+/* The twist that holds over the step that ends with this reading. */
+static void twist_of_step(const plr_filter *f, const plr_real reading[6], plr_real held[6]) {
+    const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
+    for (int i = 0; i < 6; i++)
+        held[i] = timing == PLR_TWIST_END     ? reading[i]
+                  : timing == PLR_TWIST_START ? f->reading[i]
+                                              : PLR_R(0.5) * (f->reading[i] + reading[i]);
+}
+
+static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
+    if (!f->clock_started)
+        return PLR_OK;
+    if ((f->reading_valid && t_ns <= f->reading_ns) || t_ns < f->t_ns)
+        return PLR_E_TIME;
+    return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
+}
+
+/* Could the reading itself be held for as long as readings are? With timing start it is not before
+ * the next one comes, and by then it would block that one and all that follow. */
+static plr_status check_reading(const plr_filter *f, const plr_real reading[6], plr_real interval) {
+    const plr_real first = PLR_R(1e-3); /* there is no interval yet */
+    plr_real seconds = interval > 0 ? interval : first;
+    if (f->interval_s > 0 && f->interval_s < seconds) /* a pause says nothing about the next one */
+        seconds = f->interval_s;
+    return plr_twist_check(f, reading, seconds);
+}
+
+static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
+                         plr_real interval) {
+    memcpy(f->reading, reading, sizeof f->reading);
+    f->reading_ns = t_ns;
+    f->reading_valid = 1;
+    f->interval_s = interval;
+    f->totals.twists++;
+}
+
+static plr_status refuse_twist(plr_filter *f, plr_status status) {
+    f->totals.twists_refused++;
+    return plr_filter_refuse(f, status);
+}
+
+plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
+    if (!f || !twist)
+        return PLR_E_ARGUMENT;
+    const plr_status sound = plr_guard_look(f);
+    if (sound != PLR_OK)
+        return sound;
+    if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
+        return refuse_twist(f, PLR_E_NOT_FINITE);
+
+    plr_real reading[6], held[6];
+    for (int i = 0; i < 3; i++) {
+        reading[i] = (plr_real)twist->v_B_mps[i];
+        reading[3 + i] = (plr_real)twist->w_B_radps[i];
+        if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
+            return refuse_twist(f, PLR_E_RANGE);
+    }
+    if (f->config.mode == PLR_MODE_MAPPING) {
+        f->totals.twists++;
+        plr_guard_seal(f);
+        return PLR_OK;
+    }
+    const plr_status in_time = check_time(f, t_ns);
+    if (in_time != PLR_OK)
+        return refuse_twist(f, in_time);
+    twist_of_step(f, reading, held);
+    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
+    const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
+    if (plr_twist_check(f, held, seconds) != PLR_OK ||
+        check_reading(f, reading, interval) != PLR_OK)
+        return refuse_twist(f, PLR_E_RANGE);
+    if (seconds > 0)
+        plr_twist_step(f, t_ns, held, seconds, interval);
+    f->t_ns = t_ns;
+    f->clock_started = 1;
+    take_reading(f, t_ns, reading, interval);
+    plr_guard_seal(f);
+    return PLR_OK;
+}

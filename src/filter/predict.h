@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+/* The motion between frames, and its end: landmarks and covariance follow the pose. */
+#ifndef PLR_FILTER_PREDICT_H
+#define PLR_FILTER_PREDICT_H
+
+#include "pelorus/state.h"
+#include "state/motion.h"
+
+/* Carries the pose to t_ns by the last reading. */
+void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
+
+/* Applies D' to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
+ * noise is kept in work.noise, not in P, until plr_covariance_close_noise. Sets f->diverged if a
+ * variance is no longer positive. */
+void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);
+
+/* Applies the accumulated motion to landmarks and covariance without observations: at nu = 0. */
+void plr_predict_settle(plr_filter *f);
+
+#endif

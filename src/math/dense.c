@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+#include "math/dense.h"
+
+#include <string.h>
+
+#include "math/small.h"
+#include "math/tile.h"
+
+void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
+    plr_real AP[36] = {0};
+    plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
+    memset(S, 0, 36 * sizeof *S);
+    for (unsigned i = 0; i < 6; i++) {
+        plr_gemm_nt(1, i + 1, 6, AP + 6 * i, 6, A, 6, S + 6 * i, 6);
+        for (unsigned j = 0; j < i; j++)
+            S[6 * j + i] = S[6 * i + j];
+    }
+}
+
+enum { STRIP = PLR_TILE_COLUMNS };
+
+/* x[c] = from[c] - sum_l U(l, i) y_l[c] for a strip of columns, l = 0 .. i-1, y_l = y + sum of the
+ * steps before: STRIP numbers that stay in registers. The first step reads `from`, for a copy would
+ * cost as much as a few steps. U is k x k, packed upper; i > 0. `down` is what brings y_l to y_l+1:
+ * ldx for a dense matrix; 0 where the rows are those of U itself, k - 1, k - 2, ... */
+static inline void reduce_strip(unsigned k, const plr_real *restrict U, unsigned i,
+                                const plr_real *restrict y, size_t down,
+                                const plr_real *restrict from, plr_real *restrict x) {
+    PLR_ASSERT(i > 0 && i < k);
+    const plr_real *u = U + i; /* (0, i), then down the column */
+    const plr_real first = -*u;
+    plr_real sum[STRIP];
+    for (int c = 0; c < STRIP; c++)
+        sum[c] = PLR_FMA(first, y[c], from[c]);
+    for (size_t step = k - 1; step > k - i; step--) {
+        u += step;
+        y += down ? down : step;
+        const plr_real a = -*u;
+        for (int c = 0; c < STRIP; c++)
+            sum[c] = PLR_FMA(a, y[c], sum[c]);
+    }
+    for (int c = 0; c < STRIP; c++)
+        x[c] = sum[c];
+}
+
+bool plr_cholesky_upper(unsigned n, plr_real *S) {
+    for (unsigned i = 0; i < n; i++) {
+        plr_real *row = S + plr_upper_row(n, i);
+        plr_real inverse = 1;
+        for (unsigned j = i; j < n; j += STRIP) {
+            plr_real x[STRIP];
+            if (i > 0)
+                reduce_strip(n, S, i, S + j, 0, row + (j - i), x);
+            else
+                memcpy(x, row + (j - i), sizeof x);
+            if (j == i) {
+                if (!(x[0] > 0) || !plr_is_finite(x[0]))
+                    return false;
+                inverse = PLR_R(1) / PLR_SQRT(x[0]);
+            }
+            for (int c = 0; c < STRIP; c++)
+                x[c] *= inverse;
+            memcpy(row + (j - i), x, (n - j < STRIP ? n - j : STRIP) * sizeof *x);
+        }
+    }
+    return true;
+}
+
+/* Rows i .. i + 3 of the solution for STRIP columns, where the rows above have been solved. */
+static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, plr_real *X,
+                                   size_t ldx) {
+    plr_real *const row[PLR_TILE_ROWS] = {X + i * ldx, X + (i + 1) * ldx, X + (i + 2) * ldx,
+                                          X + (i + 3) * ldx};
+    if (i > 0) {
+        const plr_tile_factors above = {
+            .U = U + i, .W = X, .to_next_U = k - 1, .to_next_W = ldx, .shrink = 1};
+        plr_tile_subtract(i, above, row, row);
+    }
+    const plr_real *u0 = U + plr_upper_row(k, i), *u1 = u0 + (k - i);
+    const plr_real *u2 = u1 + (k - i - 1), *u3 = u2 + (k - i - 2);
+    plr_real x0[STRIP], x1[STRIP], x2[STRIP], x3[STRIP];
+    plr_tile_scale(x0, PLR_R(1) / u0[0], row[0]);
+    plr_tile_add(x1, -u0[1], x0, row[1]);
+    plr_tile_add(x2, -u0[2], x0, row[2]);
+    plr_tile_add(x3, -u0[3], x0, row[3]);
+    memcpy(row[0], x0, sizeof x0);
+    plr_tile_scale(row[1], PLR_R(1) / u1[0], x1);
+    plr_tile_accumulate(x2, -u1[1], row[1]);
+    plr_tile_accumulate(x3, -u1[2], row[1]);
+    plr_tile_scale(row[2], PLR_R(1) / u2[0], x2);
+    plr_tile_accumulate(x3, -u2[1], row[2]);
+    plr_tile_scale(row[3], PLR_R(1) / u3[0], x3);
+}
+
+static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
+    plr_real x[STRIP];
+    unsigned i = 0;
+    for (; i + PLR_TILE_ROWS <= k; i += PLR_TILE_ROWS)
+        solve_four_rows(k, U, i, X, ldx);
+    for (; i < k; i++) {
+        plr_real *row = X + i * ldx;
+        if (i > 0)
+            reduce_strip(k, U, i, X, ldx, row, x);
+        else
+            memcpy(x, row, sizeof x);
+        plr_tile_scale(row, PLR_R(1) / U[plr_upper_row(k, i)], x);
+    }
+}
+
+/* The same for a single column. */
+static void solve_column(unsigned k, const plr_real *restrict U, plr_real *X, size_t ldx) {
+    for (unsigned i = 0; i < k; i++) {
+        plr_real x = X[i * ldx];
+        const plr_real *u = U + i;
+        for (unsigned l = 0; l < i; l++) {
+            x = PLR_FMA(-*u, X[l * ldx], x);
+            u += k - l - 1;
+        }
+        X[i * ldx] = x * (PLR_R(1) / *u);
+    }
+}
+
+void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_real *X,
+                                size_t ldx) {
+    PLR_ASSERT(ldx >= n);
+    unsigned j = 0;
+    for (; j + STRIP <= n; j += STRIP)
+        solve_strip(k, U, X + j, ldx);
+    for (; j < n; j++)
+        solve_column(k, U, X + j, ldx);
+}
+
+void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x) {
+    for (unsigned i = k; i-- > 0;) {
+        const plr_real *row = U + plr_upper_row(k, i);
+        for (unsigned j = i + 1; j < k; j++)
+            x[i] = PLR_FMA(-row[j - i], x[j], x[i]);
+        x[i] *= PLR_R(1) / row[0];
+    }
+}
+
+void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
+                      const plr_real *restrict X, size_t ldx, plr_real *restrict x) {
+    PLR_ASSERT(ldx >= n || depth < 2);
+    unsigned j = 0;
+    for (; depth > 0 && j + STRIP <= n; j += STRIP) {
+        const plr_real *restrict row = X + j;
+        plr_real *restrict to = x + j;
+        plr_real sum[STRIP];
+        plr_tile_add(sum, a[0], row, to);
+        for (unsigned k = 1; k < depth; k++) {
+            row += ldx;
+            plr_tile_accumulate(sum, a[k], row);
+        }
+        for (int c = 0; c < STRIP; c++)
+            to[c] = sum[c];
+    }
+    for (; j < n; j++)
+        for (unsigned k = 0; k < depth; k++)
+            x[j] = PLR_FMA(a[k], X[k * ldx + j], x[j]);
+}
+
+void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
+                            const plr_real *V, size_t ldv, plr_real *const X[4]) {
+    PLR_ASSERT(depth >= 2 && n % PLR_TILE_COLUMNS == 0);
+    PLR_ASSERT(lda >= 4 && ldv >= n);
+    plr_tile_factors factors = {.U = A, .W = V, .to_next_U = lda, .to_next_W = ldv};
+    for (unsigned j = 0; j < n; j += STRIP) {
+        plr_real *const at[PLR_TILE_ROWS] = {X[0] + j, X[1] + j, X[2] + j, X[3] + j};
+        plr_tile_subtract(depth, factors, at, at);
+        factors.W += STRIP;
+    }
+}

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+/*
+ * Dense matrices, row by row, with a leading dimension (elements from one row to the next).
+ * Every kernel adds the products for one element of the result in the same order: it starts with
+ * the element's old value and k ascends. Therefore blocked, plain and vectorised code agree bit for
+ * bit.
+ */
+#ifndef PLR_MATH_DENSE_H
+#define PLR_MATH_DENSE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "pelorus/assertions.h"
+#include "pelorus/config.h"
+
+/* C += A B. A is m x k, B is k x n, C is m x n and overlaps neither. Inlined, because in
+ * nearly all uses the sizes are small constants. */
+static inline void plr_gemm_nn(unsigned m, unsigned n, unsigned k, const plr_real *restrict A,
+                               size_t lda, const plr_real *restrict B, size_t ldb,
+                               plr_real *restrict C, size_t ldc) {
+    PLR_ASSERT(lda >= k && ldb >= n && ldc >= n);
+    for (unsigned i = 0; i < m; i++)
+        for (unsigned l = 0; l < k; l++) {
+            const plr_real a = A[i * lda + l];
+            for (unsigned j = 0; j < n; j++)
+                C[i * ldc + j] = PLR_FMA(a, B[l * ldb + j], C[i * ldc + j]);
+        }
+}
+
+/* C += A B^T. A is m x k, B is n x k, C is m x n and overlaps neither. */
+static inline void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_real *restrict A,
+                               size_t lda, const plr_real *restrict B, size_t ldb,
+                               plr_real *restrict C, size_t ldc) {
+    PLR_ASSERT(lda >= k && ldb >= k && ldc >= n);
+    for (unsigned i = 0; i < m; i++)
+        for (unsigned j = 0; j < n; j++) {
+            plr_real sum = C[i * ldc + j];
+            for (unsigned l = 0; l < k; l++)
+                sum = PLR_FMA(A[i * lda + l], B[j * ldb + l], sum);
+            C[i * ldc + j] = sum;
+        }
+}
+
+/* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
+void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
+
+/* Index of element (i, i) of an n x n matrix whose upper triangle is packed row by row: (0,0) (0,1)
+ * ... (0,n-1) (1,1) ...; i <= n. */
+static inline size_t plr_upper_row(unsigned n, unsigned i) {
+    PLR_ASSERT(i <= n);
+    return (size_t)i * n - (size_t)i * (i - 1U) / 2;
+}
+
+/* Cholesky: replaces the upper triangle of S, n x n, packed row by row, by U with U^T U = S. False
+ * if a pivot is not a positive finite number; S is then destroyed. PLR_KERNEL_MARGIN elements after
+ * the end of S must be readable. */
+bool plr_cholesky_upper(unsigned n, plr_real *S);
+
+/* X <- U^-T X: U is k x k, packed upper; X is k x n with leading dimension ldx. */
+void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_real *X, size_t ldx);
+
+/* x <- U^-1 x, k long: U is k x k, packed upper. */
+void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x);
+
+/* x += sum_k a_k X_k: X is depth x n with leading dimension ldx, x is n long. */
+void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, const plr_real *X, size_t ldx,
+                      plr_real *x);
+
+/* X_r -= sum_k A(k, r) V_k for four rows X_r of n elements, r = 0 .. 3: V is depth x n with leading
+ * dimension ldv, A is depth x 4 with leading dimension lda, depth >= 2, n a multiple of
+ * PLR_TILE_COLUMNS. Same order of operations, and so the same bits, as plr_combine_rows. */
+void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
+                            const plr_real *V, size_t ldv, plr_real *const X[4]);
+
+#endif

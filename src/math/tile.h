@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The innermost loops of an update. A tile of the result, PLR_TILE_ROWS x PLR_TILE_COLUMNS, stays
+ * in the processor's registers while the rows of the two factors are read one after another.
+ * Inlined where it is used. plr_tile_add and plr_tile_accumulate differ only in what the compiler
+ * may assume about overlap; they take the factor with its sign, because gcc vectorises a loop
+ * without the negation better.
+ */
+#ifndef PLR_MATH_TILE_H
+#define PLR_MATH_TILE_H
+
+#include <stddef.h>
+
+#include "pelorus/assertions.h"
+#include "pelorus/config.h"
+
+enum { PLR_TILE_ROWS = 4 };
+
+/* A row of a tile. */
+typedef plr_real plr_tile_row[PLR_TILE_COLUMNS];
+
+/* to[c] = u w[c] + from[c] */
+static inline void plr_tile_add(plr_real *restrict to, plr_real u, const plr_real *restrict w,
+                                const plr_real *restrict from) {
+    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
+        to[c] = PLR_FMA(u, w[c], from[c]);
+}
+
+/* to[c] += u w[c] */
+static inline void plr_tile_accumulate(plr_real *restrict to, plr_real u,
+                                       const plr_real *restrict w) {
+    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
+        to[c] = PLR_FMA(u, w[c], to[c]);
+}
+
+/* to[c] = u w[c] */
+static inline void plr_tile_scale(plr_real *restrict to, plr_real u, const plr_real *restrict w) {
+    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
+        to[c] = u * w[c];
+}
+
+/* The current row of U and of W, and the number of elements to the next one. In a packed upper
+ * triangle that number decreases by one from row to row: shrink is 1; otherwise 0. */
+typedef struct plr_tile_factors {
+    const plr_real *U, *W;
+    size_t to_next_U, to_next_W;
+    size_t shrink;
+} plr_tile_factors;
+
+static inline void plr_tile_next(plr_tile_factors *at) {
+    at->U += at->to_next_U;
+    at->W += at->to_next_W;
+    at->to_next_U -= at->shrink;
+}
+
+/* to[r][c] = from[r][c] - sum_k U(k, r) W(k, c), k = 0 .. depth-1, depth >= 2; to[r] may be
+ * from[r]. The first step reads `from` and the last one writes `to`: separate copies would take the
+ * time of a few steps. */
+static inline void plr_tile_subtract(unsigned depth, plr_tile_factors at,
+                                     plr_real *const from[PLR_TILE_ROWS],
+                                     plr_real *const to[PLR_TILE_ROWS]) {
+    PLR_ASSERT(depth >= 2);
+    plr_tile_row a0, a1, a2, a3;
+    plr_tile_add(a0, -at.U[0], at.W, from[0]);
+    plr_tile_add(a1, -at.U[1], at.W, from[1]);
+    plr_tile_add(a2, -at.U[2], at.W, from[2]);
+    plr_tile_add(a3, -at.U[3], at.W, from[3]);
+    for (unsigned steps = depth - 2; steps > 0; steps--) {
+        plr_tile_next(&at);
+        plr_tile_accumulate(a0, -at.U[0], at.W);
+        plr_tile_accumulate(a1, -at.U[1], at.W);
+        plr_tile_accumulate(a2, -at.U[2], at.W);
+        plr_tile_accumulate(a3, -at.U[3], at.W);
+    }
+    plr_tile_next(&at);
+    plr_tile_add(to[0], -at.U[0], at.W, a0);
+    plr_tile_add(to[1], -at.U[1], at.W, a1);
+    plr_tile_add(to[2], -at.U[2], at.W, a2);
+    plr_tile_add(to[3], -at.U[3], at.W, a3);
+}
+
+#endif

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#include "process/twist.h"
+
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "math/so3.h"
+#include "state/pose.h"
+
+/* The series of SO(3) hold up to here; a robot that turns further in a step cannot be followed. */
+#define MAX_TURN PLR_R(3.1415926)
+#define MAX_WAY  PLR_R(1000)
+
+/* xi = seconds (reading - b) */
+static void displacement(const plr_filter *f, const plr_real reading[6], plr_real seconds,
+                         plr_real xi[6]) {
+    for (int i = 0; i < 6; i++)
+        xi[i] = seconds * (reading[i] - f->bias[i]);
+}
+
+plr_status plr_twist_check(const plr_filter *f, const plr_real reading[6], plr_real seconds) {
+    plr_real xi[6];
+    displacement(f, reading, seconds, xi);
+    const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
+    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
+}
+
+/* Variances of a step's displacement, (rho, theta). */
+static void step_variance(const plr_filter *f, plr_real seconds, plr_real interval,
+                          plr_real variance[6]) {
+    const plr_real share = f->config.noise == PLR_NOISE_STEP
+                               ? (interval > 0 ? seconds / interval : PLR_R(1))
+                               : seconds * interval;
+    for (int i = 0; i < 3; i++) {
+        variance[i] = f->par.velocity_variance[i] * share;
+        variance[3 + i] = f->par.gyro_variance[i] * share;
+    }
+}
+
+void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
+                    plr_real interval) {
+    plr_real xi[6], E[9], R[9], p[3], A[36], next[36], variance[6];
+    plr_motion *m = &f->motion;
+    displacement(f, reading, seconds, xi);
+    plr_se3_expm1(E, p, xi);
+    plr_se3_rotation(R, E);
+    plr_se3_adjoint_inverse(A, R, p);
+    f->t_ns = t_ns;
+    plr_pose_move(f, E, p);
+    plr_se3_append(m->E, m->p, E, p);
+    plr_so3_orthonormalise_small(m->E);
+
+    plr_sandwich6(next, A, m->Q);
+    step_variance(f, seconds, interval, variance);
+    for (int i = 0; i < 6; i++)
+        next[7 * i] += variance[i];
+    memcpy(m->Q, next, sizeof next);
+
+    if (f->config.bias) {
+        plr_real Jr[36];
+        plr_se3_right_jacobian(Jr, xi);
+        memset(next, 0, sizeof next);
+        plr_gemm_nn(6, 6, 6, A, 6, m->B, 6, next, 6);
+        for (int i = 0; i < 36; i++)
+            m->B[i] = PLR_FMA(-seconds, Jr[i], next[i]);
+    }
+    m->seconds += seconds;
+    m->pending = 1;
+    m->noisy = 1;
+}

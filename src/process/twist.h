@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+/* The process `twist`: velocity and angular rate are measured, and move the pose (docs/MATH.md 4). */
+#ifndef PLR_PROCESS_TWIST_H
+#define PLR_PROCESS_TWIST_H
+
+#include "pelorus/state.h"
+
+/* PLR_OK if the twist `reading` (6: v, w) minus the bias gives at most pi rad and 1 km in
+ * `seconds`; else PLR_E_RANGE. */
+plr_status plr_twist_check(const plr_filter *f, const plr_real reading[6], plr_real seconds);
+
+/* T <- T Exp(seconds (reading - b)), and the same into f->motion. Adds the variance
+ * sigma^2 interval seconds, where `interval` is the time for which the reading is valid, so that
+ * the parts of an interval add up to sigma^2 interval^2. Sets the time to t_ns. */
+void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
+                    plr_real interval);
+
+#endif

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The covariance P of the whole state: pose (6), bias (6, if on), landmarks (3 each), as a packed
+ * lower triangle. No other file touches an element of it.
+ */
+#ifndef PLR_STATE_COVARIANCE_H
+#define PLR_STATE_COVARIANCE_H
+
+#include <stdbool.h>
+
+#include "pelorus/state.h"
+#include "state/model.h"
+#include "state/motion.h"
+
+/* Rows of P in use: 6 (+ 6) + 3 count. */
+unsigned plr_covariance_dim(const plr_filter *f);
+
+/* The leading dimension of V^T in the workspace: dim, rounded up to whole tiles of the kernels. */
+unsigned plr_covariance_ld(const plr_filter *f);
+
+/* The first of the three rows of a landmark. */
+unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
+
+/* --- blocks --- */
+
+/* Sets the pose block to P_xi (6x6) and its correlation with the bias to zero. Only without
+ * landmarks. */
+void plr_covariance_set_pose(plr_filter *f, const double P_xi[36]);
+
+/* P_xi += C, 6x6 and symmetric. */
+void plr_covariance_widen_pose(plr_filter *f, const plr_real C[36]);
+
+/* Sets the bias block to a diagonal, uncorrelated with anything. Only without landmarks. */
+void plr_covariance_set_bias(plr_filter *f, const double variance[6]);
+
+/* The blocks of pose (xi, xi), bias (db, db) and their correlation (xi, db), 6x6. */
+void plr_covariance_pose(const plr_filter *f, plr_real P_xi[36]);
+void plr_covariance_bias(const plr_filter *f, plr_real P_b[36]);
+void plr_covariance_pose_bias(const plr_filter *f, plr_real P_xib[36]);
+
+/* P_out = [J_pose J_landmark] P_(xi, slot) [...]^T, 3x3: J_pose 3x6, J_landmark 3x3. */
+void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_pose[18],
+                          const plr_real J_landmark[9], plr_real P_out[9]);
+
+/* A landmark's own block, 3x3. */
+void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]);
+
+/* The variance of a landmark's third number: in `body` its inverse range. */
+plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot);
+
+double plr_covariance_trace(const plr_filter *f);
+
+/* False if a variance is negative or not finite. */
+bool plr_covariance_is_positive(const plr_filter *f);
+
+/* --- motion --- */
+
+/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
+void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F);
+
+/* Takes the part of P that is correlated with the motion's noise out of P and into W: with
+ * C = P_(:,b) B^T and nu = L^-1 n,
+ *   P -= (C L^-T) (C L^-T)^T,  W += C L^-T,  Lambda = I,  eta = -z,  dx = C L^-T z,
+ * so that the state is x + W (nu - z) with x and nu independent. Before the call W^T (6 x dim,
+ * leading dimension plr_covariance_ld) must hold the motion's direct effect. */
+void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
+
+/* The reverse, after the observations: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T and
+ * dx += W Lambda^-1 eta. nu (6; may be NULL) receives the estimate z + Lambda^-1 eta. Does nothing
+ * if plr_covariance_open_noise was not called. */
+void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]);
+
+/* V = C L^-T = P_(:,b) K^T for `rows` rows of the state from `row` on, rows x 6: their covariance
+ * with nu. */
+void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
+                                 const plr_real K[36], plr_real *V);
+
+/* The pose's rows alone: xi <- A xi + B db + N(0, Q). */
+void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion);
+
+/* Adds `velocity` to the first three bias variances and `gyro` to the last three. */
+void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyro);
+
+/* --- update --- */
+
+/* S = H P H^T of one observation, 3x3, the upper triangle packed row by row (6 numbers). */
+void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                               plr_real S[6]);
+
+/* S += (H W)(H W)^T, 3x3 packed: the part of the innovation covariance that is still in W. Only
+ * before the first block. */
+void plr_covariance_add_open_noise(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                                   plr_real S[6]);
+
+/* Three rows of (P H^T)^T, each of dim elements, then zeros up to the leading dimension ld. */
+void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
+                            plr_real *rows, size_t ld);
+
+/* P -= V V^T, where V^T is depth x dim in the workspace with leading dimension plr_covariance_ld.
+ * False, and nothing is changed, if a variance would not be positive. */
+bool plr_covariance_subtract(plr_filter *f, unsigned depth);
+
+/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than rounding in the updates can
+ * have removed. Without it rounding errors add up while a robot stands still and measures the same
+ * landmarks, until P is no longer positive (docs/NUMERICS.md 1). */
+void plr_covariance_make_up_for_rounding(plr_filter *f);
+
+/* --- slots --- */
+
+/* Appends the rows of slot f->count (not yet counted): error = J_pose xi + N(0, landmark->P). */
+void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark);
+
+/* Moves the rows of the last slot into those of `slot`. */
+void plr_covariance_remove(plr_filter *f, unsigned slot);
+
+#endif

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The `body` model: landmarks in the current left camera, q, with errors in the polar chart at q.
+ * An observation depends on its landmark alone; motion moves all landmarks together. Invariant: the
+ * directions that nothing observes stay so, and the filter does not believe more than it knows.
+ * docs/MATH.md, "body".
+ */
+#include "state/covariance.h"
+#include "state/model.h"
+#include "state/polar.h"
+#include "state/rigid_fit.h"
+#include "state/slots.h"
+
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "sensor/stereo.h"
+#include "state/camera.h"
+#include "state/motion.h"
+#include "state/pose.h"
+
+/*
+ * Three products of Jw and Ji are written out below: in each of them q^T N = 0 or q x q = 0 takes a
+ * large number from itself, which float32 would leave to rounding for a point a kilometre away.
+ */
+
+/* row = [way turn] Ad, Ad = [R, C; 0, R]; turn may be NULL for zeros. */
+static inline void times_adjoint(plr_real row[6], const plr_real way[3], const plr_real *turn,
+                                 const plr_real Ad[36]) {
+    for (int j = 0; j < 6; j++)
+        row[j] = PLR_FMA(way[2], Ad[12 + j], PLR_FMA(way[1], Ad[6 + j], way[0] * Ad[j]));
+    for (int j = 3; j < 6 && turn; j++)
+        row[j] = PLR_FMA(turn[2], Ad[30 + j],
+                         PLR_FMA(turn[1], Ad[24 + j], PLR_FMA(turn[0], Ad[18 + j], row[j])));
+}
+
+/* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q.
+ * Jw [-I | [q]x] = [ -N^T / r | N^T [mu]x ; mu^T / r^2 | 0 ]. */
+static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, plr_real J[18]) {
+    const plr_real inverse = PLR_R(1) / chart->r;
+    plr_real way[3];
+    for (int row = 0; row < 2; row++) {
+        const plr_real n[3] = {chart->N[row], chart->N[2 + row], chart->N[4 + row]};
+        plr_real turn[3];
+        plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
+        for (int j = 0; j < 3; j++)
+            way[j] = -n[j] * inverse;
+        times_adjoint(J + 6 * row, way, turn, f->par.Ad_CB);
+    }
+    for (int j = 0; j < 3; j++)
+        way[j] = chart->mu[j] * inverse * inverse;
+    times_adjoint(J + 12, way, NULL, f->par.Ad_CB);
+}
+
+/* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): a chart's error carried along a rigid motion.
+ * With N+^T q+ = 0 and q^T N = 0:
+ *   F = [ r/r+ N+^T R^T N | -r/r+ N+^T R^T p ; r/r+^3 p^T N | (r - p^T mu) r^2 / r+^3 ]. */
+static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
+                        const plr_real p[3], const plr_polar *from) {
+    const plr_real ratio = from->r / to->r;
+    const plr_real shrink = ratio / (to->r * to->r);
+    plr_real turned[3];
+    for (int column = 0; column < 2; column++) {
+        const plr_real n[3] = {from->N[column], from->N[2 + column], from->N[4 + column]};
+        plr_mat3_tvec(turned, R, n);
+        for (int row = 0; row < 2; row++) {
+            const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
+            F[3 * row + column] = ratio * plr_dot3(m, turned);
+        }
+        F[6 + column] = shrink * plr_dot3(p, n);
+    }
+    plr_mat3_tvec(turned, R, p);
+    for (int row = 0; row < 2; row++) {
+        const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
+        F[3 * row + 2] = -ratio * plr_dot3(m, turned);
+    }
+    F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
+}
+
+/* Nearer than this a landmark is put no further: the camera has run into it, and the frame drops it. */
+static void keep_off(plr_real q[3]) {
+    const plr_real range2 = plr_dot3(q, q);
+    if (range2 >= PLR_MIN_RANGE * PLR_MIN_RANGE)
+        return;
+    const plr_real scale = range2 > 0 ? PLR_MIN_RANGE / PLR_SQRT(range2) : 0;
+    for (int i = 0; i < 3; i++)
+        q[i] *= scale;
+    if (!(range2 > 0))
+        q[2] = PLR_MIN_RANGE;
+}
+
+/* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
+static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size_t ld) {
+    const unsigned n = plr_covariance_dim(f), first = plr_covariance_row(f, 0);
+    for (unsigned k = 0; k < 6; k++) {
+        for (unsigned i = 0; i < 6; i++)
+            Wt[k * ld + i] = JL[6 * i + k];
+        memset(Wt + k * ld + 6, 0, (first - 6) * sizeof *Wt); /* it moves no bias */
+        memset(Wt + k * ld + n, 0, (ld - n) * sizeof *Wt);
+    }
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const unsigned row = plr_covariance_row(f, slot);
+        plr_polar chart;
+        plr_real G[18], GL[18] = {0};
+        plr_polar_at(&chart, f->slots[slot].x);
+        chart_by_body_twist(f, &chart, G);
+        plr_gemm_nn(3, 6, 6, G, 6, JL, 6, GL, 6);
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned k = 0; k < 6; k++)
+                Wt[k * ld + row + i] = GL[6 * i + k];
+    }
+}
+
+/* Moves a landmark along its ray to where it is linearised (vantage.h). The estimate stays what it was:
+ * returns how far it is from that point, as inverse range. */
+static plr_real bring_closer(plr_filter *f, unsigned slot) {
+    plr_slot *s = &f->slots[slot];
+    const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
+    const plr_real wanted = s->beyond + f->work.noise.closer[slot];
+    plr_real ratio = PLR_FMA(wanted, range, PLR_R(1)); /* of inverse ranges */
+    const plr_real farthest = f->par.min_inverse_range * range;
+    ratio = ratio < farthest ? farthest : ratio > nearest ? nearest : ratio;
+    const plr_real step = (PLR_R(1) - ratio) / ratio;
+    for (int i = 0; i < 3; i++)
+        s->x[i] = PLR_FMA(step, s->x[i], s->x[i]);
+    return s->beyond - (ratio - PLR_R(1)) / range;
+}
+
+/* The variances of J n, which limit what the landmarks may have moved together (common_motion). */
+static void note_spread(plr_filter *f, const plr_real JL[36]) {
+    for (unsigned k = 0; k < 6; k++)
+        f->work.noise.spread[k] = plr_norm2_of_6(JL + 6 * k);
+}
+
+static unsigned body_retract(plr_filter *f, const plr_real *dx);
+
+static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
+    plr_real E[9], R[9], p[3];
+    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
+    plr_se3_rotation(R, E);
+
+    plr_real *F = f->work.Vt, most_left = 0;
+    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        plr_slot *s = &f->slots[slot];
+        plr_polar from, to;
+        const plr_real left = bring_closer(f, slot);
+        most_left = plr_abs(left) > most_left ? plr_abs(left) : most_left;
+        plr_polar_at(&from, s->x);
+        plr_se3_move_back(s->x, E, p);
+        keep_off(s->x);
+        plr_polar_at(&to, s->x);
+        carry_chart(F + 9 * slot, &to, R, p, &from);
+        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
+        dx[0] = left * F[9 * slot + 2];
+        dx[1] = left * F[9 * slot + 5];
+        dx[2] = 0;
+        s->beyond = left * F[9 * slot + 8];
+    }
+    plr_real A[36];
+    note_spread(f, motion->JL);
+    plr_se3_rotation(R, motion->E);
+    plr_se3_adjoint_inverse(A, R, motion->p);
+    plr_covariance_transport(f, A, F);
+    if (!f->motion.noisy) { /* no correction follows that would begin with what is left */
+        if (most_left > 0)
+            (void)body_retract(f, f->work.dx);
+        return;
+    }
+    enter_noise(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
+    plr_covariance_open_noise(f, motion);
+}
+
+/* H_l = Dz Ji(q). */
+static bool body_linearise(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin) {
+    const plr_camera *camera = &f->par.camera;
+    lin->depth = slot->x[2];
+    lin->uses_pose = false;
+    if (!(lin->depth >= f->par.min_depth))
+        return false;
+    plr_polar chart;
+    plr_real Dz[9];
+    plr_stereo_project(lin->z, camera, slot->x);
+    plr_stereo_jacobian(Dz, camera, slot->x);
+    plr_polar_at(&chart, slot->x);
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 2; column++) {
+            const plr_real n[3] = {chart.N[column], chart.N[2 + column], chart.N[4 + column]};
+            lin->H_landmark[3 * row + column] = chart.r * plr_dot3(Dz + 3 * row, n);
+        }
+    /* -r^2 Dz mu: along its own ray a point moves in the right image alone */
+    lin->H_landmark[2] = lin->H_landmark[8] = 0;
+    lin->H_landmark[5] = -camera->fx * camera->baseline * chart.r / slot->x[2];
+    lin->z[1] = PLR_FMA(lin->H_landmark[5], slot->beyond, lin->z[1]);
+    return true;
+}
+
+static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
+                            plr_new_landmark *landmark) {
+    (void)f;
+    plr_polar chart;
+    plr_real Jw[9], JS[9];
+    plr_polar_at(&chart, q);
+    plr_polar_from_point(Jw, &chart);
+    plr_mat3_mul(JS, Jw, S_q);
+    plr_mat3_mul_nt(landmark->P, JS, JS);
+    memcpy(landmark->x, q, 3 * sizeof *q);
+    landmark->uses_pose = false;
+}
+
+/* P = J P_W J^T, 3x3, in double: a far point's bearing variance is what is left of its range variance,
+ * more digits below than float32 has. False if a variance comes out negative. */
+static bool carry_covariance(plr_real P[9], const plr_real J[9], const double P_W[9]) {
+    double JP[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            JP[3 * i + j] = 0;
+            for (int k = 0; k < 3; k++)
+                JP[3 * i + j] += (double)J[3 * i + k] * P_W[3 * k + j];
+        }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = 0;
+            for (int k = 0; k < 3; k++)
+                sum += JP[3 * i + k] * (double)J[3 * j + k];
+            P[3 * i + j] = P[3 * j + i] = (plr_real)sum;
+        }
+    return P[0] >= 0 && P[4] >= 0 && P[8] >= 0;
+}
+
+static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark) {
+    plr_real offset_W[3], s_B[3], R_CW[9], R_WB[9];
+    double p_WB[3];
+    plr_pose_reference(f, R_WB, p_WB);
+    for (int i = 0; i < 3; i++)
+        offset_W[i] = (plr_real)(known->p_W_m[i] - p_WB[i]);
+    plr_mat3_tvec(s_B, R_WB, offset_W);
+    plr_camera_from_body(landmark->x, &f->par.camera, s_B);
+    const plr_real range2 = plr_dot3(landmark->x, landmark->x);
+    if (!(range2 > PLR_MIN_RANGE * PLR_MIN_RANGE) ||
+        !(range2 * f->par.min_inverse_range * f->par.min_inverse_range < 1))
+        return false;
+
+    plr_polar chart;
+    plr_real Jw[9], J_W[9];
+    plr_polar_at(&chart, landmark->x);
+    chart_by_body_twist(f, &chart, landmark->J_pose);
+    landmark->uses_pose = true;
+    plr_polar_from_point(Jw, &chart);
+    plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, R_WB);
+    plr_mat3_mul(J_W, Jw, R_CW);
+    return carry_covariance(landmark->P, J_W, known->P_W_m2);
+}
+
+/* The rigid motion eta of the body that the corrections of the landmarks have in common. It is not the
+ * pose's correction xi: most of that may concern the way here, which no landmark in sight shares. A
+ * bearing counts as its angle, an inverse range as the disparity that it makes. Known landmarks have
+ * no voice: they stand in the world, and what moves them in the camera is the pose, while what the
+ * errors of a map have in common by chance is no motion. J becomes chart_by_body_twist of every slot. */
+static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J, plr_real eta[6]) {
+    const plr_real baseline = f->par.camera.baseline;
+    const plr_real W[3] = {1, 1, baseline * baseline};
+    const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
+    plr_rigid_fit fit;
+    plr_rigid_fit_clear(&fit);
+    for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
+        plr_polar chart;
+        plr_polar_at(&chart, f->slots[slot].x);
+        chart_by_body_twist(f, &chart, J);
+        if (!f->slots[slot].known)
+            plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
+    }
+    plr_rigid_fit_solve(&fit, dx, f->work.noise.spread, angle2, eta);
+}
+
+/*
+ * What the landmarks' corrections have in common is a rigid motion eta and is applied as one; only the
+ * rest of each goes through the chart:
+ *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = retr(q, w_rest),  q+ = Exp(eta_C)^-1 q~.
+ * P is transported by Jw(q+) Exp(-theta_C) Ji(q~) diag(M, 1) with theta_C eta_C's rotation, the pose
+ * by Ad(Exp(-xi)).
+ */
+static unsigned body_retract(plr_filter *f, const plr_real *dx) {
+    plr_real R_xi[9], p_xi[3], A[36], eta[6], eta_C[6] = {0}, E_C[9], R_C[9], p_C[3];
+    plr_se3_exp(R_xi, p_xi, dx);
+    plr_se3_adjoint_inverse(A, R_xi, p_xi);
+    plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot, of 72 at least */
+    common_motion(f, dx, J, eta);
+    plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, eta, 1, eta_C, 1);
+    plr_se3_expm1(E_C, p_C, eta_C);
+    plr_se3_rotation(R_C, E_C);
+
+    unsigned cut = 0;
+    for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
+        plr_slot *s = &f->slots[slot];
+        plr_polar from, there, to;
+        plr_real M[4], w[3], rigid[9];
+        plr_polar_at(&from, s->x);
+        memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 6; k++)
+                w[i] = PLR_FMA(-J[6 * i + k], eta[k], w[i]);
+        w[2] += s->beyond;
+        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x, &s->beyond);
+        plr_se3_move_back(s->x, E_C, p_C);
+        plr_polar_at(&to, s->x);
+        carry_chart(rigid, &to, R_C, p_C, &there);
+        s->beyond *= rigid[8];
+        plr_real *own = F + 9 * slot;
+        for (int i = 0; i < 3; i++) {
+            const plr_real *row = rigid + 3 * i;
+            own[3 * i] = PLR_FMA(row[1], M[2], row[0] * M[0]);
+            own[3 * i + 1] = PLR_FMA(row[1], M[3], row[0] * M[1]);
+            own[3 * i + 2] = row[2];
+        }
+    }
+    plr_covariance_transport(f, A, F);
+    return cut;
+}
+
+static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
+    plr_polar chart;
+    plr_real s_B[3], offset[3], Ji[9], R_WC[9], R_WB[9];
+    double p_WB[3];
+    plr_pose_reference(f, R_WB, p_WB);
+    plr_camera_to_body(s_B, &f->par.camera, slot->x);
+    plr_mat3_vec(offset, R_WB, s_B);
+    for (int i = 0; i < 3; i++)
+        point->p_W[i] = p_WB[i] + (double)offset[i];
+
+    plr_world_by_pose(R_WB, s_B, point->J_pose);
+    plr_polar_at(&chart, slot->x);
+    plr_polar_to_point(Ji, &chart);
+    plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
+    plr_mat3_mul(point->J_landmark, R_WC, Ji);
+}
+
+const struct plr_model plr_model_body = {
+    .name = "body",
+    .propagate = body_propagate,
+    .linearise = body_linearise,
+    .initialise = body_initialise,
+    .adopt = body_adopt,
+    .retract = body_retract,
+    .in_world = body_in_world,
+};

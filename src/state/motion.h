@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+/* The motion since the last frame. It is in the pose already, and is accumulated in f->motion until
+ * landmarks and covariance follow (docs/MATH.md 4 and 6). */
+#ifndef PLR_STATE_MOTION_H
+#define PLR_STATE_MOTION_H
+
+#include <stdbool.h>
+
+#include "pelorus/state.h"
+
+/* Nothing accumulated: D = I, Q = 0, B = 0. */
+void plr_motion_clear(plr_motion *motion);
+
+/* T <- T_WB without noise (mapping). */
+void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], const double p_WB[3]);
+
+/* The accumulated motion D Exp(L nu) with its noise nu ~ N(0, I), linearised at nu = z, a value
+ * found from the frame's observations (docs/MATH.md 4 and 10). */
+typedef struct plr_applied_motion {
+    plr_real E[9], p[3]; /* D' = D Exp(L z) = (I + E, p) */
+    plr_real L[36];      /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
+    plr_real K[36];      /* L^-1 B, rows of zero columns zero: what nu shares with the biases */
+    plr_real JL[36];     /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
+    plr_real z[6];
+} plr_applied_motion;
+
+/* The motion at nu = 0: D' = D. */
+void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
+
+/* The motion at nu = 0 with a prior so wide that it allows any motion of a robot between two
+ * frames: 30 times the sigmas of plr_motion_prior, plus 0.3 m and 0.1 rad. */
+void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
+
+/* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
+void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
+                   plr_applied_motion *applied);
+
+/* Discards the accumulated motion; the bias walk of its duration is still added. */
+void plr_motion_drop(plr_filter *f);
+
+/* The pose's covariance as it would be with the accumulated motion applied, 6x6; changes nothing. */
+void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]);
+
+#endif

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The polar chart at a point q (docs/MATH.md 5): two bearing angles and inverse range,
+ * w = (N^T mu-change, change of 1/r), with r = |q|, mu = q / r, N(mu) a 3x2 orthonormal basis of
+ * the plane orthogonal to mu. Far points are nearly Gaussian in it.
+ */
+#ifndef PLR_STATE_POLAR_H
+#define PLR_STATE_POLAR_H
+
+#include <stdbool.h>
+
+#include "pelorus/config.h"
+
+/* Nearer than this a point has no bearing worth the name, m. */
+#define PLR_MIN_RANGE PLR_R(0.01)
+
+/* The chart at one point. */
+typedef struct plr_polar {
+    plr_real r;     /* m */
+    plr_real mu[3]; /* unit vector */
+    plr_real N[6];  /* 3x2: orthonormal, orthogonal to mu */
+} plr_polar;
+
+/* The chart at q; needs |q| > 0. N follows Duff et al., Building an Orthonormal Basis, Revisited
+ * (2017). */
+void plr_polar_at(plr_polar *chart, const plr_real q[3]);
+
+/* Jw = [N^T / r; -mu^T / r^2], 3x3: point error to chart. */
+void plr_polar_from_point(plr_real Jw[9], const plr_polar *chart);
+
+/* Ji = [r N | -r^2 mu], 3x3, the inverse of Jw: chart to point error. */
+void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart);
+
+/* Moves a point along its chart: a = mu x (N w_12), mu+ = Exp(a) mu, 1/r+ = 1/r + w_3.
+ * q, the chart's point, goes there by what is added to it: a small step is rounded at its own size.
+ * *result is the chart at the new point, M = N(mu+)^T Exp(a) N(mu) (2x2) the transport of the
+ * bearing part. Where 1/r+ would be below min_inverse_range the point stays there, and *beyond (0
+ * elsewhere) is what is left of w_3. Returns true where w had to be cut: a bearing change over 1
+ * rad, a range under PLR_MIN_RANGE, or no number. */
+bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
+                       const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
+                       plr_real *beyond);
+
+#endif

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#include "state/pose.h"
+
+#include "math/se3.h"
+#include "math/small.h"
+#include "math/so3.h"
+
+/* p <- p + R d, in double; R <- R dR, once more a rotation to rounding: an hour of steps without
+ * that leaves it by a hundredth in float32. */
+void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
+    plr_real step[3], change[9];
+    plr_mat3_vec(step, f->R_WB, d);
+    plr_mat3_mul(change, f->R_WB, E);
+    for (int i = 0; i < 3; i++)
+        f->p_WB[i] += (double)step[i];
+    for (int i = 0; i < 9; i++)
+        f->R_WB[i] += change[i];
+    plr_so3_orthonormalise(f->R_WB);
+}
+
+void plr_pose_correct(plr_filter *f, const plr_real xi[6]) {
+    plr_real E[9], p[3];
+    plr_se3_expm1(E, p, xi);
+    plr_pose_move(f, E, p);
+}
+
+void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
+    plr_real moved[3];
+    memcpy(R_WB, f->R_WB, sizeof f->R_WB);
+    memcpy(p_WB, f->p_WB, sizeof f->p_WB);
+    if (!f->motion.pending)
+        return;
+    plr_real back[9];
+    plr_mat3_mul_nt(back, f->R_WB, f->motion.E); /* T D^-1 */
+    for (int i = 0; i < 9; i++)
+        R_WB[i] += back[i];
+    plr_so3_orthonormalise(R_WB);
+    plr_mat3_vec(moved, R_WB, f->motion.p);
+    for (int i = 0; i < 3; i++)
+        p_WB[i] -= (double)moved[i];
+}
+
+void plr_filter_diverge(plr_filter *f) {
+    if (!f->diverged)
+        f->totals.diverged_ns = f->t_ns;
+    f->diverged = 1;
+    f->work.noise.open = 0; /* what was about to come back into P is lost with it */
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+/* The pose T_WB of the body. */
+#ifndef PLR_STATE_POSE_H
+#define PLR_STATE_POSE_H
+
+#include "pelorus/state.h"
+
+/* T <- T (I + E, d): p <- p + R d in double, and R is made orthonormal. */
+void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]);
+
+/* T <- T Exp(xi), and makes R orthonormal: the correction of the pose by a frame. */
+void plr_pose_correct(plr_filter *f, const plr_real xi[6]);
+
+/* The pose to which landmarks and covariance refer: the one before the accumulated motion. */
+void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]);
+
+/* Marks the filter as diverged, because a variance is no longer positive: no update from now on. */
+void plr_filter_diverge(plr_filter *f);
+
+#endif

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The rigid motion that is common to a frame's corrections of all landmarks: eta, a twist of the
+ * body, (rho, theta), that minimises
+ *     sum_i |w_i - J_i eta|^2_W + |eta - xi|^2_(s diag A) + a sum_k eta_k^2 / spread_k,
+ *     A = sum_i J_i^T W J_i, s = 0.1:
+ * w_i are the corrections in their charts, J_i says how a twist enters there, and W weighs the parts
+ * as the image shows them. Where the landmarks say little, the correction xi of the pose decides, and
+ * where none has a voice, xi alone.
+ * docs/MATH.md, "Retraction and transport".
+ */
+#ifndef PLR_STATE_RIGID_FIT_H
+#define PLR_STATE_RIGID_FIT_H
+
+#include "pelorus/config.h"
+
+/* A correction that turns further, rad^2, is none that a retraction can follow. */
+#define PLR_MAX_CORRECTION_TURN2 PLR_R(9)
+
+typedef struct plr_rigid_fit {
+    plr_real A[21 + PLR_KERNEL_MARGIN]; /* 6x6, upper triangle packed row by row */
+    plr_real b[6];                      /* sum_i J_i^T W w_i */
+    unsigned voices;
+} plr_rigid_fit;
+
+void plr_rigid_fit_clear(plr_rigid_fit *fit);
+
+/* A landmark: J 3x6, w and the diagonal of W, 3 each. */
+void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[18], const plr_real w[3],
+                       const plr_real W[3]);
+
+/* eta, 6; xi itself if no landmark has a voice, if A cannot be factorised, or if eta turns by more than a
+ * correction may. `noise` is a, what a unit of W scatters by. Spends the fit. */
+void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], const plr_real spread[6],
+                         plr_real noise, plr_real eta[6]);
+
+#endif

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+#include "state/slots.h"
+
+#include <string.h>
+
+#include "state/covariance.h"
+#include "state/model.h"
+
+uint16_t plr_slots_find(const plr_filter *f, uint32_t id) {
+    for (unsigned slot = 0; slot < f->count; slot++)
+        if (f->slots[slot].id == id)
+            return (uint16_t)slot;
+    return PLR_NO_SLOT;
+}
+
+/* The landmark longest unseen, or PLR_NO_SLOT if all were seen in this frame. Frame numbers may
+ * wrap: ages are differences. */
+static uint16_t oldest(const plr_filter *f) {
+    uint16_t found = PLR_NO_SLOT;
+    uint32_t age = 0;
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const uint32_t unseen = f->frame_number - f->slots[slot].last_frame;
+        if (unseen > age) {
+            age = unseen;
+            found = (uint16_t)slot;
+        }
+    }
+    return found;
+}
+
+bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed) {
+    if (f->count < f->config.slots)
+        return true;
+    const uint16_t slot = oldest(f);
+    if (slot == PLR_NO_SLOT)
+        return false;
+    if (f->map.sink) {
+        plr_landmark landmark;
+        plr_slots_export(f, slot, &landmark);
+        if (f->map.sink(f->map.context, &landmark) != 0) {
+            *sink_failed = true;
+            return false;
+        }
+    }
+    plr_slots_remove(f, slot);
+    (*evicted)++;
+    return true;
+}
+
+void plr_slots_append(plr_filter *f, uint32_t id, bool known, const plr_new_landmark *landmark) {
+    plr_covariance_append(f, landmark);
+    plr_slot *slot = &f->slots[f->count++];
+    memset(slot, 0, sizeof *slot);
+    memcpy(slot->x, landmark->x, sizeof slot->x);
+    slot->id = id;
+    slot->known = known;
+    slot->times_seen = known ? 0 : 1; /* a known one is counted when it is matched */
+    slot->last_frame = f->frame_number;
+    slot->last_seen_ns = f->t_ns;
+}
+
+void plr_slots_remove(plr_filter *f, unsigned slot) {
+    plr_covariance_remove(f, slot);
+    f->count--;
+    if (slot != f->count)
+        f->slots[slot] = f->slots[f->count];
+}
+
+void plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark) {
+    const plr_slot *s = &f->slots[slot];
+    plr_world_point point;
+    plr_real P[9];
+    plr_model_of(f)->in_world(f, s, &point);
+    plr_covariance_joint(f, slot, point.J_pose, point.J_landmark, P);
+    landmark->id = s->id;
+    landmark->times_seen = s->times_seen;
+    landmark->times_gated = s->times_gated;
+    landmark->last_seen_ns = s->last_seen_ns;
+    landmark->known = s->known != 0;
+    for (int i = 0; i < 3; i++)
+        landmark->p_W_m[i] = point.p_W[i];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            landmark->P_W_m2[3 * i + j] = (double)P[i >= j ? 3 * i + j : 3 * j + i];
+}
