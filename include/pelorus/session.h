@@ -11,8 +11,8 @@
  *         plr_session_step(&session);                   // at most one message, bounded time
  *
  * Messages in (docs/REPLAY-FORMAT.md), in this order: HEADER; CONFIG and known LANDMARKs, as
- * needed; START, or instead of it STATE (restore); then TWIST, STEREO and TRUTH, and at any time
- * among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a REPORT after each
+ * needed; START, or instead of it STATE (restore); then TWIST, STEREO, TRUTH and READING, and at
+ * any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a REPORT after each
  * frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END. No input stops the
  * session: a message that it cannot use is counted and answered with a REPORT that says what was
  * refused (subject) and why (status). After END it waits for the next HEADER.
@@ -130,7 +130,7 @@ typedef enum plr_step {
 
 /* Counts since init or since the HEADER that followed an END. */
 typedef struct plr_session_totals {
-    uint32_t twists, stereos, truths, landmarks; /* received */
+    uint32_t twists, stereos, truths, landmarks, readings; /* received */
     uint32_t refused; /* messages of any kind that were refused; frames that the reader skipped
                                are in reader.counts */
     uint32_t without_truth; /* mapping: frames without a TRUTH of the same time */

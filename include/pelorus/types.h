@@ -148,6 +148,26 @@ typedef struct plr_observation {
 /* No limit on the observations of a frame. */
 enum { PLR_NO_BUDGET = 65535 };
 
+/* A sensor that measures one to three numbers directly. */
+typedef enum plr_sensor {
+    PLR_SENSOR_WHEEL = 1,      /* the velocity of a point of the body, along the body's axes */
+    PLR_SENSOR_STANDSTILL = 2, /* the body does not move: that velocity is zero */
+    PLR_SENSOR_POSITION = 3    /* the position of a point of the body in the world: GNSS, motion
+                                  capture, a beacon */
+} plr_sensor;
+
+/* One reading of such a sensor. */
+typedef struct plr_reading {
+    plr_time_ns t_ns;
+    uint8_t sensor;   /* plr_sensor */
+    uint8_t axes;     /* bits 0 to 2: which of the three numbers were measured; 1 to 7 */
+    double value[3];  /* wheel: velocity of the point at_B_m in body axes, m/s; standstill: zeros;
+                         position: of that point in the world, m */
+    double sigma[3];  /* standard deviation of each, in the same unit; above 0 where axes has the
+                         bit */
+    double at_B_m[3]; /* where on the body the sensor is, in body axes */
+} plr_reading;
+
 /* All observations of one stereo pair. */
 typedef struct plr_frame {
     plr_time_ns t_ns;

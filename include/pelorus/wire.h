@@ -31,13 +31,14 @@ typedef enum plr_kind {
     PLR_KIND_REPORT = 9,
     PLR_KIND_TEXT = 10,
     PLR_KIND_END = 11,
-    PLR_KIND_STATE = 12
+    PLR_KIND_STATE = 12,
+    PLR_KIND_READING = 13
 } plr_kind;
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 2,
-    PLR_WIRE_KINDS = 12,     /* kinds are 1 to this */
+    PLR_WIRE_VERSION_MINOR = 3,
+    PLR_WIRE_KINDS = 13,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
     PLR_WIRE_MAX_SETTINGS = 64,
@@ -132,10 +133,23 @@ typedef struct plr_pose_message {
     plr_twist velocity;
     double bias[6]; /* (b_v, b_w), m/s and rad/s */
     double P_u[21]; /* covariance of velocity, in the order (v, w); packed like P_xi */
+    double trace;   /* of the whole covariance, landmarks included; negative: not known. Known after
+                       a STEREO alone, and not from senders before format 1.3 */
+    double bias_variance[6]; /* of bias, in the order (b_v, b_w); negative: not known, as above. The
+                                frame has float32 */
 } plr_pose_message;
+
+/* What a REPORT tells besides its status. */
+typedef enum plr_notice {
+    PLR_NOTICE_NONE = 0,
+    PLR_NOTICE_STARTED = 1, /* the sender has just started: whatever it was told before is lost */
+    PLR_NOTICE_SAVED = 2,   /* the filter's state was saved */
+    PLR_NOTICE_RESTORED = 3 /* the filter continues from a saved state */
+} plr_notice;
 
 typedef struct plr_report_message {
     uint8_t subject; /* plr_kind of the message that it answers */
+    uint8_t notice;  /* plr_notice; those of a later version are passed on */
     plr_report report;
     uint32_t update_us; /* time that the frame took, us; 0 without a clock */
 } plr_report_message;
@@ -151,9 +165,24 @@ typedef struct plr_text {
     char text[PLR_WIRE_MAX_TEXT + 1]; /* UTF-8, ends with a zero; a reader cuts longer texts */
 } plr_text;
 
-/* How many frames of each kind, and of all kinds, the sender has written before this one. */
+/* The kinds that END counts by name, as indices. */
+typedef enum plr_counted {
+    PLR_COUNTED_TWIST,
+    PLR_COUNTED_STEREO,
+    PLR_COUNTED_TRUTH,
+    PLR_COUNTED_LANDMARK,
+    PLR_COUNTED_READING,
+    PLR_COUNTED
+} plr_counted;
+
 typedef struct plr_end {
+    /* How many frames of each kind, and of all kinds, the sender has written before this one. */
     uint32_t twists, stereos, truths, landmarks, frames;
+    uint32_t readings; /* 0 from senders before format 1.3 */
+    /* Where this END answers another: bit i is set if of kind i (plr_counted) another number arrived
+     * than that END says, and arrived[i] is that number; else it is 0. */
+    uint8_t differs;
+    uint32_t arrived[PLR_COUNTED];
 } plr_end;
 
 typedef enum plr_state_action { PLR_STATE_SAVE = 1, PLR_STATE_RESTORE = 2 } plr_state_action;
@@ -184,6 +213,7 @@ typedef struct plr_message {
         plr_text text;
         plr_end end;
         plr_state_message state;
+        plr_reading reading;
     } as;
 } plr_message;
 
@@ -287,7 +317,7 @@ typedef struct plr_writer {
 plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *context);
 
 /* Writes one message as a frame. The writer supplies the sequence number, the version of a HEADER
- * and the counts of an END; those in *message are ignored.
+ * and what an END counts as sent; those in *message are ignored.
  * PLR_E_ARGUMENT the message holds an impossible value: nothing is written. PLR_E_IO the function
  * failed: the message is lost, and a reader counts it as missing. The next frame then begins with a
  * delimiter, so that it can be read. */

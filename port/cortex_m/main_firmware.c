@@ -22,13 +22,17 @@ static plr_session session;
 static plr_landmark known[KNOWN_LANDMARKS];
 static plr_state_store store;
 
-/* The first frame after a reset: name of the board, build, and reason of the start. A host that
- * receives it during a drive knows that the board has lost its state. */
+/* The first frames after a reset. A host that receives the REPORT during a drive knows that the board
+ * has lost its state; the TEXT tells people the name of the board, its build, and why it started. */
 static void announce(void) {
     static plr_message message;
     static text words;
     const uint8_t delimiter = 0; /* ends a frame that the reset may have cut */
     (void)serial_write(&serial_link, &delimiter, 1);
+    message.kind = PLR_KIND_REPORT;
+    message.as.report.notice = PLR_NOTICE_STARTED;
+    message.as.report.report.budget = PLR_NO_BUDGET;
+    (void)plr_writer_put(&session.writer, &message);
     text_clear(&words);
     text_add(&words, "pelorus ");
     text_add(&words, plr_version());

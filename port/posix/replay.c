@@ -123,6 +123,8 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
         return totals->truths;
     case PLR_KIND_LANDMARK:
         return totals->landmarks;
+    case PLR_KIND_READING:
+        return totals->readings;
     default:
         return 0;
     }

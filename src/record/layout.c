@@ -39,6 +39,9 @@ void plr_layout(plr_pass *p, plr_message *m) {
     case PLR_KIND_STATE:
         plr_layout_state(p, &m->as.state);
         return;
+    case PLR_KIND_READING:
+        plr_layout_reading(p, &m->as.reading);
+        return;
     case PLR_KIND_NONE:
         break;
     }

@@ -19,6 +19,7 @@ void plr_layout_state(plr_pass *p, plr_state_message *m);
 void plr_layout_twist(plr_pass *p, plr_twist_message *m);
 void plr_layout_stereo(plr_pass *p, plr_frame *m);
 void plr_layout_truth(plr_pass *p, plr_truth *m);
+void plr_layout_reading(plr_pass *p, plr_reading *m);
 
 /* layout_result.c */
 void plr_layout_landmark(plr_pass *p, plr_landmark_message *m);

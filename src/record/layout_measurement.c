@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* TWIST, STEREO, TRUTH: what a robot and its reference measure. */
+/* TWIST, STEREO, TRUTH, READING: what a robot and its reference measure. */
 #include "record/layout.h"
 
 void plr_layout_twist(plr_pass *p, plr_twist_message *m) {
@@ -43,4 +43,14 @@ void plr_layout_truth(plr_pass *p, plr_truth *m) {
     plr_pass_u64(p, &m->t_ns);
     plr_pass_f64s(p, m->T_WB.R, 9);
     plr_pass_f64s(p, m->T_WB.p, 3);
+}
+
+/* Which sensors and axes there are is for the filter to say. */
+void plr_layout_reading(plr_pass *p, plr_reading *m) {
+    plr_pass_u64(p, &m->t_ns);
+    plr_pass_u8(p, &m->sensor);
+    plr_pass_u8(p, &m->axes);
+    plr_pass_f64s(p, m->value, 3);
+    plr_pass_reals(p, m->sigma, 3, 4);
+    plr_pass_reals(p, m->at_B_m, 3, 4);
 }

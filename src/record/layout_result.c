@@ -27,6 +27,18 @@ void plr_layout_landmark(plr_pass *p, plr_landmark_message *m) {
     }
 }
 
+/* At the end, since version 1.3; a payload of 1.2 ends before. */
+static void pass_trace(plr_pass *p, plr_pose_message *m) {
+    if (plr_pass_reads(p) && p->left == 0) {
+        m->trace = -1;
+        for (unsigned i = 0; i < 6; i++)
+            m->bias_variance[i] = -1;
+        return;
+    }
+    plr_pass_f64s(p, &m->trace, 1);
+    plr_pass_reals(p, m->bias_variance, 6, 4);
+}
+
 void plr_layout_pose(plr_pass *p, plr_pose_message *m) {
     plr_pass_u64(p, &m->t_ns);
     plr_pass_u8(p, &m->real_bytes);
@@ -40,6 +52,7 @@ void plr_layout_pose(plr_pass *p, plr_pose_message *m) {
     plr_pass_reals(p, m->velocity.w_B_radps, 3, m->real_bytes);
     plr_pass_reals(p, m->bias, 6, m->real_bytes);
     plr_pass_reals(p, m->P_u, 21, m->real_bytes);
+    pass_trace(p, m);
 }
 
 /* As i8. Numbers below those of types.h are let through: a later version's reason for a refusal. */
@@ -99,4 +112,10 @@ void plr_layout_report(plr_pass *p, plr_report_message *m) {
     plr_pass_f32(p, &r->nis);
     plr_pass_u32(p, &m->update_us);
     pass_upper_reasons(p, r, lower_reasons);
+    if (plr_pass_reads(p) && p->left == 0) {
+        m->notice = PLR_NOTICE_NONE; /* before version 1.3 */
+        return;
+    }
+    plr_pass_u8(p, &m->notice);
+    plr_pass_reserved(p);
 }

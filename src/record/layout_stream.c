@@ -32,4 +32,15 @@ void plr_layout_end(plr_pass *p, plr_end *m) {
     plr_pass_u32(p, &m->truths);
     plr_pass_u32(p, &m->landmarks);
     plr_pass_u32(p, &m->frames);
+    if (plr_pass_reads(p) && p->left == 0) { /* before version 1.3 */
+        m->readings = 0;
+        m->differs = 0;
+        for (unsigned i = 0; i < PLR_COUNTED; i++)
+            m->arrived[i] = 0;
+        return;
+    }
+    plr_pass_u32(p, &m->readings);
+    plr_pass_u8(p, &m->differs);
+    for (unsigned i = 0; i < PLR_COUNTED; i++)
+        plr_pass_u32(p, &m->arrived[i]);
 }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <string.h>
+
 #include "record/bytes.h"
 #include "record/frame_out.h"
 #include "record/layout.h"
@@ -12,10 +14,14 @@ plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *contex
 
 /* A layout takes what it could write to; in the directions CHECK and WRITE it only looks. */
 static plr_fault pass_payload(plr_pass p, plr_writer *w, const plr_message *message) {
-    if (message->kind == PLR_KIND_END)
-        plr_layout_end(&p, &w->counts);
-    else
+    if (message->kind == PLR_KIND_END) {
+        plr_end end = w->counts;
+        end.differs = message->as.end.differs;
+        memcpy(end.arrived, message->as.end.arrived, sizeof end.arrived);
+        plr_layout_end(&p, &end);
+    } else {
         plr_layout(&p, (plr_message *)message);
+    }
     return p.fault;
 }
 
@@ -39,6 +45,8 @@ static void count(plr_end *counts, plr_kind kind) {
         counts->truths++;
     if (kind == PLR_KIND_LANDMARK)
         counts->landmarks++;
+    if (kind == PLR_KIND_READING)
+        counts->readings++;
 }
 
 plr_status plr_writer_put(plr_writer *w, const plr_message *message) {

@@ -200,6 +200,14 @@ void plr_data_use_truth(plr_session *s) {
     }
 }
 
+/* --- READING --- */
+
+/* To be replaced by plr_filter_measure: no filter of this version uses one. */
+void plr_data_use_reading(plr_session *s) {
+    const plr_reading *reading = &s->in.as.reading;
+    plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, PLR_E_MODE, NULL);
+}
+
 /* --- START among the data --- */
 
 void plr_data_use_start(plr_session *s) {

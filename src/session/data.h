@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* TWIST, STEREO, TRUTH, and START among them: s->in is one of them. */
+/* TWIST, STEREO, TRUTH, READING, and START among them: s->in is one of them. */
 #ifndef PLR_SESSION_DATA_H
 #define PLR_SESSION_DATA_H
 
@@ -9,6 +9,7 @@
 void plr_data_use_twist(plr_session *s);
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
+void plr_data_use_reading(plr_session *s);
 
 /* Sets the pose anew. */
 void plr_data_use_start(plr_session *s);

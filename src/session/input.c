@@ -13,28 +13,25 @@
 
 /* --- END --- */
 
-/* ", 10 of 12 TWIST" if that is how many arrived. */
-static bool add_missing(plr_text *line, const char *what, uint32_t sent, uint32_t received) {
-    if (sent == received)
-        return false;
-    plr_line_count(line, ", ", received);
-    plr_line_count(line, " of ", sent);
-    plr_line_text(line, what);
-    return true;
-}
-
-/* END says how many there were. */
+/* END says how many there were: ", 10 of 12 TWIST" if 10 arrived. */
 static void compare_counts(plr_session *s) {
+    static const char *const names[PLR_COUNTED] = {" TWIST", " STEREO", " TRUTH", " LANDMARK",
+                                                   " READING"};
     const plr_end *end = &s->in.as.end;
-    const plr_session_totals *received = &s->totals;
+    const uint32_t sent[PLR_COUNTED] = {end->twists, end->stereos, end->truths, end->landmarks,
+                                        end->readings};
+    plr_end answer;
     plr_text *line = &s->out.as.text;
+    plr_send_describe_end(s, &answer);
     plr_line_begin(line, PLR_SEVERITY_WARNING);
     plr_line_text(line, "the recording is not complete: not everything arrived");
-    bool differs = add_missing(line, " TWIST", end->twists, received->twists);
-    differs |= add_missing(line, " STEREO", end->stereos, received->stereos);
-    differs |= add_missing(line, " TRUTH", end->truths, received->truths);
-    differs |= add_missing(line, " LANDMARK", end->landmarks, received->landmarks);
-    if (differs)
+    for (unsigned i = 0; i < PLR_COUNTED; i++)
+        if (answer.differs >> i & 1) {
+            plr_line_count(line, ", ", answer.arrived[i]);
+            plr_line_count(line, " of ", sent[i]);
+            plr_line_text(line, names[i]);
+        }
+    if (answer.differs != 0)
         plr_send_text(s);
 }
 
@@ -57,7 +54,7 @@ static void save(plr_session *s) {
     plr_saving_save(s, s->in.as.state.t_ns);
 }
 
-enum { RESTORE = PLR_KIND_STATE + 1, ROWS };
+enum { RESTORE = PLR_WIRE_KINDS + 1, ROWS };
 
 /* docs/REPLAY-FORMAT.md shows it too. What other filters computed (POSE, REPORT, LANDMARK of another
  * role) is ignored everywhere: row PLR_KIND_NONE. */
@@ -75,6 +72,7 @@ static const struct {
     [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_twist},
     [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_stereo},
     [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_data_use_truth},
+    [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_reading},
     [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
     [PLR_KIND_TEXT]     = {{ECHO,   ECHO,  ECHO,    ECHO,    ECHO,    ECHO}, NULL},
     [PLR_KIND_END]      = {{USE,    USE,   USE,     USE,     USE,     USE},  compare_counts},
@@ -105,6 +103,8 @@ static plr_time_ns time_of(const plr_message *in) {
         return in->as.landmark.landmark.last_seen_ns;
     case PLR_KIND_STATE:
         return in->as.state.t_ns;
+    case PLR_KIND_READING:
+        return in->as.reading.t_ns;
     default:
         return 0;
     }
@@ -120,6 +120,7 @@ static void count(plr_session *s) {
     s->totals.stereos += s->in.kind == PLR_KIND_STEREO;
     s->totals.truths += s->in.kind == PLR_KIND_TRUTH;
     s->totals.landmarks += s->in.kind == PLR_KIND_LANDMARK;
+    s->totals.readings += s->in.kind == PLR_KIND_READING;
     s->is_log = s->is_log || is_in_force(&s->in);
 }
 

@@ -37,6 +37,7 @@ bool plr_plausible_message(const plr_message *message) {
     const plr_twist *twist = &message->as.twist.twist;
     const plr_start *start = &message->as.start;
     const plr_landmark *landmark = &message->as.landmark.landmark;
+    const plr_reading *reading = &message->as.reading;
     switch (message->kind) {
     case PLR_KIND_TWIST:
         return all_within(twist->v_B_mps, 3, SPEED_MPS) &&
@@ -47,6 +48,9 @@ bool plr_plausible_message(const plr_message *message) {
     case PLR_KIND_LANDMARK:
         return all_within(landmark->p_W_m, 3, POSITION_M) &&
                all_within(landmark->P_W_m2, 9, VARIANCE);
+    case PLR_KIND_READING:
+        return all_within(reading->value, 3,
+                          reading->sensor == PLR_SENSOR_POSITION ? POSITION_M : SPEED_MPS);
     default:
         return true;
     }

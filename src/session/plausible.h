@@ -17,7 +17,8 @@
 
 #include "pelorus/wire.h"
 
-/* A TWIST; a START's pose and, where it is given, its covariance; a LANDMARK. Of other kinds true. */
+/* A TWIST; a START's pose and, where it is given, its covariance; a LANDMARK; the value of a READING.
+ * Of other kinds true. */
 bool plr_plausible_message(const plr_message *message);
 
 bool plr_plausible_pose(const plr_pose *pose);

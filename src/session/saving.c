@@ -48,11 +48,11 @@ void plr_saving_refuse(plr_session *s, plr_state_action action, plr_time_ns t_ns
 
 /* "state saved: generation 3, 17 landmarks, 8612 bytes, of 12.345 s", and whether the other slot is
  * damaged; of_ns is the time of the state, t_ns that of the REPORT. */
-static void answer(plr_session *s, const char *what, const plr_stored_state *stored,
+static void answer(plr_session *s, plr_notice notice, const plr_stored_state *stored,
                    plr_time_ns of_ns, plr_time_ns t_ns) {
     plr_text *line = &s->out.as.text;
     plr_line_begin(line, PLR_SEVERITY_INFO);
-    plr_line_text(line, what);
+    plr_line_text(line, notice == PLR_NOTICE_SAVED ? "state saved" : "state restored");
     plr_line_count(line, ": generation ", stored->generation);
     plr_line_count(line, ", ", plr_filter_landmark_count(&s->filter));
     plr_line_count(line, " landmarks, ", stored->length);
@@ -61,7 +61,7 @@ static void answer(plr_session *s, const char *what, const plr_stored_state *sto
     if (stored->damaged > 0)
         plr_line_text(line, "; the other slot holds a damaged one");
     plr_send_text(s);
-    plr_send_answer(s, PLR_KIND_STATE, t_ns, PLR_OK);
+    plr_send_state_answer(s, t_ns, notice);
 }
 
 /* ---------------------------------------------------------------- save */
@@ -80,7 +80,7 @@ void plr_saving_save(plr_session *s, plr_time_ns t_ns) {
         status = has_data(s) ? plr_state_store_save(s->options.store, &s->filter, &saved)
                              : PLR_E_NOT_READY;
     if (status == PLR_OK)
-        answer(s, "state saved", &saved, plr_filter_time(&s->filter), t_ns);
+        answer(s, PLR_NOTICE_SAVED, &saved, plr_filter_time(&s->filter), t_ns);
     else
         plr_saving_refuse(s, PLR_STATE_SAVE, t_ns, status);
 }
@@ -167,7 +167,7 @@ void plr_saving_restore(plr_session *s) {
     }
     plr_send_echo(s); /* behind the CONFIG in force, as data: a log of it can be replayed */
     if (status == PLR_OK)
-        answer(s, "state restored", &stored, of_ns, wanted.t_ns);
+        answer(s, PLR_NOTICE_RESTORED, &stored, of_ns, wanted.t_ns);
     else
         plr_saving_refuse(s, PLR_STATE_RESTORE, wanted.t_ns, status);
 }
@@ -182,5 +182,5 @@ void plr_saving_restore_at_start(plr_session *s, plr_time_ns t_ns) {
         return;
     }
     start_from_state(s, PLR_EVENT_POSE);
-    answer(s, "state restored", &stored, of_ns, t_ns);
+    answer(s, PLR_NOTICE_RESTORED, &stored, of_ns, t_ns);
 }

@@ -42,7 +42,8 @@ static bool describe_covariance(double packed[21], double P[36], plr_status stat
     return true;
 }
 
-static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
+/* Trace and variances of the biases are told once a frame: they take as long as the rest. */
+static bool describe_pose(plr_pose_message *pose, const plr_filter *f, bool after_update) {
     double P[36];
     if (plr_filter_pose(f, &pose->T_WB) != PLR_OK ||
         plr_filter_velocity(f, &pose->velocity) != PLR_OK)
@@ -50,7 +51,12 @@ static bool describe_pose(plr_pose_message *pose, const plr_filter *f) {
     if (!describe_covariance(pose->P_xi, P, plr_filter_pose_covariance(f, P)) ||
         !describe_covariance(pose->P_u, P, plr_filter_velocity_covariance(f, P)))
         return false;
-    return plr_filter_bias(f, pose->bias, NULL) == PLR_OK;
+    if (plr_filter_bias(f, pose->bias, P) != PLR_OK)
+        return false;
+    pose->trace = after_update ? plr_filter_trace(f) : -1;
+    for (unsigned i = 0; i < 6; i++)
+        pose->bias_variance[i] = after_update ? P[7 * i] : -1;
+    return true;
 }
 
 /* A controller must not mistake the jump of a reset for motion. */
@@ -67,7 +73,7 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
     plr_pose_message *pose = &s->out.as.pose;
     s->out.kind = PLR_KIND_POSE;
     memset(pose, 0, sizeof *pose);
-    if (!describe_pose(pose, &s->filter))
+    if (!describe_pose(pose, &s->filter, after_update))
         return NULL;
     pose->t_ns = plr_filter_time(&s->filter);
     pose->real_bytes = (uint8_t)sizeof(plr_real);
@@ -80,20 +86,22 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
 }
 
 static void put_report(plr_session *s, plr_kind subject, const plr_report *report,
-                       uint64_t compute_ns) {
+                       uint64_t compute_ns, plr_notice notice) {
     const uint64_t us = compute_ns / 1000u;
     s->out.kind = PLR_KIND_REPORT;
     s->out.as.report.subject = (uint8_t)subject;
+    s->out.as.report.notice = (uint8_t)notice;
     s->out.as.report.report = *report;
     s->out.as.report.update_us = us < UINT32_MAX ? (uint32_t)us : UINT32_MAX;
     put(s, PLR_OUTPUT_REPORT, &s->out);
 }
 
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns) {
-    put_report(s, PLR_KIND_STEREO, report, compute_ns);
+    put_report(s, PLR_KIND_STEREO, report, compute_ns, PLR_NOTICE_NONE);
 }
 
-void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status) {
+static void answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                   plr_notice notice) {
     plr_report report;
     memset(&report, 0, sizeof report);
     report.t_ns = t_ns;
@@ -102,7 +110,15 @@ void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_sta
     report.reasons = s->last.reasons;
     report.budget = PLR_NO_BUDGET;
     report.active = s->last.active;
-    put_report(s, subject, &report, 0);
+    put_report(s, subject, &report, 0, notice);
+}
+
+void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status) {
+    answer(s, subject, t_ns, status, PLR_NOTICE_NONE);
+}
+
+void plr_send_state_answer(plr_session *s, plr_time_ns t_ns, plr_notice notice) {
+    answer(s, PLR_KIND_STATE, t_ns, PLR_OK, notice);
 }
 
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
@@ -130,7 +146,23 @@ void plr_send_text(plr_session *s) {
         s->options.observer.text(s->options.observer.context, &s->out.as.text);
 }
 
+void plr_send_describe_end(const plr_session *s, plr_end *end) {
+    const plr_session_totals *got = &s->totals;
+    const plr_end *told = &s->in.as.end;
+    const uint32_t arrived[PLR_COUNTED] = {got->twists, got->stereos, got->truths, got->landmarks,
+                                           got->readings};
+    const uint32_t sent[PLR_COUNTED] = {told->twists, told->stereos, told->truths, told->landmarks,
+                                        told->readings};
+    memset(end, 0, sizeof *end);
+    for (unsigned i = 0; i < PLR_COUNTED && s->in.kind == PLR_KIND_END; i++)
+        if (arrived[i] != sent[i]) {
+            end->differs |= (uint8_t)(1U << i);
+            end->arrived[i] = arrived[i];
+        }
+}
+
 void plr_send_end(plr_session *s) {
     s->out.kind = PLR_KIND_END;
+    plr_send_describe_end(s, &s->out.as.end);
     put(s, PLR_OUTPUT_END, &s->out);
 }

@@ -25,6 +25,9 @@ void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_
 /* A REPORT that says what came of a message that is no frame, with the health of the last frame. */
 void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status);
 
+/* The REPORT that answers a STATE that was done. */
+void plr_send_state_answer(plr_session *s, plr_time_ns t_ns, plr_notice notice);
+
 /* A message was refused: counted, shown, and sent as a REPORT. `culprit` is the setting to change,
  * or NULL. */
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
@@ -36,6 +39,10 @@ void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmar
 
 /* A line, built with session/line.h in s->out.as.text. */
 void plr_send_text(plr_session *s);
+
+/* How many messages arrived in this drive, of those kinds of which the END that came in tells another
+ * number. */
+void plr_send_describe_end(const plr_session *s, plr_end *end);
 
 void plr_send_end(plr_session *s);
 

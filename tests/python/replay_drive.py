@@ -22,6 +22,7 @@ import pytest
 from pelorus import wire
 from pelorus.frames import (
     Camera,
+    End,
     Header,
     Landmark,
     Message,
@@ -111,14 +112,14 @@ def later(message: Message, seconds: int) -> Twist | Truth | Stereo:
     return replace(message, t_ns=message.t_ns + seconds * SECOND)
 
 
-def encode(messages: Iterable[Message], end: bool = True) -> bytes:
-    """The bytes of a recording."""
+def encode(messages: Iterable[Message], end: bool | End = True) -> bytes:
+    """The bytes of a recording; `end` may be the END that a robot has said."""
     stream = io.BytesIO()
     writer = wire.Writer(stream)
     for message in messages:
         writer.write(message)
     if end:
-        writer.end()
+        writer.end(end if isinstance(end, End) else None)
     return stream.getvalue()
 
 

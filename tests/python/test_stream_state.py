@@ -34,7 +34,7 @@ class KeepingBoard(FakeBoard):
             return super()._answer(message)
         if not self.answers_state:
             return []
-        words: list[Message] = [Text(self.words)] if self.words else []
+        words: list[Message] = [Text(self.words, int(self.status != 0))] if self.words else []
         return [*words, Report(message.t_ns, Kind.STATE, self.status)]
 
     def states(self) -> list[State]:

@@ -26,8 +26,10 @@ from pelorus.frames import (
     Message,
     Noise,
     Pose,
+    Reading,
     Report,
     Role,
+    Sensor,
     Start,
     StartFlag,
     State,
@@ -61,11 +63,12 @@ MESSAGES: list[Message] = [
     Truth(12, R, CHANCE.normal(size=3)),
     Landmark(2**32 - 1, CHANCE.normal(size=3), CHANCE.normal(size=6), Role.FINAL, 99, 7),
     Pose(5, CHANCE.normal(size=3), R, CHANCE.normal(size=21), real_bytes=8, reset_count=3),
-    Pose(5, CHANCE.normal(size=3), real_bytes=4, after_stereo=True),
-    Report(8, 5, -7, 3, 0xFFFF, 60, *COUNTS, nis=1.5, update_us=2**32 - 1),  # type: ignore[misc]
+    Pose(5, CHANCE.normal(size=3), real_bytes=4, after_stereo=True, trace=0.5),
+    Report(8, 5, -7, 3, 0xFFFF, 60, *COUNTS, nis=1.5, update_us=2**32 - 1, notice=3),  # type: ignore[misc]
     Text("grün", 2),
-    End(1, 2, 3, 4, 5),
+    End(1, 2, 3, 4, 5, 6, 31, 7, 8, 9, 10, 11),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
+    Reading(10, Sensor.WHEEL, 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
 ]
 SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 settings
     Kind.HEADER: [250 + 9],
@@ -75,11 +78,12 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.STEREO: [12 + 20 * n for n in (5, 0, 4096)],
     Kind.TRUTH: [104],
     Kind.LANDMARK: [90],
-    Kind.POSE: [36 + 63 * 8, 36 + 63 * 4],
-    Kind.REPORT: [54],
+    Kind.POSE: [36 + 63 * 8 + 32, 36 + 63 * 4 + 32],
+    Kind.REPORT: [56],
     Kind.TEXT: [1 + 5],
-    Kind.END: [20],
+    Kind.END: [45],
     Kind.STATE: [57],
+    Kind.READING: [58],
 }
 
 
@@ -131,7 +135,7 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 2, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 3, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:211] == "Straße 7".encode()
     assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
     assert struct.unpack_from("<5d", header, 10) == (700.5, 701.5, 320.1, 240.2, 0.54)
@@ -238,6 +242,24 @@ def test_a_header_of_format_1_1_tells_nothing_of_single_axes() -> None:
     header = Header(Camera(1, 1, 1, 1, 1), noise=noise, name="old")
     assert Header.unpack(header.pack()) == header
     assert Header.unpack(header.pack()[:-48]) == replace(header, noise=Noise(0.5))
+
+
+@pytest.mark.parametrize(("kind", "added"), [(Pose, 32), (Report, 2), (End, 25)])
+def test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2(
+    kind: type[Message], added: int
+) -> None:
+    message = [m for m in MESSAGES if isinstance(m, kind)][-1]
+    payload = message.pack()
+    old = kind.unpack(payload[:-added])
+    assert old.pack()[:-added] == payload[:-added]
+    unknown = {"trace": -1, "notice": 0, "readings": 0, "differs": 0, "arrived_twists": 0}
+    told = {name: value for name, value in unknown.items() if hasattr(old, name)}
+    assert told == {name: getattr(old, name) for name in told} != {}
+    if isinstance(old, Pose):
+        assert (old.bias_variance == -1).all()
+    for cut in range(1, added):
+        with pytest.raises(MalformedPayload):
+            kind.unpack(payload[:-cut])
 
 
 def test_a_report_of_format_1_1_has_the_lower_reasons_alone() -> None:

@@ -128,6 +128,8 @@ def a_pose(random: np.random.Generator) -> Message:
         real_bytes=real_bytes,
         after_stereo=bool(random.integers(2)),
         reset_count=whole(random, 16),
+        trace=float(reals(random)),
+        bias_variance=narrow_reals(random, 6),
     )
 
 
@@ -140,6 +142,7 @@ def a_report(random: np.random.Generator) -> Message:
         nis=float(narrow_reals(random)),
         update_us=whole(random, 32),
         reasons=whole(random, 32),
+        notice=whole(random, 8),
     )
     return replace(report, **{name: whole(random, 16) for name in REPORT_COUNTS})
 
@@ -151,6 +154,17 @@ def a_remark(random: np.random.Generator) -> Message:
 def a_state(random: np.random.Generator) -> Message:
     action = frames.StateAction(int(random.integers(1, 3)))
     return frames.State(whole(random, 64), action, reals(random, 6))
+
+
+def a_reading(random: np.random.Generator) -> Message:
+    return frames.Reading(
+        t_ns=whole(random, 64),
+        sensor=whole(random, 8),
+        axes=whole(random, 8),
+        value=reals(random, 3),
+        sigma=narrow_reals(random, 3),
+        at_B_m=narrow_reals(random, 3),
+    )
 
 
 MAKERS = [
@@ -165,6 +179,7 @@ MAKERS = [
     a_report,
     a_remark,
     a_state,
+    a_reading,
 ]
 
 

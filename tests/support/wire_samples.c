@@ -173,12 +173,24 @@ static void make_pose(plr_pose_message *m, unsigned variant) {
     fill_narrow(m->velocity.w_B_radps, 3, variant, 33);
     fill_narrow(m->bias, 6, variant, 36);
     fill_narrow(m->P_u, 21, variant, 42);
+    m->trace = real_of(variant, 6);
+    fill_narrow(m->bias_variance, 6, variant, 63);
+}
+
+static void make_reading(plr_reading *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    m->sensor = whole8(variant, UINT8_MAX, PLR_SENSOR_POSITION);
+    m->axes = whole8(variant, UINT8_MAX, 5);
+    fill(m->value, 3, variant, 2);
+    fill_narrow(m->sigma, 3, variant, 5);
+    fill_narrow(m->at_B_m, 3, variant, 8);
 }
 
 static void make_report(plr_report_message *m, unsigned variant) {
     plr_report *r = &m->report;
     m->subject = whole8(variant, UINT8_MAX, PLR_KIND_STEREO);
     m->update_us = whole32(variant, 310);
+    m->notice = whole8(variant, UINT8_MAX, PLR_NOTICE_RESTORED);
     r->t_ns = time_of(variant);
     r->status = variant == WIRE_SAMPLE_LEAST ? PLR_OK : PLR_E_LATE;
     if (variant == WIRE_SAMPLE_MOST)
@@ -251,7 +263,14 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
             variant == WIRE_SAMPLE_LEAST ? PLR_STATE_SAVE : (uint8_t)PLR_STATE_RESTORE;
         fill(m.as.state.moved_variance, 6, variant, 0);
         break;
+    case PLR_KIND_READING:
+        make_reading(&m.as.reading, variant);
+        break;
     case PLR_KIND_END:
+        m.as.end.differs = whole8(variant, UINT8_MAX, 1U << PLR_COUNTED_READING);
+        for (unsigned i = 0; i < PLR_COUNTED; i++)
+            m.as.end.arrived[i] = whole32(variant, 70 + i);
+        break;
     case PLR_KIND_NONE:
         break;
     }
@@ -335,10 +354,13 @@ static void same_pose(const plr_pose_message *e, const plr_pose_message *a) {
     SAME(velocity);
     SAME(bias);
     SAME(P_u);
+    SAME(trace);
+    SAME(bias_variance);
 }
 
 static void same_report(const plr_report_message *e, const plr_report_message *a) {
     SAME(subject);
+    SAME(notice);
     SAME(update_us);
     SAME(report.t_ns);
     SAME(report.status);
@@ -360,6 +382,26 @@ static void same_report(const plr_report_message *e, const plr_report_message *a
     SAME(report.active);
     SAME(report.nis_dof);
     SAME(report.nis);
+}
+
+static void same_end(const plr_end *e, const plr_end *a) {
+    SAME(twists);
+    SAME(stereos);
+    SAME(truths);
+    SAME(landmarks);
+    SAME(frames);
+    SAME(readings);
+    SAME(differs);
+    SAME(arrived);
+}
+
+static void same_reading(const plr_reading *e, const plr_reading *a) {
+    SAME(t_ns);
+    SAME(sensor);
+    SAME(axes);
+    SAME(value);
+    SAME(sigma);
+    SAME(at_B_m);
 }
 
 void wire_assert_same(const plr_message *e, const plr_message *a) {
@@ -397,12 +439,15 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         TEST_ASSERT_EQUAL_STRING(e->as.text.text, a->as.text.text);
         break;
     case PLR_KIND_END:
-        SAME(as.end);
+        same_end(&e->as.end, &a->as.end);
         break;
     case PLR_KIND_STATE:
         SAME(as.state.t_ns);
         SAME(as.state.action);
         SAME(as.state.moved_variance);
+        break;
+    case PLR_KIND_READING:
+        same_reading(&e->as.reading, &a->as.reading);
         break;
     case PLR_KIND_NONE:
         break;

@@ -11,7 +11,7 @@ from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo, Text, Tw
 from pelorus.robot.compare import digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
-from pelorus.robot.stream import BOOT_WORDS, Streamer
+from pelorus.robot.stream import Streamer
 from pelorus.wire import Reader, encode
 from recordings import first_frames
 
@@ -32,7 +32,7 @@ def stereo_indices(messages: list[Message]) -> list[int]:
 
 
 def boots(streamer: Streamer) -> int:
-    return sum(text.text.startswith(BOOT_WORDS) for text in streamer.outcome.texts)
+    return streamer.outcome.boots
 
 
 def answers_to(link: Link, sent: bytes, wanted: Kind | None = None) -> list[Message]:

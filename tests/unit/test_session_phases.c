@@ -102,6 +102,7 @@ static const struct {
     {"TWIST", {{EARLY, WAITING}, {OK, STARTING}, {EARLY, REJECTED}, {OK, STARTING}, {OK, RUNNING}, {OK, RUNNING}}},
     {"STEREO", {{EARLY, WAITING}, {EARLY, STARTING}, {EARLY, REJECTED}, {EARLY, STARTING}, {OK, RUNNING}, {OK, RUNNING}}},
     {"TRUTH", {{OK, WAITING}, {OK, STARTING}, {OK, REJECTED}, {OK, STARTING}, {OK, RUNNING}, {OK, RUNNING}}},
+    {"READING", {{EARLY, WAITING}, {LATE, STARTING}, {EARLY, REJECTED}, {LATE, STARTING}, {LATE, RUNNING}, {LATE, RUNNING}}},
     {"TEXT", {{OK, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"POSE", {{OK, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"END", {{OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}}},
@@ -137,11 +138,18 @@ static plr_message message_of(unsigned row) {
         return drive_stereo(0.2);
     case 11:
         return drive_truth(0.2);
-    case 13:
+    case 12:
+        message.kind = PLR_KIND_READING;
+        message.as.reading = (plr_reading){.t_ns = drive_time_ns(0.2),
+                                           .sensor = PLR_SENSOR_STANDSTILL,
+                                           .axes = 7,
+                                           .sigma = {0.01, 0.01, 0.01}};
+        return message;
+    case 14:
         message.kind = PLR_KIND_POSE;
         message.as.pose.real_bytes = 8;
         return message;
-    case 14:
+    case 15:
         return end_message();
     default:
         return message;
@@ -240,7 +248,8 @@ static void test_a_message_is_echoed_whether_it_is_used_or_refused(void) {
         {1, PLR_KIND_HEADER, 1},   {3, PLR_KIND_CONFIG, 1},   {4, PLR_KIND_START, 1},
         {5, PLR_KIND_LANDMARK, 1}, {6, PLR_KIND_LANDMARK, 0}, {7, PLR_KIND_STATE, 1},
         {8, PLR_KIND_STATE, 1},    {9, PLR_KIND_TWIST, 1},    {10, PLR_KIND_STEREO, 1},
-        {11, PLR_KIND_TRUTH, 1},   {12, PLR_KIND_TEXT, 1},    {13, PLR_KIND_POSE, 0},
+        {11, PLR_KIND_TRUTH, 1},   {12, PLR_KIND_READING, 1}, {13, PLR_KIND_TEXT, 1},
+        {14, PLR_KIND_POSE, 0},
     };
     for (unsigned i = 0; i < sizeof tried / sizeof tried[0]; i++)
         for (unsigned phase = 0; phase < PLR_PHASES; phase++) {

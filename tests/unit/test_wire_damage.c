@@ -26,7 +26,9 @@ void setUp(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_put(&w, &sent[i]));
         end_of[i] = sink.length;
     }
-    sent[PLR_KIND_END - 1].as.end = (plr_end){1, 1, 1, 1, PLR_KIND_END - 1};
+    plr_end *end = &sent[PLR_KIND_END - 1].as.end;
+    end->twists = end->stereos = end->truths = end->landmarks = 1;
+    end->frames = PLR_KIND_END - 1;
     length = sink.length;
 }
 

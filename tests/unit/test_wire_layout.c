@@ -162,7 +162,7 @@ static void test_pose_fields_of_float64_lie_where_the_page_says(void) {
     message.as.pose.real_bytes = 8;
     const plr_pose_message *m = &message.as.pose;
     length = wire_payload(&message, payload, sizeof payload);
-    TEST_ASSERT_EQUAL_size_t(36 + 63 * 8, length);
+    TEST_ASSERT_EQUAL_size_t(36 + 63 * 8 + 32, length);
     ASSERT_NUMBER(8, 1, 8);
     assert_f64s(12, m->T_WB.p, 3);
     assert_f64s(36, m->T_WB.R, 9);
@@ -171,11 +171,13 @@ static void test_pose_fields_of_float64_lie_where_the_page_says(void) {
     assert_f64s(300, m->velocity.w_B_radps, 3);
     assert_f64s(324, m->bias, 6);
     assert_f64s(372, m->P_u, 21);
+    ASSERT_F64(540, m->trace);
+    assert_f32s(548, m->bias_variance, 6);
 }
 
 static void test_pose_fields_of_float32_lie_where_the_page_says(void) {
     const plr_pose_message m = encode(PLR_KIND_POSE).as.pose;
-    TEST_ASSERT_EQUAL_size_t(36 + 63 * 4, length);
+    TEST_ASSERT_EQUAL_size_t(36 + 63 * 4 + 32, length);
     ASSERT_NUMBER(0, 8, m.t_ns);
     ASSERT_NUMBER(8, 1, 4);
     ASSERT_NUMBER(9, 1, 1);
@@ -187,11 +189,13 @@ static void test_pose_fields_of_float32_lie_where_the_page_says(void) {
     assert_f32s(168, m.velocity.w_B_radps, 3);
     assert_f32s(180, m.bias, 6);
     assert_f32s(204, m.P_u, 21);
+    ASSERT_F64(288, m.trace);
+    assert_f32s(296, m.bias_variance, 6);
 }
 
 static void test_report_fields_lie_where_the_page_says(void) {
     const plr_report_message m = encode(PLR_KIND_REPORT).as.report;
-    TEST_ASSERT_EQUAL_size_t(54, length);
+    TEST_ASSERT_EQUAL_size_t(56, length);
     ASSERT_NUMBER(0, 8, m.report.t_ns);
     ASSERT_NUMBER(8, 1, m.subject);
     ASSERT_NUMBER(9, 1, 256 - 7); /* PLR_E_LATE */
@@ -203,6 +207,8 @@ static void test_report_fields_lie_where_the_page_says(void) {
     ASSERT_F32(44, m.report.nis);
     ASSERT_NUMBER(48, 4, m.update_us);
     ASSERT_NUMBER(52, 2, PLR_REASON_STATE_DAMAGED >> 16);
+    ASSERT_NUMBER(54, 1, PLR_NOTICE_RESTORED);
+    ASSERT_NUMBER(55, 1, 0);
 }
 
 static void test_text_fills_the_payload_to_its_end(void) {
@@ -214,9 +220,9 @@ static void test_text_fills_the_payload_to_its_end(void) {
 
 static void test_end_counts_lie_where_the_page_says(void) {
     plr_end counts = {0};
-    for (unsigned i = 0; i < 20; i++)
-        payload[i] = (uint8_t)(i % 4 == 0 ? 1 + i / 4 : 0);
-    plr_pass pass = {.direction = PLR_PASS_READ, .payload = payload, .left = 20};
+    for (unsigned i = 0; i < 45; i++) /* numbers of 4 bytes, with the one byte at 24 between them */
+        payload[i] = (uint8_t)((i > 24 ? i - 1 : i) % 4 == 0 ? 1 + i / 4 : 0);
+    plr_pass pass = {.direction = PLR_PASS_READ, .payload = payload, .left = 45};
     plr_layout_end(&pass, &counts);
     TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, pass.fault);
     TEST_ASSERT_EQUAL_size_t(0, pass.left);
@@ -225,6 +231,10 @@ static void test_end_counts_lie_where_the_page_says(void) {
     TEST_ASSERT_EQUAL_UINT32(3, counts.truths);
     TEST_ASSERT_EQUAL_UINT32(4, counts.landmarks);
     TEST_ASSERT_EQUAL_UINT32(5, counts.frames);
+    TEST_ASSERT_EQUAL_UINT32(6, counts.readings);
+    TEST_ASSERT_EQUAL_UINT8(7, counts.differs);
+    for (unsigned i = 0; i < PLR_COUNTED; i++)
+        TEST_ASSERT_EQUAL_UINT32(7 + i, counts.arrived[i]);
 }
 
 static void test_state_fields_lie_where_the_page_says(void) {
@@ -233,6 +243,17 @@ static void test_state_fields_lie_where_the_page_says(void) {
     ASSERT_NUMBER(0, 8, m.t_ns);
     ASSERT_NUMBER(8, 1, 2); /* restore */
     assert_f64s(9, m.moved_variance, 6);
+}
+
+static void test_reading_fields_lie_where_the_page_says(void) {
+    const plr_reading m = encode(PLR_KIND_READING).as.reading;
+    TEST_ASSERT_EQUAL_size_t(58, length);
+    ASSERT_NUMBER(0, 8, m.t_ns);
+    ASSERT_NUMBER(8, 1, 3); /* position */
+    ASSERT_NUMBER(9, 1, 5); /* x and z */
+    assert_f64s(10, m.value, 3);
+    assert_f32s(34, m.sigma, 3);
+    assert_f32s(46, m.at_B_m, 3);
 }
 
 /* --- lengths --- */
@@ -253,9 +274,20 @@ static plr_fault read_payload(plr_kind kind, size_t n, plr_message *m) {
     return pass.fault;
 }
 
-/* By how much a payload of format 1.1 is shorter: half of the reasons, the sigmas of single axes. */
+/* By how much a payload of format 1.1 is shorter: half of the reasons and the notice, the sigmas of
+ * single axes. */
 static size_t since_1_1(plr_kind kind) {
-    return kind == PLR_KIND_REPORT ? 2 : kind == PLR_KIND_HEADER ? 48 : 0;
+    return kind == PLR_KIND_REPORT ? 4 : kind == PLR_KIND_HEADER ? 48 : 0;
+}
+
+/* The same of format 1.2: trace and variances of the biases, the notice, what has arrived. */
+static size_t since_1_2(plr_kind kind) {
+    return kind == PLR_KIND_POSE ? 32 : kind == PLR_KIND_REPORT ? 2 : kind == PLR_KIND_END ? 25 : 0;
+}
+
+static bool is_whole_in_an_earlier_format(plr_kind kind, size_t n) {
+    return (since_1_1(kind) > 0 && n == length - since_1_1(kind)) ||
+           (since_1_2(kind) > 0 && n == length - since_1_2(kind));
 }
 
 static void test_every_shorter_payload_is_malformed(void) {
@@ -264,7 +296,7 @@ static void test_every_shorter_payload_is_malformed(void) {
         encode((plr_kind)kind);
         size_t least = kind == PLR_KIND_TEXT ? 1 : length;
         for (size_t n = 0; n < least; n++) {
-            if (since_1_1((plr_kind)kind) > 0 && n == length - since_1_1((plr_kind)kind))
+            if (is_whole_in_an_earlier_format((plr_kind)kind, n))
                 continue;
             encode((plr_kind)kind);
             TEST_ASSERT_EQUAL_INT(PLR_FAULT_MALFORMED, read_payload((plr_kind)kind, n, &m));
@@ -277,6 +309,7 @@ static void test_a_report_of_format_1_1_has_the_lower_reasons_alone(void) {
     const size_t old = length - since_1_1(PLR_KIND_REPORT);
     TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_REPORT, old, &m));
     expected.as.report.report.reasons &= 0xFFFF;
+    expected.as.report.notice = PLR_NOTICE_NONE;
     wire_assert_same(&expected, &m);
     TEST_ASSERT_EQUAL_HEX32(PLR_REASON_FEW_OBSERVATIONS, m.as.report.report.reasons);
 }
@@ -292,9 +325,28 @@ static void test_a_header_of_format_1_1_tells_nothing_of_single_axes(void) {
     wire_assert_same(&expected, &m);
 }
 
+static void test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2(void) {
+    static const plr_kind kinds[] = {PLR_KIND_POSE, PLR_KIND_REPORT, PLR_KIND_END};
+    for (unsigned i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        plr_message m, expected = encode(kinds[i]);
+        const size_t old = length - since_1_2(kinds[i]);
+        TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(kinds[i], old, &m));
+        if (kinds[i] == PLR_KIND_POSE) {
+            expected.as.pose.trace = -1;
+            for (unsigned j = 0; j < 6; j++)
+                expected.as.pose.bias_variance[j] = -1;
+        }
+        if (kinds[i] == PLR_KIND_REPORT)
+            expected.as.report.notice = PLR_NOTICE_NONE;
+        if (kinds[i] == PLR_KIND_END)
+            memset(&expected.as.end, 0, sizeof expected.as.end);
+        wire_assert_same(&expected, &m);
+    }
+}
+
 static void test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored(void) {
     for (unsigned kind = PLR_KIND_HEADER; kind <= PLR_WIRE_KINDS; kind++) {
-        if (kind == PLR_KIND_TEXT || kind == PLR_KIND_END)
+        if (kind == PLR_KIND_TEXT)
             continue;
         for (size_t more = 0; more < 40; more++) {
             plr_message m, expected = encode((plr_kind)kind);
@@ -351,7 +403,8 @@ static void test_bits_and_bytes_without_a_meaning_are_ignored(void) {
     } spare[] = {{PLR_KIND_START, 104, 0xFC},
                  {PLR_KIND_LANDMARK, 9, 0xFF},
                  {PLR_KIND_POSE, 9, 0xFE},
-                 {PLR_KIND_REPORT, 11, 0xFF}};
+                 {PLR_KIND_REPORT, 11, 0xFF},
+                 {PLR_KIND_REPORT, 55, 0xFF}};
     for (size_t i = 0; i < sizeof spare / sizeof *spare; i++) {
         plr_message m, expected = encode(spare[i].kind);
         payload[spare[i].at] |= spare[i].bits;
@@ -382,9 +435,11 @@ int main(void) {
     RUN_TEST(test_text_fills_the_payload_to_its_end);
     RUN_TEST(test_end_counts_lie_where_the_page_says);
     RUN_TEST(test_state_fields_lie_where_the_page_says);
+    RUN_TEST(test_reading_fields_lie_where_the_page_says);
     RUN_TEST(test_every_shorter_payload_is_malformed);
     RUN_TEST(test_a_report_of_format_1_1_has_the_lower_reasons_alone);
     RUN_TEST(test_a_header_of_format_1_1_tells_nothing_of_single_axes);
+    RUN_TEST(test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2);
     RUN_TEST(test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored);
     RUN_TEST(test_values_that_the_page_does_not_list_are_malformed);
     RUN_TEST(test_a_status_of_a_later_version_is_let_through);

@@ -138,18 +138,21 @@ static void test_the_sequence_goes_from_0_and_wraps(void) {
 static void test_an_end_tells_what_was_written_whatever_it_says(void) {
     const plr_kind kinds[] = {PLR_KIND_HEADER, PLR_KIND_TWIST,    PLR_KIND_TWIST, PLR_KIND_TWIST,
                               PLR_KIND_STEREO, PLR_KIND_STEREO,   PLR_KIND_TRUTH, PLR_KIND_LANDMARK,
-                              PLR_KIND_TWIST,  PLR_KIND_LANDMARK, PLR_KIND_TRUTH, PLR_KIND_TRUTH};
+                              PLR_KIND_TWIST,  PLR_KIND_LANDMARK, PLR_KIND_TRUTH, PLR_KIND_TRUTH,
+                              PLR_KIND_READING};
     enum { FRAMES = sizeof kinds / sizeof *kinds };
     for (unsigned i = 0; i < FRAMES; i++)
         TEST_ASSERT_EQUAL_INT(PLR_OK, put_sample(kinds[i]));
     sink.length = 0;
     plr_message end = {.kind = PLR_KIND_END}, back;
     end.as.end.twists = 1000;
+    end.as.end.arrived[PLR_COUNTED_READING] = 9; /* which the writer cannot know */
+    end.as.end.differs = 1U << PLR_COUNTED_READING;
     TEST_ASSERT_EQUAL_INT(PLR_OK, put(&end));
     plr_reader r = wire_reader();
     size_t taken;
     TEST_ASSERT_EQUAL_INT(PLR_READ_MESSAGE, plr_reader_feed(&r, bytes, sink.length, &taken, &back));
-    end.as.end = (plr_end){4, 2, 3, 2, FRAMES};
+    end.as.end = (plr_end){4, 2, 3, 2, FRAMES, 1, 16, {0, 0, 0, 0, 9}};
     wire_assert_same(&end, &back);
 }
 

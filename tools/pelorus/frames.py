@@ -42,6 +42,7 @@ class Kind(IntEnum):
     TEXT = 10
     END = 11
     STATE = 12
+    READING = 13
 
 
 class BodyAxes(IntEnum):
@@ -74,6 +75,23 @@ class StateAction(IntEnum):
     RESTORE = 2
 
 
+class Notice(IntEnum):
+    """What a REPORT tells besides its status."""
+
+    NONE = 0
+    STARTED = 1  # the sender has just started: whatever it was told before is lost
+    SAVED = 2
+    RESTORED = 3  # the filter goes on from a saved state
+
+
+class Sensor(IntEnum):
+    """What measured a READING."""
+
+    WHEEL = 1  # the velocity of a point of the body, in body axes
+    STANDSTILL = 2  # that it does not move
+    POSITION = 3  # the position of a point of the body in the world
+
+
 class Role(IntEnum):
     """Where a landmark comes from."""
 
@@ -96,6 +114,11 @@ def zeros(*shape: int) -> Any:
     return field(default_factory=lambda: np.zeros(shape))
 
 
+def unknown(*shape: int) -> Any:
+    """A dataclass field: -1 everywhere by default, for variances that are not known."""
+    return field(default_factory=lambda: np.full(shape, -1.0))
+
+
 def identity() -> Any:
     """A dataclass field: the rotation that does nothing by default."""
     return field(default_factory=lambda: np.eye(3))
@@ -106,13 +129,19 @@ class Message:
 
     kind: ClassVar[Kind]
     layout: ClassVar[Layout]
+    tail: ClassVar[Layout] = Layout("")  # what format 1.3 added; in an older payload it is absent
 
     def pack(self) -> bytes:
-        return self.layout.pack(vars(self))
+        return self.layout.pack(vars(self)) + self.tail.pack(vars(self))
 
     @classmethod
     def unpack(cls, payload: bytes) -> Self:
-        return cls(**cls.layout.unpack(payload))
+        return cls(**cls.layout.unpack(payload), **cls.added(payload, cls.layout.size))
+
+    @classmethod
+    def added(cls, payload: bytes, at: int) -> dict[str, Any]:
+        """The fields of the tail; none if the payload ends before it."""
+        return cls.tail.unpack(payload, at) if len(payload) > at else {}
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self.pack() == other.pack()
@@ -168,7 +197,7 @@ class Header(Message):
     noise: Noise = Noise()
     name: str = ""
     version_major: int = 1
-    version_minor: int = 2
+    version_minor: int = 3
     units: int = 0
 
     kind: ClassVar[Kind] = Kind.HEADER
@@ -286,6 +315,21 @@ class Truth(Message):
 
 
 @dataclass(frozen=True, eq=False)
+class Reading(Message):
+    """One to three numbers of a sensor at `at_B_m` on the body; bits of `axes` say which."""
+
+    t_ns: int
+    sensor: int  # Sensor, or one of a later version
+    axes: int = 7
+    value: Floats = zeros(3)
+    sigma: Floats = zeros(3)
+    at_B_m: Floats = zeros(3)
+
+    kind: ClassVar[Kind] = Kind.READING
+    layout: ClassVar[Layout] = Layout("t_ns:Q sensor:B axes:B value:3d sigma:3f at_B_m:3f")
+
+
+@dataclass(frozen=True, eq=False)
 class Text(Message):
     """A remark; severity 0 info, 1 warning, 2 error."""
 
@@ -311,16 +355,43 @@ class Text(Message):
 
 @dataclass(frozen=True, eq=False)
 class End(Message):
-    """How many frames there were; `frames` counts all before this one."""
+    """How many frames there were; `frames` counts all before this one.
+
+    Bits of `differs` say of which kinds another number arrived than the END says that this one
+    answers, and `arrived_*`, in the same order, how many; the others are 0.
+    """
 
     twists: int
     stereos: int
     truths: int
     landmarks: int
     frames: int
+    readings: int = 0
+    differs: int = 0
+    arrived_twists: int = 0
+    arrived_stereos: int = 0
+    arrived_truths: int = 0
+    arrived_landmarks: int = 0
+    arrived_readings: int = 0
 
     kind: ClassVar[Kind] = Kind.END
     layout: ClassVar[Layout] = Layout("twists:I stereos:I truths:I landmarks:I frames:I")
+    tail: ClassVar[Layout] = Layout(
+        "readings:I differs:B arrived_twists:I arrived_stereos:I arrived_truths:I "
+        "arrived_landmarks:I arrived_readings:I"
+    )
+
+    @property
+    def incomplete(self) -> dict[Kind, int]:
+        """How many arrived, of the kinds of which that is another number than was sent."""
+        counts = (
+            (Kind.TWIST, self.arrived_twists),
+            (Kind.STEREO, self.arrived_stereos),
+            (Kind.TRUTH, self.arrived_truths),
+            (Kind.LANDMARK, self.arrived_landmarks),
+            (Kind.READING, self.arrived_readings),
+        )
+        return {kind: count for at, (kind, count) in enumerate(counts) if self.differs >> at & 1}
 
 
 @dataclass(frozen=True, eq=False)
@@ -402,12 +473,15 @@ class Pose(Message):
     real_bytes: int = 8
     after_stereo: bool = False
     reset_count: int = 0
+    trace: float = -1.0  # of the whole covariance; negative: not known
+    bias_variance: Floats = unknown(6)  # negative: not known
 
     kind: ClassVar[Kind] = Kind.POSE
     layout: ClassVar[Layout] = Layout(
         "t_ns:Q real_bytes:B after_stereo:B reset_count:H p_WB_m:3d",
         after_stereo=lambda flags: bool(flags & 1),
     )
+    tail: ClassVar[Layout] = Layout("trace:d bias_variance:6f")
     REALS: ClassVar[dict[int, Layout]] = {
         size: Layout(
             f"R_WB:3x3{code} covariance:21{code} v_B_mps:3{code} w_B_radps:3{code} bias:6{code} "
@@ -422,15 +496,18 @@ class Pose(Message):
         return bool(self.covariance[0] < UNKNOWN_VARIANCE)
 
     def pack(self) -> bytes:
-        return super().pack() + self.REALS[self.real_bytes].pack(vars(self))
+        values = vars(self)
+        reals = self.REALS[self.real_bytes].pack(values)
+        return self.layout.pack(values) + reals + self.tail.pack(values)
 
     @classmethod
     def unpack(cls, payload: bytes) -> Pose:
         found = cls.layout.unpack(payload)
         if found["real_bytes"] not in cls.REALS:
             raise MalformedPayload(f"reals of {found['real_bytes']} bytes, 4 or 8 are defined")
-        reals = cls.REALS[found["real_bytes"]].unpack(payload, cls.layout.size)
-        return cls(**found, **reals)
+        layout = cls.REALS[found["real_bytes"]]
+        reals = layout.unpack(payload, cls.layout.size)
+        return cls(**found, **reals, **cls.added(payload, cls.layout.size + layout.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -459,6 +536,7 @@ class Report(Message):
     nis_dof: int = 0
     nis: float = 0.0
     update_us: int = 0
+    notice: int = Notice.NONE  # Notice, or one of a later version
 
     kind: ClassVar[Kind] = Kind.REPORT
     layout: ClassVar[Layout] = Layout(
@@ -469,12 +547,12 @@ class Report(Message):
         health=lambda value: within("health", value, 0, 3),
     )
     UPPER: ClassVar[Layout] = Layout("reasons:H")  # the upper half of them; since format 1.2
+    tail: ClassVar[Layout] = Layout("notice:B _:B")
 
     def pack(self) -> bytes:
         upper, lower = divmod(self.reasons, 1 << 16)
-        return self.layout.pack(vars(self) | {"reasons": lower}) + self.UPPER.pack(
-            {"reasons": upper}
-        )
+        fixed = self.layout.pack(vars(self) | {"reasons": lower})
+        return fixed + self.UPPER.pack({"reasons": upper}) + self.tail.pack(vars(self))
 
     @classmethod
     def unpack(cls, payload: bytes) -> Report:
@@ -482,7 +560,8 @@ class Report(Message):
         if len(payload) == cls.layout.size:
             return report
         upper = cls.UPPER.unpack(payload, cls.layout.size)["reasons"]
-        return replace(report, reasons=upper << 16 | report.reasons)
+        added = cls.added(payload, cls.layout.size + cls.UPPER.size)
+        return replace(report, reasons=upper << 16 | report.reasons, **added)
 
 
 KINDS: dict[int, type[Message]] = {cls.kind: cls for cls in Message.__subclasses__()}

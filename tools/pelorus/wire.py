@@ -11,7 +11,7 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -197,6 +197,19 @@ class Reader:
         self.counts.fault(offset, f"longer than {STUFFED_BYTES_MAX} bytes")
 
 
+def end_of(counts: Counter[Kind], heard: End | None = None) -> End:
+    """The END behind that many frames; what has arrived is as another END says."""
+    sent = {
+        "twists": counts[Kind.TWIST],
+        "stereos": counts[Kind.STEREO],
+        "truths": counts[Kind.TRUTH],
+        "landmarks": counts[Kind.LANDMARK],
+        "readings": counts[Kind.READING],
+        "frames": sum(counts.values()),
+    }
+    return End(**sent) if heard is None else replace(heard, **sent)
+
+
 class Writer:
     """Writes messages as frames, counts them, and closes the stream with END."""
 
@@ -208,17 +221,9 @@ class Writer:
         self._stream.write(encode(message, sum(self._counts.values())))
         self._counts[message.kind] += 1
 
-    def end(self) -> None:
-        counts = self._counts
-        self.write(
-            End(
-                twists=counts[Kind.TWIST],
-                stereos=counts[Kind.STEREO],
-                truths=counts[Kind.TRUTH],
-                landmarks=counts[Kind.LANDMARK],
-                frames=sum(counts.values()),
-            )
-        )
+    def end(self, heard: End | None = None) -> None:
+        """`heard` is a robot's END: what it says of what has arrived goes into this one."""
+        self.write(end_of(self._counts, heard))
 
 
 def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], Counts]:

@@ -2,12 +2,11 @@
 """A robot's log, taken apart: frames with their answers, and what is known to have been lost.
 
 A log is read as parts. A board that starts anew forgets everything but what it is then told, so
-each of its lives is a drive of its own, from its HEADER to the next boot message.
+each of its lives is a drive of its own, from its HEADER to the next REPORT that says so.
 """
 
 from __future__ import annotations
 
-import re
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,10 +17,12 @@ from typing import NamedTuple
 from pelorus.errors import PelorusError
 from pelorus.frames import (
     Config,
+    End,
     Header,
     Kind,
     Landmark,
     Message,
+    Notice,
     Pose,
     Report,
     Role,
@@ -31,15 +32,12 @@ from pelorus.frames import (
     Text,
 )
 from pelorus.robot.status import STATUSES
-from pelorus.robot.stream import BOOT_WORDS, is_restore
+from pelorus.robot.stream import is_restore
 from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
 
-DATA_KINDS = (Kind.TWIST, Kind.STEREO, Kind.TRUTH)
+DATA_KINDS = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.READING)
 NOT_ARRIVED = (-1, -15, -16)  # statuses of what was damaged on the way
 FULL = -10
-ARRIVED = re.compile(r"(\d+) of \d+ (TWIST|STEREO|TRUTH|LANDMARK)")
-INCOMPLETE_WORDS = "the recording is not complete"
-RESTORED_WORDS = "state restored"
 RIGHT = "`pelorus stream --record` and `pelorus-replay --out` write what a replay needs"
 
 
@@ -147,9 +145,10 @@ def read_log(path: Path) -> Log:
     if Kind.STEREO not in kinds:
         raise PelorusError(f"{path}: holds answers but no STEREO, so no inputs to replay; {RIGHT}")
     header_of(received, path)
-    parts, frames = _parts(_up_to_end(received))
+    before, end = _up_to_end(received)
+    parts, frames = _parts(before, end)
     remarks = [] if counts.ended else ["there is no END: the log was cut short"]
-    if counts.ended and len(_up_to_end(received)) + 1 < len(received):
+    if counts.ended and len(before) + 1 < len(received):
         remarks.append("goes on behind END; that was not read")
     if not counts.clean:
         remarks.append(f"the log is damaged: {counts.damaged} frames, {counts.missing} missing")
@@ -164,23 +163,25 @@ def frames_of(messages: Iterable[Message]) -> list[Frame]:
     return walk.frames
 
 
-def _up_to_end(received: list[Received]) -> list[Received]:
-    ends = [at for at, frame in enumerate(received) if frame.message.kind == Kind.END]
-    return received[: ends[0]] if ends else received
+def _up_to_end(received: list[Received]) -> tuple[list[Received], End | None]:
+    for at, frame in enumerate(received):
+        if isinstance(frame.message, End):
+            return received[:at], frame.message
+    return received, None
 
 
-def _parts(received: Sequence[Received]) -> tuple[list[Part], int]:
+def _parts(received: Sequence[Received], end: End | None) -> tuple[list[Part], int]:
     boots = [
         at
         for at, frame in enumerate(received)
-        if isinstance(frame.message, Text) and frame.message.text.startswith(BOOT_WORDS)
+        if isinstance(frame.message, Report) and frame.message.notice == Notice.STARTED
     ]
     edges = [0, *boots, len(received)]
     parts: list[Part] = []
     frames, config = 0, None
     for first, last in pairwise(edges):
         before = received[first - 1].sequence if first else None
-        part = _part(received[first:last], before, frames)
+        part = _part(received[first:last], before, frames, end if last == edges[-1] else None)
         config = part.config = part.config or config  # of the same board
         frames += len(part.frames)
         if part.frames:
@@ -188,7 +189,9 @@ def _parts(received: Sequence[Received]) -> tuple[list[Part], int]:
     return parts, frames
 
 
-def _part(received: Sequence[Received], before: int | None, frames_before: int) -> Part:
+def _part(
+    received: Sequence[Received], before: int | None, frames_before: int, end: End | None
+) -> Part:
     messages = [frame.message for frame in received]
     walk = _Walk(frames_before)
     expected = None if before is None else (before + 1) % SEQUENCE_MODULUS
@@ -205,7 +208,7 @@ def _part(received: Sequence[Received], before: int | None, frames_before: int) 
         Loss(f.number, f"no answer to frame {f.number}: it, or the answer, was lost on the way")
         for f in part.unanswered
     ]
-    absent = _not_arrived(part)
+    absent = _not_arrived(part, end)
     if absent > len(part.losses):
         words = f"the robot's count at the end lacks messages that the log holds: {absent}"
         part.losses.append(Loss(NOWHERE, words))
@@ -278,21 +281,16 @@ def _is_input(message: Message) -> bool:
 
 def _is_restored(messages: Sequence[Message]) -> bool:
     """Whether the filter said so, or was asked to and did not refuse."""
-    if any(isinstance(m, Text) and m.text.startswith(RESTORED_WORDS) for m in messages):
+    if any(isinstance(m, Report) and m.notice == Notice.RESTORED for m in messages):
         return True
     asked = [m.t_ns for m in messages if isinstance(m, State) and m.action == StateAction.RESTORE]
     refused = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STATE]
     return bool(asked) and not any(r.status and r.t_ns in asked for r in refused)
 
 
-def _not_arrived(part: Part) -> int:
+def _not_arrived(part: Part, end: End | None) -> int:
     """How many inputs the log holds that the robot did not get, by its count at the end."""
+    if end is None:
+        return 0
     held = Counter(m.kind for m in part.messages if _is_input(m))
-    last_words = [
-        m.text for m in part.messages if isinstance(m, Text) and m.text.startswith(INCOMPLETE_WORDS)
-    ]
-    return sum(
-        max(held[Kind[name]] - int(count), 0)
-        for text in last_words
-        for count, name in ARRIVED.findall(text)
-    )
+    return sum(max(held[kind] - count, 0) for kind, count in end.incomplete.items())

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import BinaryIO
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Config, Kind, Message, Report
+from pelorus.frames import Config, End, Kind, Message, Report
 from pelorus.wire import Writer
 
 SETUP_KINDS = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK, Kind.START)
@@ -45,11 +45,11 @@ class FlightLog:
         for message in held:
             self._write(message)
 
-    def end(self) -> None:
-        """Close the recording with END."""
+    def end(self, heard: End | None = None) -> None:
+        """Close the recording with END; `heard` is the board's."""
         self.release()
         try:
-            self._writer.end()
+            self._writer.end(heard)
             self._stream.flush()
         except OSError as error:
             raise self._trouble(error) from error

@@ -3,7 +3,7 @@
 
 The rule of docs/PORTING.md, "Flow control": after each STEREO and each STATE the sender waits for
 the REPORT that answers it, or for a time-out; it never waits without reading. A board that starts
-anew announces itself with a TEXT; it is then given HEADER, settings and its own last pose, and the
+anew says so in a REPORT; it is then given HEADER, settings and its own last pose, and the
 drive goes on.
 """
 
@@ -25,6 +25,7 @@ from pelorus.frames import (
     Kind,
     Landmark,
     Message,
+    Notice,
     Pose,
     Report,
     Start,
@@ -37,9 +38,8 @@ from pelorus.frames import (
 from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
 from pelorus.robot.link import Link
 from pelorus.robot.status import refusal
-from pelorus.wire import DELIMITER, Counts, Reader, encode
+from pelorus.wire import DELIMITER, Counts, Reader, encode, end_of
 
-BOOT_WORDS = "pelorus "  # a board's first TEXT begins with them
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
 QUIET_S = 0.3
 GREETING_S = 3.0  # a board may be in the middle of something
@@ -63,7 +63,8 @@ class Outcome:
     texts: list[Text] = field(default_factory=list)
     frames: int = 0  # STEREO sent
     unanswered: int = 0
-    restarts: int = 0
+    boots: int = 0  # times that the board said it had started
+    restarts: int = 0  # those in mid-drive
     worst_update_us: int = 0
     states: list[Report] = field(default_factory=list)  # the answers to STATE
     state_trouble: str = ""  # why the last STATE was not done
@@ -91,7 +92,7 @@ class Streamer:
         self._unread_bytes = 0
         self._awaited: int | None = None  # time of the STEREO that is to be answered
         self._unanswered_in_a_row = 0
-        self._ended = False
+        self._end_heard: End | None = None  # the board's
         self._under_way = False
         self._board_is_new = False  # it announced itself, and has not been given its set-up yet
 
@@ -118,14 +119,16 @@ class Streamer:
         boots is lost.
         """
         deadline = time.monotonic() + self.answer_s
-        while not self._ended and time.monotonic() < deadline:
+        while self._end_heard is None and time.monotonic() < deadline:
             self._exchange(DELIMITER + encode(End(0, 0, 0, 0, 0), 0), 0.0)
-            self._wait(lambda: self._ended, min(END_AGAIN_S, deadline - time.monotonic()))
+            self._wait(
+                lambda: self._end_heard is not None, min(END_AGAIN_S, deadline - time.monotonic())
+            )
         self._await_quiet()
-        self.outcome = Outcome(texts=self.outcome.texts)
+        self.outcome = Outcome(texts=self.outcome.texts, boots=self.outcome.boots)
         self.reader.counts = Counts()  # what came before is not this drive's
         self._sequence = 1
-        self._ended = False
+        self._end_heard = None
         self._under_way = True
 
     def _await_quiet(self) -> None:
@@ -163,15 +166,10 @@ class Streamer:
 
     def finish(self) -> None:
         """Say END, and hear the board's."""
-        self._put(self._end(), logged=False)
-        self._wait(lambda: self._ended, self.answer_s)
+        self._put(end_of(self._sent), logged=False)
+        self._wait(lambda: self._end_heard is not None, self.answer_s)
         if self._log is not None:
-            self._log.end()
-
-    def _end(self) -> End:
-        sent = self._sent
-        counts = (sent[Kind.TWIST], sent[Kind.STEREO], sent[Kind.TRUTH], sent[Kind.LANDMARK])
-        return End(*counts, frames=sum(sent.values()))
+            self._log.end(self._end_heard)
 
     def _put(self, message: Message, logged: bool = True) -> None:
         if logged and self._log is not None:
@@ -212,23 +210,23 @@ class Streamer:
 
         Without the state that it was to go on from, a drive would be another one: it ends there.
         """
-        answers = len(self.outcome.states)
+        answers, words = len(self.outcome.states), len(self.outcome.texts)
         patience_s = max(STATE_S, self.answer_s)
         self._wait(lambda: len(self.outcome.states) > answers or self._board_is_new, patience_s)
         self._unread_bytes = 0
         if len(self.outcome.states) > answers:
-            self.outcome.state_trouble = self._why_not(self.outcome.states[-1])
+            self.outcome.state_trouble = self._why_not(self.outcome.states[-1], words)
         else:
             self.outcome.state_trouble = "the board did not answer when asked about its state"
             self._note(self.outcome.state_trouble)
         if self.outcome.state_trouble and is_restore(state):
             raise PelorusError(self.outcome.state_trouble)
 
-    def _why_not(self, answer: Report) -> str:
-        """The board's own words before it, if it has said any; nothing if all is well."""
+    def _why_not(self, answer: Report, words_before: int) -> str:
+        """The board's own words since it was asked, if it has said any; nothing if all is well."""
         if answer.status == 0:
             return ""
-        words = [text.text for text in self.outcome.texts if text.text.startswith("state not ")]
+        words = [text.text for text in self.outcome.texts[words_before:] if text.severity]
         return words[-1] if words else refusal(Kind.STATE, answer.status, 1)
 
     def _exchange(self, outgoing: bytes, wait_s: float) -> bool:
@@ -253,14 +251,15 @@ class Streamer:
                 self.outcome.config = message
             case Text():
                 self.outcome.texts.append(message)
-                if self._under_way and message.text.startswith(BOOT_WORDS):
-                    self._board_is_new = True
             case End():
-                self._ended = True
+                self._end_heard = message
             case _:
                 pass  # landmarks: they are in the log
 
     def _take_report(self, report: Report) -> None:
+        if report.notice == Notice.STARTED:
+            self.outcome.boots += 1
+            self._board_is_new = self._under_way
         if report.subject == Kind.STATE:
             self.outcome.states.append(report)
         if report.subject != Kind.STEREO:
