@@ -117,7 +117,8 @@ enum {
     PLR_POSE_DIM = 6,     /* (rho, theta) */
     PLR_BIAS_DIM = 6,     /* (b_v, b_w) */
     PLR_LANDMARK_DIM = 3, /* w_i or dm_i */
-    PLR_ROWS = 3,         /* rows of an observation: uL, uR, v */
+    PLR_ROWS = 3,         /* rows of a measurement */
+    PLR_WIDEST_BLOCK = 6, /* of the state */
     PLR_BLOCK_ROWS = PLR_ROWS * PLR_BLOCK_OBSERVATIONS,
     PLR_WORK_ROWS = PLR_BLOCK_ROWS > 24 ? PLR_BLOCK_ROWS : 24, /* a predict needs 4 x 6 */
     PLR_MAX_STATE = PLR_POSE_DIM + PLR_BIAS_DIM + PLR_LANDMARK_DIM * PLR_MAX_LANDMARKS,

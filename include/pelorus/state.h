@@ -47,6 +47,21 @@ typedef struct plr_totals {
     plr_time_ns diverged_ns; /* when a variance was last found not positive; 0: never */
 } plr_totals;
 
+/* The blocks of the state's error before the landmarks, in their order in P. */
+typedef enum plr_block_id {
+    PLR_BLOCK_POSE, /* (rho, theta): T_WB Exp(rho, theta) is the truth; m, rad */
+    PLR_BLOCK_BIAS, /* (b_v, b_w), of the twists; m/s, rad/s */
+    PLR_BLOCKS
+} plr_block_id;
+
+/* Where they stand: laid out once by the process. */
+typedef struct plr_layout {
+    struct {
+        uint8_t row, size; /* size 0: not estimated */
+    } block[PLR_BLOCKS];
+    uint8_t core; /* rows of all blocks: the first landmark's row */
+} plr_layout;
+
 /* One landmark slot. */
 typedef struct plr_slot {
     plr_real x[PLR_LANDMARK_DIM]; /* body: q in the current left camera; world: m; metres */
@@ -164,6 +179,7 @@ typedef struct plr_filter {
     plr_map map;
     plr_parameters par;
     uint8_t model; /* plr_model_kind: of the table of models */
+    plr_layout layout;
 
     plr_time_ns t_ns;       /* of the estimate */
     plr_time_ns reading_ns; /* of the last twist */

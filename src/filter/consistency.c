@@ -6,6 +6,7 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
+#include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/slots.h"
@@ -363,7 +364,7 @@ static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
         reasons |= PLR_REASON_TWIST_CONTRADICTED;
     if (c->frozen)
         reasons |= PLR_REASON_FROZEN_IMAGE;
-    if (f->config.bias && bias_is_off(f))
+    if (plr_has_block(f, PLR_BLOCK_BIAS) && bias_is_off(f))
         reasons |= PLR_REASON_BIAS_OFF_PRIOR;
     if (report->matched > 0 && c->matched > STALE_FRAMES && c->gated > REJECTED_SHARE * c->matched)
         reasons |= PLR_REASON_SCENE_DISAGREES;
@@ -393,7 +394,7 @@ static void settle(plr_filter *f) {
     if (plr_norm2_of_6(c->apart) > 0) {
         plr_real C[36];
         covariance_of(f, c->apart, C);
-        plr_covariance_widen_pose(f, C);
+        plr_covariance_add(f, PLR_BLOCK_POSE, C);
         f->totals.widened++;
     }
     memset(c->apart, 0, sizeof c->apart);

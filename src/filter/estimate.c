@@ -6,6 +6,7 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/slots.h"
@@ -69,7 +70,7 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
 
 /* The bias covariance at the time of the estimate: P_b and the walk not yet applied. */
 static void bias_covariance(const plr_filter *f, plr_real P_b[36]) {
-    plr_covariance_bias(f, P_b);
+    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     for (int i = 0; i < 6; i++)
         P_b[7 * i] +=
             f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
@@ -84,7 +85,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     if (f->diverged)
         return PLR_E_DIVERGED;
     plr_real P[36] = {0};
-    if (f->config.bias)
+    if (plr_has_block(f, PLR_BLOCK_BIAS))
         bias_covariance(f, P);
     /* with noise = step the sigmas are of a displacement: divide by the step */
     const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
@@ -107,7 +108,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     if (f->diverged && P_b)
         return PLR_E_DIVERGED;
     plr_real P[36] = {0};
-    if (f->config.bias)
+    if (plr_has_block(f, PLR_BLOCK_BIAS))
         bias_covariance(f, P);
     to_double(b, f->bias, 6);
     if (P_b)
@@ -120,13 +121,14 @@ double plr_filter_trace(const plr_filter *f) {
         return 0;
     plr_real P[36], P_b[36] = {0};
     double trace = plr_covariance_trace(f);
-    plr_covariance_pose(f, P); /* the pose's and the biases' variances are those of now */
+    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE,
+                       P); /* the pose's and the biases' variances are those of now */
     for (int i = 0; i < 6; i++)
         trace -= (double)P[7 * i];
     pose_covariance(f, P);
-    if (f->config.bias) {
+    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real before[36];
-        plr_covariance_bias(f, before);
+        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before);
         bias_covariance(f, P_b);
         for (int i = 0; i < 6; i++)
             trace += (double)P_b[7 * i] - (double)before[7 * i];

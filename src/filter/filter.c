@@ -7,9 +7,12 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/predict.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/twist.h"
+#include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -99,6 +102,7 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
         f->map = *map;
     f->model = config->model;
     set_parameters(&f->par, calibration, config);
+    plr_twist_lay_out(f);
     f->magic = PLR_FILTER_MAGIC;
     plr_guard_seal_constant(f);
     return plr_filter_reset(f);
@@ -112,12 +116,19 @@ static void start_covariance(const plr_filter *f, double P_xi[36]) {
         P_xi[7 * i] = sigma * sigma;
 }
 
+void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
+    double P_b[PLR_BIAS_DIM * PLR_BIAS_DIM] = {0};
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        P_b[(PLR_BIAS_DIM + 1) * i] = variance[i];
+    plr_covariance_begin(f, PLR_BLOCK_BIAS, P_b);
+}
+
 static void set_bias_prior(plr_filter *f, const double mean[6], const double variance[6]) {
     for (int i = 0; i < 6; i++) {
         f->bias[i] = f->bias_prior[i] = (plr_real)mean[i];
         f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
     }
-    plr_covariance_set_bias(f, variance);
+    plr_filter_begin_bias(f, variance);
 }
 
 static void start_bias(plr_filter *f) {
@@ -139,7 +150,7 @@ static void go_back_to_bias_prior(plr_filter *f) {
         f->bias[i] = f->bias_prior[i];
         variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
     }
-    plr_covariance_set_bias(f, variance);
+    plr_filter_begin_bias(f, variance);
 }
 
 plr_status plr_filter_reset(plr_filter *f) {
@@ -169,9 +180,9 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(f->bias_prior, 0, sizeof f->bias_prior);
     plr_consistency_clear(f);
     start_covariance(f, P_xi);
-    plr_covariance_set_pose(f, P_xi);
+    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_filter_keep_for_recovery(f);
-    if (f->config.bias)
+    if (plr_has_block(f, PLR_BLOCK_BIAS))
         start_bias(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
@@ -236,17 +247,18 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
 
     double P_start[36];
     start_covariance(f, P_start);
-    plr_motion_drop(f);
+    plr_predict_drop(f);
     if (f->clock_started)
         f->totals.resets++;
     f->count = 0;
-    plr_covariance_set_pose(f, P_xi ? P_xi : P_start);
+    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi ? P_xi : P_start);
     put_pose(f, t_ns, T_WB);
     plr_consistency_clear(f);
     plr_filter_keep_for_recovery(f);
     f->diverged = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
-    if (!plr_covariance_is_positive(f) && f->config.bias) /* the bias is lost too */
+    if (!plr_covariance_is_positive(f) &&
+        plr_has_block(f, PLR_BLOCK_BIAS)) /* the bias is lost too */
         go_back_to_bias_prior(f);
     /* a reading, and a frame, of another clock say nothing any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
@@ -263,7 +275,7 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
     const plr_status sound = plr_guard_look_whole(f);
     if (sound != PLR_OK)
         return sound;
-    if (!f->config.bias || f->totals.twists > 0 || f->totals.frames > 0 ||
+    if (!plr_has_block(f, PLR_BLOCK_BIAS) || f->totals.twists > 0 || f->totals.frames > 0 ||
         f->config.mode == PLR_MODE_MAPPING)
         return plr_filter_refuse(f, PLR_E_MODE);
     if (!plr_all_finite(mean, 6) || !plr_all_finite(variance, 6))

@@ -24,6 +24,9 @@ static inline plr_real plr_seconds(plr_time_ns ns) {
 /* Forgets the last twist reading: the body is assumed to stand still, reading - bias = 0. */
 void plr_filter_forget_reading(plr_filter *f);
 
+/* The biases' covariance becomes a diagonal, uncorrelated with the rest. Only without landmarks. */
+void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]);
+
 /* Counts a refused call in the totals, and returns its status. */
 plr_status plr_filter_refuse(plr_filter *f, plr_status status);
 

@@ -9,6 +9,7 @@
 #include "filter/vantage.h"
 #include "math/dense.h"
 #include "math/small.h"
+#include "sensor/stereo.h"
 #include "state/motion.h"
 #include "state/slots.h"
 
@@ -38,7 +39,7 @@ static void judge_at_zero(plr_search *s, unsigned i) {
     }
     const plr_real *U = at->U[s->bank];
     plr_real M[6], x[3];
-    plr_real limit = s->f->par.camera.fx * s->f->par.camera.fx;
+    plr_real limit = plr_stereo_largest_spread(s->f);
     bool basis = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
@@ -53,7 +54,7 @@ static void judge_at_zero(plr_search *s, unsigned i) {
             for (unsigned l = 0; l < 3; l++)
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
-        basis = basis && sum - plr_gate_noise(s->f, r) <= limit;
+        basis = basis && sum - plr_stereo_variance(s->f, r) <= limit;
     }
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
         at->voice = 0;
@@ -102,21 +103,17 @@ static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_re
     return plr_dot3(e, e);
 }
 
-/* The squared norm of the four residuals at the point evaluated last, for the course's gate. */
-static plr_real residual_norm2(const plr_search *s, unsigned i, plr_real row_gap) {
+/* The squared norm of the four residuals at the point evaluated last, for the setting gate-residual. */
+static plr_real residual_norm2(const plr_search *s, unsigned i) {
     const plr_sighting *at = &s->sightings[i];
     plr_real r[3];
     plr_multiply3_transposed(r, at->U[s->bank], at->rho);
-    /* vL and vR lie half the gap to both sides of v */
-    return plr_dot3(r, r) + r[2] * r[2] + PLR_R(0.5) * row_gap * row_gap;
+    return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
 static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U, const plr_real dz[6],
                   float *nis) {
-    const plr_parameters *par = &s->f->par;
     const plr_sighting *at = &s->sightings[i];
-    const plr_observation *o = plr_search_observation(s, i);
-    const plr_real row_gap = (plr_real)o->vL_px - (plr_real)o->vR_px;
     plr_real d2 = at->at_zero, e[3], rest = 0;
     if (!(d2 >= 0) || at->lost)
         return false;
@@ -124,8 +121,8 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U, cons
         const plr_real by_others = left_out(at, U, dz, e, &rest);
         d2 = rest >= LEAST_REST ? by_others : d2;
     }
-    d2 += row_gap * row_gap / (PLR_R(2) * par->pixel_variance);
-    const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i, row_gap));
+    d2 += plr_stereo_besides(s->f, plr_search_observation(s, i));
+    const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && rest >= LEAST_REST)
         plr_track_add(slot, e);

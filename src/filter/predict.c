@@ -17,6 +17,11 @@
 
 /* ---------------------------------------------------------------- applying what is accumulated */
 
+void plr_predict_drop(plr_filter *f) {
+    plr_twist_walk(f, f->motion.seconds);
+    plr_motion_clear(&f->motion);
+}
+
 void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     if (plr_norm2_of_6(applied->z) > 0) {
         plr_real n[6] = {0};
@@ -25,7 +30,7 @@ void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     }
     plr_model_of(f)->propagate(f, applied);
     plr_filter_carry_recovery(f);
-    plr_motion_drop(f);
+    plr_predict_drop(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);
 }

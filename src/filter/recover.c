@@ -7,6 +7,7 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
+#include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 
@@ -24,7 +25,7 @@ static void unpack(const plr_filter *f, plr_real P[36]) {
 
 void plr_filter_keep_for_recovery(plr_filter *f) {
     plr_real P[36];
-    plr_covariance_pose(f, P);
+    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     pack(f, P);
 }
 
@@ -62,10 +63,10 @@ void plr_filter_recover(plr_filter *f) {
     f->frames_without_use = f->frames_mostly_gated = 0;
     f->work.noise.open = 0;
     plr_motion_clear(&f->motion);
-    plr_covariance_set_pose(f, P_xi);
+    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_consistency_clear(f);
     f->consistency.doubtful = 1;
-    if (!f->config.bias)
+    if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < 6; i++) {
         const plr_real sigma = f->bias_prior_sigma[i], off = f->bias[i] - f->bias_prior[i];
@@ -73,5 +74,5 @@ void plr_filter_recover(plr_filter *f) {
             f->bias[i] = f->bias_prior[i];
         variance[i] = (double)sigma * (double)sigma;
     }
-    plr_covariance_set_bias(f, variance);
+    plr_filter_begin_bias(f, variance);
 }

@@ -3,16 +3,13 @@
 
 #include <string.h>
 
-#include "filter/gate.h"
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "sensor/stereo.h"
 #include "state/camera.h"
 #include "state/covariance.h"
-#include "state/model.h"
 #include "state/motion.h"
-#include "state/polar.h"
 
 enum { TRIALS = 4 }; /* of a better point; the start and a return to the best one come on top */
 
@@ -38,24 +35,6 @@ static void prepare(plr_search *s, unsigned i) {
                 at->P[3 * r + c] = PLR_FMA(-at->V[6 * r + k], at->V[6 * c + k], at->P[3 * r + c]);
 }
 
-/* How the pixels of a landmark at q0, which the camera's motion (R, p) brings to q, depend on the chart
- * at q0: J = Dz R^T Ji(q0), 3x3. As in model_body.c the products that vanish, here Dz q in the rows uL
- * and v, are left out. */
-static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
-                          const plr_real p[3], const plr_real q[3], const plr_real Dz[9],
-                          plr_real J[9]) {
-    plr_real DzRt[9];
-    plr_mat3_mul_nt(DzRt, Dz, R);
-    for (int row = 0; row < 3; row++) {
-        const plr_real along = row == 1 ? camera->fx * camera->baseline / q[2] : PLR_R(0);
-        for (int column = 0; column < 2; column++) {
-            const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
-            J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, n);
-        }
-        J[3 * row + 2] = -chart->r * (along + plr_dot3(DzRt + 3 * row, p));
-    }
-}
-
 /* How q depends on nu, 3x6: [-I | [q]x] N, N = Ad(T_CB) JL. */
 static void point_by_motion(const plr_real q[3], const plr_real N[36], plr_real dq[18]) {
     for (unsigned k = 0; k < 6; k++) {
@@ -65,14 +44,6 @@ static void point_by_motion(const plr_real q[3], const plr_real N[36], plr_real 
         for (unsigned i = 0; i < 3; i++)
             dq[6 * i + k] = way[i] - N[6 * i + k];
     }
-}
-
-/* Does a single observation still make a part of what is known of a landmark's range? Of one that
- * has been seen often, the uncertainty is nearly all the camera's, common to all, and moving each by
- * itself would shift them against the pose. */
-static bool depends_on_observation(const plr_filter *f, const plr_real J[9], const plr_real P[9]) {
-    const plr_real by_range = J[2] - J[5];
-    return by_range * by_range * P[8] > PLR_R(0.02) * f->par.pixel_variance;
 }
 
 /* The camera's motion at a point of the search. */
@@ -94,43 +65,36 @@ static void step_to(const plr_search *s, const plr_real z[6], plr_camera_step *s
 
 /* One observation at a point: U of the trial bank, a and rho. False where nothing can be said. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
-    const plr_camera *camera = &s->f->par.camera;
     const plr_slot *slot = plr_search_slot(s, i);
     plr_sighting *at = &s->sightings[i];
-    plr_linearisation lin;
-    plr_polar chart;
-    plr_real q[3], Dz[9], J[9], dq[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
+    plr_stereo_sight sight;
+    plr_real dq[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
     plr_real S[6];
-    memcpy(q, slot->x, sizeof q);
-    plr_se3_move_back(q, step->E, step->p);
-    if (!(q[2] >= s->f->par.min_depth))
+    if (!plr_stereo_sight_after(s->f, slot, plr_search_observation(s, i), step->E, step->R, step->p,
+                                &sight))
         return false;
-    plr_polar_at(&chart, slot->x);
-    plr_stereo_project(lin.z, camera, q);
-    plr_stereo_jacobian(Dz, camera, q);
-    differentiate(camera, &chart, step->R, step->p, q, Dz, J);
+    const plr_real *J = sight.J;
     plr_mat3_mul(JP, J, at->P);
     plr_mat3_mul_nt(full, JP, J);
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++)
-            S[k++] = full[3 * c + r] + (r == c ? plr_gate_noise(s->f, r) : PLR_R(0));
+            S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(s->f, r) : PLR_R(0));
     if (!plr_cholesky3(S))
         return false;
     plr_gemm_nn(3, 6, 3, J, 3, at->V, 6, dz, 6);
     plr_gemm_nn(3, 1, 6, dz, 6, step->z, 1, shift, 1);
     for (unsigned r = 0; r < 3; r++)
         shift[r] = PLR_FMA(J[3 * r + 2], slot->beyond, shift[r]);
-    point_by_motion(q, step->N, dq);
-    plr_gemm_nn(3, 6, 3, Dz, 3, dq, 6, dz, 6);
-    plr_gate_innovation(at->rho, plr_search_observation(s, i), &lin);
+    point_by_motion(sight.q, step->N, dq);
+    plr_gemm_nn(3, 6, 3, sight.Dz, 3, dq, 6, dz, 6);
     for (unsigned r = 0; r < 3; r++)
-        at->rho[r] -= shift[r];
+        at->rho[r] = sight.r[r] - shift[r];
     memcpy(at->a, dz, sizeof at->a);
     plr_solve3_transposed(6, S, at->a);
     plr_solve3_transposed(1, S, at->rho);
     at->closer = 0;
     at->left = at->P[8];
-    if (depends_on_observation(s->f, J, at->P)) {
+    if (plr_stereo_tells_range(s->f, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->closer = plr_dot3(column, at->rho);

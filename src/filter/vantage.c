@@ -2,6 +2,7 @@
 #include "filter/vantage.h"
 
 #include "math/small.h"
+#include "sensor/stereo.h"
 #include "state/covariance.h"
 
 enum { PASSES = 3 };
@@ -22,9 +23,7 @@ static plr_real inverse_range(const plr_slot *slot) {
  */
 plr_real plr_vantage_usual(const plr_filter *f) {
     const plr_real least = f->par.min_inverse_range;
-    const plr_real by_range = f->par.camera.fx * f->par.camera.baseline;
-    plr_real spread =
-        PLR_FMA(least, least, PLR_R(2) * f->par.pixel_variance / (by_range * by_range));
+    plr_real spread = PLR_FMA(least, least, plr_stereo_inverse_range_variance(f));
     plr_real usual = least;
     for (unsigned pass = 0; pass < PASSES && f->count > 0; pass++) {
         plr_real weights = 0, sum = 0;

@@ -5,11 +5,29 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
 #include "state/pose.h"
 
 /* The series of SO(3) hold up to here; a robot that turns further in a step cannot be followed. */
 #define MAX_TURN PLR_R(3.1415926)
 #define MAX_WAY  PLR_R(1000)
+
+void plr_twist_lay_out(plr_filter *f) {
+    const uint8_t bias = f->config.bias ? PLR_BIAS_DIM : 0;
+    f->layout.block[PLR_BLOCK_POSE].row = 0;
+    f->layout.block[PLR_BLOCK_POSE].size = PLR_POSE_DIM;
+    f->layout.block[PLR_BLOCK_BIAS].row = PLR_POSE_DIM;
+    f->layout.block[PLR_BLOCK_BIAS].size = bias;
+    f->layout.core = (uint8_t)(PLR_POSE_DIM + bias);
+}
+
+void plr_twist_walk(plr_filter *f, plr_real seconds) {
+    plr_real variance[PLR_BIAS_DIM];
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        variance[i] = seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
+    plr_covariance_add_variance(f, PLR_BLOCK_BIAS, variance);
+}
 
 /* xi = seconds (reading - b) */
 static void displacement(const plr_filter *f, const plr_real reading[6], plr_real seconds,
@@ -56,7 +74,7 @@ void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], 
         next[7 * i] += variance[i];
     memcpy(m->Q, next, sizeof next);
 
-    if (f->config.bias) {
+    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real Jr[36];
         plr_se3_right_jacobian(Jr, xi);
         memset(next, 0, sizeof next);

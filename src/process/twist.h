@@ -5,6 +5,12 @@
 
 #include "pelorus/state.h"
 
+/* Lays out the state's blocks: the pose, and with the setting `bias` the biases of the twists. */
+void plr_twist_lay_out(plr_filter *f);
+
+/* Adds what the biases may have changed in `seconds`: their random walk. */
+void plr_twist_walk(plr_filter *f, plr_real seconds);
+
 /* PLR_OK if the twist `reading` (6: v, w) minus the bias gives at most pi rad and 1 km in
  * `seconds`; else PLR_E_RANGE. */
 plr_status plr_twist_check(const plr_filter *f, const plr_real reading[6], plr_real seconds);

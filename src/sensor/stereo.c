@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "sensor/stereo.h"
 
+#include "math/se3.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
+#include "state/polar.h"
+
+/* ---------------------------------------------------------------- the pair of cameras */
 
 void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real q[3]) {
     PLR_ASSERT(q[2] < 0 || q[2] > 0);
@@ -40,4 +44,176 @@ void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *ca
     }
     Dq[0] += scale;
     Dq[5] = scale * aspect;
+}
+
+/* ---------------------------------------------------------------- the measurement */
+
+void plr_stereo_rows(plr_real z[3], const plr_observation *seen) {
+    z[0] = (plr_real)seen->uL_px;
+    z[1] = (plr_real)seen->uR_px;
+    z[2] = PLR_R(0.5) * ((plr_real)seen->vL_px + (plr_real)seen->vR_px);
+}
+
+plr_real plr_stereo_variance(const plr_filter *f, unsigned row) {
+    return row == 2 ? PLR_R(0.5) * f->par.pixel_variance : f->par.pixel_variance;
+}
+
+static plr_real row_gap(const plr_observation *seen) {
+    return (plr_real)seen->vL_px - (plr_real)seen->vR_px;
+}
+
+plr_real plr_stereo_besides(const plr_filter *f, const plr_observation *seen) {
+    return row_gap(seen) * row_gap(seen) / (PLR_R(2) * f->par.pixel_variance);
+}
+
+/* Along a point's own ray only its right image moves: Dz q = (0, fx baseline, 0) / z. */
+static void along_the_ray(const plr_camera *camera, plr_real along[3]) {
+    along[0] = along[2] = 0;
+    along[1] = camera->fx * camera->baseline;
+}
+
+static plr_real residual_norm2(const plr_observation *seen, const plr_real z[3]) {
+    const plr_real residual[4] = {(plr_real)seen->uL_px - z[0], (plr_real)seen->uR_px - z[1],
+                                  (plr_real)seen->vL_px - z[2], (plr_real)seen->vR_px - z[2]};
+    return PLR_FMA(residual[3], residual[3], plr_dot3(residual, residual));
+}
+
+plr_real plr_stereo_largest_spread(const plr_filter *f) {
+    return f->par.camera.fx * f->par.camera.fx;
+}
+
+bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
+                        plr_measurement *m) {
+    const plr_camera *camera = &f->par.camera;
+    plr_real z[3], Dz[9], along[3];
+    plr_view view;
+    if (!plr_model_of(f)->look(f, slot, &view))
+        return false;
+    plr_stereo_project(z, camera, view.q);
+    plr_stereo_jacobian(Dz, camera, view.q);
+    along_the_ray(camera, along);
+    plr_model_of(f)->derive(f, slot, &view, Dz, along, z, &m->H);
+    plr_stereo_rows(m->r, seen);
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
+        m->r[i] -= z[i];
+        m->R[i] = plr_stereo_variance(f, i);
+    }
+    m->besides = plr_stereo_besides(f, seen);
+    m->residual2 = residual_norm2(seen, z);
+    m->largest_spread = f->slots[slot].known ? 0 : plr_stereo_largest_spread(f);
+    return true;
+}
+
+/* ---------------------------------------------------------------- while the motion is sought */
+
+/* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v, are
+ * left out. */
+static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
+                          const plr_real p[3], plr_stereo_sight *sight) {
+    plr_real DzRt[9];
+    plr_mat3_mul_nt(DzRt, sight->Dz, R);
+    for (int row = 0; row < 3; row++) {
+        const plr_real along = row == 1 ? camera->fx * camera->baseline / sight->q[2] : PLR_R(0);
+        for (int column = 0; column < 2; column++) {
+            const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
+            sight->J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, n);
+        }
+        sight->J[3 * row + 2] = -chart->r * (along + plr_dot3(DzRt + 3 * row, p));
+    }
+}
+
+bool plr_stereo_sight_after(const plr_filter *f, const plr_slot *slot, const plr_observation *seen,
+                            const plr_real E[9], const plr_real R[9], const plr_real p[3],
+                            plr_stereo_sight *sight) {
+    plr_polar chart;
+    plr_real z[3];
+    memcpy(sight->q, slot->x, sizeof sight->q);
+    plr_se3_move_back(sight->q, E, p);
+    if (!(sight->q[2] >= f->par.min_depth))
+        return false;
+    plr_polar_at(&chart, slot->x);
+    plr_stereo_project(z, &f->par.camera, sight->q);
+    plr_stereo_jacobian(sight->Dz, &f->par.camera, sight->q);
+    differentiate(&f->par.camera, &chart, R, p, sight);
+    plr_stereo_rows(sight->r, seen);
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        sight->r[i] -= z[i];
+    return true;
+}
+
+bool plr_stereo_tells_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]) {
+    const plr_real by_range = J[2] - J[5];
+    return by_range * by_range * P[8] > PLR_R(0.02) * f->par.pixel_variance;
+}
+
+plr_real plr_stereo_residual2(const plr_observation *seen, const plr_real r[3]) {
+    /* vL and vR lie half the gap to both sides of v */
+    return plr_dot3(r, r) + r[2] * r[2] + PLR_R(0.5) * row_gap(seen) * row_gap(seen);
+}
+
+plr_real plr_stereo_inverse_range_variance(const plr_filter *f) {
+    const plr_real by_range = f->par.camera.fx * f->par.camera.baseline;
+    return PLR_R(2) * f->par.pixel_variance / (by_range * by_range);
+}
+
+/* ---------------------------------------------------------------- new landmarks */
+
+/* The disparity of a point at infinity lies above this but for one in 700. */
+static plr_real least_disparity(const plr_filter *f) {
+    return f->config.model == PLR_MODEL_BODY ? PLR_R(-4.25) * PLR_SQRT(f->par.pixel_variance) : 0;
+}
+
+/* A landmark stands no further at its birth than where this is its disparity, px: further off, what a
+ * single observation says of its bearing would be left to rounding in float32. */
+static plr_real farthest_disparity(const plr_filter *f) {
+    const plr_real by_range =
+        f->par.camera.fx * f->par.camera.baseline * f->par.min_inverse_range * PLR_R(1.5);
+    return by_range > PLR_R(0.05) ? by_range : PLR_R(0.05);
+}
+
+bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen) {
+    plr_real z[3];
+    plr_stereo_rows(z, seen);
+    const plr_real disparity = z[0] - z[1];
+    const plr_real least = f->par.min_disparity > 0 ? f->par.min_disparity : least_disparity(f);
+    if (!(disparity >= least) ||
+        (f->par.max_row_gap > 0 && plr_abs(row_gap(seen)) > f->par.max_row_gap))
+        return false;
+    const bool any_depth = f->config.model == PLR_MODEL_BODY && f->par.max_depth <= 0;
+    if (any_depth && disparity < farthest_disparity(f))
+        return true;
+    const plr_real depth = f->par.camera.fx * f->par.camera.baseline / disparity;
+    return disparity > 0 && depth >= f->par.min_depth &&
+           (f->par.max_depth <= 0 || depth <= f->par.max_depth) &&
+           depth * f->par.min_inverse_range < 1;
+}
+
+/* Where a point's noise has left it no disparity to stand at, the landmark stands at this one, and what
+ * is missing goes into its inverse range besides. */
+static plr_real stand_at_some_distance(const plr_filter *f, plr_real z[3]) {
+    const plr_real disparity = z[0] - z[1], farthest = farthest_disparity(f);
+    if (f->config.model != PLR_MODEL_BODY || disparity >= farthest)
+        return 0;
+    z[1] = z[0] - farthest;
+    return disparity - farthest;
+}
+
+/* S_q with S_q S_q^T = Dq R Dq^T, the pixels' noise in the camera; or the course's constant. */
+static void initial_factor(const plr_filter *f, const plr_real Dq[9], plr_real S_q[9]) {
+    const plr_real constant = f->par.landmark_variance;
+    for (unsigned i = 0; i < 9; i++)
+        S_q[i] = constant > 0 ? (i % 4 == 0 ? PLR_SQRT(constant) : PLR_R(0))
+                              : Dq[i] * PLR_SQRT(plr_stereo_variance(f, i % 3));
+}
+
+plr_real plr_stereo_initialise(const plr_filter *f, const plr_observation *seen,
+                               plr_new_landmark *landmark) {
+    plr_real z[3], q[3], Dq[9], S_q[9];
+    plr_stereo_rows(z, seen);
+    const plr_real missing = stand_at_some_distance(f, z);
+    plr_stereo_back_project(q, Dq, &f->par.camera, z);
+    initial_factor(f, Dq, S_q);
+    plr_model_of(f)->initialise(f, q, S_q, landmark);
+    /* inverse range is disparity over focal length and baseline, along the ray */
+    return missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (f->par.camera.fx * f->par.camera.baseline);
 }

@@ -11,6 +11,7 @@
 #include "pelorus/state.h"
 #include "state/model.h"
 #include "state/motion.h"
+#include "state/rows.h"
 
 /* Rows of P in use: 6 (+ 6) + 3 count. */
 unsigned plr_covariance_dim(const plr_filter *f);
@@ -23,24 +24,18 @@ unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
 
 /* --- blocks --- */
 
-/* Sets the pose block to P_xi (6x6) and its correlation with the bias to zero. Only without
- * landmarks. */
-void plr_covariance_set_pose(plr_filter *f, const double P_xi[36]);
+/* Sets a block to P_own (size x size; the lower triangle is used), uncorrelated with all others. Only
+ * without landmarks. */
+void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own);
 
-/* P_xi += C, 6x6 and symmetric. */
-void plr_covariance_widen_pose(plr_filter *f, const plr_real C[36]);
+/* A block's own covariance += C, size x size and symmetric. */
+void plr_covariance_add(plr_filter *f, plr_block_id block, const plr_real *C);
 
-/* Sets the bias block to a diagonal, uncorrelated with anything. Only without landmarks. */
-void plr_covariance_set_bias(plr_filter *f, const double variance[6]);
+/* The same for its variances alone. */
+void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_real *variance);
 
-/* The blocks of pose (xi, xi), bias (db, db) and their correlation (xi, db), 6x6. */
-void plr_covariance_pose(const plr_filter *f, plr_real P_xi[36]);
-void plr_covariance_bias(const plr_filter *f, plr_real P_b[36]);
-void plr_covariance_pose_bias(const plr_filter *f, plr_real P_xib[36]);
-
-/* P_out = [J_pose J_landmark] P_(xi, slot) [...]^T, 3x3: J_pose 3x6, J_landmark 3x3. */
-void plr_covariance_joint(const plr_filter *f, unsigned slot, const plr_real J_pose[18],
-                          const plr_real J_landmark[9], plr_real P_out[9]);
+/* The part of P between two blocks, row by row. */
+void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P);
 
 /* A landmark's own block, 3x3. */
 void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]);
@@ -75,26 +70,20 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]);
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
                                  const plr_real K[36], plr_real *V);
 
-/* The pose's rows alone: xi <- A xi + B db + N(0, Q). */
-void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_motion *motion);
-
-/* Adds `velocity` to the first three bias variances and `gyro` to the last three. */
-void plr_covariance_add_bias_walk(plr_filter *f, plr_real velocity, plr_real gyro);
+/* The pose's rows alone: xi <- A xi + n, n = B db + N(0, Q), with M = B P_bb B^T + Q. */
+void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_real B[36],
+                                 const plr_real M[36]);
 
 /* --- update --- */
 
-/* S = H P H^T of one observation, 3x3, the upper triangle packed row by row (6 numbers). */
-void plr_covariance_innovation(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
-                               plr_real S[6]);
+/* S = H P H^T, 3x3. */
+void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]);
 
-/* S += (H W)(H W)^T, 3x3 packed: the part of the innovation covariance that is still in W. Only
- * before the first block. */
-void plr_covariance_add_open_noise(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
-                                   plr_real S[6]);
+/* S += (H W)(H W)^T, 3x3: the part of H P H^T that is still in W. Only before the first block. */
+void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_real S[9]);
 
-/* Three rows of (P H^T)^T, each of dim elements, then zeros up to the leading dimension ld. */
-void plr_covariance_project(const plr_filter *f, unsigned slot, const plr_linearisation *lin,
-                            plr_real *rows, size_t ld);
+/* The three rows of (P H^T)^T, each of dim elements, then zeros up to the leading dimension ld. */
+void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *rows, size_t ld);
 
 /* P -= V V^T, where V^T is depth x dim in the workspace with leading dimension plr_covariance_ld.
  * False, and nothing is changed, if a variance would not be positive. */

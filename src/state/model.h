@@ -10,15 +10,13 @@
 
 #include "pelorus/state.h"
 #include "state/motion.h"
+#include "state/rows.h"
 
-/* An observation's prediction and derivatives at the current estimate. Rows (uL, uR, v). */
-typedef struct plr_linearisation {
-    plr_real z[3];          /* px */
-    plr_real depth;         /* m, along the camera's axis */
-    bool uses_pose;         /* false: H_pose is zero and not filled */
-    plr_real H_pose[18];    /* 3x6 */
-    plr_real H_landmark[9]; /* 3x3 */
-} plr_linearisation;
+/* A landmark where the camera sees it. */
+typedef struct plr_view {
+    plr_real q[3]; /* in the left camera, m */
+    plr_real s[3]; /* `world` alone: in the body, m */
+} plr_view;
 
 /* A landmark about to enter the state: error = J_pose xi + N(0, P). */
 typedef struct plr_new_landmark {
@@ -28,11 +26,10 @@ typedef struct plr_new_landmark {
     plr_real P[9];       /* 3x3 */
 } plr_new_landmark;
 
-/* A landmark's place in the world, and how its error arises: dm = J_pose xi + J_landmark w. */
+/* A landmark's place in the world, and how its error arises. */
 typedef struct plr_world_point {
     double p_W[3];
-    plr_real J_pose[18];
-    plr_real J_landmark[9];
+    plr_rows J; /* of landmark and pose */
 } plr_world_point;
 
 struct plr_model {
@@ -42,9 +39,16 @@ struct plr_model {
      * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
     void (*propagate)(plr_filter *f, const plr_applied_motion *motion);
 
-    /* Predicts the observation of a slot, with its derivatives. False if the point is nearer than
-     * min_depth_m in front of the camera, where a linearisation means nothing. */
-    bool (*linearise)(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin);
+    /* Where the camera sees a landmark. False if it is nearer than min_depth_m in front of the
+     * camera, where a linearisation means nothing. */
+    bool (*look)(const plr_filter *f, unsigned slot, plr_view *view);
+
+    /* From derivatives by the point in the camera to derivatives by the state's error: H = Dz dq/dx.
+     * Dz = dz/dq, 3x3. Along the point's own ray Dz q = along / q_z, which is passed because three
+     * products that cancel would be left to rounding. z, the prediction, receives what the stored
+     * point leaves out (plr_slot.beyond). */
+    void (*derive)(const plr_filter *f, unsigned slot, const plr_view *view, const plr_real Dz[9],
+                   const plr_real along[3], plr_real z[3], plr_rows *H);
 
     /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
      * S_q is passed, because for a far point the product is so large along the ray that rounding

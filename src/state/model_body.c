@@ -5,6 +5,7 @@
  * directions that nothing observes stay so, and the filter does not believe more than it knows.
  * docs/MATH.md, "body".
  */
+#include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/polar.h"
@@ -14,7 +15,6 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
-#include "sensor/stereo.h"
 #include "state/camera.h"
 #include "state/motion.h"
 #include "state/pose.h"
@@ -171,28 +171,28 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_covariance_open_noise(f, motion);
 }
 
-/* H_l = Dz Ji(q). */
-static bool body_linearise(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin) {
-    const plr_camera *camera = &f->par.camera;
-    lin->depth = slot->x[2];
-    lin->uses_pose = false;
-    if (!(lin->depth >= f->par.min_depth))
-        return false;
+static bool body_look(const plr_filter *f, unsigned slot, plr_view *view) {
+    memcpy(view->q, f->slots[slot].x, sizeof view->q);
+    return view->q[2] >= f->par.min_depth;
+}
+
+/* H = Dz Ji(q), Ji = [r N | -r q]. */
+static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view,
+                        const plr_real Dz[9], const plr_real along[3], plr_real z[3], plr_rows *H) {
     plr_polar chart;
-    plr_real Dz[9];
-    plr_stereo_project(lin->z, camera, slot->x);
-    plr_stereo_jacobian(Dz, camera, slot->x);
-    plr_polar_at(&chart, slot->x);
-    for (int row = 0; row < 3; row++)
+    plr_polar_at(&chart, view->q);
+    H->terms = 1;
+    H->term[0].row = plr_covariance_row(f, slot);
+    H->term[0].columns = PLR_LANDMARK_DIM;
+    for (int row = 0; row < 3; row++) {
+        plr_real *h = H->term[0].H + 3 * row;
         for (int column = 0; column < 2; column++) {
             const plr_real n[3] = {chart.N[column], chart.N[2 + column], chart.N[4 + column]};
-            lin->H_landmark[3 * row + column] = chart.r * plr_dot3(Dz + 3 * row, n);
+            h[column] = chart.r * plr_dot3(Dz + 3 * row, n);
         }
-    /* -r^2 Dz mu: along its own ray a point moves in the right image alone */
-    lin->H_landmark[2] = lin->H_landmark[8] = 0;
-    lin->H_landmark[5] = -camera->fx * camera->baseline * chart.r / slot->x[2];
-    lin->z[1] = PLR_FMA(lin->H_landmark[5], slot->beyond, lin->z[1]);
-    return true;
+        h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
+        z[row] = PLR_FMA(h[2], f->slots[slot].beyond, z[row]);
+    }
 }
 
 static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
@@ -328,17 +328,24 @@ static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_p
     for (int i = 0; i < 3; i++)
         point->p_W[i] = p_WB[i] + (double)offset[i];
 
-    plr_world_by_pose(R_WB, s_B, point->J_pose);
+    plr_term *own = &point->J.term[0], *pose = &point->J.term[1];
+    point->J.terms = 2;
+    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
+    pose->columns = PLR_POSE_DIM;
+    plr_world_by_pose(R_WB, s_B, pose->H);
+    own->row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    own->columns = PLR_LANDMARK_DIM;
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
     plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
-    plr_mat3_mul(point->J_landmark, R_WC, Ji);
+    plr_mat3_mul(own->H, R_WC, Ji);
 }
 
 const struct plr_model plr_model_body = {
     .name = "body",
     .propagate = body_propagate,
-    .linearise = body_linearise,
+    .look = body_look,
+    .derive = body_derive,
     .initialise = body_initialise,
     .adopt = body_adopt,
     .retract = body_retract,

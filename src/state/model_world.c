@@ -4,13 +4,13 @@
  * (III.1 to III.14). It believes more than it knows, and in float32 its covariance can break down
  * (docs/NUMERICS.md): it is here to be compared with.
  */
+#include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
 
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
-#include "sensor/stereo.h"
 #include "state/camera.h"
 #include "state/motion.h"
 
@@ -23,35 +23,42 @@ static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
 }
 
 static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
-    plr_real A[36], R[9];
+    plr_real A[36], R[9], BPB[36], M[36];
     (void)motion; /* the pose alone moves, by f->motion */
     plr_se3_rotation(R, f->motion.E);
     plr_se3_adjoint_inverse(A, R, f->motion.p);
-    plr_covariance_predict_pose(f, A, &f->motion);
+    plr_motion_covariance(f, BPB, M);
+    plr_covariance_predict_pose(f, A, f->motion.B, M);
+}
+
+static bool world_look(const plr_filter *f, unsigned slot, plr_view *view) {
+    in_body(f, f->slots[slot].x, view->s);
+    plr_camera_from_body(view->q, &f->par.camera, view->s);
+    return view->q[2] >= f->par.min_depth;
 }
 
 /* H_pose = Dz R_CB [-I | [s]x], H_l = Dz R_CB R^T (III.7, III.11). */
-static bool world_linearise(const plr_filter *f, const plr_slot *slot, plr_linearisation *lin) {
-    const plr_camera *camera = &f->par.camera;
-    plr_real s[3], q[3], Dz[9], DzR[9], S[9], DzRS[9];
-    in_body(f, slot->x, s);
-    plr_camera_from_body(q, camera, s);
-    lin->depth = q[2];
-    lin->uses_pose = true;
-    if (!(lin->depth >= f->par.min_depth))
-        return false;
-    plr_stereo_project(lin->z, camera, q);
-    plr_stereo_jacobian(Dz, camera, q);
-    plr_mat3_mul(DzR, Dz, camera->R_CB);
-    plr_skew(S, s);
+static void world_derive(const plr_filter *f, unsigned slot, const plr_view *view,
+                         const plr_real Dz[9], const plr_real along[3], plr_real z[3],
+                         plr_rows *H) {
+    plr_real DzR[9], S[9], DzRS[9];
+    plr_term *own = &H->term[0], *pose = &H->term[1];
+    (void)along;
+    (void)z;
+    plr_mat3_mul(DzR, Dz, f->par.camera.R_CB);
+    plr_skew(S, view->s);
     plr_mat3_mul(DzRS, DzR, S);
+    H->terms = 2;
+    own->row = plr_covariance_row(f, slot);
+    own->columns = PLR_LANDMARK_DIM;
+    plr_mat3_mul_nt(own->H, DzR, f->R_WB);
+    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
+    pose->columns = PLR_POSE_DIM;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
-            lin->H_pose[6 * i + j] = -DzR[3 * i + j];
-            lin->H_pose[6 * i + 3 + j] = DzRS[3 * i + j];
+            pose->H[PLR_POSE_DIM * i + j] = -DzR[3 * i + j];
+            pose->H[PLR_POSE_DIM * i + 3 + j] = DzRS[3 * i + j];
         }
-    plr_mat3_mul_nt(lin->H_landmark, DzR, f->R_WB);
-    return true;
 }
 
 static void world_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
@@ -89,17 +96,19 @@ static unsigned world_retract(plr_filter *f, const plr_real *dx) {
 }
 
 static void world_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
-    (void)f;
     for (int i = 0; i < 3; i++)
         point->p_W[i] = (double)slot->x[i];
-    memset(point->J_pose, 0, sizeof point->J_pose);
-    plr_mat3_identity(point->J_landmark);
+    point->J.terms = 1;
+    point->J.term[0].row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    point->J.term[0].columns = PLR_LANDMARK_DIM;
+    plr_mat3_identity(point->J.term[0].H);
 }
 
 const struct plr_model plr_model_world = {
     .name = "world",
     .propagate = world_propagate,
-    .linearise = world_linearise,
+    .look = world_look,
+    .derive = world_derive,
     .initialise = world_initialise,
     .adopt = world_adopt,
     .retract = world_retract,

@@ -5,6 +5,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "state/blocks.h"
 #include "state/covariance.h"
 
 void plr_motion_clear(plr_motion *motion) {
@@ -31,16 +32,15 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
  * from depending on the biases alone, which would leave the biases' own variance to rounding. */
 #define SHARE_OF_BIAS PLR_R(1e-4)
 
-/* M = B P_bb B^T + Q, 6x6. */
-static void motion_covariance(const plr_filter *f, plr_real M[36]) {
-    memset(M, 0, 36 * sizeof *M);
-    if (f->config.bias) {
+void plr_motion_covariance(const plr_filter *f, plr_real BPB[36], plr_real M[36]) {
+    memset(BPB, 0, 36 * sizeof *BPB);
+    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real P_b[36];
-        plr_covariance_bias(f, P_b);
-        plr_sandwich6(M, f->motion.B, P_b);
+        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+        plr_sandwich6(BPB, f->motion.B, P_b);
     }
     for (int i = 0; i < 36; i++)
-        M[i] = PLR_FMA(SHARE_OF_BIAS, M[i], M[i]) + f->motion.Q[i];
+        M[i] = BPB[i] + f->motion.Q[i];
 }
 
 /* M = L L^T, 6x6. A direction in which M is zero, to rounding, becomes a zero column. */
@@ -79,20 +79,20 @@ static void share_of_bias(const plr_real L[36], const plr_real B[36], plr_real K
 
 static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
                       plr_real turn2) {
-    plr_real M[36];
+    plr_real BPB[36], M[36];
     memset(f->work.noise.closer, 0, sizeof f->work.noise.closer);
     memset(applied, 0, sizeof *applied);
     memcpy(applied->E, f->motion.E, sizeof applied->E);
     memcpy(applied->p, f->motion.p, sizeof applied->p);
     if (!f->motion.noisy)
         return;
-    motion_covariance(f, M);
+    plr_motion_covariance(f, BPB, M);
     for (int i = 0; i < 36; i++)
-        M[i] *= scale;
+        M[i] = scale * (PLR_FMA(SHARE_OF_BIAS, BPB[i], BPB[i]) + f->motion.Q[i]);
     for (int i = 0; i < 6; i++)
         M[7 * i] += i < 3 ? way2 : turn2;
     factorise(M, applied->L);
-    if (f->config.bias)
+    if (plr_has_block(f, PLR_BLOCK_BIAS))
         share_of_bias(applied->L, f->motion.B, applied->K);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
@@ -122,32 +122,25 @@ void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const p
     plr_gemm_nn(6, 6, 6, Jr, 6, applied->L, 6, applied->JL, 6);
 }
 
-void plr_motion_drop(plr_filter *f) {
-    if (f->config.bias)
-        plr_covariance_add_bias_walk(f, f->par.bias_velocity_walk * f->motion.seconds,
-                                     f->par.bias_gyro_walk * f->motion.seconds);
-    plr_motion_clear(&f->motion);
-}
-
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
     const plr_motion *m = &f->motion;
     plr_real A[36], P[36], R[9], BPB[36] = {0};
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
-    plr_covariance_pose(f, P);
+    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     plr_sandwich6(P_xi, A, P);
     for (int i = 0; i < 36; i++)
         P_xi[i] += m->Q[i];
-    if (f->config.bias) {
-        plr_covariance_bias(f, P);
+    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
+        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
         plr_sandwich6(BPB, m->B, P);
     }
     /* the terms that follow may take most of a variance away: their rounding is made up for */
     for (int i = 0; i < 6; i++)
         P_xi[7 * i] = PLR_FMA(PLR_R(8) * PLR_EPSILON, P_xi[7 * i] + BPB[7 * i], P_xi[7 * i]);
-    if (f->config.bias) {
+    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real AP[36] = {0}, cross[36] = {0};
-        plr_covariance_pose_bias(f, P);
+        plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_BIAS, P);
         plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
         plr_gemm_nt(6, 6, 6, AP, 6, m->B, 6, cross, 6);
         for (int i = 0; i < 6; i++)

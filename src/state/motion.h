@@ -24,6 +24,9 @@ typedef struct plr_applied_motion {
     plr_real z[6];
 } plr_applied_motion;
 
+/* M = B P_bb B^T + Q, the covariance of the accumulated motion, and its part BPB by the biases; 6x6. */
+void plr_motion_covariance(const plr_filter *f, plr_real BPB[36], plr_real M[36]);
+
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
 
@@ -34,9 +37,6 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
 /* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
                    plr_applied_motion *applied);
-
-/* Discards the accumulated motion; the bias walk of its duration is still added. */
-void plr_motion_drop(plr_filter *f);
 
 /* The pose's covariance as it would be with the accumulated motion applied, 6x6; changes nothing. */
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]);

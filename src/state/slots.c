@@ -71,7 +71,7 @@ void plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark
     plr_world_point point;
     plr_real P[9];
     plr_model_of(f)->in_world(f, s, &point);
-    plr_covariance_joint(f, slot, point.J_pose, point.J_landmark, P);
+    plr_covariance_of_rows(f, &point.J, P);
     landmark->id = s->id;
     landmark->times_seen = s->times_seen;
     landmark->times_gated = s->times_gated;

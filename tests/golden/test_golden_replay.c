@@ -72,7 +72,7 @@ static uint32_t crc_of_landmarks(void) {
 static void describe(char line[LINE], const plr_report *r) {
     plr_real P_xi[36];
     const unsigned n = plr_covariance_dim(&filter);
-    plr_covariance_pose(&filter, P_xi);
+    plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     snprintf(line, LINE,
              "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x "
              "used %u gated %u new %u evicted %u active %u status %d",

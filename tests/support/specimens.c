@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/polar.h"
@@ -141,13 +142,42 @@ void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion) {
     motion->pending = motion->noisy = 1;
 }
 
-plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
-    plr_linearisation lin;
-    if (!plr_model_of(f)->linearise(f, &f->slots[slot], &lin))
+plr_measurement specimen_measurement(const plr_filter *f, unsigned slot,
+                                     const plr_observation *seen) {
+    plr_measurement m;
+    if (!plr_stereo_measure(f, slot, seen, &m))
         abort();
-    return (plr_observation){f->slots[slot].id, (float)lin.z[0] + shift_px[0],
-                             (float)lin.z[2] + shift_px[1], (float)lin.z[1] + shift_px[2],
-                             (float)lin.z[2] + shift_px[3]};
+    return m;
+}
+
+void specimen_prediction(const plr_filter *f, unsigned slot, plr_real z[3]) {
+    const plr_observation corner = {0}; /* r = 0 - z */
+    const plr_measurement m = specimen_measurement(f, slot, &corner);
+    for (int i = 0; i < 3; i++)
+        z[i] = -m.r[i];
+}
+
+void specimen_put_rows(double *H, unsigned n, const plr_rows *rows) {
+    for (unsigned t = 0; t < rows->terms; t++) {
+        const plr_term *term = &rows->term[t];
+        double block[PLR_ROWS * PLR_WIDEST_BLOCK];
+        to_doubles(block, term->H, PLR_ROWS * term->columns);
+        specimen_put(H, n, 0, term->row, PLR_ROWS, term->columns, block);
+    }
+}
+
+plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observation *seen) {
+    plr_measurement m;
+    plr_verdict none = {.accepted = false};
+    return plr_stereo_measure(f, slot, seen, &m) ? plr_gate_judge(f, &m) : none;
+}
+
+plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]) {
+    plr_real z[3];
+    specimen_prediction(f, slot, z);
+    return (plr_observation){f->slots[slot].id, (float)z[0] + shift_px[0],
+                             (float)z[2] + shift_px[1], (float)z[1] + shift_px[2],
+                             (float)z[2] + shift_px[3]};
 }
 
 void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]) {

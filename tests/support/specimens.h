@@ -6,7 +6,9 @@
 
 #include <stdbool.h>
 
+#include "filter/gate.h"
 #include "pelorus/filter.h"
+#include "sensor/measurement.h"
 #include "support/random.h"
 
 /* Settings of a specimen: default, with that model and bias, and no gate. */
@@ -26,6 +28,19 @@ void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion);
 
 /* The observation that a slot predicts, moved by so many pixels in uL, vL, uR, vR. */
 plr_observation specimen_observation(const plr_filter *f, unsigned slot, const float shift_px[4]);
+
+/* The measurement of a slot that the camera can see. */
+plr_measurement specimen_measurement(const plr_filter *f, unsigned slot,
+                                     const plr_observation *seen);
+
+/* (uL, uR, v) as the filter predicts them, px. */
+void specimen_prediction(const plr_filter *f, unsigned slot, plr_real z[3]);
+
+/* The rows in H, 3 x n; what they have no part in stays as it is. */
+void specimen_put_rows(double *H, unsigned n, const plr_rows *rows);
+
+/* The gate's verdict of an observation; not accepted if the camera cannot see the slot. */
+plr_verdict specimen_judge(const plr_filter *f, unsigned slot, const plr_observation *seen);
 
 /* Jw and Ji of the chart at a point, as the filter has them. */
 void specimen_chart(const plr_real x[3], double Jw[9], double Ji[9]);

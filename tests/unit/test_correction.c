@@ -9,6 +9,7 @@
 #include "filter/correction.h"
 #include "filter/gate.h"
 #include "math/packed.h"
+#include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "support/matrices.h"
@@ -22,6 +23,14 @@ static const double eps = REAL_EPSILON;
 static plr_filter filter, before;
 static rng chance;
 static plr_observation seen[MANY];
+
+/* plr_sensed.measure: observation i of slot i. */
+static void measure(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
+    const plr_observation *observations = context;
+    TEST_ASSERT_TRUE(plr_stereo_measure(f, i, &observations[i], m));
+}
+
+static const plr_sensed of_slots = {measure, seen};
 
 void setUp(void) {
     chance = rng_seeded(52);
@@ -37,9 +46,6 @@ static void take_specimen(plr_model_kind model, bool bias) {
         const float u = (float)rng_normal(&chance), v = (float)rng_normal(&chance);
         const float shift[4] = {u, v, (float)(0.9 * (double)u), v};
         seen[slot] = specimen_observation(&filter, slot, shift);
-        filter.work.order[slot] = (uint16_t)slot;
-        filter.work.slot_of[slot] = (uint16_t)slot;
-        filter.work.used[slot] = (uint16_t)slot;
     }
 }
 
@@ -50,22 +56,13 @@ static void dense_correction(unsigned count, double *dx, double *P) {
     double *HP = specimen_zeros(m, n), *K = specimen_zeros(m, n),
            *prior = specimen_covariance(&filter);
     for (unsigned a = 0; a < count; a++) {
-        plr_linearisation lin;
-        plr_real r_real[3];
-        double pose[18], landmark[9];
-        TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[a], &lin));
-        to_doubles(landmark, lin.H_landmark, 9);
-        specimen_put(H, n, 3 * a, plr_covariance_row(&filter, a), 3, 3, landmark);
-        if (lin.uses_pose) {
-            to_doubles(pose, lin.H_pose, 18);
-            specimen_put(H, n, 3 * a, 0, 3, 6, pose);
-        }
-        plr_gate_innovation(r_real, &seen[a], &lin);
-        to_doubles(r + 3 * a, r_real, 3);
+        const plr_measurement measured = specimen_measurement(&filter, a, &seen[a]);
+        specimen_put_rows(H + 3 * (size_t)a * n, n, &measured.H);
+        to_doubles(r + 3 * a, measured.r, 3);
     }
     oracle_sandwich(m, n, H, prior, S);
     for (unsigned i = 0; i < m; i++)
-        S[i * m + i] += (double)plr_gate_noise(&filter, i % 3);
+        S[i * m + i] += (double)plr_stereo_variance(&filter, i % 3);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, H, prior, 0, HP);
     memcpy(K, HP, (size_t)m * n * sizeof *K);
     TEST_ASSERT_TRUE(oracle_solve_spd(m, n, S, K)); /* K^T = S^-1 H P */
@@ -88,9 +85,9 @@ static void check_against_dense(plr_model_kind model, bool bias, unsigned count)
     dense_correction(count, dx, P);
     double bias_before[6];
     to_doubles(bias_before, filter.bias, 6);
-    const plr_correction correction = plr_correct(&filter, seen, count);
+    const plr_correction correction = plr_correct(&filter, &of_slots, count);
     TEST_ASSERT_EQUAL_UINT(count, correction.applied);
-    TEST_ASSERT_EQUAL_UINT(0, correction.failed_blocks);
+    TEST_ASSERT_EQUAL_UINT(0, correction.failed_batches);
     TEST_ASSERT_EQUAL_UINT(0, correction.cut);
     TEST_ASSERT_EQUAL_UINT8(0, filter.diverged);
 
@@ -125,7 +122,7 @@ static void test_blocks_give_the_correction_of_one_gain(void) {
 static void test_no_observations_change_nothing(void) {
     take_specimen(PLR_MODEL_BODY, true);
     before = filter;
-    const plr_correction correction = plr_correct(&filter, seen, 0);
+    const plr_correction correction = plr_correct(&filter, &of_slots, 0);
     TEST_ASSERT_EQUAL_UINT(0, correction.applied);
     TEST_ASSERT_EQUAL_MEMORY(filter.P, before.P, sizeof filter.P);
     TEST_ASSERT_EQUAL_MEMORY(filter.slots, before.slots, sizeof filter.slots);
@@ -157,14 +154,14 @@ static void test_a_block_that_cannot_be_factorised_leaves_the_estimate(void) {
     take_specimen(PLR_MODEL_BODY, true);
     spoil(1);
     before = filter;
-    const plr_correction correction = plr_correct(&filter, seen, 2);
+    const plr_correction correction = plr_correct(&filter, &of_slots, 2);
     if (PLR_BLOCK_OBSERVATIONS == 1) {
         TEST_ASSERT_EQUAL_UINT(1, correction.applied);
-        TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
+        TEST_ASSERT_EQUAL_UINT(1, correction.failed_batches);
         return;
     }
     TEST_ASSERT_EQUAL_UINT(0, correction.applied);
-    TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
+    TEST_ASSERT_EQUAL_UINT(1, correction.failed_batches);
     TEST_ASSERT_TRUE(estimate_is_as_before());
 }
 
@@ -175,8 +172,8 @@ static void test_blocks_beside_a_failed_one_are_applied(void) {
     const unsigned second = (MANY - first + blocks - 2) / (blocks - 1);
     take_specimen(PLR_MODEL_BODY, false);
     spoil(first);
-    const plr_correction correction = plr_correct(&filter, seen, MANY);
-    TEST_ASSERT_EQUAL_UINT(1, correction.failed_blocks);
+    const plr_correction correction = plr_correct(&filter, &of_slots, MANY);
+    TEST_ASSERT_EQUAL_UINT(1, correction.failed_batches);
     TEST_ASSERT_EQUAL_UINT(MANY - second, correction.applied);
 }
 
@@ -189,7 +186,7 @@ static void test_a_variance_that_would_be_lost_stops_the_correction(void) {
     filter.P[plr_packed_at(0, 0)] = PLR_R(1e-4);
     filter.P[plr_packed_at(row, 0)] = (plr_real)(20 * sqrt((double)own * 1e-4));
     before = filter;
-    const plr_correction correction = plr_correct(&filter, seen, 1);
+    const plr_correction correction = plr_correct(&filter, &of_slots, 1);
     TEST_ASSERT_EQUAL_UINT(0, correction.applied);
     TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
     TEST_ASSERT_EQUAL_UINT64(filter.t_ns, filter.totals.diverged_ns);
@@ -204,7 +201,7 @@ static void test_a_senseless_correction_marks_the_filter_diverged(void) {
             filter.P[plr_packed_at(i, k)] *= i < 3 ? PLR_R(4e10) : PLR_R(2e5);
     seen[0].uL_px += 30;
     const plr_pose pose = {{0}, {filter.p_WB[0], filter.p_WB[1], filter.p_WB[2]}};
-    (void)plr_correct(&filter, seen, 1);
+    (void)plr_correct(&filter, &of_slots, 1);
     TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
     TEST_ASSERT_EQUAL_MEMORY(pose.p, filter.p_WB, sizeof pose.p);
 }
@@ -233,7 +230,7 @@ static void test_corrections_beyond_the_largest_range_are_kept(void) {
         (double)(filter.par.camera.fx * filter.par.camera.baseline); /* px m, along the axis */
     for (unsigned slot = 0; slot < 3; slot++)
         seen[slot].uR_px = seen[slot].uL_px + 30; /* beyond infinity */
-    const plr_correction correction = plr_correct(&filter, seen, 3);
+    const plr_correction correction = plr_correct(&filter, &of_slots, 3);
     TEST_ASSERT_EQUAL_UINT(0, correction.cut);
     TEST_ASSERT_EQUAL_UINT(3, correction.applied);
     for (unsigned slot = 0; slot < 3; slot++) {
@@ -250,7 +247,7 @@ static void test_corrections_at_the_least_range_are_counted(void) {
     take_loose_specimen();
     filter.par.pixel_variance = PLR_R(1e-6);
     seen[0].uR_px = seen[0].uL_px - 1e5F; /* a millimetre before the lens */
-    const plr_correction correction = plr_correct(&filter, seen, 1);
+    const plr_correction correction = plr_correct(&filter, &of_slots, 1);
     TEST_ASSERT_EQUAL_UINT(1, correction.applied);
     TEST_ASSERT_EQUAL_UINT(1, correction.cut);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.01, range_of(0));

@@ -6,7 +6,9 @@
 #include <unity.h>
 
 #include "math/packed.h"
+#include "process/twist.h"
 #include "state/covariance.h"
+#include "state/motion.h"
 #include "support/covariance_twin.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
@@ -43,13 +45,13 @@ static void demand_block(const plr_real *got, unsigned row, unsigned column) {
 
 static void check_blocks(void) {
     plr_real block[36];
-    plr_covariance_pose(&twin.filter, block);
+    plr_covariance_get(&twin.filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, block);
     demand_block(block, 0, 0);
     if (!twin.filter.config.bias)
         return;
-    plr_covariance_bias(&twin.filter, block);
+    plr_covariance_get(&twin.filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, block);
     demand_block(block, 6, 6);
-    plr_covariance_pose_bias(&twin.filter, block);
+    plr_covariance_get(&twin.filter, PLR_BLOCK_POSE, PLR_BLOCK_BIAS, block);
     demand_block(block, 0, 6);
 }
 
@@ -63,7 +65,7 @@ static void check_set(void) {
     double P_xi[36];
     const double variance[6] = {1, 2, 3, 4, 5, 6};
     random_spd(&twin.chance, 6, 0.1, P_xi);
-    plr_covariance_set_pose(&twin.filter, P_xi);
+    plr_covariance_begin(&twin.filter, PLR_BLOCK_POSE, P_xi);
     memset(twin.expected, 0, (size_t)twin.n * twin.n * sizeof *twin.expected);
     specimen_put(twin.expected, twin.n, 0, 0, 6, 6, P_xi);
     for (unsigned i = 6; i < twin.n; i++)
@@ -72,7 +74,10 @@ static void check_set(void) {
     twin_demand_expected(1);
     if (!twin.filter.config.bias)
         return;
-    plr_covariance_set_bias(&twin.filter, variance);
+    double P_b[36] = {0};
+    for (unsigned i = 0; i < 6; i++)
+        P_b[7 * i] = variance[i];
+    plr_covariance_begin(&twin.filter, PLR_BLOCK_BIAS, P_b);
     for (unsigned i = 6; i < 12; i++)
         for (unsigned j = 6; j < 12; j++)
             twin.expected[i * twin.n + j] = i == j ? variance[i - 6] : 0;
@@ -85,15 +90,15 @@ static void test_pose_and_bias_are_set_without_correlation(void) {
 
 static void check_joint(void) {
     for (unsigned slot = 0; slot < twin.filter.count; slot++) {
-        plr_real J_pose[18], J_landmark[9], got[9];
+        plr_real got[9];
         double pose[18], landmark[9], joint[9], got_double[9];
         double *J = specimen_zeros(3, twin.n);
-        twin_random(J_pose, pose, 18);
-        twin_random(J_landmark, landmark, 9);
-        specimen_put(J, twin.n, 0, 0, 3, 6, pose);
-        specimen_put(J, twin.n, 0, plr_covariance_row(&twin.filter, slot), 3, 3, landmark);
+        plr_rows rows = {2, {{plr_covariance_row(&twin.filter, slot), 3, {0}}, {0, 6, {0}}}};
+        twin_random(rows.term[1].H, pose, 18);
+        twin_random(rows.term[0].H, landmark, 9);
+        specimen_put_rows(J, twin.n, &rows);
         oracle_sandwich(3, twin.n, J, twin.P, joint);
-        plr_covariance_joint(&twin.filter, slot, J_pose, J_landmark, got);
+        plr_covariance_of_rows(&twin.filter, &rows, got);
         to_doubles(got_double, got, 9);
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(100 * eps, 0, specimen_gap(3, joint, got_double),
                                           twin.at);
@@ -188,7 +193,10 @@ static void check_predict_pose(void) {
     for (unsigned k = 0; k < 6; k++)
         G[7 * k] = 1;
     expect_motion(&motion, F, G);
-    plr_covariance_predict_pose(&twin.filter, A, &motion);
+    plr_real BPB[36], M[36];
+    twin.filter.motion = motion;
+    plr_motion_covariance(&twin.filter, BPB, M);
+    plr_covariance_predict_pose(&twin.filter, A, motion.B, M);
     twin_demand_expected(200);
     free(G);
     free(F);
@@ -201,7 +209,9 @@ static void test_motion_of_the_pose_alone_agrees(void) {
 static void check_walk(void) {
     if (!twin.filter.config.bias)
         return;
-    plr_covariance_add_bias_walk(&twin.filter, PLR_R(0.25), PLR_R(0.0625));
+    twin.filter.par.bias_velocity_walk = PLR_R(0.125);
+    twin.filter.par.bias_gyro_walk = PLR_R(0.03125);
+    plr_twist_walk(&twin.filter, 2);
     for (unsigned i = 6; i < 12; i++)
         twin.expected[i * twin.n + i] += i < 9 ? 0.25 : 0.0625;
     twin_demand_expected(1);

@@ -21,31 +21,30 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-static void random_linearisation(plr_linearisation *lin, bool uses_pose, double *H, unsigned slot) {
-    double pose[18], landmark[9];
-    memset(lin, 0, sizeof *lin);
-    lin->uses_pose = uses_pose;
-    twin_random(lin->H_pose, pose, 18);
-    twin_random(lin->H_landmark, landmark, 9);
+static void random_rows(plr_rows *rows, bool uses_pose, double *H, unsigned slot) {
+    double unused[18];
+    memset(rows, 0, sizeof *rows);
+    rows->terms = uses_pose ? 2 : 1;
+    rows->term[0].row = plr_covariance_row(&twin.filter, slot);
+    rows->term[0].columns = 3;
+    rows->term[1].columns = 6;
+    twin_random(rows->term[1].H, unused, 18);
+    twin_random(rows->term[0].H, unused, 9);
     memset(H, 0, 3 * (size_t)twin.n * sizeof *H);
-    if (uses_pose)
-        specimen_put(H, twin.n, 0, 0, 3, 6, pose);
-    specimen_put(H, twin.n, 0, plr_covariance_row(&twin.filter, slot), 3, 3, landmark);
+    specimen_put_rows(H, twin.n, rows);
 }
 
 static void check_innovation(void) {
     double *H = specimen_zeros(3, twin.n);
     for (unsigned slot = 0; slot < twin.filter.count; slot++)
         for (int uses_pose = 0; uses_pose < 2; uses_pose++) {
-            plr_linearisation lin;
-            plr_real S[6];
+            plr_rows rows_of_H;
+            plr_real S[9];
             double dense[9], got[9];
-            random_linearisation(&lin, uses_pose, H, slot);
+            random_rows(&rows_of_H, uses_pose, H, slot);
             oracle_sandwich(3, twin.n, H, twin.P, dense);
-            plr_covariance_innovation(&twin.filter, slot, &lin, S);
-            for (unsigned i = 0, k = 0; i < 3; i++)
-                for (unsigned j = i; j < 3; j++, k++)
-                    got[3 * i + j] = got[3 * j + i] = (double)S[k];
+            plr_covariance_of_rows(&twin.filter, &rows_of_H, S);
+            to_doubles(got, S, 9);
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(100 * eps, 0, specimen_gap(3, dense, got), twin.at);
         }
     free(H);
@@ -60,11 +59,11 @@ static void check_project(void) {
     double *H = specimen_zeros(3, twin.n), *HP = specimen_zeros(3, twin.n);
     for (unsigned slot = 0; slot < twin.filter.count; slot++)
         for (int uses_pose = 0; uses_pose < 2; uses_pose++) {
-            plr_linearisation lin;
+            plr_rows rows_of_H;
             plr_real *rows = twin.filter.work.Vt;
-            random_linearisation(&lin, uses_pose, H, slot);
+            random_rows(&rows_of_H, uses_pose, H, slot);
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, twin.n, twin.n, 1, H, twin.P, 0, HP);
-            plr_covariance_project(&twin.filter, slot, &lin, rows, ld);
+            plr_covariance_project(&twin.filter, &rows_of_H, rows, ld);
             for (unsigned r = 0; r < 3; r++) {
                 double scale = 0;
                 for (unsigned j = 0; j < twin.n; j++)

@@ -319,7 +319,7 @@ static void test_a_budget_takes_the_largest_gains(void) {
         gain[i] = 0;
         for (unsigned slot = 0; slot < rig.filter.count; slot++)
             if (rig.filter.slots[slot].id == seen[i].id) {
-                const plr_verdict verdict = plr_gate_judge(&rig.filter, slot, &seen[i]);
+                const plr_verdict verdict = specimen_judge(&rig.filter, slot, &seen[i]);
                 gain[i] = verdict.accepted ? (double)verdict.gain : 0;
             }
     }

@@ -7,6 +7,7 @@
 
 #include "filter/gate.h"
 #include "math/packed.h"
+#include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "support/matrices.h"
@@ -28,40 +29,32 @@ void tearDown(void) {
 }
 
 static void test_innovation_is_seen_minus_predicted(void) {
-    const plr_linearisation lin = {.z = {PLR_R(100), PLR_R(80), PLR_R(50)}};
-    const plr_observation seen = {1, 103.5F, 51.0F, 78.25F, 54.0F};
-    plr_real r[3];
-    plr_gate_innovation(r, &seen, &lin);
-    TEST_ASSERT_EQUAL_DOUBLE(3.5, (double)r[0]);
-    TEST_ASSERT_EQUAL_DOUBLE(-1.75, (double)r[1]);
-    TEST_ASSERT_EQUAL_DOUBLE(2.5, (double)r[2]);
+    const float shift[4] = {3.5F, 1.0F, -1.75F, 4.0F};
+    const plr_observation seen = specimen_observation(&filter, 2, shift);
+    const plr_measurement m = specimen_measurement(&filter, 2, &seen);
+    const double px = 2e-4; /* specimen_observation holds pixels in float32 */
+    TEST_ASSERT_DOUBLE_WITHIN(px, 3.5, (double)m.r[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(px, -1.75, (double)m.r[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(px, 2.5, (double)m.r[2]);
 }
 
 static void test_the_vertical_row_is_a_mean_of_two(void) {
     filter.par.pixel_variance = PLR_R(9);
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_gate_noise(&filter, 0));
-    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_gate_noise(&filter, 1));
-    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_gate_noise(&filter, 2));
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter, 0));
+    TEST_ASSERT_EQUAL_DOUBLE(9, (double)plr_stereo_variance(&filter, 1));
+    TEST_ASSERT_EQUAL_DOUBLE(4.5, (double)plr_stereo_variance(&filter, 2));
 }
 
 /* S = H P H^T + R of a slot, 3x3, and r, in double. */
 static void dense_innovation(unsigned slot, const plr_observation *seen, double S[9], double r[3]) {
     const unsigned n = plr_covariance_dim(&filter);
-    plr_linearisation lin;
-    plr_real r_real[3];
-    double pose[18], landmark[9], *H = specimen_zeros(3, n), *P = specimen_covariance(&filter);
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[slot], &lin));
-    to_doubles(landmark, lin.H_landmark, 9);
-    specimen_put(H, n, 0, plr_covariance_row(&filter, slot), 3, 3, landmark);
-    if (lin.uses_pose) {
-        to_doubles(pose, lin.H_pose, 18);
-        specimen_put(H, n, 0, 0, 3, 6, pose);
-    }
+    const plr_measurement m = specimen_measurement(&filter, slot, seen);
+    double *H = specimen_zeros(3, n), *P = specimen_covariance(&filter);
+    specimen_put_rows(H, n, &m.H);
     oracle_sandwich(3, n, H, P, S);
     for (unsigned i = 0; i < 3; i++)
-        S[4 * i] += (double)plr_gate_noise(&filter, i);
-    plr_gate_innovation(r_real, seen, &lin);
-    to_doubles(r, r_real, 3);
+        S[4 * i] += (double)m.R[i];
+    to_doubles(r, m.r, 3);
     free(P);
     free(H);
 }
@@ -86,7 +79,7 @@ static void check_model(plr_model_kind model) {
             const double gap = (double)seen.vL_px - (double)seen.vR_px;
             const double d2 = r[0] * y[0] + r[1] * y[1] + r[2] * y[2] +
                               gap * gap / (2 * (double)filter.par.pixel_variance);
-            const plr_verdict verdict = plr_gate_judge(&filter, slot, &seen);
+            const plr_verdict verdict = specimen_judge(&filter, slot, &seen);
             /* S holds variances of up to 1000 px^2 beside 2: a thousand roundings */
             TEST_ASSERT_DOUBLE_WITHIN(d2 * 3000 * eps, d2, (double)verdict.d2);
             TEST_ASSERT_DOUBLE_WITHIN(gain * 3000 * eps, gain, (double)verdict.gain);
@@ -103,20 +96,20 @@ static void test_distance_and_gain_agree_with_the_dense_ones(void) {
 static void test_the_threshold_itself_is_accepted(void) {
     const float shift[4] = {1, 2, 3, 4};
     const plr_observation seen = specimen_observation(&filter, 2, shift);
-    const plr_real d2 = plr_gate_judge(&filter, 2, &seen).d2;
+    const plr_real d2 = specimen_judge(&filter, 2, &seen).d2;
     filter.par.gate_d2 = d2;
-    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 2, &seen).accepted);
+    TEST_ASSERT_TRUE(specimen_judge(&filter, 2, &seen).accepted);
     filter.par.gate_d2 = d2 * PLR_R(0.999);
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 2, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 2, &seen).accepted);
 }
 
 static void test_a_row_gap_counts_even_where_the_three_rows_fit(void) {
     const float shift[4] = {0, 20, 0, -20};
     const plr_observation seen = specimen_observation(&filter, 0, shift);
-    const plr_verdict verdict = plr_gate_judge(&filter, 0, &seen);
+    const plr_verdict verdict = specimen_judge(&filter, 0, &seen);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 40 * 40 / (2 * 4.0), (double)verdict.d2);
     filter.par.gate_d2 = PLR_R(13.3);
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 0, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 0, &seen).accepted);
 }
 
 static void test_the_course_gate_looks_at_the_norm_of_four_residuals(void) {
@@ -124,9 +117,9 @@ static void test_the_course_gate_looks_at_the_norm_of_four_residuals(void) {
     const plr_observation seen = specimen_observation(&filter, 1, shift);
     filter.par.gate_residual2 = PLR_R(16.01 * 16.01);
     filter.par.gate_d2 = PLR_R(1e-6); /* not looked at */
-    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 1, &seen).accepted);
+    TEST_ASSERT_TRUE(specimen_judge(&filter, 1, &seen).accepted);
     filter.par.gate_residual2 = PLR_R(15.99 * 15.99);
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 1, &seen).accepted);
 }
 
 static void test_the_course_gate_when_open_looks_at_the_covariance_too(void) {
@@ -134,20 +127,20 @@ static void test_the_course_gate_when_open_looks_at_the_covariance_too(void) {
     const plr_observation seen = specimen_observation(&filter, 1, near);
     const plr_observation wild = specimen_observation(&filter, 1, far);
     filter.par.gate_residual2 = PLR_R(0.25);
-    filter.par.gate_d2 = plr_gate_judge(&filter, 1, &seen).d2 + 1;
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &seen).accepted);
+    filter.par.gate_d2 = specimen_judge(&filter, 1, &seen).d2 + 1;
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 1, &seen).accepted);
     filter.frames_mostly_gated = 10; /* locked */
-    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 1, &seen).accepted);
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 1, &wild).accepted);
+    TEST_ASSERT_TRUE(specimen_judge(&filter, 1, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 1, &wild).accepted);
     filter.par.gate_residual2 = PLR_R(16.01 * 16.01); /* what passes the pixels passes */
-    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 1, &wild).accepted);
+    TEST_ASSERT_TRUE(specimen_judge(&filter, 1, &wild).accepted);
 }
 
 static void test_a_point_too_near_is_rejected_even_by_an_open_gate(void) {
     const float shift[4] = {0};
     const plr_observation seen = specimen_observation(&filter, 3, shift);
     filter.slots[3].x[2] = PLR_R(0.2);
-    const plr_verdict verdict = plr_gate_judge(&filter, 3, &seen);
+    const plr_verdict verdict = specimen_judge(&filter, 3, &seen);
     TEST_ASSERT_FALSE(verdict.accepted);
     TEST_ASSERT_TRUE(isfinite((double)verdict.d2) && isfinite((double)verdict.gain));
 }
@@ -160,9 +153,9 @@ static void test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmark
     const unsigned row = plr_covariance_row(&filter, 3);
     for (unsigned i = row; i < row + 2; i++)
         filter.P[plr_packed_at(i, i)] = PLR_R(9); /* 3 rad of bearing */
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 3, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
     filter.slots[3].known = 1;
-    TEST_ASSERT_TRUE(plr_gate_judge(&filter, 3, &seen).accepted);
+    TEST_ASSERT_TRUE(specimen_judge(&filter, 3, &seen).accepted);
 }
 
 static void test_an_innovation_covariance_that_is_not_positive_is_rejected(void) {
@@ -171,9 +164,9 @@ static void test_an_innovation_covariance_that_is_not_positive_is_rejected(void)
     const unsigned row = plr_covariance_row(&filter, 3);
     for (unsigned i = row; i < row + 3; i++)
         filter.P[plr_packed_at(i, i)] = PLR_R(-1);
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 3, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
     filter.P[plr_packed_at(row, row)] = (plr_real)NAN;
-    TEST_ASSERT_FALSE(plr_gate_judge(&filter, 3, &seen).accepted);
+    TEST_ASSERT_FALSE(specimen_judge(&filter, 3, &seen).accepted);
 }
 
 static void test_judging_changes_nothing_but_workspace(void) {
@@ -181,7 +174,7 @@ static void test_judging_changes_nothing_but_workspace(void) {
     const plr_observation seen = specimen_observation(&filter, 3, shift);
     static plr_filter before;
     before = filter;
-    (void)plr_gate_judge(&filter, 3, &seen);
+    (void)specimen_judge(&filter, 3, &seen);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
 }
 

@@ -31,7 +31,7 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-/* A, from (xi, db, w) to (xi, db, dm): dm = J_pose xi + J_landmark w. n x n; to be freed. */
+/* A, from (xi, db, w) to (xi, db, dm): dm = J (xi, w). n x n; to be freed. */
 static double *errors_to_world(void) {
     const unsigned n = plr_covariance_dim(&body);
     double *A = specimen_zeros(n, n);
@@ -40,12 +40,8 @@ static double *errors_to_world(void) {
     for (unsigned slot = 0; slot < body.count; slot++) {
         const unsigned row = plr_covariance_row(&body, slot);
         plr_world_point point;
-        double pose[18], landmark[9];
         plr_model_body.in_world(&body, &body.slots[slot], &point);
-        to_doubles(pose, point.J_pose, 18);
-        to_doubles(landmark, point.J_landmark, 9);
-        specimen_put(A, n, row, 0, 3, 6, pose);
-        specimen_put(A, n, row, row, 3, 3, landmark);
+        specimen_put_rows(A + (size_t)row * n, n, &point.J);
     }
     return A;
 }
@@ -70,17 +66,6 @@ static void take_pair(bool bias) {
     free(A);
 }
 
-static void put_rows(double *H, unsigned n, unsigned row, const plr_linearisation *lin) {
-    double pose[18], landmark[9];
-    memset(H, 0, 3 * (size_t)n * sizeof *H);
-    to_doubles(landmark, lin->H_landmark, 9);
-    specimen_put(H, n, 0, row, 3, 3, landmark);
-    if (lin->uses_pose) {
-        to_doubles(pose, lin->H_pose, 18);
-        specimen_put(H, n, 0, 0, 3, 6, pose);
-    }
-}
-
 static void test_observations_are_linearly_equivalent_at_one_point(void) {
     for (int run = 0; run < RUNS; run++) {
         take_pair(run % 2);
@@ -88,12 +73,13 @@ static void test_observations_are_linearly_equivalent_at_one_point(void) {
         double *A = errors_to_world(), *H_body = specimen_zeros(3, n);
         double *H_world = specimen_zeros(3, n), *HA = specimen_zeros(3, n);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
-            const unsigned row = plr_covariance_row(&body, slot);
-            plr_linearisation in_body, in_world;
-            TEST_ASSERT_TRUE(plr_model_body.linearise(&body, &body.slots[slot], &in_body));
-            TEST_ASSERT_TRUE(plr_model_world.linearise(&world, &world.slots[slot], &in_world));
-            put_rows(H_body, n, row, &in_body);
-            put_rows(H_world, n, row, &in_world);
+            const plr_observation corner = {0};
+            const plr_measurement in_body = specimen_measurement(&body, slot, &corner);
+            const plr_measurement in_world = specimen_measurement(&world, slot, &corner);
+            memset(H_body, 0, 3 * (size_t)n * sizeof *H_body);
+            memset(H_world, 0, 3 * (size_t)n * sizeof *H_world);
+            specimen_put_rows(H_body, n, &in_body.H);
+            specimen_put_rows(H_world, n, &in_world.H);
             oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, n, n, 1, H_world, A, 0, HA);
             /* entries to 500 px a unit times 35 m, of which the world model takes differences */
             TEST_ASSERT_DOUBLE_WITHIN(2e5 * eps, 0, largest_difference(H_body, HA, 3 * n));
@@ -111,8 +97,8 @@ static void test_the_gate_judges_alike(void) {
         take_pair(run % 2);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
             const plr_observation seen = specimen_observation(&body, slot, shift_px);
-            const plr_verdict a = plr_gate_judge(&body, slot, &seen);
-            const plr_verdict b = plr_gate_judge(&world, slot, &seen);
+            const plr_verdict a = specimen_judge(&body, slot, &seen);
+            const plr_verdict b = specimen_judge(&world, slot, &seen);
             /* the world's P holds terms a hundred times larger, which cancel in H P H^T */
             TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e5 * eps, 1, (double)(b.d2 / a.d2));
         }

@@ -42,15 +42,19 @@ static void test_observation_agrees_with_differences(void) {
     for (int run = 0; run < RUNS; run++) {
         take_specimen(false, LANDMARKS);
         for (unsigned slot = 0; slot < LANDMARKS; slot++) {
-            plr_linearisation lin;
+            const plr_observation corner = {0};
+            const plr_measurement lin = specimen_measurement(&filter, slot, &corner);
+            plr_real predicted[3];
             double q[3], z[3], got[3], unused[9], Jw[9], Ji[9];
-            TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[slot], &lin));
-            TEST_ASSERT_FALSE(lin.uses_pose);
+            TEST_ASSERT_EQUAL_UINT(1, lin.H.terms); /* the pose has no part in it */
             point_of(slot, q);
             observe_project3(&truth.camera, q, z, unused);
-            to_doubles(got, lin.z, 3);
+            specimen_prediction(&filter, slot, predicted);
+            to_doubles(got, predicted, 3);
             TEST_ASSERT_DOUBLE_WITHIN(5000 * eps, 0, largest_difference(z, got, 3));
-            TEST_ASSERT_DOUBLE_WITHIN(0, q[2], (double)lin.depth);
+            plr_view view;
+            TEST_ASSERT_TRUE(plr_model_of(&filter)->look(&filter, slot, &view));
+            TEST_ASSERT_DOUBLE_WITHIN(0, q[2], (double)view.q[2]);
             specimen_chart(filter.slots[slot].x, Jw, Ji);
             for (int j = 0; j < 3; j++) {
                 const double h = j < 2 ? 1e-6 : 1e-6 / q[2];
@@ -65,7 +69,7 @@ static void test_observation_agrees_with_differences(void) {
                 for (int i = 0; i < 3; i++)
                     TEST_ASSERT_DOUBLE_WITHIN(1e-4 + 3e4 * eps,
                                               (z_ahead[i] - z_behind[i]) / (2 * h),
-                                              (double)lin.H_landmark[3 * i + j]);
+                                              (double)lin.H.term[0].H[3 * i + j]);
             }
         }
     }
@@ -74,13 +78,13 @@ static void test_observation_agrees_with_differences(void) {
 static void test_a_point_nearer_than_min_depth_is_not_linearised(void) {
     static const double depths_m[] = {0.299, 0.0, -5.0, (double)NAN};
     take_specimen(false, 1);
-    plr_linearisation lin;
+    plr_view view;
     for (unsigned i = 0; i < sizeof depths_m / sizeof *depths_m; i++) {
         filter.slots[0].x[2] = (plr_real)depths_m[i];
-        TEST_ASSERT_FALSE(plr_model_of(&filter)->linearise(&filter, &filter.slots[0], &lin));
+        TEST_ASSERT_FALSE(plr_model_of(&filter)->look(&filter, 0, &view));
     }
     filter.slots[0].x[2] = PLR_R(0.301);
-    TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[0], &lin));
+    TEST_ASSERT_TRUE(plr_model_of(&filter)->look(&filter, 0, &view));
 }
 
 /* ---------------------------------------------------------------- new landmarks */
@@ -212,13 +216,13 @@ static void test_place_in_the_world_agrees_with_differences(void) {
                 }
                 for (int i = 0; i < 3; i++)
                     TEST_ASSERT_DOUBLE_WITHIN(1e-7 + 300 * eps, (ends[0][i] - ends[1][i]) / (2 * h),
-                                              (double)point.J_pose[6 * i + j]);
+                                              (double)point.J.term[1].H[6 * i + j]);
             }
             specimen_chart(filter.slots[slot].x, Jw, Ji);
             observe_camera_to_world(&truth, R_WC);
             square_multiply(3, R_WC, Ji, J);
             for (int i = 0; i < 9; i++)
-                TEST_ASSERT_DOUBLE_WITHIN(1e4 * eps, J[i], (double)point.J_landmark[i]);
+                TEST_ASSERT_DOUBLE_WITHIN(1e4 * eps, J[i], (double)point.J.term[0].H[i]);
         }
     }
 }

@@ -317,7 +317,7 @@ static void drive(void) {
 static void add_share_of_bias(double P[36]) {
     plr_real P_b[36];
     double B[36], same[36], share[36];
-    plr_covariance_bias(&before, P_b);
+    plr_covariance_get(&before, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     to_doubles(same, P_b, 36);
     to_doubles(B, before.motion.B, 36);
     oracle_sandwich(6, 6, B, same, share);
@@ -334,7 +334,7 @@ static void check_pose_covariance(plr_model_kind model, bool bias) {
     plr_motion_pose_covariance(&filter, on_the_side);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
     plr_predict_settle(&filter);
-    plr_covariance_pose(&filter, settled);
+    plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, settled);
     to_doubles(a, on_the_side, 36);
     to_doubles(b, settled, 36);
     if (bias && model == PLR_MODEL_BODY)
@@ -361,10 +361,10 @@ static void test_settling_charges_the_walk_of_the_bias(void) {
     plr_real was[36], is[36];
     filter.par.bias_velocity_walk = PLR_R(0.5);
     filter.par.bias_gyro_walk = PLR_R(0.125);
-    plr_covariance_bias(&filter, was);
+    plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, was);
     drive();
     plr_predict_settle(&filter);
-    plr_covariance_bias(&filter, is);
+    plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, is);
     const double seconds = 0.01 * STEPS;
     for (int i = 0; i < 6; i++)
         TEST_ASSERT_DOUBLE_WITHIN(20 * eps, (i < 3 ? 0.5 : 0.125) * seconds,

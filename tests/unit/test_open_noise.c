@@ -10,6 +10,7 @@
 #include "filter/correction.h"
 #include "filter/gate.h"
 #include "filter/predict.h"
+#include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -85,7 +86,7 @@ static void check_factor(noise_kind kind, bool bias, bool shifted) {
     if (bias) {
         double B[36], P_b[36], share[36];
         plr_real real[36];
-        plr_covariance_bias(&filter, real);
+        plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, real);
         to_doubles(P_b, real, 36);
         to_doubles(B, filter.motion.B, 36);
         oracle_sandwich(6, 6, B, P_b, share);
@@ -183,6 +184,12 @@ static void test_without_observations_the_noise_comes_back_into_P(void) {
 
 /* ---------------------------------------------------------------- with observations */
 
+/* plr_sensed.measure: observation i of slot i. */
+static void measure(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
+    const plr_observation *observations = context;
+    TEST_ASSERT_TRUE(plr_stereo_measure(f, i, &observations[i], m));
+}
+
 typedef struct joint_update {
     unsigned n, m;
     double *P, *mean; /* of the state with the noise in it: P + W W^T and dx - W z */
@@ -208,14 +215,9 @@ static joint_update take_together(const plr_observation *seen, unsigned count) {
         }
     }
     for (unsigned a = 0; a < count; a++) {
-        plr_linearisation lin;
-        plr_real r[3];
-        double H[9];
-        TEST_ASSERT_TRUE(plr_model_of(&filter)->linearise(&filter, &filter.slots[a], &lin));
-        to_doubles(H, lin.H_landmark, 9);
-        specimen_put(u.H, n, 3 * a, plr_covariance_row(&filter, a), 3, 3, H);
-        plr_gate_innovation(r, &seen[a], &lin);
-        to_doubles(u.r + 3 * a, r, 3);
+        const plr_measurement measured = specimen_measurement(&filter, a, &seen[a]);
+        specimen_put_rows(u.H + 3 * (size_t)a * n, n, &measured.H);
+        to_doubles(u.r + 3 * a, measured.r, 3);
     }
     return u;
 }
@@ -227,7 +229,7 @@ static void one_gain(joint_update *u) {
     double *KR = specimen_zeros(n, m);
     oracle_sandwich(m, n, u->H, u->P, S);
     for (unsigned i = 0; i < m; i++)
-        S[i * m + i] += (double)plr_gate_noise(&filter, i % 3);
+        S[i * m + i] += (double)plr_stereo_variance(&filter, i % 3);
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, n, n, 1, u->H, u->P, 0, K);
     TEST_ASSERT_TRUE(oracle_solve_spd(m, n, S, K)); /* K^T */
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, m, 1, n, -1, u->H, u->mean, 1, u->r);
@@ -239,7 +241,7 @@ static void one_gain(joint_update *u) {
     oracle_sandwich(n, n, I_KH, u->P, P);
     for (unsigned i = 0; i < n; i++)
         for (unsigned k = 0; k < m; k++)
-            KR[i * m + k] = K[k * n + i] * sqrt((double)plr_gate_noise(&filter, k % 3));
+            KR[i * m + k] = K[k * n + i] * sqrt((double)plr_stereo_variance(&filter, k % 3));
     oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, n, n, m, 1, KR, KR, 1, P);
     memcpy(u->P, P, (size_t)n * n * sizeof *P);
     free(P);
@@ -290,13 +292,12 @@ static void check_update(noise_kind kind, bool bias, bool shifted) {
         if (!(filter.slots[slot].x[2] > 1)) /* a shift may take one beside the camera */
             filter.slots[slot].x[2] = 1;
         seen[slot] = specimen_observation(&filter, slot, shift);
-        filter.work.order[slot] = filter.work.slot_of[slot] = filter.work.used[slot] =
-            (uint16_t)slot;
     }
+    const plr_sensed sensed = {measure, seen};
     joint_update joint = take_together(seen, count);
     one_gain(&joint);
     before = filter;
-    const plr_correction correction = plr_correct(&filter, seen, count);
+    const plr_correction correction = plr_correct(&filter, &sensed, count);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(count, correction.applied, at);
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, filter.diverged, at);
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, filter.work.noise.open, at);

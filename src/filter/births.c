@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "filter/births.h"
+
+#include "filter/predict.h"
+#include "filter/tracks.h"
+#include "sensor/stereo.h"
+#include "state/slots.h"
+
+bool plr_births_are_allowed(const plr_filter *f) {
+    return f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
+}
+
+/* A slot is free, and the observation makes a landmark. */
+static void append_new(plr_filter *f, const plr_observation *seen) {
+    plr_new_landmark landmark;
+    const plr_real beyond = plr_stereo_initialise(f, seen, &landmark);
+    plr_slots_append(f, seen->id, false, &landmark);
+    f->slots[f->count - 1].beyond = beyond;
+}
+
+void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n,
+                               plr_frame_events *events, plr_report *report) {
+    const bool makes = plr_births_are_allowed(f);
+    for (unsigned k = 0; k < n; k++) {
+        const plr_observation *o = &frame->observations[f->work.order[k]];
+        if (f->work.slot_of[k] != PLR_NO_SLOT)
+            continue;
+        if (!makes || !plr_stereo_makes_landmark(f, o)) {
+            report->poor++;
+            continue;
+        }
+        if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+            report->no_room++;
+            continue;
+        }
+        append_new(f, o);
+        report->created++;
+    }
+    if (!makes) /* those that found no slot are counted as such already */
+        report->poor = (uint16_t)(report->poor - report->no_room);
+}
+
+void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
+    plr_workspace *w = &f->work;
+    for (unsigned k = 0; k < n; k++) {
+        const bool was_rejected = w->slot_of[k] != PLR_NO_SLOT && w->gain[k] < 0;
+        if (was_rejected)
+            plr_slots_remove(f, plr_slots_find(f, frame->observations[w->order[k]].id));
+    }
+    for (unsigned k = 0; k < n; k++)
+        w->slot_of[k] = plr_slots_find(f, frame->observations[w->order[k]].id);
+}
+
+void plr_births_anew(plr_filter *f, const plr_frame *frame, unsigned n, const plr_report *report) {
+    plr_workspace *w = &f->work;
+    const bool may = f->config.model == PLR_MODEL_BODY && plr_births_are_allowed(f);
+    if (!may || 2 * report->gated >= report->matched)
+        return;
+    for (unsigned k = 0; k < n; k++) {
+        const plr_observation *o = &frame->observations[w->order[k]];
+        if (w->slot_of[k] == PLR_NO_SLOT || w->gain[k] >= 0)
+            continue;
+        const unsigned slot = plr_slots_find(f, o->id); /* one that began anew has moved another */
+        const plr_slot before = f->slots[slot];
+        if (!plr_track_may_begin_anew(&before) || !plr_stereo_makes_landmark(f, o))
+            continue;
+        plr_predict_settle(f);
+        plr_slots_remove(f, slot);
+        append_new(f, o);
+        plr_track_begin_anew(&f->slots[f->count - 1], &before);
+    }
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+/* Landmarks begin, and those that are wrong begin anew. */
+#ifndef PLR_FILTER_BIRTHS_H
+#define PLR_FILTER_BIRTHS_H
+
+#include <stdbool.h>
+
+#include "filter/health.h"
+#include "pelorus/state.h"
+
+/* Does the mode in force make landmarks from pixels? */
+bool plr_births_are_allowed(const plr_filter *f);
+
+/* Initialises landmarks from the observations that match none. */
+void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n,
+                               plr_frame_events *events, plr_report *report);
+
+/* Drops the landmarks that the gate rejected in this frame, because it has rejected nearly everything
+ * for too long. Their observations count as new ones. */
+void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n);
+
+/* Where most of a frame agrees, a landmark that was rejected for long is itself wrong: it is
+ * initialised anew where it is seen now. */
+void plr_births_anew(plr_filter *f, const plr_frame *frame, unsigned n, const plr_report *report);
+
+#endif

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+/* Elements of P, for the files that share the covariance's work: covariance.c, covariance_motion.c and
+ * covariance_update.c. */
+#ifndef PLR_STATE_ELEMENTS_H
+#define PLR_STATE_ELEMENTS_H
+
+#include "math/packed.h"
+#include "pelorus/state.h"
+
+/* B (rows x columns) = P[row.., column..], dense, whichever side of the diagonal. */
+static inline void plr_get_block(const plr_filter *f, unsigned row, unsigned rows, unsigned column,
+                                 unsigned columns, plr_real *B) {
+    for (unsigned i = 0; i < rows; i++)
+        for (unsigned j = 0; j < columns; j++)
+            B[i * columns + j] = f->P[plr_packed_at(row + i, column + j)];
+}
+
+/* The reverse. Of a block on the diagonal the lower triangle is taken. */
+static inline void plr_set_block(plr_filter *f, unsigned row, unsigned rows, unsigned column,
+                                 unsigned columns, const plr_real *B) {
+    for (unsigned i = 0; i < rows; i++)
+        for (unsigned j = 0; j < columns; j++)
+            if (row + i >= column + j)
+                f->P[plr_packed_row(row + i) + column + j] = B[i * columns + j];
+}
+
+/* out[i] += a P(i, column) for all rows i, whichever side of the diagonal. */
+static inline void plr_add_column(const plr_filter *f, unsigned n, unsigned column, plr_real a,
+                                  plr_real *restrict out) {
+    const plr_real *restrict row = f->P + plr_packed_row(column);
+    for (unsigned i = 0; i < column; i++)
+        out[i] = PLR_FMA(a, row[i], out[i]);
+    const plr_real *x = row + column;
+    for (unsigned i = column; i < n; i++) {
+        out[i] = PLR_FMA(a, *x, out[i]);
+        x += i + 1;
+    }
+}
+
+#endif
