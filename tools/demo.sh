@@ -42,7 +42,8 @@ if [ -z "$recording" ]; then
 fi
 
 heading 'Replaying it (float32, what the robot runs)'
-build/bin/pelorus-replay "$recording" --trajectory out/trajectory.tum --map out/map.ply
+build/bin/pelorus-replay "$recording" --trajectory out/trajectory.tum --out out/log.plr
+"$VENV/bin/pelorus" export out/log.plr --map out/map.ply
 
 heading 'Drawing the report'
 "$VENV/bin/pelorus" report "$recording" --out out

@@ -16,7 +16,7 @@
 #include "posix/result_file.h"
 #include "posix/storage.h"
 #include "posix/summary.h"
-#include "posix/tables.h"
+#include "posix/trajectory.h"
 #include "posix/verdict.h"
 
 enum {
@@ -30,7 +30,7 @@ typedef struct replay {
     plr_session session;
     plr_landmark known[KNOWN_LANDMARKS];
     file_port port;
-    result_file trajectory, map, frames, out;
+    result_file trajectory, frames, out;
     storage storage;
     map_in map_in;
     bool finishing; /* the end is the replay's own doing, not a message's */
@@ -93,16 +93,6 @@ static void on_frame(void *context, const plr_frame_result *result) {
         trajectory_put(run->trajectory.file, result->pose);
     put_frame_row(run, result);
     complaints_observations(&run->complaints, run->session.totals.stereos, result->report);
-}
-
-static void on_truth(void *context, const plr_truth *truth) {
-    replay *run = context;
-    evaluation_add_truth(&run->summary.evaluation, truth);
-}
-
-static void on_landmark(void *context, const plr_landmark_message *landmark) {
-    replay *run = context;
-    samples_add(&run->summary.landmarks, landmark);
 }
 
 static void on_text(void *context, const plr_text *text) {
@@ -189,16 +179,13 @@ static bool open_outputs(replay *run) {
     if (o->print_config)
         return true; /* nothing is computed */
     return result_file_open(&run->trajectory, o->trajectory, o->input) &&
-           result_file_open(&run->map, o->map, o->input) &&
            result_file_open(&run->frames, o->frames, o->input) && open_log(run);
 }
 
 static bool close_outputs(replay *run) {
-    map_put(run->map.file, &run->summary.landmarks);
     bool good = compressed_output_close(run->port.packer); /* told with the file, below */
     run->port.packer = NULL;
     good = result_file_close(&run->trajectory) && good;
-    good = result_file_close(&run->map) && good;
     good = result_file_close(&run->frames) && good;
     good = result_file_close(&run->out) && good;
     return good;
@@ -221,8 +208,6 @@ static plr_status start_session(replay *run) {
     options.observer = (plr_session_observer){.context = run,
                                               .started = on_started,
                                               .frame = on_frame,
-                                              .truth = on_truth,
-                                              .landmark = on_landmark,
                                               .text = on_text,
                                               .refused = on_refused};
     return plr_session_init(&run->session, &port, &options);
@@ -318,14 +303,10 @@ static bool print_results(replay *run) {
 }
 
 static bool memory_sufficed(const replay *run) {
-    const samples *lists[] = {&run->summary.landmarks, &run->summary.compute_us,
-                              &run->summary.evaluation.estimates, &run->summary.evaluation.truths};
-    for (unsigned i = 0; i < sizeof lists / sizeof lists[0]; i++)
-        if (lists[i]->out_of_memory) {
-            fprintf(stderr, PELORUS_NAME ": out of memory: map and figures are not complete\n");
-            return false;
-        }
-    return true;
+    if (!run->summary.compute_us.out_of_memory)
+        return true;
+    fprintf(stderr, PELORUS_NAME ": out of memory: the figures are not complete\n");
+    return false;
 }
 
 static int usage_error(const char *problem) {

@@ -13,14 +13,10 @@
 void summary_init(summary *s) {
     memset(s, 0, sizeof *s);
     samples_init(&s->compute_us, sizeof(double));
-    evaluation_init(&s->evaluation);
-    samples_init(&s->landmarks, sizeof(plr_landmark_message));
 }
 
 void summary_free(summary *s) {
     samples_free(&s->compute_us);
-    evaluation_free(&s->evaluation);
-    samples_free(&s->landmarks);
 }
 
 static void add_counts(summary *s, const plr_report *report) {
@@ -55,7 +51,6 @@ static void add_pose(summary *s, const plr_pose_message *pose) {
     s->path_m += sqrt(squared);
     s->last_pose = pose->T_WB;
     s->last_ns = pose->t_ns;
-    evaluation_add_estimate(&s->evaluation, pose);
 }
 
 void summary_add_frame(summary *s, const plr_frame_result *result) {
@@ -71,21 +66,7 @@ void summary_add_frame(summary *s, const plr_frame_result *result) {
     s->frames++;
 }
 
-static bool poses_are_given(const plr_session *session) {
-    return plr_filter_config(&session->filter)->mode == PLR_MODE_MAPPING;
-}
-
-void summary_figures_of(summary *s, const plr_session *session, summary_figures *figures) {
-    plr_pose A;
-    evaluation_figures_of(&s->evaluation, &figures->truth);
-    evaluation_start(&s->evaluation, &A);
-    map_figures_of(&figures->map, &s->landmarks, &session->known, &A);
-    if (poses_are_given(session))
-        figures->truth = (evaluation_figures){.frames = figures->truth.frames,
-                                              .err0_m = nan(""),
-                                              .ate_m = nan(""),
-                                              .rot_deg = nan(""),
-                                              .nees_per_dof = nan("")};
+void summary_figures_of(summary *s, summary_figures *figures) {
     samples_sort_doubles(&s->compute_us);
     figures->update_us_median = samples_quantile(&s->compute_us, 0.5);
     figures->update_us_p99 = samples_quantile(&s->compute_us, 0.99);
@@ -155,35 +136,6 @@ static void print_counts(const summary *s, const plr_session *session) {
                s->recoveries, (double)s->diverged_ns * 1e-9);
 }
 
-static void print_truth(const evaluation_figures *truth) {
-    if (truth->frames == 0) {
-        printf("accuracy      the recording holds no TRUTH at its frames\n");
-        return;
-    }
-    printf("accuracy      err0 %.3f m, ATE %.3f m, rotation %.3f deg", truth->err0_m, truth->ate_m,
-           truth->rot_deg);
-    if (!isnan(truth->nees_per_dof))
-        printf(", NEES/6 %.2f", truth->nees_per_dof);
-    printf(" (%zu frames with truth)\n", truth->frames);
-    if (truth->not_positive > 0 && !isnan(truth->nees_per_dof))
-        printf("              NEES leaves out %zu frames whose covariance has no inverse\n",
-               truth->not_positive);
-}
-
-static void print_map(const map_figures *map, bool given) {
-    if (given)
-        printf("accuracy      the poses are given (mapping): it is the map's that counts\n");
-    if (map->landmarks > 0)
-        printf("map           %zu landmarks that the recording knows: RMS %.3f m, median %.3f m, "
-               "NEES/3 %.2f;\n"
-               "              claimed sigmas %.2g to %.2g m\n",
-               map->landmarks, map->rms_m, map->median_m, map->nees_per_dof, map->least_sigma_m,
-               map->largest_sigma_m);
-    else if (given)
-        printf(
-            "map           the recording knows none of its landmarks: nothing to compare with\n");
-}
-
 static void print_damage(const summary *s, const plr_session *session) {
     const plr_reader_counts *c = &session->reader.counts;
     const uint32_t skipped = c->damaged + c->unknown + c->malformed + c->too_long;
@@ -223,7 +175,7 @@ static void print_recording(const char *path, const char *name, double duration_
 
 void summary_print(summary *s, const plr_session *session, const char *path) {
     summary_figures figures;
-    summary_figures_of(s, session, &figures);
+    summary_figures_of(s, &figures);
     print_recording(path, session->header.name, figures.duration_s);
     print_filter(session);
     print_counts(s, session);
@@ -232,8 +184,7 @@ void summary_print(summary *s, const plr_session *session, const char *path) {
            "replay took %.2f s\n",
            figures.update_us_median, figures.update_us_p99, figures.update_us_max,
            figures.realtime_factor, s->wall_s);
-    if (!poses_are_given(session))
-        print_truth(&figures.truth);
-    print_map(&figures.map, poses_are_given(session));
+    if (session->totals.truths > 0)
+        printf("accuracy      of a log that --out wrote: pelorus evaluate OUT.plr\n");
     print_damage(s, session);
 }

@@ -4,8 +4,7 @@
 #define PELORUS_POSIX_SUMMARY_H
 
 #include "pelorus/session.h"
-#include "posix/evaluation.h"
-#include "posix/map_evaluation.h"
+#include "posix/samples.h"
 
 typedef struct summary {
     uint64_t frames, frames_refused;
@@ -19,8 +18,6 @@ typedef struct summary {
     double path_m;
     samples compute_us; /* double, a frame each */
     uint64_t compute_ns;
-    evaluation evaluation;
-    samples landmarks; /* plr_landmark_message: those that left the state, and those at the end */
 
     /* Filled in at the end. */
     double wall_s;
@@ -37,15 +34,12 @@ void summary_add_frame(summary *s, const plr_frame_result *result);
 void summary_print(summary *s, const plr_session *session, const char *path);
 void summary_print_json(summary *s, const plr_session *session, const char *path);
 
-/* The figures that both print. None about the accuracy of poses in mapping, where they are
- * given. */
+/* The figures that both print. */
 typedef struct summary_figures {
-    evaluation_figures truth;
-    map_figures map;
     double update_us_median, update_us_p99, update_us_max; /* NaN without frames */
     double duration_s, realtime_factor;
 } summary_figures;
 
-void summary_figures_of(summary *s, const plr_session *session, summary_figures *figures);
+void summary_figures_of(summary *s, summary_figures *figures);
 
 #endif

@@ -33,18 +33,6 @@ static void put_settings(json_object *o, const plr_config *config) {
 }
 
 static void put_figures(json_object *o, const summary *s, const summary_figures *figures) {
-    json_number(o, "err0_m", figures->truth.err0_m);
-    json_number(o, "ate_m", figures->truth.ate_m);
-    json_number(o, "rot_deg", figures->truth.rot_deg);
-    json_number(o, "nees_per_dof", figures->truth.nees_per_dof);
-    json_count(o, "truth_frames", figures->truth.frames);
-    json_count(o, "nees_left_out", figures->truth.not_positive);
-    json_count(o, "map_landmarks", figures->map.landmarks);
-    json_number(o, "map_rms_m", figures->map.rms_m);
-    json_number(o, "map_median_m", figures->map.median_m);
-    json_number(o, "map_nees_per_dof", figures->map.nees_per_dof);
-    json_number(o, "map_sigma_least_m", figures->map.least_sigma_m);
-    json_number(o, "map_sigma_largest_m", figures->map.largest_sigma_m);
     json_number(o, "path_m", s->path_m);
     json_number(o, "duration_s", figures->duration_s);
     json_number(o, "update_us_median", figures->update_us_median);
@@ -100,7 +88,7 @@ static void put_damage(json_object *o, const summary *s, const plr_session *sess
 void summary_print_json(summary *s, const plr_session *session, const char *path) {
     summary_figures figures;
     json_object o;
-    summary_figures_of(s, session, &figures);
+    summary_figures_of(s, &figures);
     json_begin(&o, stdout);
     put_build(&o, session, path);
     put_figures(&o, s, &figures);

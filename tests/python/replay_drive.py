@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pelorus import wire
+from pelorus.evaluation import judge
 from pelorus.frames import (
     Camera,
     End,
@@ -150,6 +151,23 @@ def run(*arguments: str | Path, program: str = "pelorus-replay", stdin: bytes = 
     done = subprocess.run(command, input=stdin, capture_output=True, check=False, timeout=1800)
     assert done.returncode >= 0, f"killed by signal {-done.returncode}"
     return Result(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+def err0_m(log: Path) -> float:
+    """A result's RMS position error against the truth in it, first poses aligned."""
+    found = judge(log_of(log))["err0_m"]
+    assert found is not None
+    return found
+
+
+def judged(
+    recording: Path, *options: str | Path, program: str = "pelorus-replay"
+) -> dict[str, Any]:
+    """The summary of a run, with the figures of its log against the truth in it."""
+    log = recording.with_suffix(".judged.plr")
+    result = run(recording, *options, "--json", "--out", log, program=program)
+    assert result.status == OK, result.stderr
+    return result.summary | judge(log_of(log))
 
 
 Record = Callable[[Iterable[Message] | bytes], Path]

@@ -35,5 +35,5 @@ def compared(path: Path, programs: Programs, *settings: str) -> Comparison:
     """Carry out the runs of a report."""
     folder = path.parent / "runs"
     folder.mkdir()
-    plans = plan_runs(programs, path, settings or SETTINGS)
-    return Comparison(read_subject(path), [carry_out(plan, path, folder) for plan in plans])
+    plans, subject = plan_runs(programs, path, settings or SETTINGS), read_subject(path)
+    return Comparison(subject, [carry_out(plan, subject, folder) for plan in plans])

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drives import with_turned_axes
-from pelorus import evaluation, road, trajectory
+from pelorus import road, trajectory
 from pelorus.converters import ece276a, matlab
+from pelorus.evaluation import Accuracy, assess
 from pelorus.faults.mend import mend
 from pelorus.frames import BodyAxes, TwistTiming
 from pelorus.recording import Recording
+from pelorus.trajectory import Trajectory
 
 
 def test_0027_has_stale_tracks_and_a_malformed_lever(real: Callable[[str], Path]) -> None:
@@ -76,9 +78,12 @@ def test_a_kitti_pose_file_reads_as_rigid_poses(real: Callable[[str], Path]) -> 
     assert np.allclose(poses.R @ np.swapaxes(poses.R, 1, 2), np.eye(3), atol=1e-12)
 
 
-def dead_reckoning(recording: Recording) -> evaluation.Figures:
-    count = len(recording.truth_t_ns)
-    return evaluation.figures(recording.dead_reckoning().at(slice(0, count)), recording.truth)
+def dead_reckoning(recording: Recording) -> Accuracy:
+    t_ns = recording.truth_t_ns
+    poses = recording.dead_reckoning().at(slice(0, len(t_ns)))
+    found = assess(Trajectory(t_ns, poses), Trajectory(t_ns, recording.truth))
+    assert found is not None
+    return found
 
 
 def test_dead_reckoning_of_starry_night_is_the_designs(real: Callable[[str], Path]) -> None:

@@ -87,10 +87,10 @@ def test_mapping_is_as_good_as_a_fit_of_each_landmark_by_itself(
     assert run_replay(starry, *options, "--out", log).status == 0
     said = pelorus("evaluate", log, "--truth", starry, "--json")
     found = json.loads(said.out)
-    assert found["landmarks"] == 20
+    assert found["map_landmarks"] == 20
     assert found["map_median_m"] < 1.2 * oracle_median
     assert found["map_rms_m"] < 1.5 * oracle_rms
-    assert found["map_nees"] > 10  # it claims an eighth of that, ...
+    assert found["map_nees_per_dof"] > 10  # it claims an eighth of that, ...
 
 
 def test_residuals_at_the_true_landmarks_do_not_average_out(starry: Path) -> None:

@@ -12,12 +12,13 @@ from pelorus.frames import Kind, Landmark, Stereo
 from pelorus.trajectory import read_tum
 from replay_drive import (
     BIN,
-    OK,
     USAGE,
     Record,
     Result,
     drive,
+    err0_m,
     header,
+    judged,
     known,
     log_of,
     recorder,
@@ -60,10 +61,8 @@ def test_with_slots_for_all_the_replay_computes_the_same(
     summaries = []
     for program in (TEXTBOOK, "pelorus-replay-f64"):
         way = tmp_path / f"{program}.tum"
-        slots = ("--slots", "256", "--json", "--trajectory", way)
-        result = run(path, *options, *slots, program=program)
-        assert result.status == OK, result.stderr
-        summaries.append(result.summary)
+        slots = ("--slots", "256", "--trajectory", way)
+        summaries.append(judged(path, *options, *slots, program=program))
         ways.append(read_tum(way))
     assert summaries[0].keys() == summaries[1].keys()
     for count in ("frames", "matched", "used", "gated", "new", "poor", "evicted"):
@@ -87,8 +86,8 @@ def test_no_landmark_leaves_it(record: Record, tmp_path: Path) -> None:
 @pytest.mark.parametrize("model", [COURSE, ("--model", "body")])
 def test_known_landmarks_locate_it(record: Record, model: tuple[str, ...]) -> None:
     path = record([header(), *known(), *drive()[1:]])
-    options = (*model, "--mode", "localization", "--json")
-    mine, theirs = textbook(path, *options).summary, run(path, *options).summary
+    options = (*model, "--mode", "localization")
+    mine, theirs = judged(path, *options, program=TEXTBOOK), judged(path, *options)
     assert mine["used"] == theirs["used"] > 0
     assert mine["err0_m"] == pytest.approx(theirs["err0_m"], abs=1e-3)
 
@@ -134,12 +133,13 @@ def test_what_the_textbook_has_not_is_refused_by_name(
     assert not Path("s.state").exists()
 
 
-def test_the_standard_input_is_read_twice(record: Record) -> None:
+def test_the_standard_input_is_read_twice(record: Record, tmp_path: Path) -> None:
     path = record(drive())
-    piped = textbook("-", *COURSE, "--json", stdin=path.read_bytes()).summary
-    whole = textbook(path, *COURSE, "--json").summary
-    assert piped["err0_m"] == whole["err0_m"]
-    assert piped["used"] == whole["used"]
+    log = tmp_path / "piped.plr"
+    result = textbook("-", *COURSE, "--json", "--out", log, stdin=path.read_bytes())
+    whole = judged(path, *COURSE, program=TEXTBOOK)
+    assert err0_m(log) == whole["err0_m"]
+    assert result.summary["used"] == whole["used"]
 
 
 def test_what_is_no_recording_is_told_as_the_replay_tells_it(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ COMMANDS = (
     "convert",
     "info",
     "evaluate",
+    "export",
     "simulate",
     "report",
     "map",

@@ -6,13 +6,19 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rich.markup import escape
+
 from pelorus import packed_file
+from pelorus.console import err
 from pelorus.errors import PelorusError, writing
+from pelorus.frames import Message, Pose
+from pelorus.wire import messages_of
 
 SOURCE_ROOT = Path(__file__).resolve().parents[3]
 USUAL_FOLDER = Path("build/bin")
@@ -48,17 +54,16 @@ def _environment() -> Path | None:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What one run writes: runs/NAME.tum, .csv, .ply, .plr, .json."""
+    """What one run writes: runs/NAME.tum, .csv, .plr, .json."""
 
     trajectory: Path
     frames: Path
-    map: Path  # to be looked at: what is computed with comes from the log
     log: Path
     summary: Path
 
     @classmethod
     def named(cls, folder: Path, name: str) -> Outputs:
-        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "ply", "plr", "json")))
+        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "plr", "json")))
 
 
 def replay(
@@ -67,7 +72,7 @@ def replay(
     """Run the filter; its summary, and what it had to say on the way."""
     wanted = [
         *("--trajectory", str(outputs.trajectory), "--frames", str(outputs.frames)),
-        *("--map", str(outputs.map), "--out", str(outputs.log), "--json"),
+        *("--out", str(outputs.log), "--json"),
     ]
     stdout, stderr = run_program(program, recording, [*options, *wanted])
     try:
@@ -77,6 +82,23 @@ def replay(
     with writing(outputs.summary):
         outputs.summary.write_text(stdout, encoding="utf-8")
     return summary, [line for line in stderr.splitlines() if line.strip()]
+
+
+def result_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
+    """The messages of a result as they are; of a recording those of a replay in float32."""
+    messages = messages_of(source)
+    if any(isinstance(m, Pose) and m.after_stereo for m in messages):
+        if options:
+            raise PelorusError(
+                f"{source}: holds a filter's result already: --config and --set are for recordings"
+            )
+        return messages
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        outputs = Outputs.named(Path(folder), "result")
+        _, said = replay(find_programs(programs).float32, source, options, outputs)
+        for line in said:
+            err.print(escape(line))
+        return messages_of(outputs.log)
 
 
 def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> float:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import Decimal, DecimalException
 from pathlib import Path
 from typing import NamedTuple
@@ -13,11 +14,12 @@ from scipy.spatial.transform import Rotation
 from pelorus import foreign, packed_file, se3, wire
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
-from pelorus.frames import Header, Stereo, Truth
+from pelorus.frames import Header, Message, Pose, Stereo, Truth
+from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
 from pelorus.se3 import Poses
-from pelorus.wire import Received
 
+POSE_SIZE = 6
 TUM_COLUMNS = 8
 KITTI_COLUMNS = 12
 QUATERNION_NORM_TOLERANCE = 1e-2
@@ -80,17 +82,41 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
 
 def truth_of(path: Path) -> Trajectory:
     """TRUTH at the times of STEREO, where the figures are evaluated."""
-    received, _ = wire.read_file(path)
-    truth = [frame.message for frame in received if isinstance(frame.message, Truth)]
-    if not truth:
+    messages = wire.messages_of(path)
+    found = truth_in(messages)
+    if found is not None:
+        return found
+    count = sum(isinstance(m, Truth) for m in messages)
+    if not count:
         raise PelorusError(f"{path}: holds no TRUTH frame")
-    frames = _frame_times(received)
-    used = {t.t_ns: t for t in truth if t.t_ns in frames}
-    if not used:
-        raise PelorusError(f"{path}: none of its {len(truth)} TRUTH frames has a STEREO's time")
-    t_ns = np.array(sorted(used), np.int64)
-    R = np.array([used[t].R_WB for t in t_ns.tolist()])
-    return Trajectory(t_ns, Poses(R, np.array([used[t].p_WB_m for t in t_ns.tolist()])))
+    raise PelorusError(f"{path}: none of its {count} TRUTH frames has a STEREO's time")
+
+
+def truth_in(messages: Sequence[Message]) -> Trajectory | None:
+    """TRUTH at the times of STEREO; of two at one time the later, and none that is not finite."""
+    frames = _frame_times(messages)
+    used = {m.t_ns: m for m in messages if isinstance(m, Truth) and m.t_ns in frames}
+    sound = [m for m in used.values() if np.isfinite(m.R_WB).all() and np.isfinite(m.p_WB_m).all()]
+    return _ordered(sound) if sound else None
+
+
+def estimate_in(messages: Sequence[Message]) -> tuple[Trajectory, Floats] | None:
+    """A filter's poses after STEREO with their covariance (n, 6, 6), NaN where it knows none."""
+    poses = {m.t_ns: m for m in messages if isinstance(m, Pose) and m.after_stereo}
+    if not poses:
+        return None
+    estimate = _ordered(list(poses.values()))
+    unknown = np.full(POSE_SIZE * (POSE_SIZE + 1) // 2, np.nan)
+    ordered = [poses[t] for t in estimate.t_ns.tolist()]
+    packed = np.array([m.covariance if m.knows_covariance else unknown for m in ordered])
+    return estimate, unpack_symmetric(packed, POSE_SIZE)
+
+
+def _ordered(poses: Sequence[Truth | Pose]) -> Trajectory:
+    poses = sorted(poses, key=lambda pose: pose.t_ns)
+    t_ns = np.array([pose.t_ns for pose in poses], np.int64)
+    R, p = np.array([pose.R_WB for pose in poses]), np.array([pose.p_WB_m for pose in poses])
+    return Trajectory(t_ns, Poses(R, p))
 
 
 def read_kitti(path: Path) -> Poses:
@@ -127,7 +153,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
     if recording is not None:
         received, _ = wire.read_file(recording)
         header: Header = wire.header_of(received, recording)
-        t_ns = np.array(sorted(_frame_times(received)), np.int64)
+        t_ns = np.array(sorted(_frame_times([frame.message for frame in received])), np.int64)
         poses = body_poses(poses, Poses(header.R_CB, header.t_CB_m))
         whose = recording
     elif times is not None:
@@ -142,8 +168,8 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
     return Trajectory(t_ns[: len(poses.p)], poses)
 
 
-def _frame_times(received: list[Received]) -> set[int]:
-    return {frame.message.t_ns for frame in received if isinstance(frame.message, Stereo)}
+def _frame_times(messages: Sequence[Message]) -> set[int]:
+    return {m.t_ns for m in messages if isinstance(m, Stereo)}
 
 
 def is_recording(path: Path) -> bool:

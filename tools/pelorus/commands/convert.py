@@ -147,8 +147,8 @@ def map_(
         ...,
         metavar="IN",
         help="CSV with the columns id, x_m, y_m, z_m in the world, and sigma_m or cov_xx_m2, "
-        "cov_yx_m2, cov_yy_m2, cov_zx_m2, cov_zy_m2, cov_zz_m2 (a column frame must say world); "
-        "or a PLY of pelorus-replay --map.",
+        "cov_yx_m2, cov_yy_m2, cov_zx_m2, cov_zy_m2, cov_zz_m2 (a column frame must say world): "
+        "what pelorus export --map OUT.csv writes.",
     ),
     target: Path = typer.Argument(..., metavar="OUT.plr", help="The map to write."),
     like: Path = typer.Option(
@@ -158,7 +158,10 @@ def map_(
         help="A recording of the camera that will see the landmarks: for HEADER and body axes.",
     ),
 ) -> None:
-    """Make known landmarks of a map, to be localised in."""
+    """Make known landmarks of a map, to be localised in (pelorus-replay --map-in).
+
+    A result of pelorus-replay --out is such a map as it is.
+    """
     recording = landmark_map.convert(source, like)
     size = recording.write(target)
     sigma = [float(np.sqrt(m.covariance[[0, 2, 5]].mean())) for m in recording.known]

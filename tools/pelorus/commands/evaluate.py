@@ -1,37 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus evaluate TRAJECTORY.tum --truth FILE | --road FILE.csv`."""
+"""`pelorus evaluate RECORDING | RESULT | TRAJECTORY.tum [--truth FILE | --road FILE.csv]`."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 import typer
 from rich.table import Table
 
-from pelorus import evaluation, road, se3
+from pelorus import evaluation, road
+from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.errors import PelorusError
+from pelorus.evaluation import Figures, assess, judge, known_in
 from pelorus.frames import Message
-from pelorus.report.results import read_poses
-from pelorus.trajectory import Trajectory, is_recording, read_truth, read_tum
+from pelorus.replay import result_of
+from pelorus.trajectory import Trajectory, estimate_in, is_recording, read_truth, read_tum, truth_of
 from pelorus.wire import messages_of
 
-MEANING = {
-    "err0_m": "RMS position error, first poses aligned",
-    "ate_m": "RMS position error after the best rigid fit",
-    "rot_deg": "RMS rotation error, first poses aligned",
-    "poses": "poses compared",
-    "path_m": "length of the trajectory",
+POSES_MIN = 3  # three points fix a rigid fit
+MEANING = evaluation.MEANING | {
     "road_m": "RMS distance to the road",
     "out_of_plane_m": "RMS distance out of the trajectory's plane",
     "tilt_deg": "tilt of that plane against the first pose's z",
-    "map_rms_m": "RMS distance of the landmarks from where they are known to be",
-    "map_median_m": "median of that distance",
-    "map_nees": "squared error of a landmark over its covariance, an axis: 1 is due",
-    "landmarks": "landmarks compared",
     "step_change_m": "RMS change of the step from pose to pose: how erratic it is",
 }
 
@@ -39,25 +32,25 @@ MEANING = {
 def register(parent: typer.Typer) -> None:
     """Add `evaluate` to the command line."""
     parent.command(
-        epilog="Example:  pelorus evaluate drive.tum --truth drive.plr",
+        epilog="Example:  pelorus evaluate drive.plr --config robot.conf --set bias=on",
     )(evaluate)
 
 
 def evaluate(
-    trajectory: Path = typer.Argument(
+    source: Path = typer.Argument(
         ...,
-        metavar="TRAJECTORY.tum",
-        help="Rows t x y z qx qy qz qw, s and m; or a result (.plr), whose map is compared too "
-        "where it or the truth's recording knows landmarks.",
+        metavar="RECORDING|RESULT|TRAJECTORY.tum",
+        help="A recording, or what pelorus-replay --out left of it; or rows t x y z qx qy qz qw, "
+        "s and m.",
     ),
     truth: Path | None = typer.Option(
         None,
         metavar="FILE",
         help="The reference: a .plr with TRUTH, a TUM file, or KITTI poses (then give "
-        "--recording or --times).",
+        "--recording or --times). Else the TRUTH in the result itself.",
     ),
     road_file: Path | None = typer.Option(
-        None, "--road", metavar="FILE.csv", help="A digitised road: rows arc_m,x_m,y_m."
+        None, "--road", metavar="FILE.csv", help="Or a digitised road: rows arc_m,x_m,y_m."
     ),
     recording: Path | None = typer.Option(
         None,
@@ -71,32 +64,44 @@ def evaluate(
     tolerance: float = typer.Option(
         1e-6, metavar="S", help="Times that differ by no more are equal."
     ),
+    config: Path | None = typer.Option(
+        None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
+    ),
+    settings: list[str] = SETTINGS,
+    programs: Path | None = PROGRAMS,
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),
 ) -> None:
     """Compare a trajectory with a reference, or with a road.
 
-    Of a result in mode mapping, whose poses were given, the map alone is compared.
+    A recording is replayed first, in float32. The map is compared too, where the truth's recording
+    or the result itself knows landmarks; in mode mapping, whose poses were given, it alone.
     """
-    if (truth is None) == (road_file is None):
-        raise typer.BadParameter("either --truth or --road is due", param_hint="--truth / --road")
-    result = messages_of(trajectory) if is_recording(trajectory) else []
-    estimate = read_poses(trajectory)[0] if result else read_tum(trajectory)
-    found: dict[str, float] = {}
+    if truth is not None and road_file is not None:
+        raise typer.BadParameter("one of them, not both", param_hint="--truth / --road")
+    options = replay_options(config, settings)
+    messages: list[Message] = []
+    if is_recording(source):
+        messages = result_of(source, options, programs)
+    elif options:
+        raise typer.BadParameter("for a recording", param_hint="--config / --set")
+    elif truth is None and road_file is None:
+        raise typer.BadParameter("for a TUM file one is due", param_hint="--truth / --road")
+    found_poses = estimate_in(messages)
+    estimate = found_poses[0] if found_poses else read_tum(source)
+    found: Figures = {}
     if road_file is not None:
-        found = _road(estimate, road_file, skip)
-    elif truth is not None:
-        reference = read_truth(truth, times, recording)
+        found |= asdict(road.compare(estimate.poses.p, road.read_road(road_file), skip))
+    else:
+        reference = truth_of(source) if truth is None else read_truth(truth, times, recording)
+        known = known_in(messages_of(truth)) if truth is not None and is_recording(truth) else []
         tolerance_ns = round(tolerance * 1e9)
-        if not evaluation.is_mapping(result):  # the poses are the reference's
-            found = asdict(
-                evaluation.compare(estimate, reference, tolerance_ns, (trajectory, truth))
-            )
-        found |= _map(result, truth, estimate, reference, tolerance_ns)
-        if not found:
-            raise PelorusError(
-                f"{trajectory}: its poses were given (mode mapping), and {truth} knows none of its "
-                "landmarks: there is nothing to compare"
-            )
+        if messages:
+            found |= judge(messages, reference, known, tolerance_ns)
+        else:
+            accuracy = assess(estimate, reference, tolerance_ns=tolerance_ns)
+            found |= accuracy.figures if accuracy else {"truth_frames": 0}
+        _require_something(found, (source, estimate), (truth or source, reference), messages)
+    found["path_m"] = evaluation.path_m(estimate.poses)
     found["step_change_m"] = evaluation.step_change(estimate.poses)
     if as_json:
         typer.echo(json.dumps(found))
@@ -104,33 +109,35 @@ def evaluate(
         _show(found)
 
 
-def _map(
-    result: Sequence[Message],
-    truth: Path,
-    estimate: Trajectory,
-    reference: Trajectory,
-    tolerance_ns: int,
-) -> dict[str, float]:
-    """Of the landmarks that the truth's recording, or the result itself, knows."""
-    known = evaluation.known_in(messages_of(truth)) if is_recording(truth) else []
-    known = known or evaluation.known_in(result)
-    mine, theirs = evaluation.match(estimate, reference, tolerance_ns)
-    if not len(mine):
-        return {}
-    start = se3.compose(
-        estimate.poses.at(int(mine[0])), se3.inverse(reference.poses.at(int(theirs[0])))
-    )
-    found = evaluation.compare_maps(result, known, start)
-    return {} if found is None else asdict(found)
+def _require_something(
+    found: Figures,
+    mine: tuple[Path, Trajectory],
+    theirs: tuple[Path, Trajectory],
+    messages: list[Message],
+) -> None:
+    """Of the poses, or where they were given of the map."""
+    if evaluation.is_mapping(messages):
+        if not found["map_landmarks"]:
+            raise PelorusError(
+                f"{mine[0]}: its poses were given (mode mapping), and {theirs[0]} knows none of "
+                "its landmarks: there is nothing to compare"
+            )
+    elif (found["truth_frames"] or 0) < POSES_MIN:
+        raise PelorusError(
+            f"{mine[0]}: {found['truth_frames']} of its {len(mine[1].t_ns)} poses "
+            f"({_span(mine[1])}) have a pose of equal time among the {len(theirs[1].t_ns)} of "
+            f"{theirs[0]} ({_span(theirs[1])}); {POSES_MIN} are due"
+        )
 
 
-def _road(estimate: Trajectory, path: Path, skip: float) -> dict[str, float]:
-    return asdict(road.compare(estimate.poses.p, road.read_road(path), skip))
+def _span(trajectory: Trajectory) -> str:
+    return f"{trajectory.t_ns[0] * 1e-9:.3f} to {trajectory.t_ns[-1] * 1e-9:.3f} s"
 
 
-def _show(found: dict[str, float]) -> None:
+def _show(found: Figures) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for key, value in found.items():
-        text = str(value) if isinstance(value, int) else f"{value:.3f}"
-        table.add_row(key, text, MEANING[key])
+        if value is not None:
+            text = str(value) if isinstance(value, int) else f"{value:.3f}"
+            table.add_row(key, text, MEANING[key])
     out.print(table)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +11,11 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out
-from pelorus.errors import PelorusError
+from pelorus.console import out
 from pelorus.grid import files, occupancy
 from pelorus.grid.occupancy import Band, Grid, Wish
-from pelorus.grid.sightings import Sightings, is_result, sightings
-from pelorus.replay import Outputs, find_programs, replay
-from pelorus.wire import messages_of
+from pelorus.grid.sightings import sightings
+from pelorus.replay import result_of
 
 
 def register(parent: typer.Typer) -> None:
@@ -63,7 +60,8 @@ def map_(
     replayed first.
     """
     wish = _wish(resolution, height, range_)
-    seen = _seen(source, replay_options(config, settings), programs)
+    messages = result_of(source, replay_options(config, settings), programs)
+    seen = sightings(source, messages)
     grid = occupancy.occupancy(seen, wish)
     _publish(grid, f"{seen.name}: {files.heights(grid.band)}", folder)
     _tell(grid, folder)
@@ -84,23 +82,6 @@ def _wish(resolution: float | None, height: tuple[float, float] | None, range_m:
             param_hint="--height",
         )
     return Wish(resolution, None if height is None else Band(*height), range_m)
-
-
-def _seen(source: Path, options: list[str], programs: Path | None) -> Sightings:
-    """Of a result as it is; of a recording after a replay."""
-    messages = messages_of(source)
-    if is_result(messages):
-        if options:
-            raise PelorusError(
-                f"{source}: holds a filter's result already: --config and --set are for recordings"
-            )
-        return sightings(source, messages)
-    with tempfile.TemporaryDirectory(prefix="pelorus-map-") as folder:
-        outputs = Outputs.named(Path(folder), "map")
-        _, said = replay(find_programs(programs).float32, source, options, outputs)
-        for line in said:
-            err.print(escape(line))
-        return sightings(source, messages_of(outputs.log))
 
 
 def _publish(grid: Grid, title: str, folder: Path) -> None:

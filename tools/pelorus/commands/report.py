@@ -49,7 +49,7 @@ def report(
     subject = read_subject(recording)
     plans = plan_runs(find_programs(programs), recording, replay_options(config, settings))
     runs_folder = made(folder / "runs")
-    runs = [carry_out(plan, recording, runs_folder) for plan in progress(plans, "replaying")]
+    runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
 
     from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
 

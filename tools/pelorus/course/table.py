@@ -11,7 +11,7 @@ from pelorus.course.pictures import NAMES
 from pelorus.course.trial import Trial
 from pelorus.evaluation import step_change
 from pelorus.layout import Floats
-from pelorus.report.words import NONE, number
+from pelorus.report.words import NONE, POSE_KEYS, number
 
 TITLES = (
     "recording",
@@ -36,17 +36,14 @@ def rows(trials: Sequence[Trial]) -> list[tuple[str, ...]]:
 
 
 def _row(trial: Trial, name: str) -> tuple[str, ...]:
-    run, truth = trial.compared.run(name), trial.truth_figures.get(name)
+    run = trial.compared.run(name)
     fit, found = trial.road_fits.get(name), trial.traces.get(name)
     moving = ("", "") if found is None else (_range(found.active), _range(found.whole))
     return (
         trial.subject.title,
         NAMES[name],
         number(fit.figures.road_m if fit else None),
-        number(truth.err0_m if truth else None),
-        number(truth.ate_m if truth else None),
-        number(truth.rot_deg if truth else None),
-        number(trial.nees(name)),
+        *(number(run.summary[key]) for key in POSE_KEYS),
         number(step_change(run.trajectory.poses)),
         str(run.summary["used"]),
         str(run.summary["gated"]),

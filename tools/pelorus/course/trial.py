@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import evaluation, road
+from pelorus import road
 from pelorus.console import progress
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Figures
 from pelorus.grid import plane
 from pelorus.grid.sightings import sightings
 from pelorus.layout import Floats
@@ -55,14 +54,6 @@ class Trial:
         return self.compared.runs
 
     @cached_property
-    def truth_figures(self) -> dict[str, Figures]:
-        truth = self.subject.truth
-        if truth is None:
-            return {}
-        names = (self.subject.path, self.subject.path)
-        return {run.name: evaluation.compare(run.trajectory, truth, 0, names) for run in self.runs}
-
-    @cached_property
     def road_fits(self) -> dict[str, RoadFit]:
         """Each trajectory fitted to the road on its own."""
         way = self.reference.road_m
@@ -74,13 +65,6 @@ class Trial:
     def traces(self) -> dict[str, Traces]:
         """Of the runs that have landmarks with a covariance in metres: the course's."""
         return {COURSE: self.compared.whole_map}
-
-    def nees(self, name: str) -> float | None:
-        """Mean NEES a degree of freedom; None without truth."""
-        accuracy = self.compared.accuracy.get(name)
-        if accuracy is None or not np.isfinite(accuracy.nees).any():
-            return None
-        return float(np.nanmean(accuracy.nees))
 
     def flat(self, name: str, points: Floats) -> Floats:
         """Points of a run's world (n, 3) -> the picture (n, 2)."""
@@ -128,5 +112,5 @@ def carry_out_trial(
     preset = planned[COURSE]
     planned[COURSE] = replace(preset, options=(*preset.options, *options.course))
     plans = progress([planned[name] for name in RUNS], f"replaying {subject.path.name}")
-    runs = [carry_out(plan, subject.path, folder) for plan in plans]
+    runs = [carry_out(plan, subject, folder) for plan in plans]
     return Trial(Comparison(subject, runs), reference)

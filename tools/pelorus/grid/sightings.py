@@ -46,11 +46,6 @@ class Sightings:
     landmark: Indices
 
 
-def is_result(messages: list[Message]) -> bool:
-    """Whether a filter has been here: it leaves poses after stereo frames."""
-    return any(isinstance(m, Pose) and m.after_stereo for m in messages)
-
-
 def sightings(path: Path, messages: list[Message]) -> Sightings:
     """Landmarks, poses, and who saw whom; PelorusError where there is no landmark."""
     header = _all(messages, Header)[0]

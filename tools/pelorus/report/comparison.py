@@ -23,16 +23,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import evaluation, style
+from pelorus import style
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Accuracy, MapFigures, assess
-from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo
+from pelorus.evaluation import Accuracy, assess, in_force
+from pelorus.frames import Kind, Landmark, Message, Report, Role, Stereo
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
 from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.report.results import DIAGONAL, Run, Subject
+from pelorus.report.results import Run, Subject
 
+DIAGONAL = (0, 2, 5)  # of a packed 3 x 3
 PRIOR_VARIANCE_M2 = 2.0  # Sigma_m of the report, an axis
 MIN_DISPARITY, LANDMARK_SIGMA = 17, 22  # the settings' ids
 
@@ -48,8 +49,8 @@ class Traces(NamedTuple):
 
 def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
     """From a result's messages and the state's trace at the frames' times."""
-    least_px = _in_force(messages, MIN_DISPARITY, 0.0)
-    sigma_m = _in_force(messages, LANDMARK_SIGMA, 0.0)
+    least_px = in_force(messages, MIN_DISPARITY) or 0.0
+    sigma_m = in_force(messages, LANDMARK_SIGMA) or 0.0
     prior = 3 * (sigma_m**2 or PRIOR_VARIANCE_M2)
     ids = set[int]()
     for message in messages:
@@ -76,16 +77,6 @@ def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
     return Traces(times, columns[:, 1], columns[:, 2], len(ids))
 
 
-def _in_force(messages: Sequence[Message], id: int, otherwise: float) -> float:
-    """The value of a setting."""
-    values = [
-        m.settings[id]
-        for m in messages
-        if isinstance(m, Config) and m.build_fingerprint and id in m.settings
-    ]
-    return values[-1] if values else otherwise
-
-
 MAIN = "body"  # the default model: what the report is about
 COURSE = "course"
 
@@ -103,7 +94,7 @@ class Comparison:
         truth = self.subject.truth
         if truth is None:
             return {}
-        found = {run.name: assess(run.trajectory, run.covariance, truth) for run in self.runs}
+        found = {run.name: assess(run.trajectory, truth, run.covariance) for run in self.runs}
         return {name: accuracy for name, accuracy in found.items() if accuracy is not None}
 
     @cached_property
@@ -120,19 +111,6 @@ class Comparison:
             return occupancy(sightings(self.main.log, self.main.messages), Wish())
         except PelorusError:
             return None
-
-    @cached_property
-    def map_error(self) -> dict[str, MapFigures]:
-        """By the run's name; empty where the recording knows no landmark."""
-        if not self.subject.known:
-            return {}
-        found = {run.name: self._map_error(run) for run in self.runs}
-        return {name: figures for name, figures in found.items() if figures is not None}
-
-    def _map_error(self, run: Run) -> MapFigures | None:
-        accuracy = self.accuracy.get(run.name)
-        A = accuracy.A if accuracy else evaluation.UNMOVED
-        return evaluation.compare_maps(run.messages, self.subject.known, A)
 
     @cached_property
     def whole_map(self) -> Traces:

@@ -17,7 +17,7 @@ from pelorus.grid.files import heights
 from pelorus.layout import Floats
 from pelorus.report import top_view
 from pelorus.report.comparison import COURSE, MAIN, Comparison
-from pelorus.report.results import POSE_SIZE, Run
+from pelorus.report.results import Run
 from pelorus.style import (
     BLACK,
     BLUE,
@@ -38,6 +38,7 @@ from pelorus.style import (
     new_figure,
     panel,
 )
+from pelorus.trajectory import POSE_SIZE
 
 CURVE_MIN = 2  # frames: one point is no curve
 NAMES = (

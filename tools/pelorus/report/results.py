@@ -13,13 +13,12 @@ import numpy as np
 
 from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.evaluation import known_in
-from pelorus.frames import Header, Landmark, Message, Pose, Role, Truth
-from pelorus.layout import Floats, unpack_symmetric
+from pelorus.evaluation import judge, known_in, made_in, sigmas_m
+from pelorus.frames import Header, Landmark, Message
+from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.replay import Outputs, Programs, depth_limit_m, replay
-from pelorus.se3 import Poses
-from pelorus.trajectory import Trajectory, truth_of
+from pelorus.trajectory import Trajectory, estimate_in, truth_in
 
 
 @dataclass(frozen=True)
@@ -45,16 +44,7 @@ def read_subject(path: Path) -> Subject:
     """Read a recording; PelorusError where there is nothing to report on."""
     messages = wire.messages_of(path)
     header = next(m for m in messages if isinstance(m, Header))
-    truth = _truth(path) if any(isinstance(m, Truth) for m in messages) else None
-    return Subject(path, header, truth, known_in(messages))
-
-
-def _truth(path: Path) -> Trajectory | None:
-    """None where no TRUTH has a frame's time: the verdict says that there is nothing to compare."""
-    try:
-        return truth_of(path)
-    except PelorusError:
-        return None
+    return Subject(path, header, truth_in(messages), known_in(messages))
 
 
 WORLD_DEPTH_M = 60.0  # the world model must leave far points out
@@ -84,10 +74,6 @@ def plan_runs(programs: Programs, recording: Path, settings: Sequence[str]) -> l
         Plan("course", programs.float64, ("--preset", "course")),
         Plan("world", programs.float64, world),
     ]
-
-
-POSE_SIZE = 6
-DIAGONAL = (0, 2, 5)  # of a packed 3 x 3
 
 
 class Points(NamedTuple):
@@ -122,7 +108,9 @@ class FrameTable:
 
 @dataclass(frozen=True)
 class Run:
-    """One replay: `trajectory` and the pose covariance (n, 6, 6) after each frame."""
+    """One replay: `trajectory` and the pose covariance (n, 6, 6) after each frame; `summary` is the
+    program's, with the figures of `pelorus.evaluation`.
+    """
 
     plan: Plan
     summary: dict[str, Any]
@@ -144,43 +132,24 @@ class Run:
         return bool(self.summary["mode"] == "mapping")
 
 
-def carry_out(plan: Plan, recording: Path, folder: Path) -> Run:
+def carry_out(plan: Plan, subject: Subject, folder: Path) -> Run:
     """Replay the recording as planned, leave the files in the folder, and read them."""
     outputs = Outputs.named(folder, plan.name)
-    summary, said = replay(plan.program, recording, plan.options, outputs)
+    summary, said = replay(plan.program, subject.path, plan.options, outputs)
     messages = wire.messages_of(outputs.log)
-    trajectory, covariance = _poses(outputs.log, messages)
+    found = estimate_in(messages)
+    if found is None:
+        raise PelorusError(f"{outputs.log}: holds no pose after a stereo frame")
     return Run(
         plan,
-        summary,
+        summary | judge(messages, subject.truth, subject.known),
         said,
         read_frames(outputs.frames),
-        trajectory,
-        covariance,
+        *found,
         read_map(messages),
         messages,
         outputs.log,
     )
-
-
-def read_poses(log: Path) -> tuple[Trajectory, Floats]:
-    """The poses after STEREO with their whole covariance, which no other output has.
-
-    NaN where the filter has diverged and knows none.
-    """
-    return _poses(log, wire.messages_of(log))
-
-
-def _poses(log: Path, messages: Sequence[Message]) -> tuple[Trajectory, Floats]:
-    poses = [m for m in messages if isinstance(m, Pose) and m.after_stereo]
-    if not poses:
-        raise PelorusError(f"{log}: holds no pose after a stereo frame")
-    t_ns = np.array([pose.t_ns for pose in poses], np.int64)
-    R = np.array([pose.R_WB for pose in poses])
-    p = np.array([pose.p_WB_m for pose in poses])
-    unknown = np.full(POSE_SIZE * (POSE_SIZE + 1) // 2, np.nan)
-    packed = np.array([pose.covariance if pose.knows_covariance else unknown for pose in poses])
-    return Trajectory(t_ns, Poses(R, p)), unpack_symmetric(packed, POSE_SIZE)
 
 
 def read_frames(path: Path) -> FrameTable:
@@ -205,7 +174,5 @@ def _nanoseconds(seconds: str) -> int:
 
 def read_map(messages: Sequence[Message]) -> Points:
     """The landmarks that a filter left behind, evicted and final."""
-    made = [m for m in messages if isinstance(m, Landmark) and m.role != Role.KNOWN]
-    variances = np.array([m.covariance[list(DIAGONAL)] for m in made]).reshape(-1, 3)
-    places = np.array([m.p_W_m for m in made]).reshape(-1, 3)
-    return Points(places, np.sqrt(variances.mean(axis=1)))
+    made = made_in(messages)
+    return Points(np.array([m.p_W_m for m in made]).reshape(-1, 3), sigmas_m(made))

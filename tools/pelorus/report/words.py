@@ -16,6 +16,7 @@ from pelorus.report.results import Run
 NONE = "-"
 POSE = ("err0 m", "ATE m", "rotation deg", "NEES/6")
 MAP = ("map m", "NEES/3")
+MAP_KEYS = ("map_rms_m", "map_nees_per_dof")
 USE = ("used", "gated", "times real time")
 POSE_KEYS = ("err0_m", "ate_m", "rot_deg", "nees_per_dof")
 
@@ -28,15 +29,9 @@ def titles(compared: Comparison) -> tuple[str, ...]:
 def row(compared: Comparison, run: Run) -> tuple[str, ...]:
     """Cells in the order of the titles. In mapping the poses are given: they have no error."""
     summary = run.summary
-    pose = (NONE if run.poses_given else number(summary[key]) for key in POSE_KEYS)
-    found = compared.map_error.get(run.name)
-    of_map: tuple[str, ...] = ()
-    if compared.subject.known:
-        of_map = (NONE,) * len(MAP)
-    if found is not None:
-        of_map = (number(found.map_rms_m), number(found.map_nees))
+    keys = (*POSE_KEYS, *(MAP_KEYS if compared.subject.known else ()))
     use = (str(summary["used"]), str(summary["gated"]), _factor(summary["realtime_factor"]))
-    return (run.name, *pose, *of_map, *use)
+    return (run.name, *(number(summary[key]) for key in keys), *use)
 
 
 def number(value: Any) -> str:
@@ -97,7 +92,7 @@ def _of_run(run: Run, dead_reckoning: Run, compared: Comparison) -> Iterator[str
     checks = (
         _health(run, compared.origin_ns),
         _frames(run),
-        _map(run, compared) if run.poses_given else _consistency(run),
+        _map(run) if run.poses_given else _consistency(run),
         _gate(run),
         _room(run),
         _use(run, dead_reckoning),
@@ -144,19 +139,20 @@ def _consistency(run: Run) -> Iterator[str]:
         yield f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due."
 
 
-def _map(run: Run, compared: Comparison) -> Iterator[str]:
+def _map(run: Run) -> Iterator[str]:
     """Where the poses are given, the map is what was estimated."""
-    found = compared.map_error.get(run.name)
-    if found is None:
+    found = run.summary
+    if not found["map_landmarks"]:
         yield "its poses were given, and the recording knows no landmarks: nothing to compare."
         return
     yield (
-        f"its poses were given; the map of {found.landmarks} landmarks is {found.map_rms_m:.3f} m "
-        f"RMS off, {found.map_median_m:.3f} m median."
+        f"its poses were given; the map of {found['map_landmarks']} landmarks is "
+        f"{found['map_rms_m']:.3f} m RMS off, {found['map_median_m']:.3f} m median."
     )
-    if found.map_nees > NEES_HIGH:
+    nees = found["map_nees_per_dof"]
+    if nees is not None and nees > NEES_HIGH:
         yield (
-            f"the map believes more than it knows: NEES/3 is {found.map_nees:.3g} where 1 is due. "
+            f"the map believes more than it knows: NEES/3 is {nees:.3g} where 1 is due. "
             "Given poses and calibration have errors too, which do not average out."
         )
 

@@ -1,10 +1,32 @@
 // SPDX-License-Identifier: MIT
-#include "posix/tables.h"
+#include "posix/trajectory.h"
 
 #include <inttypes.h>
 #include <math.h>
 
-#include "posix/pose_math.h"
+/* The four squared components of the quaternion times four; the largest is taken as the pivot, so
+ * that nothing is divided by a small number (Shepperd 1978). */
+void rotation_quaternion(double q[4], const double R[9]) {
+    const double trace = R[0] + R[4] + R[8];
+    const double squares[4] = {1 + 2 * R[0] - trace, 1 + 2 * R[4] - trace, 1 + 2 * R[8] - trace,
+                               1 + trace};
+    int pivot = 0;
+    for (int i = 1; i < 4; i++)
+        if (squares[i] > squares[pivot])
+            pivot = i;
+    const double xy = R[1] + R[3], xz = R[2] + R[6], yz = R[5] + R[7];
+    const double wx = R[7] - R[5], wy = R[2] - R[6], wz = R[3] - R[1];
+    const double rows[4][4] = {{squares[0], xy, xz, wx},
+                               {xy, squares[1], yz, wy},
+                               {xz, yz, squares[2], wz},
+                               {wx, wy, wz, squares[3]}};
+    double norm = 0;
+    for (int i = 0; i < 4; i++)
+        norm += rows[pivot][i] * rows[pivot][i];
+    const double scale = (rows[pivot][3] < 0 ? -1 : 1) / sqrt(norm);
+    for (int i = 0; i < 4; i++)
+        q[i] = rows[pivot][i] * scale;
+}
 
 /* Seconds without a rounding: a double holds no nanoseconds of this century. */
 static void put_time(FILE *file, plr_time_ns t_ns) {
@@ -95,28 +117,4 @@ void frames_put(FILE *file, const plr_frame_result *result, double trace,
         put_nothing(file, ESTIMATE_COLUMNS);
     put_report(file, result->report);
     fprintf(file, ",%.3f\n", (double)result->compute_ns / 1e3);
-}
-
-static void put_landmark(FILE *file, const plr_landmark_message *message) {
-    const plr_landmark *l = &message->landmark;
-    const double mean_variance = (l->P_W_m2[0] + l->P_W_m2[4] + l->P_W_m2[8]) / 3;
-    fprintf(file, "%.9g %.9g %.9g %" PRIu32 " %u %" PRIu32 " %.6g\n", l->p_W_m[0], l->p_W_m[1],
-            l->p_W_m[2], l->id, (unsigned)message->role, l->times_seen, sqrt(mean_variance));
-}
-
-void map_put(FILE *file, const samples *landmarks) {
-    if (file == NULL)
-        return;
-    fprintf(file,
-            "ply\nformat ascii 1.0\n"
-            "comment landmarks in the world, m; role 1: left the state, 2: held at the end\n"
-            "comment sigma: root of the mean variance of an axis, m\n"
-            "element vertex %zu\n"
-            "property double x\nproperty double y\nproperty double z\n"
-            "property uint id\nproperty uchar role\nproperty uint times_seen\n"
-            "property float sigma\nend_header\n",
-            landmarks->count);
-    const plr_landmark_message *items = landmarks->items;
-    for (size_t i = 0; i < landmarks->count; i++)
-        put_landmark(file, &items[i]);
 }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 /* The replay's results as text files. A NULL file is left alone. */
-#ifndef PELORUS_POSIX_TABLES_H
-#define PELORUS_POSIX_TABLES_H
+#ifndef PELORUS_POSIX_TRAJECTORY_H
+#define PELORUS_POSIX_TRAJECTORY_H
 
 #include <stdio.h>
 
 #include "pelorus/session.h"
-#include "posix/samples.h"
 
 /* TUM: `t x y z qx qy qz qw`, seconds and metres, the body in the world. */
 void trajectory_put(FILE *file, const plr_pose_message *pose);
@@ -18,7 +17,7 @@ void frames_put_titles(FILE *file);
 void frames_put(FILE *file, const plr_frame_result *result, double trace,
                 const double *bias_variance);
 
-/* PLY, ASCII: plr_landmark_message items, with id, role, times seen and standard deviation. */
-void map_put(FILE *file, const samples *landmarks);
+/* Unit quaternion (x, y, z, w) of a rotation, with w >= 0. */
+void rotation_quaternion(double q[4], const double R[9]);
 
 #endif
