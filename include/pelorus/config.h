@@ -114,7 +114,9 @@ typedef double plr_real;
 #define PLR_R(x) ((plr_real)(x))
 
 enum {
-    PLR_POSE_DIM = 6,     /* (rho, theta) */
+    PLR_POSE_DIM = 6, /* (rho, theta): of a pose, and of any rigid motion */
+    PLR_POSE_SQUARE = PLR_POSE_DIM * PLR_POSE_DIM,
+    PLR_POSE_TRIANGLE = PLR_POSE_DIM * (PLR_POSE_DIM + 1) / 2,
     PLR_BIAS_DIM = 6,     /* (b_v, b_w) */
     PLR_LANDMARK_DIM = 3, /* w_i or dm_i */
     PLR_ROWS = 3,         /* rows of a measurement */

@@ -85,19 +85,19 @@ typedef struct plr_slot {
 /* Motion that is already in the pose but not yet in the covariance: D = (I + E, p) with
  * xi+ = Ad(D^-1) xi + B db + N(0, Q), docs/MATH.md 4. */
 typedef struct plr_motion {
-    plr_real E[9], p[3]; /* 3x3 and m */
-    plr_real Q[36];      /* 6x6 */
-    plr_real B[36];      /* 6x6 */
-    plr_real seconds;    /* duration, for the bias walk */
-    uint8_t pending;     /* 1 if any motion is accumulated */
-    uint8_t noisy;       /* 0 if it is exact (mapping): Q and B are zero */
+    plr_real E[9], p[3];         /* 3x3 and m */
+    plr_real Q[PLR_POSE_SQUARE]; /* 6x6 */
+    plr_real B[PLR_POSE_SQUARE]; /* 6x6 */
+    plr_real seconds;            /* duration, for the bias walk */
+    uint8_t pending;             /* 1 if any motion is accumulated */
+    uint8_t noisy;               /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
 
 /* Sums over frames, in which older ones count less: of nu, the difference between the motion by
  * vision and by twists in units of the twists' sigmas, and of the covariance expected of it. */
 typedef struct plr_consistency_window {
-    plr_real sum[6];
-    plr_real variance[21]; /* 6x6, packed upper triangle */
+    plr_real sum[PLR_POSE_DIM];
+    plr_real variance[PLR_POSE_TRIANGLE]; /* 6x6, packed upper triangle */
 } plr_consistency_window;
 
 enum { PLR_CONSISTENCY_WINDOWS = 3 };
@@ -105,11 +105,13 @@ enum { PLR_CONSISTENCY_WINDOWS = 3 };
 /* Whether twists and pictures agree: src/filter/consistency.h. */
 typedef struct plr_consistency {
     plr_consistency_window windows[PLR_CONSISTENCY_WINDOWS];
-    plr_real apart[6];        /* from the pose by twists to the pose by vision: rho m, theta rad */
-    plr_real apart_sigmas[6]; /* the same in units of the twists' sigmas */
-    plr_real apart_noise;     /* the expected square of apart_sigmas if it is only noise */
-    plr_real still_way[6];    /* motion by twists while the picture stayed the same: m, rad */
-    plr_real still_variance[6];            /* its variance */
+    plr_real
+        apart[PLR_POSE_DIM]; /* from the pose by twists to the pose by vision: rho m, theta rad */
+    plr_real apart_sigmas[PLR_POSE_DIM]; /* the same in units of the twists' sigmas */
+    plr_real apart_noise; /* the expected square of apart_sigmas if it is only noise */
+    plr_real
+        still_way[PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
+    plr_real still_variance[PLR_POSE_DIM]; /* its variance */
     plr_real matched, gated, nis, nis_dof; /* sums over frames, older ones weighted less */
     uint16_t agreeing;                     /* successive frames in agreement */
     plr_real excess;                       /* |L^-1 n|^2 of frames that contradicted the twists by
@@ -125,7 +127,7 @@ typedef struct plr_consistency {
 /* Settings and camera in the filter's precision; of sigmas the squares. */
 typedef struct plr_parameters {
     plr_camera camera;
-    plr_real Ad_CB[36]; /* Ad(T_CB): body twists to the camera */
+    plr_real Ad_CB[PLR_POSE_SQUARE]; /* Ad(T_CB): body twists to the camera */
     plr_real pixel_variance;
     plr_real velocity_variance[3], gyro_variance[3]; /* of the body's axes */
     plr_real bias_velocity_walk, bias_gyro_walk;
@@ -141,7 +143,7 @@ typedef struct plr_parameters {
  * information (Lambda, eta) about nu. docs/MATH.md 10. */
 typedef struct plr_noise {
     plr_real Wt[PLR_POSE_DIM * PLR_MAX_LD + PLR_KERNEL_MARGIN]; /* W^T, 6 x dim */
-    plr_real Lambda[21 + PLR_KERNEL_MARGIN];                    /* 6x6, packed upper triangle */
+    plr_real Lambda[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];     /* 6x6, packed upper triangle */
     plr_real eta[PLR_POSE_DIM];
     plr_real z[PLR_POSE_DIM];           /* the value of nu at which the motion was linearised */
     plr_real spread[PLR_POSE_DIM];      /* variances of the motion's own six numbers; 0: known */
@@ -191,9 +193,10 @@ typedef struct plr_filter {
     double p_WB[3]; /* double in both builds: adding a small step to a float32 would lose it */
     plr_real bias[PLR_BIAS_DIM];
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
-    plr_real recovery_P[21]; /* the pose's covariance when it was last in order, plus the motion
+    plr_real recovery_P
+        [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
                                 since; packed lower triangle */
-    plr_real reading[6];     /* last twist */
+    plr_real reading[PLR_POSE_DIM]; /* last twist */
     plr_motion motion;
 
     unsigned count; /* active slots, dense from 0 */

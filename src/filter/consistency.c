@@ -62,14 +62,14 @@ void plr_consistency_clear(plr_filter *f) {
 
 /* s^T (V + UNSEEN I)^-1 s */
 static plr_real statistic(const plr_consistency_window *w) {
-    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, s[6];
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM];
     memcpy(U, w->variance, sizeof w->variance);
     memcpy(s, w->sum, sizeof s);
-    for (unsigned k = 0; k < 6; k++)
-        U[plr_upper_row(6, k)] += UNSEEN;
-    if (!plr_cholesky_upper(6, U))
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        U[plr_upper_row(PLR_POSE_DIM, k)] += UNSEEN;
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return 0;
-    plr_solve_upper_transposed(6, 1, U, s, 1);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, s, 1);
     return plr_dot3(s, s) + plr_dot3(s + 3, s + 3);
 }
 
@@ -86,109 +86,115 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
     const plr_real fast = fast_statistic(f), excess = f->consistency.excess;
     const plr_real factor = PLR_R(1) + (fast > excess ? fast : excess) * WIDENING;
     f->consistency.excess *= EXCESS_KEEPS;
-    for (unsigned i = 0; i < 36; i++)
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         f->motion.Q[i] *= factor;
 }
 
 /* What a frame says of nu in the twists' own sigmas: from units of applied->L to those of believed->L.
  * With T = L'^-1 L, J <- T^T J T, b <- T^T b. */
-static void in_own_sigmas(const plr_real L[36], const plr_real own[36], plr_real J[36],
-                          plr_real b[6]) {
-    plr_real T[36] = {0}, TtJ[36] = {0}, turned[6] = {0};
-    for (unsigned c = 0; c < 6; c++)
-        for (unsigned r = c; r < 6; r++) {
-            plr_real sum = own[6 * r + c];
+static void in_own_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real own[PLR_POSE_SQUARE],
+                          plr_real J[PLR_POSE_SQUARE], plr_real b[PLR_POSE_DIM]) {
+    plr_real T[PLR_POSE_SQUARE] = {0}, TtJ[PLR_POSE_SQUARE] = {0}, turned[PLR_POSE_DIM];
+    for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+        for (unsigned r = c; r < PLR_POSE_DIM; r++) {
+            plr_real sum = own[PLR_POSE_DIM * r + c];
             for (unsigned l = c; l < r; l++)
-                sum = PLR_FMA(-L[6 * r + l], T[6 * l + c], sum);
-            T[6 * r + c] = L[7 * r] > 0 ? sum / L[7 * r] : 0;
+                sum = PLR_FMA(-L[PLR_POSE_DIM * r + l], T[PLR_POSE_DIM * l + c], sum);
+            T[PLR_POSE_DIM * r + c] =
+                L[(PLR_POSE_DIM + 1) * r] > 0 ? sum / L[(PLR_POSE_DIM + 1) * r] : 0;
         }
-    for (unsigned r = 0; r < 6; r++)
-        for (unsigned c = 0; c < 6; c++)
-            for (unsigned l = 0; l < 6; l++) {
-                TtJ[6 * r + c] = PLR_FMA(T[6 * l + r], J[6 * l + c], TtJ[6 * r + c]);
+    for (unsigned r = 0; r < PLR_POSE_DIM; r++)
+        for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+            for (unsigned l = 0; l < PLR_POSE_DIM; l++) {
+                TtJ[PLR_POSE_DIM * r + c] = PLR_FMA(
+                    T[PLR_POSE_DIM * l + r], J[PLR_POSE_DIM * l + c], TtJ[PLR_POSE_DIM * r + c]);
                 if (c == 0)
-                    turned[r] = PLR_FMA(T[6 * l + r], b[l], turned[r]);
+                    turned[r] = PLR_FMA(T[PLR_POSE_DIM * l + r], b[l], turned[r]);
             }
-    memset(J, 0, 36 * sizeof *J);
-    plr_gemm_nn(6, 6, 6, TtJ, 6, T, 6, J, 6);
+    plr_mat6_mul(J, TtJ, T);
     memcpy(b, turned, sizeof turned);
 }
 
 /* nu = (I + J)^-1 b and V = I - (I + J)^-1, its covariance if the twists are what they say. */
-static bool estimate(const plr_real J[36], const plr_real b[6], plr_real nu[6], plr_real V[21]) {
-    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, C[36] = {0};
-    for (unsigned k = 0, at = 0; k < 6; k++)
-        for (unsigned l = k; l < 6; l++, at++)
-            U[at] = PLR_R(0.5) * (J[6 * k + l] + J[6 * l + k]) + (k == l ? PLR_R(1) : PLR_R(0));
-    if (!plr_cholesky_upper(6, U))
+static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POSE_DIM],
+                     plr_real nu[PLR_POSE_DIM], plr_real V[PLR_POSE_TRIANGLE]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, C[PLR_POSE_SQUARE] = {0};
+    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++)
+            U[at] = PLR_R(0.5) * (J[PLR_POSE_DIM * k + l] + J[PLR_POSE_DIM * l + k]) +
+                    (k == l ? PLR_R(1) : PLR_R(0));
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return false;
-    memcpy(nu, b, 6 * sizeof *nu);
-    plr_solve_upper_transposed(6, 1, U, nu, 1);
-    plr_solve_upper(6, U, nu);
-    for (unsigned k = 0; k < 6; k++)
-        C[7 * k] = 1;
-    plr_solve_upper_transposed(6, 6, U, C, 6); /* U^-T; (I + J)^-1 = its square */
-    for (unsigned k = 0, at = 0; k < 6; k++)
-        for (unsigned l = k; l < 6; l++, at++) {
+    memcpy(nu, b, PLR_POSE_DIM * sizeof *nu);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, nu, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        C[(PLR_POSE_DIM + 1) * k] = 1;
+    plr_solve_upper_transposed(PLR_POSE_DIM, PLR_POSE_DIM, U, C,
+                               PLR_POSE_DIM); /* U^-T; (I + J)^-1 = its square */
+    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++) {
             V[at] = k == l ? PLR_R(1) : PLR_R(0);
-            for (unsigned r = 0; r < 6; r++)
-                V[at] = PLR_FMA(-C[6 * r + k], C[6 * r + l], V[at]);
+            for (unsigned r = 0; r < PLR_POSE_DIM; r++)
+                V[at] = PLR_FMA(-C[PLR_POSE_DIM * r + k], C[PLR_POSE_DIM * r + l], V[at]);
         }
     return true;
 }
 
 /* n = (V + UNSEEN I)^-1 nu: what the observations alone make of it, where they see it. */
-static void by_vision_alone(const plr_real nu[6], const plr_real V[21], plr_real n[6]) {
-    plr_real U[21 + PLR_KERNEL_MARGIN] = {0};
+static void by_vision_alone(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
+                            plr_real n[PLR_POSE_DIM]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
     memcpy(U, V, 21 * sizeof *V);
-    memcpy(n, nu, 6 * sizeof *nu);
-    for (unsigned k = 0; k < 6; k++)
-        U[plr_upper_row(6, k)] += UNSEEN;
-    if (!plr_cholesky_upper(6, U))
+    memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        U[plr_upper_row(PLR_POSE_DIM, k)] += UNSEEN;
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return;
-    plr_solve_upper_transposed(6, 1, U, n, 1);
-    plr_solve_upper(6, U, n);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, n);
 }
 
-static void fade_in(plr_consistency_window *w, plr_real keep, const plr_real nu[6],
-                    const plr_real V[21]) {
-    for (unsigned k = 0; k < 6; k++)
+static void fade_in(plr_consistency_window *w, plr_real keep, const plr_real nu[PLR_POSE_DIM],
+                    const plr_real V[PLR_POSE_TRIANGLE]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         w->sum[k] = PLR_FMA(keep, w->sum[k], nu[k]);
-    for (unsigned k = 0; k < 21; k++)
+    for (unsigned k = 0; k < PLR_POSE_TRIANGLE; k++)
         w->variance[k] = PLR_FMA(keep * keep, w->variance[k], V[k]);
 }
 
 /* ---------------------------------------------------------------- the contradiction */
 
-static plr_real trace(const plr_real V[21]) {
+static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
     plr_real sum = 0;
-    for (unsigned k = 0; k < 6; k++)
-        sum += V[plr_upper_row(6, k)];
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        sum += V[plr_upper_row(PLR_POSE_DIM, k)];
     return sum;
 }
 
 /* d <- Ad(D^-1) d + n: the way between the two stories, in the body as it stands now. nu is the same in
  * the twists' own sigmas, and `noise` is what its square would be by their noise alone. */
-static void carry_apart(plr_filter *f, const plr_applied_motion *applied, const plr_real n[6],
-                        const plr_real nu[6], plr_real noise) {
-    plr_real R[9], A[36], d[6] = {0};
+static void carry_apart(plr_filter *f, const plr_applied_motion *applied,
+                        const plr_real n[PLR_POSE_DIM], const plr_real nu[PLR_POSE_DIM],
+                        plr_real noise) {
+    plr_real R[9], A[PLR_POSE_SQUARE], d[PLR_POSE_DIM];
     plr_se3_rotation(R, applied->E);
     plr_se3_adjoint_inverse(A, R, applied->p);
-    plr_gemm_nn(6, 1, 6, A, 6, f->consistency.apart, 1, d, 1);
-    for (unsigned k = 0; k < 6; k++)
+    plr_mat6_vec(d, A, f->consistency.apart);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         f->consistency.apart[k] = d[k] + n[k];
-    for (unsigned k = 0; k < 6; k++)
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         f->consistency.apart_sigmas[k] += nu[k];
     f->consistency.apart_noise += noise;
 }
 
 /* Is what the last frames make of the difference a good part of the motion? */
-static bool differs_much(const plr_consistency_window *w, const plr_real L[36],
+static bool differs_much(const plr_consistency_window *w, const plr_real L[PLR_POSE_SQUARE],
                          const plr_applied_motion *applied) {
-    plr_real mean[6], n[6] = {0};
+    plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
     by_vision_alone(w->sum, w->variance, mean);
-    plr_gemm_nn(6, 1, 6, L, 6, mean, 1, n, 1);
-    for (unsigned k = 0; k < 6; k++)
+    plr_mat6_vec(n, L, mean);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         n[k] /= PLR_R(1) + keeps[0]; /* of sums over frames to the mean of a frame */
     plr_real turn[3];
     plr_turn_of(turn, applied->E);
@@ -198,12 +204,13 @@ static bool differs_much(const plr_consistency_window *w, const plr_real L[36],
 }
 
 /* v = L^-1 n */
-static void in_sigmas(const plr_real L[36], const plr_real n[6], plr_real v[6]) {
-    for (unsigned k = 0; k < 6; k++) {
+static void in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
+                      plr_real v[PLR_POSE_DIM]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         v[k] = n[k];
         for (unsigned l = 0; l < k; l++)
-            v[k] = PLR_FMA(-L[6 * k + l], v[l], v[k]);
-        v[k] = L[7 * k] > 0 ? v[k] / L[7 * k] : 0;
+            v[k] = PLR_FMA(-L[PLR_POSE_DIM * k + l], v[l], v[k]);
+        v[k] = L[(PLR_POSE_DIM + 1) * k] > 0 ? v[k] / L[(PLR_POSE_DIM + 1) * k] : 0;
     }
 }
 
@@ -214,35 +221,36 @@ static void contradict(plr_filter *f) {
 }
 
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
-                         const plr_applied_motion *applied, const plr_real nu[6],
-                         const plr_real Lambda[21], bool outright) {
+                         const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
+                         const plr_real Lambda[PLR_POSE_TRIANGLE], bool outright) {
     plr_consistency *c = &f->consistency;
-    plr_real J[36], b[6] = {0}, own[6], V[21], n[6] = {0};
+    plr_real J[PLR_POSE_SQUARE], b[PLR_POSE_DIM], own[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE],
+        n[PLR_POSE_DIM];
     if (outright) {
-        plr_gemm_nn(6, 1, 6, applied->L, 6, nu, 1, n, 1);
+        plr_mat6_vec(n, applied->L, nu);
         in_sigmas(believed->L, n, own);
         carry_apart(f, applied, n, own, 0);
         contradict(f);
         c->excess = plr_norm2_of_6(own);
         return;
     }
-    for (unsigned k = 0, at = 0; k < 6; k++)
-        for (unsigned l = k; l < 6; l++, at++)
-            J[6 * k + l] = J[6 * l + k] = Lambda[at];
-    plr_gemm_nn(6, 1, 6, J, 6, nu, 1, b, 1);
-    for (unsigned k = 0; k < 6; k++)
-        J[7 * k] -= 1;
+    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++)
+            J[PLR_POSE_DIM * k + l] = J[PLR_POSE_DIM * l + k] = Lambda[at];
+    plr_mat6_vec(b, J, nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        J[(PLR_POSE_DIM + 1) * k] -= 1;
     if (c->contradicted)
         in_own_sigmas(applied->L, believed->L, J, b);
     if (!estimate(J, b, own, V))
         return;
-    plr_real way[6] = {0};
+    plr_real way[PLR_POSE_DIM] = {0};
     if (c->contradicted || c->drifting) {
         by_vision_alone(own, V, n);
-        plr_gemm_nn(6, 1, 6, believed->L, 6, n, 1, way, 1);
+        plr_mat6_vec(way, believed->L, n);
         carry_apart(f, applied, way, own, trace(V));
     } else if (c->doubtful) { /* what came apart before stays so until it is settled */
-        static const plr_real none[6] = {0};
+        static const plr_real none[PLR_POSE_DIM] = {0};
         carry_apart(f, applied, none, none, 0);
     }
     for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
@@ -252,8 +260,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     const plr_real most = fast > slow ? fast : slow;
     if (!c->contradicted && !c->drifting && most > DIFFERS) { /* what has come apart until now */
         const plr_consistency_window *w = &c->windows[slow > fast ? FAST_WINDOWS : 1];
-        plr_gemm_nn(6, 1, 6, believed->L, 6, w->sum, 1, way, 1);
-        for (unsigned k = 0; k < 6; k++) {
+        plr_mat6_vec(way, believed->L, w->sum);
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
             c->apart[k] += way[k];
             c->apart_sigmas[k] += w->sum[k];
         }
@@ -294,9 +302,9 @@ static bool has_moved(plr_filter *f) {
     const plr_motion *m = &f->motion;
     plr_real turn[3], sum = 0;
     plr_turn_of(turn, m->E);
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real way = c->still_way[k] + (k < 3 ? m->p[k] : turn[k - 3]);
-        const plr_real variance = c->still_variance[k] + m->Q[7 * k];
+        const plr_real variance = c->still_variance[k] + m->Q[(PLR_POSE_DIM + 1) * k];
         if (variance > 0)
             sum += way * way / variance;
         else if (way * way > PLR_R(1e-8))
@@ -331,9 +339,9 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
         &f->motion; /* this picture is used: what moved until now is not pending */
     plr_real turn[3];
     plr_turn_of(turn, m->E);
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         c->still_way[k] += k < 3 ? m->p[k] : turn[k - 3];
-        c->still_variance[k] += m->Q[7 * k];
+        c->still_variance[k] += m->Q[(PLR_POSE_DIM + 1) * k];
     }
     return false;
 }
@@ -341,7 +349,7 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
 /* ---------------------------------------------------------------- the verdict */
 
 static bool bias_is_off(const plr_filter *f) {
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real limit = OFF_PRIOR * f->bias_prior_sigma[k];
         if (limit > 0 && plr_abs(f->bias[k] - f->bias_prior[k]) > limit)
             return true;
@@ -377,22 +385,23 @@ static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
 
 /* C = s d d^T, and a share of it to all sides, for d itself is not known any better; s is what of d the
  * twists' own noise does not explain, for that is in P already. */
-static void covariance_of(const plr_filter *f, const plr_real d[6], plr_real C[36]) {
+static void covariance_of(const plr_filter *f, const plr_real d[PLR_POSE_DIM],
+                          plr_real C[PLR_POSE_SQUARE]) {
     const plr_real sigmas2 = plr_norm2_of_6(f->consistency.apart_sigmas);
     const plr_real noise = f->consistency.apart_noise;
     const plr_real s = sigmas2 > noise ? PLR_R(1) - noise / sigmas2 : PLR_R(0);
     const plr_real way = SIDEWAYS * SIDEWAYS * plr_dot3(d, d);
     const plr_real turn = SIDEWAYS * SIDEWAYS * plr_dot3(d + 3, d + 3);
-    for (unsigned i = 0; i < 6; i++)
-        for (unsigned j = 0; j < 6; j++)
-            C[6 * i + j] = s * (d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn));
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++)
+            C[PLR_POSE_DIM * i + j] = s * (d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn));
 }
 
 /* Both stories have agreed for long enough: what lies between them becomes a part of P. */
 static void settle(plr_filter *f) {
     plr_consistency *c = &f->consistency;
     if (plr_norm2_of_6(c->apart) > 0) {
-        plr_real C[36];
+        plr_real C[PLR_POSE_SQUARE];
         covariance_of(f, c->apart, C);
         plr_covariance_add(f, PLR_BLOCK_POSE, C);
         f->totals.widened++;
@@ -421,16 +430,16 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     return c->doubtful ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;
 }
 
-void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]) {
+void plr_consistency_cover(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     const plr_motion *m = &f->motion;
-    plr_real R[9], A[36], d[6] = {0};
+    plr_real R[9], A[PLR_POSE_SQUARE], d[PLR_POSE_DIM];
     if (!(plr_norm2_of_6(f->consistency.apart) > 0))
         return;
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
-    plr_gemm_nn(6, 1, 6, A, 6, f->consistency.apart, 1, d, 1);
-    plr_real C[36];
+    plr_mat6_vec(d, A, f->consistency.apart);
+    plr_real C[PLR_POSE_SQUARE];
     covariance_of(f, d, C);
-    for (unsigned i = 0; i < 36; i++)
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] += C[i];
 }

@@ -25,8 +25,8 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed);
  * Lambda, 6x6 packed upper triangle, prior included. `outright`: this frame contradicts the twists
  * by itself. */
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
-                         const plr_applied_motion *applied, const plr_real nu[6],
-                         const plr_real Lambda[21], bool outright);
+                         const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
+                         const plr_real Lambda[PLR_POSE_TRIANGLE], bool outright);
 
 /* True if the frame repeats the previous picture: most matched observations have exactly the same
  * pixels, while the twists report a motion of more than their noise. Call it once a frame, after
@@ -39,6 +39,6 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
 /* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers
  * the poses by twists and by pictures: by d d^T, where d is the difference between the two, and by
  * a part of |d|^2 in all directions. */
-void plr_consistency_cover(const plr_filter *f, plr_real P_xi[36]);
+void plr_consistency_cover(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
 
 #endif

@@ -49,7 +49,7 @@ static void stack(plr_filter *f, const plr_sensed *sensed, unsigned first, plr_b
         plr_rows_apply(&m->H, w->dx, Hx);
         for (unsigned i = 0; i < PLR_ROWS; i++)
             w->y[PLR_ROWS * a + i] = m->r[i] - Hx[i];
-        for (unsigned k = 0; w->noise.open && k < 6; k++) {
+        for (unsigned k = 0; w->noise.open && k < PLR_POSE_DIM; k++) {
             plr_rows_apply(&m->H, w->noise.Wt + k * batch->ld, Hx);
             for (unsigned i = 0; i < PLR_ROWS; i++)
                 batch->E[WIDE * (PLR_ROWS * a + i) + k] = Hx[i];
@@ -63,10 +63,10 @@ static void stack(plr_filter *f, const plr_sensed *sensed, unsigned first, plr_b
 static void inform_noise(plr_noise *noise, const plr_batch *batch, const plr_real *y,
                          unsigned rows) {
     plr_real *Lambda = noise->Lambda;
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         for (unsigned r = 0; r < rows; r++)
             noise->eta[k] = PLR_FMA(batch->E[WIDE * r + k], y[r], noise->eta[k]);
-        for (unsigned l = k; l < 6; l++, Lambda++)
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, Lambda++)
             for (unsigned r = 0; r < rows; r++)
                 *Lambda = PLR_FMA(batch->E[WIDE * r + k], batch->E[WIDE * r + l], *Lambda);
     }
@@ -103,7 +103,7 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
         plr_combine_rows(batch->n, rows, w->y, w->Vt, batch->ld, w->dx);
         return true;
     }
-    plr_solve_upper_transposed(rows, 6, w->S, batch->E, WIDE);
+    plr_solve_upper_transposed(rows, PLR_POSE_DIM, w->S, batch->E, WIDE);
     inform_noise(&w->noise, batch, w->y, rows);
     move_state(f, batch, rows);
     return true;

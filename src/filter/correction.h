@@ -8,11 +8,12 @@
 
 /* The result of all blocks. */
 typedef struct plr_correction {
-    unsigned applied;        /* measurements in batches that were applied */
-    unsigned failed_batches; /* left out: S could not be factorised */
-    unsigned cut;            /* landmark corrections limited: PLR_REASON_RANGE_LIMITED */
-    plr_real nu[6];          /* estimated noise of the motion, in units of its sigmas */
-    plr_real Lambda[21];     /* information about nu, prior included: 6x6, packed upper triangle */
+    unsigned applied;          /* measurements in batches that were applied */
+    unsigned failed_batches;   /* left out: S could not be factorised */
+    unsigned cut;              /* landmark corrections limited: PLR_REASON_RANGE_LIMITED */
+    plr_real nu[PLR_POSE_DIM]; /* estimated noise of the motion, in units of its sigmas */
+    plr_real Lambda
+        [PLR_POSE_TRIANGLE]; /* information about nu, prior included: 6x6, packed upper triangle */
     bool moved;              /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 

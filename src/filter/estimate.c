@@ -21,7 +21,7 @@ static void to_double(double *y, const plr_real *x, unsigned n) {
 }
 
 /* The pose's covariance now, enlarged while vision contradicts the twists. */
-static void pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
+static void pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     plr_motion_pose_covariance(f, P_xi);
     plr_consistency_cover(f, P_xi);
 }
@@ -49,9 +49,9 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
         return sound;
     if (f->diverged)
         return PLR_E_DIVERGED;
-    plr_real P[36];
+    plr_real P[PLR_POSE_SQUARE];
     pose_covariance(f, P);
-    to_double(P_xi, P, 36);
+    to_double(P_xi, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
 
@@ -69,10 +69,10 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
 }
 
 /* The bias covariance at the time of the estimate: P_b and the walk not yet applied. */
-static void bias_covariance(const plr_filter *f, plr_real P_b[36]) {
+static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
-    for (int i = 0; i < 6; i++)
-        P_b[7 * i] +=
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        P_b[(PLR_POSE_DIM + 1) * i] +=
             f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
 }
 
@@ -84,7 +84,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
         return sound;
     if (f->diverged)
         return PLR_E_DIVERGED;
-    plr_real P[36] = {0};
+    plr_real P[PLR_POSE_SQUARE] = {0};
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         bias_covariance(f, P);
     /* with noise = step the sigmas are of a displacement: divide by the step */
@@ -92,10 +92,10 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
                                ? PLR_R(1) / (f->interval_s * f->interval_s)
                                : PLR_R(1);
     for (int i = 0; i < 3; i++) {
-        P[7 * i] += scale * f->par.velocity_variance[i];
-        P[7 * (3 + i)] += scale * f->par.gyro_variance[i];
+        P[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
+        P[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
     }
-    to_double(P_u, P, 36);
+    to_double(P_u, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
 
@@ -107,34 +107,34 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
         return sound;
     if (f->diverged && P_b)
         return PLR_E_DIVERGED;
-    plr_real P[36] = {0};
+    plr_real P[PLR_POSE_SQUARE] = {0};
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         bias_covariance(f, P);
-    to_double(b, f->bias, 6);
+    to_double(b, f->bias, PLR_POSE_DIM);
     if (P_b)
-        to_double(P_b, P, 36);
+        to_double(P_b, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
 
 double plr_filter_trace(const plr_filter *f) {
     if (!f || plr_guard_look_whole(f) != PLR_OK || f->diverged)
         return 0;
-    plr_real P[36], P_b[36] = {0};
+    plr_real P[PLR_POSE_SQUARE], P_b[PLR_POSE_SQUARE] = {0};
     double trace = plr_covariance_trace(f);
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE,
                        P); /* the pose's and the biases' variances are those of now */
-    for (int i = 0; i < 6; i++)
-        trace -= (double)P[7 * i];
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        trace -= (double)P[(PLR_POSE_DIM + 1) * i];
     pose_covariance(f, P);
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_real before[36];
+        plr_real before[PLR_POSE_SQUARE];
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before);
         bias_covariance(f, P_b);
-        for (int i = 0; i < 6; i++)
-            trace += (double)P_b[7 * i] - (double)before[7 * i];
+        for (int i = 0; i < PLR_POSE_DIM; i++)
+            trace += (double)P_b[(PLR_POSE_DIM + 1) * i] - (double)before[(PLR_POSE_DIM + 1) * i];
     }
-    for (int i = 0; i < 6; i++)
-        trace += (double)P[7 * i];
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        trace += (double)P[(PLR_POSE_DIM + 1) * i];
     return trace;
 }
 

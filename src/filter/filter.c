@@ -109,11 +109,11 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
 }
 
 /* P_xi = start_sigma^2 I, or zero where poses are given exactly. */
-static void start_covariance(const plr_filter *f, double P_xi[36]) {
+static void start_covariance(const plr_filter *f, double P_xi[PLR_POSE_SQUARE]) {
     const double sigma = f->config.mode == PLR_MODE_MAPPING ? 0 : f->config.start_sigma;
-    memset(P_xi, 0, 36 * sizeof *P_xi);
-    for (int i = 0; i < 6; i++)
-        P_xi[7 * i] = sigma * sigma;
+    memset(P_xi, 0, PLR_POSE_SQUARE * sizeof *P_xi);
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        P_xi[(PLR_POSE_DIM + 1) * i] = sigma * sigma;
 }
 
 void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
@@ -123,8 +123,9 @@ void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
     plr_covariance_begin(f, PLR_BLOCK_BIAS, P_b);
 }
 
-static void set_bias_prior(plr_filter *f, const double mean[6], const double variance[6]) {
-    for (int i = 0; i < 6; i++) {
+static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
+                           const double variance[PLR_POSE_DIM]) {
+    for (int i = 0; i < PLR_POSE_DIM; i++) {
         f->bias[i] = f->bias_prior[i] = (plr_real)mean[i];
         f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
     }
@@ -132,10 +133,10 @@ static void set_bias_prior(plr_filter *f, const double mean[6], const double var
 }
 
 static void start_bias(plr_filter *f) {
-    static const double zero[6] = {0};
-    double variance[6] = {0};
+    static const double zero[PLR_POSE_DIM] = {0};
+    double variance[PLR_POSE_DIM] = {0};
     if (f->config.mode != PLR_MODE_MAPPING)
-        for (int i = 0; i < 6; i++) {
+        for (int i = 0; i < PLR_POSE_DIM; i++) {
             const double sigma =
                 i < 3 ? f->config.bias_velocity_sigma_mps : f->config.bias_gyro_sigma_radps;
             variance[i] = sigma * sigma;
@@ -145,8 +146,8 @@ static void start_bias(plr_filter *f) {
 
 /* After the biases' covariance was lost. */
 static void go_back_to_bias_prior(plr_filter *f) {
-    double variance[6];
-    for (int i = 0; i < 6; i++) {
+    double variance[PLR_POSE_DIM];
+    for (int i = 0; i < PLR_POSE_DIM; i++) {
         f->bias[i] = f->bias_prior[i];
         variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
     }
@@ -154,7 +155,7 @@ static void go_back_to_bias_prior(plr_filter *f) {
 }
 
 plr_status plr_filter_reset(plr_filter *f) {
-    double P_xi[36];
+    double P_xi[PLR_POSE_SQUARE];
     if (!f)
         return PLR_E_ARGUMENT;
     const plr_status sound = plr_guard_look_constant(f);
@@ -238,14 +239,14 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     const plr_status status = check_pose(T_WB);
     if (status != PLR_OK)
         return plr_filter_refuse(f, status);
-    if (P_xi && !plr_all_finite(P_xi, 36))
+    if (P_xi && !plr_all_finite(P_xi, PLR_POSE_SQUARE))
         return plr_filter_refuse(f, PLR_E_NOT_FINITE);
-    if (P_xi && !plr_all_within(P_xi, 36, PLR_MAX_VARIANCE))
+    if (P_xi && !plr_all_within(P_xi, PLR_POSE_SQUARE, PLR_MAX_VARIANCE))
         return plr_filter_refuse(f, PLR_E_RANGE);
-    if (P_xi && !plr_is_covariance(P_xi, 6))
+    if (P_xi && !plr_is_covariance(P_xi, PLR_POSE_DIM))
         return plr_filter_refuse(f, PLR_E_ARGUMENT);
 
-    double P_start[36];
+    double P_start[PLR_POSE_SQUARE];
     start_covariance(f, P_start);
     plr_predict_drop(f);
     if (f->clock_started)
@@ -278,11 +279,12 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
     if (!plr_has_block(f, PLR_BLOCK_BIAS) || f->totals.twists > 0 || f->totals.frames > 0 ||
         f->config.mode == PLR_MODE_MAPPING)
         return plr_filter_refuse(f, PLR_E_MODE);
-    if (!plr_all_finite(mean, 6) || !plr_all_finite(variance, 6))
+    if (!plr_all_finite(mean, PLR_POSE_DIM) || !plr_all_finite(variance, PLR_POSE_DIM))
         return plr_filter_refuse(f, PLR_E_NOT_FINITE);
-    if (!plr_all_within(mean, 6, PLR_MAX_BIAS) || !plr_all_within(variance, 6, PLR_MAX_VARIANCE))
+    if (!plr_all_within(mean, PLR_POSE_DIM, PLR_MAX_BIAS) ||
+        !plr_all_within(variance, PLR_POSE_DIM, PLR_MAX_VARIANCE))
         return plr_filter_refuse(f, PLR_E_RANGE);
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < PLR_POSE_DIM; i++)
         if (variance[i] < 0)
             return plr_filter_refuse(f, PLR_E_ARGUMENT);
     set_bias_prior(f, mean, variance);

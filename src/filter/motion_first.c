@@ -43,8 +43,9 @@ static void judge_at_zero(plr_search *s, unsigned i) {
     bool basis = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
-            M[k] = plr_dot3(at->a + 6 * r, at->a + 6 * c) +
-                   plr_dot3(at->a + 6 * r + 3, at->a + 6 * c + 3) + (r == c ? PLR_R(1) : PLR_R(0));
+            M[k] = plr_dot3(at->a + PLR_POSE_DIM * r, at->a + PLR_POSE_DIM * c) +
+                   plr_dot3(at->a + PLR_POSE_DIM * r + 3, at->a + PLR_POSE_DIM * c + 3) +
+                   (r == c ? PLR_R(1) : PLR_R(0));
         }
     for (unsigned r = 0; r < 3; r++) { /* the diagonal of U^T M U - R */
         plr_real u[3] = {0}, sum = 0;
@@ -69,22 +70,22 @@ static void judge_at_zero(plr_search *s, unsigned i) {
 
 /* d^2 of an observation by what all the others say: with h = a (I + J)^-1 a^T and the weight w that it
  * had in J, e^T [(I - w h)(I + (1 - w) h)]^-1 e. `rest` is the least share left to the others. */
-static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_real dz[6],
+static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_real dz[PLR_POSE_DIM],
                          plr_real e[3], plr_real *rest) {
-    plr_real X[18], h[9], M[6];
+    plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9], M[6];
     const plr_real w = at->weight;
     for (unsigned r = 0; r < 3; r++) {
         e[r] = at->rho[r];
-        for (unsigned k = 0; k < 6; k++) {
-            e[r] = PLR_FMA(-at->a[6 * r + k], dz[k], e[r]);
-            X[3 * k + r] = at->a[6 * r + k];
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+            e[r] = PLR_FMA(-at->a[PLR_POSE_DIM * r + k], dz[k], e[r]);
+            X[3 * k + r] = at->a[PLR_POSE_DIM * r + k];
         }
     }
-    plr_solve_upper_transposed(6, 3, U, X, 3);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 3, U, X, 3);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++) {
             h[3 * r + c] = 0;
-            for (unsigned k = 0; k < 6; k++)
+            for (unsigned k = 0; k < PLR_POSE_DIM; k++)
                 h[3 * r + c] = PLR_FMA(X[3 * k + r], X[3 * k + c], h[3 * r + c]);
         }
     for (unsigned r = 0, k = 0; r < 3; r++)
@@ -111,8 +112,8 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
     return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
-static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U, const plr_real dz[6],
-                  float *nis) {
+static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
+                  const plr_real dz[PLR_POSE_DIM], float *nis) {
     const plr_sighting *at = &s->sightings[i];
     plr_real d2 = at->at_zero, e[3], rest = 0;
     if (!(d2 >= 0) || at->lost)
@@ -144,16 +145,16 @@ static bool is_suspicious(const plr_search *s, const plr_search_point *best) {
 
 /* Do the observations leave no direction of the motion open? */
 static bool is_well_spread(const plr_search_point *point) {
-    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, C[36] = {0};
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, C[PLR_POSE_SQUARE] = {0};
     if (!plr_search_factorise(point, 0, U))
         return false;
-    for (unsigned k = 0; k < 6; k++)
-        C[7 * k] = 1;
-    plr_solve_upper_transposed(6, 6, U, C, 6);
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        C[(PLR_POSE_DIM + 1) * k] = 1;
+    plr_solve_upper_transposed(PLR_POSE_DIM, PLR_POSE_DIM, U, C, PLR_POSE_DIM);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real left = 0;
-        for (unsigned r = 0; r < 6; r++)
-            left = PLR_FMA(C[6 * r + k], C[6 * r + k], left);
+        for (unsigned r = 0; r < PLR_POSE_DIM; r++)
+            left = PLR_FMA(C[PLR_POSE_DIM * r + k], C[PLR_POSE_DIM * r + k], left);
         if (left > LEFT_OPEN)
             return false;
     }
@@ -229,7 +230,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
                      float *nis) {
     plr_search s = {.f = f, .frame = frame, .sightings = (plr_sighting *)(void *)f->work.Vt};
     plr_search_point best;
-    plr_real U[21 + PLR_KERNEL_MARGIN] = {0}, dz[6] = {0};
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
     plr_motion_prior(f, &s.prior);
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {

@@ -24,8 +24,8 @@ void plr_predict_drop(plr_filter *f) {
 
 void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     if (plr_norm2_of_6(applied->z) > 0) {
-        plr_real n[6] = {0};
-        plr_gemm_nn(6, 1, 6, applied->L, 6, applied->z, 1, n, 1);
+        plr_real n[PLR_POSE_DIM];
+        plr_mat6_vec(n, applied->L, applied->z);
         plr_pose_correct(f, n);
     }
     plr_model_of(f)->propagate(f, applied);
@@ -72,9 +72,10 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
 /* ---------------------------------------------------------------- twists */
 
 /* The twist that holds over the step that ends with this reading. */
-static void twist_of_step(const plr_filter *f, const plr_real reading[6], plr_real held[6]) {
+static void twist_of_step(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                          plr_real held[PLR_POSE_DIM]) {
     const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < PLR_POSE_DIM; i++)
         held[i] = timing == PLR_TWIST_END     ? reading[i]
                   : timing == PLR_TWIST_START ? f->reading[i]
                                               : PLR_R(0.5) * (f->reading[i] + reading[i]);
@@ -90,7 +91,8 @@ static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
 
 /* Could the reading itself be held for as long as readings are? With timing start it is not before
  * the next one comes, and by then it would block that one and all that follow. */
-static plr_status check_reading(const plr_filter *f, const plr_real reading[6], plr_real interval) {
+static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                                plr_real interval) {
     const plr_real first = PLR_R(1e-3); /* there is no interval yet */
     plr_real seconds = interval > 0 ? interval : first;
     if (f->interval_s > 0 && f->interval_s < seconds) /* a pause says nothing about the next one */
@@ -98,7 +100,7 @@ static plr_status check_reading(const plr_filter *f, const plr_real reading[6], 
     return plr_twist_check(f, reading, seconds);
 }
 
-static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6],
+static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                          plr_real interval) {
     memcpy(f->reading, reading, sizeof f->reading);
     f->reading_ns = t_ns;
@@ -121,7 +123,7 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
         return refuse_twist(f, PLR_E_NOT_FINITE);
 
-    plr_real reading[6], held[6];
+    plr_real reading[PLR_POSE_DIM], held[PLR_POSE_DIM];
     for (int i = 0; i < 3; i++) {
         reading[i] = (plr_real)twist->v_B_mps[i];
         reading[3 + i] = (plr_real)twist->w_B_radps[i];

@@ -11,20 +11,20 @@
 #include "state/covariance.h"
 #include "state/motion.h"
 
-static void pack(plr_filter *f, const plr_real P[36]) {
-    for (unsigned i = 0, at = 0; i < 6; i++)
+static void pack(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]) {
+    for (unsigned i = 0, at = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j <= i; j++)
-            f->recovery_P[at++] = P[6 * i + j];
+            f->recovery_P[at++] = P[PLR_POSE_DIM * i + j];
 }
 
-static void unpack(const plr_filter *f, plr_real P[36]) {
-    for (unsigned i = 0, at = 0; i < 6; i++)
+static void unpack(const plr_filter *f, plr_real P[PLR_POSE_SQUARE]) {
+    for (unsigned i = 0, at = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j <= i; j++, at++)
-            P[6 * i + j] = P[6 * j + i] = f->recovery_P[at];
+            P[PLR_POSE_DIM * i + j] = P[PLR_POSE_DIM * j + i] = f->recovery_P[at];
 }
 
 void plr_filter_keep_for_recovery(plr_filter *f) {
-    plr_real P[36];
+    plr_real P[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     pack(f, P);
 }
@@ -33,28 +33,29 @@ void plr_filter_keep_for_recovery(plr_filter *f) {
  * what has broken down. */
 void plr_filter_carry_recovery(plr_filter *f) {
     const plr_motion *m = &f->motion;
-    plr_real R[9], A[36], P[36], carried[36], S[36] = {0}, BSB[36];
+    plr_real R[9], A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], carried[PLR_POSE_SQUARE],
+        S[PLR_POSE_SQUARE] = {0}, BSB[PLR_POSE_SQUARE];
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
     unpack(f, P);
     plr_sandwich6(carried, A, P);
-    for (unsigned i = 0; i < 6; i++)
-        S[7 * i] = f->bias_prior_sigma[i] * f->bias_prior_sigma[i];
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        S[(PLR_POSE_DIM + 1) * i] = f->bias_prior_sigma[i] * f->bias_prior_sigma[i];
     plr_sandwich6(BSB, m->B, S);
-    for (unsigned i = 0; i < 36; i++)
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         carried[i] += m->Q[i] + BSB[i];
     pack(f, carried);
 }
 
 void plr_filter_recover(plr_filter *f) {
-    plr_real P[36];
-    double P_xi[36], variance[6];
+    plr_real P[PLR_POSE_SQUARE];
+    double P_xi[PLR_POSE_SQUARE], variance[PLR_POSE_DIM];
     if (f->motion.pending)
         plr_filter_carry_recovery(f);
     unpack(f, P);
     plr_consistency_cover(f, P);
     pack(f, P);
-    for (unsigned i = 0; i < 36; i++)
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];
     f->count = 0;
     f->diverged = 0;
@@ -68,7 +69,7 @@ void plr_filter_recover(plr_filter *f) {
     f->consistency.doubtful = 1;
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
-    for (unsigned i = 0; i < 6; i++) {
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
         const plr_real sigma = f->bias_prior_sigma[i], off = f->bias[i] - f->bias_prior[i];
         if (!(off <= 4 * sigma && off >= -4 * sigma))
             f->bias[i] = f->bias_prior[i];

@@ -8,11 +8,11 @@ static plr_status check_moved(const plr_filter *f, const double *P_moved) {
         return PLR_E_MODE;
     if (!P_moved)
         return PLR_OK;
-    if (!plr_all_finite(P_moved, 36))
+    if (!plr_all_finite(P_moved, PLR_POSE_SQUARE))
         return PLR_E_NOT_FINITE;
-    if (!plr_all_within(P_moved, 36, PLR_MAX_VARIANCE))
+    if (!plr_all_within(P_moved, PLR_POSE_SQUARE, PLR_MAX_VARIANCE))
         return PLR_E_RANGE;
-    return plr_is_covariance(P_moved, 6) ? PLR_OK : PLR_E_ARGUMENT;
+    return plr_is_covariance(P_moved, PLR_POSE_DIM) ? PLR_OK : PLR_E_ARGUMENT;
 }
 
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved) {
@@ -32,9 +32,10 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
         return PLR_OK;
     }
     /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */
-    for (unsigned i = 0; i < 6; i++)
-        for (unsigned j = 0; j < 6; j++)
-            f->motion.Q[6 * i + j] += (plr_real)(0.5 * (P_moved[6 * i + j] + P_moved[6 * j + i]));
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++)
+            f->motion.Q[PLR_POSE_DIM * i + j] +=
+                (plr_real)(0.5 * (P_moved[PLR_POSE_DIM * i + j] + P_moved[PLR_POSE_DIM * j + i]));
     f->motion.pending = f->motion.noisy = 1;
     plr_guard_seal(f);
     return PLR_OK;

@@ -31,36 +31,37 @@ static void prepare(plr_search *s, unsigned i) {
     plr_covariance_landmark(f, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
-            for (unsigned k = 0; k < 6; k++)
-                at->P[3 * r + c] = PLR_FMA(-at->V[6 * r + k], at->V[6 * c + k], at->P[3 * r + c]);
+            for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+                at->P[3 * r + c] = PLR_FMA(-at->V[PLR_POSE_DIM * r + k],
+                                           at->V[PLR_POSE_DIM * c + k], at->P[3 * r + c]);
 }
 
 /* How q depends on nu, 3x6: [-I | [q]x] N, N = Ad(T_CB) JL. */
-static void point_by_motion(const plr_real q[3], const plr_real N[36], plr_real dq[18]) {
-    for (unsigned k = 0; k < 6; k++) {
+static void point_by_motion(const plr_real q[3], const plr_real N[PLR_POSE_SQUARE],
+                            plr_real dq[PLR_ROWS * PLR_POSE_DIM]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real turn[3] = {N[18 + k], N[24 + k], N[30 + k]};
         plr_real way[3];
         plr_cross3(way, q, turn);
         for (unsigned i = 0; i < 3; i++)
-            dq[6 * i + k] = way[i] - N[6 * i + k];
+            dq[PLR_POSE_DIM * i + k] = way[i] - N[PLR_POSE_DIM * i + k];
     }
 }
 
 /* The camera's motion at a point of the search. */
 typedef struct plr_camera_step {
-    plr_real z[6];
-    plr_real R[9], E[9], p[3]; /* R = I + E */
-    plr_real N[36];            /* how nu moves the camera: Ad(T_CB) JL, 6x6 */
+    plr_real z[PLR_POSE_DIM];
+    plr_real R[9], E[9], p[3];   /* R = I + E */
+    plr_real N[PLR_POSE_SQUARE]; /* how nu moves the camera: Ad(T_CB) JL, 6x6 */
 } plr_camera_step;
 
-static void step_to(const plr_search *s, const plr_real z[6], plr_camera_step *step) {
+static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_camera_step *step) {
     plr_applied_motion m;
     plr_motion_at(s->f, &s->prior, z, &m);
     plr_camera_motion(step->E, step->p, &s->f->par.camera, m.E, m.p);
     plr_se3_rotation(step->R, step->E);
     memcpy(step->z, z, sizeof step->z);
-    memset(step->N, 0, sizeof step->N);
-    plr_gemm_nn(6, 6, 6, s->f->par.Ad_CB, 6, m.JL, 6, step->N, 6);
+    plr_mat6_mul(step->N, s->f->par.Ad_CB, m.JL);
 }
 
 /* One observation at a point: U of the trial bank, a and rho. False where nothing can be said. */
@@ -68,7 +69,8 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     const plr_slot *slot = plr_search_slot(s, i);
     plr_sighting *at = &s->sightings[i];
     plr_stereo_sight sight;
-    plr_real dq[18], JP[9], full[9], dz[18] = {0}, shift[3] = {0};
+    plr_real dq[PLR_ROWS * PLR_POSE_DIM], JP[9], full[9], dz[PLR_ROWS * PLR_POSE_DIM] = {0},
+                                                                        shift[3] = {0};
     plr_real S[6];
     if (!plr_stereo_sight_after(s->f, slot, plr_search_observation(s, i), step->E, step->R, step->p,
                                 &sight))
@@ -81,12 +83,12 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
             S[k++] = full[3 * c + r] + (r == c ? plr_stereo_variance(s->f, r) : PLR_R(0));
     if (!plr_cholesky3(S))
         return false;
-    plr_gemm_nn(3, 6, 3, J, 3, at->V, 6, dz, 6);
-    plr_gemm_nn(3, 1, 6, dz, 6, step->z, 1, shift, 1);
+    plr_gemm_nn(3, PLR_POSE_DIM, 3, J, 3, at->V, PLR_POSE_DIM, dz, PLR_POSE_DIM);
+    plr_gemm_nn(3, 1, PLR_POSE_DIM, dz, PLR_POSE_DIM, step->z, 1, shift, 1);
     for (unsigned r = 0; r < 3; r++)
         shift[r] = PLR_FMA(J[3 * r + 2], slot->beyond, shift[r]);
     point_by_motion(sight.q, step->N, dq);
-    plr_gemm_nn(3, 6, 3, sight.Dz, 3, dq, 6, dz, 6);
+    plr_gemm_nn(3, PLR_POSE_DIM, 3, sight.Dz, 3, dq, PLR_POSE_DIM, dz, PLR_POSE_DIM);
     for (unsigned r = 0; r < 3; r++)
         at->rho[r] = sight.r[r] - shift[r];
     memcpy(at->a, dz, sizeof at->a);
@@ -115,10 +117,10 @@ static plr_real in_best_measure(const plr_sighting *at, unsigned bank) {
 /* J += w a^T a, b += w a^T rho */
 static void gather(const plr_sighting *at, plr_search_point *point) {
     plr_real *J = point->J;
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real column[3] = {at->a[k], at->a[6 + k], at->a[12 + k]};
         point->b[k] = PLR_FMA(at->weight, plr_dot3(column, at->rho), point->b[k]);
-        for (unsigned l = k; l < 6; l++, J++) {
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, J++) {
             const plr_real other[3] = {at->a[l], at->a[6 + l], at->a[12 + l]};
             *J = PLR_FMA(at->weight, plr_dot3(column, other), *J);
         }
@@ -140,7 +142,7 @@ void plr_search_prepare(plr_search *s) {
 
 /* All observations at nu = z. Returns by how much the sum is larger than at the best point, in that
  * point's measure. An observation that falls behind the camera is left out of the comparison. */
-static plr_real evaluate(plr_search *s, const plr_real z[6], plr_search_point *point) {
+static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *point) {
     plr_camera_step step;
     plr_real change = 0;
     step_to(s, z, &step);
@@ -171,50 +173,51 @@ static void accept(plr_search *s) {
         s->sightings[i].cost = huber(plr_dot3(s->sightings[i].rho, s->sightings[i].rho));
 }
 
-void plr_search_go_to(plr_search *s, const plr_real z[6], plr_search_point *best) {
+void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best) {
     (void)evaluate(s, z, best);
     accept(s);
 }
 
 bool plr_search_factorise(const plr_search_point *point, plr_real damping,
-                          plr_real U[21 + PLR_KERNEL_MARGIN]) {
+                          plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]) {
     memcpy(U, point->J, sizeof point->J);
-    for (unsigned k = 0; k < 6; k++) {
-        plr_real *diagonal = U + plr_upper_row(6, k);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_real *diagonal = U + plr_upper_row(PLR_POSE_DIM, k);
         *diagonal = PLR_FMA(damping, PLR_R(1) + *diagonal, PLR_R(1) + *diagonal);
     }
-    return plr_cholesky_upper(6, U);
+    return plr_cholesky_upper(PLR_POSE_DIM, U);
 }
 
-plr_real plr_search_step(const plr_search_point *point, const plr_real *U, plr_real dz[6]) {
-    plr_real gradient[6], promise = 0;
-    for (unsigned k = 0; k < 6; k++)
+plr_real plr_search_step(const plr_search_point *point, const plr_real *U,
+                         plr_real dz[PLR_POSE_DIM]) {
+    plr_real gradient[PLR_POSE_DIM], promise = 0;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         gradient[k] = dz[k] = point->b[k] - point->z[k];
-    plr_solve_upper_transposed(6, 1, U, dz, 1);
-    plr_solve_upper(6, U, dz);
-    for (unsigned k = 0; k < 6; k++)
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, dz, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, dz);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         promise = PLR_FMA(dz[k], gradient[k], promise);
     return promise;
 }
 
 /* May a motion be off by L z? As far as a retraction can follow. */
-static bool is_within_reach(const plr_search *s, const plr_real z[6]) {
+static bool is_within_reach(const plr_search *s, const plr_real z[PLR_POSE_DIM]) {
     static const plr_real way2 = 1e6, turn2 = 4;
-    plr_real n[6] = {0};
-    plr_gemm_nn(6, 1, 6, s->prior.L, 6, z, 1, n, 1);
+    plr_real n[PLR_POSE_DIM];
+    plr_mat6_vec(n, s->prior.L, z);
     return plr_dot3(n, n) <= way2 && plr_dot3(n + 3, n + 3) <= turn2;
 }
 
 void plr_search_descend(plr_search *s, plr_search_point *best) {
     plr_search_point trial;
-    plr_real U[21 + PLR_KERNEL_MARGIN], damping = 0;
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], damping = 0;
     bool at_best = true;
     for (int i = 0; i < TRIALS; i++) {
-        plr_real z[6], dz[6];
+        plr_real z[PLR_POSE_DIM], dz[PLR_POSE_DIM];
         if (!plr_search_factorise(best, damping, U) ||
             !(plr_search_step(best, U, dz) >= SMALL_GAIN))
             break;
-        for (unsigned k = 0; k < 6; k++)
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             z[k] = best->z[k] + dz[k];
         at_best = false;
         if (is_within_reach(s, z)) {
@@ -237,7 +240,7 @@ void plr_search_descend(plr_search *s, plr_search_point *best) {
 }
 
 void plr_search_from_zero(plr_search *s, plr_search_point *best) {
-    static const plr_real zero[6] = {0};
+    static const plr_real zero[PLR_POSE_DIM] = {0};
     plr_search_prepare(s);
     plr_search_go_to(s, zero, best);
 }

@@ -13,11 +13,13 @@
 
 /* One matched observation. */
 typedef struct plr_sighting {
-    plr_real V[18];     /* covariance of landmark and nu by the biases: P_(i,b) B^T L^-T, 3x6 */
-    plr_real P[9];      /* the landmark's covariance once nu is known */
-    plr_real U[2][6];   /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
-    plr_real a[18];     /* U^-T dz/dnu, 3x6, at the point evaluated last */
-    plr_real rho[3];    /* U^-T r there */
+    plr_real
+        V[PLR_ROWS *
+          PLR_POSE_DIM]; /* covariance of landmark and nu by the biases: P_(i,b) B^T L^-T, 3x6 */
+    plr_real P[9];       /* the landmark's covariance once nu is known */
+    plr_real U[2][6]; /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
+    plr_real a[PLR_ROWS * PLR_POSE_DIM]; /* U^-T dz/dnu, 3x6, at the point evaluated last */
+    plr_real rho[3];                     /* U^-T r there */
     plr_real closer;    /* P J^T S^-1 r: by how much the observation changes its inverse range */
     plr_real left;      /* the variance of the inverse range after that */
     plr_real weight;    /* Huber's: 1, and less for a large residual */
@@ -41,9 +43,9 @@ typedef struct plr_search {
 
 /* A point nu = z, and what the derivatives of |z|^2 + sum of Huber's rho(|U^-T r|^2) there are made of. */
 typedef struct plr_search_point {
-    plr_real z[6];
-    plr_real J[21 + PLR_KERNEL_MARGIN]; /* sum of w a^T a, packed upper */
-    plr_real b[6];                      /* sum of w a^T rho */
+    plr_real z[PLR_POSE_DIM];
+    plr_real J[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]; /* sum of w a^T a, packed upper */
+    plr_real b[PLR_POSE_DIM];                          /* sum of w a^T rho */
 } plr_search_point;
 
 static inline const plr_observation *plr_search_observation(const plr_search *s, unsigned i) {
@@ -70,14 +72,15 @@ void plr_search_from_zero(plr_search *s, plr_search_point *best);
 void plr_search_descend(plr_search *s, plr_search_point *best);
 
 /* All sightings at nu = z, which becomes the best point. */
-void plr_search_go_to(plr_search *s, const plr_real z[6], plr_search_point *best);
+void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best);
 
 /* U^T U = I + J + damping (I + diag J), packed upper; false if it cannot be factorised. */
 bool plr_search_factorise(const plr_search_point *point, plr_real damping,
-                          plr_real U[21 + PLR_KERNEL_MARGIN]);
+                          plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]);
 
 /* The step from a point towards the least sum, from its factor. Returns what it promises of the
  * sum. */
-plr_real plr_search_step(const plr_search_point *point, const plr_real *U, plr_real dz[6]);
+plr_real plr_search_step(const plr_search_point *point, const plr_real *U,
+                         plr_real dz[PLR_POSE_DIM]);
 
 #endif

@@ -120,7 +120,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_applied_motion believed;
     plr_motion_first first;
     plr_correction correction = {0};
-    plr_real Q[36];
+    plr_real Q[PLR_POSE_SQUARE];
     memcpy(Q, f->motion.Q, sizeof Q);
     plr_consistency_widen(f, &believed);
     plr_motion_find(f, frame, n, &first, &report->nis);

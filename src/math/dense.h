@@ -42,6 +42,32 @@ static inline void plr_gemm_nt(unsigned m, unsigned n, unsigned k, const plr_rea
         }
 }
 
+/* y = A x for 6x6; y may not be x */
+static inline void plr_mat6_vec(plr_real y[PLR_POSE_DIM], const plr_real A[PLR_POSE_SQUARE],
+                                const plr_real x[PLR_POSE_DIM]) {
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        y[i] = 0;
+    plr_gemm_nn(PLR_POSE_DIM, 1, PLR_POSE_DIM, A, PLR_POSE_DIM, x, 1, y, 1);
+}
+
+/* C = A B for 6x6; C may not be A or B */
+static inline void plr_mat6_mul(plr_real C[PLR_POSE_SQUARE], const plr_real A[PLR_POSE_SQUARE],
+                                const plr_real B[PLR_POSE_SQUARE]) {
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        C[i] = 0;
+    plr_gemm_nn(PLR_POSE_DIM, PLR_POSE_DIM, PLR_POSE_DIM, A, PLR_POSE_DIM, B, PLR_POSE_DIM, C,
+                PLR_POSE_DIM);
+}
+
+/* C = A B^T for 6x6; C may not be A or B */
+static inline void plr_mat6_mul_nt(plr_real C[PLR_POSE_SQUARE], const plr_real A[PLR_POSE_SQUARE],
+                                   const plr_real B[PLR_POSE_SQUARE]) {
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        C[i] = 0;
+    plr_gemm_nt(PLR_POSE_DIM, PLR_POSE_DIM, PLR_POSE_DIM, A, PLR_POSE_DIM, B, PLR_POSE_DIM, C,
+                PLR_POSE_DIM);
+}
+
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 

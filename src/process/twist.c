@@ -30,14 +30,15 @@ void plr_twist_walk(plr_filter *f, plr_real seconds) {
 }
 
 /* xi = seconds (reading - b) */
-static void displacement(const plr_filter *f, const plr_real reading[6], plr_real seconds,
-                         plr_real xi[6]) {
-    for (int i = 0; i < 6; i++)
+static void displacement(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                         plr_real seconds, plr_real xi[PLR_POSE_DIM]) {
+    for (int i = 0; i < PLR_POSE_DIM; i++)
         xi[i] = seconds * (reading[i] - f->bias[i]);
 }
 
-plr_status plr_twist_check(const plr_filter *f, const plr_real reading[6], plr_real seconds) {
-    plr_real xi[6];
+plr_status plr_twist_check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                           plr_real seconds) {
+    plr_real xi[PLR_POSE_DIM];
     displacement(f, reading, seconds, xi);
     const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
     return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
@@ -45,7 +46,7 @@ plr_status plr_twist_check(const plr_filter *f, const plr_real reading[6], plr_r
 
 /* Variances of a step's displacement, (rho, theta). */
 static void step_variance(const plr_filter *f, plr_real seconds, plr_real interval,
-                          plr_real variance[6]) {
+                          plr_real variance[PLR_POSE_DIM]) {
     const plr_real share = f->config.noise == PLR_NOISE_STEP
                                ? (interval > 0 ? seconds / interval : PLR_R(1))
                                : seconds * interval;
@@ -55,9 +56,10 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
     }
 }
 
-void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
-                    plr_real interval) {
-    plr_real xi[6], E[9], R[9], p[3], A[36], next[36], variance[6];
+void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                    plr_real seconds, plr_real interval) {
+    plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
+        variance[PLR_POSE_DIM];
     plr_motion *m = &f->motion;
     displacement(f, reading, seconds, xi);
     plr_se3_expm1(E, p, xi);
@@ -70,16 +72,15 @@ void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], 
 
     plr_sandwich6(next, A, m->Q);
     step_variance(f, seconds, interval, variance);
-    for (int i = 0; i < 6; i++)
-        next[7 * i] += variance[i];
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        next[(PLR_POSE_DIM + 1) * i] += variance[i];
     memcpy(m->Q, next, sizeof next);
 
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_real Jr[36];
+        plr_real Jr[PLR_POSE_SQUARE];
         plr_se3_right_jacobian(Jr, xi);
-        memset(next, 0, sizeof next);
-        plr_gemm_nn(6, 6, 6, A, 6, m->B, 6, next, 6);
-        for (int i = 0; i < 36; i++)
+        plr_mat6_mul(next, A, m->B);
+        for (int i = 0; i < PLR_POSE_SQUARE; i++)
             m->B[i] = PLR_FMA(-seconds, Jr[i], next[i]);
     }
     m->seconds += seconds;

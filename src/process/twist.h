@@ -13,12 +13,13 @@ void plr_twist_walk(plr_filter *f, plr_real seconds);
 
 /* PLR_OK if the twist `reading` (6: v, w) minus the bias gives at most pi rad and 1 km in
  * `seconds`; else PLR_E_RANGE. */
-plr_status plr_twist_check(const plr_filter *f, const plr_real reading[6], plr_real seconds);
+plr_status plr_twist_check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                           plr_real seconds);
 
 /* T <- T Exp(seconds (reading - b)), and the same into f->motion. Adds the variance
  * sigma^2 interval seconds, where `interval` is the time for which the reading is valid, so that
  * the parts of an interval add up to sigma^2 interval^2. Sets the time to t_ns. */
-void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[6], plr_real seconds,
-                    plr_real interval);
+void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                    plr_real seconds, plr_real interval);
 
 #endif

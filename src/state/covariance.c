@@ -91,9 +91,11 @@ void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
         const plr_real *J = landmark->J_pose;
         for (unsigned i = 0; i < 3; i++)
             for (unsigned c = 0; c < PLR_POSE_DIM; c++)
-                plr_add_column(f, s, pose + c, J[6 * i + c], f->P + plr_packed_row(s + i));
+                plr_add_column(f, s, pose + c, J[PLR_POSE_DIM * i + c],
+                               f->P + plr_packed_row(s + i));
         for (unsigned i = 0; i < 3; i++)
-            plr_gemm_nt(1, 3, 6, f->P + plr_packed_row(s + i), 6, J, 6, own + 3 * i, 3);
+            plr_gemm_nt(1, 3, PLR_POSE_DIM, f->P + plr_packed_row(s + i), PLR_POSE_DIM, J,
+                        PLR_POSE_DIM, own + 3 * i, 3);
     }
     plr_set_block(f, s, 3, s, 3, own);
 }

@@ -51,7 +51,7 @@ bool plr_covariance_is_positive(const plr_filter *f);
 /* --- motion --- */
 
 /* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
-void plr_covariance_transport(plr_filter *f, const plr_real A[36], const plr_real *F);
+void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F);
 
 /* Takes the part of P that is correlated with the motion's noise out of P and into W: with
  * C = P_(:,b) B^T and nu = L^-1 n,
@@ -63,16 +63,17 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
 /* The reverse, after the observations: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T and
  * dx += W Lambda^-1 eta. nu (6; may be NULL) receives the estimate z + Lambda^-1 eta. Does nothing
  * if plr_covariance_open_noise was not called. */
-void plr_covariance_close_noise(plr_filter *f, plr_real nu[6]);
+void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
 
 /* V = C L^-T = P_(:,b) K^T for `rows` rows of the state from `row` on, rows x 6: their covariance
  * with nu. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real K[36], plr_real *V);
+                                 const plr_real K[PLR_POSE_SQUARE], plr_real *V);
 
 /* The pose's rows alone: xi <- A xi + n, n = B db + N(0, Q), with M = B P_bb B^T + Q. */
-void plr_covariance_predict_pose(plr_filter *f, const plr_real A[36], const plr_real B[36],
-                                 const plr_real M[36]);
+void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
+                                 const plr_real B[PLR_POSE_SQUARE],
+                                 const plr_real M[PLR_POSE_SQUARE]);
 
 /* --- update --- */
 

@@ -33,7 +33,7 @@ void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9
 
 void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_real S[9]) {
     const unsigned ld = plr_covariance_ld(f);
-    for (unsigned k = 0; k < 6; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real a[3];
         plr_rows_apply(H, f->work.noise.Wt + k * ld, a);
         for (unsigned i = 0; i < 3; i++)

@@ -20,10 +20,10 @@ typedef struct plr_view {
 
 /* A landmark about to enter the state: error = J_pose xi + N(0, P). */
 typedef struct plr_new_landmark {
-    plr_real x[3];       /* as stored in a slot */
-    bool uses_pose;      /* false: J_pose is zero and not filled */
-    plr_real J_pose[18]; /* 3x6 */
-    plr_real P[9];       /* 3x3 */
+    plr_real x[3];                            /* as stored in a slot */
+    bool uses_pose;                           /* false: J_pose is zero and not filled */
+    plr_real J_pose[PLR_ROWS * PLR_POSE_DIM]; /* 3x6 */
+    plr_real P[9];                            /* 3x3 */
 } plr_new_landmark;
 
 /* A landmark's place in the world, and how its error arises. */
@@ -71,7 +71,8 @@ struct plr_model {
 
 /* J = R_WB [I | -[s]x], 3x6: derivative of a point's world position by the pose's error (rho,
  * theta), where s is the point in the body, m. */
-void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3], plr_real J[18]);
+void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
+                       plr_real J[PLR_ROWS * PLR_POSE_DIM]);
 
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;

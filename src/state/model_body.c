@@ -25,18 +25,19 @@
  */
 
 /* row = [way turn] Ad, Ad = [R, C; 0, R]; turn may be NULL for zeros. */
-static inline void times_adjoint(plr_real row[6], const plr_real way[3], const plr_real *turn,
-                                 const plr_real Ad[36]) {
-    for (int j = 0; j < 6; j++)
+static inline void times_adjoint(plr_real row[PLR_POSE_DIM], const plr_real way[3],
+                                 const plr_real *turn, const plr_real Ad[PLR_POSE_SQUARE]) {
+    for (int j = 0; j < PLR_POSE_DIM; j++)
         row[j] = PLR_FMA(way[2], Ad[12 + j], PLR_FMA(way[1], Ad[6 + j], way[0] * Ad[j]));
-    for (int j = 3; j < 6 && turn; j++)
+    for (int j = 3; j < PLR_POSE_DIM && turn; j++)
         row[j] = PLR_FMA(turn[2], Ad[30 + j],
                          PLR_FMA(turn[1], Ad[24 + j], PLR_FMA(turn[0], Ad[18 + j], row[j])));
 }
 
 /* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q.
  * Jw [-I | [q]x] = [ -N^T / r | N^T [mu]x ; mu^T / r^2 | 0 ]. */
-static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, plr_real J[18]) {
+static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
+                                plr_real J[PLR_ROWS * PLR_POSE_DIM]) {
     const plr_real inverse = PLR_R(1) / chart->r;
     plr_real way[3];
     for (int row = 0; row < 2; row++) {
@@ -45,7 +46,7 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart, plr
         plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
         for (int j = 0; j < 3; j++)
             way[j] = -n[j] * inverse;
-        times_adjoint(J + 6 * row, way, turn, f->par.Ad_CB);
+        times_adjoint(J + PLR_POSE_DIM * row, way, turn, f->par.Ad_CB);
     }
     for (int j = 0; j < 3; j++)
         way[j] = chart->mu[j] * inverse * inverse;
@@ -90,24 +91,27 @@ static void keep_off(plr_real q[3]) {
 }
 
 /* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
-static void enter_noise(plr_filter *f, const plr_real JL[36], plr_real *Wt, size_t ld) {
+static void enter_noise(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt,
+                        size_t ld) {
     const unsigned n = plr_covariance_dim(f), first = plr_covariance_row(f, 0);
-    for (unsigned k = 0; k < 6; k++) {
-        for (unsigned i = 0; i < 6; i++)
-            Wt[k * ld + i] = JL[6 * i + k];
-        memset(Wt + k * ld + 6, 0, (first - 6) * sizeof *Wt); /* it moves no bias */
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            Wt[k * ld + i] = JL[PLR_POSE_DIM * i + k];
+        memset(Wt + k * ld + PLR_POSE_DIM, 0,
+               (first - PLR_POSE_DIM) * sizeof *Wt); /* it moves no bias */
         memset(Wt + k * ld + n, 0, (ld - n) * sizeof *Wt);
     }
     for (unsigned slot = 0; slot < f->count; slot++) {
         const unsigned row = plr_covariance_row(f, slot);
         plr_polar chart;
-        plr_real G[18], GL[18] = {0};
+        plr_real G[PLR_ROWS * PLR_POSE_DIM], GL[PLR_ROWS * PLR_POSE_DIM] = {0};
         plr_polar_at(&chart, f->slots[slot].x);
         chart_by_body_twist(f, &chart, G);
-        plr_gemm_nn(3, 6, 6, G, 6, JL, 6, GL, 6);
+        plr_gemm_nn(3, PLR_POSE_DIM, PLR_POSE_DIM, G, PLR_POSE_DIM, JL, PLR_POSE_DIM, GL,
+                    PLR_POSE_DIM);
         for (unsigned i = 0; i < 3; i++)
-            for (unsigned k = 0; k < 6; k++)
-                Wt[k * ld + row + i] = GL[6 * i + k];
+            for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+                Wt[k * ld + row + i] = GL[PLR_POSE_DIM * i + k];
     }
 }
 
@@ -127,9 +131,9 @@ static plr_real bring_closer(plr_filter *f, unsigned slot) {
 }
 
 /* The variances of J n, which limit what the landmarks may have moved together (common_motion). */
-static void note_spread(plr_filter *f, const plr_real JL[36]) {
-    for (unsigned k = 0; k < 6; k++)
-        f->work.noise.spread[k] = plr_norm2_of_6(JL + 6 * k);
+static void note_spread(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        f->work.noise.spread[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
 }
 
 static unsigned body_retract(plr_filter *f, const plr_real *dx);
@@ -157,7 +161,7 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
         dx[2] = 0;
         s->beyond = left * F[9 * slot + 8];
     }
-    plr_real A[36];
+    plr_real A[PLR_POSE_SQUARE];
     note_spread(f, motion->JL);
     plr_se3_rotation(R, motion->E);
     plr_se3_adjoint_inverse(A, R, motion->p);
@@ -257,13 +261,14 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
  * bearing counts as its angle, an inverse range as the disparity that it makes. Known landmarks have
  * no voice: they stand in the world, and what moves them in the camera is the pose, while what the
  * errors of a map have in common by chance is no motion. J becomes chart_by_body_twist of every slot. */
-static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J, plr_real eta[6]) {
+static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
+                          plr_real eta[PLR_POSE_DIM]) {
     const plr_real baseline = f->par.camera.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
     const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
     plr_rigid_fit fit;
     plr_rigid_fit_clear(&fit);
-    for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
+    for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_polar chart;
         plr_polar_at(&chart, f->slots[slot].x);
         chart_by_body_twist(f, &chart, J);
@@ -281,25 +286,26 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J, 
  * by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
-    plr_real R_xi[9], p_xi[3], A[36], eta[6], eta_C[6] = {0}, E_C[9], R_C[9], p_C[3];
+    plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE], eta[PLR_POSE_DIM], eta_C[PLR_POSE_DIM], E_C[9],
+        R_C[9], p_C[3];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
     plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot, of 72 at least */
     common_motion(f, dx, J, eta);
-    plr_gemm_nn(6, 1, 6, f->par.Ad_CB, 6, eta, 1, eta_C, 1);
+    plr_mat6_vec(eta_C, f->par.Ad_CB, eta);
     plr_se3_expm1(E_C, p_C, eta_C);
     plr_se3_rotation(R_C, E_C);
 
     unsigned cut = 0;
-    for (unsigned slot = 0; slot < f->count; slot++, J += 18) {
+    for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, there, to;
         plr_real M[4], w[3], rigid[9];
         plr_polar_at(&from, s->x);
         memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
         for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 6; k++)
-                w[i] = PLR_FMA(-J[6 * i + k], eta[k], w[i]);
+            for (int k = 0; k < PLR_POSE_DIM; k++)
+                w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], eta[k], w[i]);
         w[2] += s->beyond;
         cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_se3_move_back(s->x, E_C, p_C);

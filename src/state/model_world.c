@@ -23,7 +23,7 @@ static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
 }
 
 static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
-    plr_real A[36], R[9], BPB[36], M[36];
+    plr_real A[PLR_POSE_SQUARE], R[9], BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];
     (void)motion; /* the pose alone moves, by f->motion */
     plr_se3_rotation(R, f->motion.E);
     plr_se3_adjoint_inverse(A, R, f->motion.p);

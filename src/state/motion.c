@@ -32,54 +32,57 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
  * from depending on the biases alone, which would leave the biases' own variance to rounding. */
 #define SHARE_OF_BIAS PLR_R(1e-4)
 
-void plr_motion_covariance(const plr_filter *f, plr_real BPB[36], plr_real M[36]) {
-    memset(BPB, 0, 36 * sizeof *BPB);
+void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
+                           plr_real M[PLR_POSE_SQUARE]) {
+    memset(BPB, 0, PLR_POSE_SQUARE * sizeof *BPB);
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_real P_b[36];
+        plr_real P_b[PLR_POSE_SQUARE];
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
         plr_sandwich6(BPB, f->motion.B, P_b);
     }
-    for (int i = 0; i < 36; i++)
+    for (int i = 0; i < PLR_POSE_SQUARE; i++)
         M[i] = BPB[i] + f->motion.Q[i];
 }
 
 /* M = L L^T, 6x6. A direction in which M is zero, to rounding, becomes a zero column. */
-static void factorise(const plr_real M[36], plr_real L[36]) {
-    memset(L, 0, 36 * sizeof *L);
-    for (unsigned k = 0; k < 6; k++) {
-        plr_real pivot = M[7 * k];
+static void factorise(const plr_real M[PLR_POSE_SQUARE], plr_real L[PLR_POSE_SQUARE]) {
+    memset(L, 0, PLR_POSE_SQUARE * sizeof *L);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_real pivot = M[(PLR_POSE_DIM + 1) * k];
         for (unsigned l = 0; l < k; l++)
-            pivot = PLR_FMA(-L[6 * k + l], L[6 * k + l], pivot);
-        if (!(pivot > PLR_R(1e-6) * M[7 * k]))
+            pivot = PLR_FMA(-L[PLR_POSE_DIM * k + l], L[PLR_POSE_DIM * k + l], pivot);
+        if (!(pivot > PLR_R(1e-6) * M[(PLR_POSE_DIM + 1) * k]))
             continue;
         const plr_real root = PLR_SQRT(pivot), inverse = PLR_R(1) / root;
-        L[7 * k] = root;
-        for (unsigned i = k + 1; i < 6; i++) {
-            plr_real sum = M[6 * i + k];
+        L[(PLR_POSE_DIM + 1) * k] = root;
+        for (unsigned i = k + 1; i < PLR_POSE_DIM; i++) {
+            plr_real sum = M[PLR_POSE_DIM * i + k];
             for (unsigned l = 0; l < k; l++)
-                sum = PLR_FMA(-L[6 * i + l], L[6 * k + l], sum);
-            L[6 * i + k] = sum * inverse;
+                sum = PLR_FMA(-L[PLR_POSE_DIM * i + l], L[PLR_POSE_DIM * k + l], sum);
+            L[PLR_POSE_DIM * i + k] = sum * inverse;
         }
     }
 }
 
 /* K = L^-1 B. */
-static void share_of_bias(const plr_real L[36], const plr_real B[36], plr_real K[36]) {
-    memcpy(K, B, 36 * sizeof *K);
-    for (unsigned k = 0; k < 6; k++) {
-        const plr_real inverse = L[7 * k] > 0 ? PLR_R(1) / L[7 * k] : PLR_R(0);
-        for (unsigned c = 0; c < 6; c++) {
-            plr_real sum = K[6 * k + c];
+static void share_of_bias(const plr_real L[PLR_POSE_SQUARE], const plr_real B[PLR_POSE_SQUARE],
+                          plr_real K[PLR_POSE_SQUARE]) {
+    memcpy(K, B, PLR_POSE_SQUARE * sizeof *K);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        const plr_real inverse =
+            L[(PLR_POSE_DIM + 1) * k] > 0 ? PLR_R(1) / L[(PLR_POSE_DIM + 1) * k] : PLR_R(0);
+        for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
+            plr_real sum = K[PLR_POSE_DIM * k + c];
             for (unsigned l = 0; l < k; l++)
-                sum = PLR_FMA(-L[6 * k + l], K[6 * l + c], sum);
-            K[6 * k + c] = sum * inverse;
+                sum = PLR_FMA(-L[PLR_POSE_DIM * k + l], K[PLR_POSE_DIM * l + c], sum);
+            K[PLR_POSE_DIM * k + c] = sum * inverse;
         }
     }
 }
 
 static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
                       plr_real turn2) {
-    plr_real BPB[36], M[36];
+    plr_real BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];
     memset(f->work.noise.closer, 0, sizeof f->work.noise.closer);
     memset(applied, 0, sizeof *applied);
     memcpy(applied->E, f->motion.E, sizeof applied->E);
@@ -87,10 +90,10 @@ static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale
     if (!f->motion.noisy)
         return;
     plr_motion_covariance(f, BPB, M);
-    for (int i = 0; i < 36; i++)
+    for (int i = 0; i < PLR_POSE_SQUARE; i++)
         M[i] = scale * (PLR_FMA(SHARE_OF_BIAS, BPB[i], BPB[i]) + f->motion.Q[i]);
-    for (int i = 0; i < 6; i++)
-        M[7 * i] += i < 3 ? way2 : turn2;
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        M[(PLR_POSE_DIM + 1) * i] += i < 3 ? way2 : turn2;
     factorise(M, applied->L);
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         share_of_bias(applied->L, f->motion.B, applied->K);
@@ -105,46 +108,49 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {
     put_prior(f, applied, PLR_R(900), PLR_R(0.09), PLR_R(0.01));
 }
 
-void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
-                   plr_applied_motion *applied) {
-    plr_real n[6] = {0}, E[9], p[3], Jr[36];
+void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
+                   const plr_real z[PLR_POSE_DIM], plr_applied_motion *applied) {
+    plr_real n[PLR_POSE_DIM], E[9], p[3], Jr[PLR_POSE_SQUARE];
     if (applied != prior)
         *applied = *prior;
     memcpy(applied->z, z, sizeof applied->z);
-    plr_gemm_nn(6, 1, 6, applied->L, 6, z, 1, n, 1);
+    plr_mat6_vec(n, applied->L, z);
     plr_se3_expm1(E, p, n);
     memcpy(applied->E, f->motion.E, sizeof applied->E);
     memcpy(applied->p, f->motion.p, sizeof applied->p);
     plr_se3_append(applied->E, applied->p, E, p);
     plr_so3_orthonormalise_small(applied->E);
     plr_se3_right_jacobian(Jr, n);
-    memset(applied->JL, 0, sizeof applied->JL);
-    plr_gemm_nn(6, 6, 6, Jr, 6, applied->L, 6, applied->JL, 6);
+    plr_mat6_mul(applied->JL, Jr, applied->L);
 }
 
-void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]) {
+void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     const plr_motion *m = &f->motion;
-    plr_real A[36], P[36], R[9], BPB[36] = {0};
+    plr_real A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], R[9], BPB[PLR_POSE_SQUARE] = {0};
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     plr_sandwich6(P_xi, A, P);
-    for (int i = 0; i < 36; i++)
+    for (int i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] += m->Q[i];
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
         plr_sandwich6(BPB, m->B, P);
     }
     /* the terms that follow may take most of a variance away: their rounding is made up for */
-    for (int i = 0; i < 6; i++)
-        P_xi[7 * i] = PLR_FMA(PLR_R(8) * PLR_EPSILON, P_xi[7 * i] + BPB[7 * i], P_xi[7 * i]);
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        P_xi[(PLR_POSE_DIM + 1) * i] = PLR_FMA(
+            PLR_R(8) * PLR_EPSILON, P_xi[(PLR_POSE_DIM + 1) * i] + BPB[(PLR_POSE_DIM + 1) * i],
+            P_xi[(PLR_POSE_DIM + 1) * i]);
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_real AP[36] = {0}, cross[36] = {0};
+        plr_real AP[PLR_POSE_SQUARE], cross[PLR_POSE_SQUARE];
         plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_BIAS, P);
-        plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
-        plr_gemm_nt(6, 6, 6, AP, 6, m->B, 6, cross, 6);
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++)
-                P_xi[6 * i + j] += cross[6 * i + j] + cross[6 * j + i] + BPB[6 * i + j];
+        plr_mat6_mul(AP, A, P);
+        plr_mat6_mul_nt(cross, AP, m->B);
+        for (int i = 0; i < PLR_POSE_DIM; i++)
+            for (int j = 0; j < PLR_POSE_DIM; j++)
+                P_xi[PLR_POSE_DIM * i + j] += cross[PLR_POSE_DIM * i + j] +
+                                              cross[PLR_POSE_DIM * j + i] +
+                                              BPB[PLR_POSE_DIM * i + j];
     }
 }

@@ -17,15 +17,17 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], co
 /* The accumulated motion D Exp(L nu) with its noise nu ~ N(0, I), linearised at nu = z, a value
  * found from the frame's observations (docs/MATH.md 4 and 10). */
 typedef struct plr_applied_motion {
-    plr_real E[9], p[3]; /* D' = D Exp(L z) = (I + E, p) */
-    plr_real L[36];      /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
-    plr_real K[36];      /* L^-1 B, rows of zero columns zero: what nu shares with the biases */
-    plr_real JL[36];     /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
-    plr_real z[6];
+    plr_real E[9], p[3];         /* D' = D Exp(L z) = (I + E, p) */
+    plr_real L[PLR_POSE_SQUARE]; /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
+    plr_real
+        K[PLR_POSE_SQUARE]; /* L^-1 B, rows of zero columns zero: what nu shares with the biases */
+    plr_real JL[PLR_POSE_SQUARE]; /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
+    plr_real z[PLR_POSE_DIM];
 } plr_applied_motion;
 
 /* M = B P_bb B^T + Q, the covariance of the accumulated motion, and its part BPB by the biases; 6x6. */
-void plr_motion_covariance(const plr_filter *f, plr_real BPB[36], plr_real M[36]);
+void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
+                           plr_real M[PLR_POSE_SQUARE]);
 
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
@@ -35,10 +37,10 @@ void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
 void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
 
 /* The same motion taken at nu = z. `prior` is from plr_motion_prior. */
-void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior, const plr_real z[6],
-                   plr_applied_motion *applied);
+void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
+                   const plr_real z[PLR_POSE_DIM], plr_applied_motion *applied);
 
 /* The pose's covariance as it would be with the accumulated motion applied, 6x6; changes nothing. */
-void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[36]);
+void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
 
 #endif

@@ -18,7 +18,7 @@ void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     plr_so3_orthonormalise(f->R_WB);
 }
 
-void plr_pose_correct(plr_filter *f, const plr_real xi[6]) {
+void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
     plr_real E[9], p[3];
     plr_se3_expm1(E, p, xi);
     plr_pose_move(f, E, p);

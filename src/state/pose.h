@@ -9,7 +9,7 @@
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]);
 
 /* T <- T Exp(xi), and makes R orthonormal: the correction of the pose by a frame. */
-void plr_pose_correct(plr_filter *f, const plr_real xi[6]);
+void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
 
 /* The pose to which landmarks and covariance refer: the one before the accumulated motion. */
 void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]);

@@ -17,35 +17,36 @@ void plr_rigid_fit_clear(plr_rigid_fit *fit) {
     memset(fit, 0, sizeof *fit);
 }
 
-void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[18], const plr_real w[3],
-                       const plr_real W[3]) {
+void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
+                       const plr_real w[3], const plr_real W[3]) {
     fit->voices++;
     for (unsigned row = 0; row < 3; row++) {
-        const plr_real *j = J + 6 * row;
+        const plr_real *j = J + PLR_POSE_DIM * row;
         plr_real *A = fit->A;
-        for (unsigned k = 0; k < 6; k++) {
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
             const plr_real weighted = W[row] * j[k];
             fit->b[k] = PLR_FMA(weighted, w[row], fit->b[k]);
-            for (unsigned l = k; l < 6; l++, A++)
+            for (unsigned l = k; l < PLR_POSE_DIM; l++, A++)
                 *A = PLR_FMA(weighted, j[l], *A);
         }
     }
 }
 
-void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], const plr_real spread[6],
-                         plr_real noise, plr_real eta[6]) {
+void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[PLR_POSE_DIM],
+                         const plr_real spread[PLR_POSE_DIM], plr_real noise,
+                         plr_real eta[PLR_POSE_DIM]) {
     memcpy(eta, fit->b, sizeof fit->b);
-    for (unsigned k = 0; k < 6; k++) {
-        plr_real *diagonal = fit->A + plr_upper_row(6, k);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_real *diagonal = fit->A + plr_upper_row(PLR_POSE_DIM, k);
         const plr_real weight = PLR_FMA(SHARE_OF_POSE, *diagonal, TINY);
         eta[k] = PLR_FMA(weight, xi[k], eta[k]);
         *diagonal += weight + noise / (spread[k] + KNOWN);
     }
-    if (fit->voices > 0 && plr_cholesky_upper(6, fit->A)) {
-        plr_solve_upper_transposed(6, 1, fit->A, eta, 1);
-        plr_solve_upper(6, fit->A, eta);
+    if (fit->voices > 0 && plr_cholesky_upper(PLR_POSE_DIM, fit->A)) {
+        plr_solve_upper_transposed(PLR_POSE_DIM, 1, fit->A, eta, 1);
+        plr_solve_upper(PLR_POSE_DIM, fit->A, eta);
         if (plr_dot3(eta + 3, eta + 3) < PLR_MAX_CORRECTION_TURN2)
             return;
     }
-    memcpy(eta, xi, 6 * sizeof *eta);
+    memcpy(eta, xi, PLR_POSE_DIM * sizeof *eta);
 }

@@ -18,20 +18,21 @@
 #define PLR_MAX_CORRECTION_TURN2 PLR_R(9)
 
 typedef struct plr_rigid_fit {
-    plr_real A[21 + PLR_KERNEL_MARGIN]; /* 6x6, upper triangle packed row by row */
-    plr_real b[6];                      /* sum_i J_i^T W w_i */
+    plr_real A[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]; /* 6x6, upper triangle packed row by row */
+    plr_real b[PLR_POSE_DIM];                          /* sum_i J_i^T W w_i */
     unsigned voices;
 } plr_rigid_fit;
 
 void plr_rigid_fit_clear(plr_rigid_fit *fit);
 
 /* A landmark: J 3x6, w and the diagonal of W, 3 each. */
-void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[18], const plr_real w[3],
-                       const plr_real W[3]);
+void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
+                       const plr_real w[3], const plr_real W[3]);
 
 /* eta, 6; xi itself if no landmark has a voice, if A cannot be factorised, or if eta turns by more than a
  * correction may. `noise` is a, what a unit of W scatters by. Spends the fit. */
-void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[6], const plr_real spread[6],
-                         plr_real noise, plr_real eta[6]);
+void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[PLR_POSE_DIM],
+                         const plr_real spread[PLR_POSE_DIM], plr_real noise,
+                         plr_real eta[PLR_POSE_DIM]);
 
 #endif
