@@ -6,8 +6,8 @@
 #include "posix/setting_list.h"
 
 typedef struct replay_options {
-    const char *input; /* "-" is the standard input; NULL if none was given */
-    const char *config, *trajectory, *frames, *out; /* paths, NULL where not wanted */
+    const char *input;                     /* "-" is the standard input; NULL if none was given */
+    const char *config, *trajectory, *out; /* paths, NULL where not wanted */
     const char *map_in, *load_state, *save_state;
     bool print_config, json, quiet, help, version;
 

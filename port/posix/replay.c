@@ -30,7 +30,7 @@ typedef struct replay {
     plr_session session;
     plr_landmark known[KNOWN_LANDMARKS];
     file_port port;
-    result_file trajectory, frames, out;
+    result_file trajectory, out;
     storage storage;
     map_in map_in;
     bool finishing; /* the end is the replay's own doing, not a message's */
@@ -62,36 +62,11 @@ static void on_started(void *context) {
                                          "ids must be those of this recording's front end");
 }
 
-/* Trace of the whole covariance. In dead reckoning it is put together from parts that leave the
- * filter's pending motion alone, so that no output changes the bits of another. */
-static double whole_trace(replay *run, const plr_pose_message *pose, const double P_b[36]) {
-    plr_filter *f = &run->session.filter;
-    double trace = 0;
-    if (plr_filter_config(f)->mode != PLR_MODE_DEAD_RECKONING)
-        return plr_filter_trace(f);
-    for (int i = 0; i < 6; i++)
-        trace += pose->P_xi[i * (i + 3) / 2] + P_b[7 * i];
-    return trace;
-}
-
-static void put_frame_row(replay *run, const plr_frame_result *result) {
-    double bias[6], P_b[36] = {0}, variances[6] = {0}, trace = 0;
-    if (run->frames.file == NULL)
-        return;
-    if (result->pose != NULL && plr_filter_bias(&run->session.filter, bias, P_b) == PLR_OK) {
-        for (int i = 0; i < 6; i++)
-            variances[i] = P_b[7 * i];
-        trace = whole_trace(run, result->pose, P_b);
-    }
-    frames_put(run->frames.file, result, trace, variances);
-}
-
 static void on_frame(void *context, const plr_frame_result *result) {
     replay *run = context;
     summary_add_frame(&run->summary, result);
     if (result->pose != NULL)
         trajectory_put(run->trajectory.file, result->pose);
-    put_frame_row(run, result);
     complaints_observations(&run->complaints, run->session.totals.stereos, result->report);
 }
 
@@ -178,15 +153,13 @@ static bool open_outputs(replay *run) {
     const replay_options *o = &run->options;
     if (o->print_config)
         return true; /* nothing is computed */
-    return result_file_open(&run->trajectory, o->trajectory, o->input) &&
-           result_file_open(&run->frames, o->frames, o->input) && open_log(run);
+    return result_file_open(&run->trajectory, o->trajectory, o->input) && open_log(run);
 }
 
 static bool close_outputs(replay *run) {
     bool good = compressed_output_close(run->port.packer); /* told with the file, below */
     run->port.packer = NULL;
     good = result_file_close(&run->trajectory) && good;
-    good = result_file_close(&run->frames) && good;
     good = result_file_close(&run->out) && good;
     return good;
 }
@@ -271,7 +244,6 @@ static void tell_ending(replay *run) {
 
 static void read_recording(replay *run) {
     const uint64_t begin = monotonic_ns();
-    frames_put_titles(run->frames.file);
     progress_begin(&run->progress, !run->options.quiet && !run->options.print_config,
                    run->port.size);
     while (take_step(run))

@@ -11,8 +11,9 @@ import pytest
 from converted import Run
 from pelorus.converters import landmark_map
 from pelorus.evaluation import made_in
-from pelorus.frames import Landmark, Role
-from replay_drive import BIN, OK, drive, log_of, points, recorder, run
+from pelorus.frame_table import HEALTH
+from pelorus.frames import Landmark, Report, Role
+from replay_drive import BIN, FRAMES, OK, drive, log_of, points, poses_of, recorder, run
 
 
 @pytest.fixture
@@ -25,6 +26,25 @@ def log(tmp_path: Path) -> Path:
 
 def landmarks_of(log: Path) -> list[Landmark]:
     return [m for m in log_of(log) if isinstance(m, Landmark)]
+
+
+def test_the_frame_table_agrees_with_the_log(pelorus: Run, log: Path, tmp_path: Path) -> None:
+    csv = tmp_path / "a.csv"
+    said = pelorus("export", log, "--frames", csv)
+    assert said.status == 0, said.err
+    poses = poses_of(log)
+    rows = np.genfromtxt(csv, delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert len(rows) == len(poses) == FRAMES
+    assert np.allclose(rows["x_m"], [p.p_WB_m[0] for p in poses], rtol=1e-8)
+    assert np.allclose(rows["qz"], [np.sin(0.01 * k) for k in range(FRAMES)], atol=0.02)
+    assert np.allclose(rows["var_theta_z"], [p.covariance[20] for p in poses], rtol=1e-6)
+    assert (rows["trace"] > rows["var_rho_x"] + rows["var_rho_y"]).all()
+    assert (rows["var_bias_wz"] > 0).all()
+    reports = [m for m in log_of(log) if isinstance(m, Report)]
+    for column, field in (("used", "used"), ("new", "created"), ("nis_dof", "nis_dof")):
+        assert rows[column].tolist() == [getattr(report, field) for report in reports]
+    assert rows["health"].tolist() == [HEALTH[report.health] for report in reports]
+    assert csv.read_text().splitlines()[1].startswith("5.000000000,")
 
 
 def test_the_map_to_look_at_has_every_landmark_of_the_log(

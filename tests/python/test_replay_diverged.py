@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pelorus.evaluation import judge
+from pelorus.frame_table import frame_table
 from pelorus.frames import Report
-from pelorus.report.results import read_frames
 from replay_drive import (
     OK,
     Result,
@@ -116,9 +116,9 @@ def test_in_float64_it_does_not_diverge(tmp_path: Path) -> None:
 
 
 def test_the_frame_table_has_every_variance(tmp_path: Path) -> None:
-    replay(tmp_path, "--frames", str(tmp_path / "frames.csv"))
+    replay(tmp_path)
     recovered = recovered_at(tmp_path)
-    table = read_frames(tmp_path / "frames.csv")
+    table = frame_table(log_of(tmp_path / "log.plr"))
     for name in ("var_rho_x", "var_theta_z", "trace", "var_bias_vx", "var_bias_wz"):
         assert np.isfinite(table[name]).all()
         assert (table[name][recovered] > 0).all()

@@ -95,7 +95,7 @@ def test_a_camera_without_sense_is_refused(record: Record, camera: Camera) -> No
 
 def test_outputs_that_cannot_be_written_are_refused(record: Record, tmp_path: Path) -> None:
     path = record(drive())
-    for option in ("--out", "--trajectory", "--frames"):
+    for option in ("--out", "--trajectory"):
         result = run(path, option, tmp_path / "no" / "such" / "folder")
         assert result.status == OUTPUT
         assert "no/such/folder: cannot be written" in result.stderr
@@ -106,7 +106,7 @@ def test_outputs_that_cannot_be_written_are_refused(record: Record, tmp_path: Pa
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is not here")
 def test_a_full_disk_is_told(record: Record) -> None:
-    for option in ("--out", "--trajectory", "--frames"):
+    for option in ("--out", "--trajectory"):
         result = run(record(drive()), option, "/dev/full", "--quiet")
         assert result.status == OUTPUT
         assert "/dev/full: not wholly written" in result.stderr

@@ -15,13 +15,15 @@ import numpy as np
 import pytest
 from converted import Run as Command
 from pelorus import se3
+from pelorus.errors import PelorusError
 from pelorus.evaluation import assess, made_in, map_figures, nees_per_dof
-from pelorus.frames import Landmark, Pose, Role, Stereo, Truth
+from pelorus.frame_table import frame_table, write_csv
+from pelorus.frames import Kind, Landmark, Pose, Report, Role, Stereo, Truth
 from pelorus.layout import pack_symmetric, unpack_symmetric
 from pelorus.replay import Outputs, Programs
 from pelorus.report import pictures, words
 from pelorus.report.comparison import Comparison
-from pelorus.report.results import read_frames, read_map
+from pelorus.report.results import read_map
 from pelorus.trajectory import Trajectory, estimate_in, read_tum
 from PIL import Image
 from replay_drive import FRAMES, ROOT, drive, encode, header, known, t_ns
@@ -122,13 +124,25 @@ def test_poses_between_the_frames_are_left_out() -> None:
 
 
 def test_a_refused_frame_has_no_estimate_but_its_counts(tmp_path: Path) -> None:
-    path = tmp_path / "frames.csv"
-    path.write_text("t_s,trace,health,used\n1699999999.000000001,2.5,good,4\n2.5,,lost,7\n")
-    table = read_frames(path)
-    assert table.t_ns[0] == 1_699_999_999_000_000_001
+    t = 1_699_999_999_000_000_001
+    seen = Stereo(t, np.zeros(0, np.uint32), np.zeros((0, 4), np.float32))
+    good = Report(t, Kind.STEREO, used=4), Report(t, Kind.STEREO, status=-6, health=2, used=7)
+    pose = Pose(t, after_stereo=True, trace=2.5)
+    between = Pose(t, p_WB_m=np.ones(3))  # after a twist
+    log = [seen, pose, good[0], between, seen, good[1]]  # the same time again is refused
+    table = frame_table(log)
+    assert table.t_ns.tolist() == [t, t]
     assert table["trace"][0] == 2.5
+    assert np.isnan(table["x_m"]).tolist() == [False, True]
     assert math.isnan(table["trace"][1])
     assert table["used"].tolist() == [4, 7]
+    write_csv(tmp_path / "frames.csv", table)
+    titles, first, second = (tmp_path / "frames.csv").read_text().splitlines()
+    cells = dict(zip(titles.split(","), second.split(","), strict=True))
+    assert first.startswith("1699999999.000000001,0,0,0,")
+    assert (cells["trace"], cells["status"], cells["health"]) == ("", "-6", "lost")
+    with pytest.raises(PelorusError, match="no answer to a stereo frame"):
+        frame_table([between])
 
 
 def test_a_map_without_landmarks_is_empty() -> None:
@@ -183,7 +197,7 @@ def test_report_leaves_page_pictures_and_runs(
     for name in RUNS:
         assert name in said.out
         assert f"<td>{name}</td>" in page
-        for end in ("tum", "csv", "plr", "json"):
+        for end in ("tum", "plr", "json"):
             assert (out / "runs" / f"{name}.{end}").stat().st_size > 0
     with Image.open(out / "hero.png") as hero:
         assert hero.width == 1200

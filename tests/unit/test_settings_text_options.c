@@ -79,10 +79,9 @@ static void test_every_row_of_the_table_is_an_option(void) {
 }
 
 static void test_paths_flags_and_start_are_taken(void) {
-    TEST_ASSERT_TRUE(PARSE("--trajectory", "a", "--frames=c", "--out", "d", "--json", "--quiet",
-                           "--start", "identity", "--deadline", "1500", "in.plr"));
+    TEST_ASSERT_TRUE(PARSE("--trajectory", "a", "--out=d", "--json", "--quiet", "--start",
+                           "identity", "--deadline", "1500", "in.plr"));
     TEST_ASSERT_EQUAL_STRING("a", options.trajectory);
-    TEST_ASSERT_EQUAL_STRING("c", options.frames);
     TEST_ASSERT_EQUAL_STRING("d", options.out);
     TEST_ASSERT_TRUE(options.json && options.quiet && !options.help && !options.print_config);
     TEST_ASSERT_EQUAL_INT(PLR_START_IDENTITY, options.start);

@@ -54,16 +54,15 @@ def _environment() -> Path | None:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What one run writes: runs/NAME.tum, .csv, .plr, .json."""
+    """What one run writes: runs/NAME.tum, .plr, .json."""
 
     trajectory: Path
-    frames: Path
     log: Path
     summary: Path
 
     @classmethod
     def named(cls, folder: Path, name: str) -> Outputs:
-        return cls(*(folder / f"{name}.{end}" for end in ("tum", "csv", "plr", "json")))
+        return cls(*(folder / f"{name}.{end}" for end in ("tum", "plr", "json")))
 
 
 def replay(
@@ -71,8 +70,7 @@ def replay(
 ) -> tuple[dict[str, Any], list[str]]:
     """Run the filter; its summary, and what it had to say on the way."""
     wanted = [
-        *("--trajectory", str(outputs.trajectory), "--frames", str(outputs.frames)),
-        *("--out", str(outputs.log), "--json"),
+        *("--trajectory", str(outputs.trajectory), "--out", str(outputs.log), "--json"),
     ]
     stdout, stderr = run_program(program, recording, [*options, *wanted])
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus export RECORDING|RESULT --map OUT.ply`."""
+"""`pelorus export RECORDING|RESULT [--frames OUT.csv] [--map OUT.ply]`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,26 @@ import typer
 from pelorus import export as tables
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.evaluation import made_in
+from pelorus.frame_table import frame_table, write_csv
 from pelorus.replay import result_of
 
 
 def register(parent: typer.Typer) -> None:
     """Add `export` to the command line."""
-    parent.command(epilog="Example:  pelorus export log.plr --map map.ply")(export)
+    parent.command(epilog="Example:  pelorus export log.plr --frames frames.csv --map map.ply")(
+        export
+    )
 
 
 def export(
     source: Path = typer.Argument(
         ..., metavar="RECORDING|RESULT", help="A recording, or what a filter left of it."
+    ),
+    frames_file: Path | None = typer.Option(
+        None,
+        "--frames",
+        metavar="OUT.csv",
+        help="A row a frame: pose, variances, counts, NIS, time.",
     ),
     map_file: Path | None = typer.Option(
         None,
@@ -36,8 +45,10 @@ def export(
     programs: Path | None = PROGRAMS,
 ) -> None:
     """Write what a filter found as tables for other programs. A recording is replayed first."""
-    if map_file is None:
-        raise typer.BadParameter("say what to write", param_hint="--map")
+    if frames_file is None and map_file is None:
+        raise typer.BadParameter("say what to write", param_hint="--frames / --map")
     messages = result_of(source, replay_options(config, settings), programs)
+    if frames_file is not None:
+        write_csv(frames_file, frame_table(messages))
     if map_file is not None:
         tables.write_map(map_file, made_in(messages))

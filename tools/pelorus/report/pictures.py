@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import chi2
 
+from pelorus.frame_table import BIASES
 from pelorus.grid import picture
 from pelorus.grid.files import heights
 from pelorus.layout import Floats
@@ -196,7 +197,6 @@ def limits(error: Floats, band: Floats) -> tuple[float, float]:
 TIME = "time (s)"
 BAND = 0.95
 POSITION = ("var_rho_x", "var_rho_y", "var_rho_z")
-BIASES = ("bias_vx", "bias_vy", "bias_vz", "bias_wx", "bias_wy", "bias_wz")
 
 
 def covariance(compared: Comparison) -> Figure:
@@ -281,7 +281,7 @@ def observations(compared: Comparison) -> Figure:
         t,
         frames["used"],
         frames["gated"],
-        frames["new"],
+        frames["created"],
         labels=("used", "gated", "new"),
         colors=(SKY, VERMILLION, ORANGE),
         step="mid",

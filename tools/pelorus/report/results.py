@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,9 @@ import numpy as np
 from pelorus import wire
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge, known_in, made_in, sigmas_m
+from pelorus.frame_table import FrameTable, frame_table
 from pelorus.frames import Header, Landmark, Message
 from pelorus.layout import Floats
-from pelorus.motion import Times
 from pelorus.replay import Outputs, Programs, depth_limit_m, replay
 from pelorus.trajectory import Trajectory, estimate_in, truth_in
 
@@ -83,29 +82,6 @@ class Points(NamedTuple):
     sigma_m: Floats
 
 
-class FrameTable:
-    """The rows of --frames by column.
-
-    NaN where a refused frame has no estimate, or a diverged filter no covariance.
-    """
-
-    def __init__(self, t_ns: Times, columns: dict[str, Floats]) -> None:
-        self.t_ns = t_ns
-        self._columns = columns
-
-    def __getitem__(self, name: str) -> Floats:
-        return self._columns[name]
-
-    def stack(self, *names: str) -> Floats:
-        """(rows, len(names))."""
-        return np.stack([self._columns[name] for name in names], axis=-1)
-
-    @property
-    def reasons(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Bits of `plr_reason`."""
-        return self["reasons"].astype(np.int64)
-
-
 @dataclass(frozen=True)
 class Run:
     """One replay: `trajectory` and the pose covariance (n, 6, 6) after each frame; `summary` is the
@@ -144,32 +120,12 @@ def carry_out(plan: Plan, subject: Subject, folder: Path) -> Run:
         plan,
         summary | judge(messages, subject.truth, subject.known),
         said,
-        read_frames(outputs.frames),
+        frame_table(messages),
         *found,
         read_map(messages),
         messages,
         outputs.log,
     )
-
-
-def read_frames(path: Path) -> FrameTable:
-    """A row a frame; the word of the health is the summary's to count."""
-    try:
-        with path.open(newline="", encoding="ascii") as stream:
-            rows = list(csv.DictReader(stream))
-    except OSError as error:
-        raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
-    if not rows:
-        raise PelorusError(f"{path}: holds no frame")
-    names = [name for name in rows[0] if name not in ("t_s", "health")]
-    t_ns = np.array([_nanoseconds(row["t_s"]) for row in rows], np.int64)
-    columns = {name: np.array([float(row[name] or "nan") for row in rows]) for name in names}
-    return FrameTable(t_ns, columns)
-
-
-def _nanoseconds(seconds: str) -> int:
-    """Nine decimals are always there; a double would round them."""
-    return int(seconds.replace(".", ""))
 
 
 def read_map(messages: Sequence[Message]) -> Points:

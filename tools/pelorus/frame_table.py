@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""What a filter made of each stereo frame, by column, and as CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pelorus.errors import PelorusError, write_text
+from pelorus.frames import Kind, Message, Pose, Report, Stereo
+from pelorus.layout import Floats
+from pelorus.motion import Times
+
+HEALTH = ("good", "degraded", "lost", "diverged")
+RHO_THETA = tuple(f"var_{part}_{axis}" for part in ("rho", "theta") for axis in "xyz")
+BIASES = tuple(f"bias_{part}{axis}" for part in "vw" for axis in "xyz")
+ESTIMATE = (
+    *("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", *RHO_THETA, "trace"),
+    *("vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps"),
+    *(*BIASES, *(f"var_{name}" for name in BIASES)),
+)
+REPORT = (
+    *("status", "health", "reasons", "budget", "observations", "matched", "used", "gated"),
+    *("created", "evicted", "refused", "duplicates", "no_room", "poor", "left_out"),
+    *("blocks_failed", "active", "nis", "nis_dof", "update_us"),
+)
+DIAGONAL = [i * (i + 3) // 2 for i in range(6)]  # of a packed 6 x 6
+
+
+@dataclass(frozen=True)
+class FrameTable:
+    """A row a frame, refused ones too: NaN where there is no estimate, or no covariance."""
+
+    t_ns: Times
+    columns: dict[str, Floats]
+
+    def __getitem__(self, name: str) -> Floats:
+        return self.columns[name]
+
+    def stack(self, *names: str) -> Floats:
+        """(rows, len(names))."""
+        return np.stack([self.columns[name] for name in names], axis=-1)
+
+    @property
+    def reasons(self) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """Bits of `plr_reason`."""
+        return self.columns["reasons"].astype(np.int64)
+
+
+def frame_table(messages: Sequence[Message]) -> FrameTable:
+    """From the messages of a result."""
+    rows = list(_answers(messages))
+    if not rows:
+        raise PelorusError("the result holds no answer to a stereo frame")
+    estimate = np.array([_estimate(pose) for pose, _ in rows])
+    columns = dict(zip(ESTIMATE, estimate.T, strict=True))
+    for name in REPORT:
+        columns[name] = np.array([getattr(report, name) for _, report in rows], np.float64)
+    return FrameTable(np.array([report.t_ns for _, report in rows], np.int64), columns)
+
+
+def _answers(messages: Sequence[Message]) -> Iterator[tuple[Pose | None, Report]]:
+    """A frame is followed by its pose, if it was not refused, and its report."""
+    pose: Pose | None = None
+    for message in messages:
+        if isinstance(message, Stereo):
+            pose = None
+        elif isinstance(message, Pose) and message.after_stereo:
+            pose = message
+        elif isinstance(message, Report) and message.subject == Kind.STEREO:
+            yield pose, message
+            pose = None
+
+
+def _estimate(pose: Pose | None) -> Floats:
+    if pose is None:
+        return np.full(len(ESTIMATE), np.nan)
+    variances = np.append(pose.covariance[DIAGONAL], pose.trace)
+    of_bias = np.asarray(pose.bias_variance, np.float64)
+    return np.concatenate(
+        (
+            pose.p_WB_m,
+            Rotation.from_matrix(pose.R_WB).as_quat(canonical=True),
+            np.where(pose.knows_covariance & (variances >= 0), variances, np.nan),
+            pose.v_B_mps,
+            pose.w_B_radps,
+            pose.bias,
+            np.where(pose.knows_covariance & (of_bias >= 0), of_bias, np.nan),
+        )
+    )
+
+
+def write_csv(path: Path, table: FrameTable) -> None:
+    """Times to the nanosecond; what is not known is empty."""
+    names = {"created": "new"}  # of columns, where another word is the usual one
+    titles = ",".join(("t_s", *(names.get(name, name) for name in table.columns)))
+    rows = np.stack(list(table.columns.values()), axis=-1)
+    health = list(table.columns).index("health")
+    lines = [titles]
+    for t, row in zip(table.t_ns.tolist(), rows.tolist(), strict=True):
+        cells = ["" if np.isnan(x) else f"{x:.9g}" for x in row]
+        cells[health] = HEALTH[int(row[health])]
+        lines.append(",".join((f"{t // 10**9}.{t % 10**9:09d}", *cells)))
+    write_text(path, "\n".join(lines) + "\n")
