@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 /*
- * The filter's state as bytes and back: docs/STATE-FORMAT.md. What init derives from settings and
- * calibration is not carried, but compared: a state belongs to the filter that it was taken from.
+ * The filter's state as bytes and back: docs/STATE-FORMAT.md, by the tables of snapshot.def. What init
+ * derives from settings and calibration is not restored, but compared: a state belongs to the filter
+ * that it was saved from.
  */
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "math/packed.h"
-#include "record/fields.h"
+#include "record/codec.h"
 #include "state/covariance.h"
 
 /* "PLRF" */
@@ -14,30 +15,13 @@
 
 enum { STATE_VERSION = 2 };
 
-#define LENGTH(table) (sizeof(table) / sizeof *(table))
-#define FIELD(type, member, kind, n)                                                               \
-    { offsetof(type, member), kind, n }
-#define OF_FILTER(member, kind, n)      FIELD(plr_filter, member, kind, n)
-#define OF_CONSISTENCY(member, kind, n) FIELD(plr_filter, consistency.member, kind, n)
-#define OF_CAMERA(member, n)            FIELD(plr_camera, member, PLR_FIELD_REAL, n)
-#define OF_SLOT(member, kind, n)        FIELD(plr_slot, member, kind, n)
-#define OF_TOTALS(member, kind)         OF_FILTER(totals.member, kind, 1)
-
 /* ---------------------------------------------------------------- layout */
 
 /* What must agree before anything else can be read. */
 typedef struct plr_state_origin {
     uint32_t magic, version, build_fingerprint;
+    uint8_t settings;
 } plr_state_origin;
-
-static const plr_field origin_fields[] = {
-    FIELD(plr_state_origin, magic, PLR_FIELD_U32, 1),
-    FIELD(plr_state_origin, version, PLR_FIELD_U32, 1),
-    FIELD(plr_state_origin, build_fingerprint, PLR_FIELD_U32, 1),
-};
-
-static const plr_field u8_fields[] = {{0, PLR_FIELD_U8, 1}};
-static const plr_field u32_fields[] = {{0, PLR_FIELD_U32, 1}};
 
 /* One for each row of the setting table. */
 typedef struct plr_state_setting {
@@ -45,150 +29,80 @@ typedef struct plr_state_setting {
     double value;
 } plr_state_setting;
 
-static const plr_field setting_fields[] = {
-    FIELD(plr_state_setting, id, PLR_FIELD_U8, 1),
-    FIELD(plr_state_setting, value, PLR_FIELD_F64, 1),
-};
+typedef struct plr_state_count {
+    uint32_t landmarks;
+} plr_state_count;
 
-static const plr_field camera_fields[] = {
-    OF_CAMERA(fx, 1),       OF_CAMERA(fy, 1),   OF_CAMERA(cx, 1),   OF_CAMERA(cy, 1),
-    OF_CAMERA(baseline, 1), OF_CAMERA(R_CB, 9), OF_CAMERA(t_CB, 3),
-};
+#define TABLE(name, times) static const plr_field name##_fields[] = {
+#define GROUP(about)
+#define FIELD(type, member, kind_, count_, most_, about)                                           \
+    {.offset = offsetof(type, member),                                                             \
+     .most = (most_),                                                                              \
+     .kind = PLR_FIELD_##kind_,                                                                    \
+     .count = (count_)},
+#define END(name)                                                                                  \
+    }                                                                                              \
+    ;
+#include "filter/snapshot.def"
 
-static const plr_field filter_fields[] = {
-    OF_FILTER(t_ns, PLR_FIELD_U64, 1),
-    OF_FILTER(reading_ns, PLR_FIELD_U64, 1),
-    OF_FILTER(interval_s, PLR_FIELD_REAL, 1),
-    OF_FILTER(clock_started, PLR_FIELD_FLAG, 1),
-    OF_FILTER(reading_valid, PLR_FIELD_FLAG, 1),
-    OF_FILTER(R_WB, PLR_FIELD_REAL, 9),
-    OF_FILTER(p_WB, PLR_FIELD_F64, 3),
-    OF_FILTER(bias, PLR_FIELD_REAL, PLR_BIAS_DIM),
-    OF_FILTER(reading, PLR_FIELD_REAL, 6),
-    OF_FILTER(motion.E, PLR_FIELD_REAL, 9),
-    OF_FILTER(motion.p, PLR_FIELD_REAL, 3),
-    OF_FILTER(motion.Q, PLR_FIELD_REAL, PLR_POSE_SQUARE),
-    OF_FILTER(motion.B, PLR_FIELD_REAL, PLR_POSE_SQUARE),
-    OF_FILTER(motion.seconds, PLR_FIELD_REAL, 1),
-    OF_FILTER(motion.pending, PLR_FIELD_FLAG, 1),
-    OF_FILTER(motion.noisy, PLR_FIELD_FLAG, 1),
-    OF_FILTER(frame_number, PLR_FIELD_U32, 1),
-    OF_FILTER(bias_prior, PLR_FIELD_REAL, PLR_BIAS_DIM),
-    OF_FILTER(bias_prior_sigma, PLR_FIELD_REAL, PLR_BIAS_DIM),
-    OF_FILTER(recovery_P, PLR_FIELD_REAL, PLR_POSE_TRIANGLE),
-    OF_CONSISTENCY(windows[0].sum, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(windows[0].variance, PLR_FIELD_REAL, PLR_POSE_TRIANGLE),
-    OF_CONSISTENCY(windows[1].sum, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(windows[1].variance, PLR_FIELD_REAL, PLR_POSE_TRIANGLE),
-    OF_CONSISTENCY(windows[2].sum, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(windows[2].variance, PLR_FIELD_REAL, PLR_POSE_TRIANGLE),
-    OF_CONSISTENCY(apart, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(apart_sigmas, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(apart_noise, PLR_FIELD_REAL, 1),
-    OF_CONSISTENCY(still_way, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(still_variance, PLR_FIELD_REAL, 6),
-    OF_CONSISTENCY(matched, PLR_FIELD_REAL, 1),
-    OF_CONSISTENCY(gated, PLR_FIELD_REAL, 1),
-    OF_CONSISTENCY(nis, PLR_FIELD_REAL, 1),
-    OF_CONSISTENCY(nis_dof, PLR_FIELD_REAL, 1),
-    OF_CONSISTENCY(agreeing, PLR_FIELD_U16, 1),
-    OF_CONSISTENCY(excess, PLR_FIELD_REAL, 1),
-    OF_CONSISTENCY(insisting, PLR_FIELD_U16, 1),
-    OF_CONSISTENCY(slight, PLR_FIELD_U16, 1),
-    OF_CONSISTENCY(contradicted, PLR_FIELD_FLAG, 1),
-    OF_CONSISTENCY(drifting, PLR_FIELD_FLAG, 1),
-    OF_CONSISTENCY(frozen, PLR_FIELD_FLAG, 1),
-    OF_CONSISTENCY(doubtful, PLR_FIELD_FLAG, 1),
-    OF_FILTER(health, PLR_FIELD_U8, 1),
-    OF_FILTER(reasons, PLR_FIELD_U32, 1),
-    OF_FILTER(last_frame_ns, PLR_FIELD_U64, 1),
-    OF_FILTER(last_use_ns, PLR_FIELD_U64, 1),
-    OF_FILTER(refused_before, PLR_FIELD_U32, 1),
-    OF_FILTER(frames_without_use, PLR_FIELD_U16, 1),
-    OF_FILTER(frames_mostly_gated, PLR_FIELD_U16, 1),
-    OF_FILTER(matches_since_gated, PLR_FIELD_U32, 1),
-    OF_TOTALS(twists, PLR_FIELD_U32),
-    OF_TOTALS(frames, PLR_FIELD_U32),
-    OF_TOTALS(late, PLR_FIELD_U32),
-    OF_TOTALS(refused, PLR_FIELD_U32),
-    OF_TOTALS(resets, PLR_FIELD_U32),
-    OF_TOTALS(locks, PLR_FIELD_U32),
-    OF_TOTALS(range_limited, PLR_FIELD_U32),
-    OF_TOTALS(blocks_failed, PLR_FIELD_U32),
-    OF_TOTALS(widened, PLR_FIELD_U32),
-    OF_TOTALS(recoveries, PLR_FIELD_U32),
-    OF_TOTALS(contradictions, PLR_FIELD_U32),
-    OF_TOTALS(twists_refused, PLR_FIELD_U32),
-    OF_TOTALS(frames_refused, PLR_FIELD_U32),
-    OF_TOTALS(damaged, PLR_FIELD_U32),
-    OF_TOTALS(observations, PLR_FIELD_U64),
-    OF_TOTALS(matched, PLR_FIELD_U64),
-    OF_TOTALS(used, PLR_FIELD_U64),
-    OF_TOTALS(gated, PLR_FIELD_U64),
-    OF_TOTALS(created, PLR_FIELD_U64),
-    OF_TOTALS(evicted, PLR_FIELD_U64),
-    OF_TOTALS(diverged_ns, PLR_FIELD_U64),
-};
+/* All fields of a table, and their size as bytes. */
+#define PASS(c, object, table)                                                                     \
+    plr_codec_fields((c), (void *)(object), table##_fields,                                        \
+                     sizeof table##_fields / sizeof *table##_fields)
+#define SIZE(table) plr_codec_size(table##_fields, sizeof table##_fields / sizeof *table##_fields)
 
-static const plr_field slot_fields[] = {
-    OF_SLOT(x, PLR_FIELD_REAL, PLR_LANDMARK_DIM),
-    OF_SLOT(beyond, PLR_FIELD_REAL, 1),
-    OF_SLOT(id, PLR_FIELD_U32, 1),
-    OF_SLOT(times_seen, PLR_FIELD_U32, 1),
-    OF_SLOT(times_gated, PLR_FIELD_U32, 1),
-    OF_SLOT(last_frame, PLR_FIELD_U32, 1),
-    OF_SLOT(print, PLR_FIELD_U32, 1),
-    OF_SLOT(last_seen_ns, PLR_FIELD_U64, 1),
-    OF_SLOT(lean, PLR_FIELD_REAL, 3),
-    OF_SLOT(lean_variance, PLR_FIELD_REAL, 1),
-    OF_SLOT(known, PLR_FIELD_FLAG, 1),
-    OF_SLOT(strays, PLR_FIELD_FLAG, 1),
-    OF_SLOT(chances, PLR_FIELD_U8, 1),
-    OF_SLOT(accepted, PLR_FIELD_U16, 1),
-    OF_SLOT(rejected, PLR_FIELD_U16, 1),
-};
-
-/* n elements of P, which are carried here and not computed with: row i is i + 1 long. */
-static plr_field reals(uint32_t n) {
-    const plr_field field = {0, PLR_FIELD_REAL, n};
-    return field;
-}
-
-static plr_state_origin origin(void) {
-    const plr_state_origin here = {STATE_MAGIC, STATE_VERSION, plr_build_fingerprint()};
-    return here;
-}
-
-static plr_state_setting setting_in_force(const plr_filter *f, unsigned index) {
-    const plr_setting *setting = plr_setting_at(index);
-    const plr_state_setting here = {setting->id, plr_config_get(&f->config, setting)};
-    return here;
+/* Elements of P with that many landmarks: row i of the lower triangle is i + 1 long. */
+static uint32_t elements(const plr_filter *f, unsigned landmarks) {
+    return (uint32_t)plr_packed_row(plr_covariance_row(f, landmarks));
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
     if (!f || plr_guard_look(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
-    const plr_field P = reals((uint32_t)plr_packed_row(plr_covariance_row(f, landmarks)));
-    return plr_fields_size(origin_fields, LENGTH(origin_fields)) + plr_fields_size(u32_fields, 1) +
-           plr_fields_size(u8_fields, 1) +
-           plr_setting_count() * plr_fields_size(setting_fields, LENGTH(setting_fields)) +
-           plr_fields_size(camera_fields, LENGTH(camera_fields)) +
-           plr_fields_size(filter_fields, LENGTH(filter_fields)) +
-           landmarks * plr_fields_size(slot_fields, LENGTH(slot_fields)) + plr_fields_size(&P, 1);
+    return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
+           SIZE(filter) + landmarks * SIZE(slot) +
+           elements(f, landmarks) * (uint32_t)sizeof(plr_real);
+}
+
+/* What the state belongs to: build, settings, camera. */
+static void pass_origin(plr_codec *c, const plr_filter *f) {
+    const plr_state_origin here = {STATE_MAGIC, STATE_VERSION, plr_build_fingerprint(),
+                                   (uint8_t)plr_setting_count()};
+    PASS(c, &here, origin);
+    for (unsigned i = 0; i < here.settings && !c->differs; i++) {
+        const plr_setting *row = plr_setting_at(i);
+        const plr_state_setting setting = {row->id, plr_config_get(&f->config, row)};
+        PASS(c, &setting, setting);
+    }
+    if (!c->differs)
+        PASS(c, &f->par.camera, camera);
 }
 
 /* ---------------------------------------------------------------- save */
 
-static void put_belonging(plr_fields_out *out, const plr_filter *f) {
-    const plr_state_origin here = origin();
-    const uint8_t settings = (uint8_t)plr_setting_count();
-    plr_fields_put(out, &here, origin_fields, LENGTH(origin_fields));
-    plr_fields_put(out, &settings, u8_fields, 1);
-    for (unsigned i = 0; i < settings; i++) {
-        const plr_state_setting setting = setting_in_force(f, i);
-        plr_fields_put(out, &setting, setting_fields, LENGTH(setting_fields));
+/* Bytes on their way to the sink. */
+typedef struct plr_state_out {
+    plr_state_sink sink;
+    void *context;
+    uint8_t buffer[PLR_STATE_CHUNK];
+    unsigned fill;
+} plr_state_out;
+
+static bool flush(plr_state_out *out) {
+    const unsigned n = out->fill;
+    out->fill = 0;
+    return n == 0 || out->sink(out->context, out->buffer, n) == 0;
+}
+
+static bool append(void *context, uint8_t *bytes, unsigned n) {
+    plr_state_out *out = context;
+    bool good = true;
+    for (unsigned i = 0; i < n && good; i++) {
+        out->buffer[out->fill++] = bytes[i];
+        if (out->fill == sizeof out->buffer)
+            good = flush(out);
     }
-    plr_fields_put(out, &f->par.camera, camera_fields, LENGTH(camera_fields));
+    return good;
 }
 
 plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *context) {
@@ -199,75 +113,97 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
         return sound;
     if (f->diverged || !plr_covariance_is_positive(f))
         return PLR_E_DIVERGED;
-    plr_fields_out out = {.sink = sink, .context = context, .status = PLR_OK};
-    const uint32_t count = f->count;
-    const plr_field P = reals((uint32_t)plr_packed_row(plr_covariance_dim(f)));
-    put_belonging(&out, f);
-    plr_fields_put(&out, &count, u32_fields, 1);
-    plr_fields_put(&out, f, filter_fields, LENGTH(filter_fields));
+    plr_state_out out = {.sink = sink, .context = context};
+    plr_codec c = {.direction = sink ? PLR_CODEC_WRITE : PLR_CODEC_CHECK,
+                   .finite = true,
+                   .move = append,
+                   .context = &out};
+    const plr_state_count count = {f->count};
+    pass_origin(&c, f);
+    PASS(&c, &count, count);
+    PASS(&c, f, filter);
     for (unsigned slot = 0; slot < f->count; slot++)
-        plr_fields_put(&out, &f->slots[slot], slot_fields, LENGTH(slot_fields));
-    plr_fields_put(&out, f->P, &P, 1);
-    plr_fields_flush(&out);
-    return out.status;
+        PASS(&c, &f->slots[slot], slot);
+    plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)f->P, elements(f, f->count));
+    if (c.status == PLR_OK && !flush(&out))
+        c.status = PLR_E_IO;
+    return c.status;
 }
 
 /* ---------------------------------------------------------------- restore */
 
-/* PLR_OK, or PLR_E_FOREIGN: of another build, of other settings, of another camera. */
-static plr_status read_belonging(plr_fields_in *in, const plr_filter *f) {
-    const plr_state_origin here = origin();
-    const uint8_t settings = (uint8_t)plr_setting_count();
-    bool same = plr_fields_match(in, &here, origin_fields, LENGTH(origin_fields)) &&
-                plr_fields_match(in, &settings, u8_fields, 1);
-    for (unsigned i = 0; same && i < settings; i++) {
-        const plr_state_setting setting = setting_in_force(f, i);
-        same = plr_fields_match(in, &setting, setting_fields, LENGTH(setting_fields));
+/* Bytes on their way from the source. */
+typedef struct plr_state_in {
+    plr_state_source source;
+    void *context;
+    uint32_t at, length; /* bytes taken from the source, and all that there are */
+    uint8_t buffer[PLR_STATE_CHUNK];
+    unsigned first, fill;
+} plr_state_in;
+
+static bool refill(plr_state_in *in) {
+    const uint32_t left = in->length - in->at;
+    in->fill = left < sizeof in->buffer ? (unsigned)left : (unsigned)sizeof in->buffer;
+    in->first = 0;
+    in->at += in->fill;
+    return in->source(in->context, in->at - in->fill, in->buffer, in->fill) == 0;
+}
+
+/* The codec asks for no more than there is. */
+static bool take(void *context, uint8_t *bytes, unsigned n) {
+    plr_state_in *in = context;
+    for (unsigned i = 0; i < n; i++) {
+        if (in->first == in->fill && !refill(in))
+            return false;
+        bytes[i] = in->buffer[in->first++];
     }
-    same = same && plr_fields_match(in, &f->par.camera, camera_fields, LENGTH(camera_fields));
-    if (in->status != PLR_OK)
-        return in->status;
-    return same ? PLR_OK : PLR_E_FOREIGN;
+    return true;
 }
 
-/* The number of landmarks, which the length must agree with. */
-static plr_status read_count(plr_fields_in *in, const plr_filter *f, unsigned *landmarks) {
-    uint32_t count = 0;
-    plr_fields_get(in, &count, u32_fields, 1);
-    if (in->status != PLR_OK)
-        return in->status;
-    if (in->length != plr_filter_saved_size(f, count)) /* which is 0 if these are too many */
-        return PLR_E_CORRUPT;
-    *landmarks = count;
-    return PLR_OK;
+/* In bytes that were saved no number can be one that save refuses. */
+static plr_status as_stored(const plr_codec *c) {
+    return c->status == PLR_OK || c->status == PLR_E_IO ? c->status : PLR_E_CORRUPT;
 }
 
-/* Looks at the rest, and keeps nothing: numbers finite, flags flags, variances not negative. */
-static plr_status check_rest(plr_fields_in *in, const plr_filter *f, unsigned landmarks) {
-    const unsigned dim = plr_covariance_row(f, landmarks);
-    plr_fields_get(in, NULL, filter_fields, LENGTH(filter_fields));
-    for (unsigned slot = 0; slot < landmarks; slot++)
-        plr_fields_get(in, NULL, slot_fields, LENGTH(slot_fields));
-    for (unsigned i = 0; i < dim && in->status == PLR_OK; i++) {
-        const plr_field before = reals(i), last = reals(1);
+/* Looks at the covariance, and keeps nothing: numbers finite, variances not negative. */
+static plr_status check_covariance(plr_codec *c, unsigned dim) {
+    for (unsigned i = 0; i < dim && c->status == PLR_OK; i++) {
         plr_real variance = 0;
-        plr_fields_get(in, NULL, &before, 1);
-        plr_fields_get(in, &variance, &last, 1);
-        if (in->status == PLR_OK && !(variance >= 0))
+        plr_codec_numbers(c, PLR_FIELD_REAL, NULL, i);
+        plr_codec_numbers(c, PLR_FIELD_REAL, &variance, 1);
+        if (c->status == PLR_OK && !(variance >= 0))
             return PLR_E_CORRUPT;
     }
-    return in->status;
+    return as_stored(c);
 }
 
-static plr_status load_rest(plr_fields_in *in, plr_filter *f, unsigned landmarks) {
-    plr_fields_get(in, f, filter_fields, LENGTH(filter_fields));
-    f->count = landmarks;
-    f->diverged = 0;
-    for (unsigned slot = 0; slot < landmarks; slot++)
-        plr_fields_get(in, &f->slots[slot], slot_fields, LENGTH(slot_fields));
-    const plr_field P = reals((uint32_t)plr_packed_row(plr_covariance_dim(f)));
-    plr_fields_get(in, f->P, &P, 1);
-    return in->status;
+/* Reads the whole state. f NULL: looks at it, and keeps nothing. `like` is the filter that it must
+ * belong to. PLR_E_FOREIGN: of another build, of other settings, of another camera. */
+static plr_status read_state(plr_codec *c, plr_filter *f, const plr_filter *like) {
+    plr_state_count count = {0};
+    const size_t length = c->left;
+    c->direction = PLR_CODEC_MATCH;
+    pass_origin(c, like);
+    c->direction = PLR_CODEC_READ;
+    if (c->status == PLR_OK && c->differs)
+        return PLR_E_FOREIGN;
+    PASS(c, &count, count);
+    if (c->status != PLR_OK)
+        return as_stored(c);
+    if (length !=
+        plr_filter_saved_size(like, count.landmarks)) /* which is 0 if these are too many */
+        return PLR_E_CORRUPT;
+    PASS(c, f, filter);
+    if (f) {
+        f->count = count.landmarks;
+        f->diverged = 0;
+    }
+    for (unsigned slot = 0; slot < count.landmarks; slot++)
+        PASS(c, f ? &f->slots[slot] : NULL, slot);
+    if (!f)
+        return check_covariance(c, plr_covariance_row(like, count.landmarks));
+    plr_codec_numbers(c, PLR_FIELD_REAL, f->P, elements(f, f->count));
+    return as_stored(c);
 }
 
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,
@@ -277,24 +213,17 @@ plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source s
     const plr_status sound = plr_guard_look(f);
     if (sound != PLR_OK)
         return sound;
-    const plr_fields_in start = {
-        .source = source, .context = context, .length = length, .status = PLR_OK};
-    unsigned landmarks = 0;
-    plr_fields_in in = start;
-    plr_status status = read_belonging(&in, f);
-    if (status == PLR_OK)
-        status = read_count(&in, f, &landmarks);
-    if (status == PLR_OK)
-        status = check_rest(&in, f, landmarks);
+    const plr_state_in start = {.source = source, .context = context, .length = length};
+    plr_state_in in = start;
+    const plr_codec begin = {.finite = true, .move = take, .context = &in, .left = length};
+    plr_codec c = begin;
+    plr_status status = read_state(&c, NULL, f);
     if (status != PLR_OK)
         return status;
 
     in = start;
-    status = read_belonging(&in, f);
-    if (status == PLR_OK)
-        status = read_count(&in, f, &landmarks); /* of the length, so the same as before */
-    if (status == PLR_OK)
-        status = load_rest(&in, f, landmarks);
+    c = begin;
+    status = read_state(&c, f, f);
     if (status == PLR_OK)
         plr_guard_seal_whole(f);
     else

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <string.h>
+
 #include "pelorus/assertions.h"
 #include "record/bytes.h"
 #include "record/cobs.h"
-#include "record/layout.h"
+#include "record/messages.h"
 
 /* The checksum of a body together with its own checksum: the same for every good body. */
 static const uint32_t GOOD_CRC = 0x2144DF1C;
@@ -29,22 +31,31 @@ static void count_missing(plr_reader *r, uint16_t sequence) {
     r->next_sequence = (uint16_t)(sequence + 1);
 }
 
-/* The message of a body whose checksum is good. */
-static plr_fault decode(plr_reader *r, plr_message *message) {
+/* Takes the next n bytes of a payload. */
+static bool take(void *context, uint8_t *bytes, unsigned n) {
+    const uint8_t **payload = context;
+    memcpy(bytes, *payload, n);
+    *payload += n;
+    return true;
+}
+
+/* The message of a body whose checksum is good. PLR_OK, or as plr_message_pass. */
+static plr_status decode(plr_reader *r, plr_message *message) {
     PLR_ASSERT(r->length >= PLR_WIRE_OVERHEAD && r->length <= r->buffer_size);
     uint16_t sequence = (uint16_t)plr_bytes_get(r->buffer + AT_SEQUENCE, 2);
     count_missing(r, sequence);
     if (r->overrun)
-        return PLR_FAULT_TOO_LONG;
-    plr_pass pass = {.direction = PLR_PASS_READ,
-                     .payload = r->buffer + AT_PAYLOAD,
-                     .left = r->length - PLR_WIRE_OVERHEAD,
-                     .observations = r->observations,
-                     .max_observations = r->max_observations};
+        return PLR_E_FULL;
+    const uint8_t *payload = r->buffer + AT_PAYLOAD;
+    const plr_observation_room room = {r->observations, r->max_observations};
+    plr_codec codec = {.direction = PLR_CODEC_READ,
+                       .move = take,
+                       .context = &payload,
+                       .left = r->length - PLR_WIRE_OVERHEAD};
     message->kind = (plr_kind)r->buffer[0];
     message->sequence = sequence;
-    plr_layout(&pass, message);
-    return pass.fault;
+    plr_message_pass(&codec, message->kind, &message->as, &room);
+    return codec.status;
 }
 
 static plr_read_event skip(plr_reader *r, plr_skip why, uint32_t *count) {
@@ -55,15 +66,15 @@ static plr_read_event skip(plr_reader *r, plr_skip why, uint32_t *count) {
     return PLR_READ_SKIPPED;
 }
 
-static plr_read_event refuse(plr_reader *r, plr_fault fault, plr_message *message) {
-    if (fault == PLR_FAULT_FUTURE) {
+static plr_read_event refuse(plr_reader *r, plr_status fault, plr_message *message) {
+    if (fault == PLR_E_FOREIGN && message->kind == PLR_KIND_HEADER) {
         r->future = true;
         return PLR_READ_FUTURE;
     }
     message->kind = PLR_KIND_NONE;
-    if (fault == PLR_FAULT_UNKNOWN)
+    if (fault == PLR_E_FOREIGN)
         return skip(r, PLR_SKIP_UNKNOWN, &r->counts.unknown);
-    if (fault == PLR_FAULT_TOO_LONG)
+    if (fault == PLR_E_FULL)
         return skip(r, PLR_SKIP_TOO_LONG, &r->counts.too_long);
     return skip(r, PLR_SKIP_MALFORMED, &r->counts.malformed);
 }
@@ -72,8 +83,8 @@ static plr_read_event refuse(plr_reader *r, plr_fault fault, plr_message *messag
 static plr_read_event end_frame(plr_reader *r, bool whole, plr_message *message) {
     if (!whole || r->length < PLR_WIRE_OVERHEAD || r->crc != GOOD_CRC)
         return skip(r, PLR_SKIP_DAMAGED, &r->counts.damaged);
-    plr_fault fault = decode(r, message);
-    if (fault != PLR_FAULT_NONE)
+    const plr_status fault = decode(r, message);
+    if (fault != PLR_OK)
         return refuse(r, fault, message);
     r->counts.frames++;
     return PLR_READ_MESSAGE;

@@ -3,7 +3,7 @@
 
 #include "record/bytes.h"
 #include "record/frame_out.h"
-#include "record/layout.h"
+#include "record/messages.h"
 
 plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *context) {
     if (!w || !write)
@@ -12,17 +12,24 @@ plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *contex
     return PLR_OK;
 }
 
-/* A layout takes what it could write to; in the directions CHECK and WRITE it only looks. */
-static plr_fault pass_payload(plr_pass p, plr_writer *w, const plr_message *message) {
+static bool put(void *writer, uint8_t *bytes, unsigned n) {
+    plr_frame_out_put(writer, bytes, n);
+    return true; /* a failure is kept in the writer */
+}
+
+/* The codec takes what it could read into; in these directions it only looks at it. END says what was
+ * written, whatever the message says. */
+static plr_status pass_payload(plr_direction direction, plr_writer *w, const plr_message *message) {
+    plr_codec codec = {.direction = direction, .move = put, .context = w};
     if (message->kind == PLR_KIND_END) {
         plr_end end = w->counts;
         end.differs = message->as.end.differs;
         memcpy(end.arrived, message->as.end.arrived, sizeof end.arrived);
-        plr_layout_end(&p, &end);
+        plr_message_pass(&codec, PLR_KIND_END, &end, NULL);
     } else {
-        plr_layout(&p, (plr_message *)message);
+        plr_message_pass(&codec, message->kind, (void *)&message->as, NULL);
     }
-    return p.fault;
+    return codec.status;
 }
 
 static plr_status send_frame(plr_writer *w, const plr_message *message) {
@@ -31,7 +38,7 @@ static plr_status send_frame(plr_writer *w, const plr_message *message) {
     w->sequence = (uint16_t)(w->sequence + 1);
     plr_frame_out_begin(w);
     plr_frame_out_put(w, head, sizeof head);
-    pass_payload((plr_pass){.direction = PLR_PASS_WRITE, .writer = w}, w, message);
+    (void)pass_payload(PLR_CODEC_WRITE, w, message);
     return plr_frame_out_end(w);
 }
 
@@ -52,7 +59,7 @@ static void count(plr_end *counts, plr_kind kind) {
 plr_status plr_writer_put(plr_writer *w, const plr_message *message) {
     if (!w || !message || !w->write)
         return PLR_E_ARGUMENT;
-    if (pass_payload((plr_pass){.direction = PLR_PASS_CHECK}, w, message) != PLR_FAULT_NONE)
+    if (pass_payload(PLR_CODEC_CHECK, w, message) != PLR_OK)
         return PLR_E_ARGUMENT;
     plr_status status = send_frame(w, message);
     if (status == PLR_OK)

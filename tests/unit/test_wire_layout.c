@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* The payload of every kind against docs/REPLAY-FORMAT.md: the place of each field, and what is
  * too short, too long, or beyond what the page lists. */
-#include "record/layout.h"
+#include "record/messages.h"
 
 #include <string.h>
 #include <unity.h>
@@ -50,6 +50,14 @@ static void assert_f32s(size_t at, const double *values, unsigned n) {
         float narrow = (float)values[i];
         ASSERT_F32(at + 4 * i, narrow);
     }
+}
+
+/* The next n bytes of a payload. */
+static bool take(void *context, uint8_t *bytes, unsigned n) {
+    const uint8_t **at = context;
+    memcpy(bytes, *at, n);
+    *at += n;
+    return true;
 }
 
 static void test_header_fields_lie_where_the_page_says(void) {
@@ -222,10 +230,11 @@ static void test_end_counts_lie_where_the_page_says(void) {
     plr_end counts = {0};
     for (unsigned i = 0; i < 45; i++) /* numbers of 4 bytes, with the one byte at 24 between them */
         payload[i] = (uint8_t)((i > 24 ? i - 1 : i) % 4 == 0 ? 1 + i / 4 : 0);
-    plr_pass pass = {.direction = PLR_PASS_READ, .payload = payload, .left = 45};
-    plr_layout_end(&pass, &counts);
-    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, pass.fault);
-    TEST_ASSERT_EQUAL_size_t(0, pass.left);
+    const uint8_t *at = payload;
+    plr_codec codec = {.direction = PLR_CODEC_READ, .move = take, .context = &at, .left = 45};
+    plr_message_pass(&codec, PLR_KIND_END, &counts, NULL);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, codec.status);
+    TEST_ASSERT_EQUAL_size_t(0, codec.left);
     TEST_ASSERT_EQUAL_UINT32(1, counts.twists);
     TEST_ASSERT_EQUAL_UINT32(2, counts.stereos);
     TEST_ASSERT_EQUAL_UINT32(3, counts.truths);
@@ -260,18 +269,16 @@ static void test_reading_fields_lie_where_the_page_says(void) {
 
 /* Reads n bytes of payload. The bytes are copied to where a step beyond them is found out by the
  * sanitizers. */
-static plr_fault read_payload(plr_kind kind, size_t n, plr_message *m) {
+static plr_status read_payload(plr_kind kind, size_t n, plr_message *m) {
     static plr_observation observations[PLR_WIRE_MAX_OBSERVATIONS];
-    plr_pass pass = {.direction = PLR_PASS_READ,
-                     .payload = payload + sizeof payload - n,
-                     .left = n,
-                     .observations = observations,
-                     .max_observations = PLR_WIRE_MAX_OBSERVATIONS};
+    const plr_observation_room room = {observations, PLR_WIRE_MAX_OBSERVATIONS};
+    const uint8_t *at = payload + sizeof payload - n;
+    plr_codec codec = {.direction = PLR_CODEC_READ, .move = take, .context = &at, .left = n};
     memmove(payload + sizeof payload - n, payload, n);
     memset(m, 0, sizeof *m);
     m->kind = kind;
-    plr_layout(&pass, m);
-    return pass.fault;
+    plr_message_pass(&codec, kind, &m->as, &room);
+    return codec.status;
 }
 
 /* By how much a payload of format 1.1 is shorter: half of the reasons and the notice, the sigmas of
@@ -299,7 +306,7 @@ static void test_every_shorter_payload_is_malformed(void) {
             if (is_whole_in_an_earlier_format((plr_kind)kind, n))
                 continue;
             encode((plr_kind)kind);
-            TEST_ASSERT_EQUAL_INT(PLR_FAULT_MALFORMED, read_payload((plr_kind)kind, n, &m));
+            TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, read_payload((plr_kind)kind, n, &m));
         }
     }
 }
@@ -307,7 +314,7 @@ static void test_every_shorter_payload_is_malformed(void) {
 static void test_a_report_of_format_1_1_has_the_lower_reasons_alone(void) {
     plr_message m, expected = encode(PLR_KIND_REPORT);
     const size_t old = length - since_1_1(PLR_KIND_REPORT);
-    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_REPORT, old, &m));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(PLR_KIND_REPORT, old, &m));
     expected.as.report.report.reasons &= 0xFFFF;
     expected.as.report.notice = PLR_NOTICE_NONE;
     wire_assert_same(&expected, &m);
@@ -317,7 +324,7 @@ static void test_a_report_of_format_1_1_has_the_lower_reasons_alone(void) {
 static void test_a_header_of_format_1_1_tells_nothing_of_single_axes(void) {
     plr_message m, expected = encode(PLR_KIND_HEADER);
     const size_t old = length - since_1_1(PLR_KIND_HEADER);
-    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_HEADER, old, &m));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(PLR_KIND_HEADER, old, &m));
     for (unsigned i = 0; i < 3; i++) {
         expected.as.header.velocity_sigma_axes_mps[i] = -1;
         expected.as.header.gyro_sigma_axes_radps[i] = -1;
@@ -330,7 +337,7 @@ static void test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2(void) 
     for (unsigned i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         plr_message m, expected = encode(kinds[i]);
         const size_t old = length - since_1_2(kinds[i]);
-        TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(kinds[i], old, &m));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(kinds[i], old, &m));
         if (kinds[i] == PLR_KIND_POSE) {
             expected.as.pose.trace = -1;
             for (unsigned j = 0; j < 6; j++)
@@ -351,7 +358,7 @@ static void test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored(
         for (size_t more = 0; more < 40; more++) {
             plr_message m, expected = encode((plr_kind)kind);
             memset(payload + length, 0xA5, more);
-            TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload((plr_kind)kind, length + more, &m));
+            TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload((plr_kind)kind, length + more, &m));
             wire_assert_same(&expected, &m);
         }
     }
@@ -382,7 +389,7 @@ static void test_values_that_the_page_does_not_list_are_malformed(void) {
             encode(bad->kind);
             memset(payload + length, 0, sizeof payload - length);
             payload[bad->at] = (uint8_t)value;
-            TEST_ASSERT_EQUAL_INT(PLR_FAULT_MALFORMED, read_payload(bad->kind, sizeof payload, &m));
+            TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, read_payload(bad->kind, sizeof payload, &m));
         }
     }
 }
@@ -391,7 +398,7 @@ static void test_a_status_of_a_later_version_is_let_through(void) {
     plr_message m;
     encode(PLR_KIND_REPORT);
     payload[9] = 128;
-    TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(PLR_KIND_REPORT, length, &m));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(PLR_KIND_REPORT, length, &m));
     TEST_ASSERT_EQUAL_INT(-128, m.as.report.report.status);
 }
 
@@ -408,16 +415,16 @@ static void test_bits_and_bytes_without_a_meaning_are_ignored(void) {
     for (size_t i = 0; i < sizeof spare / sizeof *spare; i++) {
         plr_message m, expected = encode(spare[i].kind);
         payload[spare[i].at] |= spare[i].bits;
-        TEST_ASSERT_EQUAL_INT(PLR_FAULT_NONE, read_payload(spare[i].kind, length, &m));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, read_payload(spare[i].kind, length, &m));
         wire_assert_same(&expected, &m);
     }
 }
 
 static void test_a_text_s_length_ends_at_its_zero_or_at_its_size(void) {
     static const char text[] = "abcdefg";
-    TEST_ASSERT_EQUAL_size_t(7, plr_pass_text_length(text, sizeof text));
-    TEST_ASSERT_EQUAL_size_t(4, plr_pass_text_length(text, 4));
-    TEST_ASSERT_EQUAL_size_t(0, plr_pass_text_length(text, 0));
+    TEST_ASSERT_EQUAL_size_t(7, plr_text_length(text, sizeof text));
+    TEST_ASSERT_EQUAL_size_t(4, plr_text_length(text, 4));
+    TEST_ASSERT_EQUAL_size_t(0, plr_text_length(text, 0));
 }
 
 int main(void) {

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include "record/messages.h"
+
+/* The fields of each message, and those of its rows. They are counted from the beginning of the
+ * message's content, which all members of plr_message.as share. */
+#define MESSAGE(name, from, about) static const plr_field name##_fields[] = {
+#define FIELD(name, member, kind_, count_, least_, most_, since_, unit, about)                     \
+    {.offset = offsetof(plr_message, as.member) - offsetof(plr_message, as),                       \
+     .most = (most_),                                                                              \
+     .kind = PLR_FIELD_##kind_,                                                                    \
+     .count = (count_),                                                                            \
+     .least = (least_),                                                                            \
+     .since = (since_)},
+#define ROWS(name, type)                                                                           \
+    }                                                                                              \
+    ;                                                                                              \
+    static const plr_field name##_rows[] = {
+#define ROW(name, type, member, kind_, unit, about)                                                \
+    {.offset = offsetof(type, member), .kind = PLR_FIELD_##kind_, .count = 1},
+#define END(name)                                                                                  \
+    }                                                                                              \
+    ;
+#include "record/messages.def"
+
+#define LENGTH(table) (sizeof(table) / sizeof *(table))
+
+typedef struct plr_record {
+    const plr_field *fields;
+    unsigned count;
+} plr_record;
+
+#undef MESSAGE
+#undef FIELD
+#undef ROWS
+#undef ROW
+#undef END
+#define MESSAGE(name, from, about) [PLR_KIND_##name] = {name##_fields, LENGTH(name##_fields)},
+#define FIELD(name, member, kind, count, least, most, since, unit, about)
+#define ROWS(name, type)
+#define ROW(name, type, member, kind, unit, about)
+#define END(name)
+
+static const plr_record records[PLR_WIRE_KINDS + 1] = {
+#include "record/messages.def"
+};
+
+static void pass_settings(plr_codec *c, plr_config_message *m) {
+    for (unsigned i = 0; i < m->count && c->status == PLR_OK; i++)
+        plr_codec_fields(c, &m->settings[i], CONFIG_rows, LENGTH(CONFIG_rows));
+}
+
+/* What is read goes to the reader's room; what is written comes from the message, which is only
+ * looked at. */
+static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_room *room) {
+    plr_observation *rows = (plr_observation *)m->observations;
+    if (plr_codec_reads(c)) {
+        m->observations = rows = room->observations;
+        if (m->count > room->most)
+            plr_codec_fail(c, PLR_E_FULL);
+    } else if (m->count > 0 && !rows) {
+        plr_codec_fail(c, PLR_E_ARGUMENT);
+    }
+    for (unsigned i = 0; i < m->count && c->status == PLR_OK; i++)
+        plr_codec_fields(c, &rows[i], STEREO_rows, LENGTH(STEREO_rows));
+}
+
+void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
+                      const plr_observation_room *room) {
+    if (kind == PLR_KIND_NONE || (unsigned)kind > PLR_WIRE_KINDS) {
+        plr_codec_fail(c, PLR_E_FOREIGN);
+        return;
+    }
+    plr_codec_fields(c, content, records[kind].fields, records[kind].count);
+    if (kind == PLR_KIND_CONFIG)
+        pass_settings(c, content);
+    if (kind == PLR_KIND_STEREO)
+        pass_observations(c, content, room);
+    if (kind == PLR_KIND_LANDMARK && plr_codec_reads(c)) {
+        plr_landmark_message *m = content;
+        m->landmark.times_gated = 0;
+        m->landmark.known = m->role == PLR_LANDMARK_KNOWN;
+    }
+}
