@@ -94,7 +94,7 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
  * With T = L'^-1 L, J <- T^T J T, b <- T^T b. */
 static void in_own_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real own[PLR_POSE_SQUARE],
                           plr_real J[PLR_POSE_SQUARE], plr_real b[PLR_POSE_DIM]) {
-    plr_real T[PLR_POSE_SQUARE] = {0}, TtJ[PLR_POSE_SQUARE] = {0}, turned[PLR_POSE_DIM];
+    plr_real T[PLR_POSE_SQUARE] = {0}, TtJ[PLR_POSE_SQUARE] = {0}, turned[PLR_POSE_DIM] = {0};
     for (unsigned c = 0; c < PLR_POSE_DIM; c++)
         for (unsigned r = c; r < PLR_POSE_DIM; r++) {
             plr_real sum = own[PLR_POSE_DIM * r + c];
