@@ -41,8 +41,9 @@ typedef struct plr_totals {
     uint32_t widened;       /* times the pose's covariance was enlarged: the pose may have jumped */
     uint32_t recoveries;    /* times the landmarks were dropped after a divergence */
     uint32_t contradictions; /* times the filter followed vision against the twists */
-    uint32_t twists_refused, frames_refused; /* for any reason */
-    uint32_t damaged;                        /* frames refused with PLR_E_DAMAGED */
+    uint32_t twists_refused, frames_refused;             /* for any reason */
+    uint32_t readings, readings_gated, readings_refused; /* of small sensors */
+    uint32_t damaged;                                    /* frames refused with PLR_E_DAMAGED */
     uint64_t observations, matched, used, gated, created, evicted;
     plr_time_ns diverged_ns; /* when a variance was last found not positive; 0: never */
 } plr_totals;
@@ -92,6 +93,18 @@ typedef struct plr_motion {
     uint8_t pending;             /* 1 if any motion is accumulated */
     uint8_t noisy;               /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
+
+/* A velocity that a small sensor measured: z = M (v, w) + noise. It holds until its next reading;
+ * src/process/velocity.h. */
+typedef struct plr_held_velocity {
+    plr_time_ns t_ns, until_ns;
+    plr_real z[PLR_ROWS];
+    plr_real M[PLR_ROWS * PLR_POSE_DIM];
+    plr_real density[PLR_ROWS]; /* variance times the seconds between readings */
+    uint8_t known;              /* 0: the sensor has never spoken */
+} plr_held_velocity;
+
+enum { PLR_HELD_VELOCITIES = 3 }; /* a wheel's; a standstill's v, and its w */
 
 /* Sums over frames, in which older ones count less: of nu, the difference between the motion by
  * vision and by twists in units of the twists' sigmas, and of the covariance expected of it. */
@@ -198,6 +211,11 @@ typedef struct plr_filter {
                                 since; packed lower triangle */
     plr_real reading[PLR_POSE_DIM]; /* last twist */
     plr_motion motion;
+    plr_held_velocity held[PLR_HELD_VELOCITIES];
+    plr_real
+        bias_Lambda[PLR_POSE_SQUARE]; /* what held velocities said of the biases since the last */
+    plr_real bias_eta[PLR_BIAS_DIM];  /* correction: information Lambda db = eta */
+    uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];

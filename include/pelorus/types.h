@@ -123,7 +123,10 @@ typedef enum plr_reason {
     PLR_REASON_STATE_DAMAGED = 1 << 20,
     /* Twists are missing or refused, or the last one is too old. Check the odometry and its
      * link. */
-    PLR_REASON_NO_TWISTS = 1 << 21
+    PLR_REASON_NO_TWISTS = 1 << 21,
+    /* Ten successive readings of a wheel, a standstill or a position were rejected. The sensor or the
+     * estimate is wrong: check the sensor's frame, lever arm, units and sigma. */
+    PLR_REASON_READINGS_REJECTED = 1 << 22
 } plr_reason;
 
 /* A rigid motion x -> R x + p. */
@@ -151,9 +154,10 @@ enum { PLR_NO_BUDGET = 65535 };
 /* A sensor that measures one to three numbers directly. */
 typedef enum plr_sensor {
     PLR_SENSOR_WHEEL = 1,      /* the velocity of a point of the body, along the body's axes */
-    PLR_SENSOR_STANDSTILL = 2, /* the body does not move: that velocity is zero */
-    PLR_SENSOR_POSITION = 3    /* the position of a point of the body in the world: GNSS, motion
+    PLR_SENSOR_STANDSTILL = 2, /* the body does not move */
+    PLR_SENSOR_POSITION = 3,   /* the position of a point of the body in the world: GNSS, motion
                                   capture, a beacon */
+    PLR_SENSORS = 3            /* kinds are 1 to this */
 } plr_sensor;
 
 /* One reading of such a sensor. */
@@ -164,9 +168,16 @@ typedef struct plr_reading {
     double value[3];  /* wheel: velocity of the point at_B_m in body axes, m/s; standstill: zeros;
                          position: of that point in the world, m */
     double sigma[3];  /* standard deviation of each, in the same unit; above 0 where axes has the
-                         bit */
+                         bit. Standstill: [0] of the velocity, m/s, [1] of the rate, rad/s */
     double at_B_m[3]; /* where on the body the sensor is, in body axes */
 } plr_reading;
+
+/* What became of a reading. */
+typedef struct plr_reading_result {
+    plr_status status;
+    bool used; /* false: the gate rejected it */
+    double d2; /* r^T S^-1 r: the squared distance from its prediction, in sigmas */
+} plr_reading_result;
 
 /* All observations of one stereo pair. */
 typedef struct plr_frame {

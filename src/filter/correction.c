@@ -5,6 +5,7 @@
 
 #include "math/dense.h"
 #include "math/small.h"
+#include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
@@ -12,6 +13,7 @@
 #include "state/pose.h"
 #include "state/rigid_fit.h"
 
+enum { ABOUT_BIAS = 2 }; /* measurements about the biases */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
 
 /* Measurements that are applied together, stacked: S = H P H^T + R and y = r - H dx. */
@@ -38,12 +40,26 @@ static void fill_S(const plr_filter *f, const plr_batch *batch, plr_real *S) {
     }
 }
 
+/* Number i of the measurements, behind which stand the two about the biases. */
+static void take(const plr_filter *f, const plr_sensed *sensed, unsigned count, unsigned i,
+                 plr_measurement *m) {
+    if (i < count) {
+        sensed->measure(f, sensed->context, i, m);
+        return;
+    }
+    memset(m, 0, sizeof *m);
+    plr_velocity_about_bias(f, i - count, &m->H, m->r);
+    for (unsigned r = 0; r < PLR_ROWS; r++)
+        m->R[r] = 1;
+}
+
 /* Linearises the batch's measurements; fills rows of (P H^T)^T, S and y in the workspace. */
-static void stack(plr_filter *f, const plr_sensed *sensed, unsigned first, plr_batch *batch) {
+static void stack(plr_filter *f, const plr_sensed *sensed, unsigned count, unsigned first,
+                  plr_batch *batch) {
     plr_workspace *w = &f->work;
     for (unsigned a = 0; a < batch->count; a++) {
         plr_measurement *m = &batch->measured[a];
-        sensed->measure(f, sensed->context, first + a, m);
+        take(f, sensed, count, first + a, m);
         plr_covariance_project(f, &m->H, w->Vt + PLR_ROWS * a * batch->ld, batch->ld);
         plr_real Hx[3];
         plr_rows_apply(&m->H, w->dx, Hx);
@@ -126,17 +142,18 @@ plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned cou
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
         memset(f->work.noise.spread, 0, sizeof f->work.noise.spread);
     }
-    unsigned blocks = (count + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
-    for (; blocks > 0 && !f->diverged; blocks--) {
+    const unsigned all = count + (plr_velocity_speaks_of_bias(f) ? ABOUT_BIAS : 0);
+    unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
+    for (; batches > 0 && !f->diverged; batches--) {
         plr_batch batch; /* not initialised: that would cost as much as a row of S */
         bool factorised;
         batch.n = n;
         batch.ld = plr_covariance_ld(f);
         batch.count =
-            (count - at + blocks - 1) / blocks; /* alike: the cost grows with the square */
-        stack(f, sensed, at, &batch);
+            (all - at + batches - 1) / batches; /* alike: the cost grows with the square */
+        stack(f, sensed, count, at, &batch);
         if (apply_batch(f, &batch, &factorised))
-            result.applied += batch.count;
+            result.applied += at >= count ? 0 : at + batch.count > count ? count - at : batch.count;
         else if (!factorised)
             result.failed_batches++;
         else
@@ -146,7 +163,7 @@ plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned cou
     result.moved = f->work.noise.open;
     memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
     plr_covariance_close_noise(f, result.nu);
-    if (result.applied == 0 && !result.moved)
+    if (result.applied == 0 && !result.moved && all == count)
         return result;
     if (!is_sane(f, n)) {
         plr_filter_diverge(f);
@@ -155,6 +172,7 @@ plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned cou
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
             f->bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
+    plr_velocity_forget_bias(f);
     result.cut = plr_model_of(f)->retract(f, f->work.dx);
     plr_pose_correct(f, f->work.dx);
     plr_covariance_make_up_for_rounding(f);

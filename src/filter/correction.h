@@ -23,7 +23,8 @@ typedef struct plr_sensed {
     const void *context;
 } plr_sensed;
 
-/* Applies `count` measurements. All are linearised at the current estimate, and the estimate is
+/* Applies `count` measurements, and what velocities said of the biases since the last correction
+ * (process/velocity.h). All are linearised at the current estimate, and the estimate is
  * corrected once, at the end. If a variance would not be positive or the correction is not finite,
  * the filter is marked as diverged and keeps the result of the batches before. */
 plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned count);

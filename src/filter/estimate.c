@@ -6,6 +6,7 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "process/twist.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
@@ -68,14 +69,6 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     return PLR_OK;
 }
 
-/* The bias covariance at the time of the estimate: P_b and the walk not yet applied. */
-static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
-    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
-    for (int i = 0; i < PLR_POSE_DIM; i++)
-        P_b[(PLR_POSE_DIM + 1) * i] +=
-            f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
-}
-
 plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     if (!f || !P_u)
         return PLR_E_ARGUMENT;
@@ -84,17 +77,8 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
         return sound;
     if (f->diverged)
         return PLR_E_DIVERGED;
-    plr_real P[PLR_POSE_SQUARE] = {0};
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
-        bias_covariance(f, P);
-    /* with noise = step the sigmas are of a displacement: divide by the step */
-    const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
-                               ? PLR_R(1) / (f->interval_s * f->interval_s)
-                               : PLR_R(1);
-    for (int i = 0; i < 3; i++) {
-        P[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
-        P[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
-    }
+    plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
+    plr_twist_now(f, u, P);
     to_double(P_u, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
@@ -107,9 +91,8 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
         return sound;
     if (f->diverged && P_b)
         return PLR_E_DIVERGED;
-    plr_real P[PLR_POSE_SQUARE] = {0};
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
-        bias_covariance(f, P);
+    plr_real P[PLR_POSE_SQUARE];
+    plr_twist_bias_covariance(f, P);
     to_double(b, f->bias, PLR_POSE_DIM);
     if (P_b)
         to_double(P_b, P, PLR_POSE_SQUARE);
@@ -129,7 +112,7 @@ double plr_filter_trace(const plr_filter *f) {
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real before[PLR_POSE_SQUARE];
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before);
-        bias_covariance(f, P_b);
+        plr_twist_bias_covariance(f, P_b);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             trace += (double)P_b[(PLR_POSE_DIM + 1) * i] - (double)before[(PLR_POSE_DIM + 1) * i];
     }

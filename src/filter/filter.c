@@ -12,6 +12,7 @@
 #include "math/small.h"
 #include "math/so3.h"
 #include "process/twist.h"
+#include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
@@ -120,6 +121,7 @@ void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
     double P_b[PLR_BIAS_DIM * PLR_BIAS_DIM] = {0};
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         P_b[(PLR_BIAS_DIM + 1) * i] = variance[i];
+    plr_velocity_forget_bias(f);
     plr_covariance_begin(f, PLR_BLOCK_BIAS, P_b);
 }
 
@@ -170,6 +172,8 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->R_WB);
     plr_motion_clear(&f->motion);
+    plr_velocity_forget(f);
+    memset(f->readings_rejected, 0, sizeof f->readings_rejected);
     f->count = 0;
     f->frame_number = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
@@ -192,6 +196,7 @@ plr_status plr_filter_reset(plr_filter *f) {
 /* ---------------------------------------------------------------- from outside */
 
 void plr_filter_forget_reading(plr_filter *f) {
+    plr_velocity_forget(f);
     f->reading_valid = 0;
     f->interval_s = 0;
     memcpy(f->reading, f->bias, sizeof f->reading);

@@ -8,11 +8,12 @@
 #include "filter/guard.h"
 
 enum {
-    LOCK_FRAMES = 10,    /* successive frames of a gate that rejects nearly all */
-    LOCK_MATCHES = 5,    /* fewer matches say nothing about the gate */
-    LOST_FRAMES = 10,    /* frames without one used observation */
-    FEW_USED = 3,        /* fewer do not fix a pose */
-    INERT_MATCHES = 1000 /* a gate that rejects none of so many does nothing */
+    LOCK_FRAMES = 10,       /* successive frames of a gate that rejects nearly all */
+    LOCK_MATCHES = 5,       /* fewer matches say nothing about the gate */
+    LOST_FRAMES = 10,       /* frames without one used observation */
+    FEW_USED = 3,           /* fewer do not fix a pose */
+    REJECTED_READINGS = 10, /* of a small sensor, in succession */
+    INERT_MATCHES = 1000    /* a gate that rejects none of so many does nothing */
 };
 
 /* The pose goes on by prediction for longer than this, s. */
@@ -98,6 +99,9 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_BUDGET;
     if (events->recovered)
         reasons |= PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
+    for (unsigned i = 0; i < PLR_SENSORS; i++)
+        if (f->readings_rejected[i] >= REJECTED_READINGS)
+            reasons |= PLR_REASON_READINGS_REJECTED;
     if (lacks_twists(f))
         reasons |= PLR_REASON_NO_TWISTS;
     return reasons;

@@ -7,6 +7,7 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "math/packed.h"
+#include "process/velocity.h"
 #include "record/codec.h"
 #include "state/covariance.h"
 
@@ -197,6 +198,7 @@ static plr_status read_state(plr_codec *c, plr_filter *f, const plr_filter *like
     if (f) {
         f->count = count.landmarks;
         f->diverged = 0;
+        plr_velocity_forget(f); /* their clock is not the one that goes on */
     }
     for (unsigned slot = 0; slot < count.landmarks; slot++)
         PASS(c, f ? &f->slots[slot] : NULL, slot);

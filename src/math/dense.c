@@ -171,3 +171,22 @@ void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_
         factors.W += STRIP;
     }
 }
+
+void plr_factor6(plr_real L[PLR_POSE_SQUARE], const plr_real M[PLR_POSE_SQUARE]) {
+    memset(L, 0, PLR_POSE_SQUARE * sizeof *L);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_real pivot = M[(PLR_POSE_DIM + 1) * k];
+        for (unsigned l = 0; l < k; l++)
+            pivot = PLR_FMA(-L[PLR_POSE_DIM * k + l], L[PLR_POSE_DIM * k + l], pivot);
+        if (!(pivot > PLR_R(1e-6) * M[(PLR_POSE_DIM + 1) * k]))
+            continue;
+        const plr_real root = PLR_SQRT(pivot), inverse = PLR_R(1) / root;
+        L[(PLR_POSE_DIM + 1) * k] = root;
+        for (unsigned i = k + 1; i < PLR_POSE_DIM; i++) {
+            plr_real sum = M[PLR_POSE_DIM * i + k];
+            for (unsigned l = 0; l < k; l++)
+                sum = PLR_FMA(-L[PLR_POSE_DIM * i + l], L[PLR_POSE_DIM * k + l], sum);
+            L[PLR_POSE_DIM * i + k] = sum * inverse;
+        }
+    }
+}

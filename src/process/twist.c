@@ -5,6 +5,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
@@ -27,6 +28,30 @@ void plr_twist_walk(plr_filter *f, plr_real seconds) {
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         variance[i] = seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
     plr_covariance_add_variance(f, PLR_BLOCK_BIAS, variance);
+}
+
+void plr_twist_bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
+    memset(P_b, 0, PLR_POSE_SQUARE * sizeof *P_b);
+    if (!plr_has_block(f, PLR_BLOCK_BIAS))
+        return;
+    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+    for (int i = 0; i < PLR_BIAS_DIM; i++)
+        P_b[(PLR_BIAS_DIM + 1) * i] +=
+            f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
+}
+
+void plr_twist_now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
+    /* with noise = step the sigmas are of a displacement: divide by the step */
+    const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
+                               ? PLR_R(1) / (f->interval_s * f->interval_s)
+                               : PLR_R(1);
+    plr_twist_bias_covariance(f, P_u);
+    for (int i = 0; i < 3; i++) {
+        P_u[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
+        P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
+    }
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        u[i] = f->reading[i] - f->bias[i];
 }
 
 /* xi = seconds (reading - b) */
@@ -59,9 +84,17 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
 void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                     plr_real seconds, plr_real interval) {
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
-        variance[PLR_POSE_DIM];
+        variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
     plr_motion *m = &f->motion;
+    const bool fused = plr_velocity_holds(f);
     displacement(f, reading, seconds, xi);
+    step_variance(f, seconds, interval, variance);
+    if (fused) {
+        memset(V, 0, sizeof V);
+        for (int i = 0; i < PLR_POSE_DIM; i++)
+            V[(PLR_POSE_DIM + 1) * i] = variance[i];
+        plr_velocity_fuse(f, seconds, xi, V, T);
+    }
     plr_se3_expm1(E, p, xi);
     plr_se3_rotation(R, E);
     plr_se3_adjoint_inverse(A, R, p);
@@ -71,14 +104,19 @@ void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_
     plr_so3_orthonormalise_small(m->E);
 
     plr_sandwich6(next, A, m->Q);
-    step_variance(f, seconds, interval, variance);
-    for (int i = 0; i < PLR_POSE_DIM; i++)
+    for (int i = 0; i < PLR_POSE_DIM && !fused; i++)
         next[(PLR_POSE_DIM + 1) * i] += variance[i];
+    for (int i = 0; i < PLR_POSE_SQUARE && fused; i++)
+        next[i] += V[i];
     memcpy(m->Q, next, sizeof next);
 
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real Jr[PLR_POSE_SQUARE];
         plr_se3_right_jacobian(Jr, xi);
+        if (fused) {
+            plr_mat6_mul(next, Jr, T);
+            memcpy(Jr, next, sizeof Jr);
+        }
         plr_mat6_mul(next, A, m->B);
         for (int i = 0; i < PLR_POSE_SQUARE; i++)
             m->B[i] = PLR_FMA(-seconds, Jr[i], next[i]);

@@ -11,6 +11,14 @@ void plr_twist_lay_out(plr_filter *f);
 /* Adds what the biases may have changed in `seconds`: their random walk. */
 void plr_twist_walk(plr_filter *f, plr_real seconds);
 
+/* The body's twist now, (v, w), by the last reading, and its covariance, 6x6: the reading's and the
+ * biases'. */
+void plr_twist_now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
+
+/* The biases' covariance at the time of the estimate, 6x6: with the walk not yet applied. Zeros if
+ * they are not estimated. */
+void plr_twist_bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]);
+
 /* PLR_OK if the twist `reading` (6: v, w) minus the bias gives at most pi rad and 1 km in
  * `seconds`; else PLR_E_RANGE. */
 plr_status plr_twist_check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],

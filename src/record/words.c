@@ -104,6 +104,9 @@ const char *plr_reason_text(plr_reason reason) {
         return "the filter's memory was changed by something else";
     case PLR_REASON_NO_TWISTS:
         return "twists are missing, refused or held for too long: does the odometry send?";
+    case PLR_REASON_READINGS_REJECTED:
+        return "readings of a wheel, a standstill or a position are rejected: frame, arm, units, "
+               "sigma?";
     }
     return "no reason of this version";
 }

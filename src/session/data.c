@@ -202,10 +202,12 @@ void plr_data_use_truth(plr_session *s) {
 
 /* --- READING --- */
 
-/* To be replaced by plr_filter_measure: no filter of this version uses one. */
 void plr_data_use_reading(plr_session *s) {
     const plr_reading *reading = &s->in.as.reading;
-    plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, PLR_E_MODE, NULL);
+    plr_data_apply_held(s, reading->t_ns);
+    const plr_status status = plr_filter_measure(&s->filter, reading, NULL);
+    if (status != PLR_OK)
+        plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, status, NULL);
 }
 
 /* --- START among the data --- */

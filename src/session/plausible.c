@@ -49,8 +49,7 @@ bool plr_plausible_message(const plr_message *message) {
         return all_within(landmark->p_W_m, 3, POSITION_M) &&
                all_within(landmark->P_W_m2, 9, VARIANCE);
     case PLR_KIND_READING:
-        return all_within(reading->value, 3,
-                          reading->sensor == PLR_SENSOR_POSITION ? POSITION_M : SPEED_MPS);
+        return all_within(reading->value, 3, POSITION_M);
     default:
         return true;
     }

@@ -51,11 +51,12 @@ static bool describe_pose(plr_pose_message *pose, const plr_filter *f, bool afte
     if (!describe_covariance(pose->P_xi, P, plr_filter_pose_covariance(f, P)) ||
         !describe_covariance(pose->P_u, P, plr_filter_velocity_covariance(f, P)))
         return false;
-    if (plr_filter_bias(f, pose->bias, P) != PLR_OK)
+    const bool all = after_update && plr_filter_bias(f, pose->bias, P) == PLR_OK;
+    if (!all && plr_filter_bias(f, pose->bias, NULL) != PLR_OK)
         return false;
-    pose->trace = after_update ? plr_filter_trace(f) : -1;
+    pose->trace = all ? plr_filter_trace(f) : -1;
     for (unsigned i = 0; i < 6; i++)
-        pose->bias_variance[i] = after_update ? P[7 * i] : -1;
+        pose->bias_variance[i] = all ? P[7 * i] : -1;
     return true;
 }
 

@@ -44,26 +44,6 @@ void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
         M[i] = BPB[i] + f->motion.Q[i];
 }
 
-/* M = L L^T, 6x6. A direction in which M is zero, to rounding, becomes a zero column. */
-static void factorise(const plr_real M[PLR_POSE_SQUARE], plr_real L[PLR_POSE_SQUARE]) {
-    memset(L, 0, PLR_POSE_SQUARE * sizeof *L);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        plr_real pivot = M[(PLR_POSE_DIM + 1) * k];
-        for (unsigned l = 0; l < k; l++)
-            pivot = PLR_FMA(-L[PLR_POSE_DIM * k + l], L[PLR_POSE_DIM * k + l], pivot);
-        if (!(pivot > PLR_R(1e-6) * M[(PLR_POSE_DIM + 1) * k]))
-            continue;
-        const plr_real root = PLR_SQRT(pivot), inverse = PLR_R(1) / root;
-        L[(PLR_POSE_DIM + 1) * k] = root;
-        for (unsigned i = k + 1; i < PLR_POSE_DIM; i++) {
-            plr_real sum = M[PLR_POSE_DIM * i + k];
-            for (unsigned l = 0; l < k; l++)
-                sum = PLR_FMA(-L[PLR_POSE_DIM * i + l], L[PLR_POSE_DIM * k + l], sum);
-            L[PLR_POSE_DIM * i + k] = sum * inverse;
-        }
-    }
-}
-
 /* K = L^-1 B. */
 static void share_of_bias(const plr_real L[PLR_POSE_SQUARE], const plr_real B[PLR_POSE_SQUARE],
                           plr_real K[PLR_POSE_SQUARE]) {
@@ -94,7 +74,7 @@ static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale
         M[i] = scale * (PLR_FMA(SHARE_OF_BIAS, BPB[i], BPB[i]) + f->motion.Q[i]);
     for (int i = 0; i < PLR_POSE_DIM; i++)
         M[(PLR_POSE_DIM + 1) * i] += i < 3 ? way2 : turn2;
-    factorise(M, applied->L);
+    plr_factor6(applied->L, M);
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         share_of_bias(applied->L, f->motion.B, applied->K);
     memcpy(applied->JL, applied->L, sizeof applied->JL);

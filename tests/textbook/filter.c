@@ -136,6 +136,15 @@ static plr_twist twist_of_step(const plr_twist *reading) {
     return held;
 }
 
+/* The textbook knows no small sensors. */
+plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
+                              plr_reading_result *result) {
+    (void)f;
+    (void)reading;
+    (void)result;
+    return the.ready ? the_filter_refuses(PLR_E_MODE) : PLR_E_NOT_READY;
+}
+
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
     (void)f;
     if (!the.ready)

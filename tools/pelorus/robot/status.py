@@ -53,6 +53,7 @@ REASONS = (
     "no frame used for too long",
     "the filter's memory was changed",
     "twists are missing or refused",
+    "readings of a small sensor are rejected",
 )
 
 

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+/* A reading of a small sensor: checked, gated, and applied, or held until the next one. */
+#include <string.h>
+
+#include "filter/correction.h"
+#include "filter/filter_internal.h"
+#include "filter/guard.h"
+#include "filter/predict.h"
+#include "math/dense.h"
+#include "math/small.h"
+#include "process/twist.h"
+#include "process/velocity.h"
+#include "sensor/sensor.h"
+#include "state/blocks.h"
+#include "state/motion.h"
+
+/* Beyond this a lever arm or a sigma is an error of the sender, m and so on. */
+#define MAX_ARM   1e3
+#define MAX_SIGMA 1e6
+
+static plr_status check_numbers(const plr_reading *reading) {
+    if (!plr_sensor_of(reading->sensor) || reading->axes < 1 || reading->axes > 7)
+        return PLR_E_ARGUMENT;
+    if (!plr_all_finite(reading->value, 3) || !plr_all_finite(reading->at_B_m, 3))
+        return PLR_E_NOT_FINITE;
+    if (!plr_all_within(reading->value, 3, PLR_MAX_POSITION) ||
+        !plr_all_within(reading->at_B_m, 3, MAX_ARM))
+        return PLR_E_RANGE;
+    for (unsigned i = 0; i < 3; i++) {
+        if (!plr_reading_has(reading, i))
+            continue;
+        if (!plr_all_finite(reading->sigma + i, 1))
+            return PLR_E_NOT_FINITE;
+        if (!((plr_real)(reading->sigma[i] * reading->sigma[i]) > 0))
+            return PLR_E_ARGUMENT;
+        if (reading->sigma[i] > MAX_SIGMA)
+            return PLR_E_RANGE;
+    }
+    return PLR_OK;
+}
+
+static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
+    if (f->config.mode == PLR_MODE_MAPPING)
+        return PLR_E_MODE;
+    if (!f->clock_started || !f->reading_valid)
+        return PLR_E_TIME;
+    if (reading->t_ns < f->t_ns)
+        return PLR_E_LATE;
+    if (reading->t_ns - f->t_ns > f->par.max_gap_ns)
+        return PLR_E_GAP;
+    return plr_twist_check(f, f->reading, plr_seconds(reading->t_ns - f->t_ns));
+}
+
+/* d^2 = r^T (S + R)^-1 r of three rows; negative if S + R cannot be factorised. */
+static plr_real distance2(const plr_real S[9], const plr_real R[PLR_ROWS],
+                          const plr_real r[PLR_ROWS]) {
+    plr_real U[6], e[PLR_ROWS];
+    for (unsigned i = 0, k = 0; i < PLR_ROWS; i++)
+        for (unsigned j = i; j < PLR_ROWS; j++)
+            U[k++] = S[3 * j + i] + (i == j ? R[i] : PLR_R(0));
+    if (!plr_cholesky3(U))
+        return -1;
+    memcpy(e, r, sizeof e);
+    plr_solve3_transposed(1, U, e);
+    return plr_dot3(e, e);
+}
+
+/* S = M P M^T for three rows M over six numbers of covariance P. */
+static void sandwich(plr_real S[9], const plr_real M[PLR_ROWS * PLR_POSE_DIM],
+                     const plr_real P[PLR_POSE_SQUARE]) {
+    plr_real MP[PLR_ROWS * PLR_POSE_DIM] = {0};
+    memset(S, 0, 9 * sizeof *S);
+    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, M, PLR_POSE_DIM, P, PLR_POSE_DIM, MP,
+                PLR_POSE_DIM);
+    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, MP, PLR_POSE_DIM, M, PLR_POSE_DIM, S, PLR_ROWS);
+}
+
+static bool accepts(const plr_filter *f, plr_real d2, plr_reading_result *result) {
+    result->d2 += (double)d2;
+    return d2 >= 0 && plr_is_finite(d2) && (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
+}
+
+/* Against the twist that holds now. */
+static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
+                 plr_reading_result *result) {
+    plr_twist_rows rows[2];
+    plr_real u[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
+    bool accepted = true;
+    const unsigned parts = kind->of_twist(reading, rows);
+    plr_twist_now(f, u, P_u);
+    for (unsigned part = 0; part < parts; part++) {
+        plr_real S[9], r[PLR_ROWS];
+        sandwich(S, rows[part].M, P_u);
+        for (unsigned i = 0; i < PLR_ROWS; i++) {
+            r[i] = rows[part].z[i];
+            for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+                r[i] = PLR_FMA(-rows[part].M[PLR_POSE_DIM * i + c], u[c], r[i]);
+        }
+        accepted = accepts(f, distance2(S, rows[part].R, r), result) && accepted;
+    }
+    for (unsigned part = 0; accepted && part < parts; part++)
+        plr_velocity_hold(f, kind->place + part, &rows[part]);
+    return accepted;
+}
+
+/* plr_sensed.measure: the one that the context is. */
+static void given(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
+    (void)f;
+    (void)i;
+    *m = *(const plr_measurement *)context;
+}
+
+/* Against the pose as it would be with its motion applied; only an accepted one applies it. */
+static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
+                  plr_reading_result *result) {
+    plr_measurement m;
+    plr_real P_xi[PLR_POSE_SQUARE], S[9];
+    memset(&m, 0, sizeof m);
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        m.R[i] = 1;
+    kind->of_state(f, reading, &m);
+    plr_motion_pose_covariance(f, P_xi);
+    sandwich(S, m.H.term[0].H, P_xi);
+    if (!accepts(f, distance2(S, m.R, m.r), result))
+        return false;
+    if (f->motion.pending) {
+        plr_applied_motion motion;
+        plr_motion_prior(f, &motion);
+        plr_predict_apply(f, &motion);
+    }
+    if (!f->diverged) {
+        const plr_sensed sensed = {given, &m};
+        (void)plr_correct(f, &sensed, 1);
+    }
+    if (f->diverged)
+        plr_filter_recover(f);
+    return true;
+}
+
+static plr_status refuse(plr_filter *f, plr_status status, plr_reading_result *result) {
+    f->totals.readings_refused++;
+    result->status = status;
+    return plr_filter_refuse(f, status);
+}
+
+plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
+                              plr_reading_result *result) {
+    plr_reading_result scratch;
+    plr_reading_result *got = result ? result : &scratch;
+    memset(got, 0, sizeof *got);
+    if (!f || !reading)
+        return got->status = PLR_E_ARGUMENT;
+    const plr_status sound = plr_guard_look_whole(f);
+    if (sound != PLR_OK)
+        return got->status = sound;
+    plr_status status = check_numbers(reading);
+    if (status == PLR_OK)
+        status = check_time(f, reading);
+    if (status != PLR_OK)
+        return refuse(f, status, got);
+    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
+    plr_predict_to(f, reading->t_ns);
+    got->used = kind->of_twist ? hold(f, kind, reading, got) : apply(f, kind, reading, got);
+    uint16_t *rejected = &f->readings_rejected[reading->sensor - 1];
+    *rejected = got->used ? 0 : (uint16_t)(*rejected + (*rejected < UINT16_MAX));
+    f->totals.readings++;
+    f->totals.readings_gated += !got->used;
+    plr_guard_seal_whole(f);
+    return PLR_OK;
+}

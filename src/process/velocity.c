@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+#include "process/velocity.h"
+
+#include <string.h>
+
+#include "math/dense.h"
+#include "math/small.h"
+#include "state/blocks.h"
+
+/* A sensor whose next reading fails to come is listened to for so many of its intervals. */
+enum { HELD_INTERVALS = 2 };
+
+void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows) {
+    plr_held_velocity *held = &f->held[which];
+    const bool first = !held->known || f->t_ns <= held->t_ns;
+    const plr_time_ns interval = first ? 0 : f->t_ns - held->t_ns;
+    held->known = 1;
+    held->t_ns = f->t_ns;
+    held->until_ns = f->t_ns + (interval < f->par.max_gap_ns ? HELD_INTERVALS * interval : 0);
+    memcpy(held->z, rows->z, sizeof held->z);
+    memcpy(held->M, rows->M, sizeof held->M);
+    for (unsigned r = 0; r < PLR_ROWS; r++)
+        held->density[r] = rows->R[r] * (plr_real)((double)interval * 1e-9);
+}
+
+void plr_velocity_forget(plr_filter *f) {
+    memset(f->held, 0, sizeof f->held);
+    plr_velocity_forget_bias(f);
+}
+
+void plr_velocity_forget_bias(plr_filter *f) {
+    memset(f->bias_Lambda, 0, sizeof f->bias_Lambda);
+    memset(f->bias_eta, 0, sizeof f->bias_eta);
+}
+
+static bool holds(const plr_filter *f, const plr_held_velocity *held) {
+    return held->known && f->t_ns < held->until_ns;
+}
+
+bool plr_velocity_holds(const plr_filter *f) {
+    for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
+        if (holds(f, &f->held[i]))
+            return true;
+    return false;
+}
+
+/* What the difference e = U^-T (z - M u) says of the biases, which enter it by Y = -s U^-T M T. */
+static void inform(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
+                   const plr_real e[PLR_ROWS]) {
+    for (unsigned r = 0; r < PLR_ROWS; r++)
+        for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
+            const plr_real y = Y[PLR_POSE_DIM * r + i];
+            f->bias_eta[i] = PLR_FMA(y, e[r], f->bias_eta[i]);
+            for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
+                f->bias_Lambda[PLR_BIAS_DIM * i + j] =
+                    PLR_FMA(y, Y[PLR_POSE_DIM * r + j], f->bias_Lambda[PLR_BIAS_DIM * i + j]);
+        }
+}
+
+/* V <- J V J^T + K R K^T with J = I - K M: positive by construction. T <- J T. */
+static void correct(plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE],
+                    const plr_real Kt[PLR_ROWS * PLR_POSE_DIM], const plr_held_velocity *held,
+                    const plr_real R[PLR_ROWS]) {
+    plr_real J[PLR_POSE_SQUARE] = {0}, next[PLR_POSE_SQUARE];
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++) {
+            plr_real *to = &J[PLR_POSE_DIM * i + j];
+            *to = i == j ? PLR_R(1) : PLR_R(0);
+            for (unsigned r = 0; r < PLR_ROWS; r++)
+                *to = PLR_FMA(-Kt[PLR_POSE_DIM * r + i], held->M[PLR_POSE_DIM * r + j], *to);
+        }
+    plr_sandwich6(next, J, V);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++) {
+            plr_real sum = next[PLR_POSE_DIM * i + j];
+            for (unsigned r = 0; r < PLR_ROWS; r++)
+                sum = PLR_FMA(R[r] * Kt[PLR_POSE_DIM * r + i], Kt[PLR_POSE_DIM * r + j], sum);
+            V[PLR_POSE_DIM * i + j] = sum;
+        }
+    plr_mat6_mul(next, J, T);
+    memcpy(T, next, sizeof next);
+}
+
+/* One held velocity against the step: s z = M xi + noise of variance s density. */
+static void fuse_one(plr_filter *f, const plr_held_velocity *held, plr_real seconds,
+                     plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
+                     plr_real T[PLR_POSE_SQUARE]) {
+    plr_real Kt[PLR_ROWS * PLR_POSE_DIM] = {0}, Y[PLR_ROWS * PLR_POSE_DIM] = {0};
+    plr_real full[9] = {0}, S[6], e[PLR_ROWS], R[PLR_ROWS];
+    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, held->M, PLR_POSE_DIM, V, PLR_POSE_DIM, Kt,
+                PLR_POSE_DIM);
+    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, Kt, PLR_POSE_DIM, held->M, PLR_POSE_DIM, full,
+                PLR_ROWS);
+    for (unsigned r = 0, k = 0; r < PLR_ROWS; r++) {
+        R[r] = held->density[r] * seconds;
+        e[r] = seconds * held->z[r];
+        for (unsigned c = 0; c < PLR_POSE_DIM; c++)
+            e[r] = PLR_FMA(-held->M[PLR_POSE_DIM * r + c], xi[c], e[r]);
+        full[4 * r] += R[r];
+        for (unsigned c = r; c < PLR_ROWS; c++)
+            S[k++] = full[3 * c + r];
+    }
+    if (!plr_cholesky3(S))
+        return;
+    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, held->M, PLR_POSE_DIM, T, PLR_POSE_DIM, Y,
+                PLR_POSE_DIM);
+    plr_solve3_transposed(PLR_POSE_DIM, S, Kt);
+    plr_solve3_transposed(PLR_POSE_DIM, S, Y);
+    plr_solve3_transposed(1, S, e);
+    for (unsigned i = 0; i < PLR_ROWS * PLR_POSE_DIM; i++)
+        Y[i] *= -seconds;
+    if (plr_has_block(f, PLR_BLOCK_BIAS))
+        inform(f, Y, e);
+    for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            xi[c] = PLR_FMA(Kt[PLR_POSE_DIM * r + c], e[r], xi[c]);
+        /* K^T = U^-1 (U^-T M V) */
+        plr_real *k0 = Kt + c, *k1 = k0 + PLR_POSE_DIM, *k2 = k1 + PLR_POSE_DIM;
+        *k2 /= S[5];
+        *k1 = PLR_FMA(-S[4], *k2, *k1) / S[3];
+        *k0 = PLR_FMA(-S[2], *k2, PLR_FMA(-S[1], *k1, *k0)) / S[0];
+    }
+    correct(V, T, Kt, held, R);
+}
+
+void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM],
+                       plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE]) {
+    memset(T, 0, PLR_POSE_SQUARE * sizeof *T);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        T[(PLR_POSE_DIM + 1) * i] = 1;
+    for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
+        if (holds(f, &f->held[i]))
+            fuse_one(f, &f->held[i], seconds, xi, V, T);
+}
+
+/* ---------------------------------------------------------------- the biases */
+
+bool plr_velocity_speaks_of_bias(const plr_filter *f) {
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        if (f->bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
+            return true;
+    return false;
+}
+
+/* With Lambda = L L^T: L^T db = L^-1 eta + N(0, I). */
+void plr_velocity_about_bias(const plr_filter *f, unsigned part, plr_rows *H,
+                             plr_real r[PLR_ROWS]) {
+    plr_real L[PLR_POSE_SQUARE], y[PLR_BIAS_DIM];
+    plr_factor6(L, f->bias_Lambda);
+    for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
+        const plr_real pivot = L[(PLR_BIAS_DIM + 1) * k];
+        y[k] = f->bias_eta[k];
+        for (unsigned l = 0; l < k; l++)
+            y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
+        y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);
+    }
+    H->terms = 1;
+    H->term[0].row = plr_row_of(f, PLR_BLOCK_BIAS);
+    H->term[0].columns = PLR_BIAS_DIM;
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
+        const unsigned k = PLR_ROWS * part + i;
+        r[i] = y[k];
+        for (unsigned c = 0; c < PLR_BIAS_DIM; c++)
+            H->term[0].H[PLR_BIAS_DIM * i + c] = L[PLR_BIAS_DIM * c + k];
+    }
+}

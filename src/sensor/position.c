@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+/* The position of a point l of the body in the world, z = p_WB + R_WB l: GNSS in local metres, motion
+ * capture, a beacon; with axes = 4 a height alone. */
+#include <string.h>
+
+#include "math/small.h"
+#include "sensor/sensor.h"
+#include "state/blocks.h"
+#include "state/model.h"
+
+static void measure(const plr_filter *f, const plr_reading *reading, plr_measurement *m) {
+    plr_real l[3], arm[3], J[PLR_ROWS * PLR_POSE_DIM];
+    plr_term *pose = &m->H.term[0];
+    for (unsigned i = 0; i < 3; i++)
+        l[i] = (plr_real)reading->at_B_m[i];
+    plr_mat3_vec(arm, f->R_WB, l);
+    plr_world_by_pose(f->R_WB, l, J);
+    m->H.terms = 1;
+    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
+    pose->columns = PLR_POSE_DIM;
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
+        if (!plr_reading_has(reading, i))
+            continue;
+        memcpy(pose->H + PLR_POSE_DIM * i, J + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *J);
+        m->r[i] = (plr_real)(reading->value[i] - f->p_WB[i] - (double)arm[i]);
+        m->R[i] = (plr_real)(reading->sigma[i] * reading->sigma[i]);
+    }
+}
+
+const plr_sensor_kind plr_position = {"position", measure, NULL, 0};

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The small sensors: a reading of one to three numbers. Each has a file of its own and a row in the
+ * table of sensors.c; docs/ADD-A-SENSOR.md adds one.
+ */
+#ifndef PLR_SENSOR_SENSOR_H
+#define PLR_SENSOR_SENSOR_H
+
+#include "pelorus/state.h"
+#include "sensor/measurement.h"
+
+/* What a kind of sensor measures: one of the two functions, the other is NULL. The reading was
+ * checked: finite numbers, a sigma above zero for each number that was measured. */
+typedef struct plr_sensor_kind {
+    const char *name; /* "wheel" */
+
+    /* Of the state: rows with their derivatives at the present estimate. */
+    void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
+
+    /* Of the body's twist (v, w): three rows, or twice three. Returns how many threes. They hold until
+     * the next reading, in f->held[place] and after it. */
+    unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
+    unsigned place;
+} plr_sensor_kind;
+
+/* The kind of that number (plr_sensor); NULL if there is none. */
+const plr_sensor_kind *plr_sensor_of(unsigned sensor);
+
+/* Was this number, 0 to 2, of the reading measured? */
+static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
+    return (reading->axes >> i & 1U) != 0;
+}
+
+extern const plr_sensor_kind plr_wheel, plr_standstill, plr_position;
+
+#endif
