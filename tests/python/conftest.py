@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import pickle
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
+from converted import Converted, Once
 from flight_logs import Compare, robots_log
 from pelorus.cli import main
+from pelorus.converters import ece276a
 from pelorus.frames import Message
 from pelorus.robot import stream
 from replay_drive import BIN, drive, encode
@@ -45,6 +49,62 @@ def real() -> Callable[[str], Path]:
     return find
 
 
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
+    """A file that several tests read is made once, by whichever process of pytest-xdist needs it
+    first. Nobody else writes into its folder.
+    """
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "once"
+    folder.mkdir(exist_ok=True)
+
+    def get(name: str, make: Callable[[Path], object]) -> Path:
+        path, part = folder / name, folder / f"part-{name}"
+        with (folder / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                make(part)
+                part.rename(path)
+        return path
+
+    return get
+
+
+@pytest.fixture
+def kept(once: Once) -> Callable[[str, Callable[[], Any]], Any]:
+    """The same for what a function gives."""
+
+    def get(name: str, make: Callable[[], Any]) -> Any:
+        path = once(f"{name}.pickle", lambda path: path.write_bytes(pickle.dumps(make())))
+        return pickle.loads(path.read_bytes())
+
+    return get
+
+
+@pytest.fixture
+def of_0027(real: Callable[[str], Path], kept: Callable[..., Any]) -> Converted:
+    """The course's 0027 with its truth, mended, and what was found."""
+    source, truth = real("ece276a/0027.npz"), real("truth/kitti-odometry-07.txt")
+    return Converted(*kept("0027", lambda: ece276a.convert(source, truth)))
+
+
+@pytest.fixture
+def of_03(real: Callable[[str], Path], kept: Callable[..., Any]) -> Converted:
+    """The course's 03, mended, and what was found."""
+    source = real("ece276a/03.npz")
+    return Converted(*kept("03", lambda: ece276a.convert(source)))
+
+
+@pytest.fixture
+def plr_0027(of_0027: Converted, once: Once) -> Path:
+    return once("0027.plr", of_0027.recording.write)
+
+
+@pytest.fixture
+def plr_03(of_03: Converted, once: Once) -> Path:
+    return once("03.plr", of_03.recording.write)
+
+
 @pytest.fixture
 def pelorus(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     def run(*arguments: object) -> Said:
@@ -54,6 +114,17 @@ def pelorus(capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
         return Said(status, captured.out, captured.err)
 
     return run
+
+
+@pytest.fixture
+def zst_0027(real: Callable[[str], Path], once: Once, pelorus: Callable[..., Said]) -> Path:
+    """The course's 0027 as its own file has it, without truth, converted by its name's ending."""
+    source = real("ece276a/0027.npz")
+
+    def make(path: Path) -> None:
+        assert pelorus("convert", "ece276a", source, path).status == 0
+
+    return once("0027.plr.zst", make)
 
 
 @pytest.fixture

@@ -5,14 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pelorus import wire
+from pelorus.faults.finding import Finding
 from pelorus.frames import Message
+from pelorus.recording import Recording
 
 Run = Callable[..., Any]  # the fixture `pelorus`
+Once = Callable[[str, Callable[[Path], object]], Path]  # the fixture `once`
 SHORT = {"duration_s": 6.0}
 COUNT = 61  # frames of such a drive
+
+
+class Converted(NamedTuple):
+    """What a converter gives."""
+
+    recording: Recording
+    findings: list[Finding]
 
 
 def messages_of(path: Path, kind: type[Message]) -> list[Any]:

@@ -12,6 +12,7 @@ import json
 import math
 import os
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -164,10 +165,11 @@ def judged(
     recording: Path, *options: str | Path, program: str = "pelorus-replay"
 ) -> dict[str, Any]:
     """The summary of a run, with the figures of its log against the truth in it."""
-    log = recording.with_suffix(".judged.plr")
-    result = run(recording, *options, "--json", "--out", log, program=program)
-    assert result.status == OK, result.stderr
-    return result.summary | judge(log_of(log))
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.plr"
+        result = run(recording, *options, "--json", "--out", log, program=program)
+        assert result.status == OK, result.stderr
+        return result.summary | judge(log_of(log))
 
 
 Record = Callable[[Iterable[Message] | bytes], Path]

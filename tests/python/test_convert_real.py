@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from converted import Converted
 from drives import with_turned_axes
 from pelorus import road, trajectory
 from pelorus.converters import ece276a, matlab
@@ -18,9 +20,10 @@ from pelorus.recording import Recording
 from pelorus.trajectory import Trajectory
 
 
-def test_0027_has_stale_tracks_and_a_malformed_lever(real: Callable[[str], Path]) -> None:
-    source = real("ece276a/0027.npz")
-    recording, findings = ece276a.convert(source, real("truth/kitti-odometry-07.txt"))
+def test_0027_has_stale_tracks_and_a_malformed_lever(
+    real: Callable[[str], Path], of_0027: Converted
+) -> None:
+    source, (recording, findings) = real("ece276a/0027.npz"), of_0027
     assert [finding.found for finding in findings[:3]] == [True, False, True]
     assert "in 91 of 1106 frames" in findings[0].evidence
     assert "4196 observations" in findings[0].evidence
@@ -33,9 +36,8 @@ def test_0027_has_stale_tracks_and_a_malformed_lever(real: Callable[[str], Path]
     assert not any(finding.found for finding in mend(again)[1])
 
 
-def test_03_has_stale_tracks_and_turned_axes(real: Callable[[str], Path]) -> None:
-    source = real("ece276a/03.npz")
-    recording, findings = ece276a.convert(source)
+def test_03_has_stale_tracks_and_turned_axes(real: Callable[[str], Path], of_03: Converted) -> None:
+    source, (recording, findings) = real("ece276a/03.npz"), of_03
     assert [finding.found for finding in findings[:3]] == [True, True, False]
     given = ece276a.read(source).T_CB
     assert np.allclose(recording.T_CB.R, given.R @ np.diag([1, -1, -1]))
@@ -45,22 +47,24 @@ def test_03_has_stale_tracks_and_turned_axes(real: Callable[[str], Path]) -> Non
     assert not any(finding.found for finding in mend(recording)[1])
 
 
-def test_0027_tells_the_noise_that_was_added_to_its_twists(real: Callable[[str], Path]) -> None:
-    recording, _ = ece276a.convert(real("ece276a/0027.npz"))
-    noise = recording.header.noise
+def test_0027_tells_the_noise_that_was_added_to_its_twists(of_0027: Converted) -> None:
+    noise = of_0027.recording.header.noise
     assert noise.velocity_sigma_mps == pytest.approx(0.50, rel=0.05)
     assert noise.gyro_sigma_radps == pytest.approx(0.050, rel=0.1)
 
 
-def test_of_03_the_images_can_tell_the_gyro_alone(real: Callable[[str], Path]) -> None:
-    recording, _ = ece276a.convert(real("ece276a/03.npz"))
-    assert recording.header.noise.velocity_sigma_mps < 0
-    assert 0.005 < recording.header.noise.gyro_sigma_radps < 0.02
+def test_of_03_the_images_can_tell_the_gyro_alone(of_03: Converted) -> None:
+    noise = of_03.recording.header.noise
+    assert noise.velocity_sigma_mps < 0
+    assert 0.005 < noise.gyro_sigma_radps < 0.02
 
 
 @pytest.mark.parametrize("drive", ["09_26_drive_0001", "09_26_drive_0036", "09_30_drive_0020"])
-def test_the_klt_drives_have_none_of_the_faults(real: Callable[[str], Path], drive: str) -> None:
-    recording = matlab.klt(real(f"klt/2011_{drive}_sync_KLT.mat"))
+def test_the_klt_drives_have_none_of_the_faults(
+    real: Callable[[str], Path], kept: Callable[..., Any], drive: str
+) -> None:
+    source = real(f"klt/2011_{drive}_sync_KLT.mat")
+    recording = kept(drive, lambda: matlab.klt(source))
     assert not any(finding.found for finding in mend(recording)[1])
     turned = with_turned_axes(recording)
     assert [finding.found for finding in mend(turned)[1]] == [False, True, False]
@@ -91,10 +95,8 @@ def test_dead_reckoning_of_starry_night_is_the_designs(real: Callable[[str], Pat
     assert found.err0_m == pytest.approx(1.28, abs=0.005)
 
 
-def test_dead_reckoning_of_0027_is_the_designs(real: Callable[[str], Path]) -> None:
-    source, truth = real("ece276a/0027.npz"), real("truth/kitti-odometry-07.txt")
-    recording, _ = ece276a.convert(source, truth, twist_timing=TwistTiming.START)
-    found = dead_reckoning(recording)
+def test_dead_reckoning_of_0027_is_the_designs(of_0027: Converted) -> None:
+    found = dead_reckoning(of_0027.recording.with_header(twist_timing=TwistTiming.START))
     assert found.err0_m == pytest.approx(39.9, abs=0.05)
     assert found.ate_m == pytest.approx(15.8, abs=0.05)
 
@@ -104,16 +106,17 @@ def test_dead_reckoning_of_0027_is_the_designs(real: Callable[[str], Path]) -> N
     [("09_26_drive_0001", 1.52), ("09_26_drive_0036", 1.18), ("09_30_drive_0020", 9.2)],
 )
 def test_dead_reckoning_of_the_klt_drives_is_the_designs(
-    real: Callable[[str], Path], drive: str, err0_m: float
+    real: Callable[[str], Path], kept: Callable[..., Any], drive: str, err0_m: float
 ) -> None:
-    found = dead_reckoning(matlab.klt(real(f"klt/2011_{drive}_sync_KLT.mat")))
+    source = real(f"klt/2011_{drive}_sync_KLT.mat")
+    found = dead_reckoning(kept(drive, lambda: matlab.klt(source)))
     assert found.err0_m == pytest.approx(err0_m, rel=0.005)
 
 
 def test_dead_reckoning_of_03_leaves_the_road_as_the_design_says(
-    real: Callable[[str], Path],
+    real: Callable[[str], Path], of_03: Converted
 ) -> None:
-    recording, _ = ece276a.convert(real("ece276a/03.npz"), twist_timing=TwistTiming.START)
+    recording = of_03.recording.with_header(twist_timing=TwistTiming.START)
     digitised = road.read_road(real("truth/kitti360-0003-path.csv"))
     found = road.compare(recording.dead_reckoning().p, digitised, 45.0)
     assert found.road_m == pytest.approx(25.8, abs=0.05)

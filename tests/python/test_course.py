@@ -200,16 +200,15 @@ def numbers(line: str) -> dict[str, Any]:
 
 
 def test_the_course_filter_is_what_the_report_says_on_03(
-    pelorus: Command, real: Callable[[str], Path], tmp_path: Path
+    pelorus: Command, real: Callable[[str], Path], plr_03: Path, tmp_path: Path
 ) -> None:
     """The road within 5 m; with the file's own ids, the whole map's trace falls as in figure 2."""
     source, way = real("ece276a/03.npz"), real("truth/kitti360-0003-path.csv")
-    path, kept = tmp_path / "03.plr", tmp_path / "03-ids.plr"
-    assert pelorus("convert", "ece276a", source, path).status == 0
+    kept = tmp_path / "03-ids.plr"
     assert pelorus("convert", "ece276a", source, kept, "--keep-ids").status == 0
     config = ("--config", ROOT / "tools" / "config" / "03.conf")
     common = ("--out", tmp_path / "out", "--bin", BIN)
-    assert pelorus("course", path, *common, *config, "--road", way).status == 0
+    assert pelorus("course", plr_03, *common, *config, "--road", way).status == 0
     dead, course, body = map(numbers, (tmp_path / "out" / "table.md").read_text().splitlines()[2:])
     assert float(course["road m"]) <= 5.0
     assert float(body["road m"]) < float(course["road m"]) < float(dead["road m"])
@@ -223,12 +222,9 @@ def test_the_course_filter_is_what_the_report_says_on_03(
 
 
 def test_the_course_filter_stays_within_8_m_on_0027(
-    pelorus: Command, real: Callable[[str], Path], tmp_path: Path
+    pelorus: Command, plr_0027: Path, tmp_path: Path
 ) -> None:
-    source, truth = real("ece276a/0027.npz"), real("truth/kitti-odometry-07.txt")
-    path = tmp_path / "0027.plr"
-    assert pelorus("convert", "ece276a", source, path, "--truth", truth).status == 0
-    said = pelorus("course", path, "--out", tmp_path / "out", "--bin", BIN)
+    said = pelorus("course", plr_0027, "--out", tmp_path / "out", "--bin", BIN)
     assert said.status == 0, said.err
     course = numbers((tmp_path / "out" / "table.md").read_text().splitlines()[3])
     assert float(course["ATE m"]) <= 8.0

@@ -21,22 +21,17 @@ def replay(recording: Path, slots: str, *arguments: str | Path) -> Result:
 
 
 def test_on_03_the_preset_stays_within_5_m_of_the_road(
-    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path
+    real: Callable[[str], Path], plr_03: Path, tmp_path: Path
 ) -> None:
-    recording, trajectory = tmp_path / "03.plr", tmp_path / "03.tum"
-    pelorus("convert", "ece276a", real("ece276a/03.npz"), recording)
-    replay(recording, "100", "--trajectory", trajectory)
+    trajectory = tmp_path / "03.tum"
+    replay(plr_03, "100", "--trajectory", trajectory)
     way = road.read_road(real("truth/kitti360-0003-path.csv"))
     found = road.compare(read_tum(trajectory).poses.p, way, skip_m=45.0)
     assert 4.0 < found.road_m <= 5.0  # numpy, without a gate that opens: 4.5
 
 
 @pytest.mark.parametrize("slots", SLOTS_MOST)
-def test_on_0027_the_preset_has_an_ate_below_8_m(
-    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path, slots: str
-) -> None:
-    recording, truth = tmp_path / "0027.plr", real("truth/kitti-odometry-07.txt")
-    pelorus("convert", "ece276a", real("ece276a/0027.npz"), recording, "--truth", truth)
+def test_on_0027_the_preset_has_an_ate_below_8_m(plr_0027: Path, slots: str) -> None:
     options = ("--preset", "course", "--slots", slots)
-    found = judged(recording, *options, program="pelorus-replay-f64")
+    found = judged(plr_0027, *options, program="pelorus-replay-f64")
     assert 7.0 < found["ate_m"] <= 8.0  # numpy: 7.4

@@ -129,10 +129,9 @@ def test_a_robots_log_is_packed_and_compared(pelorus: Run, tmp_path: Path) -> No
 
 
 def test_0027_takes_no_more_than_15_bytes_an_observation(
-    pelorus: Run, real: Callable[[str], Path], tmp_path: Path
+    real: Callable[[str], Path], zst_0027: Path
 ) -> None:
-    source, path = real("ece276a/0027.npz"), tmp_path / "0027.plr.zst"
-    assert pelorus("convert", "ece276a", source, path).status == 0
+    source, path = real("ece276a/0027.npz"), zst_0027
     frames = [r.message for r in wire.read_file(path)[0] if isinstance(r.message, Stereo)]
     observations = int(np.sum([len(frame.ids) for frame in frames]))
     assert observations == 75647

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pelorus import packed_file
 from replay_drive import BIN, OK, RECORDING, Record, bits_of, drive, recorder, run
 
 ZSTD = shutil.which("zstd")
@@ -123,12 +123,10 @@ def test_without_the_library_the_way_round_is_named(record: Record, tmp_path: Pa
 
 
 @with_library
-def test_0027_takes_15_bytes_an_observation(
-    real: Callable[[str], Path], pelorus: Callable[..., object], tmp_path: Path
-) -> None:
+def test_0027_takes_15_bytes_an_observation(zst_0027: Path, tmp_path: Path) -> None:
     """As the course's own file has it: without truth. That file takes 21.7."""
     path = tmp_path / "0027.plr"
-    pelorus("convert", "ece276a", real("ece276a/0027.npz"), path)
+    path.write_bytes(b"".join(packed_file.pieces(zst_0027)))
     small = packed(path)
     observations = run(small, "--mode", "dead_reckoning", "--json").summary["observations"]
     assert observations == 75647
