@@ -19,6 +19,7 @@
 #include "math/order.h"
 #include "math/small.h"
 #include "process/twist.h"
+#include "process/velocity.h"
 #include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/motion.h"
@@ -205,6 +206,22 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     return plr_twist_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
+/* A frame of dead reckoning: the motion alone, and what velocities said of the biases. */
+static void reckon(plr_filter *f) {
+    plr_applied_motion motion;
+    if (f->motion.pending && plr_velocity_speaks_of_bias(f)) {
+        const plr_sensed nothing = {NULL, NULL};
+        plr_motion_prior(f, &motion);
+        plr_predict_apply(f, &motion);
+        if (!f->diverged)
+            (void)plr_correct(f, &nothing, 0);
+    } else {
+        plr_predict_settle(f);
+    }
+    if (f->diverged)
+        plr_filter_recover(f);
+}
+
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_report scratch;
     plr_report *r = report ? report : &scratch;
@@ -232,9 +249,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
         process(f, frame, r);
     } else {
-        plr_predict_settle(f);
-        if (f->diverged)
-            plr_filter_recover(f);
+        reckon(f);
     }
     r->active = (uint16_t)f->count;
     plr_health_count(f, r);

@@ -7,6 +7,7 @@
 #include <unity.h>
 
 #include "support/axes.h"
+#include "support/chi_square.h"
 #include "support/oracle.h"
 #include "support/rig.h"
 #include "support/rigid.h"
@@ -21,20 +22,6 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-/* xi with Exp(xi) = E, by Newton's steps from its first-order part. */
-static void logarithm(const double E[16], double xi[6]) {
-    rigid_vee(xi, E);
-    for (int step = 0; step < 5; step++) {
-        double X[16], inverse[16], rest[16], d[6];
-        rigid_exp(X, xi);
-        rigid_inverse(inverse, X);
-        square_multiply(4, inverse, E, rest);
-        rigid_vee(d, rest);
-        for (int i = 0; i < 6; i++)
-            xi[i] += d[i];
-    }
-}
-
 /* e^T P^-1 e, e = Log(T^^-1 T): chi-square with six degrees of freedom, if P is right. */
 static double squared_error(void) {
     plr_pose pose;
@@ -44,19 +31,12 @@ static double squared_error(void) {
     rigid_from_pose(T, &pose);
     rigid_inverse(inverse, T);
     square_multiply(4, inverse, rig.world.T_WB, E);
-    logarithm(E, e);
+    rigid_log(e, E);
     memcpy(weighted, e, sizeof e);
     TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
     for (int i = 0; i < 6; i++)
         sum += e[i] * weighted[i];
     return sum;
-}
-
-/* Bounds of the mean of n chi-squares per degree of freedom, 99.9 % (Wilson and Hilferty, 1931). */
-static void bounds(unsigned n, double *low, double *high) {
-    const double z = 3.2905, v = 2.0 / (9.0 * n * DOF);
-    *low = pow(1 - v - z * sqrt(v), 3);
-    *high = pow(1 - v + z * sqrt(v), 3);
 }
 
 /* Mean squared error per degree of freedom at the end of a drive, over seeds. */
@@ -85,7 +65,7 @@ static double mean_squared_error(plr_model_kind model, bool bias) {
 static void demand_consistent(double mean) {
     char message[80];
     double low, high;
-    bounds(RUNS, &low, &high);
+    chi_square_bounds(RUNS * DOF, &low, &high);
     snprintf(message, sizeof message, "NEES %.3f per degree of freedom, %.3f to %.3f is due", mean,
              low, high);
     TEST_ASSERT_TRUE_MESSAGE(mean > low && mean < high, message);
@@ -103,7 +83,7 @@ static void test_world_believes_more_than_it_knows(void) {
     double low, high;
     if (PLR_REAL == 32)
         TEST_IGNORE_MESSAGE("world is not for float32: docs/NUMERICS.md");
-    bounds(RUNS, &low, &high);
+    chi_square_bounds(RUNS * DOF, &low, &high);
     TEST_ASSERT_GREATER_THAN_DOUBLE(1.2 * high, mean_squared_error(PLR_MODEL_WORLD, false));
 }
 

@@ -28,22 +28,6 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-/* xi with Exp(xi) = M, from Exp(xi)^-1 M, which becomes the identity. */
-static void logarithm(const double M[16], double xi[6]) {
-    double rest[6];
-    rigid_vee(xi, M);
-    for (int k = 0; k < 10; k++) {
-        double E[16], inverse[16], left[16];
-        rigid_exp(E, xi);
-        rigid_inverse(inverse, E);
-        square_multiply(4, inverse, M, left);
-        rigid_vee(rest, left);
-        for (int i = 0; i < 6; i++)
-            xi[i] += rest[i];
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, largest(rest, 6));
-}
-
 /* xi^T P^-1 xi of the pose's error T_true = T Exp(xi). */
 static double nees(void) {
     plr_pose pose;
@@ -58,7 +42,7 @@ static double nees(void) {
     M[15] = 1;
     rigid_inverse(inverse, M);
     square_multiply(4, inverse, rig.world.T_WB, product);
-    logarithm(product, xi);
+    rigid_log(xi, product);
     for (int i = 0; i < 6; i++)
         x[i] = xi[i];
     TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, x));

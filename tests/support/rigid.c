@@ -146,3 +146,16 @@ void rigid_right_jacobian(double Jr[36], const double xi[6]) {
         ad[i] = -ad[i];
     power_series(6, 1, ad, Jr);
 }
+
+void rigid_log(double xi[6], const double E[16]) {
+    rigid_vee(xi, E);
+    for (int step = 0; step < 10; step++) {
+        double X[16], inverse[16], rest[16], d[6];
+        rigid_exp(X, xi);
+        rigid_inverse(inverse, X);
+        square_multiply(4, inverse, E, rest);
+        rigid_vee(d, rest);
+        for (int i = 0; i < 6; i++)
+            xi[i] += d[i];
+    }
+}

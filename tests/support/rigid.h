@@ -34,6 +34,9 @@ void rigid_to_pose(plr_pose *pose, const double M[16]);
 /* The first-order part of a motion near identity: M = I + [xi]^ + O(xi^2). */
 void rigid_vee(double xi[6], const double M[16]);
 
+/* xi with Exp(xi) = E, by Newton's steps from its first-order part; for motions well below pi rad. */
+void rigid_log(double xi[6], const double E[16]);
+
 /* ad(xi) = [ [theta]x, [rho]x; 0, [theta]x ], 6x6. */
 void rigid_ad(double ad[36], const double xi[6]);
 

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: MIT
+/* Wheel, standstill and position: with noise as it is told, errors stay within the covariance, and
+ * each makes the estimate better. Simulated drives, normalised squared errors against chi-square. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+#include "support/axes.h"
+#include "support/chi_square.h"
+#include "support/oracle.h"
+#include "support/reseal.h"
+#include "support/rig.h"
+#include "support/rigid.h"
+#include "support/specimens.h"
+
+/* In a slow build fewer drives, and with them wider bounds. */
+enum { RUNS = PELORUS_SLOW_BUILD ? 4 : 20, DOF = 6 };
+
+static const double arm[3] = {0.4, -0.3, 0.2};
+
+typedef struct helpers {
+    unsigned wheel_every, standstill_every, position_every; /* in steps of 10 ms; 0: none */
+    uint8_t axes;
+    bool camera;
+    double wheel_sigma, position_sigma;
+} helpers;
+
+static rng chance;
+
+void setUp(void) {
+    rig_set_up();
+    rig.options.landmarks = 300;
+    rig.options.most_seen = 20;
+    rig.options.velocity_sigma_mps = 0.2;
+    rig.options.gyro_sigma_radps = 0.02;
+    rig.config.pixel_sigma_px = rig.options.pixel_sigma_px;
+    each_axis(rig.config.velocity_sigma, rig.options.velocity_sigma_mps);
+    each_axis(rig.config.gyro_sigma, rig.options.gyro_sigma_radps);
+    rig.config.bias_gyro_sigma_radps = 0.002; /* so that dead reckoning stays nearly linear */
+    rig.config.gate_d2 = 40;                  /* wide: what it cuts off is missing in the errors */
+}
+
+void tearDown(void) {
+}
+
+static plr_reading reading_of(plr_sensor sensor, uint8_t axes, double sigma) {
+    plr_reading reading = {.t_ns = rig.world.t_ns, .sensor = (uint8_t)sensor, .axes = axes};
+    each_axis(reading.sigma, sigma);
+    if (sensor != PLR_SENSOR_STANDSTILL)
+        memcpy(reading.at_B_m, arm, sizeof arm);
+    return reading;
+}
+
+static plr_reading wheel(uint8_t axes, double sigma) {
+    plr_reading reading = reading_of(PLR_SENSOR_WHEEL, axes, sigma);
+    plr_twist u;
+    scene_true_twist(&rig.world, &u);
+    const double *w = u.w_B_radps;
+    const double turn[3] = {w[1] * arm[2] - w[2] * arm[1], w[2] * arm[0] - w[0] * arm[2],
+                            w[0] * arm[1] - w[1] * arm[0]};
+    for (int i = 0; i < 3; i++)
+        reading.value[i] = u.v_B_mps[i] + turn[i] + sigma * rng_normal(&chance);
+    return reading;
+}
+
+static plr_reading position(uint8_t axes, double sigma) {
+    plr_reading reading = reading_of(PLR_SENSOR_POSITION, axes, sigma);
+    rigid_apply(reading.value, rig.world.T_WB, arm);
+    for (int i = 0; i < 3; i++)
+        reading.value[i] += sigma * rng_normal(&chance);
+    return reading;
+}
+
+static void measure(plr_reading reading) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(&rig.filter, &reading, NULL));
+}
+
+/* A step of 10 ms: a twist at its start, and what else is read then. */
+static void step(const helpers *with, unsigned k) {
+    const plr_twist twist = scene_read(&rig.world);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+    if (with->wheel_every && k % with->wheel_every == 0)
+        measure(wheel(with->axes, with->wheel_sigma));
+    if (with->standstill_every && k % with->standstill_every == 0)
+        measure(reading_of(PLR_SENSOR_STANDSTILL, 3, 0.002));
+    scene_move(&rig.world, RIG_STEP_NS);
+    if (with->position_every && (k + 1) % with->position_every == 0)
+        measure(position(with->axes, with->position_sigma));
+    if (with->camera && (k + 1) % RIG_TWISTS == 0)
+        rig_frame();
+}
+
+/* e^T P^-1 e of the pose, e = Log(T^^-1 T), and of the biases. */
+static void squared_errors(double *of_pose, double *of_bias, double *metres) {
+    plr_pose pose;
+    double P[36], T[16], inverse[16], E[16], e[6], weighted[6], b[6];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    rigid_from_pose(T, &pose);
+    rigid_inverse(inverse, T);
+    square_multiply(4, inverse, rig.world.T_WB, E);
+    rigid_log(e, E);
+    *metres = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+    memcpy(weighted, e, sizeof e);
+    TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
+    *of_pose = *of_bias = 0;
+    for (int i = 0; i < 6; i++)
+        *of_pose += e[i] * weighted[i];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
+    for (int i = 0; i < 6; i++)
+        e[i] = weighted[i] = rig.options.bias[i] - b[i];
+    TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
+    for (int i = 0; i < 6; i++)
+        *of_bias += e[i] * weighted[i];
+}
+
+typedef struct outcome {
+    double nees_pose, nees_bias; /* per degree of freedom */
+    double metres;               /* root mean square at the end */
+} outcome;
+
+static outcome drive(const helpers *with, unsigned steps) {
+    outcome sum = {0};
+    for (uint64_t seed = 1; seed <= RUNS; seed++) {
+        double pose, bias, metres;
+        chance = rng_seeded(seed + 500);
+        rig.options.seed = seed;
+        rng_normals(&chance, rig.config.bias_velocity_sigma_mps, rig.options.bias, 3);
+        rng_normals(&chance, rig.config.bias_gyro_sigma_radps, rig.options.bias + 3, 3);
+        rig_begin();
+        for (unsigned k = 0; k < steps; k++)
+            step(with, k);
+        squared_errors(&pose, &bias, &metres);
+        sum.nees_pose += pose / (DOF * RUNS);
+        sum.nees_bias += bias / (DOF * RUNS);
+        sum.metres += metres * metres / RUNS;
+    }
+    sum.metres = sqrt(sum.metres);
+    return sum;
+}
+
+static void demand_consistent(double mean, const char *what) {
+    char message[96];
+    double low, high;
+    chi_square_bounds(RUNS * DOF, &low, &high);
+    snprintf(message, sizeof message, "%s: NEES %.3f per degree of freedom, %.3f to %.3f is due",
+             what, mean, low, high);
+    TEST_ASSERT_TRUE_MESSAGE(mean > low && mean < high, message);
+}
+
+static void check(const helpers *with, unsigned steps, double better_by) {
+    const helpers without = {.camera = with->camera};
+    const outcome got = drive(with, steps), before = drive(&without, steps);
+    demand_consistent(got.nees_pose, "pose");
+    demand_consistent(got.nees_bias, "biases");
+    TEST_ASSERT_LESS_THAN_DOUBLE(before.metres / better_by, got.metres);
+}
+
+static void test_a_wheel_on_three_axes_improves_dead_reckoning(void) {
+    const helpers with = {.wheel_every = 1, .axes = 7, .wheel_sigma = 0.05};
+    check(&with, 1500, 1.5);
+}
+
+static void test_a_slower_wheel_on_one_axis_too(void) {
+    const helpers with = {.wheel_every = 5, .axes = 1, .wheel_sigma = 0.03};
+    check(&with, 1500, 1.05);
+}
+
+static void test_a_wheel_beside_a_camera(void) {
+    const helpers with = {.wheel_every = 2, .axes = 3, .wheel_sigma = 0.02, .camera = true};
+    check(&with, 1000, 1.05);
+}
+
+static void test_in_dead_reckoning_a_wheel_finds_the_biases(void) {
+    const helpers with = {.wheel_every = 1, .axes = 7, .wheel_sigma = 0.02, .camera = true};
+    rig.config.mode = PLR_MODE_DEAD_RECKONING;
+    check(&with, 1000, 1.5);
+    double P[36], b[6];
+    const double prior = rig.config.bias_velocity_sigma_mps;
+    drive(&with, 1000);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
+    for (int i = 0; i < 3; i++)
+        TEST_ASSERT_LESS_THAN_DOUBLE(0.3 * prior, sqrt(P[7 * i]));
+}
+
+static void test_a_standstill_holds_the_pose_and_finds_the_biases(void) {
+    const helpers with = {.standstill_every = 10};
+    rig.options.speed_mps = rig.options.turn_radps = rig.options.sway = 0;
+    check(&with, 1500, 20);
+}
+
+static void test_positions_bound_the_error(void) {
+    const helpers with = {.position_every = 20, .axes = 7, .position_sigma = 0.05};
+    check(&with, 2000, 4);
+}
+
+static void test_a_height_alone(void) {
+    const helpers with = {.position_every = 50, .axes = 4, .position_sigma = 0.05, .camera = true};
+    check(&with, 1000, 1.0);
+}
+
+static void test_positions_without_biases_too(void) {
+    const helpers with = {.position_every = 100, .axes = 7, .position_sigma = 0.3};
+    outcome got;
+    rig.config.bias = 0;
+    rig.config.bias_velocity_sigma_mps = rig.config.bias_gyro_sigma_radps = 0;
+    memset(&got, 0, sizeof got);
+    for (uint64_t seed = 1; seed <= RUNS; seed++) {
+        plr_pose pose;
+        double P[36], T[16], inverse[16], E[16], e[6], weighted[6];
+        chance = rng_seeded(seed + 900);
+        rig.options.seed = seed;
+        rig_begin();
+        for (unsigned k = 0; k < 1500; k++)
+            step(&with, k);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+        rigid_from_pose(T, &pose);
+        rigid_inverse(inverse, T);
+        square_multiply(4, inverse, rig.world.T_WB, E);
+        rigid_log(e, E);
+        memcpy(weighted, e, sizeof e);
+        TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
+        for (int i = 0; i < 6; i++)
+            got.nees_pose += e[i] * weighted[i] / (DOF * RUNS);
+    }
+    demand_consistent(got.nees_pose, "pose");
+}
+
+/* ---------------------------------------------------------------- what is refused, and rejected */
+
+static void refuse(plr_reading reading, plr_status expected) {
+    plr_reading_result result;
+    rig_remember();
+    rig_demand_untouched(expected, plr_filter_measure(&rig.filter, &reading, &result));
+    TEST_ASSERT_EQUAL_INT(expected, result.status);
+    TEST_ASSERT_FALSE(result.used);
+    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.readings_refused + 1,
+                             rig.filter.totals.readings_refused);
+}
+
+static void test_bad_readings_are_refused_and_change_nothing(void) {
+    plr_reading good = wheel(7, 0.1), bad;
+    refuse(good, PLR_E_TIME); /* before the first twist */
+    rig_twist();
+    good.t_ns = rig.world.t_ns;
+    bad = good, bad.sensor = PLR_SENSORS + 1, refuse(bad, PLR_E_ARGUMENT);
+    bad = good, bad.sensor = 0, refuse(bad, PLR_E_ARGUMENT);
+    bad = good, bad.axes = 0, refuse(bad, PLR_E_ARGUMENT);
+    bad = good, bad.axes = 8, refuse(bad, PLR_E_ARGUMENT);
+    bad = good, bad.value[1] = (double)NAN, refuse(bad, PLR_E_NOT_FINITE);
+    bad = good, bad.at_B_m[2] = (double)INFINITY, refuse(bad, PLR_E_NOT_FINITE);
+    bad = good, bad.sigma[0] = (double)NAN, refuse(bad, PLR_E_NOT_FINITE);
+    bad = good, bad.sigma[0] = 0, refuse(bad, PLR_E_ARGUMENT);
+    bad = good, bad.sigma[2] = 1e7, refuse(bad, PLR_E_RANGE);
+    bad = good, bad.value[0] = 2e9, refuse(bad, PLR_E_RANGE);
+    bad = good, bad.at_B_m[0] = 1e4, refuse(bad, PLR_E_RANGE);
+    bad = good, bad.t_ns = 1, refuse(bad, PLR_E_LATE);
+    bad = good, bad.t_ns += 10000000000U, refuse(bad, PLR_E_GAP);
+    bad = good, bad.axes = 1, bad.sigma[1] = (double)NAN; /* not measured: not looked at */
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(&rig.filter, &bad, NULL));
+}
+
+static void test_what_the_gate_rejects_changes_nothing_but_the_time(void) {
+    plr_reading_result result;
+    rig_drive(10);
+    for (int sensor = PLR_SENSOR_WHEEL; sensor <= PLR_SENSORS; sensor++) {
+        plr_reading wild = sensor == PLR_SENSOR_POSITION ? position(7, 0.1) : wheel(7, 0.01);
+        wild.sensor = (uint8_t)sensor;
+        wild.value[0] += 100;
+        each_axis(wild.sigma, 0.001);
+        plr_filter_predict(&rig.filter, rig.world.t_ns, &(plr_twist){{2, 0, 0}, {0, 0, 0}});
+        rig_remember();
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(&rig.filter, &wild, &result));
+        TEST_ASSERT_FALSE(result.used);
+        TEST_ASSERT_GREATER_THAN_DOUBLE(40, result.d2);
+        TEST_ASSERT_EQUAL_UINT32(rig.before.totals.readings_gated + 1,
+                                 rig.filter.totals.readings_gated);
+        rig.before.totals = rig.filter.totals;
+        memcpy(rig.before.readings_rejected, rig.filter.readings_rejected,
+               sizeof rig.before.readings_rejected);
+        TEST_ASSERT_TRUE(specimen_same_state(&rig.before, &rig.filter));
+        scene_move(&rig.world, RIG_STEP_NS);
+    }
+}
+
+static void test_ten_rejected_in_succession_are_a_reason(void) {
+    rig_drive(20);
+    for (int k = 0; k < 10; k++) {
+        TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
+        rig_twist();
+        plr_reading wild = position(7, 0.05);
+        wild.value[0] += 30;
+        measure(wild);
+        rig_frame();
+    }
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, rig.report.health);
+    rig_twist();
+    measure(position(7, 0.05));
+    rig_frame();
+    TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_wheel_on_three_axes_improves_dead_reckoning);
+    RUN_TEST(test_a_slower_wheel_on_one_axis_too);
+    RUN_TEST(test_a_wheel_beside_a_camera);
+    RUN_TEST(test_in_dead_reckoning_a_wheel_finds_the_biases);
+    RUN_TEST(test_a_standstill_holds_the_pose_and_finds_the_biases);
+    RUN_TEST(test_positions_bound_the_error);
+    RUN_TEST(test_a_height_alone);
+    RUN_TEST(test_positions_without_biases_too);
+    RUN_TEST(test_bad_readings_are_refused_and_change_nothing);
+    RUN_TEST(test_what_the_gate_rejects_changes_nothing_but_the_time);
+    RUN_TEST(test_ten_rejected_in_succession_are_a_reason);
+    return UNITY_END();
+}
