@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#include <stdio.h>
+#include <string.h>
+
+#include "pelorus/settings.h"
+#include "schema/print.h"
+
+static bool is(const row *field, const char *type) {
+    return strcmp(field->type, type) == 0;
+}
+
+/* --- where a field stands --- */
+
+/* Bytes before it: a fixed number, reals, and a text whose length comes before. */
+typedef struct place {
+    unsigned bytes, reals;
+    const char *text; /* its name, or NULL */
+    const char *rows; /* what follows as often as a number says */
+} place;
+
+static void print_place(const place *at) {
+    printf("%u", at->bytes);
+    if (at->reals > 0)
+        printf(" + %u r", at->reals);
+    if (at->text)
+        printf(" + %s", at->text);
+    if (at->rows)
+        printf(" + %s", at->rows);
+}
+
+static unsigned numbers(const row *field) {
+    return is(field, "BITS") ? 1 : field->count;
+}
+
+static void step_over(place *at, const row *field) {
+    if (strcmp(schema_type(field), "real") == 0)
+        at->reals += field->count;
+    else if (schema_bytes(field) == 0)
+        at->text = field->name;
+    else
+        at->bytes += numbers(field) * schema_bytes(field);
+}
+
+/* Bytes of one row of a message that has rows. */
+static unsigned row_bytes(const row *repeated) {
+    unsigned bytes = 0;
+    for (const row *r = repeated + 1; r->kind == ROW_FIELD; r++)
+        bytes += schema_bytes(r);
+    return bytes;
+}
+
+/* --- messages --- */
+
+static const row *message_of(const char *name) {
+    for (size_t i = 0; i < schema_message_rows; i++)
+        if (schema_messages[i].kind == ROW_TABLE && strcmp(schema_messages[i].name, name) == 0)
+            return &schema_messages[i];
+    return NULL;
+}
+
+static void print_type(const row *field) {
+    printf("%s", schema_type(field));
+    if (numbers(field) > 1)
+        printf("[%u]", numbers(field));
+}
+
+static void print_field(const place *at, const row *field) {
+    printf("| ");
+    print_place(at);
+    printf(" | ");
+    print_type(field);
+    printf(" | %s | %s | ", is(field, "SPARE") ? "" : field->name, field->unit);
+    printf("%s", field->about);
+    if (field->since > 0)
+        printf("%ssince 1.%u", field->about[0] ? "; " : "", field->since);
+    printf(" |\n");
+}
+
+static void print_message(const row *message) {
+    place at = {0, 0, NULL, NULL};
+    char rows[32];
+    printf("| at | type | field | unit | |\n|---|---|---|---|---|\n");
+    for (const row *r = message + 1; r->kind != ROW_END; r++) {
+        if (r->kind == ROW_REPEATED) {
+            snprintf(rows, sizeof rows, "%u i", row_bytes(r));
+            at.rows = rows;
+            continue;
+        }
+        print_field(&at, r);
+        step_over(&at, r);
+    }
+}
+
+static void print_kinds(void) {
+    printf("| kind | name | payload bytes | from | |\n|---|---|---|---|---|\n");
+    for (size_t i = 0; i < schema_message_rows; i++) {
+        const row *r = &schema_messages[i];
+        place at = {0, 0, NULL, NULL};
+        char rows[32];
+        if (r->kind != ROW_TABLE)
+            continue;
+        printf("| %u | %s | ", r->number, r->name);
+        const char *from = r->from, *about = r->about;
+        for (r++; r->kind == ROW_FIELD; r++)
+            step_over(&at, r);
+        if (r->kind == ROW_REPEATED) {
+            snprintf(rows, sizeof rows, "%u n", row_bytes(r));
+            at.rows = rows;
+        }
+        print_place(&at);
+        printf(" | %s | %s |\n", from, about);
+    }
+}
+
+/* --- settings, words --- */
+
+static void print_values(const plr_setting *s) {
+    for (unsigned i = 0; s->choices && s->choices[i]; i++)
+        printf("%s%u %s", i > 0 ? ", " : "", i, s->choices[i]);
+    if (s->kind == PLR_SETTING_COUNT)
+        printf("1 to the build's capacity");
+    else if (!s->choices)
+        printf("%g to %g", s->minimum, s->maximum);
+}
+
+static void print_standard(const plr_setting *s) {
+    if (s->kind == PLR_SETTING_COUNT)
+        printf("100, or the capacity");
+    else if (s->choices)
+        printf("%s", s->choices[(unsigned)s->standard]);
+    else
+        printf("%g", s->standard);
+}
+
+static void print_settings(void) {
+    printf("| id | name | unit | values | default | |\n|---|---|---|---|---|---|\n");
+    for (unsigned i = 0; i < plr_setting_count(); i++) {
+        const plr_setting *s = plr_setting_at(i);
+        printf("| %u | %s | %s | ", (unsigned)s->id, s->name, s->unit);
+        print_values(s);
+        printf(" | ");
+        print_standard(s);
+        printf(" | %s |\n", s->about);
+    }
+}
+
+static unsigned bit_of(unsigned reason) {
+    unsigned bit = 0;
+    while (reason >> bit > 1)
+        bit++;
+    return bit;
+}
+
+static void print_words(const char *of, const char *title) {
+    printf("| %s | name | |\n|---|---|---|\n", title);
+    for (size_t i = 0; i < schema_word_rows; i++) {
+        const word *w = &schema_words[i];
+        if (strcmp(w->of, of) != 0)
+            continue;
+        if (strcmp(of, "reason") == 0)
+            printf("| %u", bit_of((unsigned)w->number));
+        else
+            printf("| %d", w->number);
+        printf(" | %s | %s |\n", schema_short_name(w), w->text);
+    }
+}
+
+/* --- the saved state --- */
+
+static void print_state(void) {
+    const char *group = "", *times = "";
+    printf("| | | | |\n|---|---|---|---|\n");
+    for (size_t i = 0; i < schema_state_rows; i++) {
+        const row *r = &schema_state[i];
+        if (r->kind == ROW_TABLE)
+            times = r->from;
+        if (r->kind == ROW_GROUP)
+            group = r->about;
+        if (r->kind != ROW_FIELD)
+            continue;
+        printf("| ");
+        if (group[0])
+            printf("**%s**%s", group, times[0] ? ", " : "");
+        printf("%s | ", times);
+        print_type(r);
+        printf(" | %s | %s |\n", r->name, r->about);
+        group = times = "";
+    }
+}
+
+bool schema_print_markdown(const char *table) {
+    const row *message = message_of(table);
+    if (message)
+        print_message(message);
+    else if (strcmp(table, "kinds") == 0)
+        print_kinds();
+    else if (strcmp(table, "settings") == 0)
+        print_settings();
+    else if (strcmp(table, "statuses") == 0)
+        print_words("status", "status");
+    else if (strcmp(table, "reasons") == 0)
+        print_words("reason", "bit");
+    else if (strcmp(table, "state") == 0)
+        print_state();
+    else
+        return false;
+    return true;
+}
