@@ -23,9 +23,7 @@ TABLE = re.compile(r"(?<=<!-- table: )(\w+) -->\n(.*?)(?=<!-- end -->)", re.DOTA
 
 def printed(program: str, *arguments: str) -> str:
     """What the program prints."""
-    return subprocess.run(
-        [program, *arguments], capture_output=True, text=True, check=True
-    ).stdout
+    return subprocess.run([program, *arguments], capture_output=True, text=True, check=True).stdout
 
 
 def expected(root: Path, program: str) -> dict[Path, str]:

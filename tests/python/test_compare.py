@@ -28,7 +28,8 @@ from flight_logs import (
 from pelorus import ARITHMETIC, __version__
 from pelorus.flight.judge import fingerprint
 from pelorus.frames import NO_BUDGET, Config, Kind, Message, Pose, Report, Stereo, Text, Twist
-from pelorus.robot.status import HEALTH, REASONS, condition
+from pelorus.robot.status import condition
+from pelorus.schema import HEALTHS, REASONS, STATUSES
 from replay_drive import BIN, FRAMES, drive, encode, header, known
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -169,7 +170,7 @@ def test_a_report_that_counts_otherwise_is_told_with_what_the_robot_said(
     assert said.status == DIFFERENT
     assert f"REPORT used: the desk {report.used}, the robot {report.used - 1}" in said.out
     assert "REPORT gated: the desk 0, the robot 1" in said.out
-    assert "health degraded (the gate is locked)" in said.out
+    assert "health degraded (the gate rejected most matches in 10 successive frames" in said.out
     assert "said      something is odd" in said.out
     assert "POSE in" not in said.out
 
@@ -179,7 +180,7 @@ def test_a_refusal_of_the_robot_alone_is_told_as_such(compare: Compare, log: lis
     said = compare(told)
     assert said.status == DIFFERENT
     assert "REPORT status: the desk 0, the robot -7" in said.out
-    assert "the robot refused it: older than the last twist (status -7)" in said.out
+    assert f"the robot refused it: {STATUSES[-7]} (status -7)" in said.out
 
 
 def test_a_number_that_is_none_is_infinitely_far(compare: Compare, log: list[Message]) -> None:
@@ -285,9 +286,10 @@ def test_the_fingerprint_is_the_librarys(log: list[Message]) -> None:
 def test_every_health_and_reason_has_words() -> None:
     text = (ROOT / "include" / "pelorus" / "types.h").read_text()
     assert text.count("PLR_REASON_") == len(REASONS)
-    assert text.count("PLR_HEALTH_") == len(HEALTH)
+    assert text.count("PLR_HEALTH_") == len(HEALTHS)
     assert condition(0, 0) == "good"
     assert (
-        condition(2, 3) == "lost (fewer than 3 observations used, none used in the last 10 frames)"
+        condition(2, 3)
+        == "lost (fewer than 3 observations used, no observation used in the last 10 frames)"
     )
     assert condition(9, 0) == "health 9"

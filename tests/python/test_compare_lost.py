@@ -37,7 +37,7 @@ from replay_drive import FRAMES, drive, encode, header, t_ns
 DAMAGED, NOT_READY, FOREIGN = -15, -13, -16  # plr_status
 STARTED = Report(0, notice=Notice.STARTED)
 BOOT = [STARTED, Text("pelorus 0.1.0 on a board, build 0x1: power-on")]
-A_TWIST_LESS = End(0, 0, 0, 0, 0, differs=1, arrived_twists=39)  # of 40
+A_TWIST_LESS = End(0, 0, 0, 0, 0, differs=1, arrived=(39, 0, 0, 0, 0))  # of 40
 
 
 # --- what was lost --------------------------------------------------------------------------------
@@ -87,9 +87,9 @@ def test_a_twist_that_was_damaged_on_the_way_ends_what_can_be_compared(
     log.insert(index(log, Twist, 3), Report(0, 0, DAMAGED))  # of noise, which cost nothing
     said = compare(encode(log, end=A_TWIST_LESS))
     assert said.status == NOT_COMPARABLE, said.out
-    assert "at frame 4: the robot refused a message: damaged on the way" in said.out
+    assert "at frame 4: the robot refused a message: damaged: bytes fail their check" in said.out
     assert f"from frame {AT + 1} on the robot may have had other inputs" in said.out
-    assert "the robot refused a message: damaged on the way (status -15)" in said.out
+    assert "the robot refused a message: damaged: bytes fail their check (status -15)" in said.out
     assert f"frame {AT + 2}, t 7.100000000 s, is the first that differs" in said.out
 
 

@@ -81,7 +81,7 @@ def test_settings_texts_and_landmarks_are_shown_by_name(tmp_path: Path, pelorus:
 
 def test_settings_are_those_of_the_formats_page() -> None:
     page = (ROOT / "docs" / "REPLAY-FORMAT.md").read_text()
-    rows = page.split("| id | name | unit | values |")[1].split("\n\n")[0].splitlines()[2:]
+    rows = page.split("| id | name | unit | values |")[1].split("<!-- end -->")[0].splitlines()[2:]
     told = {}
     for row in rows:
         number, name, unit, values = (cell.strip() for cell in row.split("|")[1:5])

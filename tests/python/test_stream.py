@@ -35,8 +35,9 @@ from pelorus.robot.compare import desktop_poses
 from pelorus.robot.flight_log import FlightLog
 from pelorus.robot.link import Link, LinkClosed
 from pelorus.robot.serial import open_serial
-from pelorus.robot.status import STATUSES, refusal
+from pelorus.robot.status import refusal
 from pelorus.robot.stream import Streamer
+from pelorus.schema import STATUSES
 from replay_drive import BIN, FRAMES, drive, encode, log_of, run
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -154,7 +155,7 @@ def test_a_frame_too_long_for_the_board_is_answered_and_told_in_words(
         said = pelorus("stream", path, "--to", served.target)
     assert said.status == 0, said.err
     assert "lost 0 without an answer" in one_line(said.out)
-    assert "1 STEREO: more than the board has room for (status -10)" in said.out
+    assert f"1 STEREO: {STATUSES[FULL]} (status -10)" in said.out
 
 
 # --- the serial device's settings -----------------------------------------------------------------
@@ -451,8 +452,13 @@ def test_a_doubled_frame_is_waited_for_twice() -> None:
 def test_the_words_for_a_refusal_are_those_of_every_status() -> None:
     text = (ROOT / "include" / "pelorus" / "types.h").read_text()
     numbers = [int(number) for number in re.findall(r"PLR_E_\w+ = (-\d+)", text)]
-    assert sorted(numbers) == sorted(STATUSES)
-    assert refusal(Kind.TWIST, -6, 3) == "3 TWIST: time repeats or goes back (status -6)"
-    assert refusal(77, -16, 1).startswith("1 kind 77: of a kind")
-    assert refusal(0, -15, 2) == "2 frames: damaged on the way (status -15)"
-    assert STATUSES[FULL] == "more than the board has room for"
+    assert sorted([*numbers, 0]) == sorted(STATUSES)
+    assert (
+        refusal(Kind.TWIST, -6, 3)
+        == "3 TWIST: time repeats or goes back; it must ascend (status -6)"
+    )
+    assert refusal(77, -16, 1).startswith(
+        "1 kind 77: it comes from another version or build, or is of a kind"
+    )
+    assert refusal(0, -15, 2) == "2 frames: damaged: bytes fail their check (status -15)"
+    assert STATUSES[FULL].startswith("there is no room for it: no slot is free, a board holds less")

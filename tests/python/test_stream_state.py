@@ -16,6 +16,7 @@ from pelorus.errors import PelorusError
 from pelorus.frames import Config, Kind, Message, Report, Start, State, StateAction, Text
 from pelorus.robot import stream
 from pelorus.robot.state import restored, saved
+from pelorus.schema import STATUSES
 from replay_drive import FRAMES, drive, encode, known, log_of, t_ns
 
 CORRUPT, FOREIGN = -15, -16  # plr_status
@@ -120,11 +121,13 @@ def test_a_save_that_fails_is_an_error_with_the_boards_words(recording: Path, pe
 def test_a_restore_that_fails_ends_the_drive_before_it_begins(
     recording: Path, pelorus: Run
 ) -> None:
-    board = KeepingBoard(status=CORRUPT, words="state not restored: stored bytes fail their check")
+    board = KeepingBoard(
+        status=CORRUPT, words="state not restored: damaged: bytes fail their check"
+    )
     with TcpBoard(board) as served:
         said = pelorus("stream", recording, "--to", served.target, "--restore-state")
     assert said.status == 1
-    assert "state not restored: stored bytes fail their check" in said.err
+    assert "state not restored: damaged: bytes fail their check" in said.err
     assert not any(message.kind == Kind.TWIST for message in board.heard)
 
 
@@ -134,7 +137,7 @@ def test_a_board_that_knows_no_state_is_told_from_its_refusal(
     with TcpBoard(KeepingBoard(status=FOREIGN, words="")) as served:
         said = pelorus("stream", recording, "--to", served.target, "--restore-state")
     assert said.status == 1
-    assert "STATE: of a kind, version or build that it does not know" in said.err
+    assert f"STATE: {STATUSES[FOREIGN]}" in said.err
 
 
 def test_a_board_that_does_not_answer_is_not_waited_for_for_ever(

@@ -15,8 +15,9 @@ from pelorus.errors import PelorusError, write_text
 from pelorus.frames import Kind, Message, Pose, Report, Stereo
 from pelorus.layout import Floats
 from pelorus.motion import Times
+from pelorus.schema import HEALTHS
 
-HEALTH = ("good", "degraded", "lost", "diverged")
+HEALTH = tuple(HEALTHS.values())
 RHO_THETA = tuple(f"var_{part}_{axis}" for part in ("rho", "theta") for axis in "xyz")
 BIASES = tuple(f"bias_{part}{axis}" for part in "vw" for axis in "xyz")
 ESTIMATE = (

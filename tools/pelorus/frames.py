@@ -1,64 +1,66 @@
 # SPDX-License-Identifier: MIT
 """The frame kinds of docs/REPLAY-FORMAT.md, one dataclass each, with their payload bytes.
 
-A kind's `layout` is the table of its page. `pack` gives the payload, `unpack` reads one; both say
-nothing about sequence, CRC and COBS, which are `pelorus.wire`'s. Two messages are equal when their
-payloads are the same bytes.
+The bytes are those of the tables in `pelorus.schema`: a dataclass has the fields of its table,
+under the same names. `pack` gives the payload, `unpack` reads one; both say nothing about sequence,
+CRC and COBS, which are `pelorus.wire`'s. Two messages are equal when their payloads are the same
+bytes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from enum import IntEnum, IntFlag
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.layout import Floats, Layout, MalformedPayload, need, within
+from pelorus import schema
+from pelorus.layout import Floats, Layout, need, row_type
 
-NO_BUDGET = 65535
-OBSERVATIONS_MAX = 4096
-SETTINGS_MAX = 64
-NAME_BYTES_MAX = 63
-TEXT_BYTES_MAX = 240
-UNKNOWN_VARIANCE = 2.0**40  # of a filter that has diverged
-OBSERVATION = np.dtype([("id", "<u4"), ("pixels", "<f4", (4,))])
-SETTING = np.dtype([("id", "u1"), ("value", "<f8")])
+NO_BUDGET = schema.LIMITS["no_budget"]
+OBSERVATIONS_MAX = schema.LIMITS["observations"]
+NAME_BYTES_MAX = schema.LIMITS["name_bytes"]
+TEXT_BYTES_MAX = schema.LIMITS["text_bytes"]
+UNKNOWN_VARIANCE = float(schema.LIMITS["unknown_variance"])  # of a filter that has diverged
+OBSERVATION = row_type(schema.MESSAGES["STEREO"].rows)
+SETTING = row_type(schema.MESSAGES["CONFIG"].rows)
 
 
 class Kind(IntEnum):
     """A frame's first byte."""
 
-    HEADER = 1
-    CONFIG = 2
-    START = 3
-    TWIST = 4
-    STEREO = 5
-    TRUTH = 6
-    LANDMARK = 7
-    POSE = 8
-    REPORT = 9
-    TEXT = 10
-    END = 11
-    STATE = 12
-    READING = 13
+    HEADER = schema.kind("HEADER")
+    CONFIG = schema.kind("CONFIG")
+    START = schema.kind("START")
+    TWIST = schema.kind("TWIST")
+    STEREO = schema.kind("STEREO")
+    TRUTH = schema.kind("TRUTH")
+    LANDMARK = schema.kind("LANDMARK")
+    POSE = schema.kind("POSE")
+    REPORT = schema.kind("REPORT")
+    TEXT = schema.kind("TEXT")
+    END = schema.kind("END")
+    STATE = schema.kind("STATE")
+    READING = schema.kind("READING")
 
 
 class BodyAxes(IntEnum):
     """Which way the body's x, y and z point."""
 
-    FORWARD_LEFT_UP = 0
-    FORWARD_RIGHT_DOWN = 1
-    OTHER = 2
+    FORWARD_LEFT_UP = schema.number("body_axes", "FORWARD_LEFT_UP")
+    FORWARD_RIGHT_DOWN = schema.number("body_axes", "FORWARD_RIGHT_DOWN")
+    OTHER = schema.number("body_axes", "OTHER")
 
 
 class TwistTiming(IntEnum):
     """When a reading holds: START on [t_j, t_j+1), END on (t_j-1, t_j], MID the mean of both."""
 
-    START = 0
-    END = 1
-    MID = 2
+    START = schema.number("twist_timing", "START")
+    END = schema.number("twist_timing", "END")
+    MID = schema.number("twist_timing", "MID")
 
 
 class StartFlag(IntFlag):
@@ -71,33 +73,34 @@ class StartFlag(IntFlag):
 class StateAction(IntEnum):
     """What a STATE asks for."""
 
-    SAVE = 1
-    RESTORE = 2
+    SAVE = schema.number("action", "SAVE")
+    RESTORE = schema.number("action", "RESTORE")
 
 
 class Notice(IntEnum):
     """What a REPORT tells besides its status."""
 
-    NONE = 0
-    STARTED = 1  # the sender has just started: whatever it was told before is lost
-    SAVED = 2
-    RESTORED = 3  # the filter goes on from a saved state
+    NONE = schema.number("notice", "NONE")
+    # the sender has just started: whatever it was told before is lost
+    STARTED = schema.number("notice", "STARTED")
+    SAVED = schema.number("notice", "SAVED")
+    RESTORED = schema.number("notice", "RESTORED")  # the filter goes on from a saved state
 
 
 class Sensor(IntEnum):
     """What measured a READING."""
 
-    WHEEL = 1  # the velocity of a point of the body, in body axes
-    STANDSTILL = 2  # that it does not move
-    POSITION = 3  # the position of a point of the body in the world
+    WHEEL = schema.number("sensor", "WHEEL")  # the velocity of a point of the body, in body axes
+    STANDSTILL = schema.number("sensor", "STANDSTILL")  # that it does not move
+    POSITION = schema.number("sensor", "POSITION")  # the place of a point of it in the world
 
 
 class Role(IntEnum):
     """Where a landmark comes from."""
 
-    KNOWN = 0
-    EVICTED = 1
-    FINAL = 2
+    KNOWN = schema.number("role", "KNOWN")
+    EVICTED = schema.number("role", "EVICTED")
+    FINAL = schema.number("role", "FINAL")
 
 
 def header_name(words: str) -> str:
@@ -129,19 +132,30 @@ class Message:
 
     kind: ClassVar[Kind]
     layout: ClassVar[Layout]
-    tail: ClassVar[Layout] = Layout("")  # what format 1.3 added; in an older payload it is absent
+    choices: ClassVar[Mapping[str, Callable[[int], Any]]] = {}  # what a number is made into
+
+    def __init_subclass__(cls, kind: Kind | None = None) -> None:
+        if kind is not None:
+            cls.kind = kind
+            cls.layout = Layout(schema.MESSAGES[kind.name])
 
     def pack(self) -> bytes:
-        return self.layout.pack(vars(self)) + self.tail.pack(vars(self))
+        return self.layout.pack(self.values())
 
     @classmethod
     def unpack(cls, payload: bytes) -> Self:
-        return cls(**cls.layout.unpack(payload), **cls.added(payload, cls.layout.size))
+        values, end = cls.layout.unpack(payload)
+        chosen = {name: choose(values[name]) for name, choose in cls.choices.items()}
+        return cls.of_values(values | chosen, payload, end)
+
+    def values(self) -> dict[str, Any]:
+        """By the names of the table."""
+        return vars(self)
 
     @classmethod
-    def added(cls, payload: bytes, at: int) -> dict[str, Any]:
-        """The fields of the tail; none if the payload ends before it."""
-        return cls.tail.unpack(payload, at) if len(payload) > at else {}
+    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
+        """The values are those before `end` in the payload; only rows lie behind it."""
+        return cls(**values)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self.pack() == other.pack()
@@ -184,7 +198,7 @@ class Noise:
 
 
 @dataclass(frozen=True, eq=False)
-class Header(Message):
+class Header(Message, kind=Kind.HEADER):
     """Calibration and conventions. q_C = R_CB s_B + t_CB_m, C the left camera, B the body."""
 
     camera: Camera
@@ -196,46 +210,37 @@ class Header(Message):
     image_height_px: int = 0
     noise: Noise = Noise()
     name: str = ""
-    version_major: int = 1
-    version_minor: int = 3
+    version_major: int = schema.LIMITS["version_major"]
+    version_minor: int = schema.LIMITS["version_minor"]
     units: int = 0
 
-    kind: ClassVar[Kind] = Kind.HEADER
-    layout: ClassVar[Layout] = Layout(
-        "version_major:B version_minor:B body_axes:B twist_timing:B units:B name_bytes:B "
-        "image_width_px:H image_height_px:H camera:5d R_CB:3x3d t_CB_m:3d noise:7d",
-        version_major=lambda value: within("version_major", value, 1, 1),
-        body_axes=BodyAxes,
-        twist_timing=TwistTiming,
-        units=lambda value: within("units", value, 0, 0),
-        name_bytes=lambda value: within("name_bytes", value, 0, NAME_BYTES_MAX),
-    )
-    BY_AXIS: ClassVar[Layout] = Layout("noise:6d")  # behind the name; since format 1.2
+    choices: ClassVar = {"body_axes": BodyAxes, "twist_timing": TwistTiming}
 
-    def pack(self) -> bytes:
-        name = self.name.encode("utf-8")
-        if len(name) > NAME_BYTES_MAX:
-            raise ValueError(f"name of {len(name)} bytes, at most {NAME_BYTES_MAX} fit a HEADER")
-        camera, noise = list(vars(self.camera).values()), list(vars(self.noise).values())
-        simple = {"name_bytes": len(name), "camera": camera, "noise": noise[:7]}
-        fixed = self.layout.pack(vars(self) | simple)
-        return fixed + name + self.BY_AXIS.pack({"noise": noise[7:]})
+    def values(self) -> dict[str, Any]:
+        noise = vars(self.noise)
+        axes = {name: [noise[part] for part in parts] for name, parts in BY_AXIS.items()}
+        arrays = {name: np.array(values) for name, values in axes.items()}
+        return vars(self) | vars(self.camera) | noise | arrays
 
     @classmethod
-    def unpack(cls, payload: bytes) -> Header:
-        found = cls.layout.unpack(payload)
-        end = cls.layout.size + found.pop("name_bytes")
-        need(payload, end)
-        noise = found["noise"].tolist()
-        if len(payload) > end:
-            noise += cls.BY_AXIS.unpack(payload, end)["noise"].tolist()
-        name = payload[cls.layout.size : end].decode("utf-8", errors="replace")
-        camera = Camera(*found["camera"].tolist())
-        return cls(**found | {"camera": camera, "noise": Noise(*noise), "name": name})
+    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
+        camera = Camera(**{part.name: values.pop(part.name) for part in fields(Camera)})
+        noise = {f.name: values.pop(f.name) for f in fields(Noise) if f.name in values}
+        for name, parts in BY_AXIS.items():
+            if name in values:
+                noise |= zip(parts, values.pop(name).tolist(), strict=True)
+        return cls(camera=camera, noise=Noise(**noise), **values)
+
+
+# The fields of Noise that are one array in a HEADER.
+BY_AXIS = {
+    f"{what}_sigma_axes_{unit}": [f"{what}_sigma_{axis}_{unit}" for axis in "xyz"]
+    for what, unit in (("velocity", "mps"), ("gyro", "radps"))
+}
 
 
 @dataclass(frozen=True, eq=False)
-class Start(Message):
+class Start(Message, kind=Kind.START):
     """The pose at the beginning; covariance of (rho, theta) packed, bias prior of (b_v, b_w)."""
 
     t_ns: int
@@ -246,27 +251,20 @@ class Start(Message):
     bias_mean: Floats = zeros(6)
     bias_variance: Floats = zeros(6)
 
-    kind: ClassVar[Kind] = Kind.START
-    layout: ClassVar[Layout] = Layout(
-        "t_ns:Q R_WB:3x3d p_WB_m:3d flags:B covariance:21d bias_mean:6d bias_variance:6d",
-        flags=lambda value: StartFlag(value & 3),
-    )
+    choices: ClassVar = {"flags": lambda value: StartFlag(value & 3)}
 
 
 @dataclass(frozen=True, eq=False)
-class Twist(Message):
+class Twist(Message, kind=Kind.TWIST):
     """One reading of the body's linear and angular velocity, in body axes."""
 
     t_ns: int
     v_B_mps: Floats = zeros(3)
     w_B_radps: Floats = zeros(3)
 
-    kind: ClassVar[Kind] = Kind.TWIST
-    layout: ClassVar[Layout] = Layout("t_ns:Q v_B_mps:3d w_B_radps:3d")
-
 
 @dataclass(frozen=True, eq=False)
-class Stereo(Message):
+class Stereo(Message, kind=Kind.STEREO):
     """One stereo frame: `ids` (n,) uint32, `pixels` (n, 4) float32 in the order uL vL uR vR."""
 
     t_ns: int
@@ -274,27 +272,30 @@ class Stereo(Message):
     pixels: NDArray[np.float32]
     budget: int = NO_BUDGET
 
-    kind: ClassVar[Kind] = Kind.STEREO
-    layout: ClassVar[Layout] = Layout(
-        "t_ns:Q budget:H count:H",
-        count=lambda value: within("n", value, 0, OBSERVATIONS_MAX),
-    )
+    def values(self) -> dict[str, Any]:
+        return vars(self) | {"count": len(self.ids)}
 
     def pack(self) -> bytes:
         count = len(self.ids)
         if count > OBSERVATIONS_MAX:
             raise ValueError(f"{count} observations in one frame, at most {OBSERVATIONS_MAX} fit")
-        rows = np.empty(count, OBSERVATION)
+        rows = np.empty(count, _STEREO_ROW)
         rows["id"] = self.ids
         rows["pixels"] = self.pixels
-        return self.layout.pack(vars(self) | {"count": count}) + rows.tobytes()
+        return super().pack() + rows.tobytes()
 
     @classmethod
-    def unpack(cls, payload: bytes) -> Stereo:
-        found = cls.layout.unpack(payload)
-        rows = _rows(payload, cls.layout.size, OBSERVATION, found["count"])
+    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
+        rows = _rows(payload, end, _STEREO_ROW, values["count"])
         ids, pixels = rows["id"].astype(np.uint32), rows["pixels"].astype(np.float32)
-        return cls(found["t_ns"], ids, pixels, found["budget"])
+        return cls(values["t_ns"], ids, pixels, values["budget"])
+
+
+# The row's numbers behind the id as one array.
+_STEREO_ROW = np.dtype(
+    [("id", OBSERVATION["id"]), ("pixels", "<f4", (len(OBSERVATION.names or ()) - 1,))]
+)
+assert _STEREO_ROW.itemsize == OBSERVATION.itemsize
 
 
 def _rows(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[Any]:
@@ -303,19 +304,16 @@ def _rows(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[An
 
 
 @dataclass(frozen=True, eq=False)
-class Truth(Message):
+class Truth(Message, kind=Kind.TRUTH):
     """A reference pose, body to world."""
 
     t_ns: int
     R_WB: Floats = identity()
     p_WB_m: Floats = zeros(3)
 
-    kind: ClassVar[Kind] = Kind.TRUTH
-    layout: ClassVar[Layout] = Layout("t_ns:Q R_WB:3x3d p_WB_m:3d")
-
 
 @dataclass(frozen=True, eq=False)
-class Reading(Message):
+class Reading(Message, kind=Kind.READING):
     """One to three numbers of a sensor at `at_B_m` on the body; bits of `axes` say which."""
 
     t_ns: int
@@ -325,40 +323,21 @@ class Reading(Message):
     sigma: Floats = zeros(3)
     at_B_m: Floats = zeros(3)
 
-    kind: ClassVar[Kind] = Kind.READING
-    layout: ClassVar[Layout] = Layout("t_ns:Q sensor:B axes:B value:3d sigma:3f at_B_m:3f")
-
 
 @dataclass(frozen=True, eq=False)
-class Text(Message):
+class Text(Message, kind=Kind.TEXT):
     """A remark; severity 0 info, 1 warning, 2 error."""
 
     text: str
     severity: int = 0
 
-    kind: ClassVar[Kind] = Kind.TEXT
-    layout: ClassVar[Layout] = Layout(
-        "severity:B", severity=lambda value: within("severity", value, 0, 2)
-    )
-
-    def pack(self) -> bytes:
-        text = self.text.encode("utf-8")
-        if len(text) > TEXT_BYTES_MAX:
-            raise ValueError(f"text of {len(text)} bytes, at most {TEXT_BYTES_MAX} fit a TEXT")
-        return super().pack() + text
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> Text:
-        text = payload[1:].decode("utf-8", errors="replace")
-        return cls(text, **cls.layout.unpack(payload))
-
 
 @dataclass(frozen=True, eq=False)
-class End(Message):
+class End(Message, kind=Kind.END):
     """How many frames there were; `frames` counts all before this one.
 
-    Bits of `differs` say of which kinds another number arrived than the END says that this one
-    answers, and `arrived_*`, in the same order, how many; the others are 0.
+    Bits of `differs` say of which kinds (COUNTED) another number arrived than the END says that
+    this one answers, and `arrived` how many; the others are 0.
     """
 
     twists: int
@@ -368,34 +347,19 @@ class End(Message):
     frames: int
     readings: int = 0
     differs: int = 0
-    arrived_twists: int = 0
-    arrived_stereos: int = 0
-    arrived_truths: int = 0
-    arrived_landmarks: int = 0
-    arrived_readings: int = 0
+    arrived: tuple[int, ...] = (0, 0, 0, 0, 0)
 
-    kind: ClassVar[Kind] = Kind.END
-    layout: ClassVar[Layout] = Layout("twists:I stereos:I truths:I landmarks:I frames:I")
-    tail: ClassVar[Layout] = Layout(
-        "readings:I differs:B arrived_twists:I arrived_stereos:I arrived_truths:I "
-        "arrived_landmarks:I arrived_readings:I"
-    )
+    COUNTED: ClassVar = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.LANDMARK, Kind.READING)
 
     @property
     def incomplete(self) -> dict[Kind, int]:
         """How many arrived, of the kinds of which that is another number than was sent."""
-        counts = (
-            (Kind.TWIST, self.arrived_twists),
-            (Kind.STEREO, self.arrived_stereos),
-            (Kind.TRUTH, self.arrived_truths),
-            (Kind.LANDMARK, self.arrived_landmarks),
-            (Kind.READING, self.arrived_readings),
-        )
+        counts = zip(self.COUNTED, self.arrived, strict=True)
         return {kind: count for at, (kind, count) in enumerate(counts) if self.differs >> at & 1}
 
 
 @dataclass(frozen=True, eq=False)
-class State(Message):
+class State(Message, kind=Kind.STATE):
     """Keep the filter's state, or bring it back at `t_ns`.
 
     `moved_variance` is how far the body may have moved meanwhile: variances of (rho, theta).
@@ -405,15 +369,14 @@ class State(Message):
     action: StateAction
     moved_variance: Floats = zeros(6)
 
-    kind: ClassVar[Kind] = Kind.STATE
-    layout: ClassVar[Layout] = Layout("t_ns:Q action:B moved_variance:6d", action=StateAction)
+    choices: ClassVar = {"action": StateAction}
 
 
 # --- what a filter writes (CONFIG and LANDMARK may come from a recorder too) ----------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Config(Message):
+class Config(Message, kind=Kind.CONFIG):
     """Settings by id (see `pelorus.settings`), and of which build they are in force."""
 
     settings: dict[int, float] = field(default_factory=dict)
@@ -423,26 +386,20 @@ class Config(Message):
     block_observations: int = 0
     real_bytes: int = 0
 
-    kind: ClassVar[Kind] = Kind.CONFIG
-    layout: ClassVar[Layout] = Layout(
-        "build_fingerprint:I max_landmarks:H max_observations:H block_observations:B "
-        "real_bytes:B count:B",
-        count=lambda value: within("n", value, 0, SETTINGS_MAX),
-    )
+    def values(self) -> dict[str, Any]:
+        return vars(self) | {"count": len(self.settings)}
 
     def pack(self) -> bytes:
-        fixed = self.layout.pack(vars(self) | {"count": len(self.settings)})
-        return fixed + np.array(list(self.settings.items()), SETTING).tobytes()
+        return super().pack() + np.array(list(self.settings.items()), SETTING).tobytes()
 
     @classmethod
-    def unpack(cls, payload: bytes) -> Config:
-        found = cls.layout.unpack(payload)
-        rows = _rows(payload, cls.layout.size, SETTING, found.pop("count"))
-        return cls({int(row["id"]): float(row["value"]) for row in rows}, **found)
+    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
+        rows = _rows(payload, end, SETTING, values.pop("count"))
+        return cls({int(row["id"]): float(row["value"]) for row in rows}, **values)
 
 
 @dataclass(frozen=True, eq=False)
-class Landmark(Message):
+class Landmark(Message, kind=Kind.LANDMARK):
     """A landmark in the world with its covariance, packed, m^2."""
 
     id: int
@@ -452,14 +409,11 @@ class Landmark(Message):
     t_ns: int = 0
     times_seen: int = 0
 
-    kind: ClassVar[Kind] = Kind.LANDMARK
-    layout: ClassVar[Layout] = Layout(
-        "t_ns:Q role:B _:B id:I times_seen:I p_W_m:3d covariance:6d", role=Role
-    )
+    choices: ClassVar = {"role": Role}
 
 
 @dataclass(frozen=True, eq=False)
-class Pose(Message):
+class Pose(Message, kind=Kind.POSE):
     """What the filter knew after a message; reals have `real_bytes` bytes, the position eight."""
 
     t_ns: int
@@ -476,42 +430,16 @@ class Pose(Message):
     trace: float = -1.0  # of the whole covariance; negative: not known
     bias_variance: Floats = unknown(6)  # negative: not known
 
-    kind: ClassVar[Kind] = Kind.POSE
-    layout: ClassVar[Layout] = Layout(
-        "t_ns:Q real_bytes:B after_stereo:B reset_count:H p_WB_m:3d",
-        after_stereo=lambda flags: bool(flags & 1),
-    )
-    tail: ClassVar[Layout] = Layout("trace:d bias_variance:6f")
-    REALS: ClassVar[dict[int, Layout]] = {
-        size: Layout(
-            f"R_WB:3x3{code} covariance:21{code} v_B_mps:3{code} w_B_radps:3{code} bias:6{code} "
-            f"velocity_covariance:21{code}"
-        )
-        for size, code in ((4, "f"), (8, "d"))
-    }
+    choices: ClassVar = {"after_stereo": lambda flags: bool(flags & 1)}
 
     @property
     def knows_covariance(self) -> bool:
         """False once the filter has diverged."""
         return bool(self.covariance[0] < UNKNOWN_VARIANCE)
 
-    def pack(self) -> bytes:
-        values = vars(self)
-        reals = self.REALS[self.real_bytes].pack(values)
-        return self.layout.pack(values) + reals + self.tail.pack(values)
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> Pose:
-        found = cls.layout.unpack(payload)
-        if found["real_bytes"] not in cls.REALS:
-            raise MalformedPayload(f"reals of {found['real_bytes']} bytes, 4 or 8 are defined")
-        layout = cls.REALS[found["real_bytes"]]
-        reals = layout.unpack(payload, cls.layout.size)
-        return cls(**found, **reals, **cls.added(payload, cls.layout.size + layout.size))
-
 
 @dataclass(frozen=True, eq=False)
-class Report(Message):
+class Report(Message, kind=Kind.REPORT):
     """What the filter did with one message; the counts are described on the format's page."""
 
     t_ns: int
@@ -538,30 +466,14 @@ class Report(Message):
     update_us: int = 0
     notice: int = Notice.NONE  # Notice, or one of a later version
 
-    kind: ClassVar[Kind] = Kind.REPORT
-    layout: ClassVar[Layout] = Layout(
-        "t_ns:Q subject:B status:b health:B _:B reasons:H budget:H observations:H matched:H used:H "
-        "gated:H created:H evicted:H refused:H duplicates:H no_room:H poor:H left_out:H "
-        "blocks_failed:H active:H nis_dof:H nis:f update_us:I",
-        status=lambda value: within("status", value, -128, 0),
-        health=lambda value: within("health", value, 0, 3),
-    )
-    UPPER: ClassVar[Layout] = Layout("reasons:H")  # the upper half of them; since format 1.2
-    tail: ClassVar[Layout] = Layout("notice:B _:B")
-
-    def pack(self) -> bytes:
+    def values(self) -> dict[str, Any]:
         upper, lower = divmod(self.reasons, 1 << 16)
-        fixed = self.layout.pack(vars(self) | {"reasons": lower})
-        return fixed + self.UPPER.pack({"reasons": upper}) + self.tail.pack(vars(self))
+        return vars(self) | {"reasons": lower, "reasons_upper": upper}
 
     @classmethod
-    def unpack(cls, payload: bytes) -> Report:
-        report = cls(**cls.layout.unpack(payload))
-        if len(payload) == cls.layout.size:
-            return report
-        upper = cls.UPPER.unpack(payload, cls.layout.size)["reasons"]
-        added = cls.added(payload, cls.layout.size + cls.UPPER.size)
-        return replace(report, reasons=upper << 16 | report.reasons, **added)
+    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
+        values["reasons"] |= values.pop("reasons_upper", 0) << 16
+        return cls(**values)
 
 
 KINDS: dict[int, type[Message]] = {cls.kind: cls for cls in Message.__subclasses__()}

@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""The bytes of a payload, told as a table of fields: name, shape and type, in their order."""
+"""The bytes of a payload, from a table of fields (`pelorus.schema`)."""
 
 from __future__ import annotations
 
-import math
-import re
 import struct
-from collections.abc import Callable, Iterator, Mapping
-from enum import EnumType
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby, islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.schema import Field, MessageTable
+
 Floats = NDArray[np.float64]
-FIELD = re.compile(r"(\w+):([\dx]*)([bBHIQfd])")
+CODES = {
+    **{"u8": "<B", "u16": "<H", "u32": "<I", "u64": "<Q", "i8": "<b"},
+    **{"f32": "<f", "f64": "<d"},
+}
+FLOATS = ("f32", "f64", "real")
 
 
 class MalformedPayload(ValueError):
@@ -34,58 +38,130 @@ def within(name: str, value: int, least: int, most: int) -> int:
     return value
 
 
-class Layout:
-    """`fields` are parted by blanks: `t_ns:Q`, `v_B_mps:3d`, `R_WB:3x3d`; the types are those of
-    Python's struct, little-endian without padding, and `_:B` is a byte without a meaning. An array
-    becomes float64. `choices` makes a field's value of the number: an enum, which refuses numbers
-    that it does not list, or a function.
-    """
+class _Run:
+    """Fields of one version that lie one behind the other, without a text among them."""
 
-    def __init__(self, fields: str, **choices: Callable[[int], Any]) -> None:
-        self._fields: list[tuple[str, tuple[int, ...]]] = []
-        codes = "<"
-        for field in fields.split():
-            name, shape, code = FIELD.fullmatch(field).groups()  # type: ignore[union-attr]
-            self._fields.append((name, tuple(int(n) for n in shape.split("x") if n)))
-            codes += f"{math.prod(self._fields[-1][1])}{code}"
-        self._struct = struct.Struct(codes)
-        self._choices = choices
-        self.size = self._struct.size
+    def __init__(self, fields: list[Field]) -> None:
+        self.fields = fields
+        self.since = fields[0].since
+        self.is_text = fields[0].type == "text"
+        self._sizes = (4, 8) if fields[0].type == "real" else (0,)  # of a real
+        self._structs = {} if self.is_text else {n: _struct(fields, n) for n in self._sizes}
+        self._shapes = [_shape(field) for field in fields]
 
     def pack(self, values: Mapping[str, Any]) -> bytes:
-        """Raises ValueError if an array has another shape than is due."""
-        return self._struct.pack(*self._flat(values))
+        return self._struct_for(values).pack(*self._flat(values))
+
+    def _struct_for(self, values: Mapping[str, Any]) -> struct.Struct:
+        return self._structs[values["real_bytes"] if len(self._sizes) > 1 else 0]
 
     def _flat(self, values: Mapping[str, Any]) -> Iterator[Any]:
-        for name, shape in self._fields:
-            value = values.get(name, 0)
+        for field, shape in zip(self.fields, self._shapes, strict=True):
+            value = values.get(field.name, 0 if field.least is None else field.least)
             if not shape:
                 yield value
-                continue
-            array = np.asarray(value, np.float64)
-            if array.shape != shape:
-                raise ValueError(f"{name} is an array of shape {array.shape} where {shape} is due")
-            yield from array.ravel().tolist()
+            elif field.type in FLOATS:
+                array = np.asarray(value, np.float64)
+                if array.shape != shape:
+                    raise ValueError(
+                        f"{field.name} is an array of shape {array.shape} where {shape} is due"
+                    )
+                yield from array.ravel().tolist()
+            else:
+                yield from value
 
-    def unpack(self, payload: bytes, offset: int = 0) -> dict[str, Any]:
-        """By name; MalformedPayload if there are not so many bytes, or one is not listed."""
-        need(payload, offset + self.size)
-        numbers = self._struct.unpack_from(payload, offset)
-        out: dict[str, Any] = {}
-        at = 0
-        for name, shape in self._fields:
-            end = at + math.prod(shape)
-            out[name] = np.array(numbers[at:end]).reshape(shape) if shape else numbers[at]
-            at = end
-        out.pop("_", None)
-        return out | {name: _chosen(name, out[name], by) for name, by in self._choices.items()}
+    def unpack(self, payload: bytes, at: int, values: dict[str, Any]) -> int:
+        """Adds to the values; where the fields end."""
+        numbers = self._struct_for(values)
+        need(payload, at + numbers.size)
+        found = iter(numbers.unpack_from(payload, at))
+        for field, shape in zip(self.fields, self._shapes, strict=True):
+            if not shape:
+                values[field.name] = next(found)
+                _check(field, values[field.name])
+            elif field.type in FLOATS:
+                values[field.name] = np.array(list(islice(found, field.count))).reshape(shape)
+            else:
+                values[field.name] = tuple(islice(found, field.count))
+        return at + numbers.size
 
 
-def _chosen(name: str, value: int, by: Callable[[int], Any]) -> Any:
-    if isinstance(by, EnumType):
-        listed = [int(choice) for choice in by]  # type: ignore[var-annotated]
-        within(name, value, min(listed), max(listed))
-    return by(value)
+class Layout:
+    """The bytes of a payload, by its table in `pelorus.schema`. Arrays become float64, and nine
+    numbers a 3x3 matrix.
+    """
+
+    def __init__(self, table: MessageTable) -> None:
+        self._name = table.name
+        self._runs = [_Run(list(run)) for _, run in groupby(table.fields, _run_of)]
+
+    def pack(self, values: Mapping[str, Any]) -> bytes:
+        """Raises ValueError where a value is none of its field."""
+        texts = {
+            run.fields[0].name: self._text(run.fields[0], values)
+            for run in self._runs
+            if run.is_text
+        }
+        told = dict(values) | {f"{name}_bytes": len(text) for name, text in texts.items()}
+        return b"".join(
+            texts[run.fields[0].name] if run.is_text else run.pack(told) for run in self._runs
+        )
+
+    def _text(self, field: Field, values: Mapping[str, Any]) -> bytes:
+        stored = str(values[field.name]).encode("utf-8")
+        if field.most is not None and len(stored) > field.most:
+            raise ValueError(
+                f"{field.name} of {len(stored)} bytes, at most {field.most} fit a {self._name}"
+            )
+        return stored
+
+    def unpack(self, payload: bytes) -> tuple[dict[str, Any], int]:
+        """Values by name, and where they end; MalformedPayload if there are not so many bytes, or a
+        value is not allowed. Fields that a later version added may be missing, in both.
+        """
+        values: dict[str, Any] = {}
+        at, since = 0, 0
+        for run in self._runs:
+            if run.since > since and at == len(payload):
+                break
+            since = run.since
+            if run.is_text:
+                name = run.fields[0].name
+                end = at + values.pop(f"{name}_bytes", len(payload) - at)
+                need(payload, end)
+                values[name] = payload[at:end].decode("utf-8", errors="replace")
+                at = end
+            else:
+                at = run.unpack(payload, at, values)
+        values.pop("_", None)
+        return values, at
+
+
+def row_type(fields: Sequence[Field]) -> np.dtype[Any]:
+    """That of numpy for a row of a message."""
+    return np.dtype([(field.name, CODES[field.type]) for field in fields])
+
+
+def _run_of(field: Field) -> tuple[str, int]:
+    """The size of a real is known behind the fields before the first one."""
+    return (field.type if field.type in ("text", "real") else "", field.since)
+
+
+def _struct(fields: Sequence[Field], real_bytes: int) -> struct.Struct:
+    codes = CODES | {"real": CODES["f32" if real_bytes == 4 else "f64"]}
+    return struct.Struct("<" + "".join(f"{f.count}{codes[f.type][-1]}" for f in fields))
+
+
+def _shape(field: Field) -> tuple[int, ...]:
+    return {1: (), 9: (3, 3)}.get(field.count, (field.count,))
+
+
+def _check(field: Field, value: int) -> None:
+    if field.least is not None and field.most is not None:
+        within(field.name, value, field.least, field.most)
+    if field.values and value not in field.values:
+        allowed = " or ".join(map(str, field.values))
+        raise MalformedPayload(f"{field.name} is {value}, {allowed} are defined")
 
 
 # --- symmetric matrices: lower triangles, row by row ----------------------------------------------

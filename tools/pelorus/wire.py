@@ -15,14 +15,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from pelorus import cobs, packed_file
+from pelorus import cobs, packed_file, schema
 from pelorus.errors import PelorusError
 from pelorus.frames import KINDS, End, Header, Kind, Message
 from pelorus.layout import MalformedPayload
 
-VERSION_MAJOR = 1
+VERSION_MAJOR = schema.LIMITS["version_major"]
 DELIMITER = b"\0"
-BODY_BYTES_MIN = 7  # kind, sequence, CRC
+BODY_BYTES_MIN = schema.LIMITS["overhead_bytes"]  # kind, sequence, CRC
 STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; bounds what is held
 SEQUENCE_MODULUS = 1 << 16
 FAULTS_KEPT = 100  # the first ones are remembered with their place, all are counted
@@ -199,15 +199,15 @@ class Reader:
 
 def end_of(counts: Counter[Kind], heard: End | None = None) -> End:
     """The END behind that many frames; what has arrived is as another END says."""
-    sent = {
-        "twists": counts[Kind.TWIST],
-        "stereos": counts[Kind.STEREO],
-        "truths": counts[Kind.TRUTH],
-        "landmarks": counts[Kind.LANDMARK],
-        "readings": counts[Kind.READING],
-        "frames": sum(counts.values()),
-    }
-    return End(**sent) if heard is None else replace(heard, **sent)
+    sent = End(
+        twists=counts[Kind.TWIST],
+        stereos=counts[Kind.STEREO],
+        truths=counts[Kind.TRUTH],
+        landmarks=counts[Kind.LANDMARK],
+        readings=counts[Kind.READING],
+        frames=sum(counts.values()),
+    )
+    return sent if heard is None else replace(sent, differs=heard.differs, arrived=heard.arrived)
 
 
 class Writer:

@@ -42,11 +42,11 @@ static bool is(const row *field, const char *type) {
 static void print_limits(const row *field) {
     if (is(field, "REAL_BYTES"))
         printf(", \"values\": [4, 8]");
-    if (is(field, "REST"))
-        printf(", \"to_the_end\": true");
-    if (is(field, "TEXT") || is(field, "REST"))
-        return;
-    if (field->most > 0 || is(field, "ZERO"))
+    if (is(field, "STATUS"))
+        printf(", \"least\": -128, \"most\": 0");
+    if (is(field, "REST") || is(field, "TEXT"))
+        printf(", \"most\": %u", field->most);
+    else if (field->most > 0 || is(field, "ZERO"))
         printf(", \"least\": %u, \"most\": %u", field->least, field->most);
 }
 

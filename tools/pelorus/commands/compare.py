@@ -17,7 +17,8 @@ from pelorus.flight.judge import Desk, Judgement, Verdict, judge, of_this_versio
 from pelorus.flight.log import NOWHERE, Frame, read_log
 from pelorus.frames import Config
 from pelorus.replay import find_programs
-from pelorus.robot.status import STATUSES, condition
+from pelorus.robot.status import condition
+from pelorus.schema import STATUSES
 
 LOSSES_SHOWN = 5
 START_HINT = "if the pelorus-replay that wrote the log was given --start, give it here too"

@@ -31,13 +31,14 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
-from pelorus.robot.status import STATUSES
 from pelorus.robot.stream import is_restore
+from pelorus.schema import STATUSES, number
 from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
 
 DATA_KINDS = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.READING)
-NOT_ARRIVED = (-1, -15, -16)  # statuses of what was damaged on the way
-FULL = -10
+# Statuses of what was damaged on the way.
+NOT_ARRIVED = tuple(number("status", name) for name in ("ARGUMENT", "CORRUPT", "FOREIGN"))
+FULL = number("status", "FULL")
 RIGHT = "`pelorus stream --record` and `pelorus-replay --out` write what a replay needs"
 
 

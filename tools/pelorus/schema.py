@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""The tables that the library in C is built from, as `pelorus-schema` prints them (tools/schema):
+layouts of messages, settings, statuses, reasons, limits. None of it is written a second time here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+_TABLES: dict[str, Any] = json.loads(files("pelorus").joinpath("schema.json").read_text("utf-8"))
+
+
+@dataclass(frozen=True)
+class Field:
+    """Numbers of a payload, or a text; in the order of the bytes."""
+
+    name: str
+    type: str  # u8 to u64, i8, f32, f64; real: of 4 or 8 bytes; text
+    count: int = 1
+    since: int = 0  # minor version
+    least: int | None = None
+    most: int | None = None  # of a text its bytes
+    values: Sequence[int] = ()  # nothing else is allowed
+    unit: str = ""
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class MessageTable:
+    """A kind of frame; `rows` follow as often as the last number before them says."""
+
+    kind: int
+    name: str
+    fields: tuple[Field, ...]
+    rows: tuple[Field, ...]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A row of the table of settings; `words` name the values of a choice."""
+
+    name: str
+    unit: str = ""
+    words: tuple[str, ...] = ()
+    of_axis: int = 0  # id of the setting that sets this one too, the sigma of a single axis
+
+
+def _message(row: dict[str, Any]) -> MessageTable:
+    fields, rows = (tuple(Field(**f) for f in row.get(key, ())) for key in ("fields", "rows"))
+    return MessageTable(row["kind"], row["name"], fields, rows)
+
+
+def _setting(row: dict[str, Any]) -> Setting:
+    return Setting(row["name"], row["unit"], tuple(row.get("words", ())), row.get("of_axis", 0))
+
+
+def _words(of: str) -> dict[int, str]:
+    return {row["number"]: row["words"] for row in _TABLES["words"] if row["of"] == of}
+
+
+LIMITS: dict[str, int] = _TABLES["limits"]
+MESSAGES: dict[str, MessageTable] = {row["name"]: _message(row) for row in _TABLES["messages"]}
+SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["settings"]}
+STATUSES = _words("status")
+HEALTHS = _words("health")
+REASONS = _words("reason")
+
+
+def number(of: str, name: str) -> int:
+    """What stands for a name: number("status", "CORRUPT") is -15."""
+    return next(
+        int(row["number"])
+        for row in (*_TABLES["enums"], *_TABLES["words"])
+        if (row["of"], row["name"]) == (of, name)
+    )
+
+
+def kind(name: str) -> int:
+    """The number of a kind of message."""
+    return MESSAGES[name].kind
