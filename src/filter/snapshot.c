@@ -95,7 +95,7 @@ static bool flush(plr_state_out *out) {
     return n == 0 || out->sink(out->context, out->buffer, n) == 0;
 }
 
-static bool append(void *context, uint8_t *bytes, unsigned n) {
+static bool to_sink(void *context, uint8_t *bytes, unsigned n) {
     plr_state_out *out = context;
     bool good = true;
     for (unsigned i = 0; i < n && good; i++) {
@@ -117,7 +117,7 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
     plr_state_out out = {.sink = sink, .context = context};
     plr_codec c = {.direction = sink ? PLR_CODEC_WRITE : PLR_CODEC_CHECK,
                    .finite = true,
-                   .move = append,
+                   .move = to_sink,
                    .context = &out};
     const plr_state_count count = {f->count};
     pass_origin(&c, f);
@@ -151,7 +151,7 @@ static bool refill(plr_state_in *in) {
 }
 
 /* The codec asks for no more than there is. */
-static bool take(void *context, uint8_t *bytes, unsigned n) {
+static bool from_source(void *context, uint8_t *bytes, unsigned n) {
     plr_state_in *in = context;
     for (unsigned i = 0; i < n; i++) {
         if (in->first == in->fill && !refill(in))
@@ -180,7 +180,7 @@ static plr_status check_covariance(plr_codec *c, unsigned dim) {
 
 /* Reads the whole state. f NULL: looks at it, and keeps nothing. `like` is the filter that it must
  * belong to. PLR_E_FOREIGN: of another build, of other settings, of another camera. */
-static plr_status read_state(plr_codec *c, plr_filter *f, const plr_filter *like) {
+static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like) {
     plr_state_count count = {0};
     const size_t length = c->left;
     c->direction = PLR_CODEC_MATCH;
@@ -217,15 +217,15 @@ plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source s
         return sound;
     const plr_state_in start = {.source = source, .context = context, .length = length};
     plr_state_in in = start;
-    const plr_codec begin = {.finite = true, .move = take, .context = &in, .left = length};
+    const plr_codec begin = {.finite = true, .move = from_source, .context = &in, .left = length};
     plr_codec c = begin;
-    plr_status status = read_state(&c, NULL, f);
+    plr_status status = read_whole(&c, NULL, f);
     if (status != PLR_OK)
         return status;
 
     in = start;
     c = begin;
-    status = read_state(&c, f, f);
+    status = read_whole(&c, f, f);
     if (status == PLR_OK)
         plr_guard_seal_whole(f);
     else

@@ -4,7 +4,6 @@
 #define PLR_RECORD_BYTES_H
 
 #include <stdint.h>
-#include <string.h>
 
 #include "pelorus/assertions.h"
 
@@ -24,28 +23,6 @@ static inline void plr_bytes_put(uint8_t *bytes, unsigned n, uint64_t value) {
         bytes[i] = (uint8_t)(value & 0xFF);
         value >>= 8;
     }
-}
-
-/* The bits of a floating-point number, and the number with given bits. They pass pointers, because
- * passing a signalling NaN by value may change it. */
-static inline uint32_t plr_bits_of_f32(const float *x) {
-    uint32_t bits;
-    memcpy(&bits, x, sizeof bits);
-    return bits;
-}
-
-static inline void plr_f32_of_bits(float *x, uint32_t bits) {
-    memcpy(x, &bits, sizeof bits);
-}
-
-static inline uint64_t plr_bits_of_f64(const double *x) {
-    uint64_t bits;
-    memcpy(&bits, x, sizeof bits);
-    return bits;
-}
-
-static inline void plr_f64_of_bits(double *x, uint64_t bits) {
-    memcpy(x, &bits, sizeof bits);
 }
 
 #endif

@@ -32,7 +32,7 @@ static void count_missing(plr_reader *r, uint16_t sequence) {
 }
 
 /* Takes the next n bytes of a payload. */
-static bool take(void *context, uint8_t *bytes, unsigned n) {
+static bool from_payload(void *context, uint8_t *bytes, unsigned n) {
     const uint8_t **payload = context;
     memcpy(bytes, *payload, n);
     *payload += n;
@@ -49,7 +49,7 @@ static plr_status decode(plr_reader *r, plr_message *message) {
     const uint8_t *payload = r->buffer + AT_PAYLOAD;
     const plr_observation_room room = {r->observations, r->max_observations};
     plr_codec codec = {.direction = PLR_CODEC_READ,
-                       .move = take,
+                       .move = from_payload,
                        .context = &payload,
                        .left = r->length - PLR_WIRE_OVERHEAD};
     message->kind = (plr_kind)r->buffer[0];

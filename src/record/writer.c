@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "record/bytes.h"
-#include "record/frame_out.h"
+#include "record/cobs.h"
 #include "record/messages.h"
 
 plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *context) {
@@ -12,15 +12,25 @@ plr_status plr_writer_init(plr_writer *w, plr_write_function write, void *contex
     return PLR_OK;
 }
 
-static bool put(void *writer, uint8_t *bytes, unsigned n) {
-    plr_frame_out_put(writer, bytes, n);
-    return true; /* a failure is kept in the writer */
+/* If the function of the caller fails, w->status says so, and the rest of the frame is not sent. */
+static void send(plr_writer *w, const uint8_t *bytes, size_t n) {
+    if (w->status == PLR_OK && n > 0 && w->write(w->context, bytes, n) != 0)
+        w->status = PLR_E_IO;
+}
+
+/* Sends n more bytes of a frame's body. */
+static bool to_frame(void *writer, uint8_t *bytes, unsigned n) {
+    plr_writer *w = writer;
+    w->crc = plr_crc32(w->crc, bytes, n);
+    for (unsigned i = 0; i < n; i++)
+        send(w, w->cobs.block, plr_cobs_encode(&w->cobs, bytes[i]));
+    return true; /* w->status has the failure */
 }
 
 /* The codec takes what it could read into; in these directions it only looks at it. END says what was
  * written, whatever the message says. */
 static plr_status pass_payload(plr_direction direction, plr_writer *w, const plr_message *message) {
-    plr_codec codec = {.direction = direction, .move = put, .context = w};
+    plr_codec codec = {.direction = direction, .move = to_frame, .context = w};
     if (message->kind == PLR_KIND_END) {
         plr_end end = w->counts;
         end.differs = message->as.end.differs;
@@ -33,13 +43,22 @@ static plr_status pass_payload(plr_direction direction, plr_writer *w, const plr
 }
 
 static plr_status send_frame(plr_writer *w, const plr_message *message) {
-    uint8_t head[3] = {(uint8_t)message->kind};
+    static const uint8_t delimiter = 0;
+    uint8_t head[3] = {(uint8_t)message->kind}, crc[4];
     plr_bytes_put(head + 1, 2, w->sequence);
     w->sequence = (uint16_t)(w->sequence + 1);
-    plr_frame_out_begin(w);
-    plr_frame_out_put(w, head, sizeof head);
+    w->status = PLR_OK;
+    w->crc = 0;
+    if (w->torn) /* the remains of the last frame end here */
+        send(w, &delimiter, 1);
+    plr_cobs_begin(&w->cobs);
+    to_frame(w, head, sizeof head);
     (void)pass_payload(PLR_CODEC_WRITE, w, message);
-    return plr_frame_out_end(w);
+    plr_bytes_put(crc, sizeof crc, w->crc);
+    to_frame(w, crc, sizeof crc);
+    send(w, w->cobs.block, plr_cobs_end(&w->cobs));
+    w->torn = w->status != PLR_OK;
+    return w->status;
 }
 
 static void count(plr_end *counts, plr_kind kind) {

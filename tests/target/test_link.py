@@ -7,7 +7,7 @@ import random
 import time
 
 import pytest
-from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo, Text, Twist
+from pelorus.frames import Header, Kind, Message, Notice, Pose, Report, Stereo, Text, Twist
 from pelorus.robot.compare import digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
@@ -36,14 +36,14 @@ def boots(streamer: Streamer) -> int:
 
 
 def answers_to(link: Link, sent: bytes, wanted: Kind | None = None) -> list[Message]:
-    """What comes until a REPORT on that kind, or until anything comes; boot messages included."""
+    """What comes until a REPORT on that kind, or until a TEXT: the boot message ends with one."""
     reader, deadline, answers = Reader(), time.monotonic() + HANG_S, []
     outgoing = sent
     while time.monotonic() < deadline:
         fresh = [got.message for got in reader.feed(link.exchange(outgoing, 0.1))]
         outgoing = b""
         answers += fresh
-        if wanted is None and answers:
+        if wanted is None and any(isinstance(answer, Text) for answer in answers):
             break
         if any(isinstance(answer, Report) and answer.subject == wanted for answer in fresh):
             break
@@ -163,7 +163,9 @@ def test_a_host_that_does_not_read_for_a_while_deadlocks_nothing(
 
 def test_data_before_a_header_is_refused(link: Link, messages: list[Message]) -> None:
     boot = answers_to(link, b"")
-    assert [type(message) for message in boot] == [Text]
+    assert [type(message) for message in boot] == [Report, Text]
+    assert isinstance(boot[0], Report)
+    assert boot[0].notice == Notice.STARTED
     stereo = messages[stereo_indices(messages)[0]]
     twist = next(message for message in messages if isinstance(message, Twist))
     answers = answers_to(link, b"\0" + encode(twist, 0) + encode(stereo, 1), Kind.STEREO)
@@ -203,7 +205,7 @@ def test_an_overlong_frame_is_refused_and_the_next_one_taken(
 
 
 def test_the_watchdog_is_fed_while_nothing_arrives(link: Link, messages: list[Message]) -> None:
-    assert len(answers_to(link, b"")) == 1  # the boot message
+    assert [message.kind for message in answers_to(link, b"")] == [Kind.REPORT, Kind.TEXT]  # boot
     assert link.exchange(b"", QUIET_S) == b""  # and no second one
     streamer = Streamer(link)
     assert len(streamer.run(messages).poses) == FRAMES

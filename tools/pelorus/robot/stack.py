@@ -36,19 +36,20 @@ HANDLERS = (
     r"save|compare_counts",
 )
 FILTER = (
-    r"plr_(filter|correct|gate|motion|slots)\w*|process|initialise_new|append_new|adopt_known"
-    r"|gate_each"
+    r"plr_(filter|predict|correct|gate|motion|slots|births|match|landmarks|stereo)\w*|process"
+    r"|gate_each|initialise_new|append_new|adopt_known"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
-    (r"plr_frame_out_\w+", ("write_to_port", "send")),
+    (r"to_frame|send_frame|plr_writer_put", ("write_to_port", "send")),
     (STORE, (DEVICE,)),
-    (r"exchange", ("put", "take", "append")),
-    (r"flush|refill|append|take", ("append_state", "read_state")),
+    (r"exchange|pass_\w+|plr_codec_\w+", ("from_payload", "to_frame", "from_source", "to_sink")),
+    (r"from_source|to_sink|plr_filter_save", ("append_state", "read_state")),
     (r"write_to_port", PORT),
     (SESSION, (*PORT, TELEMETRY)),
     (r"plr_input_handle", HANDLERS),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
+    (r"plr_correct", (*MODEL, "measure")),
     (FILTER, MODEL + MAP),
 )
 
