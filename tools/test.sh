@@ -160,7 +160,7 @@ build_and_test() {
 }
 
 check_format() {
-    find include src port tests -name '*.[ch]' -print0 |
+    find include src port tests tools -name '*.[ch]' -print0 |
         xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
 }
 

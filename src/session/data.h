@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: MIT
-/* TWIST, STEREO, TRUTH, READING, and START among them: s->in is one of them. */
+/* What happens to data: TWIST, STEREO, TRUTH and READING, and a START among them. The message is in
+ * s->in. */
 #ifndef PLR_SESSION_DATA_H
 #define PLR_SESSION_DATA_H
 
 #include "pelorus/session.h"
 
-/* With a filter that runs. */
+/* Each applies its message to the filter, which must be initialised. */
 void plr_data_use_twist(plr_session *s);
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
 void plr_data_use_reading(plr_session *s);
 
-/* Sets the pose anew. */
+/* Sets the filter's pose to that of a START. */
 void plr_data_use_start(plr_session *s);
 
-/* Lowers the budget of a STEREO to what the deadline allows. */
+/* Lowers the budget of a STEREO, the number of observations that may be used, to what can be
+ * computed before the deadline. */
 void plr_data_limit_frame(plr_session *s);
 
-/* Refuses a STEREO. */
+/* Answers a STEREO that is refused. */
 void plr_data_refuse_frame(plr_session *s, plr_status status);
 
-/* Applies the twists that are held back, of times up to until_ns. */
+/* Applies those of the delayed twists (setting twist-delay) whose time is at most until_ns. */
 void plr_data_apply_held(plr_session *s, plr_time_ns until_ns);
 
 #endif

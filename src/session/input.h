@@ -5,7 +5,7 @@
 
 #include "pelorus/session.h"
 
-/* Does with s->in what the table says. What END does besides is plr_session_finish's. */
+/* Handles s->in as the table says. After an END plr_session_finish does the rest. */
 void plr_input_handle(plr_session *s);
 
 #endif

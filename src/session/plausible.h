@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 /*
- * Numbers that no sensor gives. What arrives is finite or not, which the filter looks at itself; but
- * a speed of 1e30 m/s is finite, and accepted as a reading it would make every step from there on
- * impossible. Beyond these limits a number is a fault of the sender, and its message is refused
- * with PLR_E_RANGE:
+ * Finds numbers that no sensor measures. A speed of 1e30 m/s is finite, and a filter that used it
+ * could never continue. A message with a number beyond one of these limits is refused with
+ * PLR_E_RANGE:
  *
  *     speed, and its bias          1e4 m/s
  *     turn rate, and its bias      1e3 rad/s
  *     position                     1e9 m
  *     variance, covariance         1e12, in any unit
  *
- * What is not finite passes: it is refused further on, for what it is.
+ * NaN and infinity are within the limits here, because the filter refuses them with a status of
+ * their own.
  */
 #ifndef PLR_SESSION_PLAUSIBLE_H
 #define PLR_SESSION_PLAUSIBLE_H
@@ -26,7 +26,7 @@ bool plr_plausible_pose(const plr_pose *pose);
 /* A START's bias prior. */
 bool plr_plausible_bias(const plr_start *start);
 
-/* Every one of n numbers is finite. */
+/* True if all n numbers are finite. */
 bool plr_plausible_finite(const double *x, unsigned n);
 
 bool plr_plausible_variance(const double *variance, unsigned n);

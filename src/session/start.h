@@ -1,51 +1,53 @@
 // SPDX-License-Identifier: MIT
-/* From a HEADER to a running filter with a start pose. */
+/* How a drive begins: HEADER, settings, known landmarks, the filter, its start pose. */
 #ifndef PLR_SESSION_START_H
 #define PLR_SESSION_START_H
 
 #include "pelorus/session.h"
 
-/* Forgets everything that came before: counts, settings, START, known landmarks, held twists. */
+/* Clears what belongs to a drive: counts, settings, START, known landmarks, delayed twists. */
 void plr_start_clear(plr_session *s);
 
-/* s->in is a HEADER or CONFIG. True if it says what is in force already. */
+/* True if s->in, a HEADER or CONFIG, equals the one in use. */
 bool plr_start_in_force(const plr_session *s);
 
-/* s->in is a HEADER: begins a drive. */
+/* Begins a drive with the HEADER s->in. */
 void plr_start_begin(plr_session *s);
 
-/* s->in is a CONFIG, before the data. A value that no setting allows is refused, the others count. */
+/* Adds the settings of the CONFIG s->in, before the data. A value that its setting does not allow is
+ * refused; the others are used. */
 void plr_start_change_settings(plr_session *s);
 
-/* s->in is a START: keeps it until its time comes, if the options ask for one. */
+/* Stores the START s->in until its time has come, if the options use one. */
 void plr_start_keep(plr_session *s);
 
-/* s->in is a LANDMARK (known). */
+/* Adds the known LANDMARK s->in to the map. */
 void plr_start_add_landmark(plr_session *s);
 
-/* In PLR_PHASE_READY: composes the settings and initialises the filter. On an error what is wrong
- * has been refused, and the phase is PLR_PHASE_REJECTED. */
+/* In PLR_PHASE_READY: determines the settings and initialises the filter. On an error a refusal has
+ * been sent, and the phase is PLR_PHASE_REJECTED. */
 plr_status plr_start_filter(plr_session *s);
 
-/* Before the first data reaches the filter: sends the CONFIG in force and the map, and warns. */
+/* Before the filter uses the first data: sends the CONFIG in use, the known landmarks of the option
+ * `map`, and warnings. */
 void plr_start_announce(plr_session *s);
 
-/* The bias that a START gave, whatever the pose starts from. */
+/* Sets the bias prior of a START, if there is one; also if the pose starts from something else. */
 void plr_start_set_bias(plr_session *s);
 
-/* Sets the pose. If none was set before, it is the start. P_xi as in plr_filter_set_pose. A refusal
- * is sent with that subject. */
+/* Sets the filter's pose, which is the start pose if none was set before. P_xi as in
+ * plr_filter_set_pose. If it is refused, a REPORT of that subject is sent. */
 void plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, const plr_pose *T_WB,
                         const double *P_xi);
 
 /* Sets the pose to that of s->start. */
 void plr_start_apply(plr_session *s);
 
-/* Before data of time t_ns: applies a START whose time has come. */
+/* Call before data of time t_ns: applies the stored START if its time has come. */
 void plr_start_apply_until(plr_session *s, plr_time_ns t_ns);
 
-/* Before a frame of time t_ns: the same, and without a START the pose starts where the options say.
- * The phase stays PLR_PHASE_STARTING if they ask for a START or TRUTH that has not come. */
+/* Call before a frame of time t_ns: the same; without a START the pose starts where the options say.
+ * If they need a START or TRUTH that has not arrived, the phase stays PLR_PHASE_STARTING. */
 void plr_start_choose(plr_session *s, plr_time_ns t_ns);
 
 #endif

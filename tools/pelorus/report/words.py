@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pelorus import schema
 from pelorus.frames import Header
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import Run
@@ -51,8 +52,10 @@ def _factor(value: Any) -> str:
 
 # --- what is off ----------------------------------------------------------------------------------
 
-# Bits of plr_reason (types.h).
-GATE_LOCKED, GATE_INERT, NIS_HIGH, NOT_POSITIVE = 1 << 2, 1 << 3, 1 << 8, 1 << 10
+GATE_LOCKED, GATE_INERT, NIS_HIGH, NOT_POSITIVE = (
+    schema.number("reason", name)
+    for name in ("GATE_LOCKED", "GATE_INERT", "NIS_HIGH", "NOT_POSITIVE")
+)
 NEES_HIGH, NEES_LOW = 2.0, 0.3
 FRAMES_ENOUGH = 20  # below, a mean NEES says nothing
 GATED_MANY = 0.2  # of the matched observations
