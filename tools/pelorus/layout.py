@@ -57,7 +57,7 @@ class _Run:
 
     def _flat(self, values: Mapping[str, Any]) -> Iterator[Any]:
         for field, shape in zip(self.fields, self._shapes, strict=True):
-            value = 0 if field.name == "_" else values[field.name]
+            value: Any = 0 if field.name == "_" else values[field.name]
             if not shape:
                 yield value
             elif field.type in FLOATS:
