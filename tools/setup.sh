@@ -147,7 +147,7 @@ build_robot() {
     local options=()
     mkdir -p "$ROBOT"
     case " $* " in *' bench '*)
-        "$VENV/bin/python" -m pelorus.robot.sizes recording "$ROBOT/bench.plr" || return 1
+        PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes recording "$ROBOT/bench.plr" || return 1
         options=('-DPELORUS_CAPACITIES=8;16;32;64' -DPELORUS_BENCH_RECORDING="$ROBOT/bench.plr")
         ;;
     esac

@@ -32,5 +32,5 @@ if ! build_robot boards bench >"$LOGS/sizes-build.log" 2>&1; then
 fi
 
 heading 'Measuring under QEMU'
-"$VENV/bin/python" -m pelorus.robot.sizes "$action" "$ROBOT" "$ROOT/docs/SIZES.md"
+PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes "$action" "$ROBOT" "$ROOT/docs/SIZES.md"
 [ "$action" = check ] || echo 'docs/SIZES.md'

@@ -288,7 +288,6 @@ OPENS = re.compile(
 OWN = (
     *("packed_file.py", "report/page.py", "replay.py", "schema.py"),
     *("robot/compare.py", "robot/emulator.py", "robot/serial.py"),
-    *("robot/sizes.py", "robot/stack.py"),
 )
 
 

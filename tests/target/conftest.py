@@ -7,6 +7,7 @@ with --boards (every test is asked of each), --robot (the firmware's build folde
 from __future__ import annotations
 
 import signal
+import sys
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,9 @@ from pelorus.robot import stream
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.wire import read_file
+
+# For firmware.stack, which is no part of the package.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 LONGEST = ("test_bits", "test_new_board")
 HANG_S = 1800.0  # nothing is awaited by the clock: only what hangs is ended

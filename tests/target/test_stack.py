@@ -6,9 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from firmware.sizes import PROCESSORS
+from firmware.stack import image_bound
 from gdb_stub import symbol
-from pelorus.robot.sizes import PROCESSORS
-from pelorus.robot.stack import image_bound
 
 FLOAT64_BOARD = "mps2_an500"
 

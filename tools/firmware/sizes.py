@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What the filter costs on each board: docs/SIZES.md, made and compared.
 
-usage: python -m pelorus.robot.sizes recording OUT.plr
-       python -m pelorus.robot.sizes write|check BUILD_FOLDER DOCUMENT
+usage: PYTHONPATH=tools python -m firmware.sizes recording OUT.plr
+       PYTHONPATH=tools python -m firmware.sizes write|check BUILD_FOLDER DOCUMENT
 
 `recording` makes what the bench images carry. `write` measures all images of a build folder and
 writes the document; `check` measures, and compares with the document's numbers. tools/sizes.sh
@@ -19,14 +19,14 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from scipy.optimize import nnls
-
 from pelorus.console import err, out, progress
 from pelorus.errors import PelorusError
 from pelorus.frames import Kind, Message, Stereo
 from pelorus.robot.emulator import MACHINES, Emulator
-from pelorus.robot.stack import image_bound
 from pelorus.wire import Writer, read_file
+from scipy.optimize import nnls
+
+from firmware.stack import image_bound
 
 FRAME_OBSERVATIONS = 20
 BUSY_OBSERVATIONS = 60
@@ -306,7 +306,7 @@ In bytes. *Flash*: code, constants and initial values. *RAM*: everything static,
 *Filter* is `sizeof(plr_filter)`, the state with its workspace; *session* is what the loop adds to
 it: wire buffers, messages, held twists. *Stack, bound* is the deepest chain of calls that there can
 be, from the compiler's own account (`-fstack-usage`, call graph; calls through pointers are
-resolved by the table in `tools/pelorus/robot/stack.py`; no recursion, no frame without a
+resolved by the table in `tools/firmware/stack.py`; no recursion, no frame without a
 bound) with one interrupt on top. *Stack, seen* is what the bench image used,
 without interrupts and session.
 
