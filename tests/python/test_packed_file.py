@@ -14,7 +14,7 @@ from converted import Run
 from fake_board import FakeBoard, TcpBoard
 from pelorus import packed_file, wire
 from pelorus.frames import Stereo
-from replay_drive import BIN, drive, encode
+from replay_drive import BIN, FRAMES, drive, encode
 from report_runs import built_programs
 
 
@@ -106,15 +106,10 @@ def test_a_simulated_drive_is_packed_by_its_name(pelorus: Run, tmp_path: Path) -
 def test_a_command_takes_a_packed_recording(pelorus: Run, tmp_path: Path, command: str) -> None:
     """Though the replay may know no zstd."""
     built_programs()
-    path, out = packed(tmp_path, encode(drive())), tmp_path / "out"
-    common: tuple[object, ...] = (path, "--out", out, "--bin", BIN)
-    if command == "info":
-        common = (path,)
-    if command == "evaluate":
-        said = pelorus("course", *common)
-        assert said.status == 0, said.err
-        common = (out / "runs" / "drive" / "body.tum", "--truth", path)
-    said = pelorus(command, *common)
+    frames = 1 if command == "report" else FRAMES  # of one it draws one picture, of more many
+    path, out = packed(tmp_path, encode(drive(frames))), tmp_path / "out"
+    options: dict[str, tuple[object, ...]] = {"info": (), "evaluate": ("--bin", BIN)}
+    said = pelorus(command, path, *options.get(command, ("--out", out, "--bin", BIN)))
     assert said.status == 0, said.err
 
 

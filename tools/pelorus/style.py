@@ -104,4 +104,4 @@ def seconds(t_ns: Times, origin_ns: int) -> Floats:
 def save(draw: Callable[[], Figure], path: Path) -> None:
     """Draw and write a PNG."""
     with writing(path), rc_context(LOOK):
-        draw().savefig(path, format="png", pil_kwargs={"optimize": True})
+        draw().savefig(path, format="png")

@@ -10,6 +10,9 @@ import typer
 
 from pelorus.frames import TwistTiming
 
+CONFIG = typer.Option(
+    None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
+)
 SETTINGS = typer.Option(
     [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
 )

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from pelorus import evaluation, road
-from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.errors import PelorusError
 from pelorus.evaluation import Figures, assess, judge, known_in
@@ -64,9 +64,7 @@ def evaluate(
     tolerance: float = typer.Option(
         1e-6, metavar="S", help="Times that differ by no more are equal."
     ),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
     as_json: bool = typer.Option(False, "--json", help="Print one JSON object."),

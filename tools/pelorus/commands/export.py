@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from pelorus import export as tables
-from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.evaluation import made_in
 from pelorus.frame_table import frame_table, write_csv
 from pelorus.replay import result_of
@@ -38,9 +38,7 @@ def export(
         help="The landmarks that left the state, and those at the end: with covariance, for "
         "pelorus convert map; or to look at.",
     ),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
 ) -> None:

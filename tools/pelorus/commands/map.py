@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.grid import files, occupancy
 from pelorus.grid.occupancy import Band, Grid, Wish
@@ -47,9 +47,7 @@ def map_(
     range_: float = typer.Option(
         Wish.range_m, "--range", metavar="M", help="Greatest distance from the camera that counts."
     ),
-    config: Path | None = typer.Option(
-        None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
-    ),
+    config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
     programs: Path | None = PROGRAMS,
 ) -> None:
