@@ -217,7 +217,7 @@ def map_figures(made: Sequence[Landmark], known: Sequence[Landmark], A: Poses = 
 
 # --- a whole result -------------------------------------------------------------------------------
 
-OF_POSES = ("err0_m", "ate_m", "rot_deg", "nees_per_dof")
+OF_POSES = ("err0_m", "ate_m", "rot_deg", "nees_per_dof", "nees_left_out")
 MODE, KNOWN_MAP = 2, 5  # ids of settings
 MAPPING, LOCALIZATION = 1, 2  # modes
 
@@ -254,7 +254,7 @@ def judge(
     accuracy = None
     if found is not None and truth is not None:
         accuracy = assess(found[0], truth, found[1], tolerance_ns)
-    figures: Figures = dict.fromkeys(OF_POSES) | {"truth_frames": 0, "nees_left_out": 0}
+    figures: Figures = dict.fromkeys(OF_POSES) | {"truth_frames": 0}
     if accuracy is not None:
         figures = accuracy.figures
     if is_mapping(messages):

@@ -136,6 +136,7 @@ def _show(found: Figures) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     for key, value in found.items():
         if value is not None:
-            text = str(value) if isinstance(value, int) else f"{value:.3f}"
+            text = f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
+            text = str(value) if isinstance(value, int) else text
             table.add_row(key, text, MEANING[key])
     out.print(table)
