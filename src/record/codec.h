@@ -48,7 +48,7 @@ typedef struct plr_field {
     uint16_t most;   /* greatest value of a whole number, 0: any; of a text its greatest length */
     uint8_t kind;    /* plr_field_kind */
     uint8_t count;   /* numbers, one behind the other */
-    uint8_t least;   /* least value of a whole number */
+    uint8_t least;   /* least value, where there is a greatest one */
     uint8_t since;   /* minor version that added it at the end. Where the bytes end before it, whole
                         numbers are 0 and others -1 */
 } plr_field;
@@ -76,8 +76,7 @@ typedef struct plr_codec {
 
     /* What numbers say of those that follow. */
     uint8_t real_bytes;
-    uint8_t length;  /* of a text */
-    uint16_t number; /* the last whole number */
+    uint8_t length; /* of a text */
 } plr_codec;
 
 static inline bool plr_codec_reads(const plr_codec *c) {

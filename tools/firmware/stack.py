@@ -43,7 +43,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
     (r"to_frame|send_frame|plr_writer_put", ("write_to_port", "send")),
     (STORE, (DEVICE,)),
-    (r"exchange|pass_\w+|plr_codec_\w+", ("from_payload", "to_frame", "from_source", "to_sink")),
+    (r"move|pass_\w+|plr_codec_\w+", ("from_payload", "to_frame", "from_source", "to_sink")),
     (r"from_source|to_sink|plr_filter_save", ("append_state", "read_state")),
     (r"write_to_port", PORT),
     (SESSION, (*PORT, TELEMETRY)),
