@@ -49,7 +49,9 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (SESSION, (*PORT, TELEMETRY)),
     (r"plr_input_handle", HANDLERS),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
-    (r"plr_correct", (*MODEL, "measure")),
+    (r"plr_correct", (*MODEL, "measure", "given")),
+    (r"hold|apply", (*MODEL, "measure")),
+    (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
     (FILTER, MODEL + MAP),
 )
 
