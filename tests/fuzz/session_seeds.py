@@ -25,6 +25,8 @@ from pelorus.frames import (
     End,
     Landmark,
     Message,
+    Reading,
+    Sensor,
     Start,
     StartFlag,
     State,
@@ -105,6 +107,7 @@ def seeds() -> dict[str, bytes]:
         "clock-jumps": choices(SLAM) + records(jumping(recording)),
         "evicts": choices(TIGHT) + records(drive(known=False, loss=0.5, observations=4)),
         "gate-locks": choices(SLAM) + records(locked()),
+        "readings": choices(BIAS | SLAM) + records(measured(recording)),
         "stream": choices(STREAM | BIAS) + stream(recording),
     }
 
@@ -138,6 +141,22 @@ def jumping(recording: list[Message]) -> list[Message]:
     half = _half(recording)
     away = [replace(m, t_ns=m.t_ns + 10**13) for m in recording[half:] if isinstance(m, Data)]
     return [*recording[:half], *away]
+
+
+def measured(recording: list[Message]) -> list[Message]:
+    """With a wheel at each twist, a position at each truth, and a standstill of one axis."""
+    arm = np.array([0.5, -0.2, 0.1])
+    out = [recording[0]]
+    for message in recording[1:]:
+        out.append(message)
+        match message:
+            case Twist(t_ns, v, w):
+                speed = v + np.cross(w, arm)
+                out.append(Reading(t_ns, Sensor.WHEEL, 5, speed, np.full(3, 0.1), arm))
+            case Truth(t_ns, R, p):
+                out.append(Reading(t_ns, Sensor.POSITION, 7, p + R @ arm, np.full(3, 0.3), arm))
+                out.append(Reading(t_ns, Sensor.STANDSTILL, 2, sigma=np.full(3, 0.05)))
+    return out
 
 
 def locked() -> list[Message]:
