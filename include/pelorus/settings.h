@@ -185,6 +185,14 @@ typedef struct plr_config {
      * later than newer twists is still processed in order of time. Choose the camera's delay from
      * shutter to message. At most PLR_SESSION_HELD_TWISTS are held. */
     double twist_delay_s;
+
+    /* Setting standstill-sigma [m/s]: 0 to 1, default 0.
+     * How still a robot is that stands, m/s, and rad/s for its turning; 0: standing is not detected.
+     * Above 0 the filter takes the body for standing where for a second no pixel moved by more than its
+     * noise and the twists do not say otherwise, and measures a velocity of zero with this sigma. The
+     * pixels cannot tell a slower motion from none: choose about pixel-sigma times the usual depth over
+     * the focal length, per second (2 px, 5 m, 500 px: 0.02 m/s). */
+    double standstill_sigma_mps;
 } plr_config;
 
 /* How a setting's value is written. */

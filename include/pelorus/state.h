@@ -74,13 +74,15 @@ typedef struct plr_slot {
     uint32_t last_frame; /* number of the frame that saw it last */
     uint32_t print;      /* checksum of its pixels when it was last seen */
     plr_time_ns last_seen_ns;
-    plr_real lean[3];       /* sum of its whitened innovations, older ones weighted less */
-    plr_real lean_variance; /* the variance that lean has if the innovations are white noise */
-    uint8_t known;          /* 1: given by a map source or plr_filter_insert_known */
-    uint8_t strays;         /* 1: the innovations are not white: the point moves */
-    uint8_t chances;        /* times it was initialised again after repeated rejection */
-    uint16_t accepted;      /* frames that used it since it was last initialised */
-    uint16_t rejected;      /* successive frames in which the gate rejected it */
+    plr_real lean[3];          /* sum of its whitened innovations, older ones weighted less */
+    plr_real lean_variance;    /* the variance that lean has if the innovations are white noise */
+    plr_real anchor[PLR_ROWS]; /* its pixels (uL, uR, v) when the body last began to stand */
+    uint8_t anchored;          /* 1: anchor is filled */
+    uint8_t known;             /* 1: given by a map source or plr_filter_insert_known */
+    uint8_t strays;            /* 1: the innovations are not white: the point moves */
+    uint8_t chances;           /* times it was initialised again after repeated rejection */
+    uint16_t accepted;         /* frames that used it since it was last initialised */
+    uint16_t rejected;         /* successive frames in which the gate rejected it */
 } plr_slot;
 
 /* Motion that is already in the pose but not yet in the covariance: D = (I + E, p) with
@@ -216,6 +218,7 @@ typedef struct plr_filter {
         bias_Lambda[PLR_POSE_SQUARE]; /* what held velocities said of the biases since the last */
     plr_real bias_eta[PLR_BIAS_DIM];  /* correction: information Lambda db = eta */
     uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
+    plr_time_ns still_since_ns;              /* no pixel has moved since; 0: one has */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];

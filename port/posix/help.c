@@ -23,7 +23,7 @@ static const struct {
     {"What is estimated", {"model", "mode", "bias", "slots", "known-map"}},
     {"Motion",
      {"twist-timing", "noise", "velocity-sigma", "gyro-sigma", "bias-velocity-sigma",
-      "bias-gyro-sigma", "bias-velocity-walk", "bias-gyro-walk"}},
+      "bias-gyro-sigma", "bias-velocity-walk", "bias-gyro-walk", "standstill-sigma"}},
     {"Vision",
      {"pixel-sigma", "gate-d2", "gate-residual", "min-depth", "min-disparity", "max-depth",
       "max-row-gap", "max-range", "landmark-sigma", "landmark-prior"}},

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* A reading of a small sensor: checked, gated, and applied, or held until the next one. */
+#include "filter/measure.h"
+
 #include <string.h>
 
 #include "filter/correction.h"
@@ -137,6 +139,15 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     return true;
 }
 
+bool plr_measure(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
+    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
+    result->used =
+        kind->of_twist ? hold(f, kind, reading, result) : apply(f, kind, reading, result);
+    f->totals.readings++;
+    f->totals.readings_gated += !result->used;
+    return result->used;
+}
+
 static plr_status refuse(plr_filter *f, plr_status status, plr_reading_result *result) {
     f->totals.readings_refused++;
     result->status = status;
@@ -158,13 +169,10 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
         status = check_time(f, reading);
     if (status != PLR_OK)
         return refuse(f, status, got);
-    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
     plr_predict_to(f, reading->t_ns);
-    got->used = kind->of_twist ? hold(f, kind, reading, got) : apply(f, kind, reading, got);
     uint16_t *rejected = &f->readings_rejected[reading->sensor - 1];
-    *rejected = got->used ? 0 : (uint16_t)(*rejected + (*rejected < UINT16_MAX));
-    f->totals.readings++;
-    f->totals.readings_gated += !got->used;
+    const bool used = plr_measure(f, reading, got);
+    *rejected = used ? 0 : (uint16_t)(*rejected + (*rejected < UINT16_MAX));
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

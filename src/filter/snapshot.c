@@ -4,6 +4,8 @@
  * derives from settings and calibration is not restored, but compared: a state belongs to the filter
  * that it was saved from.
  */
+#include <string.h>
+
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "math/packed.h"
@@ -199,6 +201,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         f->count = count.landmarks;
         f->diverged = 0;
         plr_velocity_forget(f); /* their clock is not the one that goes on */
+        memset(f->slots, 0, sizeof f->slots);
     }
     for (unsigned slot = 0; slot < count.landmarks; slot++)
         PASS(c, f ? &f->slots[slot] : NULL, slot);

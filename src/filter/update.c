@@ -13,6 +13,7 @@
 #include "filter/guard.h"
 #include "filter/health.h"
 #include "filter/matching.h"
+#include "filter/measure.h"
 #include "filter/motion_first.h"
 #include "filter/predict.h"
 #include "filter/tracks.h"
@@ -20,6 +21,7 @@
 #include "math/small.h"
 #include "process/twist.h"
 #include "process/velocity.h"
+#include "sensor/sensor.h"
 #include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/motion.h"
@@ -164,6 +166,10 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_match_count(f, n);
     if (f->config.model == PLR_MODEL_BODY && plr_consistency_is_frozen(f, frame, n))
         n = 0; /* it says nothing of now */
+    plr_reading still;
+    plr_reading_result unused = {0};
+    if (f->reading_valid && plr_standstill_is_seen(f, frame, n, &still))
+        (void)plr_measure(f, &still, &unused);
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
                        f->config.mode == PLR_MODE_SLAM;
     const plr_correction correction =

@@ -60,6 +60,7 @@ static const plr_row rows[] = {
     {{28, "velocity-sigma-z", "m/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[2]), STORE_DOUBLE},
     {{29, "gyro-sigma-y", "rad/s", "of the y axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma[1]), STORE_DOUBLE},
     {{30, "gyro-sigma-z", "rad/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma[2]), STORE_DOUBLE},
+    {{31, "standstill-sigma", "m/s", "detected standing is measured with it, m/s and rad/s; 0 = off", PLR_SETTING_NUMBER, NULL, 0, 1, 0}, AT(standstill_sigma_mps), STORE_DOUBLE},
 };
 /* clang-format on */
 

@@ -228,6 +228,41 @@ static void test_positions_without_biases_too(void) {
     demand_consistent(got.nees_pose, "pose");
 }
 
+/* ---------------------------------------------------------------- standing is detected */
+
+static uint32_t readings_after(unsigned frames) {
+    rig_begin();
+    rig_drive(frames);
+    return rig.filter.totals.readings - rig.filter.totals.readings_gated;
+}
+
+static void test_standing_is_detected_from_the_pixels_and_only_if_asked_for(void) {
+    rig.options.speed_mps = rig.options.turn_radps = rig.options.sway = 0;
+    TEST_ASSERT_EQUAL_UINT32(0, readings_after(50));
+    rig.config.standstill_sigma_mps = 0.02;
+    TEST_ASSERT_GREATER_THAN_UINT32(30, readings_after(50));
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health);
+    double P[36], b[6];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
+    for (int i = 0; i < 3; i++)
+        TEST_ASSERT_LESS_THAN_DOUBLE(rig.config.bias_velocity_sigma_mps, 2 * sqrt(P[7 * i]));
+}
+
+static void test_creeping_is_not_standing(void) {
+    rig.options.speed_mps = 0.1;
+    rig.options.turn_radps = rig.options.sway = 0;
+    rig.config.standstill_sigma_mps = 0.02;
+    TEST_ASSERT_EQUAL_UINT32(0, readings_after(100));
+}
+
+static void test_turning_wheels_before_a_still_picture_are_not_standing(void) {
+    rig.options.speed_mps = rig.options.turn_radps = rig.options.sway = 0;
+    rig.config.standstill_sigma_mps = 0.02;
+    rig.config.gate_d2 = 13;
+    rig.options.bias[0] = 1.5; /* they spin on ice */
+    TEST_ASSERT_EQUAL_UINT32(0, readings_after(40));
+}
+
 /* ---------------------------------------------------------------- what is refused, and rejected */
 
 static void refuse(plr_reading reading, plr_status expected) {
@@ -313,6 +348,9 @@ int main(void) {
     RUN_TEST(test_positions_bound_the_error);
     RUN_TEST(test_a_height_alone);
     RUN_TEST(test_positions_without_biases_too);
+    RUN_TEST(test_standing_is_detected_from_the_pixels_and_only_if_asked_for);
+    RUN_TEST(test_creeping_is_not_standing);
+    RUN_TEST(test_turning_wheels_before_a_still_picture_are_not_standing);
     RUN_TEST(test_bad_readings_are_refused_and_change_nothing);
     RUN_TEST(test_what_the_gate_rejects_changes_nothing_but_the_time);
     RUN_TEST(test_ten_rejected_in_succession_are_a_reason);

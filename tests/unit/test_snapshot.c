@@ -262,11 +262,11 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 /* docs/STATE-FORMAT.md, by its own figures. */
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
-    const uint32_t count_at = 13 + 9 * 30 + 17 * real;
+    const uint32_t count_at = 13 + 9 * 31 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 107 * real;
     const uint32_t health_at = frames_at + 4 + 6 + 4 + 144 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
-    const uint32_t slots_at = totals_at + 56 + 56;
+    const uint32_t slots_at = totals_at + 68 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
     start(&driven);
     drive(&driven, NULL, 5);
@@ -275,7 +275,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
     TEST_ASSERT_EQUAL_UINT32(2, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
-    TEST_ASSERT_EQUAL_UINT(30, state.bytes[12]);
+    TEST_ASSERT_EQUAL_UINT(31, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.frame_number, number_at(frames_at, 4));
@@ -283,11 +283,11 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_HEX32(driven.reasons, number_at(health_at + 1, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.last_frame_ns, number_at(health_at + 5, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.totals.twists, number_at(totals_at, 4));
-    TEST_ASSERT_EQUAL_UINT64(driven.totals.created, number_at(totals_at + 56 + 4 * 8, 8));
+    TEST_ASSERT_EQUAL_UINT64(driven.totals.created, number_at(totals_at + 68 + 4 * 8, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].print, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(490 + 268 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(511 + 268 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
                              state.length);
 }
