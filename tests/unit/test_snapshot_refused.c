@@ -20,7 +20,7 @@ enum {
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
     FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 107 * REAL,
     HEALTH_AT = FRAMES_AT + 4 + 6 + 4 + 144 * REAL, /* doubtful stands before it */
-    SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 56 + 56,
+    SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
     SLOT_SIZE = 8 * REAL + 35,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,
     P_AT = SLOTS_AT + LANDMARKS * SLOT_SIZE
