@@ -145,7 +145,7 @@ static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POS
 static void by_vision_alone(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
                             plr_real n[PLR_POSE_DIM]) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
-    memcpy(U, V, 21 * sizeof *V);
+    memcpy(U, V, PLR_POSE_TRIANGLE * sizeof *V);
     memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         U[plr_upper_row(PLR_POSE_DIM, k)] += UNSEEN;

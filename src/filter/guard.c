@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "filter/filter_internal.h"
-#include "math/packed.h"
 #include "state/covariance.h"
 
 enum {
@@ -66,10 +65,10 @@ static uint64_t constant_sum(const plr_filter *f) {
 }
 
 static uint64_t small_sum(const plr_filter *f) {
-    const size_t used = plr_packed_row(plr_covariance_dim(f));
+    const size_t used = plr_covariance_size(f, f->count);
     plr_sum sum = {{0}};
     add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
-    add(&sum, f->P, (used < HEAD ? used : HEAD) * sizeof *f->P);
+    add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     add_between(&sum, f, offsetof(plr_filter, frame_number), offsetof(plr_filter, guard));
     return mixed(&sum);
 }
@@ -78,7 +77,7 @@ static uint64_t large_sum(const plr_filter *f) {
     plr_sum sum = {{0}};
     add(&sum, f->slots, f->count * sizeof *f->slots);
     add(&sum, &f->consistency, sizeof f->consistency);
-    add(&sum, f->P, plr_packed_row(plr_covariance_dim(f)) * sizeof *f->P);
+    add(&sum, plr_covariance_elements(f), plr_covariance_size(f, f->count) * sizeof(plr_real));
     return mixed(&sum);
 }
 

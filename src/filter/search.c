@@ -40,7 +40,8 @@ static void prepare(plr_search *s, unsigned i) {
 static void point_by_motion(const plr_real q[3], const plr_real N[PLR_POSE_SQUARE],
                             plr_real dq[PLR_ROWS * PLR_POSE_DIM]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real turn[3] = {N[18 + k], N[24 + k], N[30 + k]};
+        const plr_real turn[3] = {N[3 * PLR_POSE_DIM + k], N[4 * PLR_POSE_DIM + k],
+                                  N[5 * PLR_POSE_DIM + k]};
         plr_real way[3];
         plr_cross3(way, q, turn);
         for (unsigned i = 0; i < 3; i++)
@@ -92,7 +93,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     for (unsigned r = 0; r < 3; r++)
         at->rho[r] = sight.r[r] - shift[r];
     memcpy(at->a, dz, sizeof at->a);
-    plr_solve3_transposed(6, S, at->a);
+    plr_solve3_transposed(PLR_POSE_DIM, S, at->a);
     plr_solve3_transposed(1, S, at->rho);
     at->closer = 0;
     at->left = at->P[8];
@@ -118,10 +119,11 @@ static plr_real in_best_measure(const plr_sighting *at, unsigned bank) {
 static void gather(const plr_sighting *at, plr_search_point *point) {
     plr_real *J = point->J;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real column[3] = {at->a[k], at->a[6 + k], at->a[12 + k]};
+        const plr_real column[3] = {at->a[k], at->a[PLR_POSE_DIM + k], at->a[2 * PLR_POSE_DIM + k]};
         point->b[k] = PLR_FMA(at->weight, plr_dot3(column, at->rho), point->b[k]);
         for (unsigned l = k; l < PLR_POSE_DIM; l++, J++) {
-            const plr_real other[3] = {at->a[l], at->a[6 + l], at->a[12 + l]};
+            const plr_real other[3] = {at->a[l], at->a[PLR_POSE_DIM + l],
+                                       at->a[2 * PLR_POSE_DIM + l]};
             *J = PLR_FMA(at->weight, plr_dot3(column, other), *J);
         }
     }

@@ -8,7 +8,6 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "math/packed.h"
 #include "process/velocity.h"
 #include "record/codec.h"
 #include "state/covariance.h"
@@ -54,9 +53,8 @@ typedef struct plr_state_count {
                      sizeof table##_fields / sizeof *table##_fields)
 #define SIZE(table) plr_codec_size(table##_fields, sizeof table##_fields / sizeof *table##_fields)
 
-/* Elements of P with that many landmarks: row i of the lower triangle is i + 1 long. */
 static uint32_t elements(const plr_filter *f, unsigned landmarks) {
-    return (uint32_t)plr_packed_row(plr_covariance_row(f, landmarks));
+    return (uint32_t)plr_covariance_size(f, landmarks);
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
@@ -127,7 +125,8 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
     PASS(&c, f, filter);
     for (unsigned slot = 0; slot < f->count; slot++)
         PASS(&c, &f->slots[slot], slot);
-    plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)f->P, elements(f, f->count));
+    plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f),
+                      elements(f, f->count));
     if (c.status == PLR_OK && !flush(&out))
         c.status = PLR_E_IO;
     return c.status;
@@ -207,7 +206,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         PASS(c, f ? &f->slots[slot] : NULL, slot);
     if (!f)
         return check_covariance(c, plr_covariance_row(like, count.landmarks));
-    plr_codec_numbers(c, PLR_FIELD_REAL, f->P, elements(f, f->count));
+    plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));
     return as_stored(c);
 }
 

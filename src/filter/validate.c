@@ -36,7 +36,7 @@ bool plr_is_rotation(const double R[9]) {
 
 /* By elimination: every pivot of a positive semidefinite matrix is >= 0, but for rounding. */
 bool plr_is_covariance(const double *P, unsigned n) {
-    enum { MAX = 6 };
+    enum { MAX = PLR_POSE_DIM };
     double A[MAX * MAX];
     if (n > MAX || !plr_all_finite(P, n * n))
         return false;

@@ -60,6 +60,18 @@ plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot) {
     return f->P[plr_packed_at(row, row)];
 }
 
+size_t plr_covariance_size(const plr_filter *f, unsigned landmarks) {
+    return plr_packed_row(plr_covariance_row(f, landmarks));
+}
+
+const plr_real *plr_covariance_elements(const plr_filter *f) {
+    return f->P;
+}
+
+plr_real *plr_covariance_memory(plr_filter *f) {
+    return f->P;
+}
+
 double plr_covariance_trace(const plr_filter *f) {
     const unsigned n = plr_covariance_dim(f);
     double trace = 0;

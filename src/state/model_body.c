@@ -27,11 +27,12 @@
 /* row = [way turn] Ad, Ad = [R, C; 0, R]; turn may be NULL for zeros. */
 static inline void times_adjoint(plr_real row[PLR_POSE_DIM], const plr_real way[3],
                                  const plr_real *turn, const plr_real Ad[PLR_POSE_SQUARE]) {
+    const plr_real *R0 = Ad, *R1 = R0 + PLR_POSE_DIM, *R2 = R1 + PLR_POSE_DIM;
+    const plr_real *T0 = R2 + PLR_POSE_DIM, *T1 = T0 + PLR_POSE_DIM, *T2 = T1 + PLR_POSE_DIM;
     for (int j = 0; j < PLR_POSE_DIM; j++)
-        row[j] = PLR_FMA(way[2], Ad[12 + j], PLR_FMA(way[1], Ad[6 + j], way[0] * Ad[j]));
+        row[j] = PLR_FMA(way[2], R2[j], PLR_FMA(way[1], R1[j], way[0] * R0[j]));
     for (int j = 3; j < PLR_POSE_DIM && turn; j++)
-        row[j] = PLR_FMA(turn[2], Ad[30 + j],
-                         PLR_FMA(turn[1], Ad[24 + j], PLR_FMA(turn[0], Ad[18 + j], row[j])));
+        row[j] = PLR_FMA(turn[2], T2[j], PLR_FMA(turn[1], T1[j], PLR_FMA(turn[0], T0[j], row[j])));
 }
 
 /* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q.
@@ -50,7 +51,7 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
     }
     for (int j = 0; j < 3; j++)
         way[j] = chart->mu[j] * inverse * inverse;
-    times_adjoint(J + 12, way, NULL, f->par.Ad_CB);
+    times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, f->par.Ad_CB);
 }
 
 /* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): a chart's error carried along a rigid motion.

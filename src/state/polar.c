@@ -43,6 +43,22 @@ void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart) {
     }
 }
 
+/* M = N(mu+)^T Exp(a) N(mu), 2x2, with Exp(a) = I + E. */
+static void bearing_transport(plr_real M[4], const plr_polar *to, const plr_real E[9],
+                              const plr_polar *from) {
+    for (int column = 0; column < 2; column++) {
+        const plr_real n[3] = {from->N[column], from->N[2 + column], from->N[4 + column]};
+        plr_real turned[3];
+        plr_mat3_vec(turned, E, n);
+        for (int i = 0; i < 3; i++)
+            turned[i] += n[i];
+        for (int row = 0; row < 2; row++) {
+            const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
+            M[2 * row + column] = plr_dot3(m, turned);
+        }
+    }
+}
+
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
                        const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
                        plr_real *beyond) {
@@ -92,17 +108,6 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
             q[i] += PLR_FMA(further, mu[i], chart->r * turn[i]);
     }
     plr_polar_at(result, q);
-
-    for (int column = 0; column < 2; column++) {
-        const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
-        plr_real turned[3];
-        plr_mat3_vec(turned, E, n);
-        for (int i = 0; i < 3; i++)
-            turned[i] += n[i];
-        for (int row = 0; row < 2; row++) {
-            const plr_real to[3] = {result->N[row], result->N[2 + row], result->N[4 + row]};
-            M[2 * row + column] = plr_dot3(to, turned);
-        }
-    }
+    bearing_transport(M, result, E, chart);
     return cut;
 }

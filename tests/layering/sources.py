@@ -15,9 +15,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-LONGEST_FILE = 600
-LONG_FILE = 400
-
 # Folders of src/ that a folder of src/ may include, from the lowest room to the highest.
 FOLDERS: dict[str, set[str]] = {
     "math": {"math"},
@@ -204,19 +201,6 @@ def check_conditions(root: Path) -> Iterator[Breach]:
             yield Breach(path, 1, f"no include guard ({guard}..._H)")
 
 
-def check_lengths(root: Path) -> Iterator[Breach]:
-    """A file over 400 lines is a question, over 600 a split."""
-    for folder in ("include", "src", "port", "tests", "tools"):
-        for path in sorted((root / folder).rglob("*")):
-            if path.suffix not in {".c", ".h", ".py", ".sh"} or not path.is_file():
-                continue
-            lines = len(path.read_text(encoding="utf-8").splitlines())
-            if lines > LONGEST_FILE:
-                yield Breach(path, lines, f"{lines} lines: split it ({LONGEST_FILE} at most)")
-            elif lines > LONG_FILE:
-                print(f"note: {path.relative_to(root)} has {lines} lines: one responsibility?")
-
-
 def check_licence_lines(root: Path) -> Iterator[Breach]:
     """An SPDX line on top of each source file (behind `#!` in scripts)."""
     for folder in ("cmake", "include", "src", "port", "tests", "tools"):
@@ -251,7 +235,6 @@ CHECKS = (
     check_session,
     check_session_table,
     check_conditions,
-    check_lengths,
     check_licence_lines,
     check_port_is_outside,
     check_textbook_is_another,

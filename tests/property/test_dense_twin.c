@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: MIT
 /*
- * Whole frames of the filter against the textbook filter
- * (textbook/textbook.h) in double: state and covariance after accumulated predicts, gate,
- * blocks, retraction, eviction and new landmarks.
+ * Whole frames of the filter against the textbook filter (textbook/textbook.h) in double: state and
+ * covariance after accumulated predicts, gate, blocks, retraction, eviction and new landmarks. Built
+ * for several block sizes too: all of them must agree with the one gain of the textbook.
  *
- * Built for several block sizes too: all of them must agree with the one gain
- * of the oracle.
- *
- * Tolerances are a part for the oracle's own rounding (its numbers are of
- * metres and kilometres) and a part for the filter's, in units of its epsilon;
- * both are several times what was measured. `world` in float32 loses digits
- * from frame to frame (docs/NUMERICS.md): it is held to the first frames, and
- * to fewer digits.
+ * Each tolerance is the sum of two parts: one for the textbook's own rounding (it computes in metres and
+ * kilometres), one for the filter's, in units of its epsilon. Both are several times what was measured.
+ * `world` in float32 loses digits from frame to frame (docs/NUMERICS.md): only its first frames are
+ * compared, and fewer digits of them.
  */
 #include <math.h>
 #include <stdio.h>
@@ -33,7 +29,7 @@ static uint32_t evicted[PLR_MAX_LANDMARKS];
 static unsigned evictions, most_seen; /* most_seen: so many observations of each frame are used */
 static plr_report report;
 
-static int note_eviction(void *context, const plr_landmark *landmark) {
+static int record_eviction(void *context, const plr_landmark *landmark) {
     (void)context;
     evicted[evictions++] = landmark->id;
     return 0;
@@ -60,16 +56,20 @@ static unsigned frames(void) {
     return is_fragile() ? FRAGILE_FRAMES : FRAMES;
 }
 
-/* Runs a test for both models, without and with biases. */
+/* Runs a test without and with biases. */
+static void for_model(uint8_t model, void (*run)(void)) {
+    for (uint8_t bias = 0; bias < 2; bias++) {
+        setUp();
+        config.model = model;
+        config.bias = bias;
+        evictions = 0;
+        run();
+    }
+}
+
 static void for_each_model(void (*run)(void)) {
-    for (uint8_t model = 0; model < 2; model++)
-        for (uint8_t bias = 0; bias < 2; bias++) {
-            setUp();
-            config.model = model;
-            config.bias = bias;
-            evictions = 0;
-            run();
-        }
+    for_model(PLR_MODEL_BODY, run);
+    for_model(PLR_MODEL_WORLD, run);
 }
 
 /* The world itself, with errors of centimetres. */
@@ -84,7 +84,7 @@ static bool surveyed(void *context, uint32_t id, plr_landmark *landmark) {
 }
 
 static void begin(void) {
-    plr_map map = {.sink = note_eviction};
+    plr_map map = {.sink = record_eviction};
     if (config.mode == PLR_MODE_LOCALIZATION)
         map.source = surveyed;
     scene_start(&world, &options);
@@ -93,8 +93,7 @@ static void begin(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, &map));
 }
 
-/* One twist in both; the oracle, which has no clock, then holds it for a step.
- */
+/* One twist in both; the textbook, which has no clock, then holds it for a step. */
 static void drive(plr_time_ns step_ns) {
     const plr_twist reading = scene_read(&world);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
@@ -173,14 +172,21 @@ static void compare(unsigned frame) {
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8 + 8e4 * own, 0, gap.covariance, at);
 }
 
+static void drive_to_the_next_frame(void) {
+    for (unsigned k = 0; k < TWISTS; k++)
+        drive(STEP_NS);
+}
+
+static void run_frame(unsigned frame) {
+    drive_to_the_next_frame();
+    look();
+    compare(frame);
+}
+
 static void run_frames(void) {
     begin();
-    for (unsigned frame = 0; frame < frames(); frame++) {
-        for (unsigned k = 0; k < TWISTS; k++)
-            drive(STEP_NS);
-        look();
-        compare(frame);
-    }
+    for (unsigned frame = 0; frame < frames(); frame++)
+        run_frame(frame);
 }
 
 /* ---------------------------------------------------------------- tests */
@@ -218,15 +224,6 @@ static void set_sigmas(const double velocity[3], const double gyro[3]) {
     memcpy(config.gyro_sigma, gyro, sizeof config.gyro_sigma);
 }
 
-/* `body` without and with biases: what is tested is how it keeps the motion's noise. */
-static void for_body(void (*run)(void)) {
-    for (uint8_t bias = 0; bias < 2; bias++) {
-        setUp();
-        config.bias = bias;
-        run();
-    }
-}
-
 /* Twists that are off by dozens of pixels a frame, beside sharp ones. */
 static void make_uncertain(void) {
     static const double velocity[3] = {0.5, 0.5, 0.5}, gyro[3] = {0.5, 0.5, 0.5};
@@ -241,7 +238,7 @@ static void run_uncertain(void) {
 }
 
 static void test_uncertain_twists_beside_sharp_pixels_agree(void) {
-    for_body(run_uncertain);
+    for_model(PLR_MODEL_BODY, run_uncertain);
     TEST_ASSERT_GREATER_THAN_UINT(8, report.used);
 }
 
@@ -250,16 +247,13 @@ static void run_few_matches(void) {
     make_uncertain();
     begin();
     for (unsigned frame = 0; frame < frames(); frame++) {
-        for (unsigned k = 0; k < TWISTS; k++)
-            drive(STEP_NS);
         most_seen = frame < 2 ? 24 : frame % 3;
-        look();
-        compare(frame);
+        run_frame(frame);
     }
 }
 
 static void test_no_match_one_and_two_by_turns_agree(void) {
-    for_body(run_few_matches);
+    for_model(PLR_MODEL_BODY, run_few_matches);
 }
 
 /* Along some axes the twists are exact, or along all: the motion's covariance is singular. */
@@ -273,7 +267,7 @@ static void run_exact_axes(void) {
 }
 
 static void test_exact_axes_agree(void) {
-    for_body(run_exact_axes);
+    for_model(PLR_MODEL_BODY, run_exact_axes);
 }
 
 static void run_step_noise(void) {
@@ -351,8 +345,7 @@ static void test_pose_covariance_between_frames_agrees(void) {
     for_each_model(run_pose_covariance);
 }
 
-/* World positions and covariances of landmarks, through pose and cross terms.
- */
+/* World positions and covariances of landmarks, through pose and cross terms. */
 static void run_landmarks(void) {
     run_frames();
     for (unsigned slot = 0; slot < filter.count; slot++) {
@@ -377,8 +370,7 @@ static void test_landmarks_in_the_world_agree(void) {
 static void run_known(void) {
     begin();
     for (unsigned frame = 0; frame < frames(); frame++) {
-        for (unsigned k = 0; k < TWISTS; k++)
-            drive(STEP_NS);
+        drive_to_the_next_frame();
         look();
         if (frame % 4 == 0) {
             plr_landmark known = {.id = 100 + 7 * frame,
@@ -463,8 +455,7 @@ static void test_mapping_agrees_and_keeps_the_given_pose_exact(void) {
         run_mapping();
 }
 
-/* A pose from outside in the middle of a run: the map is gone, the biases stay.
- */
+/* A pose from outside in the middle of a run: the map is gone, the biases stay. */
 static void run_new_pose(void) {
     double P_xi[36] = {0};
     plr_pose T_WB;
@@ -478,8 +469,7 @@ static void run_new_pose(void) {
     for (unsigned frame = 0; frame < FRAGILE_FRAMES; frame++) {
         look();
         compare(frame);
-        for (unsigned k = 0; k < TWISTS; k++)
-            drive(STEP_NS);
+        drive_to_the_next_frame();
     }
 }
 
