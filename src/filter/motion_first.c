@@ -14,30 +14,31 @@
 #include "state/slots.h"
 
 enum {
-    FEW = 3, /* fewer points say nothing that could be checked */
-    MANY = 6 /* fewer are not believed against the twists */
+    MIN_POINTS = 3,        /* of fewer points none can be checked by the others */
+    MIN_AGAINST_TWISTS = 6 /* fewer points never outweigh the twists */
 };
 
-/* An observation speaks for one of two motions if its squared residuals differ by more. */
-#define DECISIVE PLR_R(9)
-/* It agrees with a motion if its squared residual is below this: 97 of 100 that stand do. */
+/* An observation supports one of two motions if its squared residual is smaller there by more than this. */
+#define CLEAR_DIFFERENCE PLR_R(9)
+/* It agrees with a motion if its squared residual is below this: 97 % of the points at rest do. */
 #define AGREES PLR_R(9)
-/* Points are well spread if together they leave no more of an open prior's variance in any direction. */
-#define LEFT_OPEN PLR_R(0.25)
-/* The least share, about, that a point may leave to the others in what is known of its own prediction.
- * Below it the point has made the motion what it is, and cannot be judged by it. */
-#define LEAST_REST PLR_R(0.05)
+/* Points are well spread if no direction of the motion keeps a larger part of the open prior's variance. */
+#define UNOBSERVED PLR_R(0.25)
+/* An observation is judged by the motion of all others only if they contribute at least about this share
+ * to its prediction. Below it the observation has determined the motion itself. */
+#define LEAST_SHARE PLR_R(0.05)
 
-/* What the twists alone say of an observation: d^2 with nu's whole uncertainty, and det S. Without a basis
- * for a linearisation d^2 is negative, and it has no voice. */
-static void judge_at_zero(plr_search *s, unsigned i) {
+/* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in S, and
+ * gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and the
+ * observation takes no part in the search. */
+static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
-    at->at_zero = -1;
-    if (at->lost) {
-        at->voice = 0;
+    at->prior_d2 = -1;
+    if (at->behind) {
+        at->active = 0;
         return;
     }
-    const plr_real *U = at->U[s->bank];
+    const plr_real *U = at->U[s->current];
     plr_real M[6], x[3];
     plr_real limit = plr_stereo_largest_spread(s->f);
     bool basis = true;
@@ -58,24 +59,25 @@ static void judge_at_zero(plr_search *s, unsigned i) {
         basis = basis && sum - plr_stereo_variance(s->f, r) <= limit;
     }
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
-        at->voice = 0;
+        at->active = 0;
         return;
     }
-    memcpy(x, at->rho, sizeof x);
+    memcpy(x, at->e, sizeof x);
     plr_solve3_transposed(1, M, x);
-    at->at_zero = plr_dot3(x, x);
+    at->prior_d2 = plr_dot3(x, x);
     const plr_real root = U[0] * U[3] * U[5] * M[0] * M[3] * M[5];
     at->gain = root * root;
 }
 
-/* d^2 of an observation by what all the others say: with h = a (I + J)^-1 a^T and the weight w that it
- * had in J, e^T [(I - w h)(I + (1 - w) h)]^-1 e. `rest` is the least share left to the others. */
-static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_real dz[PLR_POSE_DIM],
-                         plr_real e[3], plr_real *rest) {
+/* d^2 of an observation about the motion that all others give. With h = a (I + J)^-1 a^T and the weight w
+ * of the observation in J it is e^T [(I - w h)(I + (1 - w) h)]^-1 e. `share` receives the smallest pivot of
+ * the matrix in brackets, about the share that the others contribute. */
+static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
+                              const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
     plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9], M[6];
     const plr_real w = at->weight;
     for (unsigned r = 0; r < 3; r++) {
-        e[r] = at->rho[r];
+        e[r] = at->e[r];
         for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
             e[r] = PLR_FMA(-at->a[PLR_POSE_DIM * r + k], dz[k], e[r]);
             X[3 * k + r] = at->a[PLR_POSE_DIM * r + k];
@@ -94,38 +96,39 @@ static plr_real left_out(const plr_sighting *at, const plr_real *U, const plr_re
             M[k] = (r == c ? PLR_R(1) : PLR_R(0)) + (PLR_R(1) - PLR_R(2) * w) * h[3 * r + c] -
                    w * (PLR_R(1) - w) * hh;
         }
-    *rest = 0;
+    *share = 0;
     if (!plr_cholesky3(M))
         return 0;
-    *rest = M[0] < M[3] ? M[0] : M[3];
-    *rest = *rest < M[5] ? *rest : M[5];
-    *rest *= *rest;
+    *share = M[0] < M[3] ? M[0] : M[3];
+    *share = *share < M[5] ? *share : M[5];
+    *share *= *share;
     plr_solve3_transposed(1, M, e);
     return plr_dot3(e, e);
 }
 
-/* The squared norm of the four residuals at the point evaluated last, for the setting gate-residual. */
+/* The squared norm of the four pixel residuals at the point evaluated last, for the setting gate-residual. */
 static plr_real residual_norm2(const plr_search *s, unsigned i) {
     const plr_sighting *at = &s->sightings[i];
     plr_real r[3];
-    plr_multiply3_transposed(r, at->U[s->bank], at->rho);
+    plr_multiply3_transposed(r, at->U[s->current], at->e);
     return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
+/* True if the gate accepts an observation. Adds its d^2 to *nis, and its innovation to its track. */
 static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
                   const plr_real dz[PLR_POSE_DIM], float *nis) {
     const plr_sighting *at = &s->sightings[i];
-    plr_real d2 = at->at_zero, e[3], rest = 0;
-    if (!(d2 >= 0) || at->lost)
+    plr_real d2 = at->prior_d2, e[3], share = 0;
+    if (!(d2 >= 0) || at->behind)
         return false;
     if (found) {
-        const plr_real by_others = left_out(at, U, dz, e, &rest);
-        d2 = rest >= LEAST_REST ? by_others : d2;
+        const plr_real without_it = leave_one_out(at, U, dz, e, &share);
+        d2 = share >= LEAST_SHARE ? without_it : d2;
     }
     d2 += plr_stereo_besides(s->f, plr_search_observation(s, i));
     const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
-    if (accepted && rest >= LEAST_REST)
+    if (accepted && share >= LEAST_SHARE)
         plr_track_add(slot, e);
     if (!accepted || slot->strays)
         return false;
@@ -133,17 +136,17 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
     return true;
 }
 
-/* Have so many observations little weight that another motion may fit them better? */
-static bool is_suspicious(const plr_search *s, const plr_search_point *best) {
-    plr_real voices = 0, weight = 0;
+/* True if so many observations have a small weight that another motion may fit them better. */
+static bool may_contradict(const plr_search *s, const plr_search_point *best) {
+    plr_real active = 0, weight = 0;
     for (unsigned i = 0; i < s->count; i++) {
-        voices += s->sightings[i].voice;
+        active += s->sightings[i].active;
         weight += s->sightings[i].weight;
     }
-    return weight < PLR_R(0.7) * voices || plr_norm2_of_6(best->z) > PLR_R(36);
+    return weight < PLR_R(0.7) * active || plr_norm2_of_6(best->z) > PLR_R(36);
 }
 
-/* Do the observations leave no direction of the motion open? */
+/* True if the observations determine the motion in all six directions. */
 static bool is_well_spread(const plr_search_point *point) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, C[PLR_POSE_SQUARE] = {0};
     if (!plr_search_factorise(point, 0, U))
@@ -155,44 +158,44 @@ static bool is_well_spread(const plr_search_point *point) {
         plr_real left = 0;
         for (unsigned r = 0; r < PLR_POSE_DIM; r++)
             left = PLR_FMA(C[PLR_POSE_DIM * r + k], C[PLR_POSE_DIM * r + k], left);
-        if (left > LEFT_OPEN)
+        if (left > UNOBSERVED)
             return false;
     }
     return true;
 }
 
-/* Do at least three of the observations, a fifth of them, and four times as many as for the twists, speak
- * for the other motion, and do three fifths of at least six, well spread, agree on it? Fewer may stand on
- * something that moves: a car that fills a third of the picture draws the others some way along. */
-static bool speaks_against_twists(const plr_search *s, const plr_search_point *open) {
-    unsigned with = 0, against = 0, agree = 0, voices = 0;
+/* True if enough observations support the motion found without the twists: at least three, a fifth of
+ * all, and four times as many as support the twists. Of at least six, well spread, three fifths must agree
+ * with it. Fewer may lie on one moving object: a car that fills a third of the picture pulls the estimate
+ * of all others with it. */
+static bool has_support(const plr_search *s, const plr_search_point *open) {
+    unsigned with = 0, against = 0, agree = 0, active = 0;
     for (unsigned i = 0; i < s->count; i++) {
         const plr_sighting *at = &s->sightings[i];
-        const plr_real d2 = plr_dot3(at->rho, at->rho);
-        if (!(at->voice > 0))
+        const plr_real d2 = plr_dot3(at->e, at->e);
+        if (!(at->active > 0))
             continue;
-        voices++;
+        active++;
         agree += d2 < AGREES;
-        against += at->by_twists > d2 + DECISIVE;
-        with += d2 > at->by_twists + DECISIVE;
+        against += at->twist_d2 > d2 + CLEAR_DIFFERENCE;
+        with += d2 > at->twist_d2 + CLEAR_DIFFERENCE;
     }
-    return against >= FEW && 5 * against >= voices && 4 * with <= against &&
-           5 * agree >= 3 * voices && voices >= MANY && is_well_spread(open);
+    return against >= MIN_POINTS && 5 * against >= active && 4 * with <= against &&
+           5 * agree >= 3 * active && active >= MIN_AGAINST_TWISTS && is_well_spread(open);
 }
 
-/* Where the observations may contradict the twists, they are asked again with the twists' word left out.
- * True, with the search at their motion, if they agree on one that the twists exclude; else the search
- * is as it was. */
-static bool contradicts(plr_search *s, plr_search_point *best) {
+/* Searches again with a prior so wide that the twists hardly count. True, with `best` and s->prior at the
+ * result, if enough observations support it; otherwise the search is put back to where it was. */
+static bool search_without_twists(plr_search *s, plr_search_point *best) {
     const plr_applied_motion believed = s->prior;
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].by_twists = plr_dot3(s->sightings[i].rho, s->sightings[i].rho);
+        s->sightings[i].twist_d2 = plr_dot3(s->sightings[i].e, s->sightings[i].e);
     plr_motion_open_prior(s->f, &s->prior);
     plr_search_from_zero(s, &open);
     for (unsigned i = 0; i < 2; i++)
         plr_search_descend(s, &open);
-    if (speaks_against_twists(s, &open)) {
+    if (has_support(s, &open)) {
         *best = open;
         return true;
     }
@@ -203,27 +206,27 @@ static bool contradicts(plr_search *s, plr_search_point *best) {
     return false;
 }
 
-/* Judges all by the twists' prediction, and silences those that have no part in the search: what gives
- * no basis for a linearisation; and, since of one or two points none can be checked by the others, what the
- * gate does not let through there. Returns how many points there are that have a basis. */
-static unsigned judge_all_at_zero(plr_search *s, plr_search_point *best) {
-    unsigned voices = 0;
-    bool silenced = false;
+/* Compares all observations with the twists' prediction, and excludes from the search those whose
+ * prediction is too uncertain to linearise at. If fewer than three remain, none can be checked by the
+ * others; then those that the gate rejects here are excluded too. Returns how many were left before that. */
+static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
+    unsigned active = 0;
+    bool changed = false;
     for (unsigned i = 0; i < s->count; i++) {
         plr_sighting *at = &s->sightings[i];
-        const bool spoke = at->voice > 0;
-        judge_at_zero(s, i);
-        voices += at->voice > 0;
-        silenced = silenced || (spoke && !(at->voice > 0));
+        const bool was_active = at->active > 0;
+        judge_by_prior(s, i);
+        active += at->active > 0;
+        changed = changed || (was_active && !(at->active > 0));
     }
-    for (unsigned i = 0; voices < FEW && i < s->count; i++)
-        if (!plr_gate_accepts(s->f, s->sightings[i].at_zero, 0)) {
-            silenced = silenced || s->sightings[i].voice > 0;
-            s->sightings[i].voice = 0;
+    for (unsigned i = 0; active < MIN_POINTS && i < s->count; i++)
+        if (!plr_gate_accepts(s->f, s->sightings[i].prior_d2, 0)) {
+            changed = changed || s->sightings[i].active > 0;
+            s->sightings[i].active = 0;
         }
-    if (silenced)
+    if (changed)
         plr_search_from_zero(s, best);
-    return voices;
+    return active;
 }
 
 void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
@@ -238,11 +241,12 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
             plr_search_add(&s, f->slots[f->work.slot_of[k]].known ? 0 : 1);
         }
     plr_search_from_zero(&s, &best);
-    const unsigned voices = judge_all_at_zero(&s, &best);
-    first->found = voices >= FEW;
-    if (voices > 0)
+    const unsigned active = judge_all_by_prior(&s, &best);
+    first->found = active >= MIN_POINTS;
+    if (active > 0)
         plr_search_descend(&s, &best);
-    first->contradicted = first->found && is_suspicious(&s, &best) && contradicts(&s, &best);
+    first->contradicted =
+        first->found && may_contradict(&s, &best) && search_without_twists(&s, &best);
     first->found = first->found && plr_search_factorise(&best, 0, U);
     if (first->found)
         (void)plr_search_step(&best, U, dz);
@@ -253,7 +257,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);
         const plr_slot *slot = plr_search_slot(&s, i);
         if (accepted && !slot->known)
-            f->work.noise.closer[slot - f->slots] =
-                plr_vantage_offset(slot, usual, s.sightings[i].closer, s.sightings[i].left);
+            f->work.noise.closer[slot - f->slots] = plr_vantage_offset(
+                slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);
     }
 }

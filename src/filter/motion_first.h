@@ -2,7 +2,7 @@
 /*
  * Estimates how the body moved since the last frame from all matched observations together, before
  * any of them is applied to the state (docs/MATH.md 10). Of the state's covariance it uses the 3x3
- * block of each landmark. The update is linearised at the result, and the gate compares with it.
+ * block of each landmark. The update is linearised at the result, and the gate compares each observation with it.
  */
 #ifndef PLR_FILTER_MOTION_FIRST_H
 #define PLR_FILTER_MOTION_FIRST_H
@@ -13,9 +13,9 @@
 /* The estimate of the motion D Exp(L nu), nu ~ N(0, I). */
 typedef struct plr_motion_first {
     plr_applied_motion motion; /* at the nu that was found, or at 0 */
-    bool found;                /* false: too few observations, or no better than the twists */
-    bool contradicted; /* the observations agree on a motion that the twists exclude: `motion`
-                                  is theirs, with a prior wide enough for it */
+    bool found;                /* false: too few observations; `motion` is the twists' */
+    bool contradicted;         /* the observations agree on a motion that the twists exclude, and
+                                  `motion` is that one, with a prior wide enough for it */
 } plr_motion_first;
 
 /* Finds nu and gates every matched observation: work.gain[k] >= 0 if accepted, -1 if rejected. Adds

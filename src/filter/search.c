@@ -11,18 +11,20 @@
 #include "state/covariance.h"
 #include "state/motion.h"
 
-enum { TRIALS = 4 }; /* of a better point; the start and a return to the best one come on top */
+enum {
+    TRIALS = 4
+}; /* besides the evaluations at the start and, if needed, of the best point again */
 
-/* Huber's limit on a whitened residual of three rows: beyond it an observation pulls no harder. */
+/* Huber's limit on the norm of a whitened residual: beyond it the pull on the motion stays constant. */
 #define HUBER PLR_R(2.5)
-/* A step that promises less of the sum is not worth its evaluation. */
-#define SMALL_GAIN PLR_R(0.1)
+/* A step that should lower the cost by less is not evaluated. */
+#define MIN_DECREASE PLR_R(0.1)
 
 static plr_real huber(plr_real d2) {
     return d2 <= HUBER * HUBER ? d2 : PLR_R(2) * HUBER * PLR_SQRT(d2) - HUBER * HUBER;
 }
 
-/* What does not change while nu is sought. */
+/* V and P of one sighting, which do not change during the search. */
 static void prepare(plr_search *s, unsigned i) {
     plr_filter *f = s->f;
     plr_sighting *at = &s->sightings[i];
@@ -36,16 +38,16 @@ static void prepare(plr_search *s, unsigned i) {
                                            at->V[PLR_POSE_DIM * c + k], at->P[3 * r + c]);
 }
 
-/* How q depends on nu, 3x6: [-I | [q]x] N, N = Ad(T_CB) JL. */
+/* dq/dnu = [-I | [q]x] N, 3x6, with N = Ad(T_CB) JL. */
 static void point_by_motion(const plr_real q[3], const plr_real N[PLR_POSE_SQUARE],
                             plr_real dq[PLR_ROWS * PLR_POSE_DIM]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real turn[3] = {N[3 * PLR_POSE_DIM + k], N[4 * PLR_POSE_DIM + k],
                                   N[5 * PLR_POSE_DIM + k]};
-        plr_real way[3];
-        plr_cross3(way, q, turn);
+        plr_real lever[3];
+        plr_cross3(lever, q, turn);
         for (unsigned i = 0; i < 3; i++)
-            dq[PLR_POSE_DIM * i + k] = way[i] - N[PLR_POSE_DIM * i + k];
+            dq[PLR_POSE_DIM * i + k] = lever[i] - N[PLR_POSE_DIM * i + k];
     }
 }
 
@@ -53,7 +55,7 @@ static void point_by_motion(const plr_real q[3], const plr_real N[PLR_POSE_SQUAR
 typedef struct plr_camera_step {
     plr_real z[PLR_POSE_DIM];
     plr_real R[9], E[9], p[3];   /* R = I + E */
-    plr_real N[PLR_POSE_SQUARE]; /* how nu moves the camera: Ad(T_CB) JL, 6x6 */
+    plr_real N[PLR_POSE_SQUARE]; /* the camera's motion by nu: Ad(T_CB) JL, 6x6 */
 } plr_camera_step;
 
 static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_camera_step *step) {
@@ -65,7 +67,7 @@ static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_cam
     plr_mat6_mul(step->N, s->f->par.Ad_CB, m.JL);
 }
 
-/* One observation at a point: U of the trial bank, a and rho. False where nothing can be said. */
+/* Evaluates one observation at a point: U on trial, a and e. False if it cannot be predicted there. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
     const plr_slot *slot = plr_search_slot(s, i);
     plr_sighting *at = &s->sightings[i];
@@ -91,36 +93,36 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     point_by_motion(sight.q, step->N, dq);
     plr_gemm_nn(3, PLR_POSE_DIM, 3, sight.Dz, 3, dq, PLR_POSE_DIM, dz, PLR_POSE_DIM);
     for (unsigned r = 0; r < 3; r++)
-        at->rho[r] = sight.r[r] - shift[r];
+        at->e[r] = sight.r[r] - shift[r];
     memcpy(at->a, dz, sizeof at->a);
     plr_solve3_transposed(PLR_POSE_DIM, S, at->a);
-    plr_solve3_transposed(1, S, at->rho);
-    at->closer = 0;
-    at->left = at->P[8];
+    plr_solve3_transposed(1, S, at->e);
+    at->range_change = 0;
+    at->range_variance = at->P[8];
     if (plr_stereo_tells_range(s->f, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
-        at->closer = plr_dot3(column, at->rho);
-        at->left -= plr_dot3(column, column);
+        at->range_change = plr_dot3(column, at->e);
+        at->range_variance -= plr_dot3(column, column);
     }
-    memcpy(at->U[1 - s->bank], S, sizeof at->U[0]);
+    memcpy(at->U[1 - s->current], S, sizeof at->U[0]);
     return true;
 }
 
-/* |U^-T r|^2 with U of the best point, where r = U'^T rho is the residual of the one on trial. */
-static plr_real in_best_measure(const plr_sighting *at, unsigned bank) {
+/* |U^-T r|^2 with U of the best point and the residual r = U'^T e of the point on trial. */
+static plr_real d2_by_best_covariance(const plr_sighting *at, unsigned best) {
     plr_real r[3];
-    plr_multiply3_transposed(r, at->U[1 - bank], at->rho);
-    plr_solve3_transposed(1, at->U[bank], r);
+    plr_multiply3_transposed(r, at->U[1 - best], at->e);
+    plr_solve3_transposed(1, at->U[best], r);
     return plr_dot3(r, r);
 }
 
-/* J += w a^T a, b += w a^T rho */
-static void gather(const plr_sighting *at, plr_search_point *point) {
+/* J += w a^T a, b += w a^T e */
+static void add_to_sums(const plr_sighting *at, plr_search_point *point) {
     plr_real *J = point->J;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real column[3] = {at->a[k], at->a[PLR_POSE_DIM + k], at->a[2 * PLR_POSE_DIM + k]};
-        point->b[k] = PLR_FMA(at->weight, plr_dot3(column, at->rho), point->b[k]);
+        point->b[k] = PLR_FMA(at->weight, plr_dot3(column, at->e), point->b[k]);
         for (unsigned l = k; l < PLR_POSE_DIM; l++, J++) {
             const plr_real other[3] = {at->a[l], at->a[PLR_POSE_DIM + l],
                                        at->a[2 * PLR_POSE_DIM + l]};
@@ -129,11 +131,11 @@ static void gather(const plr_sighting *at, plr_search_point *point) {
     }
 }
 
-void plr_search_add(plr_search *s, plr_real voice) {
-    static const plr_real any_measure[6] = {1, 0, 0, 1, 0, 1};
+void plr_search_add(plr_search *s, plr_real active) {
+    static const plr_real identity[6] = {1, 0, 0, 1, 0, 1};
     plr_sighting *at = &s->sightings[s->count++];
-    memcpy(at->U[s->bank], any_measure, sizeof at->U[0]);
-    at->voice = voice;
+    memcpy(at->U[s->current], identity, sizeof at->U[0]);
+    at->active = active;
     at->cost = 0;
 }
 
@@ -142,8 +144,9 @@ void plr_search_prepare(plr_search *s) {
         prepare(s, i);
 }
 
-/* All observations at nu = z. Returns by how much the sum is larger than at the best point, in that
- * point's measure. An observation that falls behind the camera is left out of the comparison. */
+/* Evaluates all observations at nu = z. Returns by how much the cost of the observations is larger than at
+ * the best point, both with the S of the best point. An observation whose landmark comes to lie behind
+ * the camera is left out of the comparison. */
 static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *point) {
     plr_camera_step step;
     plr_real change = 0;
@@ -153,26 +156,26 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
     for (unsigned i = 0; i < s->count; i++) {
         plr_sighting *at = &s->sightings[i];
         at->weight = 0;
-        at->lost = !evaluate_one(s, i, &step);
-        if (at->lost) {
-            memcpy(at->U[1 - s->bank], at->U[s->bank], sizeof at->U[0]);
+        at->behind = !evaluate_one(s, i, &step);
+        if (at->behind) {
+            memcpy(at->U[1 - s->current], at->U[s->current], sizeof at->U[0]);
             continue;
         }
-        const plr_real d2 = plr_dot3(at->rho, at->rho);
-        at->weight = at->voice * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
-        if (!(at->voice > 0))
+        const plr_real d2 = plr_dot3(at->e, at->e);
+        at->weight = at->active * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
+        if (!(at->active > 0))
             continue;
-        change += huber(in_best_measure(at, s->bank)) - at->cost;
-        gather(at, point);
+        change += huber(d2_by_best_covariance(at, s->current)) - at->cost;
+        add_to_sums(at, point);
     }
     return change;
 }
 
 /* Makes the point evaluated last the best one. */
 static void accept(plr_search *s) {
-    s->bank = 1 - s->bank;
+    s->current = 1 - s->current;
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].cost = huber(plr_dot3(s->sightings[i].rho, s->sightings[i].rho));
+        s->sightings[i].cost = huber(plr_dot3(s->sightings[i].e, s->sightings[i].e));
 }
 
 void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best) {
@@ -192,18 +195,18 @@ bool plr_search_factorise(const plr_search_point *point, plr_real damping,
 
 plr_real plr_search_step(const plr_search_point *point, const plr_real *U,
                          plr_real dz[PLR_POSE_DIM]) {
-    plr_real gradient[PLR_POSE_DIM], promise = 0;
+    plr_real gradient[PLR_POSE_DIM], decrease = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         gradient[k] = dz[k] = point->b[k] - point->z[k];
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, dz, 1);
     plr_solve_upper(PLR_POSE_DIM, U, dz);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        promise = PLR_FMA(dz[k], gradient[k], promise);
-    return promise;
+        decrease = PLR_FMA(dz[k], gradient[k], decrease);
+    return decrease;
 }
 
-/* May a motion be off by L z? As far as a retraction can follow. */
-static bool is_within_reach(const plr_search *s, const plr_real z[PLR_POSE_DIM]) {
+/* True if L z is small enough for a retraction: 1 km and 2 rad. */
+static bool is_representable(const plr_search *s, const plr_real z[PLR_POSE_DIM]) {
     static const plr_real way2 = 1e6, turn2 = 4;
     plr_real n[PLR_POSE_DIM];
     plr_mat6_vec(n, s->prior.L, z);
@@ -213,29 +216,29 @@ static bool is_within_reach(const plr_search *s, const plr_real z[PLR_POSE_DIM])
 void plr_search_descend(plr_search *s, plr_search_point *best) {
     plr_search_point trial;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], damping = 0;
-    bool at_best = true;
+    bool is_at_best = true;
     for (int i = 0; i < TRIALS; i++) {
         plr_real z[PLR_POSE_DIM], dz[PLR_POSE_DIM];
         if (!plr_search_factorise(best, damping, U) ||
-            !(plr_search_step(best, U, dz) >= SMALL_GAIN))
+            !(plr_search_step(best, U, dz) >= MIN_DECREASE))
             break;
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             z[k] = best->z[k] + dz[k];
-        at_best = false;
-        if (is_within_reach(s, z)) {
+        is_at_best = false;
+        if (is_representable(s, z)) {
             const plr_real change =
                 evaluate(s, z, &trial) + plr_norm2_of_6(z) - plr_norm2_of_6(best->z);
             if (change < 0) {
                 *best = trial;
                 accept(s);
-                at_best = true;
+                is_at_best = true;
                 damping *= PLR_R(0.1);
                 continue;
             }
         }
         damping = damping > 0 ? PLR_R(10) * damping : PLR_R(0.01);
     }
-    if (!at_best) { /* a and rho are those of a point that was not taken */
+    if (!is_at_best) { /* a and e are those of a trial that was not accepted */
         const plr_search_point kept = *best;
         plr_search_go_to(s, kept.z, best);
     }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The search for a frame's motion (docs/MATH.md 10): nu ~ N(0, I) of the motion D Exp(L nu) at
- * which |nu|^2 + sum of rho(|U_i^-T r_i|^2) is least, by Levenberg's and Marquardt's steps with a
- * bounded number of evaluations. rho is Huber's function. Of the covariance each landmark's 3x3
- * block is used.
+ * The search for a frame's motion D Exp(L nu), nu ~ N(0, I) (docs/MATH.md 10): the nu at which
+ * |nu|^2 + sum of rho(|U_i^-T r_i|^2) is smallest. rho is Huber's function. The method is that of
+ * Levenberg and Marquardt with a bounded number of evaluations. Of the state's covariance it uses each
+ * landmark's own 3x3 block.
  */
 #ifndef PLR_FILTER_SEARCH_H
 #define PLR_FILTER_SEARCH_H
@@ -11,41 +11,40 @@
 #include "pelorus/state.h"
 #include "state/motion.h"
 
-/* One matched observation. */
+/* One matched observation. "Last point" is the nu at which it was evaluated last. */
 typedef struct plr_sighting {
-    plr_real
-        V[PLR_ROWS *
-          PLR_POSE_DIM]; /* covariance of landmark and nu by the biases: P_(i,b) B^T L^-T, 3x6 */
-    plr_real P[9];       /* the landmark's covariance once nu is known */
+    plr_real V[PLR_ROWS * PLR_POSE_DIM]; /* covariance of landmark and nu: P_(i,b) B^T L^-T, 3x6 */
+    plr_real P[9];                       /* the landmark's covariance if nu were known */
     plr_real U[2][6]; /* of S = J P J^T + R = U^T U: at the best point, and at the one on trial */
-    plr_real a[PLR_ROWS * PLR_POSE_DIM]; /* U^-T dz/dnu, 3x6, at the point evaluated last */
-    plr_real rho[3];                     /* U^-T r there */
-    plr_real closer;    /* P J^T S^-1 r: by how much the observation changes its inverse range */
-    plr_real left;      /* the variance of the inverse range after that */
-    plr_real weight;    /* Huber's: 1, and less for a large residual */
-    plr_real cost;      /* Huber's rho at the best point */
-    plr_real at_zero;   /* d^2 around the twists' prediction; negative: no place to linearise */
-    plr_real gain;      /* det S there */
-    plr_real voice;     /* 1: takes part in the search; 0: known, or barred */
-    bool lost;          /* at the point evaluated last it lies behind the camera */
-    plr_real by_twists; /* |U^-T r|^2 where the twists have their say */
+    plr_real a[PLR_ROWS * PLR_POSE_DIM]; /* U^-T dz/dnu at the last point, 3x6 */
+    plr_real e[3];                       /* U^-T r there: the whitened residual */
+    plr_real range_change;   /* P J^T S^-1 r, third row: the observation's correction of the inverse
+                                range, 1/m */
+    plr_real range_variance; /* the variance of the inverse range after that correction */
+    plr_real weight;         /* Huber's: 1, and less for a large residual */
+    plr_real cost;           /* Huber's rho at the best point */
+    plr_real prior_d2;       /* d^2 about the twists' prediction; negative: too uncertain */
+    plr_real gain;           /* det S of that prediction */
+    plr_real active;         /* 1: takes part in the search; 0: a known landmark, or excluded */
+    bool behind;             /* at the last point the landmark lies behind the camera */
+    plr_real twist_d2;       /* |e|^2 at the result of the search with the twists */
 } plr_sighting;
 
 /* The search for nu. */
 typedef struct plr_search {
     plr_filter *f;
     const plr_frame *frame;
-    plr_sighting *sightings; /* in work.Vt, which no one needs before the motion is applied */
+    plr_sighting *sightings; /* in work.Vt, which is free until the motion is applied */
     unsigned count;
-    unsigned bank; /* of U at the best point */
+    unsigned current; /* which U belongs to the best point */
     plr_applied_motion prior;
 } plr_search;
 
-/* A point nu = z, and what the derivatives of |z|^2 + sum of Huber's rho(|U^-T r|^2) there are made of. */
+/* A point nu = z, with the sums from which the gradient and the Hessian of the cost follow there. */
 typedef struct plr_search_point {
     plr_real z[PLR_POSE_DIM];
     plr_real J[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]; /* sum of w a^T a, packed upper */
-    plr_real b[PLR_POSE_DIM];                          /* sum of w a^T rho */
+    plr_real b[PLR_POSE_DIM];                          /* sum of w a^T e */
 } plr_search_point;
 
 static inline const plr_observation *plr_search_observation(const plr_search *s, unsigned i) {
@@ -58,28 +57,28 @@ static inline plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
     return &s->f->slots[w->slot_of[w->used[i]]];
 }
 
-/* One more sighting, of the observation work.used[s->count], of which no point is known yet. */
-void plr_search_add(plr_search *s, plr_real voice);
+/* Appends the observation work.used[s->count]. `active` is 1 if it takes part in the search, else 0. */
+void plr_search_add(plr_search *s, plr_real active);
 
-/* What of the sightings hangs on s->prior and not on nu. */
+/* Fills the fields of all sightings that depend on s->prior alone: V and P. */
 void plr_search_prepare(plr_search *s);
 
-/* Prepares all sightings for s->prior, and evaluates nu = 0: the best point so far. */
+/* Prepares all sightings for s->prior and evaluates nu = 0, which becomes the best point. */
 void plr_search_from_zero(plr_search *s, plr_search_point *best);
 
-/* From the best point downhill: a bounded number of trials, each taken only if the sum falls. At
- * the end all sightings stand at the best point. */
+/* Improves the best point by a bounded number of trials, each accepted only if the cost falls. At
+ * the end all sightings are evaluated at the best point. */
 void plr_search_descend(plr_search *s, plr_search_point *best);
 
-/* All sightings at nu = z, which becomes the best point. */
+/* Evaluates all sightings at nu = z, which becomes the best point. */
 void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best);
 
 /* U^T U = I + J + damping (I + diag J), packed upper; false if it cannot be factorised. */
 bool plr_search_factorise(const plr_search_point *point, plr_real damping,
                           plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]);
 
-/* The step from a point towards the least sum, from its factor. Returns what it promises of the
- * sum. */
+/* The step dz from a point towards the minimum; U is from plr_search_factorise. Returns by how much
+ * the cost should fall. */
 plr_real plr_search_step(const plr_search_point *point, const plr_real *U,
                          plr_real dz[PLR_POSE_DIM]);
 
