@@ -279,11 +279,20 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
     plr_rigid_fit_solve(&fit, dx, f->work.noise.spread, angle2, eta);
 }
 
+/* What is left of a correction in the chart `from` when the point has gone on to `to`: the same angle, turned
+ * along by F = carry_chart's bearing part, and the same inverse range. */
+static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
+                      const plr_polar *from) {
+    const plr_real ratio = to->r / from->r, w0 = ratio * w[0], w1 = ratio * w[1];
+    w[0] = PLR_FMA(F[1], w1, F[0] * w0);
+    w[1] = PLR_FMA(F[4], w1, F[3] * w0);
+}
+
 /*
  * What the landmarks' corrections have in common is a rigid motion eta and is applied as one; only the
- * rest of each goes through the chart:
- *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = retr(q, w_rest),  q+ = Exp(eta_C)^-1 q~.
- * P is transported by Jw(q+) Exp(-theta_C) Ji(q~) diag(M, 1) with theta_C eta_C's rotation, the pose
+ * rest of each goes through the chart, there where that has brought the landmark:
+ *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = Exp(eta_C)^-1 q,  q+ = retr(q~, w_rest).
+ * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q) with theta_C eta_C's rotation, the pose
  * by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
@@ -308,17 +317,16 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
             for (int k = 0; k < PLR_POSE_DIM; k++)
                 w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], eta[k], w[i]);
         w[2] += s->beyond;
-        cut += plr_polar_retract(&there, M, &from, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_se3_move_back(s->x, E_C, p_C);
-        plr_polar_at(&to, s->x);
-        carry_chart(rigid, &to, R_C, p_C, &there);
-        s->beyond *= rigid[8];
+        plr_polar_at(&there, s->x);
+        carry_chart(rigid, &there, R_C, p_C, &from);
+        turn_rest(w, rigid, &there, &from);
+        cut += plr_polar_retract(&to, M, &there, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_real *own = F + 9 * slot;
-        for (int i = 0; i < 3; i++) {
-            const plr_real *row = rigid + 3 * i;
-            own[3 * i] = PLR_FMA(row[1], M[2], row[0] * M[0]);
-            own[3 * i + 1] = PLR_FMA(row[1], M[3], row[0] * M[1]);
-            own[3 * i + 2] = row[2];
+        for (int k = 0; k < 3; k++) {
+            own[k] = PLR_FMA(M[1], rigid[3 + k], M[0] * rigid[k]);
+            own[3 + k] = PLR_FMA(M[3], rigid[3 + k], M[2] * rigid[k]);
+            own[6 + k] = rigid[6 + k];
         }
     }
     plr_covariance_transport(f, A, F);

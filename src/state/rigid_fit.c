@@ -10,6 +10,8 @@
 #define SHARE_OF_POSE PLR_R(0.1)
 /* For directions that no landmark shows, such as the roll about the only one's ray. */
 #define TINY PLR_R(1e-12)
+/* Where points all lie alike, so much of the diagonal on top keeps rounding from deciding. */
+#define LITTLE PLR_R(1e-5)
 /* What is known to so little, squared, is known. */
 #define KNOWN PLR_R(1e-20)
 
@@ -23,6 +25,7 @@ void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_
     for (unsigned row = 0; row < 3; row++) {
         const plr_real *j = J + PLR_POSE_DIM * row;
         plr_real *A = fit->A;
+        fit->w2 = PLR_FMA(W[row] * w[row], w[row], fit->w2);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
             const plr_real weighted = W[row] * j[k];
             fit->b[k] = PLR_FMA(weighted, w[row], fit->b[k]);
@@ -32,15 +35,36 @@ void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_
     }
 }
 
+/* What no common motion explains of the corrections, squared and per degree of freedom:
+ * (w2 - b^T A^-1 b) / (3 m - 6). */
+static plr_real scatter(const plr_rigid_fit *fit, plr_real most) {
+    plr_real A[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], y[PLR_POSE_DIM];
+    if (fit->voices < 3)
+        return most;
+    memcpy(A, fit->A, sizeof A);
+    memcpy(y, fit->b, sizeof y);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_real *diagonal = A + plr_upper_row(PLR_POSE_DIM, k);
+        *diagonal += PLR_FMA(LITTLE, *diagonal, TINY);
+    }
+    if (!plr_cholesky_upper(PLR_POSE_DIM, A))
+        return most;
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, A, y, 1);
+    const plr_real freedom = (plr_real)(PLR_ROWS * fit->voices - PLR_POSE_DIM);
+    const plr_real left = (fit->w2 - plr_norm2_of_6(y)) / freedom;
+    return left < 0 ? 0 : left < most ? left : most;
+}
+
 void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[PLR_POSE_DIM],
                          const plr_real spread[PLR_POSE_DIM], plr_real noise,
                          plr_real eta[PLR_POSE_DIM]) {
+    const plr_real left = scatter(fit, noise);
     memcpy(eta, fit->b, sizeof fit->b);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real *diagonal = fit->A + plr_upper_row(PLR_POSE_DIM, k);
         const plr_real weight = PLR_FMA(SHARE_OF_POSE, *diagonal, TINY);
         eta[k] = PLR_FMA(weight, xi[k], eta[k]);
-        *diagonal += weight + noise / (spread[k] + KNOWN);
+        *diagonal += weight + left / (spread[k] + KNOWN);
     }
     if (fit->voices > 0 && plr_cholesky_upper(PLR_POSE_DIM, fit->A)) {
         plr_solve_upper_transposed(PLR_POSE_DIM, 1, fit->A, eta, 1);

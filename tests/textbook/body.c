@@ -301,7 +301,7 @@ void body_settle(textbook *t) {
 void body_fit_add(const textbook *t, body_fit *fit, const double q[3], const double e[3]) {
     const double r2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2], baseline = t->camera.baseline_m;
     double K[18], W[9], WK[18];
-    fit->heard = true;
+    fit->heard++;
     for (unsigned k = 0; k < 9; k++) {
         const double along = q[k / 3] * q[k % 3] / r2; /* mu mu^T */
         W[k] = ((k % 4 == 0) - along) / r2 + baseline * baseline * along / (r2 * r2);
@@ -310,39 +310,67 @@ void body_fit_add(const textbook *t, body_fit *fit, const double q[3], const dou
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 6, 3, 1, W, K, 0, WK);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 6, 3, 1, K, WK, 1, fit->A);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, 6, 1, 3, 1, WK, e, 1, fit->b);
+    for (unsigned k = 0; k < 9; k++)
+        fit->square += e[k / 3] * W[k] * e[k % 3];
+}
+
+/* Per degree of freedom, what no common motion explains of the corrections. */
+static double scatter(const body_fit *fit, double most) {
+    double A[36], y[6], left = fit->square;
+    memcpy(A, fit->A, sizeof A);
+    memcpy(y, fit->b, sizeof y);
+    for (unsigned k = 0; k < 6; k++)
+        A[7 * k] += 1e-5 * A[7 * k] + 1e-12;
+    if (fit->heard < 3 || !oracle_solve_spd(6, 1, A, y))
+        return most;
+    for (unsigned k = 0; k < 6; k++)
+        left -= fit->b[k] * y[k];
+    return fmax(0, fmin(most, left / (3 * fit->heard - 6)));
 }
 
 void body_fit_solve(const textbook *t, body_fit *fit, const double xi[6], double eta[6]) {
     const double angle = t->config.pixel_sigma_px / t->camera.fx_px;
+    const double left = scatter(fit, angle * angle);
     for (unsigned k = 0; k < 6; k++) {
         const double weight = 0.1 * fit->A[7 * k] + 1e-12;
         eta[k] = fit->b[k] + weight * xi[k];
-        fit->A[7 * k] += weight + angle * angle / (t->spread[k] + 1e-20);
+        fit->A[7 * k] += weight + left / (t->spread[k] + 1e-20);
     }
-    if (!fit->heard || !oracle_solve_spd(6, 1, fit->A, eta))
+    if (fit->heard == 0 || !oracle_solve_spd(6, 1, fit->A, eta))
         memcpy(eta, xi, 6 * sizeof *eta);
 }
 
-/* One landmark's correction: less the common motion eta through the chart, then along with eta. */
+void body_along(const textbook *t, const double eta[6], const double back[16], double q[3],
+                double e[3]) {
+    double K[18], R_back[9], turned[3];
+    const double before = norm3(q);
+    observe_camera_by_pose(t, q, K);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, eta, 1, e);
+    const double along = (q[0] * e[0] + q[1] * e[1] + q[2] * e[2]) / before;
+    for (unsigned k = 0; k < 3; k++) /* an angle */
+        e[k] = (e[k] - along * q[k] / before) / before;
+    rigid_rotation(R_back, back);
+    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R_back, e, 0, turned);
+    rigid_apply(q, back, q);
+    const double r = norm3(q), off = (q[0] * turned[0] + q[1] * turned[1] + q[2] * turned[2]) / r;
+    for (unsigned k = 0; k < 3; k++) /* across the new ray, and along it */
+        e[k] = r * (turned[k] - off * q[k] / r) + along * r / (before * before) * q[k];
+}
+
+/* One landmark's correction: along with the common motion eta, then the rest through the chart. */
 static void retract_landmark(textbook *t, unsigned landmark, const double eta[6],
                              const double back[16], double block[9]) {
     textbook_landmark *l = &t->landmarks[landmark];
-    double K[18], e[3], beyond[3], moved[3], J[9], R_back[9];
+    double e[3], beyond[3], moved[3], J[9], R_back[9];
     rigid_rotation(R_back, back);
-    observe_camera_by_pose(t, l->x, K);
     body_beyond(l, beyond);
     for (unsigned k = 0; k < 3; k++)
         e[k] = t->correction[textbook_row(t, landmark) + k] + beyond[k];
-    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, eta, 1, e);
+    body_along(t, eta, back, l->x, e);
     l->beyond = limit_step(t, l->x, e);
     body_polar_step(l->x, e, moved, J);
-    square_multiply(3, R_back, J, block);
+    square_multiply(3, J, R_back, block);
     memcpy(l->x, moved, sizeof moved);
-    body_beyond(l, beyond);
-    rigid_apply(l->x, back, moved);
-    oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 3, 1, R_back, beyond, 0, e);
-    const double range = norm3(l->x); /* the inverse range of an error e is -mu^T e / range^2 */
-    l->beyond = -(l->x[0] * e[0] + l->x[1] * e[1] + l->x[2] * e[2]) / (range * range * range);
 }
 
 void body_retract(textbook *t) {

@@ -39,14 +39,20 @@ void body_beyond(const textbook_landmark *l, double e[3]);
 void body_polar_step(const double q[3], const double e[3], double moved[3], double J[9]);
 
 /* The rigid motion eta of the body that the corrections of points q have in common, where the pose's
- * own, xi, weighs a tenth, and 0 as much as t->spread allows beside the noise of a pixel. A point's
- * correction counts as the angle that it makes, and along the ray as the disparity. */
+ * own, xi, weighs a tenth, and 0 as much as t->spread allows beside what the corrections scatter by, at
+ * most the noise of a pixel. A point's correction counts as the angle that it makes, and along the ray as
+ * the disparity. */
 typedef struct body_fit {
-    double A[36], b[6];
-    bool heard; /* a landmark has been added */
+    double A[36], b[6], square;
+    unsigned heard; /* landmarks that have been added */
 } body_fit;
 
 void body_fit_add(const textbook *t, body_fit *fit, const double q[3], const double e[3]);
 void body_fit_solve(const textbook *t, body_fit *fit, const double xi[6], double eta[6]);
+
+/* Without the common motion eta, its camera's being undone by `back`: carries a point q there, and its
+ * error e becomes what is left, at the same angle and the same change of inverse range as at q. */
+void body_along(const textbook *t, const double eta[6], const double back[16], double q[3],
+                double e[3]);
 
 #endif

@@ -302,13 +302,12 @@ static void retract_twin(const double *dx, double (*q)[3], double *T) {
     specimen_put(T, n, 0, 0, 6, 6, A);
     for (unsigned slot = 0; slot < filter.count; slot++) {
         const unsigned row = plr_covariance_row(&filter, slot);
-        double K[18], moved[3], J[9], RJ[9];
-        observe_camera_by_pose(&truth, q[slot], K);
-        oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 3, 1, 6, -1, K, eta, 1, e[slot]);
+        double moved[3], J[9], JR[9];
+        body_along(&truth, eta, back, q[slot], e[slot]);
         body_polar_step(q[slot], e[slot], moved, J);
-        square_multiply(3, R_back, J, RJ);
-        specimen_put(T, n, row, row, 3, 3, RJ);
-        rigid_apply(q[slot], back, moved);
+        square_multiply(3, J, R_back, JR);
+        specimen_put(T, n, row, row, 3, 3, JR);
+        memcpy(q[slot], moved, sizeof moved);
     }
 }
 
