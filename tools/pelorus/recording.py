@@ -15,7 +15,7 @@ import numpy as np
 from pelorus import motion, packed_file, se3
 from pelorus.console import progress
 from pelorus.errors import PelorusError, writing
-from pelorus.frames import Header, Landmark, Message, Stereo, Text, Truth, Twist
+from pelorus.frames import Header, Landmark, Message, Reading, Stereo, Text, Truth, Twist
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
@@ -36,6 +36,7 @@ class Recording:
     truth_t_ns: Times = field(default_factory=lambda: np.empty(0, np.int64))
     truth: Poses = field(default_factory=lambda: Poses(np.empty((0, 3, 3)), np.empty((0, 3))))
     known: list[Landmark] = field(default_factory=list)
+    readings: list[Reading] = field(default_factory=list)  # of small sensors
     remarks: list[Text] = field(default_factory=list)
     camera_delay_ns: int = 0  # frames stand so much later in the file, as they come off a robot
     twist_delay_ns: int = 0  # twists likewise
@@ -76,21 +77,25 @@ class Recording:
         yield self.header
         yield from self.remarks
         yield from self.known
-        streams = (self._twists(), self._truths(), self._stereos())
+        streams = (self._twists(), self._readings(), self._truths(), self._stereos())
         for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
             yield message
 
     def __len__(self) -> int:
         data = len(self.twist_t_ns) + len(self.truth_t_ns) + len(self.frame_t_ns)
-        return 1 + len(self.remarks) + len(self.known) + data
+        return 1 + len(self.remarks) + len(self.known) + len(self.readings) + data
 
     def _twists(self) -> Iterator[tuple[int, int, Message]]:
         for t, v, w in zip(self.twist_t_ns.tolist(), self.v_B_mps, self.w_B_radps, strict=True):
             yield t + self.twist_delay_ns, 0, Twist(t, v, w)
 
+    def _readings(self) -> Iterator[tuple[int, int, Message]]:
+        for reading in sorted(self.readings, key=lambda reading: reading.t_ns):
+            yield reading.t_ns, 1, reading
+
     def _truths(self) -> Iterator[tuple[int, int, Message]]:
         for t, R, p in zip(self.truth_t_ns.tolist(), *self.truth, strict=True):
-            yield t, 1, Truth(t, R, p)
+            yield t, 2, Truth(t, R, p)
 
     def _stereos(self) -> Iterator[tuple[int, int, Message]]:
         bounds = self.tracks.bounds()
@@ -98,7 +103,7 @@ class Recording:
         pixels = self.tracks.pixels.astype(np.float32)
         for k, t in enumerate(self.frame_t_ns.tolist()):
             rows = slice(bounds[k], bounds[k + 1])
-            yield t + self.camera_delay_ns, 2, Stereo(t, ids[rows], pixels[rows])
+            yield t + self.camera_delay_ns, 3, Stereo(t, ids[rows], pixels[rows])
 
     def write(self, path: Path) -> int:
         """Write the whole file; its size in bytes. Nothing is left behind if that fails."""

@@ -16,7 +16,7 @@ from pelorus.frames import Config, End, Header, Kind, Landmark, Message, Stereo,
 from pelorus.wire import Counts, Received
 
 GAP_RATIO = 1.5  # an interval is a gap if it exceeds the median one so much
-DATA = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.POSE)
+DATA = (Kind.TWIST, Kind.READING, Kind.STEREO, Kind.TRUTH, Kind.POSE)
 
 
 class Gap(NamedTuple):
@@ -107,7 +107,8 @@ def _stream(messages: Sequence[Message], kind: Kind) -> Stream:
         last_ns=exact[-1],
         rate_hz=1e9 / usual if usual else 0.0,
         gaps=[Gap(exact[k], exact[k + 1] - exact[k]) for k in late],
-        steps_back=int(np.sum(steps <= 0)),
+        # Several sensors may have measured at one time.
+        steps_back=int(np.sum(steps < 0 if kind == Kind.READING else steps <= 0)),
     )
 
 
@@ -152,6 +153,7 @@ def _end_differences(end: End, counts: Counts) -> list[str]:
         Kind.STEREO: end.stereos,
         Kind.TRUTH: end.truths,
         Kind.LANDMARK: end.landmarks,
+        Kind.READING: end.readings,
     }
     return [
         f"END tells of {due} {kind.name} frames, {counts.frames[kind]} can be read"

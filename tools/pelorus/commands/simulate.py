@@ -54,6 +54,7 @@ def run(target: Path, **given: Any) -> None:
         f"{escape(str(target))}: {size} bytes, {len(recording.twist_t_ns)} twists, "
         f"{len(recording.frame_t_ns)} frames with {len(recording.tracks)} observations, "
         f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
+        f"{f', {len(recording.readings)} readings' if recording.readings else ''}"
     )
 
 

@@ -4,10 +4,13 @@
 twists   t_s or t_ns, vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps
 stereo   t_s or t_ns, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
 truth    t_s or t_ns, px_m, py_m, pz_m, qx, qy, qz, qw: body to world (optional)
+
+and files of small sensors (converters/readings.py).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,11 +18,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import calibration
-from pelorus.converters import twist_noise
+from pelorus.converters import readings, twist_noise
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import TwistTiming
+from pelorus.frames import Sensor, TwistTiming
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
@@ -37,6 +40,7 @@ class Sources(NamedTuple):
     stereo: Path
     calibration: Path
     truth: Path | None = None
+    readings: Sequence[tuple[Sensor, Path]] = ()
 
 
 def convert(
@@ -67,7 +71,10 @@ def read(sources: Sources) -> Recording:
             f"spans {frame_t_ns[0]} to {frame_t_ns[-1]} ns, {sources.twists} "
             f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap",
         )
-    recording = Recording(header, twist_t_ns, v, w, frame_t_ns, tracks)
+    found = [
+        reading for sensor, path in sources.readings for reading in readings.read(path, sensor)
+    ]
+    recording = Recording(header, twist_t_ns, v, w, frame_t_ns, tracks, readings=found)
     if sources.truth is None:
         return recording
     truth_t_ns, truth = _truth(sources.truth)

@@ -16,6 +16,7 @@ from pelorus.frames import (
     Header,
     Landmark,
     Noise,
+    Reading,
     TwistTiming,
     header_name,
 )
@@ -23,7 +24,7 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.simulation import scene, sensors, settings
+from pelorus.simulation import scene, sensors, settings, small_sensors
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
 from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
 from pelorus.simulation.settings import (
@@ -93,6 +94,18 @@ class Options:
     )
     outliers: float = setting(0.02, "Fraction of observations that are wrong.", rule=BELOW_ONE)
     drop: float = setting(0.01, "Fraction of frames that are lost.", rule=BELOW_ONE)
+    wheel_hz: float = setting(
+        0.0, "Readings of a wheel (READING): x and y of its velocity; 0: none.", "HZ"
+    )
+    wheel_sigma_mps: float = setting(0.02, "Their noise.", "M/S", POSITIVE)
+    position_hz: float = setting(
+        0.0, "Readings of a position, as of GNSS or motion capture; 0: none.", "HZ"
+    )
+    position_sigma_m: float = setting(0.05, "Their noise.", "M", POSITIVE)
+    standstill_hz: float = setting(
+        0.0, "Readings that say that the robot stands; with --parked alone.", "HZ"
+    )
+    standstill_sigma_mps: float = setting(0.001, "What is claimed of them.", "M/S", POSITIVE)
     camera_delay_s: float = setting(
         0.0, "Frames stand so much later in the file than their time, as off a slow camera.", "S"
     )
@@ -108,6 +121,12 @@ class Options:
         whole = round(ratio) == ratio >= 1
         due = "a whole multiple of the frame rate"
         require("twist_rate_hz", self.twist_rate_hz, whole, due)
+        for name in ("wheel_hz", "position_hz", "standstill_hz"):
+            rate = getattr(self, name)
+            whole = not rate or round(self.twist_rate_hz / rate) == self.twist_rate_hz / rate
+            require(name, rate, whole, "the rate of the twists, or a whole fraction of it,")
+        stands = self.parked or not self.standstill_hz
+        require("standstill_hz", self.standstill_hz, stands, "--parked beside it")
         short = self.frames <= FRAMES_MAX
         require("duration_s", self.duration_s, short, f"at most {FRAMES_MAX} frames")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
@@ -135,7 +154,10 @@ class Options:
 
     @property
     def twists_per_frame(self) -> int:
-        return round(self.twist_rate_hz / self.frame_rate_hz)
+        return self.twists_per(self.frame_rate_hz)
+
+    def twists_per(self, rate_hz: float) -> int:
+        return round(self.twist_rate_hz / rate_hz)
 
     @property
     def lookahead_s(self) -> float:
@@ -148,7 +170,7 @@ class _Chances:
 
     def __init__(self, seed: int) -> None:
         names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
-        self._names = (*names, "bias_w", "drift", "moving", "moving_ways")
+        self._names = (*names, "bias_w", "drift", "moving", "moving_ways", "wheel", "position")
         seeds = np.random.SeedSequence(seed).spawn(len(self._names))
         self._streams = [np.random.Generator(np.random.PCG64(s)) for s in seeds]
 
@@ -196,6 +218,7 @@ def simulate(options: Options) -> Simulation:
         frame_t_ns,
         truth,
         known=_known(options, points),
+        readings=_small_sensors(options, way, chances),
         camera_delay_ns=round(options.camera_delay_s * 1e9),
         twist_delay_ns=round(options.mishaps.twist_delay_s * 1e9),
     )
@@ -235,6 +258,21 @@ def _readings(
     w = way.w_B_radps + sensors.white(options.gyro_sigma_radps, count, chances["gyro"]) + bias_w
     v, w = options.mishaps.readings(way.t_ns, v, w)
     return v, w, bias_v, bias_w
+
+
+def _small_sensors(options: Options, way: Drive, chances: _Chances) -> list[Reading]:
+    found = list[Reading]()
+    if options.wheel_hz:
+        every = options.twists_per(options.wheel_hz)
+        found += small_sensors.wheel(way, every, options.wheel_sigma_mps, chances["wheel"])
+    if options.standstill_hz:
+        every = options.twists_per(options.standstill_hz)
+        found += small_sensors.standstill(way, every, options.standstill_sigma_mps)
+    if options.position_hz:
+        every, sigma = options.twists_per(options.position_hz), options.position_sigma_m
+        chance = chances["position"]
+        found += small_sensors.position(way, every, sigma, options.mishaps, chance)
+    return found
 
 
 def _observe(
