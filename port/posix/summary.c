@@ -114,6 +114,17 @@ static void print_gate_hint(const summary *s, const plr_config *config) {
         due);
 }
 
+/* Of small sensors, where there are any. */
+static void print_readings(const plr_session *session) {
+    plr_totals totals;
+    if (session->totals.readings == 0 || plr_filter_totals(&session->filter, &totals) != PLR_OK)
+        return;
+    printf("readings      %" PRIu32 ": %" PRIu32 " used, %" PRIu32 " rejected by the gate, %" PRIu32
+           " refused\n",
+           session->totals.readings, totals.readings - totals.readings_gated, totals.readings_gated,
+           totals.readings_refused);
+}
+
 static void print_counts(const summary *s, const plr_session *session) {
     printf("frames        %" PRIu64 " used, %" PRIu64 " refused; %" PRIu32 " twists\n", s->frames,
            s->frames_refused, session->totals.twists);
@@ -125,6 +136,7 @@ static void print_counts(const summary *s, const plr_session *session) {
     printf("not used      %" PRIu64 " without a slot, %" PRIu64 " too poor to start from, %" PRIu64
            " malformed, %" PRIu64 " doubled, %" PRIu64 " over budget\n",
            s->no_room, s->poor, s->refused_observations, s->duplicates, s->left_out);
+    print_readings(session);
     printf("health        %" PRIu64 " frames good, %" PRIu64 " degraded, %" PRIu64 " lost, %" PRIu64
            " diverged\n",
            s->health[PLR_HEALTH_GOOD], s->health[PLR_HEALTH_DEGRADED], s->health[PLR_HEALTH_LOST],

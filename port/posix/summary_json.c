@@ -67,6 +67,16 @@ static void put_counts(json_object *o, const summary *s, const plr_session *sess
     json_number(o, "diverged_s", s->diverged_ns > 0 ? (double)s->diverged_ns * 1e-9 : nan(""));
 }
 
+static void put_readings(json_object *o, const plr_session *session) {
+    plr_totals totals;
+    if (session->totals.readings == 0 || plr_filter_totals(&session->filter, &totals) != PLR_OK)
+        return;
+    json_count(o, "readings", session->totals.readings);
+    json_count(o, "readings_used", totals.readings - totals.readings_gated);
+    json_count(o, "readings_gated", totals.readings_gated);
+    json_count(o, "readings_refused", totals.readings_refused);
+}
+
 static void put_damage(json_object *o, const summary *s, const plr_session *session) {
     const plr_reader_counts *c = &session->reader.counts;
     json_count(o, "bytes", c->bytes);
@@ -93,6 +103,7 @@ void summary_print_json(summary *s, const plr_session *session, const char *path
     put_build(&o, session, path);
     put_figures(&o, s, &figures);
     put_counts(&o, s, session);
+    put_readings(&o, session);
     put_damage(&o, s, session);
     put_settings(&o, plr_filter_config(&session->filter));
     json_end(&o);

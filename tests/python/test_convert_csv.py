@@ -15,7 +15,7 @@ from converted import SHORT, Run, messages_of
 from drives import clean, with_turned_axes
 from pelorus import se3
 from pelorus.converters import csv as csv_converter
-from pelorus.frames import BodyAxes, Header, Reading, Sensor, Stereo, Truth, Twist, TwistTiming
+from pelorus.frames import BodyAxes, Header, Stereo, Truth, Twist, TwistTiming
 from pelorus.recording import Recording
 from scipy.spatial.transform import Rotation
 
@@ -97,9 +97,8 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
     tmp_path: Path,
 ) -> None:
     csv_files(tmp_path, clean(3, velocity_sigma_mps=0.5, gyro_sigma_radps=0.05))
-    sources = csv_converter.Sources(
-        tmp_path / "twists.csv", tmp_path / "stereo.csv", tmp_path / "camera.json"
-    )
+    names = ("twists.csv", "stereo.csv", "camera.json")
+    sources = csv_converter.Sources(*(tmp_path / name for name in names))
     recording, findings = csv_converter.convert(sources)
     assert findings[-1].subject == "twist noise"
     assert findings[-1].found
@@ -114,9 +113,8 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
 def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
     drive = clean(3)
     csv_files(tmp_path, with_turned_axes(drive))
-    sources = csv_converter.Sources(
-        tmp_path / "twists.csv", tmp_path / "stereo.csv", tmp_path / "camera.json"
-    )
+    names = ("twists.csv", "stereo.csv", "camera.json")
+    sources = csv_converter.Sources(*(tmp_path / name for name in names))
     mended, findings = csv_converter.convert(sources)
     assert [finding.found for finding in findings] == [False, True, False, False]
     assert np.allclose(mended.T_CB.R, drive.T_CB.R)
@@ -231,62 +229,3 @@ def test_twists_and_frames_of_different_clocks_are_refused(tmp_path: Path, pelor
     outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
     assert outcome.status == 1
     assert "do not overlap" in outcome.err
-
-
-# --- small sensors --------------------------------------------------------------------------------
-
-
-def test_small_sensors_arrive_with_their_axes_sigmas_and_arms(tmp_path: Path, pelorus: Run) -> None:
-    drive, target = clean(**SHORT), tmp_path / "mine.plr"
-    wheel = {"vx_mps": [1, 2], "t_ns": [1000, 2000], "sigma_mps": [0.5, 0.25], "at_x_m": [1, 1],
-             "at_y_m": [2, 2], "at_z_m": [3, 3]}  # fmt: skip
-    gnss = {"t_s": [3e-6], "px_m": [7], "pz_m": [9], "sigma_m": [2], "sigma_pz_m": [4]}
-    still = {"t_ns": [4000], "sigma_mps": [0.125]}
-    said = pelorus(
-        *("convert", "csv", *csv_files(tmp_path, drive), target),
-        *("--wheel", write_csv(tmp_path / "w.csv", wheel)),
-        *("--wheel", write_csv(tmp_path / "v.csv", {**wheel, "t_ns": [1500, 2500]})),
-        *("--position", write_csv(tmp_path / "p.csv", gnss)),
-        *("--standstill", write_csv(tmp_path / "s.csv", still)),
-    )
-    assert said.status == 0, said.err
-    assert "6 readings" in said.out
-    found = messages_of(target, Reading)
-    assert [m.t_ns for m in found] == [1000, 1500, 2000, 2500, 3000, 4000]
-    first, _, second, _, position, standstill = found
-    assert (first.sensor, first.axes, first.value.tolist()) == (Sensor.WHEEL, 1, [1, 0, 0])
-    assert first.at_B_m.tolist() == [1, 2, 3]
-    assert (first.sigma[0], second.sigma[0]) == (0.5, 0.25)
-    assert (position.sensor, position.axes) == (Sensor.POSITION, 5)
-    assert position.value.tolist() == [7, 0, 9]
-    assert (position.sigma[0], position.sigma[2]) == (2, 4)
-    assert position.at_B_m.tolist() == [0, 0, 0]
-    assert (standstill.sensor, standstill.axes) == (Sensor.STANDSTILL, 7)
-    assert standstill.sigma.tolist() == [0.125] * 3
-    assert standstill.value.tolist() == [0, 0, 0]
-
-
-@pytest.mark.parametrize(
-    ("columns", "words"),
-    [
-        ({"t_s": [1], "sigma_mps": [1]}, "measures no axis; some of vx_mps, vy_mps, vz_mps"),
-        ({"t_s": [1], "vx_mps": [1]}, "lacks the column sigma_mps"),
-        (
-            {"t_s": [1, 2], "vx_mps": [1, 1], "sigma_mps": [1, 0]},
-            "row 3: sigma_mps is not positive",
-        ),
-        ({"t_s": [2, 1], "vx_mps": [1, 1], "sigma_mps": [1, 1]}, "row 3: time does not ascend"),
-        ({"t_s": [1], "vx_mps": [1], "sigma_mps": [1], "at_x_m": [0]}, "lacks the column at_y_m"),
-        ({"t_s": [1], "vx_mps": ["nan"], "sigma_mps": [1]}, "vx_mps is not finite"),
-    ],
-)
-def test_a_small_sensor_that_makes_no_sense_is_refused(
-    tmp_path: Path, pelorus: Run, columns: dict[str, list[Any]], words: str
-) -> None:
-    wheel, target = write_csv(tmp_path / "wheel.csv", columns), tmp_path / "mine.plr"
-    files = csv_files(tmp_path, clean(**SHORT))
-    said = pelorus("convert", "csv", *files, target, "--wheel", wheel)
-    assert said.status == 1
-    assert "wheel.csv" in said.err
-    assert words in said.err
-    assert not target.exists()

@@ -36,7 +36,7 @@ class Recording:
     truth_t_ns: Times = field(default_factory=lambda: np.empty(0, np.int64))
     truth: Poses = field(default_factory=lambda: Poses(np.empty((0, 3, 3)), np.empty((0, 3))))
     known: list[Landmark] = field(default_factory=list)
-    readings: list[Reading] = field(default_factory=list)  # of small sensors
+    readings: list[Reading] = field(default_factory=list)  # of small sensors, in any order
     remarks: list[Text] = field(default_factory=list)
     camera_delay_ns: int = 0  # frames stand so much later in the file, as they come off a robot
     twist_delay_ns: int = 0  # twists likewise
@@ -77,7 +77,7 @@ class Recording:
         yield self.header
         yield from self.remarks
         yield from self.known
-        streams = (self._twists(), self._readings(), self._truths(), self._stereos())
+        streams = (self._twists(), self._small(), self._truths(), self._stereos())
         for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
             yield message
 
@@ -89,8 +89,8 @@ class Recording:
         for t, v, w in zip(self.twist_t_ns.tolist(), self.v_B_mps, self.w_B_radps, strict=True):
             yield t + self.twist_delay_ns, 0, Twist(t, v, w)
 
-    def _readings(self) -> Iterator[tuple[int, int, Message]]:
-        for reading in sorted(self.readings, key=lambda reading: reading.t_ns):
+    def _small(self) -> Iterator[tuple[int, int, Message]]:
+        for reading in sorted(self.readings, key=lambda m: (m.t_ns, m.sensor)):
             yield reading.t_ns, 1, reading
 
     def _truths(self) -> Iterator[tuple[int, int, Message]]:

@@ -62,6 +62,9 @@ def _words(of: str) -> dict[int, str]:
     return {row["number"]: row["words"] for row in _TABLES["words"] if row["of"] == of}
 
 
+SENSORS: dict[str, int] = {  # the small ones, by name
+    row["name"].lower(): int(row["number"]) for row in _TABLES["enums"] if row["of"] == "sensor"
+}
 LIMITS: dict[str, int] = _TABLES["limits"]
 MESSAGES: dict[str, MessageTable] = {row["name"]: _message(row) for row in _TABLES["messages"]}
 SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["settings"]}

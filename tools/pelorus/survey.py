@@ -12,11 +12,12 @@ import numpy as np
 
 from pelorus import wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Config, End, Header, Kind, Landmark, Message, Stereo, Text
+from pelorus.frames import Config, End, Header, Kind, Landmark, Message, Reading, Stereo, Text
+from pelorus.small_sensors import name_of
 from pelorus.wire import Counts, Received
 
 GAP_RATIO = 1.5  # an interval is a gap if it exceeds the median one so much
-DATA = (Kind.TWIST, Kind.READING, Kind.STEREO, Kind.TRUTH, Kind.POSE)
+DATA = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.POSE)
 
 
 class Gap(NamedTuple):
@@ -50,6 +51,15 @@ class Tracks:
 
 
 @dataclass(frozen=True)
+class SmallSensor:
+    """The READINGs of one sensor."""
+
+    stream: Stream
+    axes: int  # bits: all that were measured at any time
+    sigma: tuple[float, ...]  # median of each that was
+
+
+@dataclass(frozen=True)
 class Survey:
     """Everything that `info` shows."""
 
@@ -60,6 +70,7 @@ class Survey:
     landmarks: dict[str, int]  # by role
     texts: list[Text]
     streams: dict[Kind, Stream]
+    sensors: dict[str, SmallSensor]
     tracks: Tracks | None
     end: End | None
     remarks: list[str] = field(default_factory=list)
@@ -67,7 +78,7 @@ class Survey:
     @property
     def useful(self) -> bool:
         """A header, and something to which it applies."""
-        return self.header is not None and any(kind in self.streams for kind in DATA)
+        return self.header is not None and bool(self.streams or self.sensors)
 
 
 def survey(path: Path) -> Survey:
@@ -76,7 +87,11 @@ def survey(path: Path) -> Survey:
     messages = [frame.message for frame in received]
     header = next((m for m in messages if isinstance(m, Header)), None)
     end = next((m for m in reversed(messages) if isinstance(m, End)), None)
-    streams = {kind: _stream(messages, kind) for kind in DATA if counts.frames[kind]}
+    streams = {
+        kind: _stream([m for m in messages if m.kind == kind])
+        for kind in DATA
+        if counts.frames[kind]
+    }
     stereos = [m for m in messages if isinstance(m, Stereo)]
     roles = [m.role.name.lower() for m in messages if isinstance(m, Landmark)]
     found = Survey(
@@ -87,6 +102,7 @@ def survey(path: Path) -> Survey:
         landmarks={role: roles.count(role) for role in dict.fromkeys(roles)},
         texts=[m for m in messages if isinstance(m, Text)],
         streams=streams,
+        sensors=_sensors([m for m in messages if isinstance(m, Reading)]),
         tracks=_tracks(stereos) if stereos else None,
         end=end,
     )
@@ -94,10 +110,25 @@ def survey(path: Path) -> Survey:
     return found
 
 
-def _stream(messages: Sequence[Message], kind: Kind) -> Stream:
-    t_ns = np.array([m.t_ns for m in messages if m.kind == kind], np.float64)  # type: ignore[attr-defined]
-    exact = [int(m.t_ns) for m in messages if m.kind == kind]  # type: ignore[attr-defined]
-    steps = np.diff(t_ns)
+def _sensors(readings: list[Reading]) -> dict[str, SmallSensor]:
+    """By name, in the order of their numbers."""
+    found = {}
+    for number in sorted({m.sensor for m in readings}):
+        own = [m for m in readings if m.sensor == number]
+        has = np.array([[m.axes >> k & 1 for k in range(3)] for m in own], bool)
+        sigma = np.array([m.sigma for m in own])
+        found[name_of(number)] = SmallSensor(
+            _stream(own, ties=True),
+            int(np.bitwise_or.reduce([m.axes for m in own])),
+            tuple(float(np.median(sigma[has[:, k], k])) for k in range(3) if has[:, k].any()),
+        )
+    return found
+
+
+def _stream(messages: Sequence[Message], ties: bool = False) -> Stream:
+    """`ties`: at one time there may be several."""
+    exact = [int(m.t_ns) for m in messages]  # type: ignore[attr-defined]
+    steps = np.diff(np.array(exact, np.float64))
     ahead = steps[steps > 0]
     usual = float(np.median(ahead)) if len(ahead) else 0.0
     late = np.nonzero((steps > GAP_RATIO * usual) & (steps > 0))[0]
@@ -107,8 +138,7 @@ def _stream(messages: Sequence[Message], kind: Kind) -> Stream:
         last_ns=exact[-1],
         rate_hz=1e9 / usual if usual else 0.0,
         gaps=[Gap(exact[k], exact[k + 1] - exact[k]) for k in late],
-        # Several sensors may have measured at one time.
-        steps_back=int(np.sum(steps < 0 if kind == Kind.READING else steps <= 0)),
+        steps_back=int(np.sum(steps < 0 if ties else steps <= 0)),
     )
 
 
@@ -136,7 +166,7 @@ def _remarks(found: Survey, received: list[Received]) -> list[str]:
     elif not isinstance(received[0].message, Header):
         said.append("HEADER is not the first frame")
     if found.header is not None and not found.useful:
-        said.append("there are no data: neither TWIST nor STEREO nor TRUTH nor POSE")
+        said.append("there are no data: neither TWIST nor STEREO nor TRUTH nor READING nor POSE")
     if found.end is None:
         said.append("there is no END: the recording was cut short")
     else:
@@ -144,6 +174,9 @@ def _remarks(found: Survey, received: list[Received]) -> list[str]:
     for kind, stream in found.streams.items():
         if stream.steps_back:
             said.append(f"{kind.name}: time does not ascend {stream.steps_back} times")
+    for name, sensor in found.sensors.items():
+        if sensor.stream.steps_back:
+            said.append(f"READING {name}: time does not ascend {sensor.stream.steps_back} times")
     return said
 
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,10 +16,11 @@ from pelorus.commands.choices import Fix, Timing, TimingOrAuto
 from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
-from pelorus.converters import landmark_map, matlab
+from pelorus.converters import landmark_map, matlab, readings_csv
 from pelorus.faults.finding import Finding
-from pelorus.frames import TEXT_BYTES_MAX, Sensor, Text
+from pelorus.frames import TEXT_BYTES_MAX, Text
 from pelorus.recording import Recording
+from pelorus.small_sensors import SMALL_SENSORS
 
 SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
 TARGET = typer.Argument(
@@ -27,10 +30,6 @@ FIX = typer.Option(
     Fix.AUTO,
     help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "
     "and mend them; none: leave the data as they are.",
-)
-AND_ARM = (
-    " (or sigma_vx_mps, sigma_px_m and so on), and at_x_m, at_y_m, at_z_m where the sensor is not "
-    "in the body's origin; repeatable."
 )
 
 app = typer.Typer(
@@ -103,10 +102,28 @@ def klt(
     _write(matlab.klt(source, twist_timing.value_in_header), [], target)
 
 
+def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option for each small sensor's file, which it gets by name."""
+    options = [
+        inspect.Parameter(
+            sensor.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=typer.Option([], help=readings_csv.columns_of(sensor)),
+            annotation=list[Path],
+        )
+        for sensor in SMALL_SENSORS
+    ]
+    known = inspect.signature(command, eval_str=True).parameters.values()
+    own = [p for p in known if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    command.__dict__["__signature__"] = inspect.Signature([*own, *options])
+    return command
+
+
 @app.command(
     epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
-    "--calibration camera.json mine.plr",
+    "--calibration camera.json --wheel wheel.csv mine.plr",
 )
+@_with_small_sensors
 def csv(
     target: Path = TARGET,
     twists: Path = typer.Option(
@@ -128,27 +145,18 @@ def csv(
     truth: Path | None = typer.Option(
         None, help="Columns t_s (or t_ns), px_m, py_m, pz_m, qx, qy, qz, qw: body to world."
     ),
-    wheel: list[Path] = typer.Option(
-        [], help=f"Columns t_s (or t_ns), some of vx_mps, vy_mps, vz_mps, sigma_mps{AND_ARM}"
-    ),
-    position: list[Path] = typer.Option(
-        [], help=f"Columns t_s (or t_ns), some of px_m, py_m, pz_m, sigma_m{AND_ARM}"
-    ),
-    standstill: list[Path] = typer.Option(
-        [], help="Columns t_s (or t_ns), sigma_mps: while the robot stands; repeatable."
-    ),
     fix: Fix = FIX,
     twist_timing: Timing | None = typer.Option(
         None, help="When a twist reading holds; else the calibration says it, else start."
     ),
+    **readings: list[Path],
 ) -> None:
     """Convert your own data: CSV files with named columns in any order, and a JSON file."""
-    sensors = {Sensor.WHEEL: wheel, Sensor.POSITION: position, Sensor.STANDSTILL: standstill}
-    readings = [(sensor, path) for sensor, paths in sensors.items() for path in paths]
     recording, findings = csv_converter.convert(
-        csv_converter.Sources(twists, stereo, calibration, truth, readings),
+        csv_converter.Sources(twists, stereo, calibration, truth),
         fix is Fix.AUTO,
         twist_timing.value_in_header if twist_timing else None,
+        readings,
     )
     _write(recording, findings, target)
 
@@ -204,5 +212,5 @@ def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
         f"{escape(str(target))}: {size} bytes, {len(recording.twist_t_ns)} twists, "
         f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
         f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
-        f"{f', {len(recording.readings)} readings' if recording.readings else ''}"
+        + (f", {len(recording.readings)} readings" if recording.readings else "")
     )

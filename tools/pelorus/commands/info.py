@@ -12,6 +12,7 @@ from rich.table import Table
 from pelorus.console import out
 from pelorus.frames import Config, Header, Kind
 from pelorus.settings import describe
+from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.survey import Survey, Tracks, require_useful, survey
 
 GAPS_SHOWN = 5
@@ -39,6 +40,7 @@ def info(
         _show_config(config, len(found.configs))
     _show_counts(found)
     _show_streams(found)
+    _show_sensors(found)
     if found.tracks is not None:
         _show_tracks(found.tracks)
     for text in found.texts:
@@ -94,16 +96,18 @@ def _show_counts(found: Survey) -> None:
 
 
 def _show_streams(found: Survey) -> None:
-    if not found.streams:
+    streams = {kind.name: stream for kind, stream in found.streams.items()}
+    streams |= {f"READING {name}": sensor.stream for name, sensor in found.sensors.items()}
+    if not streams:
         return
-    origin = min(stream.first_ns for stream in found.streams.values())
+    origin = min(stream.first_ns for stream in streams.values())
     table = Table(
         "stream", "from s", "to s", "rate Hz", "gaps", "longest s", box=None, pad_edge=False
     )
-    for kind, stream in found.streams.items():
+    for name, stream in streams.items():
         longest = max((gap.length_ns for gap in stream.gaps), default=0)
         table.add_row(
-            kind.name,
+            name,
             _seconds(stream.first_ns - origin),
             _seconds(stream.last_ns - origin),
             f"{stream.rate_hz:.2f}",
@@ -112,11 +116,21 @@ def _show_streams(found: Survey) -> None:
         )
     out.print(table)
     out.print(f"time 0 is {origin} ns")
-    for kind, stream in found.streams.items():
+    for name, stream in streams.items():
         worst = sorted(stream.gaps, key=lambda gap: -gap.length_ns)[:GAPS_SHOWN]
         for gap in worst:
             at = _seconds(gap.after_ns - origin)
-            out.print(f"gap: {kind.name} pauses for {_seconds(gap.length_ns)} s after {at} s")
+            out.print(f"gap: {name} pauses for {_seconds(gap.length_ns)} s after {at} s")
+
+
+def _show_sensors(found: Survey) -> None:
+    letters = {sensor.name: sensor.letters for sensor in SMALL_SENSORS}
+    for name, sensor in found.sensors.items():
+        axes = "".join(x for k, x in enumerate(letters.get(name, "012")) if sensor.axes >> k & 1)
+        sigma = ", ".join(f"{x:.3g}" for x in dict.fromkeys(sensor.sigma))
+        out.print(
+            f"{sensor.stream.count} readings of a {name}, axes {axes}, sigma {sigma} (median)"
+        )
 
 
 def _show_tracks(tracks: Tracks) -> None:

@@ -17,8 +17,10 @@ from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
 from pelorus.simulation.mishaps import Mishaps
-from pelorus.simulation.settings import Span, option_name, settings_of
+from pelorus.simulation.readings import Sensing, options_without_meaning
+from pelorus.simulation.settings import Numbers, Span, option_name, settings_of
 from pelorus.simulation.simulate import Options, blindness, simulate
+from pelorus.small_sensors import SMALL_SENSORS, SmallSensor
 
 TARGET = typer.Argument(..., metavar="OUT.plr", help="The recording to write.")
 
@@ -32,29 +34,34 @@ def register(parent: typer.Typer) -> None:
             ),
             *_parameters(Options, None),
             *_parameters(Mishaps, "What goes wrong"),
+            *(p for sensor in SMALL_SENSORS for p in _of_sensor(sensor)),
         ]
     )
     parent.command(
         "simulate",
-        epilog="Example:  pelorus simulate slip.plr --slip 0.5 --slip-from 20 --slip-for 5",
+        epilog="Example:  pelorus simulate slip.plr --slip 0.5 --slip-from 20 --slip-for 5\n\n"
+        "pelorus simulate gnss.plr --position-rate 5 --position-sigma 0.05 --position-at 0.2,0,1.1",
     )(run)
 
 
 def run(target: Path, **given: Any) -> None:
     """Simulate a drive through a field of landmarks, with the truth.
 
-    And what may go wrong on it: slipping wheels, a frozen camera, a moving scene. All times are
-    counted from the beginning of the drive.
+    And what may go wrong on it: slipping wheels, a frozen camera, a moving scene. And small sensors
+    beside twists and camera, whose noise is as their readings say. All times are counted from the
+    beginning of the drive.
     """
     mishaps = Mishaps(**_values(Mishaps, given))
-    recording = simulate(Options(**_values(Options, given), mishaps=mishaps)).recording
+    readings = {sensor.name: Sensing(**_sensing(sensor, given)) for sensor in SMALL_SENSORS}
+    options = Options(**_values(Options, given), mishaps=mishaps, readings=readings)
+    recording = simulate(options).recording
     _tell_blindness(recording)
     size = recording.write(target)
     out.print(
         f"{escape(str(target))}: {size} bytes, {len(recording.twist_t_ns)} twists, "
         f"{len(recording.frame_t_ns)} frames with {len(recording.tracks)} observations, "
         f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
-        f"{f', {len(recording.readings)} readings' if recording.readings else ''}"
+        + (f", {len(recording.readings)} readings" if recording.readings else "")
     )
 
 
@@ -79,6 +86,52 @@ def _parameters(settings: type, panel: str | None) -> Iterator[inspect.Parameter
             yield _parameter(name, Timing, timing, option, about.unit, about.help, panel)
         else:
             yield _parameter(name, kind, default, option, about.unit, about.help, panel)
+
+
+def _of_sensor(sensor: SmallSensor) -> Iterator[inspect.Parameter]:
+    """The parameters of Sensing, with what this sensor has where they are empty."""
+    units = dict.fromkeys(sensor.unit(letter) for letter in sensor.letters)
+    shown = {"sigma": ",".join(units).replace("ps", "/s").upper(), "axes": f"[{sensor.letters}]"}
+    usual = {
+        "sigma": ",".join(f"{x:g}" for x in dict.fromkeys(sensor.sigma)),
+        "axes": sensor.usual or sensor.letters,
+        "at_m": "0,0,0",
+    }
+    defaults, types = Sensing(), get_type_hints(Sensing)
+    for name, about in settings_of(Sensing).items():
+        if name in options_without_meaning(sensor):
+            continue
+        own = f"{sensor.name}_{name}"
+        text = name in usual
+        yield _parameter(
+            own,
+            str if text else types[name],
+            usual[name] if text else getattr(defaults, name),
+            option_name(own),
+            shown.get(name, about.unit),
+            about.help,
+            f"Small sensor: {sensor.name}",
+        )
+
+
+def _sensing(sensor: SmallSensor, given: dict[str, Any]) -> dict[str, Any]:
+    """The fields of Sensing. What is as the table has it stays empty."""
+    usual = {p.name: p.default.default for p in _of_sensor(sensor)}
+    types = get_type_hints(Sensing)
+    found = {}
+    for name in set(settings_of(Sensing)) - options_without_meaning(sensor):
+        own = f"{sensor.name}_{name}"
+        if given[own] != usual[own]:
+            found[name] = _numbers(own, given[own]) if types[name] == Numbers else given[own]
+    return found
+
+
+def _numbers(name: str, text: str) -> Numbers:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        due = "a number, or several parted by commas,"
+        raise PelorusError(f"{option_name(name)} is {text!r}: {due} is due") from None
 
 
 def _parameter(

@@ -5,12 +5,12 @@ twists   t_s or t_ns, vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps
 stereo   t_s or t_ns, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
 truth    t_s or t_ns, px_m, py_m, pz_m, qx, qy, qz, qw: body to world (optional)
 
-and files of small sensors (converters/readings.py).
+And those of small sensors: readings_csv.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,14 +18,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import calibration
-from pelorus.converters import readings, twist_noise
+from pelorus.converters import readings_csv, twist_noise
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Sensor, TwistTiming
+from pelorus.frames import Reading, TwistTiming
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
+from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.table import Table
 from pelorus.tracks import Tracks
 
@@ -40,14 +41,19 @@ class Sources(NamedTuple):
     stereo: Path
     calibration: Path
     truth: Path | None = None
-    readings: Sequence[tuple[Sensor, Path]] = ()
 
 
 def convert(
-    sources: Sources, fix: bool = True, twist_timing: TwistTiming | None = None
+    sources: Sources,
+    fix: bool = True,
+    twist_timing: TwistTiming | None = None,
+    readings: Mapping[str, list[Path]] | None = None,
 ) -> tuple[Recording, list[Finding]]:
-    """Read; mend and measure the noise if asked. `twist_timing` overrides the calibration's."""
-    recording = read(sources)
+    """Read; mend and measure the noise if asked. `twist_timing` overrides the calibration's.
+
+    `readings` are the files of small sensors, by name.
+    """
+    recording = read(sources, readings or {})
     if twist_timing is not None:
         recording = recording.with_header(twist_timing=twist_timing)
     if not fix:
@@ -57,7 +63,7 @@ def convert(
     return recording, [*findings, finding]
 
 
-def read(sources: Sources) -> Recording:
+def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Recording:
     """The files as they are."""
     header = calibration.read(sources.calibration)
     twists = Table.read(sources.twists)
@@ -71,14 +77,38 @@ def read(sources: Sources) -> Recording:
             f"spans {frame_t_ns[0]} to {frame_t_ns[-1]} ns, {sources.twists} "
             f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap",
         )
-    found = [
-        reading for sensor, path in sources.readings for reading in readings.read(path, sensor)
-    ]
-    recording = Recording(header, twist_t_ns, v, w, frame_t_ns, tracks, readings=found)
+    recording = Recording(
+        header,
+        twist_t_ns,
+        v,
+        w,
+        frame_t_ns,
+        tracks,
+        readings=_readings(readings, sources, twist_t_ns),
+    )
     if sources.truth is None:
         return recording
     truth_t_ns, truth = _truth(sources.truth)
     return recording.with_truth(truth_t_ns, truth)
+
+
+def _readings(
+    paths: Mapping[str, list[Path]], sources: Sources, twist_t_ns: Times
+) -> list[Reading]:
+    """Of all small sensors, from the first twist on: with it the filter begins."""
+    found: list[Reading] = []
+    files = [(sensor, path) for sensor in SMALL_SENSORS for path in paths.get(sensor.name, [])]
+    for sensor, path in files:
+        own = readings_csv.read(path, sensor)
+        first, last = own[0].t_ns, own[-1].t_ns
+        if last < twist_t_ns[0] or twist_t_ns[-1] < first:
+            raise ForeignFileError(
+                path,
+                f"spans {first} to {last} ns, {sources.twists} {twist_t_ns[0]} to "
+                f"{twist_t_ns[-1]} ns: they do not overlap",
+            )
+        found += [reading for reading in own if reading.t_ns >= twist_t_ns[0]]
+    return found
 
 
 def _stereo(path: Path) -> tuple[Times, Tracks]:

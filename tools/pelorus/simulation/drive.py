@@ -12,6 +12,7 @@ from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
+from pelorus.simulation.settings import Span
 
 SERIES_TERMS = 9  # of the exponential map: exact to rounding up to 1 rad a step
 TURN_MAX_RAD = 1.0
@@ -36,13 +37,18 @@ class Drive(NamedTuple):
         )
 
 
-def drive(t_ns: Times, timing: TwistTiming, speed_mps: float, lap_s: float) -> Drive:
-    """Laps of an uneven oval, rolling and pitching a little.
+def drive(
+    t_ns: Times, timing: TwistTiming, speed_mps: float, lap_s: float, stop: Span | None = None
+) -> Drive:
+    """Laps of an uneven oval, rolling and pitching a little; in `stop` the body rests.
 
     The reading at t_j is what `timing` makes of it: the poses are the integral of the readings, to
     rounding, so truth and twists agree exactly.
     """
     v, w = profile(t_ns, speed_mps, lap_s)
+    if stop is not None:
+        rests = stop.holds(t_ns)[:, None]
+        v, w = np.where(rests, 0.0, v), np.where(rests, 0.0, w)
     tau = (np.diff(t_ns) * 1e-9)[:, None]
     steps = exp(tau * motion.held(v, timing), tau * motion.held(w, timing))
     return Drive(t_ns, v, w, chain(steps))

@@ -20,6 +20,9 @@ from pelorus.errors import PelorusError
 UNITS = ("_s", "_hz", "_mps", "_radps", "_px", "_m", "_percent")  # an option's name has no unit
 
 
+Numbers = tuple[float, ...]  # an option of several, parted by commas
+
+
 class Rule(NamedTuple):
     """What a number must be: as a test, and in words."""
 
@@ -82,11 +85,12 @@ def option_name(name: str) -> str:
 def require(name: str, value: object, good: bool, due: str) -> None:
     """Refuse a value by its option's name."""
     if not good:
-        raise PelorusError(f"{option_name(name)} is {value}: {due} is due")
+        shown = ",".join(f"{x:g}" for x in value) if isinstance(value, tuple) else value
+        raise PelorusError(f"{option_name(name)} is {shown}: {due} is due")
 
 
-def check(given: Any) -> None:
-    """Refuse the first field that is beyond its limits."""
+def check(given: Any, prefix: str = "") -> None:
+    """Refuse the first field that is beyond its limits; options' names begin with the prefix."""
     for name, about in settings_of(given).items():
         value = getattr(given, name)
         if isinstance(value, Span):
@@ -94,4 +98,4 @@ def check(given: Any) -> None:
                 stem = name.removesuffix("_span")
                 require(f"{stem}_{end}", time_s, TIME.holds(time_s), TIME.due)
         elif about.rule is not None and value is not None:
-            require(name, value, about.rule.holds(value), about.rule.due)
+            require(prefix + name, value, about.rule.holds(value), about.rule.due)

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus import motion
 from pelorus.console import progress
 from pelorus.frames import (
     OBSERVATIONS_MAX,
@@ -24,17 +26,20 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.simulation import scene, sensors, settings, small_sensors
+from pelorus.simulation import scene, sensors, settings
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
 from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
+from pelorus.simulation.readings import Sensing, read
 from pelorus.simulation.settings import (
     AT_LEAST_ONE,
     BELOW_ONE,
     POSITIVE,
     Rule,
+    Span,
     require,
     setting,
 )
+from pelorus.small_sensors import SMALL_SENSORS, Motion, SmallSensor
 from pelorus.tracks import Indices, Tracks
 
 FRAMES_MAX = 1_000_000
@@ -94,22 +99,12 @@ class Options:
     )
     outliers: float = setting(0.02, "Fraction of observations that are wrong.", rule=BELOW_ONE)
     drop: float = setting(0.01, "Fraction of frames that are lost.", rule=BELOW_ONE)
-    wheel_hz: float = setting(
-        0.0, "Readings of a wheel (READING): x and y of its velocity; 0: none.", "HZ"
-    )
-    wheel_sigma_mps: float = setting(0.02, "Their noise.", "M/S", POSITIVE)
-    position_hz: float = setting(
-        0.0, "Readings of a position, as of GNSS or motion capture; 0: none.", "HZ"
-    )
-    position_sigma_m: float = setting(0.05, "Their noise.", "M", POSITIVE)
-    standstill_hz: float = setting(
-        0.0, "Readings that say that the robot stands; with --parked alone.", "HZ"
-    )
-    standstill_sigma_mps: float = setting(0.001, "What is claimed of them.", "M/S", POSITIVE)
     camera_delay_s: float = setting(
         0.0, "Frames stand so much later in the file than their time, as off a slow camera.", "S"
     )
+    stop: Span | None = setting(None, "From then on the robot rests.")
     mishaps: Mishaps = NO_MISHAPS
+    readings: Mapping[str, Sensing] = field(default_factory=dict)  # of small sensors, by name
 
     def check(self) -> None:
         """Refuse what makes no sense, by the option's name."""
@@ -117,21 +112,22 @@ class Options:
         deeper = not self.max_depth_m or self.max_depth_m > self.min_depth_m
         require("max_depth_m", self.max_depth_m, deeper, "more than --min-depth")
         self.mishaps.check()
+        for sensor in self.small_sensors:
+            self.readings[sensor.name].check(sensor, self.twist_rate_hz)
         ratio = self.twist_rate_hz / self.frame_rate_hz
         whole = round(ratio) == ratio >= 1
         due = "a whole multiple of the frame rate"
         require("twist_rate_hz", self.twist_rate_hz, whole, due)
-        for name in ("wheel_hz", "position_hz", "standstill_hz"):
-            rate = getattr(self, name)
-            whole = not rate or round(self.twist_rate_hz / rate) == self.twist_rate_hz / rate
-            require(name, rate, whole, "the rate of the twists, or a whole fraction of it,")
-        stands = self.parked or not self.standstill_hz
-        require("standstill_hz", self.standstill_hz, stands, "--parked beside it")
         short = self.frames <= FRAMES_MAX
         require("duration_s", self.duration_s, short, f"at most {FRAMES_MAX} frames")
         turn = PEAK_TURN * 2 * np.pi / self.lap_s / self.twist_rate_hz
         due = f"at most {TURN_MAX_RAD} rad a twist"
         require("lap_s", self.lap_s, turn < TURN_MAX_RAD, due)
+
+    @property
+    def small_sensors(self) -> list[SmallSensor]:
+        """Of which anything is told."""
+        return [sensor for sensor in SMALL_SENSORS if sensor.name in self.readings]
 
     @property
     def depths(self) -> scene.Depths:
@@ -154,10 +150,7 @@ class Options:
 
     @property
     def twists_per_frame(self) -> int:
-        return self.twists_per(self.frame_rate_hz)
-
-    def twists_per(self, rate_hz: float) -> int:
-        return round(self.twist_rate_hz / rate_hz)
+        return round(self.twist_rate_hz / self.frame_rate_hz)
 
     @property
     def lookahead_s(self) -> float:
@@ -170,7 +163,8 @@ class _Chances:
 
     def __init__(self, seed: int) -> None:
         names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
-        self._names = (*names, "bias_w", "drift", "moving", "moving_ways", "wheel", "position")
+        later = ("bias_w", "drift", "moving", "moving_ways")
+        self._names = (*names, *later, *(sensor.name for sensor in SMALL_SENSORS))
         seeds = np.random.SeedSequence(seed).spawn(len(self._names))
         self._streams = [np.random.Generator(np.random.PCG64(s)) for s in seeds]
 
@@ -198,6 +192,7 @@ def simulate(options: Options) -> Simulation:
         options.twist_timing,
         options.speed_mps,
         options.lap_s,
+        options.stop,
     )
     points = scene.landmarks(beyond.poses, options.landmarks, chances["scene"], options.depths)
     t_ns = _node_times(options)
@@ -218,7 +213,7 @@ def simulate(options: Options) -> Simulation:
         frame_t_ns,
         truth,
         known=_known(options, points),
-        readings=_small_sensors(options, way, chances),
+        readings=_small_readings(options, way, chances),
         camera_delay_ns=round(options.camera_delay_s * 1e9),
         twist_delay_ns=round(options.mishaps.twist_delay_s * 1e9),
     )
@@ -260,18 +255,16 @@ def _readings(
     return v, w, bias_v, bias_w
 
 
-def _small_sensors(options: Options, way: Drive, chances: _Chances) -> list[Reading]:
-    found = list[Reading]()
-    if options.wheel_hz:
-        every = options.twists_per(options.wheel_hz)
-        found += small_sensors.wheel(way, every, options.wheel_sigma_mps, chances["wheel"])
-    if options.standstill_hz:
-        every = options.twists_per(options.standstill_hz)
-        found += small_sensors.standstill(way, every, options.standstill_sigma_mps)
-    if options.position_hz:
-        every, sigma = options.twists_per(options.position_hz), options.position_sigma_m
-        chance = chances["position"]
-        found += small_sensors.position(way, every, sigma, options.mishaps, chance)
+def _small_readings(options: Options, way: Drive, chances: _Chances) -> list[Reading]:
+    held = (motion.held(x, options.twist_timing) for x in (way.v_B_mps, way.w_B_radps))
+    v, w = (np.concatenate((x, x[-1:])) for x in held)
+    moves = Motion(options.mishaps.jumped(way.t_ns, way.poses), v, w)
+    found: list[Reading] = []
+    for sensor in options.small_sensors:
+        sensing = options.readings[sensor.name]
+        if sensing.rate_hz:
+            every = round(options.twist_rate_hz / sensing.rate_hz)
+            found += read(sensor, sensing, way.t_ns, moves, every, chances[sensor.name])
     return found
 
 

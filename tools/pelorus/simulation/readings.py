@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""What the small sensors read on a drive: noise as the filter reckons with, losses, outliers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.frames import Reading
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.simulation import settings
+from pelorus.simulation.settings import BELOW_ONE, NOT_NEGATIVE, Numbers, require, setting
+from pelorus.small_sensors import Motion, SmallSensor
+
+OUTLIER_SIGMAS = 100.0  # an outlier is off by up to so much
+HELD_INTERVALS = 2  # the filter holds a velocity for so many intervals if the next does not come
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """How one small sensor measures. What is empty is as the table of sensors has it."""
+
+    rate_hz: float = setting(
+        0.0, "Its readings, of which the twist rate is a whole multiple; 0: none.", "HZ"
+    )
+    sigma: Numbers = setting(
+        (), "Noise: a number for all that it measures, or one each, parted by commas.", rule=None
+    )
+    axes: str = setting("", "What it measures.", rule=None)
+    at_m: Numbers = setting((), "Where on the body it sits.", "X,Y,Z", None)
+    drop: float = setting(0.0, "Share of its readings that are lost.", "SHARE", BELOW_ONE)
+    outliers: float = setting(
+        0.0, "Share of them that are off by up to 100 sigma.", "SHARE", BELOW_ONE
+    )
+
+    def check(self, sensor: SmallSensor, twist_rate_hz: float) -> None:
+        """Refuse what makes no sense, by the option's name."""
+        settings.check(self, f"{sensor.name}_")
+        name = sensor.name
+        if not self.rate_hz:
+            first = next((f.name for f in fields(self) if getattr(self, f.name) != f.default), "")
+            given = getattr(self, first) if first else None
+            require(f"{name}_{first}", given, not first, f"--{name}-rate beside it")
+            return
+        ratio = twist_rate_hz / self.rate_hz
+        due = f"a whole part of the twist rate, {twist_rate_hz:g},"
+        require(f"{name}_rate_hz", self.rate_hz, round(ratio) == ratio >= 1, due)
+        letters = self.letters_of(sensor)
+        good = len(set(letters)) == len(letters) and set(letters) <= set(sensor.letters)
+        require(f"{name}_axes", self.axes, good, f"some of the letters {sensor.letters}")
+        count = len(sensor.columns)
+        sound = all(NOT_NEGATIVE.holds(x) and x > 0 for x in self.sigma)
+        due = f"one positive number, or {count} parted by commas,"
+        require(f"{name}_sigma", self.sigma, sound and len(self.sigma) in (0, 1, count), due)
+        sound = all(map(math.isfinite, self.at_m)) and len(self.at_m) in (0, 3)
+        require(f"{name}_at_m", self.at_m, sound, "three numbers of metres, parted by commas,")
+
+    def letters_of(self, sensor: SmallSensor) -> str:
+        return self.axes or sensor.usual or sensor.letters
+
+    def sigma_of(self, sensor: SmallSensor) -> Floats:
+        """Of each of its numbers."""
+        return np.broadcast_to(np.array(self.sigma or sensor.sigma), (len(sensor.columns),))
+
+
+def options_without_meaning(sensor: SmallSensor) -> set[str]:
+    """Fields of Sensing that nothing of this sensor depends on."""
+    without = set() if sensor.has_arm else {"at_m"}
+    return without | ({"outliers"} if sensor.at_rest else set())
+
+
+def read(
+    sensor: SmallSensor,
+    sensing: Sensing,
+    t_ns: Times,
+    motion: Motion,
+    every: int,
+    chance: np.random.Generator,
+) -> list[Reading]:
+    """Its readings at each `every`-th time, but for the first: before it there is no pose yet."""
+    rows = np.arange(every, len(t_ns), every)
+    if sensor.at_rest:
+        rows = rows[_stays_at_rest(motion, every)[rows]]
+    count, numbers = len(rows), len(sensor.columns)
+    arm = np.array(sensing.at_m or (0.0, 0.0, 0.0))
+    sigma = sensing.sigma_of(sensor)
+    true = sensor.measure(motion.at(rows), arm)
+    noise = sigma * chance.standard_normal((count, numbers))
+    wrong = chance.random(count) < sensing.outliers
+    astray = OUTLIER_SIGMAS * sigma * chance.uniform(-1.0, 1.0, (count, numbers))
+    kept = chance.random(count) >= sensing.drop
+    value = true if sensor.at_rest else true + noise + np.where(wrong[:, None], astray, 0.0)
+    axes = sensor.axes(sensing.letters_of(sensor))
+    has = np.array([axes >> k & 1 for k in range(numbers)], bool)
+    return [
+        Reading(
+            int(t_ns[row]),
+            sensor.number,
+            axes,
+            _three(np.where(has, value[k], 0.0)),
+            _three(np.where(has, sigma, 0.0)),
+            arm,
+        )
+        for k, row in enumerate(rows)
+        if kept[k]
+    ]
+
+
+def _stays_at_rest(motion: Motion, every: int) -> NDArray[np.bool_]:
+    """At rest, and for as long as the filter holds the reading: who drives off knows before."""
+    moves = np.concatenate((motion.v_B_mps, motion.w_B_radps), axis=1)
+    rests: NDArray[np.bool_] = (moves == 0).all(axis=1)
+    ahead = np.concatenate((rests, np.repeat(rests[-1:], HELD_INTERVALS * every - 1)))
+    windows = np.lib.stride_tricks.sliding_window_view(ahead, HELD_INTERVALS * every)
+    return np.asarray(windows.all(axis=1), np.bool_)
+
+
+def _three(numbers: Floats) -> Floats:
+    out = np.zeros(3)
+    out[: len(numbers)] = numbers
+    return out
