@@ -108,6 +108,13 @@ typedef struct plr_held_velocity {
 
 enum { PLR_HELD_VELOCITIES = 3 }; /* a wheel's; a standstill's v, and its w */
 
+typedef struct plr_velocities {
+    plr_held_velocity held[PLR_HELD_VELOCITIES];
+    /* Information Lambda db = eta about the biases since the last correction. */
+    plr_real bias_Lambda[PLR_POSE_SQUARE];
+    plr_real bias_eta[PLR_BIAS_DIM];
+} plr_velocities;
+
 /* Sums over frames, in which older ones count less: of nu, the difference between the motion by
  * vision and by twists in units of the twists' sigmas, and of the covariance expected of it. */
 typedef struct plr_consistency_window {
@@ -202,6 +209,7 @@ typedef struct plr_filter {
     plr_time_ns reading_ns; /* of the last twist */
     plr_real interval_s;    /* between the last two twists */
     uint8_t clock_started, reading_valid;
+    uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
     uint8_t diverged;
 
     plr_real R_WB[9];
@@ -213,10 +221,6 @@ typedef struct plr_filter {
                                 since; packed lower triangle */
     plr_real reading[PLR_POSE_DIM]; /* last twist */
     plr_motion motion;
-    plr_held_velocity held[PLR_HELD_VELOCITIES];
-    plr_real
-        bias_Lambda[PLR_POSE_SQUARE]; /* what held velocities said of the biases since the last */
-    plr_real bias_eta[PLR_BIAS_DIM];  /* correction: information Lambda db = eta */
     uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
     plr_time_ns still_since_ns;              /* no pixel has moved since; 0: one has */
 
@@ -227,8 +231,9 @@ typedef struct plr_filter {
     plr_workspace work;
 
     plr_consistency consistency;
-    uint32_t frame_number; /* from here on part of the "small" checksum */
-    uint8_t health;        /* plr_health of the last frame, and why */
+    plr_velocities velocities; /* part of the "small" checksum while any is known */
+    uint32_t frame_number;     /* from here on part of the "small" checksum */
+    uint8_t health;            /* plr_health of the last frame, and why */
     uint32_t reasons;
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     uint32_t refused_before;                /* twists refused until the last frame */

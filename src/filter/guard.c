@@ -70,6 +70,8 @@ static uint64_t small_sum(const plr_filter *f) {
     add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
     add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     add_between(&sum, f, offsetof(plr_filter, frame_number), offsetof(plr_filter, guard));
+    if (f->velocities_known)
+        add(&sum, &f->velocities, sizeof f->velocities);
     return mixed(&sum);
 }
 

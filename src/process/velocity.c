@@ -11,10 +11,10 @@
 enum { HELD_INTERVALS = 2 };
 
 void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows) {
-    plr_held_velocity *held = &f->held[which];
+    plr_held_velocity *held = &f->velocities.held[which];
     const bool first = !held->known || f->t_ns <= held->t_ns;
     const plr_time_ns interval = first ? 0 : f->t_ns - held->t_ns;
-    held->known = 1;
+    held->known = f->velocities_known = 1;
     held->t_ns = f->t_ns;
     held->until_ns = f->t_ns + (interval < f->par.max_gap_ns ? HELD_INTERVALS * interval : 0);
     memcpy(held->z, rows->z, sizeof held->z);
@@ -24,13 +24,13 @@ void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows
 }
 
 void plr_velocity_forget(plr_filter *f) {
-    memset(f->held, 0, sizeof f->held);
-    plr_velocity_forget_bias(f);
+    memset(&f->velocities, 0, sizeof f->velocities);
+    f->velocities_known = 0;
 }
 
 void plr_velocity_forget_bias(plr_filter *f) {
-    memset(f->bias_Lambda, 0, sizeof f->bias_Lambda);
-    memset(f->bias_eta, 0, sizeof f->bias_eta);
+    memset(f->velocities.bias_Lambda, 0, sizeof f->velocities.bias_Lambda);
+    memset(f->velocities.bias_eta, 0, sizeof f->velocities.bias_eta);
 }
 
 static bool holds(const plr_filter *f, const plr_held_velocity *held) {
@@ -38,8 +38,8 @@ static bool holds(const plr_filter *f, const plr_held_velocity *held) {
 }
 
 bool plr_velocity_holds(const plr_filter *f) {
-    for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->held[i]))
+    for (unsigned i = 0; f->velocities_known && i < PLR_HELD_VELOCITIES; i++)
+        if (holds(f, &f->velocities.held[i]))
             return true;
     return false;
 }
@@ -50,10 +50,10 @@ static void inform(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
             const plr_real y = Y[PLR_POSE_DIM * r + i];
-            f->bias_eta[i] = PLR_FMA(y, e[r], f->bias_eta[i]);
+            f->velocities.bias_eta[i] = PLR_FMA(y, e[r], f->velocities.bias_eta[i]);
             for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
-                f->bias_Lambda[PLR_BIAS_DIM * i + j] =
-                    PLR_FMA(y, Y[PLR_POSE_DIM * r + j], f->bias_Lambda[PLR_BIAS_DIM * i + j]);
+                f->velocities.bias_Lambda[PLR_BIAS_DIM * i + j] = PLR_FMA(
+                    y, Y[PLR_POSE_DIM * r + j], f->velocities.bias_Lambda[PLR_BIAS_DIM * i + j]);
         }
 }
 
@@ -129,15 +129,15 @@ void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         T[(PLR_POSE_DIM + 1) * i] = 1;
     for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->held[i]))
-            fuse_one(f, &f->held[i], seconds, xi, V, T);
+        if (holds(f, &f->velocities.held[i]))
+            fuse_one(f, &f->velocities.held[i], seconds, xi, V, T);
 }
 
 /* ---------------------------------------------------------------- the biases */
 
 bool plr_velocity_speaks_of_bias(const plr_filter *f) {
-    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-        if (f->bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
+    for (unsigned i = 0; f->velocities_known && i < PLR_BIAS_DIM; i++)
+        if (f->velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
             return true;
     return false;
 }
@@ -146,10 +146,10 @@ bool plr_velocity_speaks_of_bias(const plr_filter *f) {
 void plr_velocity_about_bias(const plr_filter *f, unsigned part, plr_rows *H,
                              plr_real r[PLR_ROWS]) {
     plr_real L[PLR_POSE_SQUARE], y[PLR_BIAS_DIM];
-    plr_factor6(L, f->bias_Lambda);
+    plr_factor6(L, f->velocities.bias_Lambda);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {
         const plr_real pivot = L[(PLR_BIAS_DIM + 1) * k];
-        y[k] = f->bias_eta[k];
+        y[k] = f->velocities.bias_eta[k];
         for (unsigned l = 0; l < k; l++)
             y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
         y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);

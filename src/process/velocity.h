@@ -4,7 +4,7 @@
  * the sensor's next one, as a twist does, and its noise counts as white: variance times seconds
  * between readings is its density. In each step of the motion the two are weighed against each
  * other, the motion takes the mean, and their difference is information about the twists' biases. It
- * waits in f->bias_Lambda until the next correction, so that twists, readings and frames may come in
+ * waits in f->velocities.bias_Lambda until the next correction, so that twists, readings and frames may come in
  * any order.
  */
 #ifndef PLR_PROCESS_VELOCITY_H

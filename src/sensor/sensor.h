@@ -18,7 +18,7 @@ typedef struct plr_sensor_kind {
     void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
 
     /* Of the body's twist (v, w): three rows, or twice three. Returns how many threes. They hold until
-     * the next reading, in f->held[place] and after it. */
+     * the next reading, in f->velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 } plr_sensor_kind;
