@@ -72,17 +72,17 @@ typedef struct plr_slot {
     uint32_t times_seen;
     uint32_t times_gated;
     uint32_t last_frame; /* number of the frame that saw it last */
-    uint32_t print;      /* checksum of its pixels when it was last seen */
+    uint32_t pixel_hash; /* checksum of its pixels when it was last seen */
     plr_time_ns last_seen_ns;
-    plr_real lean[3];          /* sum of its whitened innovations, older ones weighted less */
-    plr_real lean_variance;    /* the variance that lean has if the innovations are white noise */
-    plr_real anchor[PLR_ROWS]; /* its pixels (uL, uR, v) when the body last began to stand */
-    uint8_t anchored;          /* 1: anchor is filled */
-    uint8_t known;             /* 1: given by a map source or plr_filter_insert_known */
-    uint8_t strays;            /* 1: the innovations are not white: the point moves */
-    uint8_t chances;           /* times it was initialised again after repeated rejection */
-    uint16_t accepted;         /* frames that used it since it was last initialised */
-    uint16_t rejected;         /* successive frames in which the gate rejected it */
+    plr_real innovation_sum[3];   /* sum of its whitened innovations, older ones weighted less */
+    plr_real innovation_variance; /* the variance of innovation_sum if they are white noise */
+    plr_real anchor[PLR_ROWS];    /* its pixels (uL, uR, v) when the body last began to stand */
+    uint8_t anchored;             /* 1: anchor is filled */
+    uint8_t known;                /* 1: given by a map source or plr_filter_insert_known */
+    uint8_t moving;               /* 1: the innovations are not white: the point moves */
+    uint8_t restarts;             /* times it was initialised again after repeated rejection */
+    uint16_t accepted;            /* frames that used it since it was last initialised */
+    uint16_t rejected;            /* successive frames in which the gate rejected it */
 } plr_slot;
 
 /* Motion that is already in the pose but not yet in the covariance: D = (I + E, p) with
@@ -127,23 +127,23 @@ enum { PLR_CONSISTENCY_WINDOWS = 3 };
 /* Whether twists and pictures agree: src/filter/consistency.h. */
 typedef struct plr_consistency {
     plr_consistency_window windows[PLR_CONSISTENCY_WINDOWS];
-    plr_real
-        apart[PLR_POSE_DIM]; /* from the pose by twists to the pose by vision: rho m, theta rad */
-    plr_real apart_sigmas[PLR_POSE_DIM]; /* the same in units of the twists' sigmas */
-    plr_real apart_noise; /* the expected square of apart_sigmas if it is only noise */
-    plr_real
-        still_way[PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
-    plr_real still_variance[PLR_POSE_DIM]; /* its variance */
-    plr_real matched, gated, nis, nis_dof; /* sums over frames, older ones weighted less */
-    uint16_t agreeing;                     /* successive frames in agreement */
-    plr_real excess;                       /* |L^-1 n|^2 of frames that contradicted the twists by
+    plr_real difference
+        [PLR_POSE_DIM]; /* from the pose by twists to the pose by vision: rho m, theta rad */
+    plr_real difference_sigmas[PLR_POSE_DIM]; /* the same in units of the twists' sigmas */
+    plr_real difference_noise; /* the expected square of difference_sigmas if it is only noise */
+    plr_real frozen_motion
+        [PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
+    plr_real frozen_variance[PLR_POSE_DIM]; /* its variance */
+    plr_real matched, gated, nis, nis_dof;  /* sums over frames, older ones weighted less */
+    uint16_t agreeing_frames;               /* successive frames in agreement */
+    plr_real excess;                        /* |L^-1 n|^2 of frames that contradicted the twists by
                                               themselves, older ones weighted less */
-    uint16_t insisting;                    /* successive frames with a large contradiction */
-    uint16_t slight;                       /* successive frames with a small difference */
-    uint8_t contradicted;                  /* 1: the twists are given less weight */
-    uint8_t drifting;                      /* 1: over many frames the difference exceeds noise */
-    uint8_t frozen;                        /* 1: this frame's picture equals the one before */
-    uint8_t doubtful;                      /* 1: PLR_REASON_POSE_MAY_BE_WRONG holds */
+    uint16_t contradicting_frames;          /* successive frames with a large contradiction */
+    uint16_t small_frames;                  /* successive frames with a small difference */
+    uint8_t contradicted;                   /* 1: the twists are given less weight */
+    uint8_t drifting;                       /* 1: over many frames the difference exceeds noise */
+    uint8_t frozen;                         /* 1: this frame's picture equals the one before */
+    uint8_t doubtful;                       /* 1: PLR_REASON_POSE_MAY_BE_WRONG holds */
 } plr_consistency;
 
 /* Settings and camera in the filter's precision; of sigmas the squares. */
@@ -167,9 +167,10 @@ typedef struct plr_noise {
     plr_real Wt[PLR_POSE_DIM * PLR_MAX_LD + PLR_KERNEL_MARGIN]; /* W^T, 6 x dim */
     plr_real Lambda[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];     /* 6x6, packed upper triangle */
     plr_real eta[PLR_POSE_DIM];
-    plr_real z[PLR_POSE_DIM];           /* the value of nu at which the motion was linearised */
-    plr_real spread[PLR_POSE_DIM];      /* variances of the motion's own six numbers; 0: known */
-    plr_real closer[PLR_MAX_LANDMARKS]; /* from each inverse range to where it is linearised, 1/m */
+    plr_real z[PLR_POSE_DIM];               /* the value of nu at which the motion was linearised */
+    plr_real motion_variance[PLR_POSE_DIM]; /* of the six numbers of the motion; 0: exact */
+    plr_real
+        range_shift[PLR_MAX_LANDMARKS]; /* linearisation point minus estimate, inverse range, 1/m */
     uint8_t open;                       /* 1: W belongs to the covariance and is not in P yet */
 } plr_noise;
 

@@ -10,7 +10,7 @@ bool plr_births_are_allowed(const plr_filter *f) {
     return f->config.mode == PLR_MODE_SLAM || f->config.mode == PLR_MODE_MAPPING;
 }
 
-/* A slot is free, and the observation makes a landmark. */
+/* Initialises a landmark. A slot must be free, and plr_stereo_makes_landmark true. */
 static void append_new(plr_filter *f, const plr_observation *seen) {
     plr_new_landmark landmark;
     const plr_real beyond = plr_stereo_initialise(f, seen, &landmark);
@@ -36,7 +36,7 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
         append_new(f, o);
         report->created++;
     }
-    if (!makes) /* those that found no slot are counted as such already */
+    if (!makes) /* those without a slot are counted in no_room */
         report->poor = (uint16_t)(report->poor - report->no_room);
 }
 
@@ -51,7 +51,8 @@ void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
         w->slot_of[k] = plr_slots_find(f, frame->observations[w->order[k]].id);
 }
 
-void plr_births_anew(plr_filter *f, const plr_frame *frame, unsigned n, const plr_report *report) {
+void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
+                        const plr_report *report) {
     plr_workspace *w = &f->work;
     const bool may = f->config.model == PLR_MODEL_BODY && plr_births_are_allowed(f);
     if (!may || 2 * report->gated >= report->matched)
@@ -60,13 +61,13 @@ void plr_births_anew(plr_filter *f, const plr_frame *frame, unsigned n, const pl
         const plr_observation *o = &frame->observations[w->order[k]];
         if (w->slot_of[k] == PLR_NO_SLOT || w->gain[k] >= 0)
             continue;
-        const unsigned slot = plr_slots_find(f, o->id); /* one that began anew has moved another */
+        const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
         const plr_slot before = f->slots[slot];
-        if (!plr_track_may_begin_anew(&before) || !plr_stereo_makes_landmark(f, o))
+        if (!plr_track_may_restart(&before) || !plr_stereo_makes_landmark(f, o))
             continue;
         plr_predict_settle(f);
         plr_slots_remove(f, slot);
         append_new(f, o);
-        plr_track_begin_anew(&f->slots[f->count - 1], &before);
+        plr_track_restart(&f->slots[f->count - 1], &before);
     }
 }

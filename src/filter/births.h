@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Landmarks begin, and those that are wrong begin anew. */
+/* Initialises new landmarks, and initialises those again that turned out to be wrong. */
 #ifndef PLR_FILTER_BIRTHS_H
 #define PLR_FILTER_BIRTHS_H
 
@@ -8,7 +8,7 @@
 #include "filter/health.h"
 #include "pelorus/state.h"
 
-/* Does the mode in force make landmarks from pixels? */
+/* True if the mode initialises landmarks from pixels. */
 bool plr_births_are_allowed(const plr_filter *f);
 
 /* Initialises landmarks from the observations that match none. */
@@ -19,8 +19,9 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
  * for too long. Their observations count as new ones. */
 void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n);
 
-/* Where most of a frame agrees, a landmark that was rejected for long is itself wrong: it is
- * initialised anew where it is seen now. */
-void plr_births_anew(plr_filter *f, const plr_frame *frame, unsigned n, const plr_report *report);
+/* If at least half of a frame was accepted, a landmark that was rejected for long is taken to be wrong,
+ * and is initialised again from this frame. */
+void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
+                        const plr_report *report);
 
 #endif

@@ -33,7 +33,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
  * matching. */
 bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n);
 
-/* Adds the counts of a frame; returns bits of plr_reason. */
+/* Adds the counts of a frame; `lost`: the frame lost the pose (plr_health). Returns bits of
+ * plr_reason. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);
 
 /* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers

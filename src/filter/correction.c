@@ -140,7 +140,7 @@ plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned cou
     const unsigned n = plr_covariance_dim(f);
     if (!f->work.noise.open) { /* no motion has been applied */
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
-        memset(f->work.noise.spread, 0, sizeof f->work.noise.spread);
+        memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
     const unsigned all = count + (plr_velocity_speaks_of_bias(f) ? ABOUT_BIAS : 0);
     unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;

@@ -130,7 +130,7 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
         plr_track_add(slot, e);
-    if (!accepted || slot->strays)
+    if (!accepted || slot->moving)
         return false;
     *nis += (float)d2;
     return true;
@@ -257,7 +257,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);
         const plr_slot *slot = plr_search_slot(&s, i);
         if (accepted && !slot->known)
-            f->work.noise.closer[slot - f->slots] = plr_vantage_offset(
+            f->work.noise.range_shift[slot - f->slots] = plr_vantage_offset(
                 slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);
     }
 }

@@ -4,25 +4,26 @@
 #include "math/small.h"
 
 enum {
-    PATIENCE = 8, /* frames, the first time */
-    LONG_PATIENCE =
-        64,          /* of one that was good: its point moves, and does so in the next frames too */
-    GOOD_FRAMES = 3, /* that used it */
-    MOST_CHANCES = 8 /* patience doubles so often */
+    MIN_REJECTIONS = 8, /* successive rejections before a landmark is initialised again */
+    MIN_REJECTIONS_OF_GOOD =
+        64,          /* the same for one that was good: its point moves, and will go on */
+    GOOD_FRAMES = 3, /* a landmark was good if so many frames used it */
+    MAX_RESTARTS = 8 /* the number of rejections doubles at most so often */
 };
 
-/* The sums look back some 19 frames. */
-#define KEEP PLR_R(0.9)
-/* Chi-square, 3 degrees of freedom: sums of white noise are beyond it once in 13 millions. Real pixels have
- * heavier tails, and errors that last. */
-#define LEANS PLR_R(36)
+/* What the sums keep from frame to frame: they cover about 19 frames. */
+#define DECAY PLR_R(0.9)
+/* Chi-square with 3 degrees of freedom. White noise exceeds it once in 13 million; the limit is wide because
+ * real pixels have heavier tails and lasting errors. */
+#define MOVING_ABOVE PLR_R(36)
 
 void plr_track_add(plr_slot *slot, const plr_real e[3]) {
     for (unsigned r = 0; r < 3; r++)
-        slot->lean[r] = PLR_FMA(KEEP, slot->lean[r], e[r]);
-    slot->lean_variance = PLR_FMA(KEEP * KEEP, slot->lean_variance, PLR_R(1));
-    if (plr_dot3(slot->lean, slot->lean) > LEANS * slot->lean_variance)
-        slot->strays = 1;
+        slot->innovation_sum[r] = PLR_FMA(DECAY, slot->innovation_sum[r], e[r]);
+    slot->innovation_variance = PLR_FMA(DECAY * DECAY, slot->innovation_variance, PLR_R(1));
+    if (plr_dot3(slot->innovation_sum, slot->innovation_sum) >
+        MOVING_ABOVE * slot->innovation_variance)
+        slot->moving = 1;
 }
 
 void plr_track_count(plr_slot *slot, bool rejected) {
@@ -31,15 +32,15 @@ void plr_track_count(plr_slot *slot, bool rejected) {
     slot->rejected = rejected ? (uint16_t)(slot->rejected + (slot->rejected < UINT16_MAX)) : 0;
 }
 
-bool plr_track_may_begin_anew(const plr_slot *slot) {
-    const bool was_good = slot->strays || slot->accepted >= GOOD_FRAMES;
-    const unsigned first = was_good ? LONG_PATIENCE : PATIENCE;
-    return !slot->known && slot->rejected >= first << slot->chances;
+bool plr_track_may_restart(const plr_slot *slot) {
+    const bool was_good = slot->moving || slot->accepted >= GOOD_FRAMES;
+    const unsigned first = was_good ? MIN_REJECTIONS_OF_GOOD : MIN_REJECTIONS;
+    return !slot->known && slot->rejected >= first << slot->restarts;
 }
 
-void plr_track_begin_anew(plr_slot *slot, const plr_slot *before) {
-    slot->chances = (uint8_t)(before->chances + (before->chances < MOST_CHANCES));
+void plr_track_restart(plr_slot *slot, const plr_slot *before) {
+    slot->restarts = (uint8_t)(before->restarts + (before->restarts < MAX_RESTARTS));
     slot->times_seen = before->times_seen;
     slot->times_gated = before->times_gated;
-    slot->print = before->print;
+    slot->pixel_hash = before->pixel_hash;
 }

@@ -13,19 +13,19 @@
 #include "pelorus/state.h"
 
 /* Adds the whitened innovation e, 3 rows, of an accepted observation, predicted from all other
- * observations. Sets `strays` if the mean of the innovations is larger than noise explains: the
+ * observations. Sets `moving` if the mean of the innovations is larger than noise explains: the
  * point moves. */
 void plr_track_add(plr_slot *slot, const plr_real e[3]);
 
-/* A frame matched the landmark and the gate let it through, or did not. */
+/* Counts a frame that matched the landmark, and whether the gate rejected it. */
 void plr_track_count(plr_slot *slot, bool rejected);
 
 /* True if the landmark was rejected in so many successive frames that its position may be wrong: it
  * was initialised from an outlier, or its point has moved and is at rest again. */
-bool plr_track_may_begin_anew(const plr_slot *slot);
+bool plr_track_may_restart(const plr_slot *slot);
 
 /* For a landmark that is initialised again: keeps the counts of the one before, and doubles the
  * number of rejections that it needs the next time. */
-void plr_track_begin_anew(plr_slot *slot, const plr_slot *before);
+void plr_track_restart(plr_slot *slot, const plr_slot *before);
 
 #endif

@@ -184,7 +184,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
             plr_predict_settle(f);
             plr_births_unlock(f, frame, n);
         } else {
-            plr_births_anew(f, frame, n, report);
+            plr_births_restart(f, frame, n, report);
         }
         plr_births_from_unmatched(f, frame, n, &events, report);
     }

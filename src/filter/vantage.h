@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT
 /*
- * At which inverse range a landmark is linearised while its own is poorly known (docs/MATH.md 10). How
- * the motion moves a point in the picture is proportional to its inverse range. Taken at an estimate that
- * is mostly noise, this is larger than it is, and agrees with that noise: every frame then learns of the
- * motion what no pixel has said.
+ * The inverse range at which a landmark is linearised while its estimate is poor (docs/MATH.md 10). The
+ * derivative of a pixel by the motion is proportional to the inverse range. Taken at an estimate that is
+ * mostly noise, the derivative is correlated with that noise, and every frame adds information about the
+ * motion that no pixel contains.
  */
 #ifndef PLR_FILTER_VANTAGE_H
 #define PLR_FILTER_VANTAGE_H
 
 #include "pelorus/state.h"
 
-/* What the inverse ranges of the landmarks usually are, 1/m: their mean, each weighed by how well it is
- * known; positive. */
+/* The usual inverse range of the landmarks, 1/m: their mean, weighted by how well each is known;
+ * positive. */
 plr_real plr_vantage_usual(const plr_filter *f);
 
-/* From a landmark's estimated inverse range to where it is linearised: to the place nearest to the usual
- * one within two sigmas of estimate + change. Change is what the frame's observation is about to make of
- * it, and variance what it leaves. */
+/* The linearisation point minus the landmark's estimate, in inverse range, 1/m. The point is the one
+ * nearest to the usual inverse range within two sigmas of estimate + change: `change` is the correction
+ * by the frame's observation, `variance` that of the inverse range after it. */
 plr_real plr_vantage_offset(const plr_slot *slot, plr_real usual, plr_real change,
                             plr_real variance);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Where the left camera sits in the body: T_CB = (R_CB, t_CB). */
+/* The transformation between body and left camera, T_CB = (R_CB, t_CB). */
 #ifndef PLR_STATE_CAMERA_H
 #define PLR_STATE_CAMERA_H
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * The covariance P of the whole state: pose (6), bias (6, if on), landmarks (3 each), as a packed
- * lower triangle. No other file touches an element of it.
+ * The covariance P of the whole state: the blocks of plr_layout, then three rows a landmark, as a packed
+ * lower triangle. No file outside src/state reads or writes an element of it.
  */
 #ifndef PLR_STATE_COVARIANCE_H
 #define PLR_STATE_COVARIANCE_H
@@ -63,7 +63,7 @@ bool plr_covariance_is_positive(const plr_filter *f);
 /* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
 void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F);
 
-/* Takes the part of P that is correlated with the motion's noise out of P and into W: with
+/* Moves the part of P that is correlated with the motion's noise from P to W: with
  * C = P_(:,b) B^T and nu = L^-1 n,
  *   P -= (C L^-T) (C L^-T)^T,  W += C L^-T,  Lambda = I,  eta = -z,  dx = C L^-T z,
  * so that the state is x + W (nu - z) with x and nu independent. Before the call W^T (6 x dim,
@@ -90,7 +90,7 @@ void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE
 /* S = H P H^T, 3x3. */
 void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]);
 
-/* S += (H W)(H W)^T, 3x3: the part of H P H^T that is still in W. Only before the first block. */
+/* S += (H W)(H W)^T, 3x3: the part of H P H^T that is in W. Only before the first batch. */
 void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_real S[9]);
 
 /* The three rows of (P H^T)^T, each of dim elements, then zeros up to the leading dimension ld. */
@@ -100,9 +100,9 @@ void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *ro
  * False, and nothing is changed, if a variance would not be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
-/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than rounding in the updates can
- * have removed. Without it rounding errors add up while a robot stands still and measures the same
- * landmarks, until P is no longer positive (docs/NUMERICS.md 1). */
+/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than the rounding of the
+ * updates can have removed. Without it, rounding errors add up while a robot stands still and measures the
+ * same landmarks, until P is no longer positive (docs/NUMERICS.md 1). */
 void plr_covariance_make_up_for_rounding(plr_filter *f);
 
 /* --- slots --- */

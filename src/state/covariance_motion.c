@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The covariance while the body moves, and the motion's noise beside it. */
+/* The covariance in a motion of the body, and the motion's noise, which is kept beside it. */
 #include "state/covariance.h"
 
 #include "math/dense.h"
@@ -10,7 +10,7 @@
 
 enum { POSE_ROW = 0 }; /* the pose comes first in every layout */
 
-/* row[0..5] <- row[0..5] A^T; At is A^T, so that the columns advance together. */
+/* row[0..5] <- row[0..5] A^T, with At = A^T. */
 static inline void turn_pose_columns(plr_real *row, const plr_real At[PLR_POSE_SQUARE]) {
     plr_real turned[PLR_POSE_DIM] = {0};
     plr_gemm_nn(1, PLR_POSE_DIM, PLR_POSE_DIM, row, PLR_POSE_DIM, At, PLR_POSE_DIM, turned,
@@ -50,7 +50,7 @@ static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *r
     }
 }
 
-/* The three rows of one landmark: left by its F, right by what stands at each column. */
+/* The three rows of one landmark: its F from the left, the factor of each column from the right. */
 static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[PLR_POSE_SQUARE],
                                const plr_real *F) {
     const unsigned s = plr_covariance_row(f, slot), first = plr_core_dim(f);
@@ -147,7 +147,8 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     for (unsigned i = 0; i < PLR_POSE_DIM * ld; i++)
         minus[i] = -Xt[i];
     plr_packed_subtract(n, PLR_POSE_DIM, minus, Xt, ld, f->P);
-    for (unsigned i = plr_core_dim(f); i < n; i++) { /* what it rounds away of what was there */
+    for (unsigned i = plr_core_dim(f); i < n;
+         i++) { /* makes up for the rounding of this addition */
         plr_real added = 0;
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             added = PLR_FMA(Xt[k * ld + i], Xt[k * ld + i], added);

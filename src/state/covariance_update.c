@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The covariance in a correction: what the kernels are made for. */
+/* The covariance in a correction. Most of the filter's time is spent here. */
 #include "state/covariance.h"
 
 #include "math/dense.h"
@@ -42,8 +42,8 @@ void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_r
     }
 }
 
-/* out_r[i] = H_r x(i), r = 0 .. 2, i = 0 .. n-1: x(i) stands in three rows. H is taken by value, or
- * the compiler would load it for each i. */
+/* out_r[i] = H_r x(i), r = 0 .. 2, i = 0 .. n-1: x(i) is column i of three rows. H is copied to locals,
+ * because the compiler would otherwise load it for each i. */
 static inline void project_rows(unsigned n, const plr_real H[9], const plr_real *restrict x0,
                                 const plr_real *restrict x1, const plr_real *restrict x2,
                                 plr_real *restrict out0, plr_real *restrict out1,
@@ -57,7 +57,7 @@ static inline void project_rows(unsigned n, const plr_real H[9], const plr_real 
     }
 }
 
-/* The same for i = first .. n-1, where x(i) stands in row i of P, from column s on. */
+/* The same for i = first .. n-1, where x(i) is in row i of P, from column s on. */
 static inline void project_columns(unsigned first, unsigned n, const plr_real H[9],
                                    const plr_real *restrict P, unsigned s, plr_real *restrict out0,
                                    plr_real *restrict out1, plr_real *restrict out2) {

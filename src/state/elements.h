@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
-/* Elements of P, for the files that share the covariance's work: covariance.c, covariance_motion.c and
- * covariance_update.c. */
+/* Access to blocks of P, for covariance.c, covariance_motion.c and covariance_update.c alone. */
 #ifndef PLR_STATE_ELEMENTS_H
 #define PLR_STATE_ELEMENTS_H
 
 #include "math/packed.h"
 #include "pelorus/state.h"
 
-/* B (rows x columns) = P[row.., column..], dense, whichever side of the diagonal. */
+/* B (rows x columns) = P[row.., column..], dense, on either side of the diagonal. */
 static inline void plr_get_block(const plr_filter *f, unsigned row, unsigned rows, unsigned column,
                                  unsigned columns, plr_real *B) {
     for (unsigned i = 0; i < rows; i++)
@@ -15,7 +14,7 @@ static inline void plr_get_block(const plr_filter *f, unsigned row, unsigned row
             B[i * columns + j] = f->P[plr_packed_at(row + i, column + j)];
 }
 
-/* The reverse. Of a block on the diagonal the lower triangle is taken. */
+/* The reverse. Of a block on the diagonal only the lower triangle is used. */
 static inline void plr_set_block(plr_filter *f, unsigned row, unsigned rows, unsigned column,
                                  unsigned columns, const plr_real *B) {
     for (unsigned i = 0; i < rows; i++)
@@ -24,7 +23,7 @@ static inline void plr_set_block(plr_filter *f, unsigned row, unsigned rows, uns
                 f->P[plr_packed_row(row + i) + column + j] = B[i * columns + j];
 }
 
-/* out[i] += a P(i, column) for all rows i, whichever side of the diagonal. */
+/* out[i] += a P(i, column) for all rows i, on either side of the diagonal. */
 static inline void plr_add_column(const plr_filter *f, unsigned n, unsigned column, plr_real a,
                                   plr_real *restrict out) {
     const plr_real *restrict row = f->P + plr_packed_row(column);

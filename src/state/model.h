@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * A model: how landmarks are stored, and how the error of the state is defined. The rest of the
- * filter is the same for both models: `body` (model_body.c) and `world` (model_world.c).
+ * A model defines how landmarks are stored and what the error of the state is. The rest of the filter is
+ * the same for both models: `body` (model_body.c) and `world` (model_world.c).
  */
 #ifndef PLR_STATE_MODEL_H
 #define PLR_STATE_MODEL_H
@@ -12,13 +12,13 @@
 #include "state/motion.h"
 #include "state/rows.h"
 
-/* A landmark where the camera sees it. */
+/* A landmark relative to the camera at the present estimate. */
 typedef struct plr_view {
     plr_real q[3]; /* in the left camera, m */
     plr_real s[3]; /* `world` alone: in the body, m */
 } plr_view;
 
-/* A landmark about to enter the state: error = J_pose xi + N(0, P). */
+/* A landmark to be appended to the state: its error is J_pose xi + N(0, P). */
 typedef struct plr_new_landmark {
     plr_real x[3];                            /* as stored in a slot */
     bool uses_pose;                           /* false: J_pose is zero and not filled */
@@ -26,10 +26,10 @@ typedef struct plr_new_landmark {
     plr_real P[9];                            /* 3x3 */
 } plr_new_landmark;
 
-/* A landmark's place in the world, and how its error arises. */
+/* A landmark's position in the world, and its derivative by the state. */
 typedef struct plr_world_point {
     double p_W[3];
-    plr_rows J; /* of landmark and pose */
+    plr_rows J; /* by landmark and pose */
 } plr_world_point;
 
 struct plr_model {
@@ -39,25 +39,24 @@ struct plr_model {
      * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
     void (*propagate)(plr_filter *f, const plr_applied_motion *motion);
 
-    /* Where the camera sees a landmark. False if it is nearer than min_depth_m in front of the
-     * camera, where a linearisation means nothing. */
+    /* The landmark relative to the camera. False if its depth is less than min_depth_m, where a
+     * linearisation is not valid. */
     bool (*look)(const plr_filter *f, unsigned slot, plr_view *view);
 
     /* From derivatives by the point in the camera to derivatives by the state's error: H = Dz dq/dx.
-     * Dz = dz/dq, 3x3. Along the point's own ray Dz q = along / q_z, which is passed because three
-     * products that cancel would be left to rounding. z, the prediction, receives what the stored
-     * point leaves out (plr_slot.beyond). */
+     * Dz = dz/dq, 3x3. The derivative along the point's ray, Dz q = along / q_z, is passed separately, because
+     * computed from Dz it would be a difference of rounded numbers. z, the prediction, is corrected for
+     * plr_slot.beyond. */
     void (*derive)(const plr_filter *f, unsigned slot, const plr_view *view, const plr_real Dz[9],
                    const plr_real along[3], plr_real z[3], plr_rows *H);
 
     /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
-     * S_q is passed, because for a far point the product is so large along the ray that rounding
-     * would destroy what it says across the ray. */
+     * S_q is passed and not the product: for a far point the variance along the ray is so large that
+     * rounding would destroy the variance across it. */
     void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 
-    /* Makes a landmark from a known position in the world. False if the model cannot represent
-     * it. */
+    /* Makes a landmark from a known position in the world. False if the model cannot represent it. */
     bool (*adopt)(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark);
 
     /* Applies a correction dx of the whole state (plr_covariance_dim elements) to the landmarks,
@@ -77,8 +76,8 @@ void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 
-/* The filter holds the model's number and not its address: a damaged pointer could lead
- * anywhere. */
+/* The filter stores the model's number and not its address, because a damaged address would be followed
+ * before a checksum could be compared. */
 static inline const struct plr_model *plr_model_of(const plr_filter *f) {
     return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
 }

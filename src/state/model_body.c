@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The `body` model: landmarks in the current left camera, q, with errors in the polar chart at q.
- * An observation depends on its landmark alone; motion moves all landmarks together. Invariant: the
- * directions that nothing observes stay so, and the filter does not believe more than it knows.
- * docs/MATH.md, "body".
+ * The `body` model: landmarks q in the current left camera, with errors in the polar chart at q. An
+ * observation depends on its landmark alone, and a motion of the body moves all landmarks. The filter is
+ * invariant: directions that nothing observes (the pose of the world) stay unobserved, so that it gains
+ * no information about them from linearisation. docs/MATH.md 2 and 6.
  */
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -20,11 +20,11 @@
 #include "state/pose.h"
 
 /*
- * Three products of Jw and Ji are written out below: in each of them q^T N = 0 or q x q = 0 takes a
- * large number from itself, which float32 would leave to rounding for a point a kilometre away.
+ * Three products of Jw and Ji are written out below. Each contains q^T N = 0 or q x q = 0: a difference of
+ * large equal numbers, which for a point at a kilometre would be rounding alone in float32.
  */
 
-/* row = [way turn] Ad, Ad = [R, C; 0, R]; turn may be NULL for zeros. */
+/* row = [way turn] Ad, with Ad = [R, C; 0, R]. turn = NULL means zeros. */
 static inline void times_adjoint(plr_real row[PLR_POSE_DIM], const plr_real way[3],
                                  const plr_real *turn, const plr_real Ad[PLR_POSE_SQUARE]) {
     const plr_real *R0 = Ad, *R1 = R0 + PLR_POSE_DIM, *R2 = R1 + PLR_POSE_DIM;
@@ -35,7 +35,7 @@ static inline void times_adjoint(plr_real row[PLR_POSE_DIM], const plr_real way[
         row[j] = PLR_FMA(turn[2], T2[j], PLR_FMA(turn[1], T1[j], PLR_FMA(turn[0], T0[j], row[j])));
 }
 
-/* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: how the body's twist enters the chart at q.
+/* J = Jw(q) [-I | [q]x] Ad(T_CB), 3x6: the derivative of a landmark's chart by the body's twist.
  * Jw [-I | [q]x] = [ -N^T / r | N^T [mu]x ; mu^T / r^2 | 0 ]. */
 static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
                                 plr_real J[PLR_ROWS * PLR_POSE_DIM]) {
@@ -54,7 +54,7 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
     times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, f->par.Ad_CB);
 }
 
-/* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): a chart's error carried along a rigid motion.
+/* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): the derivative of the chart at q+ by the chart at q.
  * With N+^T q+ = 0 and q^T N = 0:
  *   F = [ r/r+ N+^T R^T N | -r/r+ N+^T R^T p ; r/r+^3 p^T N | (r - p^T mu) r^2 / r+^3 ]. */
 static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
@@ -79,8 +79,9 @@ static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
     F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
-/* Nearer than this a landmark is put no further: the camera has run into it, and the frame drops it. */
-static void keep_off(plr_real q[3]) {
+/* Keeps a landmark at least PLR_MIN_RANGE from the camera. Nearer than that the camera has reached the
+ * point, and the chart is not defined. */
+static void enforce_min_range(plr_real q[3]) {
     const plr_real range2 = plr_dot3(q, q);
     if (range2 >= PLR_MIN_RANGE * PLR_MIN_RANGE)
         return;
@@ -92,14 +93,13 @@ static void keep_off(plr_real q[3]) {
 }
 
 /* W^T, 6 x dim: rows JL of the pose, G JL of the landmarks, G = Jw(q) [-I | [q]x] Ad(T_CB). */
-static void enter_noise(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt,
-                        size_t ld) {
+static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *Wt, size_t ld) {
     const unsigned n = plr_covariance_dim(f), first = plr_covariance_row(f, 0);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
             Wt[k * ld + i] = JL[PLR_POSE_DIM * i + k];
         memset(Wt + k * ld + PLR_POSE_DIM, 0,
-               (first - PLR_POSE_DIM) * sizeof *Wt); /* it moves no bias */
+               (first - PLR_POSE_DIM) * sizeof *Wt); /* a motion changes no bias */
         memset(Wt + k * ld + n, 0, (ld - n) * sizeof *Wt);
     }
     for (unsigned slot = 0; slot < f->count; slot++) {
@@ -116,12 +116,12 @@ static void enter_noise(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_r
     }
 }
 
-/* Moves a landmark along its ray to where it is linearised (vantage.h). The estimate stays what it was:
- * returns how far it is from that point, as inverse range. */
-static plr_real bring_closer(plr_filter *f, unsigned slot) {
+/* Moves a landmark along its ray to its linearisation point (filter/vantage.h). The estimate does not
+ * change: returns the estimated inverse range minus that of the point, 1/m. */
+static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
     plr_slot *s = &f->slots[slot];
     const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
-    const plr_real wanted = s->beyond + f->work.noise.closer[slot];
+    const plr_real wanted = s->beyond + f->work.noise.range_shift[slot];
     plr_real ratio = PLR_FMA(wanted, range, PLR_R(1)); /* of inverse ranges */
     const plr_real farthest = f->par.min_inverse_range * range;
     ratio = ratio < farthest ? farthest : ratio > nearest ? nearest : ratio;
@@ -131,10 +131,10 @@ static plr_real bring_closer(plr_filter *f, unsigned slot) {
     return s->beyond - (ratio - PLR_R(1)) / range;
 }
 
-/* The variances of J n, which limit what the landmarks may have moved together (common_motion). */
-static void note_spread(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE]) {
+/* Stores the variances of the motion, the prior of the common motion in common_motion. */
+static void store_motion_variance(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        f->work.noise.spread[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
+        f->work.noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
 }
 
 static unsigned body_retract(plr_filter *f, const plr_real *dx);
@@ -144,35 +144,35 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
     plr_se3_rotation(R, E);
 
-    plr_real *F = f->work.Vt, most_left = 0;
+    plr_real *F = f->work.Vt, largest_offset = 0;
     memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
     for (unsigned slot = 0; slot < f->count; slot++) {
         plr_slot *s = &f->slots[slot];
         plr_polar from, to;
-        const plr_real left = bring_closer(f, slot);
-        most_left = plr_abs(left) > most_left ? plr_abs(left) : most_left;
+        const plr_real offset = move_to_linearisation_point(f, slot);
+        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
         plr_polar_at(&from, s->x);
         plr_se3_move_back(s->x, E, p);
-        keep_off(s->x);
+        enforce_min_range(s->x);
         plr_polar_at(&to, s->x);
         carry_chart(F + 9 * slot, &to, R, p, &from);
         plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
-        dx[0] = left * F[9 * slot + 2];
-        dx[1] = left * F[9 * slot + 5];
+        dx[0] = offset * F[9 * slot + 2];
+        dx[1] = offset * F[9 * slot + 5];
         dx[2] = 0;
-        s->beyond = left * F[9 * slot + 8];
+        s->beyond = offset * F[9 * slot + 8];
     }
     plr_real A[PLR_POSE_SQUARE];
-    note_spread(f, motion->JL);
+    store_motion_variance(f, motion->JL);
     plr_se3_rotation(R, motion->E);
     plr_se3_adjoint_inverse(A, R, motion->p);
     plr_covariance_transport(f, A, F);
-    if (!f->motion.noisy) { /* no correction follows that would begin with what is left */
-        if (most_left > 0)
+    if (!f->motion.noisy) { /* no correction follows to which dx could be added */
+        if (largest_offset > 0)
             (void)body_retract(f, f->work.dx);
         return;
     }
-    enter_noise(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
+    fill_W(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
     plr_covariance_open_noise(f, motion);
 }
 
@@ -213,8 +213,8 @@ static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_
     landmark->uses_pose = false;
 }
 
-/* P = J P_W J^T, 3x3, in double: a far point's bearing variance is what is left of its range variance,
- * more digits below than float32 has. False if a variance comes out negative. */
+/* P = J P_W J^T, 3x3, in double: the bearing variance of a far point is smaller than its range variance by
+ * more digits than float32 has. False if a variance is negative. */
 static bool carry_covariance(plr_real P[9], const plr_real J[9], const double P_W[9]) {
     double JP[9];
     for (int i = 0; i < 3; i++)
@@ -257,11 +257,11 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     return carry_covariance(landmark->P, J_W, known->P_W_m2);
 }
 
-/* The rigid motion eta of the body that the corrections of the landmarks have in common. It is not the
- * pose's correction xi: most of that may concern the way here, which no landmark in sight shares. A
- * bearing counts as its angle, an inverse range as the disparity that it makes. Known landmarks have
- * no voice: they stand in the world, and what moves them in the camera is the pose, while what the
- * errors of a map have in common by chance is no motion. J becomes chart_by_body_twist of every slot. */
+/* The rigid motion eta of the body that the corrections of the landmarks have in common. It differs from
+ * the pose's correction xi, which may mostly concern the way travelled before, in which no visible
+ * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
+ * causes. Known landmarks are left out: they are fixed in the world, so the pose moves them in the camera,
+ * and the common part of a map's errors is not a motion. J becomes chart_by_body_twist of every slot. */
 static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
                           plr_real eta[PLR_POSE_DIM]) {
     const plr_real baseline = f->par.camera.baseline;
@@ -276,11 +276,12 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
         if (!f->slots[slot].known)
             plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
     }
-    plr_rigid_fit_solve(&fit, dx, f->work.noise.spread, angle2, eta);
+    plr_rigid_fit_solve(&fit, dx, f->work.noise.motion_variance, angle2, eta);
 }
 
-/* What is left of a correction in the chart `from` when the point has gone on to `to`: the same angle, turned
- * along by F = carry_chart's bearing part, and the same inverse range. */
+/* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common motion has
+ * brought the point: the same angle, turned by the bearing part of F (carry_chart), and the same inverse
+ * range. */
 static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
                       const plr_polar *from) {
     const plr_real ratio = to->r / from->r, w0 = ratio * w[0], w1 = ratio * w[1];
@@ -289,18 +290,18 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
 }
 
 /*
- * What the landmarks' corrections have in common is a rigid motion eta and is applied as one; only the
- * rest of each goes through the chart, there where that has brought the landmark:
+ * Applies the common part of the landmarks' corrections as a rigid motion eta, exactly, and the rest of
+ * each through its chart, at the point to which that motion has brought the landmark:
  *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = Exp(eta_C)^-1 q,  q+ = retr(q~, w_rest).
- * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q) with theta_C eta_C's rotation, the pose
- * by Ad(Exp(-xi)).
+ * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q), where theta_C is the rotation of eta_C, and
+ * the pose's rows by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE], eta[PLR_POSE_DIM], eta_C[PLR_POSE_DIM], E_C[9],
         R_C[9], p_C[3];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
-    plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot, of 72 at least */
+    plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot; Vt has at least 72 */
     common_motion(f, dx, J, eta);
     plr_mat6_vec(eta_C, f->par.Ad_CB, eta);
     plr_se3_expm1(E_C, p_C, eta_C);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * The `world` model, the course report's: landmarks m in the world frame, with errors dm there
- * (III.1 to III.14). It believes more than it knows, and in float32 its covariance can break down
- * (docs/NUMERICS.md): it is here to be compared with.
+ * (III.1 to III.14). It is overconfident, and in float32 its covariance can lose
+ * positivity (docs/NUMERICS.md). It exists for comparison.
  */
 #include "state/blocks.h"
 #include "state/covariance.h"

@@ -28,8 +28,8 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
     memcpy(f->p_WB, p_WB, sizeof f->p_WB);
 }
 
-/* A part of the biases' effect on the motion that is charged as noise besides. It keeps the factor of M
- * from depending on the biases alone, which would leave the biases' own variance to rounding. */
+/* This part of B P_bb B^T is added to M as noise. Otherwise, with Q = 0, M would depend on the biases alone,
+ * and to know the motion would leave the biases a variance of zero, give or take rounding. */
 #define SHARE_OF_BIAS PLR_R(1e-4)
 
 void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
@@ -45,8 +45,8 @@ void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
 }
 
 /* K = L^-1 B. */
-static void share_of_bias(const plr_real L[PLR_POSE_SQUARE], const plr_real B[PLR_POSE_SQUARE],
-                          plr_real K[PLR_POSE_SQUARE]) {
+static void solve_for_bias(const plr_real L[PLR_POSE_SQUARE], const plr_real B[PLR_POSE_SQUARE],
+                           plr_real K[PLR_POSE_SQUARE]) {
     memcpy(K, B, PLR_POSE_SQUARE * sizeof *K);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real inverse =
@@ -60,10 +60,10 @@ static void share_of_bias(const plr_real L[PLR_POSE_SQUARE], const plr_real B[PL
     }
 }
 
-static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
-                      plr_real turn2) {
+static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
+                       plr_real turn2) {
     plr_real BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];
-    memset(f->work.noise.closer, 0, sizeof f->work.noise.closer);
+    memset(f->work.noise.range_shift, 0, sizeof f->work.noise.range_shift);
     memset(applied, 0, sizeof *applied);
     memcpy(applied->E, f->motion.E, sizeof applied->E);
     memcpy(applied->p, f->motion.p, sizeof applied->p);
@@ -76,16 +76,16 @@ static void put_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale
         M[(PLR_POSE_DIM + 1) * i] += i < 3 ? way2 : turn2;
     plr_factor6(applied->L, M);
     if (plr_has_block(f, PLR_BLOCK_BIAS))
-        share_of_bias(applied->L, f->motion.B, applied->K);
+        solve_for_bias(applied->L, f->motion.B, applied->K);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
 
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
-    put_prior(f, applied, 1, 0, 0);
+    fill_prior(f, applied, 1, 0, 0);
 }
 
 void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {
-    put_prior(f, applied, PLR_R(900), PLR_R(0.09), PLR_R(0.01));
+    fill_prior(f, applied, PLR_R(900), PLR_R(0.09), PLR_R(0.01));
 }
 
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
@@ -117,7 +117,7 @@ void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUA
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
         plr_sandwich6(BPB, m->B, P);
     }
-    /* the terms that follow may take most of a variance away: their rounding is made up for */
+    /* the terms that follow may cancel most of a variance: this covers their rounding */
     for (int i = 0; i < PLR_POSE_DIM; i++)
         P_xi[(PLR_POSE_DIM + 1) * i] = PLR_FMA(
             PLR_R(8) * PLR_EPSILON, P_xi[(PLR_POSE_DIM + 1) * i] + BPB[(PLR_POSE_DIM + 1) * i],

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The motion since the last frame. It is in the pose already, and is accumulated in f->motion until
- * landmarks and covariance follow (docs/MATH.md 4 and 6). */
+/* The motion since landmarks and covariance were last moved. The pose contains it already; f->motion
+ * accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 
@@ -19,8 +19,8 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], co
 typedef struct plr_applied_motion {
     plr_real E[9], p[3];         /* D' = D Exp(L z) = (I + E, p) */
     plr_real L[PLR_POSE_SQUARE]; /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
-    plr_real
-        K[PLR_POSE_SQUARE]; /* L^-1 B, rows of zero columns zero: what nu shares with the biases */
+    plr_real K
+        [PLR_POSE_SQUARE]; /* L^-1 B, zero rows where L has zero columns: the derivative of nu by the biases */
     plr_real JL[PLR_POSE_SQUARE]; /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
     plr_real z[PLR_POSE_DIM];
 } plr_applied_motion;

@@ -82,7 +82,7 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     *beyond = 0;
     if (!(inverse >= min_inverse_range)) {
         *beyond = inverse - min_inverse_range;
-        if (!(*beyond <= 0)) { /* no number */
+        if (!(*beyond <= 0)) { /* NaN */
             *beyond = 0;
             cut = true;
         }
@@ -99,7 +99,8 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     const plr_real further = held ? result->r - chart->r : -chart->r * result->r * w[2];
     const plr_real mu[3] = {chart->mu[0] + turn[0], chart->mu[1] + turn[1], chart->mu[2] + turn[2]};
     if (further <
-        PLR_R(-0.25) * chart->r) { /* the far point's rounding must not stay in the near one */
+        PLR_R(-0.25) *
+            chart->r) { /* else the rounding of the far point would stay in the near one */
         const plr_real scale = result->r / PLR_SQRT(plr_dot3(mu, mu));
         for (int i = 0; i < 3; i++)
             q[i] = scale * mu[i];

@@ -2,7 +2,7 @@
 /*
  * The polar chart at a point q (docs/MATH.md 5): two bearing angles and inverse range,
  * w = (N^T mu-change, change of 1/r), with r = |q|, mu = q / r, N(mu) a 3x2 orthonormal basis of
- * the plane orthogonal to mu. Far points are nearly Gaussian in it.
+ * the plane orthogonal to mu. The error of a far point is nearly Gaussian in it.
  */
 #ifndef PLR_STATE_POLAR_H
 #define PLR_STATE_POLAR_H
@@ -11,7 +11,7 @@
 
 #include "pelorus/config.h"
 
-/* Nearer than this a point has no bearing worth the name, m. */
+/* The least range, m: the bearing of a nearer point is not defined well enough. */
 #define PLR_MIN_RANGE PLR_R(0.01)
 
 /* The chart at one point. */
@@ -32,11 +32,11 @@ void plr_polar_from_point(plr_real Jw[9], const plr_polar *chart);
 void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart);
 
 /* Moves a point along its chart: a = mu x (N w_12), mu+ = Exp(a) mu, 1/r+ = 1/r + w_3.
- * q, the chart's point, goes there by what is added to it: a small step is rounded at its own size.
+ * q, the chart's point, is moved by adding the step to it, so that a small step is rounded at its own size.
  * *result is the chart at the new point, M = N(mu+)^T Exp(a) N(mu) (2x2) the transport of the
- * bearing part. Where 1/r+ would be below min_inverse_range the point stays there, and *beyond (0
- * elsewhere) is what is left of w_3. Returns true where w had to be cut: a bearing change over 1
- * rad, a range under PLR_MIN_RANGE, or no number. */
+ * bearing part. If 1/r+ would be below min_inverse_range, the point is put at that limit and *beyond
+ * receives the rest of w_3; otherwise *beyond = 0. Returns true if w was limited: a bearing change over 1
+ * rad, a range under PLR_MIN_RANGE, or NaN. */
 bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
                        const plr_real w[3], plr_real min_inverse_range, plr_real q[3],
                        plr_real *beyond);

@@ -5,8 +5,7 @@
 #include "math/small.h"
 #include "math/so3.h"
 
-/* p <- p + R d, in double; R <- R dR, once more a rotation to rounding: an hour of steps without
- * that leaves it by a hundredth in float32. */
+/* Without the orthonormalisation, an hour of steps in float32 makes R deviate from a rotation by 0.01. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     plr_real step[3], change[9];
     plr_mat3_vec(step, f->R_WB, d);
@@ -44,5 +43,5 @@ void plr_filter_diverge(plr_filter *f) {
     if (!f->diverged)
         f->totals.diverged_ns = f->t_ns;
     f->diverged = 1;
-    f->work.noise.open = 0; /* what was about to come back into P is lost with it */
+    f->work.noise.open = 0; /* W is not added to P any more */
 }

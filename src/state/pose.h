@@ -8,7 +8,7 @@
 /* T <- T (I + E, d): p <- p + R d in double, and R is made orthonormal. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]);
 
-/* T <- T Exp(xi), and makes R orthonormal: the correction of the pose by a frame. */
+/* T <- T Exp(xi): the correction of the pose by a frame. */
 void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
 
 /* The pose to which landmarks and covariance refer: the one before the accumulated motion. */

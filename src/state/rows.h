@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Three rows of numbers that depend linearly on the state's error x: y = H_0 x_0 + H_1 x_1, where
- * x_0 and x_1 are blocks of x. Of the state a measurement knows no more than this. */
+ * x_0 and x_1 are blocks of x. This is all that a measurement knows of the state. */
 #ifndef PLR_STATE_ROWS_H
 #define PLR_STATE_ROWS_H
 
@@ -20,14 +20,14 @@ typedef struct plr_rows {
 } plr_rows;
 
 /* Three rows over the body's twist u = (v, w) in place of the state: z = M u + N(0, R). How u depends
- * on the state is the process's to know. A row that is not measured has M = 0, z = 0 and R = 1. */
+ * on the state is defined by the process. A row that is not measured has M = 0, z = 0 and R = 1. */
 typedef struct plr_twist_rows {
     plr_real z[PLR_ROWS];
     plr_real M[PLR_ROWS * PLR_POSE_DIM];
     plr_real R[PLR_ROWS]; /* variances */
 } plr_twist_rows;
 
-/* One block of three columns: a landmark as the `body` model has it, which the kernels are made for. */
+/* True if the first block has three columns, as a landmark has: there are special kernels for it. */
 static inline bool plr_rows_begin_with_three(const plr_rows *rows) {
     return rows->term[0].columns == PLR_LANDMARK_DIM;
 }

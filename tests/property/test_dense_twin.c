@@ -121,8 +121,8 @@ static unsigned create(const plr_frame *frame) {
 }
 
 /* In this frame, after many that rejected it. */
-static bool began_anew(const plr_slot *slot) {
-    return slot->last_frame == filter.frame_number && slot->chances > 0 &&
+static bool restarted(const plr_slot *slot) {
+    return slot->last_frame == filter.frame_number && slot->restarts > 0 &&
            slot->accepted + slot->rejected == 0;
 }
 
@@ -143,7 +143,7 @@ static void look(void) {
         textbook_remove(&book, textbook_find(&book, evicted[i]));
     unsigned anew = 0;
     for (unsigned slot = 0; slot < filter.count; slot++)
-        if (began_anew(&filter.slots[slot])) { /* and is made again below */
+        if (restarted(&filter.slots[slot])) { /* and is made again below */
             textbook_remove(&book, textbook_find(&book, filter.slots[slot].id));
             anew++;
         }

@@ -77,7 +77,7 @@ static void test_innovations_that_lean_within_the_gate_are_found_out(void) {
     rng chance = rng_seeded(5);
     plr_slot slot = {0};
     int frames = 0;
-    for (; frames < 60 && !slot.strays; frames++) {
+    for (; frames < 60 && !slot.moving; frames++) {
         plr_real e[3];
         for (int r = 0; r < 3; r++)
             e[r] = (plr_real)(rng_normal(&chance) + (r == 0 ? 1.4 : 0));
@@ -95,7 +95,7 @@ static void test_white_innovations_are_not(void) {
             e[r] = (plr_real)rng_normal(&chance);
         plr_track_add(&slot, e);
     }
-    TEST_ASSERT_EQUAL_UINT8(0, slot.strays);
+    TEST_ASSERT_EQUAL_UINT8(0, slot.moving);
 }
 
 static void test_a_point_that_goes_ahead_of_the_body_is_found_out(void) {
@@ -104,9 +104,9 @@ static void test_a_point_that_goes_ahead_of_the_body_is_found_out(void) {
     rig_begin();
     rig_drive(10);
     put_point(8, 1.5);
-    for (int k = 0; k < FRAMES_TO_CATCH && !(k && point()->strays); k++)
+    for (int k = 0; k < FRAMES_TO_CATCH && !(k && point()->moving); k++)
         go(0, 0.5 * rig.options.speed_mps);
-    TEST_ASSERT_EQUAL_UINT8(1, point()->strays);
+    TEST_ASSERT_EQUAL_UINT8(1, point()->moving);
     const uint32_t gated = point()->times_gated;
     for (int k = 0; k < 10; k++)
         go(0, 0.5 * rig.options.speed_mps);
@@ -143,7 +143,7 @@ static void test_a_track_of_outliers_is_given_ever_fewer_chances(void) {
     for (int k = 0; k < 100; k++)
         go(k % 2 ? 120 : -120, 0);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(80, point()->times_gated);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT8(3, point()->chances); /* after 8 frames, 16, 32 */
+    TEST_ASSERT_LESS_OR_EQUAL_UINT8(3, point()->restarts); /* after 8 frames, 16, 32 */
 }
 
 int main(void) {

@@ -314,8 +314,8 @@ static void retract_twin(const double *dx, double (*q)[3], double *T) {
 /* As if a motion had been applied, of which each number is uncertain by so much, squared. */
 static void allow_common_motion(double spread) {
     for (int k = 0; k < 6; k++) {
-        filter.work.noise.spread[k] = (plr_real)spread;
-        truth.spread[k] = (double)filter.work.noise.spread[k];
+        filter.work.noise.motion_variance[k] = (plr_real)spread;
+        truth.spread[k] = (double)filter.work.noise.motion_variance[k];
     }
 }
 

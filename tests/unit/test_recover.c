@@ -123,8 +123,8 @@ static void test_the_covariance_is_the_last_good_one_and_that_of_the_motion_sinc
 static void test_a_contradiction_that_was_open_stays_covered(void) {
     double after[36];
     rig.filter.consistency.contradicted = rig.filter.consistency.drifting = 1;
-    rig.filter.consistency.apart[0] = PLR_R(0.5);
-    rig.filter.consistency.apart_sigmas[0] = PLR_R(50);
+    rig.filter.consistency.difference[0] = PLR_R(0.5);
+    rig.filter.consistency.difference_sigmas[0] = PLR_R(50);
     break_covariance();
     plr_filter_recover(&rig.filter);
     reseal(&rig.filter);

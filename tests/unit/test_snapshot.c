@@ -150,17 +150,17 @@ static void fill_consistency(rng *chance, plr_consistency *c) {
         fill_reals(chance, c->windows[w].sum, 6);
         fill_reals(chance, c->windows[w].variance, 21);
     }
-    fill_reals(chance, c->apart, 6);
-    fill_reals(chance, c->apart_sigmas, 6);
-    fill_reals(chance, &c->apart_noise, 1);
-    fill_reals(chance, c->still_way, 6);
-    fill_reals(chance, c->still_variance, 6);
+    fill_reals(chance, c->difference, 6);
+    fill_reals(chance, c->difference_sigmas, 6);
+    fill_reals(chance, &c->difference_noise, 1);
+    fill_reals(chance, c->frozen_motion, 6);
+    fill_reals(chance, c->frozen_variance, 6);
     plr_real *const counts[] = {&c->matched, &c->gated, &c->nis, &c->nis_dof, &c->excess};
     for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
         fill_reals(chance, counts[i], 1);
-    c->agreeing = 0x1122;
-    c->insisting = 0x3344;
-    c->slight = 0x5566;
+    c->agreeing_frames = 0x1122;
+    c->contradicting_frames = 0x3344;
+    c->small_frames = 0x5566;
     c->contradicted = c->drifting = c->frozen = c->doubtful = 1;
 }
 
@@ -193,7 +193,7 @@ static void test_every_field_is_carried(void) {
     driven.last_use_ns = rng_bits(&chance);
     driven.refused_before = 0x23456789;
     driven.slots[1].beyond = PLR_R(-0.25);
-    driven.slots[1].print = 0x3456789A;
+    driven.slots[1].pixel_hash = 0x3456789A;
     driven.frame_number = (uint32_t)rng_bits(&chance);
     driven.frames_without_use = 0xA1B2;
     driven.frames_mostly_gated = 0xC3D4;
@@ -286,7 +286,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT64(driven.totals.created, number_at(totals_at + 68 + 4 * 8, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
-    TEST_ASSERT_EQUAL_HEX32(driven.slots[1].print, number_at(id_at + slot + 16, 4));
+    TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
     TEST_ASSERT_EQUAL_UINT32(511 + 268 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
                              state.length);

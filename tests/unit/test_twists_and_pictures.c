@@ -151,8 +151,8 @@ static void test_a_second_slip_adds_to_what_the_first_left_unsettled(void) {
             add_slip();
             (void)judge();
             /* a way behind grows: 20 cm a frame, but for the few until it is told */
-            TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(apart, -(double)filter.consistency.apart[0]);
-            apart = -(double)filter.consistency.apart[0];
+            TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(apart, -(double)filter.consistency.difference[0]);
+            apart = -(double)filter.consistency.difference[0];
         }
         for (int k = 0; k < AGREEING && slips < 2; k++) {
             add_agreement();
@@ -208,7 +208,7 @@ static void test_the_covariance_covers_both_stories(void) {
         TEST_ASSERT_EQUAL_DOUBLE(0, (double)C[i]);
     for (int k = 0; k < 10; k++)
         add_slip();
-    const double apart = (double)filter.consistency.apart[0];
+    const double apart = (double)filter.consistency.difference[0];
     TEST_ASSERT_DOUBLE_WITHIN(0.3, -10 * WAY_M, apart);
     plr_consistency_cover(&filter, C);
     TEST_ASSERT_DOUBLE_WITHIN(0.06 * apart * apart, apart * apart, (double)C[0]);
@@ -235,7 +235,7 @@ static void test_a_frame_may_contradict_the_twists_outright(void) {
     TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge());
     TEST_ASSERT_EQUAL_UINT32(1, filter.totals.contradictions);
     TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.4, (double)filter.consistency.apart[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.4, (double)filter.consistency.difference[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-2, pow(0.4 / SIGMA_M, 2), (double)filter.consistency.excess);
 }
 
@@ -250,7 +250,7 @@ static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
         TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
         TEST_ASSERT_EQUAL_UINT32(widened, filter.totals.widened);
     }
-    const double apart = (double)filter.consistency.apart[0];
+    const double apart = (double)filter.consistency.difference[0];
     add_agreement();
     TEST_ASSERT_EQUAL_HEX32(0, judge());
     TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
@@ -259,7 +259,7 @@ static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
                              filter.totals.widened); /* what was between them is in P */
     TEST_ASSERT_DOUBLE_WITHIN(0.06 * apart * apart, before + 1.04 * apart * apart,
                               (double)filter.P[plr_packed_at(0, 0)]);
-    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.consistency.apart[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.consistency.difference[0]);
 }
 
 static void test_a_frame_that_differs_begins_the_settling_anew(void) {
