@@ -124,7 +124,7 @@ typedef enum plr_reason {
     /* Twists are missing or refused, or the last one is too old. Check the odometry and its
      * link. */
     PLR_REASON_NO_TWISTS = 1 << 21,
-    /* Ten successive readings of a wheel, a standstill or a position were rejected. The sensor or the
+    /* Ten successive readings of a small sensor (plr_sensor) were rejected. The sensor or the
      * estimate is wrong: check the sensor's frame, lever arm, units and sigma. */
     PLR_REASON_READINGS_REJECTED = 1 << 22
 } plr_reason;

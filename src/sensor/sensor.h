@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * The small sensors: a reading of one to three numbers. Each has a file of its own and a row in the
- * table of sensors.c; docs/ADD-A-SENSOR.md adds one.
+ * The small sensors: a reading of one to three numbers. Each has a file of its own and a row in
+ * sensors.def; docs/ADD-A-SENSOR.md adds one.
  */
 #ifndef PLR_SENSOR_SENSOR_H
 #define PLR_SENSOR_SENSOR_H
@@ -12,8 +12,6 @@
 /* What a kind of sensor measures: one of the two functions, the other is NULL. The reading was
  * checked: finite numbers, a sigma above zero for each number that was measured. */
 typedef struct plr_sensor_kind {
-    const char *name; /* "wheel" */
-
     /* Of the state: rows with their derivatives at the present estimate. */
     void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
 
@@ -36,6 +34,8 @@ static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
 bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
                             plr_reading *reading);
 
-extern const plr_sensor_kind plr_wheel, plr_standstill, plr_position;
+#define SENSOR(number, kind, about) extern const plr_sensor_kind kind;
+#include "sensor/sensors.def"
+#undef SENSOR
 
 #endif

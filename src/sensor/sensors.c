@@ -3,12 +3,11 @@
 
 #include <stddef.h>
 
-/* By plr_sensor. */
+#define SENSOR(number, kind, about) [(number)-1] = &(kind),
 static const plr_sensor_kind *const kinds[PLR_SENSORS] = {
-    [PLR_SENSOR_WHEEL - 1] = &plr_wheel,
-    [PLR_SENSOR_STANDSTILL - 1] = &plr_standstill,
-    [PLR_SENSOR_POSITION - 1] = &plr_position,
+#include "sensor/sensors.def"
 };
+#undef SENSOR
 
 const plr_sensor_kind *plr_sensor_of(unsigned sensor) {
     return sensor >= 1 && sensor <= PLR_SENSORS ? kinds[sensor - 1] : NULL;

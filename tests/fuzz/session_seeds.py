@@ -26,7 +26,6 @@ from pelorus.frames import (
     Landmark,
     Message,
     Reading,
-    Sensor,
     Start,
     StartFlag,
     State,
@@ -35,6 +34,7 @@ from pelorus.frames import (
     Truth,
     Twist,
 )
+from pelorus.schema import SENSORS
 from pelorus.simulation.simulate import Options, simulate
 
 Data = Twist | Stereo | Truth
@@ -152,10 +152,10 @@ def measured(recording: list[Message]) -> list[Message]:
         match message:
             case Twist(t_ns, v, w):
                 speed = v + np.cross(w, arm)
-                out.append(Reading(t_ns, Sensor.WHEEL, 5, speed, np.full(3, 0.1), arm))
+                out.append(Reading(t_ns, SENSORS["wheel"], 5, speed, np.full(3, 0.1), arm))
             case Truth(t_ns, R, p):
-                out.append(Reading(t_ns, Sensor.POSITION, 7, p + R @ arm, np.full(3, 0.3), arm))
-                out.append(Reading(t_ns, Sensor.STANDSTILL, 2, sigma=np.full(3, 0.05)))
+                out.append(Reading(t_ns, SENSORS["position"], 7, p + R @ arm, np.full(3, 0.3), arm))
+                out.append(Reading(t_ns, SENSORS["standstill"], 2, sigma=np.full(3, 0.05)))
     return out
 
 

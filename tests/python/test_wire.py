@@ -29,7 +29,6 @@ from pelorus.frames import (
     Reading,
     Report,
     Role,
-    Sensor,
     Start,
     StartFlag,
     State,
@@ -40,6 +39,7 @@ from pelorus.frames import (
     Twist,
 )
 from pelorus.layout import MalformedPayload
+from pelorus.schema import SENSORS
 from pelorus.wire import Counts, Reader, Received, VersionError, Writer
 
 CHANCE = np.random.default_rng(11)
@@ -68,7 +68,7 @@ MESSAGES: list[Message] = [
     Text("grün", 2),
     End(1, 2, 3, 4, 5, 6, 31, (7, 8, 9, 10, 11)),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
-    Reading(10, Sensor.WHEEL, 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
+    Reading(10, SENSORS["wheel"], 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
 ]
 SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 settings
     Kind.HEADER: [250 + 9],

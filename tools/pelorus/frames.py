@@ -87,14 +87,6 @@ class Notice(IntEnum):
     RESTORED = schema.number("notice", "RESTORED")  # the filter goes on from a saved state
 
 
-class Sensor(IntEnum):
-    """What measured a READING."""
-
-    WHEEL = schema.number("sensor", "WHEEL")  # the velocity of a point of the body, in body axes
-    STANDSTILL = schema.number("sensor", "STANDSTILL")  # that it does not move
-    POSITION = schema.number("sensor", "POSITION")  # the place of a point of it in the world
-
-
 class Role(IntEnum):
     """Where a landmark comes from."""
 
@@ -317,7 +309,7 @@ class Reading(Message, kind=Kind.READING):
     """One to three numbers of a sensor at `at_B_m` on the body; bits of `axes` say which."""
 
     t_ns: int
-    sensor: int  # Sensor, or one of a later version
+    sensor: int  # of schema.SENSORS, or one of a later version
     axes: int = 7
     value: Floats = zeros(3)
     sigma: Floats = zeros(3)

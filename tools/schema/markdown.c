@@ -151,10 +151,10 @@ static unsigned bit_of(unsigned reason) {
     return bit;
 }
 
-static void print_words(const char *of, const char *title) {
+static void print_words(const char *of, const char *title, const word *words, size_t n) {
     printf("| %s | name | |\n|---|---|---|\n", title);
-    for (size_t i = 0; i < schema_word_rows; i++) {
-        const word *w = &schema_words[i];
+    for (size_t i = 0; i < n; i++) {
+        const word *w = &words[i];
         if (strcmp(w->of, of) != 0)
             continue;
         if (strcmp(of, "reason") == 0)
@@ -197,9 +197,11 @@ bool schema_print_markdown(const char *table) {
     else if (strcmp(table, "settings") == 0)
         print_settings();
     else if (strcmp(table, "statuses") == 0)
-        print_words("status", "status");
+        print_words("status", "status", schema_words, schema_word_rows);
     else if (strcmp(table, "reasons") == 0)
-        print_words("reason", "bit");
+        print_words("reason", "bit", schema_words, schema_word_rows);
+    else if (strcmp(table, "sensors") == 0)
+        print_words("sensor", "sensor", schema_enums, schema_enum_rows);
     else if (strcmp(table, "state") == 0)
         print_state();
     else

@@ -81,9 +81,8 @@ const word schema_enums[] = {
     {"severity", "INFO", PLR_SEVERITY_INFO, ""},
     {"severity", "WARNING", PLR_SEVERITY_WARNING, ""},
     {"severity", "ERROR", PLR_SEVERITY_ERROR, ""},
-    {"sensor", "WHEEL", PLR_SENSOR_WHEEL, ""},
-    {"sensor", "STANDSTILL", PLR_SENSOR_STANDSTILL, ""},
-    {"sensor", "POSITION", PLR_SENSOR_POSITION, ""},
+#define SENSOR(number_, kind_, about_) {"sensor", #number_, number_, about_},
+#include "sensor/sensors.def"
 };
 const size_t schema_enum_rows = LENGTH(schema_enums);
 
