@@ -65,7 +65,7 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
         const plr_slot before = f->slots[slot];
         if (!plr_track_may_restart(&before) || !plr_stereo_makes_landmark(f, o))
             continue;
-        plr_predict_settle(f);
+        plr_predict_apply_prior(f);
         plr_slots_remove(f, slot);
         append_new(f, o);
         plr_track_restart(&f->slots[f->count - 1], &before);

@@ -13,7 +13,7 @@
 #include "state/pose.h"
 #include "state/rigid_fit.h"
 
-enum { ABOUT_BIAS = 2 }; /* measurements about the biases */
+enum { BIAS_MEASUREMENTS = 2 }; /* measurements about the biases */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
 
 /* Measurements that are applied together, stacked: S = H P H^T + R and y = r - H dx. */
@@ -41,25 +41,25 @@ static void fill_S(const plr_filter *f, const plr_batch *batch, plr_real *S) {
 }
 
 /* Number i of the measurements, behind which stand the two about the biases. */
-static void take(const plr_filter *f, const plr_sensed *sensed, unsigned count, unsigned i,
-                 plr_measurement *m) {
+static void get_measurement(const plr_filter *f, const plr_measurement_source *sensed,
+                            unsigned count, unsigned i, plr_measurement *m) {
     if (i < count) {
         sensed->measure(f, sensed->context, i, m);
         return;
     }
     memset(m, 0, sizeof *m);
-    plr_velocity_about_bias(f, i - count, &m->H, m->r);
+    plr_velocity_bias_rows(f, i - count, &m->H, m->r);
     for (unsigned r = 0; r < PLR_ROWS; r++)
         m->R[r] = 1;
 }
 
 /* Linearises the batch's measurements; fills rows of (P H^T)^T, S and y in the workspace. */
-static void stack(plr_filter *f, const plr_sensed *sensed, unsigned count, unsigned first,
-                  plr_batch *batch) {
+static void stack(plr_filter *f, const plr_measurement_source *sensed, unsigned count,
+                  unsigned first, plr_batch *batch) {
     plr_workspace *w = &f->work;
     for (unsigned a = 0; a < batch->count; a++) {
         plr_measurement *m = &batch->measured[a];
-        take(f, sensed, count, first + a, m);
+        get_measurement(f, sensed, count, first + a, m);
         plr_covariance_project(f, &m->H, w->Vt + PLR_ROWS * a * batch->ld, batch->ld);
         plr_real Hx[3];
         plr_rows_apply(&m->H, w->dx, Hx);
@@ -76,8 +76,8 @@ static void stack(plr_filter *f, const plr_sensed *sensed, unsigned count, unsig
 
 /* What the batch says of the motion's noise, with E = U^-T H W and y = U^-T (r - H dx):
  * Lambda += E^T E, eta += E^T y. */
-static void inform_noise(plr_noise *noise, const plr_batch *batch, const plr_real *y,
-                         unsigned rows) {
+static void add_noise_information(plr_noise *noise, const plr_batch *batch, const plr_real *y,
+                                  unsigned rows) {
     plr_real *Lambda = noise->Lambda;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         for (unsigned r = 0; r < rows; r++)
@@ -89,7 +89,7 @@ static void inform_noise(plr_noise *noise, const plr_batch *batch, const plr_rea
 }
 
 /* W -= V E and dx += V y, as seven rows of one product: -y stands beside E. */
-static void move_state(plr_filter *f, plr_batch *batch, unsigned rows) {
+static void update_estimate(plr_filter *f, plr_batch *batch, unsigned rows) {
     plr_workspace *w = &f->work;
     plr_real *Wt = w->noise.Wt, *beyond = w->diagonal;
     const size_t ld = batch->ld;
@@ -120,8 +120,8 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
         return true;
     }
     plr_solve_upper_transposed(rows, PLR_POSE_DIM, w->S, batch->E, WIDE);
-    inform_noise(&w->noise, batch, w->y, rows);
-    move_state(f, batch, rows);
+    add_noise_information(&w->noise, batch, w->y, rows);
+    update_estimate(f, batch, rows);
     return true;
 }
 
@@ -135,14 +135,14 @@ static bool is_sane(const plr_filter *f, unsigned n) {
     return plr_dot3(dx, dx) < max_way2 && plr_dot3(dx + 3, dx + 3) < PLR_MAX_CORRECTION_TURN2;
 }
 
-plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned count) {
+plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, unsigned count) {
     plr_correction result = {0};
     const unsigned n = plr_covariance_dim(f);
     if (!f->work.noise.open) { /* no motion has been applied */
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
         memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
-    const unsigned all = count + (plr_velocity_speaks_of_bias(f) ? ABOUT_BIAS : 0);
+    const unsigned all = count + (plr_velocity_informs_bias(f) ? BIAS_MEASUREMENTS : 0);
     unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
     for (; batches > 0 && !f->diverged; batches--) {
         plr_batch batch; /* not initialised: that would cost as much as a row of S */

@@ -18,15 +18,15 @@ typedef struct plr_correction {
 } plr_correction;
 
 /* Measurements to apply: measure() makes number i of them, linearised at the current estimate. */
-typedef struct plr_sensed {
+typedef struct plr_measurement_source {
     void (*measure)(const plr_filter *f, const void *context, unsigned i, plr_measurement *m);
     const void *context;
-} plr_sensed;
+} plr_measurement_source;
 
 /* Applies `count` measurements, and what velocities said of the biases since the last correction
  * (process/velocity.h). All are linearised at the current estimate, and the estimate is
  * corrected once, at the end. If a variance would not be positive or the correction is not finite,
  * the filter is marked as diverged and keeps the result of the batches before. */
-plr_correction plr_correct(plr_filter *f, const plr_sensed *sensed, unsigned count);
+plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, unsigned count);
 
 #endif

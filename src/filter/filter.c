@@ -147,7 +147,7 @@ static void start_bias(plr_filter *f) {
 }
 
 /* After the biases' covariance was lost. */
-static void go_back_to_bias_prior(plr_filter *f) {
+static void restore_bias_prior(plr_filter *f) {
     double variance[PLR_POSE_DIM];
     for (int i = 0; i < PLR_POSE_DIM; i++) {
         f->bias[i] = f->bias_prior[i];
@@ -266,7 +266,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     f->frames_without_use = f->frames_mostly_gated = 0;
     if (!plr_covariance_is_positive(f) &&
         plr_has_block(f, PLR_BLOCK_BIAS)) /* the bias is lost too */
-        go_back_to_bias_prior(f);
+        restore_bias_prior(f);
     /* a reading, and a frame, of another clock say nothing any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);

@@ -21,7 +21,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
     if (f->work.noise.open)
         plr_covariance_add_open_noise(f, &m->H, full);
     for (unsigned i = 0, k = 0; i < PLR_ROWS; i++) {
-        if (m->largest_spread > 0 && !(full[4 * i] <= m->largest_spread))
+        if (m->max_variance > 0 && !(full[4 * i] <= m->max_variance))
             return verdict;
         full[4 * i] += m->R[i];
         for (unsigned j = i; j < PLR_ROWS; j++)
@@ -31,7 +31,7 @@ plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
         return verdict;
     memcpy(e, m->r, sizeof e);
     plr_solve3_transposed(1, S, e);
-    verdict.d2 = plr_dot3(e, e) + m->besides;
+    verdict.d2 = plr_dot3(e, e) + m->extra_d2;
     verdict.gain = S[0] * S[0] * S[3] * S[3] * S[5] * S[5];
     verdict.accepted = plr_gate_accepts(f, verdict.d2, m->residual2);
     return verdict;

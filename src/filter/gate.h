@@ -20,7 +20,7 @@ typedef struct plr_verdict {
 bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2);
 
 /* Judges a measurement at the current estimate. Rejected whatever its residual: one whose prediction
- * varies by more than largest_spread. */
+ * varies by more than max_variance. */
 plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m);
 
 #endif

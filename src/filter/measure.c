@@ -105,7 +105,7 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     return accepted;
 }
 
-/* plr_sensed.measure: the one that the context is. */
+/* plr_measurement_source.measure: the one that the context is. */
 static void given(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
     (void)f;
     (void)i;
@@ -131,7 +131,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
         plr_predict_apply(f, &motion);
     }
     if (!f->diverged) {
-        const plr_sensed sensed = {given, &m};
+        const plr_measurement_source sensed = {given, &m};
         (void)plr_correct(f, &sensed, 1);
     }
     if (f->diverged)

@@ -40,7 +40,7 @@ static void judge_by_prior(plr_search *s, unsigned i) {
     }
     const plr_real *U = at->U[s->current];
     plr_real M[6], x[3];
-    plr_real limit = plr_stereo_largest_spread(s->f);
+    plr_real limit = plr_stereo_max_variance(s->f);
     bool basis = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
@@ -125,7 +125,7 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
         const plr_real without_it = leave_one_out(at, U, dz, e, &share);
         d2 = share >= LEAST_SHARE ? without_it : d2;
     }
-    d2 += plr_stereo_besides(s->f, plr_search_observation(s, i));
+    d2 += plr_stereo_row_gap_d2(s->f, plr_search_observation(s, i));
     const bool accepted = plr_gate_accepts(s->f, d2, residual_norm2(s, i));
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)

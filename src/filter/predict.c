@@ -35,7 +35,7 @@ void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
         plr_filter_diverge(f);
 }
 
-void plr_predict_settle(plr_filter *f) {
+void plr_predict_apply_prior(plr_filter *f) {
     plr_applied_motion applied;
     if (!f->motion.pending || f->diverged)
         return;
@@ -51,7 +51,7 @@ void plr_predict_settle(plr_filter *f) {
  * last reading is used from h0 to h1 seconds after it was taken. The error of one reading is constant,
  * so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau between
  * readings by the usual sigma^2 tau h, and later, when twists fail to come, to sigma^2 h^2. */
-static plr_real held_interval(const plr_filter *f, plr_real h0, plr_real h1) {
+static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     const plr_real tau = f->interval_s;
     if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
         return tau > 0 ? tau : h1 - h0;
@@ -62,7 +62,7 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
     if (f->clock_started && t_ns > f->t_ns) {
         const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
         const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
-        const plr_real interval = held_interval(f, h0, h1);
+        const plr_real interval = noise_interval(f, h0, h1);
         plr_twist_step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
     }
     f->t_ns = t_ns;
@@ -100,8 +100,8 @@ static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_
     return plr_twist_check(f, reading, seconds);
 }
 
-static void take_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                         plr_real interval) {
+static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                          plr_real interval) {
     memcpy(f->reading, reading, sizeof f->reading);
     f->reading_ns = t_ns;
     f->reading_valid = 1;
@@ -148,7 +148,7 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
         plr_twist_step(f, t_ns, held, seconds, interval);
     f->t_ns = t_ns;
     f->clock_started = 1;
-    take_reading(f, t_ns, reading, interval);
+    store_reading(f, t_ns, reading, interval);
     plr_guard_seal(f);
     return PLR_OK;
 }

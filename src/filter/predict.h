@@ -15,7 +15,7 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
 void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied);
 
 /* Applies the accumulated motion to landmarks and covariance without observations: at nu = 0. */
-void plr_predict_settle(plr_filter *f);
+void plr_predict_apply_prior(plr_filter *f);
 
 /* Discards the accumulated motion; the biases' walk of its duration is still added. */
 void plr_predict_drop(plr_filter *f);

@@ -71,12 +71,12 @@ static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_cam
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
     const plr_slot *slot = plr_search_slot(s, i);
     plr_sighting *at = &s->sightings[i];
-    plr_stereo_sight sight;
+    plr_stereo_prediction sight;
     plr_real dq[PLR_ROWS * PLR_POSE_DIM], JP[9], full[9], dz[PLR_ROWS * PLR_POSE_DIM] = {0},
                                                                         shift[3] = {0};
     plr_real S[6];
-    if (!plr_stereo_sight_after(s->f, slot, plr_search_observation(s, i), step->E, step->R, step->p,
-                                &sight))
+    if (!plr_stereo_predict_after(s->f, slot, plr_search_observation(s, i), step->E, step->R,
+                                  step->p, &sight))
         return false;
     const plr_real *J = sight.J;
     plr_mat3_mul(JP, J, at->P);
@@ -99,7 +99,7 @@ static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step 
     plr_solve3_transposed(1, S, at->e);
     at->range_change = 0;
     at->range_variance = at->P[8];
-    if (plr_stereo_tells_range(s->f, J, at->P)) {
+    if (plr_stereo_improves_range(s->f, J, at->P)) {
         plr_solve3_transposed(3, S, JP);
         const plr_real column[3] = {JP[2], JP[5], JP[8]};
         at->range_change = plr_dot3(column, at->e);

@@ -86,7 +86,7 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
 
 /* Is there anything in this frame that needs landmarks and covariance to stand where the body is? If
  * not, the motion goes on being accumulated, and a dark camera stays out of P. */
-static bool is_needed(const plr_filter *f, const plr_frame *frame, unsigned n) {
+static bool needs_motion_applied(const plr_filter *f, const plr_frame *frame, unsigned n) {
     for (unsigned k = 0; k < n; k++) {
         const bool used = f->work.slot_of[k] != PLR_NO_SLOT && f->work.gain[k] >= 0;
         const bool born = f->work.slot_of[k] == PLR_NO_SLOT && plr_births_are_allowed(f) &&
@@ -97,7 +97,7 @@ static bool is_needed(const plr_filter *f, const plr_frame *frame, unsigned n) {
     return false;
 }
 
-/* plr_sensed.measure: number i of the observations used. One that the motion has brought beside the
+/* plr_measurement_source.measure: number i of the observations used. One that the motion has brought beside the
  * camera says nothing. */
 static void measure(const plr_filter *f, const void *frame, unsigned i, plr_measurement *m) {
     const plr_frame *seen = frame;
@@ -113,7 +113,7 @@ static void measure(const plr_filter *f, const void *frame, unsigned i, plr_meas
 }
 
 static plr_correction correct(plr_filter *f, const plr_frame *frame, unsigned used) {
-    const plr_sensed sensed = {measure, frame};
+    const plr_measurement_source sensed = {measure, frame};
     return plr_correct(f, &sensed, used);
 }
 
@@ -127,7 +127,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     memcpy(Q, f->motion.Q, sizeof Q);
     plr_consistency_widen(f, &believed);
     plr_motion_find(f, frame, n, &first, &report->nis);
-    if (!is_needed(f, frame, n)) { /* the motion goes on: as the twists have it */
+    if (!needs_motion_applied(f, frame, n)) { /* the motion goes on: as the twists have it */
         memcpy(f->motion.Q, Q, sizeof Q);
         (void)choose(f, frame, n, report);
         return correction;
@@ -181,7 +181,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     if (!f->diverged) {
         events.locked = plr_health_gate_is_locked(f, report);
         if (events.locked) {
-            plr_predict_settle(f);
+            plr_predict_apply_prior(f);
             plr_births_unlock(f, frame, n);
         } else {
             plr_births_restart(f, frame, n, report);
@@ -213,16 +213,16 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
 }
 
 /* A frame of dead reckoning: the motion alone, and what velocities said of the biases. */
-static void reckon(plr_filter *f) {
+static void dead_reckon(plr_filter *f) {
     plr_applied_motion motion;
-    if (f->motion.pending && plr_velocity_speaks_of_bias(f)) {
-        const plr_sensed nothing = {NULL, NULL};
+    if (f->motion.pending && plr_velocity_informs_bias(f)) {
+        const plr_measurement_source nothing = {NULL, NULL};
         plr_motion_prior(f, &motion);
         plr_predict_apply(f, &motion);
         if (!f->diverged)
             (void)plr_correct(f, &nothing, 0);
     } else {
-        plr_predict_settle(f);
+        plr_predict_apply_prior(f);
     }
     if (f->diverged)
         plr_filter_recover(f);
@@ -255,7 +255,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
         process(f, frame, r);
     } else {
-        reckon(f);
+        dead_reckon(f);
     }
     r->active = (uint16_t)f->count;
     plr_health_count(f, r);

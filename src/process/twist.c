@@ -86,7 +86,7 @@ void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
     plr_motion *m = &f->motion;
-    const bool fused = plr_velocity_holds(f);
+    const bool fused = plr_velocity_is_held(f);
     displacement(f, reading, seconds, xi);
     step_variance(f, seconds, interval, variance);
     if (fused) {

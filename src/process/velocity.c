@@ -37,7 +37,7 @@ static bool holds(const plr_filter *f, const plr_held_velocity *held) {
     return held->known && f->t_ns < held->until_ns;
 }
 
-bool plr_velocity_holds(const plr_filter *f) {
+bool plr_velocity_is_held(const plr_filter *f) {
     for (unsigned i = 0; f->velocities_known && i < PLR_HELD_VELOCITIES; i++)
         if (holds(f, &f->velocities.held[i]))
             return true;
@@ -45,8 +45,8 @@ bool plr_velocity_holds(const plr_filter *f) {
 }
 
 /* What the difference e = U^-T (z - M u) says of the biases, which enter it by Y = -s U^-T M T. */
-static void inform(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
-                   const plr_real e[PLR_ROWS]) {
+static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
+                                 const plr_real e[PLR_ROWS]) {
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
             const plr_real y = Y[PLR_POSE_DIM * r + i];
@@ -110,7 +110,7 @@ static void fuse_one(plr_filter *f, const plr_held_velocity *held, plr_real seco
     for (unsigned i = 0; i < PLR_ROWS * PLR_POSE_DIM; i++)
         Y[i] *= -seconds;
     if (plr_has_block(f, PLR_BLOCK_BIAS))
-        inform(f, Y, e);
+        add_bias_information(f, Y, e);
     for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
         for (unsigned r = 0; r < PLR_ROWS; r++)
             xi[c] = PLR_FMA(Kt[PLR_POSE_DIM * r + c], e[r], xi[c]);
@@ -135,7 +135,7 @@ void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM
 
 /* ---------------------------------------------------------------- the biases */
 
-bool plr_velocity_speaks_of_bias(const plr_filter *f) {
+bool plr_velocity_informs_bias(const plr_filter *f) {
     for (unsigned i = 0; f->velocities_known && i < PLR_BIAS_DIM; i++)
         if (f->velocities.bias_Lambda[(PLR_BIAS_DIM + 1) * i] > 0)
             return true;
@@ -143,8 +143,7 @@ bool plr_velocity_speaks_of_bias(const plr_filter *f) {
 }
 
 /* With Lambda = L L^T: L^T db = L^-1 eta + N(0, I). */
-void plr_velocity_about_bias(const plr_filter *f, unsigned part, plr_rows *H,
-                             plr_real r[PLR_ROWS]) {
+void plr_velocity_bias_rows(const plr_filter *f, unsigned part, plr_rows *H, plr_real r[PLR_ROWS]) {
     plr_real L[PLR_POSE_SQUARE], y[PLR_BIAS_DIM];
     plr_factor6(L, f->velocities.bias_Lambda);
     for (unsigned k = 0; k < PLR_BIAS_DIM; k++) {

@@ -26,17 +26,17 @@ void plr_velocity_forget(plr_filter *f);
 void plr_velocity_forget_bias(plr_filter *f);
 
 /* Does anything hold for a step that begins now? */
-bool plr_velocity_holds(const plr_filter *f);
+bool plr_velocity_is_held(const plr_filter *f);
 
 /* A step of `seconds` by twists: its displacement xi, with covariance V, 6x6. Both are corrected by
  * all that holds. The step's error then depends on the biases' by -seconds T db, T 6x6. */
 void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM],
                        plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE]);
 
-/* Is there information about the biases, for plr_velocity_about_bias? */
-bool plr_velocity_speaks_of_bias(const plr_filter *f);
+/* Is there information about the biases, for plr_velocity_bias_rows? */
+bool plr_velocity_informs_bias(const plr_filter *f);
 
 /* It as two measurements: H, r and R of part 0 and of part 1. */
-void plr_velocity_about_bias(const plr_filter *f, unsigned part, plr_rows *H, plr_real r[PLR_ROWS]);
+void plr_velocity_bias_rows(const plr_filter *f, unsigned part, plr_rows *H, plr_real r[PLR_ROWS]);
 
 #endif

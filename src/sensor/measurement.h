@@ -12,13 +12,13 @@
 #include "state/rows.h"
 
 typedef struct plr_measurement {
-    plr_rows H;           /* how the rows depend on the state's error */
-    plr_real r[PLR_ROWS]; /* measured minus predicted: H x + N(0, R) */
-    plr_real R[PLR_ROWS]; /* variances of the noise, independent from row to row */
-    plr_real besides;     /* a squared distance that no state could change, in its own sigmas (of a
+    plr_rows H;            /* how the rows depend on the state's error */
+    plr_real r[PLR_ROWS];  /* measured minus predicted: H x + N(0, R) */
+    plr_real R[PLR_ROWS];  /* variances of the noise, independent from row to row */
+    plr_real extra_d2;     /* a squared distance that no state could change, in its own sigmas (of a
                                 stereo pair, the two images' row difference) */
-    plr_real residual2;   /* squared norm of the raw residuals, for the setting gate-residual */
-    plr_real largest_spread; /* a predicted row with a larger variance gives no basis for a
+    plr_real residual2;    /* squared norm of the raw residuals, for the setting gate-residual */
+    plr_real max_variance; /* a predicted row with a larger variance gives no basis for a
                                 linearisation; 0: any does */
 } plr_measurement;
 

@@ -62,7 +62,7 @@ static plr_real row_gap(const plr_observation *seen) {
     return (plr_real)seen->vL_px - (plr_real)seen->vR_px;
 }
 
-plr_real plr_stereo_besides(const plr_filter *f, const plr_observation *seen) {
+plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen) {
     return row_gap(seen) * row_gap(seen) / (PLR_R(2) * f->par.pixel_variance);
 }
 
@@ -78,7 +78,7 @@ static plr_real residual_norm2(const plr_observation *seen, const plr_real z[3])
     return PLR_FMA(residual[3], residual[3], plr_dot3(residual, residual));
 }
 
-plr_real plr_stereo_largest_spread(const plr_filter *f) {
+plr_real plr_stereo_max_variance(const plr_filter *f) {
     return f->par.camera.fx * f->par.camera.fx;
 }
 
@@ -98,9 +98,9 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
         m->r[i] -= z[i];
         m->R[i] = plr_stereo_variance(f, i);
     }
-    m->besides = plr_stereo_besides(f, seen);
+    m->extra_d2 = plr_stereo_row_gap_d2(f, seen);
     m->residual2 = residual_norm2(seen, z);
-    m->largest_spread = f->slots[slot].known ? 0 : plr_stereo_largest_spread(f);
+    m->max_variance = f->slots[slot].known ? 0 : plr_stereo_max_variance(f);
     return true;
 }
 
@@ -109,7 +109,7 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
 /* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v, are
  * left out. */
 static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
-                          const plr_real p[3], plr_stereo_sight *sight) {
+                          const plr_real p[3], plr_stereo_prediction *sight) {
     plr_real DzRt[9];
     plr_mat3_mul_nt(DzRt, sight->Dz, R);
     for (int row = 0; row < 3; row++) {
@@ -122,9 +122,9 @@ static void differentiate(const plr_camera *camera, const plr_polar *chart, cons
     }
 }
 
-bool plr_stereo_sight_after(const plr_filter *f, const plr_slot *slot, const plr_observation *seen,
-                            const plr_real E[9], const plr_real R[9], const plr_real p[3],
-                            plr_stereo_sight *sight) {
+bool plr_stereo_predict_after(const plr_filter *f, const plr_slot *slot,
+                              const plr_observation *seen, const plr_real E[9], const plr_real R[9],
+                              const plr_real p[3], plr_stereo_prediction *sight) {
     plr_polar chart;
     plr_real z[3];
     memcpy(sight->q, slot->x, sizeof sight->q);
@@ -141,7 +141,7 @@ bool plr_stereo_sight_after(const plr_filter *f, const plr_slot *slot, const plr
     return true;
 }
 
-bool plr_stereo_tells_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]) {
+bool plr_stereo_improves_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]) {
     const plr_real by_range = J[2] - J[5];
     return by_range * by_range * P[8] > PLR_R(0.02) * f->par.pixel_variance;
 }
@@ -190,7 +190,7 @@ bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen)
 
 /* Where a point's noise has left it no disparity to stand at, the landmark stands at this one, and what
  * is missing goes into its inverse range besides. */
-static plr_real stand_at_some_distance(const plr_filter *f, plr_real z[3]) {
+static plr_real limit_disparity(const plr_filter *f, plr_real z[3]) {
     const plr_real disparity = z[0] - z[1], farthest = farthest_disparity(f);
     if (f->config.model != PLR_MODEL_BODY || disparity >= farthest)
         return 0;
@@ -210,7 +210,7 @@ plr_real plr_stereo_initialise(const plr_filter *f, const plr_observation *seen,
                                plr_new_landmark *landmark) {
     plr_real z[3], q[3], Dq[9], S_q[9];
     plr_stereo_rows(z, seen);
-    const plr_real missing = stand_at_some_distance(f, z);
+    const plr_real missing = limit_disparity(f, z);
     plr_stereo_back_project(q, Dq, &f->par.camera, z);
     initial_factor(f, Dq, S_q);
     plr_model_of(f)->initialise(f, q, S_q, landmark);

@@ -38,15 +38,15 @@ void plr_stereo_rows(plr_real z[3], const plr_observation *seen);
 plr_real plr_stereo_variance(const plr_filter *f, unsigned row);
 
 /* (vL - vR)^2 / (2 s^2): the squared distance that the state has no say in; one degree of freedom. */
-plr_real plr_stereo_besides(const plr_filter *f, const plr_observation *seen);
+plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen);
 
 /* A prediction that may be off by a focal length, one radian, says nothing about where to linearise:
  * such a landmark stands beside the camera or was never well known, and its variance would shrink
  * by more digits than float32 has. px^2 */
-plr_real plr_stereo_largest_spread(const plr_filter *f);
+plr_real plr_stereo_max_variance(const plr_filter *f);
 
 /* An observation of a landmark, linearised at the present estimate. False if the landmark is nearer
- * than min-depth. Known landmarks are exempt from plr_stereo_largest_spread: in localization from a
+ * than min-depth. Known landmarks are exempt from plr_stereo_max_variance: in localization from a
  * rough start it is the pose that is not known, and nothing else could correct it. */
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m);
@@ -54,22 +54,22 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
 /* --- while the motion is sought: `body` alone --- */
 
 /* A landmark at q0 as it would be seen after a motion of the camera. */
-typedef struct plr_stereo_sight {
+typedef struct plr_stereo_prediction {
     plr_real q[3];  /* the landmark after the motion, m */
     plr_real r[3];  /* seen minus predicted, px */
     plr_real Dz[9]; /* rows by q, 3x3 */
     plr_real J[9];  /* rows by the error in the polar chart at q0, 3x3 */
-} plr_stereo_sight;
+} plr_stereo_prediction;
 
 /* For the motion (R = I + E, p) of the camera. False if the landmark would be nearer than min-depth. */
-bool plr_stereo_sight_after(const plr_filter *f, const plr_slot *slot, const plr_observation *seen,
-                            const plr_real E[9], const plr_real R[9], const plr_real p[3],
-                            plr_stereo_sight *sight);
+bool plr_stereo_predict_after(const plr_filter *f, const plr_slot *slot,
+                              const plr_observation *seen, const plr_real E[9], const plr_real R[9],
+                              const plr_real p[3], plr_stereo_prediction *sight);
 
 /* Does a single observation still make a part of what is known of a landmark's range? Of one that
  * has been seen often, the uncertainty is nearly all the camera's, common to all, and moving each by
  * itself would shift them against the pose. J of a sight, P the landmark's covariance. */
-bool plr_stereo_tells_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]);
+bool plr_stereo_improves_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]);
 
 /* The squared norm of the four residuals (uL, uR, vL, vR), px^2, from that of the three rows. */
 plr_real plr_stereo_residual2(const plr_observation *seen, const plr_real r[3]);

@@ -71,7 +71,7 @@ static void enter(textbook *t, unsigned at, const double x[3], const double *J,
 }
 
 /* In `body`: pixels whose disparity is too small to stand at. Returns what is missing of it, px. */
-static double stand_at_some_distance(const textbook *t, plr_observation *seen) {
+static double limit_disparity(const textbook *t, plr_observation *seen) {
     const double disparity = (double)seen->uL_px - (double)seen->uR_px;
     const double farthest = farthest_disparity(&t->config, &t->camera);
     if (!textbook_is_body(t) || disparity >= farthest)
@@ -93,7 +93,7 @@ static void create_in_camera(textbook *t, unsigned at, const plr_observation *se
     double q[3], S[9], P_q[9];
     if (t->pending)
         body_settle(t);
-    const double missing = stand_at_some_distance(t, &stands);
+    const double missing = limit_disparity(t, &stands);
     back_project(t, &stands, q, S);
     oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, 3, 3, 3, 1, S, S, 0, P_q);
     enter(t, at, q, NULL, P_q);

@@ -24,13 +24,13 @@ static plr_filter filter, before;
 static rng chance;
 static plr_observation seen[MANY];
 
-/* plr_sensed.measure: observation i of slot i. */
+/* plr_measurement_source.measure: observation i of slot i. */
 static void measure(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
     const plr_observation *observations = context;
     TEST_ASSERT_TRUE(plr_stereo_measure(f, i, &observations[i], m));
 }
 
-static const plr_sensed of_slots = {measure, seen};
+static const plr_measurement_source of_slots = {measure, seen};
 
 void setUp(void) {
     chance = rng_seeded(52);

@@ -333,7 +333,7 @@ static void check_pose_covariance(plr_model_kind model, bool bias) {
     before = filter;
     plr_motion_pose_covariance(&filter, on_the_side);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
-    plr_predict_settle(&filter);
+    plr_predict_apply_prior(&filter);
     plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, settled);
     to_doubles(a, on_the_side, 36);
     to_doubles(b, settled, 36);
@@ -350,10 +350,10 @@ static void test_pose_covariance_on_the_side_is_the_settled_one(void) {
 
 static void test_settling_clears_the_motion_and_is_done_once(void) {
     drive();
-    plr_predict_settle(&filter);
+    plr_predict_apply_prior(&filter);
     TEST_ASSERT_EQUAL_UINT8(0, filter.motion.pending);
     before = filter;
-    plr_predict_settle(&filter);
+    plr_predict_apply_prior(&filter);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
 }
 
@@ -363,7 +363,7 @@ static void test_settling_charges_the_walk_of_the_bias(void) {
     filter.par.bias_gyro_walk = PLR_R(0.125);
     plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, was);
     drive();
-    plr_predict_settle(&filter);
+    plr_predict_apply_prior(&filter);
     plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, is);
     const double seconds = 0.01 * STEPS;
     for (int i = 0; i < 6; i++)
@@ -374,7 +374,7 @@ static void test_settling_charges_the_walk_of_the_bias(void) {
 static void test_a_variance_that_is_lost_marks_the_filter_diverged(void) {
     filter.P[plr_packed_at(14, 14)] = (plr_real)-1e3;
     drive();
-    plr_predict_settle(&filter);
+    plr_predict_apply_prior(&filter);
     TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
     TEST_ASSERT_EQUAL_UINT64(filter.t_ns, filter.totals.diverged_ns);
 }
@@ -383,7 +383,7 @@ static void test_a_diverged_filter_is_not_settled(void) {
     drive();
     plr_filter_diverge(&filter);
     before = filter;
-    plr_predict_settle(&filter);
+    plr_predict_apply_prior(&filter);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
 }
 

@@ -184,7 +184,7 @@ static void test_without_observations_the_noise_comes_back_into_P(void) {
 
 /* ---------------------------------------------------------------- with observations */
 
-/* plr_sensed.measure: observation i of slot i. */
+/* plr_measurement_source.measure: observation i of slot i. */
 static void measure(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
     const plr_observation *observations = context;
     TEST_ASSERT_TRUE(plr_stereo_measure(f, i, &observations[i], m));
@@ -293,7 +293,7 @@ static void check_update(noise_kind kind, bool bias, bool shifted) {
             filter.slots[slot].x[2] = 1;
         seen[slot] = specimen_observation(&filter, slot, shift);
     }
-    const plr_sensed sensed = {measure, seen};
+    const plr_measurement_source sensed = {measure, seen};
     joint_update joint = take_together(seen, count);
     one_gain(&joint);
     before = filter;

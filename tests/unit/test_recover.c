@@ -102,7 +102,7 @@ static void test_the_covariance_is_the_last_good_one_and_that_of_the_motion_sinc
         plr_real Q[36];
         memcpy(Q, rig.filter.motion.Q, sizeof Q);
         if (applied) { /* it comes out only after the motion has been taken into P */
-            plr_predict_settle(&rig.filter);
+            plr_predict_apply_prior(&rig.filter);
             TEST_ASSERT_EQUAL_UINT8(0, rig.filter.motion.pending);
         }
         break_covariance();
