@@ -237,6 +237,7 @@ typedef struct plr_filter {
     uint8_t health;            /* plr_health of the last frame, and why */
     uint32_t reasons;
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
+    plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */
     uint32_t refused_before;                /* twists refused until the last frame */
     uint16_t frames_without_use, frames_mostly_gated;
     uint32_t matches_since_gated;

@@ -51,8 +51,9 @@ typedef enum plr_status {
 typedef enum plr_health {
     PLR_HEALTH_GOOD = 0,     /* nothing to report */
     PLR_HEALTH_DEGRADED = 1, /* works, with less than it should have: see the reasons */
-    PLR_HEALTH_LOST = 2,     /* the pose is predicted from twists alone, or vision contradicts it */
-    PLR_HEALTH_DIVERGED = 3  /* something else wrote to the filter's memory: init again */
+    PLR_HEALTH_LOST = 2, /* the pose is predicted from twists alone (no observation and no position
+                                was used for a second or two), or vision contradicts it */
+    PLR_HEALTH_DIVERGED = 3 /* something else wrote to the filter's memory: init again */
 } plr_health;
 
 /* Why health is not good: bits of plr_report.reasons and plr_health_state.reasons. Above each: what

@@ -18,6 +18,8 @@ enum {
 
 /* The pose goes on by prediction for longer than this, s. */
 #define LOST_S 1.0
+/* A position bounds the pose for so long, s. */
+#define POSITION_S 2.0
 /* A reading is held for longer than it may be: so many of the intervals in which readings come, and s. */
 #define HELD_INTERVALS 3.0
 #define HELD_S         0.05
@@ -107,18 +109,27 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
     return reasons;
 }
 
-static plr_health health_of(uint32_t reasons) {
+/* The reasons by which the pose is lost at a time. A position that was used not long ago does for the
+ * pose what the camera does not. */
+static uint32_t lost_by(const plr_filter *f, plr_time_ns now) {
+    const bool positioned =
+        f->last_position_ns != 0 && seconds_since(f->last_position_ns, now) <= POSITION_S;
+    return positioned ? PLR_REASON_GATE_LOCKED : LOST;
+}
+
+static plr_health health_of(uint32_t reasons, uint32_t lost) {
     if (reasons & PLR_REASON_STATE_DAMAGED)
         return PLR_HEALTH_DIVERGED;
-    if (reasons & LOST)
+    if (reasons & lost)
         return PLR_HEALTH_LOST;
     return reasons & ~(uint32_t)HARMLESS ? PLR_HEALTH_DEGRADED : PLR_HEALTH_GOOD;
 }
 
 void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report *report) {
     report->reasons = find_reasons(f, events, report);
-    report->reasons |= plr_consistency_judge(f, report, (report->reasons & LOST) != 0);
-    report->health = health_of(report->reasons);
+    const uint32_t lost = lost_by(f, f->t_ns);
+    report->reasons |= plr_consistency_judge(f, report, (report->reasons & lost) != 0);
+    report->health = health_of(report->reasons, lost);
     f->totals.range_limited += events->cut;
     f->last_frame_ns = f->t_ns;
     if (report->used > 0) {
@@ -170,7 +181,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
         (!f->reading_valid || f->totals.twists_refused != f->refused_before ||
          health->seconds_without_twist > HELD_INTERVALS * (double)f->interval_s + HELD_S))
         health->reasons |= PLR_REASON_NO_TWISTS;
-    health->health = health_of(health->reasons);
+    health->health = health_of(health->reasons, lost_by(f, now));
     return PLR_OK;
 }
 

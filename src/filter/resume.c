@@ -26,7 +26,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
         return plr_filter_refuse(f, status);
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* one of before says nothing of now */
-    f->last_frame_ns = f->last_use_ns = 0;
+    f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
     if (!P_moved) {
         plr_guard_seal(f);
         return PLR_OK;

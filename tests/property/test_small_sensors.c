@@ -338,6 +338,23 @@ static void test_ten_rejected_in_succession_are_a_reason(void) {
     TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
 }
 
+static void test_positions_in_the_dark_are_degraded_and_not_lost(void) {
+    rig_drive(10);
+    rig.options.most_seen = rig.world.is.most_seen = 0; /* the lamp goes out */
+    for (int k = 0; k < 40; k++) {
+        for (int i = 0; i < RIG_TWISTS; i++)
+            rig_twist();
+        if (k % 10 == 0 && k < 20)
+            measure(position(7, 0.05));
+        rig_frame();
+        if (k == 25)
+            TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, rig.report.health);
+    }
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_NO_OBSERVATIONS);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST,
+                          rig.report.health); /* the positions have ended as well */
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_wheel_on_three_axes_improves_dead_reckoning);
@@ -353,6 +370,7 @@ int main(void) {
     RUN_TEST(test_turning_wheels_before_a_still_picture_are_not_standing);
     RUN_TEST(test_bad_readings_are_refused_and_change_nothing);
     RUN_TEST(test_what_the_gate_rejects_changes_nothing_but_the_time);
+    RUN_TEST(test_positions_in_the_dark_are_degraded_and_not_lost);
     RUN_TEST(test_ten_rejected_in_succession_are_a_reason);
     return UNITY_END();
 }
