@@ -287,7 +287,7 @@ OPENS = re.compile(
 # What they open is the project's own: recordings, results of its replay, its build, its devices.
 OWN = (
     *("packed_file.py", "report/page.py", "replay.py", "schema.py"),
-    *("robot/compare.py", "robot/emulator.py", "robot/serial.py"),
+    *("robot/emulator.py", "robot/serial.py"),
 )
 
 

@@ -31,7 +31,6 @@ from pelorus.frames import (
     Text,
 )
 from pelorus.robot import link
-from pelorus.robot.compare import desktop_poses
 from pelorus.robot.flight_log import FlightLog
 from pelorus.robot.link import Link, LinkClosed
 from pelorus.robot.serial import open_serial
@@ -130,20 +129,25 @@ def with_a_long_frame() -> tuple[list[Message], int]:
     return messages, frame.t_ns
 
 
-def test_the_desktop_is_compared_without_the_frames_that_a_board_must_refuse(
-    tmp_path: Path,
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_drive_is_compared_as_its_log_would_be(
+    recording: Path, pelorus: Run, tmp_path: Path, kept: bool
 ) -> None:
-    messages, t_ns = with_a_long_frame()
-    path = tmp_path / "long.plr"
-    path.write_bytes(encode(messages))
-    program = BIN / "pelorus-replay"
-    if not program.exists():
-        pytest.skip(f"{program} is not built")
-    times = [pose.t_ns for pose in desktop_poses(path, program, 32)]
-    assert len(times) == FRAMES
-    assert t_ns in times
-    times.remove(t_ns)
-    assert [pose.t_ns for pose in desktop_poses(path, program, 32, 128)] == times
+    """The board that is none has bits of its own."""
+    log = tmp_path / "flight.plr"
+    record = ("--record", log) if kept else ()
+    with TcpBoard(FakeBoard()) as served:
+        said = pelorus(
+            "stream", recording, "--to", served.target, *record, "--compare", "--bin", BIN
+        )
+    assert said.status not in (0, 2), said.err
+    assert "frames    40 sent, 40 answered with a pose" in said.out
+    assert f"0 of {FRAMES} frames are the same to the bit" in said.out
+    assert log.exists() is kept
+    if kept:
+        alone = pelorus("compare", log, "--bin", BIN)
+        assert alone.status == said.status
+        assert said.out.endswith(alone.out)
 
 
 def test_a_frame_too_long_for_the_board_is_answered_and_told_in_words(

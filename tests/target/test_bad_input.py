@@ -15,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from desk import digest
 from gdb_stub import GdbStub, symbol
 from pelorus import cobs
 from pelorus.frames import End, Header, Kind, Message, Pose, Report, Stereo, Text, Truth, Twist
-from pelorus.robot.compare import digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.stream import Streamer

@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from desk import desktop_poses, digest
 from pelorus.frames import Pose, Stereo
-from pelorus.robot.compare import Comparison, desktop_poses, digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.stream import Streamer
 from pelorus.wire import read_file
@@ -36,17 +36,19 @@ def desktop_all_equal(request: pytest.FixtureRequest, recording: Path, program: 
     """The poses on which every build of the desktop's replay agrees."""
     folders = request.config.getoption("--desktops")
     assert folders, "run.sh names the desktop builds"
-    poses = [desktop_poses(recording, Path(folder) / "bin" / program, SLOTS) for folder in folders]
+    programs = [Path(folder) / "bin" / program for folder in folders]
+    poses = [desktop_poses(recording, path, SLOTS, OBSERVATIONS) for path in programs]
     digests = {digest(found) for found in poses}
     assert len(digests) == 1, "the desktop's builds differ among themselves"
     return poses[0]
 
 
 def same_bits(desktop: list[Pose], board_answer: list[Pose]) -> None:
-    comparison = Comparison(desktop, board_answer)
-    assert comparison.first_difference is None
-    assert comparison.equal
-    print(f"\n{len(comparison.board)} poses, SHA-256 {digest(comparison.board)}")
+    differ = [k for k, (a, b) in enumerate(zip(desktop, board_answer, strict=True)) if a != b]
+    assert not differ, f"pose {differ[0]} is the first that differs"
+    assert desktop
+    assert digest(desktop) == digest(board_answer)
+    print(f"\n{len(board_answer)} poses, SHA-256 {digest(board_answer)}")
 
 
 def test_float32(

@@ -7,8 +7,8 @@ import random
 import time
 
 import pytest
+from desk import digest
 from pelorus.frames import Header, Kind, Message, Notice, Pose, Report, Stereo, Text, Twist
-from pelorus.robot.compare import digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.stream import Streamer

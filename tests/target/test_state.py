@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from desk import digest
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Kind, Message, Pose, Start, State, StateAction, Stereo
-from pelorus.robot.compare import digest
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.link import Link
 from pelorus.robot.state import restored, saved

@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from rich.markup import escape
 from pelorus import packed_file
 from pelorus.console import err
 from pelorus.errors import PelorusError, writing
-from pelorus.frames import Message, Pose
-from pelorus.wire import messages_of
+from pelorus.frames import Kind, Message, Pose
+from pelorus.wire import Writer, messages_of
 
 SOURCE_ROOT = Path(__file__).resolve().parents[3]
 USUAL_FOLDER = Path("build/bin")
@@ -80,6 +80,24 @@ def replay(
     with writing(outputs.summary):
         outputs.summary.write_text(stdout, encoding="utf-8")
     return summary, [line for line in stderr.splitlines() if line.strip()]
+
+
+def replayed(program: Path, inputs: Iterable[Message], options: Sequence[str]) -> list[Message]:
+    """What the filter answers to these messages, with them."""
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        recording, answers = Path(folder) / "inputs.plr", Path(folder) / "answers.plr"
+        with writing(recording), recording.open("wb") as stream:
+            writer = Writer(stream)
+            for message in inputs:
+                if message.kind != Kind.END:
+                    writer.write(message)
+            writer.end()
+        try:
+            run_program(program, recording, ["--quiet", *options, "--out", str(answers)])
+        except PelorusError as error:
+            words = str(error).replace(str(recording), "the inputs of the log")
+            raise PelorusError(words) from error
+        return messages_of(answers)
 
 
 def result_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:

@@ -66,7 +66,7 @@ def compare(
     if start is not None and start not in STARTS:
         raise typer.BadParameter(f"{start!r} is none of {', '.join(STARTS)}", param_hint="--start")
     try:
-        verdict = _compare(log, programs, start, load_state)
+        verdict = compare_log(log, programs, start, load_state)
     except PelorusError as error:
         err.print(f"[bold red]error:[/] {escape(str(error))}")
         verdict = Verdict.NOT_COMPARABLE
@@ -74,7 +74,10 @@ def compare(
         raise typer.Exit(verdict)
 
 
-def _compare(path: Path, programs: Path | None, start: str | None, state: Path | None) -> Verdict:
+def compare_log(
+    path: Path, programs: Path | None, start: str | None = None, state: Path | None = None
+) -> Verdict:
+    """Tell what differs, and how it ends."""
     desk = Desk(find_programs(programs), start, state)
     with err.status(f"reading {escape(str(path))}"):
         log = read_log(path)

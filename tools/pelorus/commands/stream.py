@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import signal
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,10 +14,12 @@ import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from pelorus import packed_file
+from pelorus.commands.choices import PROGRAMS
+from pelorus.commands.compare import compare_log
 from pelorus.console import err, out
 from pelorus.errors import PelorusError, writing
+from pelorus.flight.judge import Verdict
 from pelorus.frames import Kind, Message, Pose
-from pelorus.robot.compare import Comparison, desktop_poses, digest, replay_program
 from pelorus.robot.emulator import MACHINES
 from pelorus.robot.state import restored, saved
 from pelorus.robot.status import refusal
@@ -49,14 +52,12 @@ def stream(
     compare: bool = typer.Option(
         False,
         "--compare",
-        help="Replay it on this machine too, and compare every bit of the poses.",
+        help="Replay it on this machine too, and compare every bit: pelorus compare.",
     ),
     image: Path | None = typer.Option(
         None, metavar="ELF", help="Firmware for qemu:BOARD; else that of build/robot."
     ),
-    replay: Path | None = typer.Option(
-        None, metavar="PROGRAM", help="The desktop replay to compare with; else that of build/bin."
-    ),
+    programs: Path | None = PROGRAMS,
     frames: int | None = typer.Option(
         None, min=1, metavar="N", help="Stop after so many stereo frames."
     ),
@@ -88,8 +89,6 @@ def stream(
     received, _ = read_file(source)
     header_of(received, source)
     messages = _first_frames([frame.message for frame in received], frames)
-    if compare and frames is not None:
-        raise PelorusError("--compare replays the whole recording: leave --frames out")
     if compare and restore_state:
         raise PelorusError("--compare knows no state that a board kept: leave --restore-state out")
     if any(moved) and not restore_state:
@@ -101,28 +100,33 @@ def stream(
     if record is not None and record.exists() and record.samefile(source):
         raise PelorusError(f"{record}: is the recording to send; --record needs another file")
     streamer: Streamer | None = None
-    try:
-        with (
-            _ended_in_order(),
-            open_target(to, image) as link,
-            _log_file(record) as log,
-            _display(messages) as show,
-        ):
-            streamer = Streamer(link, log, show, answer)
-            outcome = streamer.run(messages)
-    except (PelorusError, KeyboardInterrupt) as error:
-        if streamer is not None:
-            _tell(streamer.outcome, record)
-        if streamer is None or isinstance(error, KeyboardInterrupt):
-            raise
-        raise PelorusError(f"{error} ({_how_far(streamer.outcome, messages)})") from error
-    _tell(outcome, record)
-    if compare:
-        _compare(source, outcome, replay)
+    verdict = Verdict.SAME
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        log_path = record or (Path(folder) / "flight.plr" if compare else None)
+        try:
+            with (
+                _ended_in_order(),
+                open_target(to, image) as link,
+                _log_file(log_path) as log,
+                _display(messages) as show,
+            ):
+                streamer = Streamer(link, log, show, answer)
+                outcome = streamer.run(messages)
+        except (PelorusError, KeyboardInterrupt) as error:
+            if streamer is not None:
+                _tell(streamer.outcome, record)
+            if streamer is None or isinstance(error, KeyboardInterrupt):
+                raise
+            raise PelorusError(f"{error} ({_how_far(streamer.outcome, messages)})") from error
+        _tell(outcome, record)
+        if compare and log_path is not None:
+            verdict = compare_log(log_path, programs)
     if save_state and outcome.state_trouble:
         raise PelorusError(f"{to}: {outcome.state_trouble}")
     if not outcome.poses:
         raise PelorusError(f"{to}: took {outcome.frames} frames and gave no pose")
+    if verdict is not Verdict.SAME:
+        raise typer.Exit(verdict)
 
 
 def _first_frames(messages: list[Message], frames: int | None) -> list[Message]:
@@ -223,22 +227,3 @@ def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]
         yield "slowest", f"{outcome.worst_update_us} us for a frame, by the board's clock"
     if record is not None:
         yield "recorded", str(record)
-
-
-def _compare(source: Path, outcome: Outcome, replay: Path | None) -> None:
-    if outcome.config is None:
-        raise PelorusError("the board told no settings: nothing to compare with")
-    board = outcome.config
-    program = replay_program(board.real_bytes, replay)
-    ours = desktop_poses(source, program, board.max_landmarks, board.max_observations)
-    result = Comparison(ours, outcome.poses)
-    out.print(f"desktop {digest(result.desktop)}  {len(result.desktop)} poses")
-    out.print(f"board   {digest(result.board)}  {len(result.board)} poses")
-    if not result.equal and outcome.unanswered:
-        raise PelorusError(
-            f"they differ from pose {result.first_difference} on, and so they should: "
-            f"{outcome.unanswered} frames or their answers were lost on the way"
-        )
-    if not result.equal:
-        raise PelorusError(f"they differ from pose {result.first_difference} on")
-    out.print("[bold green]the same bits[/]")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -13,9 +12,8 @@ from pelorus import ARITHMETIC, __version__
 from pelorus.errors import PelorusError
 from pelorus.flight.difference import Difference, differ
 from pelorus.flight.log import NOWHERE, Frame, Log, Loss, Part, frames_of
-from pelorus.frames import Config, Header, Message
-from pelorus.replay import Programs
-from pelorus.robot.compare import desktop_log, write_recording
+from pelorus.frames import Config, Header
+from pelorus.replay import Programs, replayed
 from pelorus.settings import describe
 
 FNV_OFFSET, FNV_PRIME = 2166136261, 16777619
@@ -151,7 +149,7 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
         options = ["--load-state", str(state)]
     elif desk.start is not None and part.frames[0].number == 1:  # a second life has a START
         options = ["--start", desk.start]
-    messages = _replayed(part.inputs(left_out), desk.program(part.config), options)
+    messages = replayed(desk.program(part.config), part.inputs(left_out), options)
     here = next((m for m in messages if isinstance(m, Config) and m.build_fingerprint), None)
     if here is None:
         return Judgement(part, Verdict.NOT_COMPARABLE, "the replay's filter did not start")
@@ -171,19 +169,6 @@ def _compared(part: Part, desk: Desk, state: Path | None, left_out: list[Frame])
     pairs = zip(theirs, ours, strict=True)
     found.differences = [differ(robot, mine) for robot, mine in pairs if robot.answered]
     return found
-
-
-def _replayed(inputs: list[Message], program: Path, options: list[str]) -> list[Message]:
-    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
-        recording = Path(folder) / "inputs.plr"
-        try:
-            write_recording(recording, inputs)
-            return desktop_log(recording, program, options)
-        except OSError as error:
-            raise PelorusError(f"{folder}: cannot be written: {error.strerror}") from error
-        except PelorusError as error:
-            words = str(error).replace(str(recording), "the inputs of the log")
-            raise PelorusError(words) from error
 
 
 def _unlike(robot: Config, here: Config) -> str:
