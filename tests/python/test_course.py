@@ -14,8 +14,8 @@ from drives import clean, npz_arrays, with_stale_tracks
 from pelorus import road
 from pelorus.converters import ece276a
 from pelorus.frames import Config, Kind, Landmark, Message, Report, Role, Stereo, Truth
-from pelorus.report.comparison import LANDMARK_SIGMA, MIN_DISPARITY, traces
-from pelorus.settings import SETTINGS
+from pelorus.report.comparison import traces
+from pelorus.settings import IDS
 from pelorus.wire import messages_of
 from PIL import Image
 from replay_drive import BIN, ROOT, drive, encode, header
@@ -59,16 +59,14 @@ def test_a_landmark_that_comes_back_is_not_counted_twice() -> None:
 
 
 def test_an_observation_of_which_no_landmark_can_be_made_does_not_count_as_seen() -> None:
-    config = Config({MIN_DISPARITY: 0.1}, build_fingerprint=1)
+    config = Config({IDS["min-disparity"]: 0.1}, build_fingerprint=1)
     messages = [config, *frame(0, 1, disparity=0.05), *frame(1, 1, disparity=0.2)]
     assert whole(messages, [1.0, 1.0]) == [1 + PRIOR, 1]
-    assert SETTINGS[MIN_DISPARITY].name == "min-disparity"
 
 
 def test_the_prior_is_the_landmark_sigma_in_force() -> None:
-    config = Config({LANDMARK_SIGMA: 0.5}, build_fingerprint=1)
+    config = Config({IDS["landmark-sigma"]: 0.5}, build_fingerprint=1)
     assert whole([config, *frame(0, 1), *frame(1, 2)], [1.0, 1.0]) == [1 + 0.75, 1]
-    assert SETTINGS[LANDMARK_SIGMA].name == "landmark-sigma"
 
 
 # --- ids as they stand in the file ----------------------------------------------------------------

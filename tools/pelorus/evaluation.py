@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import se3
-from pelorus.frames import Config, Landmark, Message, Role
+from pelorus.frames import Landmark, Message, Role
 from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
 from pelorus.se3 import Poses
+from pelorus.settings import in_force, mode_in_force
 from pelorus.trajectory import Trajectory, estimate_in, truth_in
 
 Figures = dict[str, float | int | None]
@@ -218,25 +219,17 @@ def map_figures(made: Sequence[Landmark], known: Sequence[Landmark], A: Poses = 
 # --- a whole result -------------------------------------------------------------------------------
 
 OF_POSES = ("err0_m", "ate_m", "rot_deg", "nees_per_dof", "nees_left_out")
-MODE, KNOWN_MAP = 2, 5  # ids of settings
-MAPPING, LOCALIZATION = 1, 2  # modes
-
-
-def in_force(messages: Sequence[Message], id: int) -> float | None:
-    """The value of a setting of the filter that left this result."""
-    values = [m.settings.get(id) for m in messages if isinstance(m, Config) if m.build_fingerprint]
-    return values[-1] if values else None
 
 
 def is_mapping(messages: Sequence[Message]) -> bool:
     """Whether the poses were given: then their error says nothing."""
-    return in_force(messages, MODE) == MAPPING
+    return mode_in_force(messages) == "mapping"
 
 
 def _found_by_itself(messages: Sequence[Message]) -> list[Landmark]:
     """What the filter made; without the known ones that it was located by."""
     made = made_in(messages)
-    if in_force(messages, MODE) == LOCALIZATION or in_force(messages, KNOWN_MAP):
+    if mode_in_force(messages) == "localization" or in_force(messages, "known-map"):
         given = {m.id for m in known_in(messages)}
         made = [m for m in made if m.id not in given]
     return made

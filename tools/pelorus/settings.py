@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""The settings in a CONFIG frame, in words."""
+"""The settings in a CONFIG frame, by name and in words."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from pelorus.frames import Config, Message
 from pelorus.schema import SETTINGS, Setting
 
-__all__ = ["SETTINGS", "Setting", "describe"]
+__all__ = ["IDS", "SETTINGS", "Setting", "describe", "in_force", "mode_in_force"]
+
+IDS = {setting.name: id for id, setting in SETTINGS.items()}
 
 
 def describe(id: int, value: float) -> tuple[str, str]:
@@ -15,3 +20,15 @@ def describe(id: int, value: float) -> tuple[str, str]:
     if value in words:  # 1.0 finds the key 1
         return setting.name, words[int(value)]
     return setting.name, f"{value:g} {setting.unit}".strip()
+
+
+def in_force(messages: Sequence[Message], name: str) -> float | None:
+    """The value of a setting of the filter that left this result; None if it does not say."""
+    configs = [m for m in messages if isinstance(m, Config) and m.build_fingerprint]
+    return configs[-1].settings.get(IDS[name]) if configs else None
+
+
+def mode_in_force(messages: Sequence[Message]) -> str:
+    """slam, mapping, localization or dead_reckoning; empty if the result does not say."""
+    mode = in_force(messages, "mode")
+    return "" if mode is None else SETTINGS[IDS["mode"]].words[int(mode)]

@@ -25,17 +25,17 @@ import numpy as np
 
 from pelorus import style
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Accuracy, assess, in_force
+from pelorus.evaluation import Accuracy, assess
 from pelorus.frames import Kind, Landmark, Message, Report, Role, Stereo
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.report.results import Run, Subject
+from pelorus.settings import in_force
 
 DIAGONAL = (0, 2, 5)  # of a packed 3 x 3
 PRIOR_VARIANCE_M2 = 2.0  # Sigma_m of the report, an axis
-MIN_DISPARITY, LANDMARK_SIGMA = 17, 22  # the settings' ids
 
 
 class Traces(NamedTuple):
@@ -49,8 +49,8 @@ class Traces(NamedTuple):
 
 def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
     """From a result's messages and the state's trace at the frames' times."""
-    least_px = in_force(messages, MIN_DISPARITY) or 0.0
-    sigma_m = in_force(messages, LANDMARK_SIGMA) or 0.0
+    least_px = in_force(messages, "min-disparity") or 0.0
+    sigma_m = in_force(messages, "landmark-sigma") or 0.0
     prior = 3 * (sigma_m**2 or PRIOR_VARIANCE_M2)
     ids = set[int]()
     for message in messages:
