@@ -145,7 +145,7 @@ bool plr_measure(plr_filter *f, const plr_reading *reading, plr_reading_result *
         kind->of_twist ? hold(f, kind, reading, result) : apply(f, kind, reading, result);
     f->totals.readings++;
     f->totals.readings_gated += !result->used;
-    if (result->used && reading->sensor == PLR_SENSOR_POSITION)
+    if (result->used && kind->bounds_position)
         f->last_position_ns = f->t_ns;
     return result->used;
 }

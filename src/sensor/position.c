@@ -27,4 +27,4 @@ static void measure(const plr_filter *f, const plr_reading *reading, plr_measure
     }
 }
 
-const plr_sensor_kind plr_position = {measure, NULL, 0};
+const plr_sensor_kind plr_position = {.of_state = measure, .bounds_position = true};

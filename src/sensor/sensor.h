@@ -19,6 +19,9 @@ typedef struct plr_sensor_kind {
      * the next reading, in f->velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
+
+    /* While it is used the position cannot drift away: a dark camera alone is no LOST. */
+    bool bounds_position;
 } plr_sensor_kind;
 
 /* The kind of that number (plr_sensor); NULL if there is none. */

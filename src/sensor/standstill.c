@@ -26,7 +26,7 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
     return 2;
 }
 
-const plr_sensor_kind plr_standstill = {NULL, measure, 1};
+const plr_sensor_kind plr_standstill = {.of_twist = measure, .place = 1};
 
 /* The squared distance of a landmark's pixels from those that it was anchored at, in their noise. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from pelorus.simulation.readings import Sensing
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.small_sensors import SMALL_SENSORS, SmallSensor
-from replay_drive import judged, run
+from replay_drive import ROOT, judged, run
 from test_convert_csv import csv_files, write_csv
 
 ARM = (0.4, -0.3, 0.2)
@@ -153,6 +154,21 @@ def test_info_tells_of_pauses_and_of_sensors_that_it_does_not_know(
     said = pelorus("info", tmp_path / "x.plr").out
     assert "gap: READING sensor 77 pauses for 0.300 s after 0.200 s" in said
     assert "5 readings of a sensor 77, axes 0, sigma 0.5" in said
+
+
+def test_the_page_on_adding_a_sensor_shows_the_code_that_there_is() -> None:
+    page = (ROOT / "docs" / "ADD-A-SENSOR.md").read_text()
+    shown, path = 0, None
+    for part in re.split(r"(```\w*\n.*?```)", page, flags=re.DOTALL):
+        if not part.startswith("```"):
+            named = re.findall(r"^`([\w./]+\.\w+)`", part, flags=re.MULTILINE)
+            path = ROOT / named[-1] if named else path
+            continue
+        assert path is not None
+        code = part.split("\n", 1)[1].removesuffix("```")
+        assert code in path.read_text(), f"{path.name} has it otherwise:\n{code}"
+        shown += 1
+    assert shown == 5
 
 
 # --- from CSV -------------------------------------------------------------------------------------
