@@ -15,8 +15,8 @@ enum {
     FAST_WINDOWS = 2,     /* windows that decide whether the twists get less weight */
     AGREEING_FRAMES = 15, /* successive frames in agreement that end a doubt */
     FEW = 3,              /* points */
-    FROZEN_SHARE = 2,     /* a picture is the same if one match in so many has the same pixels */
-    MIN_MATCHES = 10 /* with fewer matches in the sums, the share of rejected ones is not judged */
+    FROZEN_SHARE = 2, /* a picture is repeated if at least one match in two has the same pixels */
+    MIN_MATCHES = 10  /* with fewer matches in the sums, the share of rejected ones is not judged */
 };
 
 /* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */

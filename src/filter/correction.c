@@ -13,7 +13,7 @@
 #include "state/pose.h"
 #include "state/rigid_fit.h"
 
-enum { BIAS_MEASUREMENTS = 2 }; /* measurements about the biases */
+enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
 
 /* Measurements that are applied together, stacked: S = H P H^T + R and y = r - H dx. */
@@ -40,7 +40,7 @@ static void fill_S(const plr_filter *f, const plr_batch *batch, plr_real *S) {
     }
 }
 
-/* Number i of the measurements, behind which stand the two about the biases. */
+/* Measurement number i. After the `count` of the source come two of the biases. */
 static void get_measurement(const plr_filter *f, const plr_measurement_source *sensed,
                             unsigned count, unsigned i, plr_measurement *m) {
     if (i < count) {
@@ -74,8 +74,8 @@ static void stack(plr_filter *f, const plr_measurement_source *sensed, unsigned 
     fill_S(f, batch, w->S);
 }
 
-/* What the batch says of the motion's noise, with E = U^-T H W and y = U^-T (r - H dx):
- * Lambda += E^T E, eta += E^T y. */
+/* The batch's information about the motion's noise: Lambda += E^T E, eta += E^T y, with E = U^-T H W and
+ * y = U^-T (r - H dx). */
 static void add_noise_information(plr_noise *noise, const plr_batch *batch, const plr_real *y,
                                   unsigned rows) {
     plr_real *Lambda = noise->Lambda;
@@ -88,7 +88,7 @@ static void add_noise_information(plr_noise *noise, const plr_batch *batch, cons
     }
 }
 
-/* W -= V E and dx += V y, as seven rows of one product: -y stands beside E. */
+/* W -= V E and dx += V y, computed as seven rows of one product, [E, -y]. */
 static void update_estimate(plr_filter *f, plr_batch *batch, unsigned rows) {
     plr_workspace *w = &f->work;
     plr_real *Wt = w->noise.Wt, *beyond = w->diagonal;
@@ -104,7 +104,7 @@ static void update_estimate(plr_filter *f, plr_batch *batch, unsigned rows) {
 }
 
 /* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but the
- * workspace, if S is not positive (*factorised = false) or a variance would be lost. */
+ * workspace, if S is not positive (*factorised = false) or a variance would not stay positive. */
 static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     plr_workspace *w = &f->work;
     const unsigned rows = PLR_ROWS * batch->count;
@@ -125,7 +125,7 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     return true;
 }
 
-/* Is the correction one that a retraction can follow? */
+/* True if the correction is finite and small enough for a retraction. */
 static bool is_sane(const plr_filter *f, unsigned n) {
     static const plr_real max_way2 = 1e6;
     const plr_real *dx = f->work.dx;
@@ -150,7 +150,7 @@ plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, 
         batch.n = n;
         batch.ld = plr_covariance_ld(f);
         batch.count =
-            (all - at + batches - 1) / batches; /* alike: the cost grows with the square */
+            (all - at + batches - 1) / batches; /* of like size: the cost grows with its square */
         stack(f, sensed, count, at, &batch);
         if (apply_batch(f, &batch, &factorised))
             result.applied += at >= count ? 0 : at + batch.count > count ? count - at : batch.count;

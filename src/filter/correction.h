@@ -6,7 +6,7 @@
 #include "pelorus/state.h"
 #include "sensor/measurement.h"
 
-/* The result of all blocks. */
+/* The result of a correction. */
 typedef struct plr_correction {
     unsigned applied;          /* measurements in batches that were applied */
     unsigned failed_batches;   /* left out: S could not be factorised */
@@ -17,14 +17,14 @@ typedef struct plr_correction {
     bool moved;              /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
-/* Measurements to apply: measure() makes number i of them, linearised at the current estimate. */
+/* Where measurements come from: measure() fills number i, linearised at the current estimate. */
 typedef struct plr_measurement_source {
     void (*measure)(const plr_filter *f, const void *context, unsigned i, plr_measurement *m);
     const void *context;
 } plr_measurement_source;
 
-/* Applies `count` measurements, and what velocities said of the biases since the last correction
- * (process/velocity.h). All are linearised at the current estimate, and the estimate is
+/* Applies `count` measurements, and the information about the biases that velocities have added since
+ * the last correction (process/velocity.h). All are linearised at the current estimate, and the estimate is
  * corrected once, at the end. If a variance would not be positive or the correction is not finite,
  * the filter is marked as diverged and keeps the result of the batches before. */
 plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, unsigned count);

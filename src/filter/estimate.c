@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What the filter believes, as doubles. Nothing here changes the estimate, but for the two calls
- * that first bring landmarks and covariance up to the pose. */
+/* The estimate as doubles. No function here changes the filter. */
 #include <string.h>
 
 #include "filter/consistency.h"
@@ -104,8 +103,7 @@ double plr_filter_trace(const plr_filter *f) {
         return 0;
     plr_real P[PLR_POSE_SQUARE], P_b[PLR_POSE_SQUARE] = {0};
     double trace = plr_covariance_trace(f);
-    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE,
-                       P); /* the pose's and the biases' variances are those of now */
+    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P); /* replaced by the present one */
     for (int i = 0; i < PLR_POSE_DIM; i++)
         trace -= (double)P[(PLR_POSE_DIM + 1) * i];
     pose_covariance(f, P);

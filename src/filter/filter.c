@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* A filter's life: init, reset, pose from outside, and the twists that carry it on. */
+/* Init, reset, and poses, biases and motions set by the caller. */
 #include "pelorus/filter.h"
 
 #include <string.h>
@@ -194,7 +194,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     return PLR_OK;
 }
 
-/* ---------------------------------------------------------------- from outside */
+/* ---------------------------------------------------------------- set by the caller */
 
 void plr_filter_forget_reading(plr_filter *f) {
     plr_velocity_forget(f);
@@ -267,7 +267,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     if (!plr_covariance_is_positive(f) &&
         plr_has_block(f, PLR_BLOCK_BIAS)) /* the bias is lost too */
         restore_bias_prior(f);
-    /* a reading, and a frame, of another clock say nothing any more */
+    /* readings and frames of another clock are not used any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
     if (f->last_frame_ns > t_ns || t_ns - f->last_frame_ns > f->par.max_gap_ns)

@@ -11,16 +11,16 @@
 /* The gate's result for one measurement. */
 typedef struct plr_verdict {
     bool accepted;
-    plr_real d2;   /* r^T S^-1 r + besides */
+    plr_real d2;   /* r^T S^-1 r + extra_d2 */
     plr_real gain; /* det(S); a larger one means more information for the state */
 } plr_verdict;
 
-/* The verdict itself: d^2 against `gate-d2`, or with `gate-residual` the squared norm of the raw
- * residuals against that, px^2. */
+/* Compares d^2 with `gate-d2`; with the setting `gate-residual`, the squared norm of the raw residuals
+ * with that, px^2. */
 bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2);
 
-/* Judges a measurement at the current estimate. Rejected whatever its residual: one whose prediction
- * varies by more than max_variance. */
+/* Judges a measurement at the current estimate. It is rejected, whatever its residual is, if the variance
+ * of a predicted row exceeds max_variance. */
 plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m);
 
 #endif

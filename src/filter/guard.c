@@ -13,8 +13,8 @@ enum {
 
 /* ---------------------------------------------------------------- sums */
 
-/* Of memory, word by word. Each sum is turned before the next word enters, so that it depends on the
- * order; and of two words that differ the sums differ, so that a change of one word is seen for sure. */
+/* A checksum of memory, word by word. Each sum is rotated before the next word is added, so that it depends
+ * on the order of the words. A change of a single word always changes the sum. */
 typedef struct plr_sum {
     uint32_t lane[LANES];
 } plr_sum;
@@ -43,7 +43,7 @@ static void add_between(plr_sum *sum, const plr_filter *f, size_t from, size_t t
     add(sum, (const unsigned char *)f + from, to - from);
 }
 
-/* Of two numbers that differ, the results do too. */
+/* A one-to-one function of `mixed` and of `word`. */
 static uint32_t step(uint32_t mixed, uint32_t word) {
     mixed = (mixed ^ word) * 0x9E3779B1U;
     return mixed ^ mixed >> 15;
@@ -113,7 +113,7 @@ static bool is_pose(const plr_filter *f) {
     return true;
 }
 
-/* ---------------------------------------------------------------- what calls use */
+/* ---------------------------------------------------------------- checks and seals */
 
 static plr_status sound(bool is_sound) {
     return is_sound ? PLR_OK : PLR_E_DAMAGED;

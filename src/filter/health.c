@@ -9,24 +9,24 @@
 
 enum {
     LOCK_FRAMES = 10,       /* successive frames of a gate that rejects nearly all */
-    LOCK_MATCHES = 5,       /* fewer matches say nothing about the gate */
+    LOCK_MATCHES = 5,       /* with fewer matches the gate is not judged */
     LOST_FRAMES = 10,       /* frames without one used observation */
     FEW_USED = 3,           /* fewer do not fix a pose */
     REJECTED_READINGS = 10, /* of a small sensor, in succession */
-    INERT_MATCHES = 1000    /* a gate that rejects none of so many does nothing */
+    INERT_MATCHES = 1000    /* a gate that rejects none of so many has no effect */
 };
 
-/* The pose goes on by prediction for longer than this, s. */
+/* After so long without observations the pose counts as lost, s. */
 #define LOST_S 1.0
 /* A position bounds the pose for so long, s. */
 #define POSITION_S 2.0
-/* A reading is held for longer than it may be: so many of the intervals in which readings come, and s. */
+/* The last twist is too old after this many of the intervals between twists, plus this time in s. */
 #define HELD_INTERVALS 3.0
 #define HELD_S         0.05
 
 /* Reasons that leave the estimate as good as it should be. */
 #define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW)
-/* Reasons of a filter that looks; dead reckoning does without by design. */
+/* Reasons that do not apply in dead reckoning. */
 #define OF_SIGHT (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)
 /* Reasons by which the pose is lost. */
 #define LOST (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES)
@@ -58,8 +58,7 @@ static double seconds_since(plr_time_ns then, plr_time_ns now) {
     return then == 0 || now < then ? 0 : (double)(now - then) * 1e-9;
 }
 
-/* Was a reading refused since the last frame, or is the last one being held for longer than readings
- * come? */
+/* True if a twist was refused since the last frame, or if the last one is too old. */
 static bool lacks_twists(plr_filter *f) {
     const bool refused = f->totals.twists_refused != f->refused_before;
     f->refused_before = f->totals.twists_refused;

@@ -14,8 +14,8 @@ unsigned plr_match_in_order(plr_filter *f, const plr_frame *frame, plr_report *r
 /* Fills work.slot_of for the n observations in order. */
 void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n);
 
-/* Asks the map source for the ids that the state does not hold. What the map does not know is counted
- * where landmarks are initialised, and in slam so is what finds no slot. */
+/* Asks the map source for the ids that the state does not hold. Ids that the map does not have are
+ * counted when landmarks are initialised; in slam, so are those without a slot. */
 void plr_match_known(plr_filter *f, const plr_observation *seen, unsigned n,
                      plr_frame_events *events, plr_report *report);
 

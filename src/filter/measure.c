@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* A reading of a small sensor: checked, gated, and applied, or held until the next one. */
+/* Readings of small sensors: each is checked and gated, then applied, or held until the next one. */
 #include "filter/measure.h"
 
 #include <string.h>
@@ -82,7 +82,7 @@ static bool accepts(const plr_filter *f, plr_real d2, plr_reading_result *result
     return d2 >= 0 && plr_is_finite(d2) && (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
 }
 
-/* Against the twist that holds now. */
+/* Gates a reading of the twist, and holds it. */
 static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
                  plr_reading_result *result) {
     plr_twist_rows rows[2];
@@ -105,14 +105,15 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     return accepted;
 }
 
-/* plr_measurement_source.measure: the one that the context is. */
+/* plr_measurement_source.measure: the context is the measurement. */
 static void given(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
     (void)f;
     (void)i;
     *m = *(const plr_measurement *)context;
 }
 
-/* Against the pose as it would be with its motion applied; only an accepted one applies it. */
+/* Gates a reading of the state by the pose's present covariance, and applies it. A rejected one changes
+ * nothing. */
 static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
                   plr_reading_result *result) {
     plr_measurement m;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The motion between frames: readings carry the pose on, and a frame lets landmarks and covariance
- * follow. */
+/* The motion between frames: twists move the pose, and a frame applies the accumulated motion to landmarks
+ * and covariance. */
 #include "filter/predict.h"
 
 #include <string.h>
@@ -44,13 +44,13 @@ void plr_predict_apply_prior(plr_filter *f) {
     if (!f->work.noise.open)
         return;
     plr_covariance_close_noise(f, NULL);
-    (void)plr_model_of(f)->retract(f, f->work.dx); /* landmarks beyond infinity go back there */
+    (void)plr_model_of(f)->retract(f, f->work.dx); /* restores plr_slot.beyond */
 }
 
-/* The interval to give plr_twist_step, which adds the variance sigma^2 interval (h1 - h0), where the
- * last reading is used from h0 to h1 seconds after it was taken. The error of one reading is constant,
+/* The argument `interval` of plr_twist_step, which adds the variance sigma^2 interval (h1 - h0), when
+ * the last reading is used from h0 to h1 seconds after its time. The error of one reading is constant,
  * so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau between
- * readings by the usual sigma^2 tau h, and later, when twists fail to come, to sigma^2 h^2. */
+ * readings by the usual sigma^2 tau h, and later, if twists fail to come, to sigma^2 h^2. */
 static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     const plr_real tau = f->interval_s;
     if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
@@ -71,7 +71,7 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
 
 /* ---------------------------------------------------------------- twists */
 
-/* The twist that holds over the step that ends with this reading. */
+/* The twist of the step that ends with this reading. */
 static void twist_of_step(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                           plr_real held[PLR_POSE_DIM]) {
     const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
@@ -89,13 +89,14 @@ static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
     return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
 }
 
-/* Could the reading itself be held for as long as readings are? With timing start it is not before
- * the next one comes, and by then it would block that one and all that follow. */
+/* Checks that the reading can be held for a usual interval. With timing start it is used only when the next
+ * one comes; were it refused then, so would be all that follow. */
 static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                                 plr_real interval) {
     const plr_real first = PLR_R(1e-3); /* there is no interval yet */
     plr_real seconds = interval > 0 ? interval : first;
-    if (f->interval_s > 0 && f->interval_s < seconds) /* a pause says nothing about the next one */
+    if (f->interval_s > 0 &&
+        f->interval_s < seconds) /* a longer pause is not expected to be repeated */
         seconds = f->interval_s;
     return plr_twist_check(f, reading, seconds);
 }

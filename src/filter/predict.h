@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The motion between frames, and its end: landmarks and covariance follow the pose. */
+/* The motion between frames, and its application to landmarks and covariance. */
 #ifndef PLR_FILTER_PREDICT_H
 #define PLR_FILTER_PREDICT_H
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* Going on after the covariance has broken down: the pose is kept, what was tied to it is dropped. */
+/* Recovery after the covariance has lost positivity: the pose is kept, landmarks and correlations are
+ * dropped. */
 #include <string.h>
 
 #include "filter/consistency.h"
@@ -29,8 +30,8 @@ void plr_filter_keep_for_recovery(plr_filter *f) {
     pack(f, P);
 }
 
-/* P <- Ad(D^-1) P Ad(D^-1)^T + Q + B S B^T, S of the biases' prior: what is known of them now may be
- * what has broken down. */
+/* P <- Ad(D^-1) P Ad(D^-1)^T + Q + B S B^T, with S the covariance of the biases' prior, because
+ * their present covariance may be wrong. */
 void plr_filter_carry_recovery(plr_filter *f) {
     const plr_motion *m = &f->motion;
     plr_real R[9], A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], carried[PLR_POSE_SQUARE],

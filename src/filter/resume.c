@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Going on after an interruption: another clock, and perhaps another place. */
+/* Continuing after an interruption, with another clock and perhaps at another place. */
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 
@@ -25,7 +25,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     if (status != PLR_OK)
         return plr_filter_refuse(f, status);
     f->t_ns = t_ns;
-    plr_filter_forget_reading(f); /* one of before says nothing of now */
+    plr_filter_forget_reading(f); /* an earlier one is not valid any more */
     f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
     if (!P_moved) {
         plr_guard_seal(f);

@@ -167,7 +167,7 @@ static plr_status as_stored(const plr_codec *c) {
     return c->status == PLR_OK || c->status == PLR_E_IO ? c->status : PLR_E_CORRUPT;
 }
 
-/* Looks at the covariance, and keeps nothing: numbers finite, variances not negative. */
+/* Checks the covariance without storing it: finite numbers, variances not negative. */
 static plr_status check_covariance(plr_codec *c, unsigned dim) {
     for (unsigned i = 0; i < dim && c->status == PLR_OK; i++) {
         plr_real variance = 0;
@@ -179,7 +179,7 @@ static plr_status check_covariance(plr_codec *c, unsigned dim) {
     return as_stored(c);
 }
 
-/* Reads the whole state. f NULL: looks at it, and keeps nothing. `like` is the filter that it must
+/* Reads the whole state. f = NULL: only checks it. `like` is the filter that it must
  * belong to. PLR_E_FOREIGN: of another build, of other settings, of another camera. */
 static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like) {
     plr_state_count count = {0};

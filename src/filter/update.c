@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
  * A stereo frame: predict, match, gate, update, retract, evict, initialise, in this order.
- * Observations are looked at by id, so the order in which they arrive changes no bit.
+ * Observations are processed in the order of their ids, so the order in which they arrive changes no bit.
  */
 #include <string.h>
 
@@ -67,7 +67,7 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
     return frame->budget;
 }
 
-/* work.gain by each observation's own prediction: where the motion is given, or has been applied. */
+/* Fills work.gain by each observation's own prediction, when the motion has been applied already. */
 static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
@@ -84,8 +84,8 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
 
 /* ---------------------------------------------------------------- the frame */
 
-/* Is there anything in this frame that needs landmarks and covariance to stand where the body is? If
- * not, the motion goes on being accumulated, and a dark camera stays out of P. */
+/* True if the frame uses or creates a landmark. Otherwise the motion is not applied and goes on
+ * accumulating, so that a dark camera does not affect P. */
 static bool needs_motion_applied(const plr_filter *f, const plr_frame *frame, unsigned n) {
     for (unsigned k = 0; k < n; k++) {
         const bool used = f->work.slot_of[k] != PLR_NO_SLOT && f->work.gain[k] >= 0;
@@ -97,8 +97,8 @@ static bool needs_motion_applied(const plr_filter *f, const plr_frame *frame, un
     return false;
 }
 
-/* plr_measurement_source.measure: number i of the observations used. One that the motion has brought beside the
- * camera says nothing. */
+/* plr_measurement_source.measure: number i of the observations used. If the motion has moved
+ * the landmark behind the camera, the measurement has no effect. */
 static void measure(const plr_filter *f, const void *frame, unsigned i, plr_measurement *m) {
     const plr_frame *seen = frame;
     const uint16_t k = f->work.used[i];
@@ -127,7 +127,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     memcpy(Q, f->motion.Q, sizeof Q);
     plr_consistency_widen(f, &believed);
     plr_motion_find(f, frame, n, &first, &report->nis);
-    if (!needs_motion_applied(f, frame, n)) { /* the motion goes on: as the twists have it */
+    if (!needs_motion_applied(f, frame, n)) { /* goes on accumulating, with the original Q */
         memcpy(f->motion.Q, Q, sizeof Q);
         (void)choose(f, frame, n, report);
         return correction;
@@ -142,7 +142,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     return correction;
 }
 
-/* The motion is given, or the observations have no say in it before the update. */
+/* The motion is known exactly, or is not searched for: predict, gate, correct. */
 static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, unsigned n,
                                       plr_report *report) {
     const plr_correction none = {0};
@@ -165,7 +165,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_match_known(f, seen, n, &events, report);
     plr_match_count(f, n);
     if (f->config.model == PLR_MODEL_BODY && plr_consistency_is_frozen(f, frame, n))
-        n = 0; /* it says nothing of now */
+        n = 0; /* it does not show the present */
     plr_reading still;
     plr_reading_result unused = {0};
     if (f->reading_valid && plr_standstill_is_seen(f, frame, n, &still))
@@ -197,7 +197,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_health_judge(f, &events, report);
 }
 
-/* Time and mode: may this frame be taken? */
+/* Checks the frame's time and the mode. */
 static plr_status check(const plr_filter *f, const plr_frame *frame) {
     if (frame->count > PLR_MAX_OBSERVATIONS || (frame->count > 0 && !frame->observations))
         return PLR_E_ARGUMENT;
@@ -212,7 +212,7 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     return plr_twist_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
-/* A frame of dead reckoning: the motion alone, and what velocities said of the biases. */
+/* A frame of dead reckoning: applies the motion, and the velocities' information about the biases. */
 static void dead_reckon(plr_filter *f) {
     plr_applied_motion motion;
     if (f->motion.pending && plr_velocity_informs_bias(f)) {

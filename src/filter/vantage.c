@@ -7,7 +7,7 @@
 
 enum { PASSES = 3 };
 
-/* An estimate is taken to be within so many sigmas. */
+/* The true value is assumed to be within so many sigmas of the estimate. */
 #define WITHIN PLR_R(2)
 
 static plr_real inverse_range(const plr_slot *slot) {

@@ -15,7 +15,7 @@ float plr_fmaf_exact(float a, float b, float c) {
     const double addend = (double)c;
     double sum = product + addend;
 
-    /* Two-sum (Knuth): sum + error is exact. With infinities error is NaN and changes nothing. */
+    /* Two-sum (Knuth): sum + error is exact. With infinities error is NaN, and is not used. */
     const double part = sum - product;
     const double error = (product - (sum - part)) + (addend - part);
     if (error < 0 || error > 0) {

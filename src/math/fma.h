@@ -4,7 +4,7 @@
 #define PLR_MATH_FMA_H
 
 /* round(a b + c) to float32, once. The same bits as the processor's instruction, for every finite
- * input and for infinities; a NaN gives a NaN. Needs nothing but IEEE double arithmetic. */
+ * input and for infinities; a NaN results in a NaN. Needs nothing but IEEE double arithmetic. */
 float plr_fmaf_exact(float a, float b, float c);
 
 #endif

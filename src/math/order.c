@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "math/order.h"
 
-/* Lets indices[root] sink until no child stands behind it. */
+/* Moves indices[root] down the heap until it comes after both of its children. */
 static void sink(uint16_t *indices, unsigned root, unsigned n, plr_before before,
                  const void *context) {
     const uint16_t moved = indices[root];

@@ -10,7 +10,7 @@
 #include "state/covariance.h"
 #include "state/pose.h"
 
-/* The series of SO(3) hold up to here; a robot that turns further in a step cannot be followed. */
+/* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
 #define MAX_TURN PLR_R(3.1415926)
 #define MAX_WAY  PLR_R(1000)
 
@@ -41,7 +41,7 @@ void plr_twist_bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE
 }
 
 void plr_twist_now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
-    /* with noise = step the sigmas are of a displacement: divide by the step */
+    /* with noise = step the sigmas are those of a displacement: divide by the step */
     const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
                                ? PLR_R(1) / (f->interval_s * f->interval_s)
                                : PLR_R(1);

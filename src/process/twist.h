@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The process `twist`: velocity and angular rate are measured, and move the pose (docs/MATH.md 4). */
+/* The process `twist`: measured velocity and angular rate move the pose (docs/MATH.md 4). */
 #ifndef PLR_PROCESS_TWIST_H
 #define PLR_PROCESS_TWIST_H
 
@@ -8,19 +8,19 @@
 /* Lays out the state's blocks: the pose, and with the setting `bias` the biases of the twists. */
 void plr_twist_lay_out(plr_filter *f);
 
-/* Adds what the biases may have changed in `seconds`: their random walk. */
+/* Adds the variance of the biases' random walk in `seconds`. */
 void plr_twist_walk(plr_filter *f, plr_real seconds);
 
-/* The body's twist now, (v, w), by the last reading, and its covariance, 6x6: the reading's and the
- * biases'. */
+/* The body's present twist (v, w): the last reading minus the bias, with its covariance, 6x6: that of the
+ * reading plus that of the bias. */
 void plr_twist_now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
 
-/* The biases' covariance at the time of the estimate, 6x6: with the walk not yet applied. Zeros if
- * they are not estimated. */
+/* The biases' covariance at the time of the estimate, 6x6, including the walk that is not
+ * applied yet. Zeros if they are not estimated. */
 void plr_twist_bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]);
 
-/* PLR_OK if the twist `reading` (6: v, w) minus the bias gives at most pi rad and 1 km in
- * `seconds`; else PLR_E_RANGE. */
+/* PLR_OK if the twist `reading` (6: v, w) minus the bias turns by at most pi rad and moves by at
+ * most 1 km in `seconds`; else PLR_E_RANGE. */
 plr_status plr_twist_check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                            plr_real seconds);
 

@@ -7,7 +7,7 @@
 #include "math/small.h"
 #include "state/blocks.h"
 
-/* A sensor whose next reading fails to come is listened to for so many of its intervals. */
+/* If the next reading does not come, the last one is held for so many of the sensor's intervals. */
 enum { HELD_INTERVALS = 2 };
 
 void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows) {
@@ -44,7 +44,8 @@ bool plr_velocity_is_held(const plr_filter *f) {
     return false;
 }
 
-/* What the difference e = U^-T (z - M u) says of the biases, which enter it by Y = -s U^-T M T. */
+/* Lambda += Y^T Y, eta += Y^T e: the whitened difference e = U^-T (s z - M xi) is Y db + N(0, I), with
+ * Y = -s U^-T M T. */
 static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
     for (unsigned r = 0; r < PLR_ROWS; r++)
@@ -81,7 +82,7 @@ static void correct(plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE],
     memcpy(T, next, sizeof next);
 }
 
-/* One held velocity against the step: s z = M xi + noise of variance s density. */
+/* Corrects a step by one held velocity: s z = M xi + noise of variance s density. */
 static void fuse_one(plr_filter *f, const plr_held_velocity *held, plr_real seconds,
                      plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
                      plr_real T[PLR_POSE_SQUARE]) {

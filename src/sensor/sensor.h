@@ -9,14 +9,14 @@
 #include "pelorus/state.h"
 #include "sensor/measurement.h"
 
-/* What a kind of sensor measures: one of the two functions, the other is NULL. The reading was
- * checked: finite numbers, a sigma above zero for each number that was measured. */
+/* A kind of sensor: one of the two functions, the other is NULL. The reading has been checked: finite
+ * numbers, and a sigma above zero for each number that was measured. */
 typedef struct plr_sensor_kind {
-    /* Of the state: rows with their derivatives at the present estimate. */
+    /* For a sensor of the state: fills the rows at the present estimate. */
     void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
 
-    /* Of the body's twist (v, w): three rows, or twice three. Returns how many threes. They hold until
-     * the next reading, in f->velocities.held[place] and after it. */
+    /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how many
+     * times. They are held until the next reading, in f->velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 
@@ -24,10 +24,10 @@ typedef struct plr_sensor_kind {
     bool bounds_position;
 } plr_sensor_kind;
 
-/* The kind of that number (plr_sensor); NULL if there is none. */
+/* The kind with this number (plr_sensor); NULL if there is none. */
 const plr_sensor_kind *plr_sensor_of(unsigned sensor);
 
-/* Was this number, 0 to 2, of the reading measured? */
+/* True if number i, 0 to 2, of the reading was measured. */
 static inline bool plr_reading_has(const plr_reading *reading, unsigned i) {
     return (reading->axes >> i & 1U) != 0;
 }

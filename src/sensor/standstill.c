@@ -7,11 +7,11 @@
 #include "sensor/stereo.h"
 #include "state/slots.h"
 
-enum { LEAST_ROWS = 15 }; /* fewer rows of pixels show nothing */
+enum { LEAST_ROWS = 15 }; /* with fewer rows of pixels a standstill is not recognised */
 
-/* Nothing moves for so long, s. */
+/* Time without a movement before a standstill is reported. */
 #define STILL_NS UINT64_C(1000000000)
-/* Chi-square of many degrees of freedom: so many of its standard deviations above its mean. */
+/* The limit on chi-square: its mean plus this many of its standard deviations. */
 #define SIGMAS PLR_R(3)
 
 static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
@@ -43,8 +43,8 @@ static void anchor(plr_slot *slot, const plr_real z[PLR_ROWS]) {
     slot->anchored = 1;
 }
 
-/* Compares all pixels with their anchors. True if together they have not moved; what has no anchor gets
- * one. */
+/* True if the pixels of all landmarks together have not moved from their anchors. A landmark without an
+ * anchor gets one. */
 static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_real distance2 = 0;
     unsigned rows = 0;

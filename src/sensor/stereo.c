@@ -104,7 +104,7 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     return true;
 }
 
-/* ---------------------------------------------------------------- while the motion is sought */
+/* ---------------------------------------------------------------- during the search for the motion */
 
 /* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v, are
  * left out. */
@@ -163,8 +163,8 @@ static plr_real least_disparity(const plr_filter *f) {
     return f->config.model == PLR_MODEL_BODY ? PLR_R(-4.25) * PLR_SQRT(f->par.pixel_variance) : 0;
 }
 
-/* A landmark stands no further at its birth than where this is its disparity, px: further off, what a
- * single observation says of its bearing would be left to rounding in float32. */
+/* The least disparity at which a landmark is initialised, px. Further away, the bearing information of a
+ * single observation would be lost by rounding in float32. */
 static plr_real farthest_disparity(const plr_filter *f) {
     const plr_real by_range =
         f->par.camera.fx * f->par.camera.baseline * f->par.min_inverse_range * PLR_R(1.5);
@@ -188,8 +188,8 @@ bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen)
            depth * f->par.min_inverse_range < 1;
 }
 
-/* Where a point's noise has left it no disparity to stand at, the landmark stands at this one, and what
- * is missing goes into its inverse range besides. */
+/* Raises the disparity of z to farthest_disparity. Returns the disparity that was removed by it, 0 or
+ * negative, which is kept in plr_slot.beyond. */
 static plr_real limit_disparity(const plr_filter *f, plr_real z[3]) {
     const plr_real disparity = z[0] - z[1], farthest = farthest_disparity(f);
     if (f->config.model != PLR_MODEL_BODY || disparity >= farthest)

@@ -37,23 +37,22 @@ void plr_stereo_rows(plr_real z[3], const plr_observation *seen);
 /* The variance of a row, px^2. */
 plr_real plr_stereo_variance(const plr_filter *f, unsigned row);
 
-/* (vL - vR)^2 / (2 s^2): the squared distance that the state has no say in; one degree of freedom. */
+/* (vL - vR)^2 / (2 s^2), which does not depend on the state; one degree of freedom. */
 plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen);
 
-/* A prediction that may be off by a focal length, one radian, says nothing about where to linearise:
- * such a landmark stands beside the camera or was never well known, and its variance would shrink
- * by more digits than float32 has. px^2 */
+/* The largest variance of a predicted pixel, px^2: one focal length, one radian. With a larger one a
+ * linearisation is wrong, and the update would reduce the variance by more digits than float32 has. */
 plr_real plr_stereo_max_variance(const plr_filter *f);
 
 /* An observation of a landmark, linearised at the present estimate. False if the landmark is nearer
- * than min-depth. Known landmarks are exempt from plr_stereo_max_variance: in localization from a
- * rough start it is the pose that is not known, and nothing else could correct it. */
+ * than min-depth. Known landmarks are exempt from plr_stereo_max_variance: in localization from a rough start
+ * the pose is uncertain, and only they can correct it. */
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m);
 
-/* --- while the motion is sought: `body` alone --- */
+/* --- during the search for the motion: `body` alone --- */
 
-/* A landmark at q0 as it would be seen after a motion of the camera. */
+/* The prediction of an observation after a motion of the camera; q0 is the landmark before it. */
 typedef struct plr_stereo_prediction {
     plr_real q[3];  /* the landmark after the motion, m */
     plr_real r[3];  /* seen minus predicted, px */
@@ -66,23 +65,24 @@ bool plr_stereo_predict_after(const plr_filter *f, const plr_slot *slot,
                               const plr_observation *seen, const plr_real E[9], const plr_real R[9],
                               const plr_real p[3], plr_stereo_prediction *sight);
 
-/* Does a single observation still make a part of what is known of a landmark's range? Of one that
- * has been seen often, the uncertainty is nearly all the camera's, common to all, and moving each by
- * itself would shift them against the pose. J of a sight, P the landmark's covariance. */
+/* True if a single observation still improves the range of a landmark noticeably. After many observations
+ * the uncertainty of the range is mostly the camera's, common to all landmarks, and correcting each one
+ * separately would move them relative to the pose. J is from a prediction, P the landmark's covariance. */
 bool plr_stereo_improves_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]);
 
 /* The squared norm of the four residuals (uL, uR, vL, vR), px^2, from that of the three rows. */
 plr_real plr_stereo_residual2(const plr_observation *seen, const plr_real r[3]);
 
-/* The variance that one observation of a far point leaves of its inverse range, 1/m^2. */
+/* The variance of a far point's inverse range after a single observation, 1/m^2. */
 plr_real plr_stereo_inverse_range_variance(const plr_filter *f);
 
 /* --- new landmarks --- */
 
-/* May these pixels make a landmark? (settings min-disparity, max-depth, max-row-gap, min-depth) */
+/* True if a landmark may be initialised from these pixels (settings min-disparity, max-depth, max-row-gap,
+ * min-depth). */
 bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen);
 
-/* The landmark that they make. Returns its plr_slot.beyond. */
+/* Initialises a landmark from them. Returns its plr_slot.beyond. */
 plr_real plr_stereo_initialise(const plr_filter *f, const plr_observation *seen,
                                plr_new_landmark *landmark);
 
