@@ -267,7 +267,7 @@ static bool print_results(replay *run) {
     if (o->json)
         summary_print_json(&run->summary, &run->session, path);
     else if (!o->quiet)
-        summary_print(&run->summary, &run->session, path);
+        summary_print(&run->summary, &run->session, path, o->out);
     if (fflush(stdout) == 0 && !ferror(stdout))
         return true;
     fprintf(stderr, PELORUS_NAME ": standard output: %s\n", strerror(errno));

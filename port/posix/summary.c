@@ -185,7 +185,7 @@ static void print_recording(const char *path, const char *name, double duration_
     printf(", %.1f s\n", duration_s);
 }
 
-void summary_print(summary *s, const plr_session *session, const char *path) {
+void summary_print(summary *s, const plr_session *session, const char *path, const char *log) {
     summary_figures figures;
     summary_figures_of(s, &figures);
     print_recording(path, session->header.name, figures.duration_s);
@@ -197,6 +197,7 @@ void summary_print(summary *s, const plr_session *session, const char *path) {
            figures.update_us_median, figures.update_us_p99, figures.update_us_max,
            figures.realtime_factor, s->wall_s);
     if (session->totals.truths > 0)
-        printf("accuracy      of a log that --out wrote: pelorus evaluate OUT.plr\n");
+        printf("accuracy      %spelorus evaluate %s\n",
+               log != NULL ? "" : "give --out LOG.plr, then ", log != NULL ? log : "LOG.plr");
     print_damage(s, session);
 }

@@ -30,8 +30,8 @@ void summary_free(summary *s);
 
 void summary_add_frame(summary *s, const plr_frame_result *result);
 
-/* Both sort what was collected. `path` is the recording's. */
-void summary_print(summary *s, const plr_session *session, const char *path);
+/* Both sort what was collected. `path` is the recording's, `log` that of --out or NULL. */
+void summary_print(summary *s, const plr_session *session, const char *path, const char *log);
 void summary_print_json(summary *s, const plr_session *session, const char *path);
 
 /* The figures that both print. */
