@@ -143,9 +143,9 @@ static void camera_back(const textbook *t, const double D[16], double back[16], 
 
 /* Brings a landmark along its ray to where it is linearised; the estimate stays, beyond that point. J is
  * the stretch. */
-static void bring_closer(const textbook *t, textbook_landmark *l, double J[9]) {
+static void move_to_linearisation_point(const textbook *t, textbook_landmark *l, double J[9]) {
     const double r = norm3(l->x);
-    double ratio = 1 + (l->beyond + l->closer) * r; /* of inverse ranges */
+    double ratio = 1 + (l->beyond + l->range_shift) * r; /* of inverse ranges */
     ratio = fmin(r / min_range, fmax(r / t->config.max_range_m, ratio));
     double along[3], moved[3];
     for (int k = 0; k < 3; k++)
@@ -173,7 +173,7 @@ static void move_landmarks(textbook *t, const double D[16]) {
     for (unsigned i = 0; i < t->count; i++) {
         textbook_landmark *l = &t->landmarks[i];
         double J[9], beyond[3], *e = t->correction + textbook_row(t, i);
-        bring_closer(t, l, J);
+        move_to_linearisation_point(t, l, J);
         body_beyond(l, beyond);
         rigid_apply(l->x, back, l->x);
         const double range = norm3(l->x);
@@ -195,7 +195,7 @@ static bool is_left(const textbook *t) {
 
 static void clear_correction(textbook *t) {
     memset(t->correction, 0, textbook_dim(t) * sizeof *t->correction);
-    memset(t->spread, 0, sizeof t->spread);
+    memset(t->motion_variance, 0, sizeof t->motion_variance);
 }
 
 void body_move(textbook *t, const double D[16]) {
@@ -203,7 +203,7 @@ void body_move(textbook *t, const double D[16]) {
     rigid_inverse(back, D);
     rigid_adjoint(A, back);
     for (unsigned i = 0; i < t->count; i++)
-        t->landmarks[i].closer = 0;
+        t->landmarks[i].range_shift = 0;
     clear_correction(t);
     move_landmarks(t, D);
     transport_covariance(t, POSE, A, t->blocks);
@@ -241,7 +241,7 @@ static void apply_motion(textbook *t, const search_result *found) {
     rigid_adjoint(A, back);
     clear_correction(t);
     for (unsigned k = 0; k < 6; k++)
-        t->spread[k] = 2 * JMJ[7 * k];
+        t->motion_variance[k] = 2 * JMJ[7 * k];
     move_landmarks(t, D);
     memset(t->noise, 0, 6 * (size_t)n * sizeof *t->noise);
     memcpy(t->noise, Jr, sizeof Jr);
@@ -262,7 +262,8 @@ static void apply_motion(textbook *t, const search_result *found) {
 /* ---------------------------------------------------------------- a frame */
 
 /* A frame that uses nothing and makes no landmark leaves the motion pending. */
-static bool is_needed(const textbook *t, const plr_frame *frame, const search_result *found) {
+static bool needs_motion_applied(const textbook *t, const plr_frame *frame,
+                                 const search_result *found) {
     bool needed = found->accepted > 0 || t->config.mode != PLR_MODE_SLAM;
     for (unsigned i = 0; i < frame->count && !needed; i++)
         needed = textbook_find(t, frame->observations[i].id) == t->count &&
@@ -274,14 +275,14 @@ bool body_catch_up(textbook *t, const plr_frame *frame) {
     search_result found = {.accepted = 0};
     clear_correction(t);
     for (unsigned i = 0; i < t->count; i++)
-        t->landmarks[i].closer = 0;
+        t->landmarks[i].range_shift = 0;
     if (!t->pending)
         return false;
     const bool judged = t->config.mode == PLR_MODE_SLAM;
     search_prior(t, found.L);
     if (judged)
         search_motion(t, frame, &found);
-    if (is_needed(t, frame, &found))
+    if (needs_motion_applied(t, frame, &found))
         apply_motion(t, &found);
     return judged;
 }
@@ -289,7 +290,7 @@ bool body_catch_up(textbook *t, const plr_frame *frame) {
 void body_settle(textbook *t) {
     search_result found = {.accepted = 0};
     for (unsigned i = 0; i < t->count; i++)
-        t->landmarks[i].closer = 0;
+        t->landmarks[i].range_shift = 0;
     search_prior(t, found.L);
     apply_motion(t, &found);
     if (is_left(t))
@@ -334,7 +335,7 @@ void body_fit_solve(const textbook *t, body_fit *fit, const double xi[6], double
     for (unsigned k = 0; k < 6; k++) {
         const double weight = 0.1 * fit->A[7 * k] + 1e-12;
         eta[k] = fit->b[k] + weight * xi[k];
-        fit->A[7 * k] += weight + left / (t->spread[k] + 1e-20);
+        fit->A[7 * k] += weight + left / (t->motion_variance[k] + 1e-20);
     }
     if (fit->heard == 0 || !oracle_solve_spd(6, 1, fit->A, eta))
         memcpy(eta, xi, 6 * sizeof *eta);

@@ -39,7 +39,7 @@ void body_beyond(const textbook_landmark *l, double e[3]);
 void body_polar_step(const double q[3], const double e[3], double moved[3], double J[9]);
 
 /* The rigid motion eta of the body that the corrections of points q have in common, where the pose's
- * own, xi, weighs a tenth, and 0 as much as t->spread allows beside what the corrections scatter by, at
+ * own, xi, weighs a tenth, and 0 as much as t->motion_variance allows beside what the corrections scatter by, at
  * most the noise of a pixel. A point's correction counts as the angle that it makes, and along the ray as
  * the disparity. */
 typedef struct body_fit {

@@ -125,7 +125,7 @@ static void look(const search *s, sight *at, const double z[6], const double bac
 }
 
 /* r^T S^-1 r with S of the best point, r = the residual of the point looked at last. */
-static double in_best_measure(const sight *at) {
+static double d2_by_best_covariance(const sight *at) {
     double L_now[9], L_best[9], r[3];
     memcpy(L_now, at->S, sizeof L_now);
     memcpy(L_best, at->best_S, sizeof L_best);
@@ -154,10 +154,10 @@ static double evaluate(search *s, const double z[6], sum *point) {
         look(s, at, z, back, JL);
         const double d2 = dot(at->rho, at->rho, 3);
         at->weight =
-            at->in_front ? at->voice * (sqrt(d2) <= huber_limit ? 1 : huber_limit / sqrt(d2)) : 0;
+            at->in_front ? at->active * (sqrt(d2) <= huber_limit ? 1 : huber_limit / sqrt(d2)) : 0;
         if (!(at->weight > 0))
             continue;
-        change += huber(in_best_measure(at)) - at->cost;
+        change += huber(d2_by_best_covariance(at)) - at->cost;
         add(at, at->weight, point->A, point->b);
     }
     return change;
@@ -184,7 +184,7 @@ static double step(const sum *point, double damping, double dz[6]) {
     return oracle_solve_spd(6, 1, N, dz) ? dot(dz, gradient, 6) : 0;
 }
 
-static bool is_within_reach(const double L[36], const double z[6]) {
+static bool is_representable(const double L[36], const double z[6]) {
     double n[6];
     oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 1, 6, 1, L, z, 0, n);
     return sqrt(dot(n, n, 3)) <= 1000 && sqrt(dot(n + 3, n + 3, 3)) <= 2;
@@ -199,7 +199,7 @@ static void descend(search *s, sum *best) {
             break;
         for (unsigned k = 0; k < 6; k++)
             z[k] = best->z[k] + dz[k];
-        if (is_within_reach(s->L, z) &&
+        if (is_representable(s->L, z) &&
             evaluate(s, z, &trial) + dot(z, z, 6) < dot(best->z, best->z, 6)) {
             *best = trial;
             accept(s);
@@ -241,14 +241,14 @@ static double distance2(const sight *at, const double A[36], const double b[6], 
 }
 
 /* What the twists alone say: no observation in A and b. */
-static void judge_at_zero(const search *s, sight *at) {
+static void judge_by_prior(const search *s, sight *at) {
     static const double none[36] = {0};
     const double s2 = s->t->config.pixel_sigma_px * s->t->config.pixel_sigma_px;
     const double limit = s->t->camera.fx_px * s->t->camera.fx_px;
     double L_S[9], La[18];
-    at->at_zero = (double)INFINITY;
+    at->prior_d2 = (double)INFINITY;
     if (!at->in_front) {
-        at->voice = 0;
+        at->active = 0;
         return;
     }
     memcpy(L_S, at->S, sizeof L_S);
@@ -257,10 +257,10 @@ static void judge_at_zero(const search *s, sight *at) {
     for (unsigned r = 0; r < 3; r++)
         if (at->S[4 * r] + dot(La + 6 * r, La + 6 * r, 6) - (r == 2 ? s2 / 2 : s2) > limit &&
             !s->t->landmarks[at->landmark].known) {
-            at->voice = 0;
+            at->active = 0;
             return;
         }
-    at->at_zero = distance2(at, none, none, none);
+    at->prior_d2 = distance2(at, none, none, none);
 }
 
 /* Is so much of what is known of this prediction from the others that they can judge it? The least
@@ -288,10 +288,10 @@ static bool others_know(const sight *at, const double A[36]) {
 
 static double judge(const sight *at, const sum *best, bool found) {
     double A[36], b[6];
-    if (!isfinite(at->at_zero) || !at->in_front)
+    if (!isfinite(at->prior_d2) || !at->in_front)
         return (double)INFINITY;
     if (!found || !others_know(at, best->A))
-        return at->at_zero;
+        return at->prior_d2;
     memcpy(A, best->A, sizeof A);
     memcpy(b, best->b, sizeof b);
     add(at, -at->weight, A, b);
@@ -384,7 +384,7 @@ static void prepare(search *s, unsigned landmark, const plr_observation *o) {
     memset(at, 0, sizeof *at);
     at->landmark = landmark;
     at->o = o;
-    at->voice = t->landmarks[landmark].known ? 0 : 1;
+    at->active = t->landmarks[landmark].known ? 0 : 1;
     for (unsigned r = 0; r < 3; r++) {
         memcpy(at->V + 6 * r, t->C + 6 * (row + r), 6 * sizeof *at->V);
         solve_lower(s->L, at->V + 6 * r);
@@ -400,8 +400,8 @@ static void prepare(search *s, unsigned landmark, const plr_observation *o) {
 /* None can be checked by the others: the twists' prediction says who may speak. */
 static void hush_outliers(search *s) {
     for (unsigned i = 0; i < s->count; i++)
-        if (!observe_accepts(s->t, s->sights[i].at_zero, 0))
-            s->sights[i].voice = 0;
+        if (!observe_accepts(s->t, s->sights[i].prior_d2, 0))
+            s->sights[i].active = 0;
 }
 
 /* Those of the frame that are in the state. */
@@ -417,20 +417,20 @@ void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
     static const double zero[6] = {0};
     search s = {.t = t, .L = result->L, .sights = t->sightings};
     sum best;
-    unsigned voices = 0;
+    unsigned active = 0;
     gather(&s, frame);
     (void)evaluate(&s, zero, &best);
     accept(&s);
     for (unsigned i = 0; i < s.count; i++) {
-        judge_at_zero(&s, &s.sights[i]);
-        voices += s.sights[i].voice > 0;
+        judge_by_prior(&s, &s.sights[i]);
+        active += s.sights[i].active > 0;
     }
-    const bool found = voices >= FEW;
+    const bool found = active >= FEW;
     if (!found)
         hush_outliers(&s);
-    (void)evaluate(&s, zero, &best); /* once more, with those alone that have a voice */
+    (void)evaluate(&s, zero, &best); /* once more, with those alone that take part */
     accept(&s);
-    if (voices > 0)
+    if (active > 0)
         descend(&s, &best);
     memcpy(result->z, best.z, sizeof result->z);
     const double usual = usual_inverse_range(t);
@@ -442,6 +442,6 @@ void search_motion(textbook *t, const plr_frame *frame, search_result *result) {
         if (!isfinite(l->d2) || !observe_accepts(t, l->d2, l->norm2))
             continue;
         result->accepted++;
-        l->closer = way_to_vantage(t, at, usual);
+        l->range_shift = way_to_vantage(t, at, usual);
     }
 }

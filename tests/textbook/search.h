@@ -4,7 +4,7 @@
  * (docs/MATH.md 10): the least of |z|^2 + sum rho(|residual|^2) over the motions D Exp(L z), by
  * Levenberg and Marquardt, with each landmark's own covariance. In double and in errors of points; an
  * observation is left out by adding up all the others. What it finds of each landmark that the frame
- * sees goes into the landmark: `closer`, from its inverse range to where it is linearised (1/m), d2
+ * sees goes into the landmark: `range_shift`, from its inverse range to where it is linearised (1/m), d2
  * without what the rows of an image differ by, and norm2, the squared residual.
  */
 #ifndef PELORUS_TEXTBOOK_SEARCH_H
@@ -28,8 +28,8 @@ typedef struct textbook_sighting {
     double J[9], S[9];    /* d z / d q, and S = J P J^T + R, there */
     double a[18], rho[3]; /* d z / d nu and residual, whitened */
     double weight, cost, best_S[9];
-    double at_zero; /* d2 by the twists alone; infinite if there is no place to linearise */
-    double voice;
+    double prior_d2; /* d2 by the twists alone; infinite if there is no place to linearise */
+    double active;
 } textbook_sighting;
 
 /* L L^T = the covariance of the pending motion, with the small part of the biases' effect that is

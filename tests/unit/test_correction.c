@@ -206,7 +206,7 @@ static void test_a_senseless_correction_marks_the_filter_diverged(void) {
     TEST_ASSERT_EQUAL_MEMORY(pose.p, filter.p_WB, sizeof pose.p);
 }
 
-/* Landmarks each for itself: they are not correlated, and have no voice in a common motion. */
+/* Landmarks that are not correlated and take no part in a common motion. */
 static void take_loose_specimen(void) {
     take_specimen(PLR_MODEL_BODY, false);
     for (unsigned slot = 0; slot < MANY; slot++)

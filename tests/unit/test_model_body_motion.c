@@ -315,7 +315,7 @@ static void retract_twin(const double *dx, double (*q)[3], double *T) {
 static void allow_common_motion(double spread) {
     for (int k = 0; k < 6; k++) {
         filter.work.noise.motion_variance[k] = (plr_real)spread;
-        truth.spread[k] = (double)filter.work.noise.motion_variance[k];
+        truth.motion_variance[k] = (double)filter.work.noise.motion_variance[k];
     }
 }
 
@@ -406,7 +406,8 @@ static void test_a_correction_beyond_infinity_is_kept_and_comes_back(void) {
     double q[3];
     take_specimen(false, LANDMARKS);
     for (unsigned slot = 0; slot < LANDMARKS; slot++)
-        filter.slots[slot].known = 1; /* no voice in a common motion: each goes for itself */
+        filter.slots[slot].known =
+            1; /* not used for a common motion: each is corrected by itself */
     plr_real *inverse_range = &dx[plr_covariance_row(&filter, 1) + 2];
     point_of(1, q);
     const double before = 1 / range_of(q);
