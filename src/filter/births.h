@@ -15,12 +15,12 @@ bool plr_births_are_allowed(const plr_filter *f);
 void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n,
                                plr_frame_events *events, plr_report *report);
 
-/* Drops the landmarks that the gate rejected in this frame, because it has rejected nearly everything
- * for too long. Their observations count as new ones. */
+/* Drops the landmarks that the gate rejected in this frame, because it has rejected nearly
+ * everything for too long. Their observations count as new ones. */
 void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n);
 
-/* If at least half of a frame was accepted, a landmark that was rejected for long is taken to be wrong,
- * and is initialised again from this frame. */
+/* If at least half of a frame was accepted, a landmark that was rejected for long is taken to be
+ * wrong, and is initialised again from this frame. */
 void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
                         const plr_report *report);
 

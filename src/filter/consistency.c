@@ -25,20 +25,21 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 /* Chi-square with 6 degrees of freedom: white noise exceeds these once in 25,000 and once in 70. */
 #define DRIFTING_ABOVE PLR_R(30)
 #define AGREEING_BELOW PLR_R(16)
-/* Noise settings are never quite true. The twists get less weight only where the difference exceeds its
- * noise by far, and is a good part of the motion itself: a filter that doubted them earlier would lose
- * the information that they have. */
+/* Noise settings are never quite true. The twists get less weight only where the difference exceeds
+ * its noise by far, and is a good part of the motion itself: a filter that doubted them earlier
+ * would lose the information that they have. */
 #define CONTRADICTED_ABOVE PLR_R(40)
 #define SHARE_OF_MOTION    PLR_R(0.15)
 #define MIN_WAY            PLR_R(0.004) /* m a frame */
 #define MIN_TURN           PLR_R(0.004) /* rad a frame */
-/* Q grows by this much of the statistic. With a third of it, stopped wheels still shorten the way by 3 %;
- * with four times as much, the filter follows a moving scene completely. */
+/* Q grows by this much of the statistic. With a third of it, stopped wheels still shorten the way
+ * by 3 %; with four times as much, the filter follows a moving scene completely. */
 #define WIDENING PLR_R(0.5)
-/* The excess of a frame that contradicted the twists by itself counts in the next frames too, less in
- * each. */
+/* The excess of a frame that contradicted the twists by itself counts in the next frames too, less
+ * in each. */
 #define EXCESS_DECAY PLR_R(0.8)
-/* The difference between the poses by twists and by pictures is known to about this part of its size. */
+/* The difference between the poses by twists and by pictures is known to about this part of its
+ * size. */
 #define SIDEWAYS_SHARE PLR_R(0.2)
 /* Added to variances, so that directions that were hardly observed do not count. */
 #define UNOBSERVED PLR_R(0.05)
@@ -48,12 +49,13 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 #define COUNTS_DECAY PLR_R(0.9)
 /* If a larger share of the matches is rejected, the scene contradicts itself. */
 #define REJECTED_SHARE PLR_R(0.3)
-/* Limits on NIS per degree of freedom, and the degrees of freedom that it takes to judge by them. */
+/* Limits on NIS per degree of freedom, and the degrees of freedom that it takes to judge by
+ * them. */
 #define NIS_HIGH PLR_R(1.5)
 #define NIS_LOW  PLR_R(0.3)
 #define NIS_DOF  PLR_R(200)
-/* The picture should have changed if the motion by twists since then exceeds its own noise by this, as a
- * sum of squares in units of sigma. */
+/* The picture should have changed if the motion by twists since then exceeds its own noise by this,
+ * as a sum of squares in units of sigma. */
 #define MOVED_ABOVE PLR_R(36)
 
 void plr_consistency_clear(plr_filter *f) {
@@ -92,8 +94,8 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
         f->motion.Q[i] *= factor;
 }
 
-/* Converts a frame's information J, b about nu from units of L, the widened noise, to units of `own`, the
- * twists' own: with T = L^-1 own, J <- T^T J T and b <- T^T b. */
+/* Converts a frame's information J, b about nu from units of L, the widened noise, to units of
+ * `own`, the twists' own: with T = L^-1 own, J <- T^T J T and b <- T^T b. */
 static void to_twist_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real own[PLR_POSE_SQUARE],
                             plr_real J[PLR_POSE_SQUARE], plr_real b[PLR_POSE_DIM]) {
     plr_real T[PLR_POSE_SQUARE] = {0}, TtJ[PLR_POSE_SQUARE] = {0}, turned[PLR_POSE_DIM] = {0};
@@ -143,7 +145,8 @@ static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POS
     return true;
 }
 
-/* n = (V + UNOBSERVED I)^-1 nu: the estimate by the observations alone, without the twists' prior. */
+/* n = (V + UNOBSERVED I)^-1 nu: the estimate by the observations alone, without the twists'
+ * prior. */
 static void by_vision_alone(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
                             plr_real n[PLR_POSE_DIM]) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
@@ -174,8 +177,8 @@ static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
     return sum;
 }
 
-/* d <- Ad(D^-1) d + n: d is the twist of the body from the pose by twists to the pose by pictures. nu is n
- * in the twists' own sigmas, and `noise` the expected square of nu if it is only noise. */
+/* d <- Ad(D^-1) d + n: d is the twist of the body from the pose by twists to the pose by pictures.
+ * nu is n in the twists' own sigmas, and `noise` the expected square of nu if it is only noise. */
 static void propagate_difference(plr_filter *f, const plr_applied_motion *applied,
                                  const plr_real n[PLR_POSE_DIM], const plr_real nu[PLR_POSE_DIM],
                                  plr_real noise) {
@@ -392,8 +395,8 @@ static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
     return reasons;
 }
 
-/* C = s (d d^T + a share of |d|^2 in all directions, because d is not known better than that). s is the
- * share of d that the twists' noise does not explain; the rest is in P already. */
+/* C = s (d d^T + a share of |d|^2 in all directions, because d is not known better than that). s is
+ * the share of d that the twists' noise does not explain; the rest is in P already. */
 static void covariance_of(const plr_filter *f, const plr_real d[PLR_POSE_DIM],
                           plr_real C[PLR_POSE_SQUARE]) {
     const plr_real sigmas2 = plr_norm2_of_6(f->consistency.difference_sigmas);
@@ -406,7 +409,8 @@ static void covariance_of(const plr_filter *f, const plr_real d[PLR_POSE_DIM],
             C[PLR_POSE_DIM * i + j] = s * (d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn));
 }
 
-/* Twists and pictures have agreed for long enough: the difference between their poses is added to P. */
+/* Twists and pictures have agreed for long enough: the difference between their poses is added to
+ * P. */
 static void resolve(plr_filter *f) {
     plr_consistency *c = &f->consistency;
     if (plr_norm2_of_6(c->difference) > 0) {

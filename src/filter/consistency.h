@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /*
- * Tests whether twists and pictures agree. Each frame yields nu, the difference between the motion seen in the
- * pictures and the one by the twists, in units of the twists' sigmas. In single frames, and in sums
- * in which older frames count less, nu must look like white noise. Where it does not, the twists
- * get less weight, the pose's covariance is enlarged to cover the poses by twists and by pictures,
- * and health says so until the two agree again (docs/MATH.md 17).
+ * Tests whether twists and pictures agree. Each frame yields nu, the difference between the motion
+ * seen in the pictures and the one by the twists, in units of the twists' sigmas. In single frames,
+ * and in sums in which older frames count less, nu must look like white noise. Where it does not,
+ * the twists get less weight, the pose's covariance is enlarged to cover the poses by twists and by
+ * pictures, and health says so until the two agree again (docs/MATH.md 17).
  */
 #ifndef PLR_FILTER_CONSISTENCY_H
 #define PLR_FILTER_CONSISTENCY_H

@@ -74,8 +74,8 @@ static void stack(plr_filter *f, const plr_measurement_source *sensed, unsigned 
     fill_S(f, batch, w->S);
 }
 
-/* The batch's information about the motion's noise: Lambda += E^T E, eta += E^T y, with E = U^-T H W and
- * y = U^-T (r - H dx). */
+/* The batch's information about the motion's noise: Lambda += E^T E, eta += E^T y, with E = U^-T H
+ * W and y = U^-T (r - H dx). */
 static void add_noise_information(plr_noise *noise, const plr_batch *batch, const plr_real *y,
                                   unsigned rows) {
     plr_real *Lambda = noise->Lambda;
@@ -103,8 +103,9 @@ static void update_estimate(plr_filter *f, plr_batch *batch, unsigned rows) {
     plr_subtract_four_rows(batch->ld, rows, batch->E + 4, WIDE, w->Vt, ld, last);
 }
 
-/* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but the
- * workspace, if S is not positive (*factorised = false) or a variance would not stay positive. */
+/* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but
+ * the workspace, if S is not positive (*factorised = false) or a variance would not stay
+ * positive. */
 static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     plr_workspace *w = &f->work;
     const unsigned rows = PLR_ROWS * batch->count;

@@ -23,10 +23,10 @@ typedef struct plr_measurement_source {
     const void *context;
 } plr_measurement_source;
 
-/* Applies `count` measurements, and the information about the biases that velocities have added since
- * the last correction (process/velocity.h). All are linearised at the current estimate, and the estimate is
- * corrected once, at the end. If a variance would not be positive or the correction is not finite,
- * the filter is marked as diverged and keeps the result of the batches before. */
+/* Applies `count` measurements, and the information about the biases that velocities have added
+ * since the last correction (process/velocity.h). All are linearised at the current estimate, and
+ * the estimate is corrected once, at the end. If a variance would not be positive or the correction
+ * is not finite, the filter is marked as diverged and keeps the result of the batches before. */
 plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, unsigned count);
 
 #endif

@@ -15,12 +15,12 @@ typedef struct plr_verdict {
     plr_real gain; /* det(S); a larger one means more information for the state */
 } plr_verdict;
 
-/* Compares d^2 with `gate-d2`; with the setting `gate-residual`, the squared norm of the raw residuals
- * with that, px^2. */
+/* Compares d^2 with `gate-d2`; with the setting `gate-residual`, the squared norm of the raw
+ * residuals with that, px^2. */
 bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2);
 
-/* Judges a measurement at the current estimate. It is rejected, whatever its residual is, if the variance
- * of a predicted row exceeds max_variance. */
+/* Judges a measurement at the current estimate. It is rejected, whatever its residual is, if the
+ * variance of a predicted row exceeds max_variance. */
 plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m);
 
 #endif

@@ -13,8 +13,8 @@ enum {
 
 /* ---------------------------------------------------------------- sums */
 
-/* A checksum of memory, word by word. Each sum is rotated before the next word is added, so that it depends
- * on the order of the words. A change of a single word always changes the sum. */
+/* A checksum of memory, word by word. Each sum is rotated before the next word is added, so that it
+ * depends on the order of the words. A change of a single word always changes the sum. */
 typedef struct plr_sum {
     uint32_t lane[LANES];
 } plr_sum;

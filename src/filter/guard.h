@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * Detects that something else has written to the filter's memory between two calls: a stray write,
- * a flipped bit, a stack that grew into it. Without the check it could lead to a crash, a NaN or a wrong pose.
+ * a flipped bit, a stack that grew into it. Without the check it could lead to a crash, a NaN or a
+ * wrong pose.
  *
  * There are three checksums: `constant`, of what never changes after init (settings, map,
  * parameters, model); `small`, of what every call changes (times, pose, bias, motion, counts, the

@@ -20,7 +20,8 @@ enum {
 #define LOST_S 1.0
 /* A position bounds the pose for so long, s. */
 #define POSITION_S 2.0
-/* The last twist is too old after this many of the intervals between twists, plus this time in s. */
+/* The last twist is too old after this many of the intervals between twists, plus this time in
+ * s. */
 #define HELD_INTERVALS 3.0
 #define HELD_S         0.05
 
@@ -108,8 +109,8 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
     return reasons;
 }
 
-/* The reasons by which the pose is lost at a time. A position that was used not long ago does for the
- * pose what the camera does not. */
+/* The reasons by which the pose is lost at a time. A position that was used not long ago does for
+ * the pose what the camera does not. */
 static uint32_t lost_by(const plr_filter *f, plr_time_ns now) {
     const bool positioned =
         f->last_position_ns != 0 && seconds_since(f->last_position_ns, now) <= POSITION_S;

@@ -7,8 +7,8 @@
 #include "pelorus/state.h"
 
 /* Fills work.order with the good observations by id, and returns their number. Malformed ones are
- * counted, and so are all copies of an id that occurs twice, because none of them can be known to be
- * the right one. */
+ * counted, and so are all copies of an id that occurs twice, because none of them can be known to
+ * be the right one. */
 unsigned plr_match_in_order(plr_filter *f, const plr_frame *frame, plr_report *report);
 
 /* Fills work.slot_of for the n observations in order. */

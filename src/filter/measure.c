@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* Readings of small sensors: each is checked and gated, then applied, or held until the next one. */
+/* Readings of small sensors: each is checked and gated, then applied, or held until the next
+ * one. */
 #include "filter/measure.h"
 
 #include <string.h>
@@ -112,8 +113,8 @@ static void given(const plr_filter *f, const void *context, unsigned i, plr_meas
     *m = *(const plr_measurement *)context;
 }
 
-/* Gates a reading of the state by the pose's present covariance, and applies it. A rejected one changes
- * nothing. */
+/* Gates a reading of the state by the pose's present covariance, and applies it. A rejected one
+ * changes nothing. */
 static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
                   plr_reading_result *result) {
     plr_measurement m;

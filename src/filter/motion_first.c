@@ -18,19 +18,21 @@ enum {
     MIN_AGAINST_TWISTS = 6 /* fewer points never outweigh the twists */
 };
 
-/* An observation supports one of two motions if its squared residual is smaller there by more than this. */
+/* An observation supports one of two motions if its squared residual is smaller there by more than
+ * this. */
 #define CLEAR_DIFFERENCE PLR_R(9)
 /* It agrees with a motion if its squared residual is below this: 97 % of the points at rest do. */
 #define AGREES PLR_R(9)
-/* Points are well spread if no direction of the motion keeps a larger part of the open prior's variance. */
+/* Points are well spread if no direction of the motion keeps a larger part of the open prior's
+ * variance. */
 #define UNOBSERVED PLR_R(0.25)
-/* An observation is judged by the motion of all others only if they contribute at least about this share
- * to its prediction. Below it the observation has determined the motion itself. */
+/* An observation is judged by the motion of all others only if they contribute at least about this
+ * share to its prediction. Below it the observation has determined the motion itself. */
 #define LEAST_SHARE PLR_R(0.05)
 
-/* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in S, and
- * gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and the
- * observation takes no part in the search. */
+/* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
+ * S, and gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and
+ * the observation takes no part in the search. */
 static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
@@ -69,9 +71,9 @@ static void judge_by_prior(plr_search *s, unsigned i) {
     at->gain = root * root;
 }
 
-/* d^2 of an observation about the motion that all others give. With h = a (I + J)^-1 a^T and the weight w
- * of the observation in J it is e^T [(I - w h)(I + (1 - w) h)]^-1 e. `share` receives the smallest pivot of
- * the matrix in brackets, about the share that the others contribute. */
+/* d^2 of an observation about the motion that all others give. With h = a (I + J)^-1 a^T and the
+ * weight w of the observation in J it is e^T [(I - w h)(I + (1 - w) h)]^-1 e. `share` receives the
+ * smallest pivot of the matrix in brackets, about the share that the others contribute. */
 static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
                               const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
     plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9], M[6];
@@ -106,7 +108,8 @@ static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
     return plr_dot3(e, e);
 }
 
-/* The squared norm of the four pixel residuals at the point evaluated last, for the setting gate-residual. */
+/* The squared norm of the four pixel residuals at the point evaluated last, for the setting
+ * gate-residual. */
 static plr_real residual_norm2(const plr_search *s, unsigned i) {
     const plr_sighting *at = &s->sightings[i];
     plr_real r[3];
@@ -114,7 +117,8 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
     return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
-/* True if the gate accepts an observation. Adds its d^2 to *nis, and its innovation to its track. */
+/* True if the gate accepts an observation. Adds its d^2 to *nis, and its innovation to its
+ * track. */
 static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
                   const plr_real dz[PLR_POSE_DIM], float *nis) {
     const plr_sighting *at = &s->sightings[i];
@@ -164,10 +168,10 @@ static bool is_well_spread(const plr_search_point *point) {
     return true;
 }
 
-/* True if enough observations support the motion found without the twists: at least three, a fifth of
- * all, and four times as many as support the twists. Of at least six, well spread, three fifths must agree
- * with it. Fewer may lie on one moving object: a car that fills a third of the picture pulls the estimate
- * of all others with it. */
+/* True if enough observations support the motion found without the twists: at least three, a fifth
+ * of all, and four times as many as support the twists. Of at least six, well spread, three fifths
+ * must agree with it. Fewer may lie on one moving object: a car that fills a third of the picture
+ * pulls the estimate of all others with it. */
 static bool has_support(const plr_search *s, const plr_search_point *open) {
     unsigned with = 0, against = 0, agree = 0, active = 0;
     for (unsigned i = 0; i < s->count; i++) {
@@ -184,8 +188,9 @@ static bool has_support(const plr_search *s, const plr_search_point *open) {
            5 * agree >= 3 * active && active >= MIN_AGAINST_TWISTS && is_well_spread(open);
 }
 
-/* Searches again with a prior so wide that the twists hardly count. True, with `best` and s->prior at the
- * result, if enough observations support it; otherwise the search is put back to where it was. */
+/* Searches again with a prior so wide that the twists hardly count. True, with `best` and s->prior
+ * at the result, if enough observations support it; otherwise the search is put back to where it
+ * was. */
 static bool search_without_twists(plr_search *s, plr_search_point *best) {
     const plr_applied_motion believed = s->prior;
     plr_search_point open;
@@ -207,8 +212,9 @@ static bool search_without_twists(plr_search *s, plr_search_point *best) {
 }
 
 /* Compares all observations with the twists' prediction, and excludes from the search those whose
- * prediction is too uncertain to linearise at. If fewer than three remain, none can be checked by the
- * others; then those that the gate rejects here are excluded too. Returns how many were left before that. */
+ * prediction is too uncertain to linearise at. If fewer than three remain, none can be checked by
+ * the others; then those that the gate rejects here are excluded too. Returns how many were left
+ * before that. */
 static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
     unsigned active = 0;
     bool changed = false;

@@ -2,7 +2,8 @@
 /*
  * Estimates how the body moved since the last frame from all matched observations together, before
  * any of them is applied to the state (docs/MATH.md 10). Of the state's covariance it uses the 3x3
- * block of each landmark. The update is linearised at the result, and the gate compares each observation with it.
+ * block of each landmark. The update is linearised at the result, and the gate compares each
+ * observation with it.
  */
 #ifndef PLR_FILTER_MOTION_FIRST_H
 #define PLR_FILTER_MOTION_FIRST_H

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The motion between frames: twists move the pose, and a frame applies the accumulated motion to landmarks
- * and covariance. */
+/* The motion between frames: twists move the pose, and a frame applies the accumulated motion to
+ * landmarks and covariance. */
 #include "filter/predict.h"
 
 #include <string.h>
@@ -47,10 +47,11 @@ void plr_predict_apply_prior(plr_filter *f) {
     (void)plr_model_of(f)->retract(f, f->work.dx); /* restores plr_slot.beyond */
 }
 
-/* The argument `interval` of plr_twist_step, which adds the variance sigma^2 interval (h1 - h0), when
- * the last reading is used from h0 to h1 seconds after its time. The error of one reading is constant,
- * so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau between
- * readings by the usual sigma^2 tau h, and later, if twists fail to come, to sigma^2 h^2. */
+/* The argument `interval` of plr_twist_step, which adds the variance sigma^2 interval (h1 - h0),
+ * when the last reading is used from h0 to h1 seconds after its time. The error of one reading is
+ * constant, so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau
+ * between readings by the usual sigma^2 tau h, and later, if twists fail to come, to sigma^2
+ * h^2. */
 static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     const plr_real tau = f->interval_s;
     if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
@@ -89,8 +90,8 @@ static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
     return t_ns - f->t_ns > f->par.max_gap_ns ? PLR_E_GAP : PLR_OK;
 }
 
-/* Checks that the reading can be held for a usual interval. With timing start it is used only when the next
- * one comes; were it refused then, so would be all that follow. */
+/* Checks that the reading can be held for a usual interval. With timing start it is used only when
+ * the next one comes; were it refused then, so would be all that follow. */
 static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                                 plr_real interval) {
     const plr_real first = PLR_R(1e-3); /* there is no interval yet */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* Recovery after the covariance has lost positivity: the pose is kept, landmarks and correlations are
- * dropped. */
+/* Recovery after the covariance has lost positivity: the pose is kept, landmarks and correlations
+ * are dropped. */
 #include <string.h>
 
 #include "filter/consistency.h"

@@ -15,7 +15,8 @@ enum {
     TRIALS = 4
 }; /* besides the evaluations at the start and, if needed, of the best point again */
 
-/* Huber's limit on the norm of a whitened residual: beyond it the pull on the motion stays constant. */
+/* Huber's limit on the norm of a whitened residual: beyond it the pull on the motion stays
+ * constant. */
 #define HUBER PLR_R(2.5)
 /* A step that should lower the cost by less is not evaluated. */
 #define MIN_DECREASE PLR_R(0.1)
@@ -67,7 +68,8 @@ static void step_to(const plr_search *s, const plr_real z[PLR_POSE_DIM], plr_cam
     plr_mat6_mul(step->N, s->f->par.Ad_CB, m.JL);
 }
 
-/* Evaluates one observation at a point: U on trial, a and e. False if it cannot be predicted there. */
+/* Evaluates one observation at a point: U on trial, a and e. False if it cannot be predicted
+ * there. */
 static bool evaluate_one(const plr_search *s, unsigned i, const plr_camera_step *step) {
     const plr_slot *slot = plr_search_slot(s, i);
     plr_sighting *at = &s->sightings[i];
@@ -144,9 +146,9 @@ void plr_search_prepare(plr_search *s) {
         prepare(s, i);
 }
 
-/* Evaluates all observations at nu = z. Returns by how much the cost of the observations is larger than at
- * the best point, both with the S of the best point. An observation whose landmark comes to lie behind
- * the camera is left out of the comparison. */
+/* Evaluates all observations at nu = z. Returns by how much the cost of the observations is larger
+ * than at the best point, both with the S of the best point. An observation whose landmark comes to
+ * lie behind the camera is left out of the comparison. */
 static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *point) {
     plr_camera_step step;
     plr_real change = 0;

@@ -2,8 +2,8 @@
 /*
  * The search for a frame's motion D Exp(L nu), nu ~ N(0, I) (docs/MATH.md 10): the nu at which
  * |nu|^2 + sum of rho(|U_i^-T r_i|^2) is smallest. rho is Huber's function. The method is that of
- * Levenberg and Marquardt with a bounded number of evaluations. Of the state's covariance it uses each
- * landmark's own 3x3 block.
+ * Levenberg and Marquardt with a bounded number of evaluations. Of the state's covariance it uses
+ * each landmark's own 3x3 block.
  */
 #ifndef PLR_FILTER_SEARCH_H
 #define PLR_FILTER_SEARCH_H
@@ -40,7 +40,8 @@ typedef struct plr_search {
     plr_applied_motion prior;
 } plr_search;
 
-/* A point nu = z, with the sums from which the gradient and the Hessian of the cost follow there. */
+/* A point nu = z, with the sums from which the gradient and the Hessian of the cost follow
+ * there. */
 typedef struct plr_search_point {
     plr_real z[PLR_POSE_DIM];
     plr_real J[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]; /* sum of w a^T a, packed upper */
@@ -57,7 +58,8 @@ static inline plr_slot *plr_search_slot(const plr_search *s, unsigned i) {
     return &s->f->slots[w->slot_of[w->used[i]]];
 }
 
-/* Appends the observation work.used[s->count]. `active` is 1 if it takes part in the search, else 0. */
+/* Appends the observation work.used[s->count]. `active` is 1 if it takes part in the search, else
+ * 0. */
 void plr_search_add(plr_search *s, plr_real active);
 
 /* Fills the fields of all sightings that depend on s->prior alone: V and P. */

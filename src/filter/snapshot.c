@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The filter's state as bytes and back: docs/STATE-FORMAT.md, by the tables of snapshot.def. What init
- * derives from settings and calibration is not restored, but compared: a state belongs to the filter
- * that it was saved from.
+ * The filter's state as bytes and back: docs/STATE-FORMAT.md, by the tables of snapshot.def. What
+ * init derives from settings and calibration is not restored, but compared: a state belongs to the
+ * filter that it was saved from.
  */
 #include <string.h>
 

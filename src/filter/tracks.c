@@ -13,8 +13,8 @@ enum {
 
 /* What the sums keep from frame to frame: they cover about 19 frames. */
 #define DECAY PLR_R(0.9)
-/* Chi-square with 3 degrees of freedom. White noise exceeds it once in 13 million; the limit is wide because
- * real pixels have heavier tails and lasting errors. */
+/* Chi-square with 3 degrees of freedom. White noise exceeds it once in 13 million; the limit is
+ * wide because real pixels have heavier tails and lasting errors. */
 #define MOVING_ABOVE PLR_R(36)
 
 void plr_track_add(plr_slot *slot, const plr_real e[3]) {

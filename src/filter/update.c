@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * A stereo frame: predict, match, gate, update, retract, evict, initialise, in this order.
- * Observations are processed in the order of their ids, so the order in which they arrive changes no bit.
+ * Observations are processed in the order of their ids, so the order in which they arrive changes
+ * no bit.
  */
 #include <string.h>
 
@@ -67,7 +68,8 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
     return frame->budget;
 }
 
-/* Fills work.gain by each observation's own prediction, when the motion has been applied already. */
+/* Fills work.gain by each observation's own prediction, when the motion has been applied
+ * already. */
 static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
@@ -212,7 +214,8 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
     return plr_twist_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
-/* A frame of dead reckoning: applies the motion, and the velocities' information about the biases. */
+/* A frame of dead reckoning: applies the motion, and the velocities' information about the
+ * biases. */
 static void dead_reckon(plr_filter *f) {
     plr_applied_motion motion;
     if (f->motion.pending && plr_velocity_informs_bias(f)) {

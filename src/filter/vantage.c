@@ -15,11 +15,12 @@ static plr_real inverse_range(const plr_slot *slot) {
 }
 
 /*
- * mean = sum w_i / r_i / sum w_i with w_i = 1 / (P_i + spread). spread = u^2 is how much the landmarks
- * themselves scatter: of a positive number with mean u, the exponential distribution assumes least, and
- * its variance is u^2. The first u^2 is the variance that one observation leaves. The mean may be
- * negative because of noise. u is the positive solution of u (u - mean) = variance of the mean: close to
- * the mean where that is well known, and its sigma where the mean is zero.
+ * mean = sum w_i / r_i / sum w_i with w_i = 1 / (P_i + spread). spread = u^2 is how much the
+ * landmarks themselves scatter: of a positive number with mean u, the exponential distribution
+ * assumes least, and its variance is u^2. The first u^2 is the variance that one observation
+ * leaves. The mean may be negative because of noise. u is the positive solution of u (u - mean) =
+ * variance of the mean: close to the mean where that is well known, and its sigma where the mean is
+ * zero.
  */
 plr_real plr_vantage_usual(const plr_filter *f) {
     const plr_real least = f->par.min_inverse_range;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The inverse range at which a landmark is linearised while its estimate is poor (docs/MATH.md 10). The
- * derivative of a pixel by the motion is proportional to the inverse range. Taken at an estimate that is
- * mostly noise, the derivative is correlated with that noise, and every frame adds information about the
- * motion that no pixel contains.
+ * The inverse range at which a landmark is linearised while its estimate is poor (docs/MATH.md 10).
+ * The derivative of a pixel by the motion is proportional to the inverse range. Taken at an
+ * estimate that is mostly noise, the derivative is correlated with that noise, and every frame adds
+ * information about the motion that no pixel contains.
  */
 #ifndef PLR_FILTER_VANTAGE_H
 #define PLR_FILTER_VANTAGE_H
@@ -14,9 +14,9 @@
  * positive. */
 plr_real plr_vantage_usual(const plr_filter *f);
 
-/* The linearisation point minus the landmark's estimate, in inverse range, 1/m. The point is the one
- * nearest to the usual inverse range within two sigmas of estimate + change: `change` is the correction
- * by the frame's observation, `variance` that of the inverse range after it. */
+/* The linearisation point minus the landmark's estimate, in inverse range, 1/m. The point is the
+ * one nearest to the usual inverse range within two sigmas of estimate + change: `change` is the
+ * correction by the frame's observation, `variance` that of the inverse range after it. */
 plr_real plr_vantage_offset(const plr_slot *slot, plr_real usual, plr_real change,
                             plr_real variance);
 

@@ -71,8 +71,8 @@ static inline void plr_mat6_mul_nt(plr_real C[PLR_POSE_SQUARE], const plr_real A
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 
-/* M = L L^T for a 6x6 that need not be definite: a direction in which M is zero, to rounding, becomes
- * a zero column of the lower triangle L. */
+/* M = L L^T for a 6x6 that need not be definite: a direction in which M is zero, to rounding,
+ * becomes a zero column of the lower triangle L. */
 void plr_factor6(plr_real L[PLR_POSE_SQUARE], const plr_real M[PLR_POSE_SQUARE]);
 
 /* Index of element (i, i) of an n x n matrix whose upper triangle is packed row by row: (0,0) (0,1)

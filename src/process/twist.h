@@ -11,8 +11,8 @@ void plr_twist_lay_out(plr_filter *f);
 /* Adds the variance of the biases' random walk in `seconds`. */
 void plr_twist_walk(plr_filter *f, plr_real seconds);
 
-/* The body's present twist (v, w): the last reading minus the bias, with its covariance, 6x6: that of the
- * reading plus that of the bias. */
+/* The body's present twist (v, w): the last reading minus the bias, with its covariance, 6x6: that
+ * of the reading plus that of the bias. */
 void plr_twist_now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
 
 /* The biases' covariance at the time of the estimate, 6x6, including the walk that is not

@@ -44,8 +44,8 @@ bool plr_velocity_is_held(const plr_filter *f) {
     return false;
 }
 
-/* Lambda += Y^T Y, eta += Y^T e: the whitened difference e = U^-T (s z - M xi) is Y db + N(0, I), with
- * Y = -s U^-T M T. */
+/* Lambda += Y^T Y, eta += Y^T e: the whitened difference e = U^-T (s z - M xi) is Y db + N(0, I),
+ * with Y = -s U^-T M T. */
 static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
     for (unsigned r = 0; r < PLR_ROWS; r++)

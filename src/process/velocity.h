@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 /*
- * Velocities measured by small sensors, in addition to the twists (docs/MATH.md 18). A reading is held
- * until the next one of its sensor, as a twist is. Its noise is treated as white, with a density of
- * variance times the seconds between readings. In each step of the motion, twist and readings are combined
- * by their covariances; their difference is information about the biases of the twists. The information
- * is collected until the next correction, so that twists, readings and frames may come in any order.
+ * Velocities measured by small sensors, in addition to the twists (docs/MATH.md 18). A reading is
+ * held until the next one of its sensor, as a twist is. Its noise is treated as white, with a
+ * density of variance times the seconds between readings. In each step of the motion, twist and
+ * readings are combined by their covariances; their difference is information about the biases of
+ * the twists. The information is collected until the next correction, so that twists, readings and
+ * frames may come in any order.
  */
 #ifndef PLR_PROCESS_VELOCITY_H
 #define PLR_PROCESS_VELOCITY_H
@@ -14,11 +15,12 @@
 #include "pelorus/state.h"
 #include "state/rows.h"
 
-/* Holds rows from now on, at index `which` < PLR_HELD_VELOCITIES. The interval of a sensor's first reading
- * is not known yet, so only the second one is held. */
+/* Holds rows from now on, at index `which` < PLR_HELD_VELOCITIES. The interval of a sensor's first
+ * reading is not known yet, so only the second one is held. */
 void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows);
 
-/* Drops all held rows and their information about the biases, when the clock or the biases change. */
+/* Drops all held rows and their information about the biases, when the clock or the biases
+ * change. */
 void plr_velocity_forget(plr_filter *f);
 
 /* Drops the information about the biases, which a correction has used. */
@@ -27,8 +29,8 @@ void plr_velocity_forget_bias(plr_filter *f);
 /* True if rows are held for a step that begins now. */
 bool plr_velocity_is_held(const plr_filter *f);
 
-/* Corrects a step of `seconds`, with displacement xi and its covariance V, 6x6, by all held rows. The
- * derivative of the step's error by the biases' error is then -seconds T, T 6x6. */
+/* Corrects a step of `seconds`, with displacement xi and its covariance V, 6x6, by all held rows.
+ * The derivative of the step's error by the biases' error is then -seconds T, T 6x6. */
 void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM],
                        plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE]);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The position of a point l of the body in the world, z = p_WB + R_WB l: GNSS in local metres, motion
- * capture, a beacon; with axes = 4 a height alone. */
+/* The position of a point l of the body in the world, z = p_WB + R_WB l: GNSS in local metres,
+ * motion capture, a beacon; with axes = 4 a height alone. */
 #include <string.h>
 
 #include "math/small.h"

@@ -9,14 +9,15 @@
 #include "pelorus/state.h"
 #include "sensor/measurement.h"
 
-/* A kind of sensor: one of the two functions, the other is NULL. The reading has been checked: finite
- * numbers, and a sigma above zero for each number that was measured. */
+/* A kind of sensor: one of the two functions, the other is NULL. The reading has been checked:
+ * finite numbers, and a sigma above zero for each number that was measured. */
 typedef struct plr_sensor_kind {
     /* For a sensor of the state: fills the rows at the present estimate. */
     void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
 
-    /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how many
-     * times. They are held until the next reading, in f->velocities.held[place] and after it. */
+    /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how
+     * many times. They are held until the next reading, in f->velocities.held[place] and after
+     * it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 

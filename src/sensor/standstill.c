@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The body does not move: v = 0 with sigma[0], m/s, and w = 0 with sigma[1], rad/s, each if `axes` has
- * its bit. */
+/* The body does not move: v = 0 with sigma[0], m/s, and w = 0 with sigma[1], rad/s, each if `axes`
+ * has its bit. */
 #include <string.h>
 
 #include "sensor/sensor.h"
@@ -28,7 +28,8 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
 
 const plr_sensor_kind plr_standstill = {.of_twist = measure, .place = 1};
 
-/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise. */
+/* The squared distance of a landmark's pixels from those that it was anchored at, in their
+ * noise. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {
     plr_real sum = 0;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
@@ -43,8 +44,8 @@ static void anchor(plr_slot *slot, const plr_real z[PLR_ROWS]) {
     slot->anchored = 1;
 }
 
-/* True if the pixels of all landmarks together have not moved from their anchors. A landmark without an
- * anchor gets one. */
+/* True if the pixels of all landmarks together have not moved from their anchors. A landmark
+ * without an anchor gets one. */
 static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_real distance2 = 0;
     unsigned rows = 0;

@@ -104,10 +104,11 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     return true;
 }
 
-/* ---------------------------------------------------------------- during the search for the motion */
+/* ---------------------------------------------------------------- during the search for the
+ * motion */
 
-/* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v, are
- * left out. */
+/* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v,
+ * are left out. */
 static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
                           const plr_real p[3], plr_stereo_prediction *sight) {
     plr_real DzRt[9];
@@ -163,8 +164,8 @@ static plr_real least_disparity(const plr_filter *f) {
     return f->config.model == PLR_MODEL_BODY ? PLR_R(-4.25) * PLR_SQRT(f->par.pixel_variance) : 0;
 }
 
-/* The least disparity at which a landmark is initialised, px. Further away, the bearing information of a
- * single observation would be lost by rounding in float32. */
+/* The least disparity at which a landmark is initialised, px. Further away, the bearing information
+ * of a single observation would be lost by rounding in float32. */
 static plr_real farthest_disparity(const plr_filter *f) {
     const plr_real by_range =
         f->par.camera.fx * f->par.camera.baseline * f->par.min_inverse_range * PLR_R(1.5);
@@ -188,8 +189,8 @@ bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen)
            depth * f->par.min_inverse_range < 1;
 }
 
-/* Raises the disparity of z to farthest_disparity. Returns the disparity that was removed by it, 0 or
- * negative, which is kept in plr_slot.beyond. */
+/* Raises the disparity of z to farthest_disparity. Returns the disparity that was removed by it, 0
+ * or negative, which is kept in plr_slot.beyond. */
 static plr_real limit_disparity(const plr_filter *f, plr_real z[3]) {
     const plr_real disparity = z[0] - z[1], farthest = farthest_disparity(f);
     if (f->config.model != PLR_MODEL_BODY || disparity >= farthest)

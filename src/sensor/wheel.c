@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The velocity of a point l of the body, along the body's axes: z = v + w x l. A driven wheel measures
- * x; one that cannot slip sideways, y too. */
+/* The velocity of a point l of the body, along the body's axes: z = v + w x l. A driven wheel
+ * measures x; one that cannot slip sideways, y too. */
 #include <string.h>
 
 #include "math/small.h"

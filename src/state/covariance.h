@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * The covariance P of the whole state: the blocks of plr_layout, then three rows a landmark, as a packed
- * lower triangle. No file outside src/state reads or writes an element of it.
+ * The covariance P of the whole state: the blocks of plr_layout, then three rows a landmark, as a
+ * packed lower triangle. No file outside src/state reads or writes an element of it.
  */
 #ifndef PLR_STATE_COVARIANCE_H
 #define PLR_STATE_COVARIANCE_H
@@ -24,8 +24,8 @@ unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
 
 /* --- blocks --- */
 
-/* Sets a block to P_own (size x size; the lower triangle is used), uncorrelated with all others. Only
- * without landmarks. */
+/* Sets a block to P_own (size x size; the lower triangle is used), uncorrelated with all others.
+ * Only without landmarks. */
 void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own);
 
 /* A block's own covariance += C, size x size and symmetric. */
@@ -45,8 +45,8 @@ plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot);
 
 double plr_covariance_trace(const plr_filter *f);
 
-/* Elements of P with that many landmarks. They lie row by row, the lower triangle alone, so the rows
- * of fewer landmarks are a part of the rows of more. */
+/* Elements of P with that many landmarks. They lie row by row, the lower triangle alone, so the
+ * rows of fewer landmarks are a part of the rows of more. */
 size_t plr_covariance_size(const plr_filter *f, unsigned landmarks);
 
 /* The elements themselves, for a checksum or a saved state. */
@@ -100,8 +100,8 @@ void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *ro
  * False, and nothing is changed, if a variance would not be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
-/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than the rounding of the
- * updates can have removed. Without it, rounding errors add up while a robot stands still and measures the
+/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than the rounding of the updates
+ * can have removed. Without it, rounding errors add up while a robot stands still and measures the
  * same landmarks, until P is no longer positive (docs/NUMERICS.md 1). */
 void plr_covariance_make_up_for_rounding(plr_filter *f);
 

@@ -42,8 +42,8 @@ void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_r
     }
 }
 
-/* out_r[i] = H_r x(i), r = 0 .. 2, i = 0 .. n-1: x(i) is column i of three rows. H is copied to locals,
- * because the compiler would otherwise load it for each i. */
+/* out_r[i] = H_r x(i), r = 0 .. 2, i = 0 .. n-1: x(i) is column i of three rows. H is copied to
+ * locals, because the compiler would otherwise load it for each i. */
 static inline void project_rows(unsigned n, const plr_real H[9], const plr_real *restrict x0,
                                 const plr_real *restrict x1, const plr_real *restrict x2,
                                 plr_real *restrict out0, plr_real *restrict out1,

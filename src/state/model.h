@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * A model defines how landmarks are stored and what the error of the state is. The rest of the filter is
- * the same for both models: `body` (model_body.c) and `world` (model_world.c).
+ * A model defines how landmarks are stored and what the error of the state is. The rest of the
+ * filter is the same for both models: `body` (model_body.c) and `world` (model_world.c).
  */
 #ifndef PLR_STATE_MODEL_H
 #define PLR_STATE_MODEL_H
@@ -43,20 +43,21 @@ struct plr_model {
      * linearisation is not valid. */
     bool (*look)(const plr_filter *f, unsigned slot, plr_view *view);
 
-    /* From derivatives by the point in the camera to derivatives by the state's error: H = Dz dq/dx.
-     * Dz = dz/dq, 3x3. The derivative along the point's ray, Dz q = along / q_z, is passed separately, because
-     * computed from Dz it would be a difference of rounded numbers. z, the prediction, is corrected for
-     * plr_slot.beyond. */
+    /* From derivatives by the point in the camera to derivatives by the state's error: H = Dz
+     * dq/dx. Dz = dz/dq, 3x3. The derivative along the point's ray, Dz q = along / q_z, is passed
+     * separately, because computed from Dz it would be a difference of rounded numbers. z, the
+     * prediction, is corrected for plr_slot.beyond. */
     void (*derive)(const plr_filter *f, unsigned slot, const plr_view *view, const plr_real Dz[9],
                    const plr_real along[3], plr_real z[3], plr_rows *H);
 
     /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
-     * S_q is passed and not the product: for a far point the variance along the ray is so large that
-     * rounding would destroy the variance across it. */
+     * S_q is passed and not the product: for a far point the variance along the ray is so large
+     * that rounding would destroy the variance across it. */
     void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 
-    /* Makes a landmark from a known position in the world. False if the model cannot represent it. */
+    /* Makes a landmark from a known position in the world. False if the model cannot represent
+     * it. */
     bool (*adopt)(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark);
 
     /* Applies a correction dx of the whole state (plr_covariance_dim elements) to the landmarks,
@@ -76,8 +77,8 @@ void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 
-/* The filter stores the model's number and not its address, because a damaged address would be followed
- * before a checksum could be compared. */
+/* The filter stores the model's number and not its address, because a damaged address would be
+ * followed before a checksum could be compared. */
 static inline const struct plr_model *plr_model_of(const plr_filter *f) {
     return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
  * The `body` model: landmarks q in the current left camera, with errors in the polar chart at q. An
- * observation depends on its landmark alone, and a motion of the body moves all landmarks. The filter is
- * invariant: directions that nothing observes (the pose of the world) stay unobserved, so that it gains
- * no information about them from linearisation. docs/MATH.md 2 and 6.
+ * observation depends on its landmark alone, and a motion of the body moves all landmarks. The
+ * filter is invariant: directions that nothing observes (the pose of the world) stay unobserved, so
+ * that it gains no information about them from linearisation. docs/MATH.md 2 and 6.
  */
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -20,8 +20,9 @@
 #include "state/pose.h"
 
 /*
- * Three products of Jw and Ji are written out below. Each contains q^T N = 0 or q x q = 0: a difference of
- * large equal numbers, which for a point at a kilometre would be rounding alone in float32.
+ * Three products of Jw and Ji are written out below. Each contains q^T N = 0 or q x q = 0: a
+ * difference of large equal numbers, which for a point at a kilometre would be rounding alone in
+ * float32.
  */
 
 /* row = [way turn] Ad, with Ad = [R, C; 0, R]. turn = NULL means zeros. */
@@ -54,8 +55,8 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
     times_adjoint(J + 2 * PLR_POSE_DIM, way, NULL, f->par.Ad_CB);
 }
 
-/* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): the derivative of the chart at q+ by the chart at q.
- * With N+^T q+ = 0 and q^T N = 0:
+/* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): the derivative of the chart at q+ by the chart
+ * at q. With N+^T q+ = 0 and q^T N = 0:
  *   F = [ r/r+ N+^T R^T N | -r/r+ N+^T R^T p ; r/r+^3 p^T N | (r - p^T mu) r^2 / r+^3 ]. */
 static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
                         const plr_real p[3], const plr_polar *from) {
@@ -79,8 +80,8 @@ static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
     F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
-/* Keeps a landmark at least PLR_MIN_RANGE from the camera. Nearer than that the camera has reached the
- * point, and the chart is not defined. */
+/* Keeps a landmark at least PLR_MIN_RANGE from the camera. Nearer than that the camera has reached
+ * the point, and the chart is not defined. */
 static void enforce_min_range(plr_real q[3]) {
     const plr_real range2 = plr_dot3(q, q);
     if (range2 >= PLR_MIN_RANGE * PLR_MIN_RANGE)
@@ -116,8 +117,8 @@ static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *
     }
 }
 
-/* Moves a landmark along its ray to its linearisation point (filter/vantage.h). The estimate does not
- * change: returns the estimated inverse range minus that of the point, 1/m. */
+/* Moves a landmark along its ray to its linearisation point (filter/vantage.h). The estimate does
+ * not change: returns the estimated inverse range minus that of the point, 1/m. */
 static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
     plr_slot *s = &f->slots[slot];
     const plr_real range = PLR_SQRT(plr_dot3(s->x, s->x)), nearest = range / PLR_MIN_RANGE;
@@ -213,8 +214,8 @@ static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_
     landmark->uses_pose = false;
 }
 
-/* P = J P_W J^T, 3x3, in double: the bearing variance of a far point is smaller than its range variance by
- * more digits than float32 has. False if a variance is negative. */
+/* P = J P_W J^T, 3x3, in double: the bearing variance of a far point is smaller than its range
+ * variance by more digits than float32 has. False if a variance is negative. */
 static bool carry_covariance(plr_real P[9], const plr_real J[9], const double P_W[9]) {
     double JP[9];
     for (int i = 0; i < 3; i++)
@@ -257,11 +258,12 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     return carry_covariance(landmark->P, J_W, known->P_W_m2);
 }
 
-/* The rigid motion eta of the body that the corrections of the landmarks have in common. It differs from
- * the pose's correction xi, which may mostly concern the way travelled before, in which no visible
- * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
- * causes. Known landmarks are left out: they are fixed in the world, so the pose moves them in the camera,
- * and the common part of a map's errors is not a motion. J becomes chart_by_body_twist of every slot. */
+/* The rigid motion eta of the body that the corrections of the landmarks have in common. It differs
+ * from the pose's correction xi, which may mostly concern the way travelled before, in which no
+ * visible landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity
+ * that it causes. Known landmarks are left out: they are fixed in the world, so the pose moves them
+ * in the camera, and the common part of a map's errors is not a motion. J becomes
+ * chart_by_body_twist of every slot. */
 static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
                           plr_real eta[PLR_POSE_DIM]) {
     const plr_real baseline = f->par.camera.baseline;
@@ -279,9 +281,9 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
     plr_rigid_fit_solve(&fit, dx, f->work.noise.motion_variance, angle2, eta);
 }
 
-/* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common motion has
- * brought the point: the same angle, turned by the bearing part of F (carry_chart), and the same inverse
- * range. */
+/* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common
+ * motion has brought the point: the same angle, turned by the bearing part of F (carry_chart), and
+ * the same inverse range. */
 static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
                       const plr_polar *from) {
     const plr_real ratio = to->r / from->r, w0 = ratio * w[0], w1 = ratio * w[1];
@@ -290,11 +292,11 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
 }
 
 /*
- * Applies the common part of the landmarks' corrections as a rigid motion eta, exactly, and the rest of
- * each through its chart, at the point to which that motion has brought the landmark:
+ * Applies the common part of the landmarks' corrections as a rigid motion eta, exactly, and the
+ * rest of each through its chart, at the point to which that motion has brought the landmark:
  *   w_rest = w - Jw(q) [-I | [q]x] eta_C,  q~ = Exp(eta_C)^-1 q,  q+ = retr(q~, w_rest).
- * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q), where theta_C is the rotation of eta_C, and
- * the pose's rows by Ad(Exp(-xi)).
+ * P is transported by diag(M, 1) Jw(q~) Exp(-theta_C) Ji(q), where theta_C is the rotation of
+ * eta_C, and the pose's rows by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE], eta[PLR_POSE_DIM], eta_C[PLR_POSE_DIM], E_C[9],

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The motion since landmarks and covariance were last moved. The pose contains it already; f->motion
- * accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
+/* The motion since landmarks and covariance were last moved. The pose contains it already;
+ * f->motion accumulates it until a frame applies it to them (docs/MATH.md 4 and 6). */
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 
@@ -17,15 +17,16 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], co
 /* The accumulated motion D Exp(L nu) with its noise nu ~ N(0, I), linearised at nu = z, a value
  * found from the frame's observations (docs/MATH.md 4 and 10). */
 typedef struct plr_applied_motion {
-    plr_real E[9], p[3];         /* D' = D Exp(L z) = (I + E, p) */
-    plr_real L[PLR_POSE_SQUARE]; /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
-    plr_real K
-        [PLR_POSE_SQUARE]; /* L^-1 B, zero rows where L has zero columns: the derivative of nu by the biases */
+    plr_real E[9], p[3];          /* D' = D Exp(L z) = (I + E, p) */
+    plr_real L[PLR_POSE_SQUARE];  /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
+    plr_real K[PLR_POSE_SQUARE];  /* L^-1 B: derivative of nu by the biases; zero rows where L
+                                     has zero columns */
     plr_real JL[PLR_POSE_SQUARE]; /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
     plr_real z[PLR_POSE_DIM];
 } plr_applied_motion;
 
-/* M = B P_bb B^T + Q, the covariance of the accumulated motion, and its part BPB by the biases; 6x6. */
+/* M = B P_bb B^T + Q, the covariance of the accumulated motion, and its part BPB by the biases;
+ * 6x6. */
 void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
                            plr_real M[PLR_POSE_SQUARE]);
 
@@ -40,7 +41,8 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
                    const plr_real z[PLR_POSE_DIM], plr_applied_motion *applied);
 
-/* The pose's covariance as it would be with the accumulated motion applied, 6x6; changes nothing. */
+/* The pose's covariance as it would be with the accumulated motion applied, 6x6; changes
+ * nothing. */
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
 
 #endif

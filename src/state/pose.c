@@ -5,7 +5,8 @@
 #include "math/small.h"
 #include "math/so3.h"
 
-/* Without the orthonormalisation, an hour of steps in float32 makes R deviate from a rotation by 0.01. */
+/* Without the orthonormalisation, an hour of steps in float32 makes R deviate from a rotation by
+ * 0.01. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     plr_real step[3], change[9];
     plr_mat3_vec(step, f->R_WB, d);

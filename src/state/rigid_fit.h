@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 /*
- * The rigid motion that a frame's corrections of the landmarks have in common: the twist eta = (rho,
- * theta) of the body that minimises
+ * The rigid motion that a frame's corrections of the landmarks have in common: the twist eta =
+ * (rho, theta) of the body that minimises
  *     sum_i |w_i - J_i eta|^2_W + |eta - xi|^2_(s diag A) + a sum_k eta_k^2 / spread_k,
  *     A = sum_i J_i^T W J_i, s = 0.1.
- * w_i is the correction of landmark i in its chart, J_i the derivative of the chart by a twist, and W the
- * weights of the chart's numbers as the image measures them. a is the variance by which the corrections
- * scatter about a common motion. Where the landmarks determine eta poorly, the pose's correction xi does;
- * without landmarks eta = xi (docs/MATH.md 11).
+ * w_i is the correction of landmark i in its chart, J_i the derivative of the chart by a twist, and
+ * W the weights of the chart's numbers as the image measures them. a is the variance by which the
+ * corrections scatter about a common motion. Where the landmarks determine eta poorly, the pose's
+ * correction xi does; without landmarks eta = xi (docs/MATH.md 11).
  */
 #ifndef PLR_STATE_RIGID_FIT_H
 #define PLR_STATE_RIGID_FIT_H
@@ -30,9 +30,9 @@ void plr_rigid_fit_clear(plr_rigid_fit *fit);
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
                        const plr_real w[3], const plr_real W[3]);
 
-/* eta, 6. It is xi if no landmark was added, if A cannot be factorised, or if eta turns by more than
- * PLR_MAX_CORRECTION_TURN2. spread: the prior variances of eta; noise: the largest value of a. The fit
- * cannot be used again. */
+/* eta, 6. It is xi if no landmark was added, if A cannot be factorised, or if eta turns by more
+ * than PLR_MAX_CORRECTION_TURN2. spread: the prior variances of eta; noise: the largest value of a.
+ * The fit cannot be used again. */
 void plr_rigid_fit_solve(plr_rigid_fit *fit, const plr_real xi[PLR_POSE_DIM],
                          const plr_real spread[PLR_POSE_DIM], plr_real noise,
                          plr_real eta[PLR_POSE_DIM]);

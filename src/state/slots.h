@@ -16,9 +16,9 @@
 /* The slot of an id, or PLR_NO_SLOT. */
 uint16_t plr_slots_find(const plr_filter *f, uint32_t id);
 
-/* Makes room for one landmark if all slots are taken: the one unseen for the longest time
- * goes to the map sink, in a tie that of the lowest slot, and never one seen in the current frame. False
- * if there is no room. *evicted is counted up, *sink_failed set if the sink failed. */
+/* Makes room for one landmark if all slots are taken: the one unseen for the longest time goes to
+ * the map sink, in a tie that of the lowest slot, and never one seen in the current frame. False if
+ * there is no room. *evicted is counted up, *sink_failed set if the sink failed. */
 bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed);
 
 /* Puts a landmark into a free slot, seen in the current frame. */
