@@ -40,7 +40,7 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
         report->poor = (uint16_t)(report->poor - report->no_room);
 }
 
-void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n) {
+void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
         const bool was_rejected = w->slot_of[k] != PLR_NO_SLOT && w->gain[k] < 0;

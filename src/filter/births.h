@@ -17,7 +17,7 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
 
 /* Drops the landmarks that the gate rejected in this frame, because it has rejected nearly
  * everything for too long. Their observations count as new ones. */
-void plr_births_unlock(plr_filter *f, const plr_frame *frame, unsigned n);
+void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n);
 
 /* If at least half of a frame was accepted, a landmark that was rejected for long is taken to be
  * wrong, and is initialised again from this frame. */

@@ -147,8 +147,8 @@ static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POS
 
 /* n = (V + UNOBSERVED I)^-1 nu: the estimate by the observations alone, without the twists'
  * prior. */
-static void by_vision_alone(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
-                            plr_real n[PLR_POSE_DIM]) {
+static void estimate_by_vision(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
+                               plr_real n[PLR_POSE_DIM]) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
     memcpy(U, V, PLR_POSE_TRIANGLE * sizeof *V);
     memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
@@ -197,7 +197,7 @@ static void propagate_difference(plr_filter *f, const plr_applied_motion *applie
 static bool is_material(const plr_consistency_window *w, const plr_real L[PLR_POSE_SQUARE],
                         const plr_applied_motion *applied) {
     plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    by_vision_alone(w->sum, w->variance, mean);
+    estimate_by_vision(w->sum, w->variance, mean);
     plr_mat6_vec(n, L, mean);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         n[k] /= PLR_R(1) + decay[0]; /* from the sum over frames to one frame's mean */
@@ -263,7 +263,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         return;
     plr_real way[PLR_POSE_DIM] = {0};
     if (c->contradicted || c->drifting) {
-        by_vision_alone(own, V, n);
+        estimate_by_vision(own, V, n);
         plr_mat6_vec(way, believed->L, n);
         propagate_difference(f, applied, way, own, trace(V));
     } else if (c->doubtful) { /* the difference stays until it is resolved */
@@ -445,7 +445,7 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     return c->doubtful ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;
 }
 
-void plr_consistency_cover(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
+void plr_consistency_enlarge(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     const plr_motion *m = &f->motion;
     plr_real R[9], A[PLR_POSE_SQUARE], d[PLR_POSE_DIM];
     if (!(plr_norm2_of_6(f->consistency.difference) > 0))

@@ -40,6 +40,6 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
 /* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers
  * the poses by twists and by pictures: by d d^T, where d is the difference between the two, and by
  * a part of |d|^2 in all directions. */
-void plr_consistency_cover(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
+void plr_consistency_enlarge(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
 
 #endif

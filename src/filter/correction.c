@@ -127,7 +127,7 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
 }
 
 /* True if the correction is finite and small enough for a retraction. */
-static bool is_sane(const plr_filter *f, unsigned n) {
+static bool is_applicable(const plr_filter *f, unsigned n) {
     static const plr_real max_way2 = 1e6;
     const plr_real *dx = f->work.dx;
     for (unsigned i = 0; i < n; i++)
@@ -166,7 +166,7 @@ plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, 
     plr_covariance_close_noise(f, result.nu);
     if (result.applied == 0 && !result.moved && all == count)
         return result;
-    if (!is_sane(f, n)) {
+    if (!is_applicable(f, n)) {
         plr_filter_diverge(f);
         return result;
     }

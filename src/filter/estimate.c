@@ -23,7 +23,7 @@ static void to_double(double *y, const plr_real *x, unsigned n) {
 /* The pose's covariance now, enlarged while vision contradicts the twists. */
 static void pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     plr_motion_pose_covariance(f, P_xi);
-    plr_consistency_cover(f, P_xi);
+    plr_consistency_enlarge(f, P_xi);
 }
 
 plr_time_ns plr_filter_time(const plr_filter *f) {
@@ -33,7 +33,7 @@ plr_time_ns plr_filter_time(const plr_filter *f) {
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
     if (!f || !T_WB)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     to_double(T_WB->R, f->R_WB, 9);
@@ -44,7 +44,7 @@ plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     if (!f || !P_xi)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     if (f->diverged)
@@ -58,7 +58,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
 plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     if (!f || !velocity)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     for (int i = 0; i < 3; i++) {
@@ -71,7 +71,7 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
 plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     if (!f || !P_u)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     if (f->diverged)
@@ -85,7 +85,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     if (!f || !b)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     if (f->diverged && P_b)
@@ -99,7 +99,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
 }
 
 double plr_filter_trace(const plr_filter *f) {
-    if (!f || plr_guard_look_whole(f) != PLR_OK || f->diverged)
+    if (!f || plr_guard_check_whole(f) != PLR_OK || f->diverged)
         return 0;
     plr_real P[PLR_POSE_SQUARE], P_b[PLR_POSE_SQUARE] = {0};
     double trace = plr_covariance_trace(f);

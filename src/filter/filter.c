@@ -160,7 +160,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     double P_xi[PLR_POSE_SQUARE];
     if (!f)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_constant(f);
+    const plr_status sound = plr_guard_check_constant(f);
     if (sound != PLR_OK)
         return sound;
     f->t_ns = f->reading_ns = 0;
@@ -187,7 +187,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     plr_consistency_clear(f);
     start_covariance(f, P_xi);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
-    plr_filter_keep_for_recovery(f);
+    plr_filter_store_for_recovery(f);
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         start_bias(f);
     plr_guard_seal_whole(f);
@@ -226,7 +226,7 @@ static void get_rotation(plr_real R[9], const plr_pose *T_WB) {
     plr_so3_orthonormalise(R);
 }
 
-static void put_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
+static void store_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
     get_rotation(f->R_WB, T_WB);
     memcpy(f->p_WB, T_WB->p, sizeof f->p_WB);
     f->t_ns = t_ns;
@@ -237,7 +237,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
                                const double *P_xi) {
     if (!f || !T_WB)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     if (f->config.mode == PLR_MODE_MAPPING)
@@ -259,9 +259,9 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
         f->totals.resets++;
     f->count = 0;
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi ? P_xi : P_start);
-    put_pose(f, t_ns, T_WB);
+    store_pose(f, t_ns, T_WB);
     plr_consistency_clear(f);
-    plr_filter_keep_for_recovery(f);
+    plr_filter_store_for_recovery(f);
     f->diverged = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;
     if (!plr_covariance_is_positive(f) &&
@@ -279,7 +279,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
 plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *variance) {
     if (!f || !mean || !variance)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     if (!plr_has_block(f, PLR_BLOCK_BIAS) || f->totals.twists > 0 || f->totals.frames > 0 ||
@@ -302,7 +302,7 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
     if (!f || !T_WB)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     if (f->config.mode != PLR_MODE_MAPPING)
@@ -313,7 +313,7 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     if (f->clock_started && t_ns <= f->t_ns)
         return plr_filter_refuse(f, PLR_E_TIME);
     if (!f->clock_started) {
-        put_pose(f, t_ns, T_WB);
+        store_pose(f, t_ns, T_WB);
         plr_guard_seal(f);
         return PLR_OK;
     }

@@ -31,10 +31,10 @@ void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]);
 plr_status plr_filter_refuse(plr_filter *f, plr_status status);
 
 /* Stores the pose's covariance after a good frame, for plr_filter_recover. */
-void plr_filter_keep_for_recovery(plr_filter *f);
+void plr_filter_store_for_recovery(plr_filter *f);
 
 /* Adds the motion that is about to be applied to the stored covariance. */
-void plr_filter_carry_recovery(plr_filter *f);
+void plr_filter_propagate_recovery(plr_filter *f);
 
 /* After a divergence: keeps the pose, sets its covariance to the stored one, drops the landmarks,
  * and sets the biases' covariance to their prior's. */

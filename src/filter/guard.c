@@ -119,21 +119,21 @@ static plr_status sound(bool is_sound) {
     return is_sound ? PLR_OK : PLR_E_DAMAGED;
 }
 
-plr_status plr_guard_look_constant(const plr_filter *f) {
+plr_status plr_guard_check_constant(const plr_filter *f) {
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
     return sound(constant_sum(f) == f->guard.constant);
 }
 
-plr_status plr_guard_look(const plr_filter *f) {
+plr_status plr_guard_check(const plr_filter *f) {
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
     return sound(plr_guard_is_in_range(f) && is_pose(f) && constant_sum(f) == f->guard.constant &&
                  small_sum(f) == f->guard.small);
 }
 
-plr_status plr_guard_look_whole(const plr_filter *f) {
-    const plr_status status = plr_guard_look(f);
+plr_status plr_guard_check_whole(const plr_filter *f) {
+    const plr_status status = plr_guard_check(f);
     return status != PLR_OK ? status : sound(large_sum(f) == f->guard.large);
 }
 

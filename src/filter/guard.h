@@ -8,7 +8,7 @@
  * parameters, model); `small`, of what every call changes (times, pose, bias, motion, counts, the
  * pose's and biases' rows of P); `large`, of all slots and the whole of P, which a frame changes. A
  * change within one aligned 32-bit word is always found, any other with near certainty. The
- * functions `look` compare a checksum with the memory; a call that changes memory ends with a
+ * functions `check` compare a checksum with the memory; a call that changes memory ends with a
  * `seal`, which computes it anew. The workspace has no checksum, because its contents are not used
  * by later calls.
  *
@@ -22,13 +22,13 @@
 #include "pelorus/state.h"
 
 /* For a call that reads or changes the small state alone. PLR_E_NOT_READY; PLR_E_DAMAGED. */
-plr_status plr_guard_look(const plr_filter *f);
+plr_status plr_guard_check(const plr_filter *f);
 
 /* For a call that reads or changes landmarks or P. */
-plr_status plr_guard_look_whole(const plr_filter *f);
+plr_status plr_guard_check_whole(const plr_filter *f);
 
 /* For a reset: settings, map, parameters, model. */
-plr_status plr_guard_look_constant(const plr_filter *f);
+plr_status plr_guard_check_constant(const plr_filter *f);
 
 /* Counts and choices are in their ranges: no index can leave its array. */
 bool plr_guard_is_in_range(const plr_filter *f);

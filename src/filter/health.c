@@ -28,7 +28,7 @@ enum {
 /* Reasons that leave the estimate as good as it should be. */
 #define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW)
 /* Reasons that do not apply in dead reckoning. */
-#define OF_SIGHT (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)
+#define OBSERVATION_REASONS (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)
 /* Reasons by which the pose is lost. */
 #define LOST (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES)
 
@@ -134,7 +134,7 @@ void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report 
     f->last_frame_ns = f->t_ns;
     if (report->used > 0) {
         f->last_use_ns = f->t_ns;
-        plr_filter_keep_for_recovery(f);
+        plr_filter_store_for_recovery(f);
     }
     f->health = (uint8_t)report->health;
     f->reasons = report->reasons;
@@ -160,7 +160,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
     if (!f || !health)
         return PLR_E_ARGUMENT;
     memset(health, 0, sizeof *health);
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK) {
         health->health = PLR_HEALTH_DIVERGED;
         health->reasons = sound == PLR_E_DAMAGED ? PLR_REASON_STATE_DAMAGED : 0;
@@ -168,7 +168,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
     }
     const plr_time_ns now = t_ns > f->t_ns ? t_ns : f->t_ns;
     const bool looks = f->config.mode != PLR_MODE_DEAD_RECKONING;
-    health->reasons = looks ? f->reasons : f->reasons & ~(uint32_t)OF_SIGHT;
+    health->reasons = looks ? f->reasons : f->reasons & ~(uint32_t)OBSERVATION_REASONS;
     health->seconds_without_frame = seconds_if(f->last_frame_ns != 0, f->last_frame_ns, now);
     health->seconds_without_use = seconds_if(f->last_use_ns != 0, f->last_use_ns, now);
     health->seconds_without_twist = seconds_if(f->reading_valid, f->reading_ns, now);

@@ -7,13 +7,13 @@
 #include "state/slots.h"
 
 unsigned plr_filter_landmark_count(const plr_filter *f) {
-    return f && plr_guard_look(f) == PLR_OK ? f->count : 0;
+    return f && plr_guard_check(f) == PLR_OK ? f->count : 0;
 }
 
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark) {
     if (!f || !landmark)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     if (slot >= f->count)
@@ -27,7 +27,7 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
 plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) {
     if (!f || !landmark)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     if (!plr_all_finite(landmark->p_W_m, 3) || !plr_all_finite(landmark->P_W_m2, 9))
@@ -54,7 +54,7 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
 plr_status plr_filter_flush_map(plr_filter *f) {
     if (!f)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     if (!f->map.sink)

@@ -165,7 +165,7 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
     memset(got, 0, sizeof *got);
     if (!f || !reading)
         return got->status = PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return got->status = sound;
     plr_status status = check_numbers(reading);

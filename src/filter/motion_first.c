@@ -22,7 +22,7 @@ enum {
  * this. */
 #define CLEAR_DIFFERENCE PLR_R(9)
 /* It agrees with a motion if its squared residual is below this: 97 % of the points at rest do. */
-#define AGREES PLR_R(9)
+#define AGREES_BELOW PLR_R(9)
 /* Points are well spread if no direction of the motion keeps a larger part of the open prior's
  * variance. */
 #define UNOBSERVED PLR_R(0.25)
@@ -180,7 +180,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open) {
         if (!(at->active > 0))
             continue;
         active++;
-        agree += d2 < AGREES;
+        agree += d2 < AGREES_BELOW;
         against += at->twist_d2 > d2 + CLEAR_DIFFERENCE;
         with += d2 > at->twist_d2 + CLEAR_DIFFERENCE;
     }

@@ -29,7 +29,7 @@ void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
         plr_pose_correct(f, n);
     }
     plr_model_of(f)->propagate(f, applied);
-    plr_filter_carry_recovery(f);
+    plr_filter_propagate_recovery(f);
     plr_predict_drop(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);
@@ -119,7 +119,7 @@ static plr_status refuse_twist(plr_filter *f, plr_status status) {
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
     if (!f || !twist)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))

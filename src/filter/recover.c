@@ -24,7 +24,7 @@ static void unpack(const plr_filter *f, plr_real P[PLR_POSE_SQUARE]) {
             P[PLR_POSE_DIM * i + j] = P[PLR_POSE_DIM * j + i] = f->recovery_P[at];
 }
 
-void plr_filter_keep_for_recovery(plr_filter *f) {
+void plr_filter_store_for_recovery(plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     pack(f, P);
@@ -32,7 +32,7 @@ void plr_filter_keep_for_recovery(plr_filter *f) {
 
 /* P <- Ad(D^-1) P Ad(D^-1)^T + Q + B S B^T, with S the covariance of the biases' prior, because
  * their present covariance may be wrong. */
-void plr_filter_carry_recovery(plr_filter *f) {
+void plr_filter_propagate_recovery(plr_filter *f) {
     const plr_motion *m = &f->motion;
     plr_real R[9], A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], carried[PLR_POSE_SQUARE],
         S[PLR_POSE_SQUARE] = {0}, BSB[PLR_POSE_SQUARE];
@@ -52,9 +52,9 @@ void plr_filter_recover(plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
     double P_xi[PLR_POSE_SQUARE], variance[PLR_POSE_DIM];
     if (f->motion.pending)
-        plr_filter_carry_recovery(f);
+        plr_filter_propagate_recovery(f);
     unpack(f, P);
-    plr_consistency_cover(f, P);
+    plr_consistency_enlarge(f, P);
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];

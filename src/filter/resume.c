@@ -18,7 +18,7 @@ static plr_status check_moved(const plr_filter *f, const double *P_moved) {
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved) {
     if (!f)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     const plr_status status = check_moved(f, P_moved);

@@ -58,7 +58,7 @@ static uint32_t elements(const plr_filter *f, unsigned landmarks) {
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
-    if (!f || plr_guard_look(f) != PLR_OK || landmarks > f->config.slots)
+    if (!f || plr_guard_check(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
            SIZE(filter) + landmarks * SIZE(slot) +
@@ -109,7 +109,7 @@ static bool to_sink(void *context, uint8_t *bytes, unsigned n) {
 plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *context) {
     if (!f)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look_whole(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     if (f->diverged || !plr_covariance_is_positive(f))
@@ -214,7 +214,7 @@ plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source s
                               void *context) {
     if (!f || !source)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_look(f);
+    const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
     const plr_state_in start = {.source = source, .context = context, .length = length};

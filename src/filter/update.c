@@ -184,7 +184,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
         events.locked = plr_health_gate_is_locked(f, report);
         if (events.locked) {
             plr_predict_apply_prior(f);
-            plr_births_unlock(f, frame, n);
+            plr_births_drop_rejected(f, frame, n);
         } else {
             plr_births_restart(f, frame, n, report);
         }
@@ -240,7 +240,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     r->t_ns = frame->t_ns;
     r->budget = frame->budget;
     r->observations = frame->count;
-    r->status = plr_guard_look_whole(f);
+    r->status = plr_guard_check_whole(f);
     if (r->status == PLR_E_DAMAGED)
         plr_health_damaged(f, r);
     if (r->status != PLR_OK)

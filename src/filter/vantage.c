@@ -8,7 +8,7 @@
 enum { PASSES = 3 };
 
 /* The true value is assumed to be within so many sigmas of the estimate. */
-#define WITHIN PLR_R(2)
+#define SIGMAS PLR_R(2)
 
 static plr_real inverse_range(const plr_slot *slot) {
     return slot->beyond + PLR_R(1) / PLR_SQRT(plr_dot3(slot->x, slot->x));
@@ -44,7 +44,7 @@ plr_real plr_vantage_usual(const plr_filter *f) {
 
 plr_real plr_vantage_offset(const plr_slot *slot, plr_real usual, plr_real change,
                             plr_real variance) {
-    const plr_real known_to = variance > 0 ? WITHIN * PLR_SQRT(variance) : 0;
+    const plr_real known_to = variance > 0 ? SIGMAS * PLR_SQRT(variance) : 0;
     const plr_real off = usual - inverse_range(slot);
     if (off < change - known_to)
         return change - known_to;

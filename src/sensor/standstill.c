@@ -7,7 +7,7 @@
 #include "sensor/stereo.h"
 #include "state/slots.h"
 
-enum { LEAST_ROWS = 15 }; /* with fewer rows of pixels a standstill is not recognised */
+enum { MIN_ROWS = 15 }; /* with fewer rows of pixels a standstill is not recognised */
 
 /* Time without a movement before a standstill is reported. */
 #define STILL_NS UINT64_C(1000000000)
@@ -63,7 +63,7 @@ static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n) {
         rows += PLR_ROWS;
     }
     const plr_real mean = (plr_real)rows;
-    return rows >= LEAST_ROWS && distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
+    return rows >= MIN_ROWS && distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
 }
 
 static void anchor_all(plr_filter *f, const plr_frame *frame, unsigned n) {

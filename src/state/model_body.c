@@ -58,8 +58,8 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
 /* F = Jw(q+) R^T Ji(q), 3x3, for q+ = R^T (q - p): the derivative of the chart at q+ by the chart
  * at q. With N+^T q+ = 0 and q^T N = 0:
  *   F = [ r/r+ N+^T R^T N | -r/r+ N+^T R^T p ; r/r+^3 p^T N | (r - p^T mu) r^2 / r+^3 ]. */
-static void carry_chart(plr_real F[9], const plr_polar *to, const plr_real R[9],
-                        const plr_real p[3], const plr_polar *from) {
+static void chart_jacobian(plr_real F[9], const plr_polar *to, const plr_real R[9],
+                           const plr_real p[3], const plr_polar *from) {
     const plr_real ratio = from->r / to->r;
     const plr_real shrink = ratio / (to->r * to->r);
     plr_real turned[3];
@@ -156,7 +156,7 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
         plr_se3_move_back(s->x, E, p);
         enforce_min_range(s->x);
         plr_polar_at(&to, s->x);
-        carry_chart(F + 9 * slot, &to, R, p, &from);
+        chart_jacobian(F + 9 * slot, &to, R, p, &from);
         plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
         dx[0] = offset * F[9 * slot + 2];
         dx[1] = offset * F[9 * slot + 5];
@@ -216,7 +216,7 @@ static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_
 
 /* P = J P_W J^T, 3x3, in double: the bearing variance of a far point is smaller than its range
  * variance by more digits than float32 has. False if a variance is negative. */
-static bool carry_covariance(plr_real P[9], const plr_real J[9], const double P_W[9]) {
+static bool covariance_in_chart(plr_real P[9], const plr_real J[9], const double P_W[9]) {
     double JP[9];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
@@ -255,7 +255,7 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     plr_polar_from_point(Jw, &chart);
     plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, R_WB);
     plr_mat3_mul(J_W, Jw, R_CW);
-    return carry_covariance(landmark->P, J_W, known->P_W_m2);
+    return covariance_in_chart(landmark->P, J_W, known->P_W_m2);
 }
 
 /* The rigid motion eta of the body that the corrections of the landmarks have in common. It differs
@@ -282,7 +282,7 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
 }
 
 /* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common
- * motion has brought the point: the same angle, turned by the bearing part of F (carry_chart), and
+ * motion has brought the point: the same angle, turned by the bearing part of F (chart_jacobian), and
  * the same inverse range. */
 static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
                       const plr_polar *from) {
@@ -322,7 +322,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         w[2] += s->beyond;
         plr_se3_move_back(s->x, E_C, p_C);
         plr_polar_at(&there, s->x);
-        carry_chart(rigid, &there, R_C, p_C, &from);
+        chart_jacobian(rigid, &there, R_C, p_C, &from);
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_real *own = F + 9 * slot;

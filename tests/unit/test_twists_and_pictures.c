@@ -162,7 +162,7 @@ static void test_a_second_slip_adds_to_what_the_first_left_unsettled(void) {
     }
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.9 * 90 * WAY_M, apart);
     plr_real P[36] = {0};
-    plr_consistency_cover(&filter, P);
+    plr_consistency_enlarge(&filter, P);
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.9 * apart * apart, (double)P[0]);
 }
 
@@ -203,14 +203,14 @@ static void test_twists_that_are_contradicted_are_believed_less(void) {
 static void test_the_covariance_covers_both_stories(void) {
     plr_real C[36] = {0};
     plr_motion_clear(&filter.motion);
-    plr_consistency_cover(&filter, C);
+    plr_consistency_enlarge(&filter, C);
     for (unsigned i = 0; i < 36; i++)
         TEST_ASSERT_EQUAL_DOUBLE(0, (double)C[i]);
     for (int k = 0; k < 10; k++)
         add_slip();
     const double apart = (double)filter.consistency.difference[0];
     TEST_ASSERT_DOUBLE_WITHIN(0.3, -10 * WAY_M, apart);
-    plr_consistency_cover(&filter, C);
+    plr_consistency_enlarge(&filter, C);
     TEST_ASSERT_DOUBLE_WITHIN(0.06 * apart * apart, apart * apart, (double)C[0]);
     for (unsigned i = 1; i < 3; i++) /* and a fifth of it to the sides */
         TEST_ASSERT_DOUBLE_WITHIN(0.002 * apart * apart, 0.04 * apart * apart, (double)C[7 * i]);
