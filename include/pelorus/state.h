@@ -103,6 +103,7 @@ typedef struct plr_held_velocity {
     plr_real z[PLR_ROWS];
     plr_real M[PLR_ROWS * PLR_POSE_DIM];
     plr_real density[PLR_ROWS]; /* variance times the seconds between readings */
+    uint32_t interval_ns;       /* between the last two held; 0: not known */
     uint8_t known;              /* 0: the sensor has never spoken */
 } plr_held_velocity;
 

@@ -14,9 +14,13 @@ void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows
     plr_held_velocity *held = &f->velocities.held[which];
     const bool first = !held->known || f->t_ns <= held->t_ns;
     const plr_time_ns interval = first ? 0 : f->t_ns - held->t_ns;
+    /* after a pause, or after a lost or rejected reading, the interval of before */
+    const bool paused = held->interval_ns > 0 && held->interval_ns < interval;
+    const plr_time_ns usual = paused ? held->interval_ns : interval;
+    held->interval_ns = interval < UINT32_MAX ? (uint32_t)interval : UINT32_MAX;
     held->known = f->velocities_known = 1;
     held->t_ns = f->t_ns;
-    held->until_ns = f->t_ns + (interval < f->par.max_gap_ns ? HELD_INTERVALS * interval : 0);
+    held->until_ns = f->t_ns + (usual < f->par.max_gap_ns ? HELD_INTERVALS * usual : 0);
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)
