@@ -20,6 +20,7 @@ from pelorus.errors import PelorusError
 
 COMMANDS = (
     "convert",
+    "track",
     "info",
     "evaluate",
     "export",

@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: MIT
+"""pelorus track: on pictures rendered here, with known points, and on the start of KITTI 06."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from converted import Run
+from numpy.typing import NDArray
+from pelorus import se3, trajectory
+from pelorus.converters import matlab
+from pelorus.evaluation import assess
+from pelorus.frames import Camera, TwistTiming
+from pelorus.recording import Recording
+from pelorus.table import Table
+from pelorus.tracking import images, matching
+from pelorus.tracking.settings import Settings
+from pelorus.tracking.tracker import track
+from pelorus.tracks import Tracks, triangulate
+from pelorus.trajectory import Trajectory
+from replay_drive import BIN, judged
+
+Frames = list[tuple[images.Gray, images.Gray]]
+
+CAMERA = Camera(fx_px=300, fy_px=300, cx_px=200, cy_px=100, baseline_m=0.5)
+WIDTH, HEIGHT = 400, 200
+FRAMES, RATE_HZ, SPEED_MPS = 10, 10.0, 2.0
+WALL_M, BOARD_M, BOARD_HALF_M = 12.0, 5.0, 0.8  # a board stands before a wall
+DRAWS = 5
+FEW = Settings(corners=40)
+
+
+# --- pictures whose points are known --------------------------------------------------------------
+
+
+def texture(seed: int) -> NDArray[np.float32]:
+    """Soft blobs, which a point can be followed on."""
+    noise = np.random.default_rng(seed).uniform(0, 255, (1024, 1024)).astype(np.float32)
+    soft = cv2.GaussianBlur(noise, (0, 0), 2.5)
+    return np.asarray(cv2.normalize(soft, np.empty(0), 0, 255, cv2.NORM_MINMAX), np.float32)
+
+
+def seen_from(x_m: float, z_m: float, shades: list[NDArray[np.float32]]) -> images.Gray:
+    """What a camera at (x, 0, z) that looks along z sees of wall and board."""
+    u, v = np.meshgrid(np.arange(WIDTH, dtype=np.float32), np.arange(HEIGHT, dtype=np.float32))
+    picture = np.zeros((HEIGHT, WIDTH), np.float32)
+    for shade, depth_m, dots_per_m in zip(shades, (WALL_M, BOARD_M), (30, 60), strict=True):
+        scale = (depth_m - z_m) / CAMERA.fx_px
+        x, y = (u - CAMERA.cx_px) * scale + x_m, (v - CAMERA.cy_px) * scale
+        column, row = (np.asarray(a * dots_per_m + 512, np.float32) for a in (x, y))
+        plane = cv2.remap(shade, column, row, cv2.INTER_CUBIC, borderMode=cv2.BORDER_WRAP)
+        there = (depth_m == WALL_M) | (np.hypot(x, y) < BOARD_HALF_M)
+        picture = np.where(there, plane, picture)
+    return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+
+
+@pytest.fixture
+def frames(kept: Callable[..., Any]) -> Frames:
+    """Forward at SPEED_MPS."""
+
+    def make() -> Frames:
+        shades = [texture(1), texture(2)]
+        z = [SPEED_MPS * k / RATE_HZ for k in range(FRAMES)]
+        return [(seen_from(0, at, shades), seen_from(CAMERA.baseline_m, at, shades)) for at in z]
+
+    rendered: Frames = kept("rendered pairs", make)
+    return rendered
+
+
+def write(folder: Path, pairs: Frames) -> tuple[Path, Path]:
+    """LEFT and RIGHT, with names that are numbers."""
+    folders = folder / "left", folder / "right"
+    for side, place in enumerate(folders):
+        place.mkdir()
+        for k, pair in enumerate(pairs):
+            cv2.imwrite(str(place / f"{k}.png"), pair[side])
+    return folders
+
+
+def followed(pairs: Frames, settings: Settings = FEW) -> Tracks:
+    return track(pairs, (Path("left"), Path("right")), settings)
+
+
+def in_world(tracks: Tracks) -> NDArray[np.float64]:
+    points = triangulate(CAMERA, tracks.pixels)
+    points[:, 2] += SPEED_MPS / RATE_HZ * tracks.frame
+    return points
+
+
+def test_every_track_stays_on_its_point(frames: Frames) -> None:
+    tracks = followed(frames)
+    points = in_world(tracks)
+    off_m = np.minimum(abs(points[:, 2] - WALL_M), abs(points[:, 2] - BOARD_M))
+    assert np.median(off_m) < 0.05
+    assert (off_m < 0.5).mean() > 0.97
+    near = points[:, 2] < (WALL_M + BOARD_M) / 2
+    assert 5 < near.sum() < len(near) - 5
+    for id in np.unique(tracks.id):
+        mine = points[tracks.id == id]
+        assert np.linalg.norm(mine[:, :2] - mine[0, :2], axis=1).max() < 0.15
+
+
+def test_a_track_is_written_only_if_it_lived_three_frames_and_has_no_gap(frames: Frames) -> None:
+    tracks = followed(frames)
+    assert np.bincount(tracks.id).min() >= 3
+    for id in np.unique(tracks.id):
+        assert (np.diff(tracks.frame[tracks.id == id]) == 1).all()
+    upside_down = np.flipud(frames[5][0]).copy(), np.flipud(frames[5][1]).copy()
+    with_a_cut = [*frames[:5], upside_down, upside_down, *frames[7:]]
+    cut = followed(with_a_cut)
+    assert not (set(cut.id[cut.frame == 4]) & set(cut.id[cut.frame == 7]))
+
+
+def test_corners_are_no_more_than_asked_for_and_spread_over_the_picture(frames: Frames) -> None:
+    for corners in (12, 40):
+        assert followed(frames, Settings(corners=corners)).counts().max() <= corners
+    one_sided = frames[0][0].copy()
+    one_sided[:, : WIDTH // 2] = 128 + (one_sided[:, : WIDTH // 2].astype(int) - 128) // 4
+    found = matching.new_corners(one_sided, matching.none(), FEW)
+    assert len(found) == FEW.corners
+    assert (found[:, 0] < WIDTH / 2).sum() >= FEW.corners / 3
+
+
+def test_what_moves_on_its_own_is_voted_out(frames: Frames) -> None:
+    strange = [(left.copy(), right.copy()) for left, right in frames]
+    patch = texture(3)[:50, :50].astype(np.uint8)
+    for k, (left, right) in enumerate(strange):
+        top = 20 + 5 * k  # a thing that falls
+        left[top : top + 50, 300:350] = patch
+        right[top : top + 50, 280:330] = patch
+    tracks = followed(strange)
+    u, v = tracks.pixels[:, 0], tracks.pixels[:, 1] - 5 * tracks.frame
+    on_thing = (u > 308) & (u < 342) & (v > 28) & (v < 62)
+    assert on_thing.mean() < 0.02
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+CALIBRATION = {
+    **{name: getattr(CAMERA, name) for name in ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m")},
+    "R_CB": [[0, -1, 0], [0, 0, -1], [1, 0, 0]],
+    "t_CB_m": [0, 0, 0],
+}
+TRUTH = "t_s,px_m,py_m,pz_m,qx,qy,qz,qw\n"
+TWISTS = "t_s,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps\n"
+
+
+def test_pictures_and_twists_become_a_drive_that_beats_dead_reckoning(
+    frames: Frames, tmp_path: Path, pelorus: Run
+) -> None:
+    left, right = write(tmp_path, frames)
+    stereo, sheet = tmp_path / "stereo.csv", tmp_path / "sheet.png"
+    said = pelorus("track", left, right, stereo, "--rate", RATE_HZ, "--sheet", sheet)
+    assert said.status == 0, said.err
+    assert f"{FRAMES} frames with {len(Table.read(stereo).times())} observations" in said.out
+    picture = cv2.imread(str(sheet))
+    assert picture is not None
+    assert (np.ptp(picture, axis=2) > 60).any()  # the tracks' colours
+    seconds = [k / RATE_HZ for k in range(FRAMES)]
+    (tmp_path / "camera.json").write_text(json.dumps(CALIBRATION))
+    wrong = SPEED_MPS + 0.5  # as of a wheel of the wrong size
+    (tmp_path / "twists.csv").write_text(
+        TWISTS + "".join(f"{t},{wrong},0.1,0,0,0.05,0\n" for t in seconds)
+    )
+    (tmp_path / "truth.csv").write_text(
+        TRUTH + "".join(f"{t},{SPEED_MPS * t},0,0,0,0,0,1\n" for t in seconds)
+    )
+    files = {"twists", "stereo", "truth"}
+    options = [word for name in sorted(files) for word in (f"--{name}", tmp_path / f"{name}.csv")]
+    plr = tmp_path / "drive.plr"
+    said = pelorus("convert", "csv", *options, "--calibration", tmp_path / "camera.json", plr)
+    assert said.status == 0, said.err
+    noise = ("--velocity-sigma", "0.5", "--gyro-sigma", "0.05")
+    alone = judged(plr, *noise, "--mode", "dead_reckoning")["err0_m"]
+    assert judged(plr, *noise)["err0_m"] < 0.2 * alone
+
+
+def test_times_are_those_of_a_file_or_of_names_in_ns(
+    frames: Frames, tmp_path: Path, pelorus: Run
+) -> None:
+    left, right = write(tmp_path, frames)
+    out = tmp_path / "stereo.csv"
+    times = tmp_path / "times.txt"
+    times.write_text("".join(f"{7 + k / 10:.1f}\n" for k in range(FRAMES)))
+    assert pelorus("track", left, right, out, "--times", times).status == 0
+    assert Table.read(out).times()[-1] == 7_900_000_000
+    for folder in (left, right):
+        for path in folder.iterdir():
+            path.rename(folder / f"{1403636579763555584 + int(path.stem)}.png")
+    assert pelorus("track", left, right, out).status == 0
+    assert Table.read(out).times()[0] == 1403636579763555584
+
+
+def _resize(path: Path) -> None:
+    cv2.imwrite(str(path), np.zeros((100, 100), np.uint8))
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+def _blank(path: Path) -> None:
+    for picture in path.parent.iterdir():
+        cv2.imwrite(str(picture), np.full((HEIGHT, WIDTH), 90, np.uint8))
+
+
+def _all_but_two(path: Path) -> None:
+    for side in ("left", "right"):
+        for picture in (path.parents[1] / side).iterdir():
+            if int(picture.stem) >= 2:
+                picture.unlink()
+
+
+@pytest.mark.parametrize(
+    ("side", "harm", "said"),
+    [
+        ("right", Path.unlink, "right: lacks the partner of 4.png in "),
+        ("left", Path.unlink, "left: lacks the partner of 4.png in "),
+        ("right", _resize, "4.png: has 100 x 100 pixels; 400 x 200 are due, which the left ones"),
+        ("left", _resize, "4.png: has 100 x 100 pixels; 400 x 200 are due, which the first"),
+        ("left", _cut, "4.png: cannot be read as a picture: image file is truncated; a whole PNG"),
+        ("right", lambda p: p.write_text("no picture"), "4.png: cannot be read as a picture: "),
+        ("right", lambda p: p.write_bytes(b""), "4.png: the file is empty"),
+        ("left", _blank, "no corner could be followed for 3 frames; pictures with texture"),
+        ("left", _all_but_two, "left: has 2 pictures; at least 3 are due"),
+    ],
+)
+def test_bad_pictures_are_named_and_nothing_is_left_behind(
+    frames: Frames,
+    tmp_path: Path,
+    pelorus: Run,
+    side: str,
+    harm: Callable[[Path], object],
+    said: str,
+) -> None:
+    left, right = write(tmp_path, frames[:6])
+    harm(tmp_path / side / "4.png")
+    out, sheet = tmp_path / "out.csv", tmp_path / "out.png"
+    outcome = pelorus("track", left, right, out, "--rate", 10, "--sheet", sheet)
+    assert outcome.status == 1
+    assert said in outcome.err
+    assert not list(tmp_path.glob("out*"))
+
+
+def test_calls_that_make_no_sense_are_refused_with_what_would_be_right(
+    frames: Frames, tmp_path: Path, pelorus: Run
+) -> None:
+    left, right = write(tmp_path, frames[:6])
+    out, folder = tmp_path / "out.csv", tmp_path / "out.folder"
+    folder.mkdir()
+    few = tmp_path / "times.txt"
+    few.write_text("0\n0.1\n")
+    rate = ("--rate", 10)
+    for words, said in (
+        ((left, right, out), "left: the name 0 is no time in ns: when were the pictures taken?"),
+        ((left, left, out, *rate), "is given as the left and as the right folder; two are due"),
+        ((right, left, out, *rate), "further left; a rectified pair is due (are left and right"),
+        ((tmp_path / "nix", right, out, *rate), "nix: cannot be read as a folder: No such"),
+        ((folder, right, out, *rate), "out.folder: holds no picture; .png"),
+        ((left, right, tmp_path / "no" / "o.csv", *rate), "cannot be written: there is no folder"),
+        ((left, right, folder, *rate), "out.folder: cannot be written: is a folder"),
+        ((left, right, out, "--times", few), "times.txt: has 2 times; 6 are due, one for each"),
+        ((left, right, out, "--rate", 0), "a rate of 0.0 Hz: must be positive"),
+        ((left, right, out, *rate, "--window", 8), "window 8: an odd number is due"),
+        ((left, right, out, *rate, "--corners", 3), "corners 3: 8 to "),
+        ((left, right, out, *rate, "--sheet", out), "is given for the tracks and for the sheet"),
+        (
+            (left, right, out, *rate, "--sheet", folder),
+            "out.folder: cannot be written: is a folder",
+        ),
+    ):
+        outcome = pelorus("track", *words)
+        assert outcome.status == 1
+        assert said in outcome.err
+        assert not out.exists()
+    assert not list(tmp_path.glob("*.part"))
+
+
+# --- real pictures --------------------------------------------------------------------------------
+
+
+def test_on_kitti_06_the_tracks_hold_noisy_twists_to_the_road(
+    real: Callable[[str], Path], tmp_path: Path
+) -> None:
+    if not (BIN / "pelorus-replay").exists():
+        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
+    poses = real("images/kitti-06-start/poses.txt")
+    source = matlab.klt(real("klt/2011_09_30_drive_0020_sync_KLT.mat"), TwistTiming.END)
+    folders = poses.parent / "image_l", poses.parent / "image_r"
+    pairs = images.pairs(*folders)
+    tracks = track((images.read(pair) for pair in pairs), folders, Settings())
+    assert np.median(np.bincount(tracks.id)) >= 5
+    T_CB, cameras = source.T_CB, trajectory.read_kitti(poses)
+    bodies = se3.compose(se3.compose(se3.inverse(T_CB), cameras), T_CB)
+    t_ns = source.frame_t_ns[: len(pairs)]
+    v, w = source.v_B_mps[: len(pairs)], source.w_B_radps[: len(pairs)]
+    P = np.loadtxt(poses.parent / "calib.txt").reshape(2, 3, 4)
+    fx, fy, cx, cy = P[0, 0, 0], P[0, 1, 1], P[0, 0, 2], P[0, 1, 2]
+    source = source.with_header(camera=Camera(fx, fy, cx, cy, -P[1, 0, 3] / fx))
+    figures = []
+    for seed in range(DRAWS):
+        noise = np.random.default_rng(seed)
+        noisy_v, noisy_w = v + noise.normal(0, 0.5, v.shape), w + noise.normal(0, 0.05, w.shape)
+        drive = Recording(source.header, t_ns, noisy_v, noisy_w, t_ns, tracks, t_ns, bodies)
+        drive.write(tmp_path / "drive.plr")
+        mine = judged(
+            tmp_path / "drive.plr", "--config", BIN.parents[1] / "tools" / "config" / "track.conf"
+        )
+        alone = assess(Trajectory(t_ns, drive.dead_reckoning()), Trajectory(t_ns, bodies))
+        assert alone is not None
+        figures.append((mine["err0_m"], alone.err0_m, mine["nees_per_dof"]))
+    err0_m, alone_m, nees = np.median(figures, axis=0)
+    assert err0_m <= 0.4 * alone_m
+    assert nees <= 10

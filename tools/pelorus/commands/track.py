@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus track LEFT RIGHT OUT.csv`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import typer
+from rich.markup import escape
+
+from pelorus.console import out, progress
+from pelorus.errors import PelorusError
+from pelorus.tracking import images, output, sheet
+from pelorus.tracking.images import Gray, Pair
+from pelorus.tracking.settings import Settings
+from pelorus.tracking.tracker import track as track_all
+from pelorus.tracks import Tracks
+
+USUAL = Settings()
+EXAMPLE = "pelorus track image_l image_r stereo.csv --rate 10 --sheet tracks.png"
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `track` to the command line."""
+    parent.command(epilog=f"Example:  {EXAMPLE}")(track)
+
+
+def track(
+    left: Path = typer.Argument(..., metavar="LEFT", help="Folder of the left camera's pictures."),
+    right: Path = typer.Argument(
+        ..., metavar="RIGHT", help="Folder of the right one's; those of a frame have equal names."
+    ),
+    target: Path = typer.Argument(
+        ..., metavar="OUT.csv", help="The tracks, for pelorus convert csv --stereo."
+    ),
+    times: Path | None = typer.Option(
+        None,
+        metavar="FILE",
+        help="A time in s a row, one for each pair, on the twists' clock. Without it and --rate "
+        "the pictures' names are times in ns.",
+    ),
+    rate: float | None = typer.Option(
+        None, metavar="HZ", help="Or: the first pair is at 0 s, and so many follow in a second."
+    ),
+    sheet_file: Path | None = typer.Option(
+        None, "--sheet", metavar="OUT.png", help="Some frames with their tracks, to look at."
+    ),
+    corners: int = typer.Option(USUAL.corners, help="At most so many tracks in a frame."),
+    spacing: float = typer.Option(
+        USUAL.spacing_px, metavar="PX", help="Least distance of a new corner from all others."
+    ),
+    window: int = typer.Option(
+        USUAL.window_px, metavar="PX", help="Side of the patch that is followed; odd."
+    ),
+    round_trip: float = typer.Option(
+        USUAL.round_trip_px,
+        metavar="PX",
+        help="Followed there and back, a point may miss its start by so much.",
+    ),
+    row_gap: float = typer.Option(
+        USUAL.row_gap_px, metavar="PX", help="Largest |vL - vR| of a match."
+    ),
+    epipolar: float = typer.Option(
+        USUAL.epipolar_px,
+        metavar="PX",
+        help="How far a point may lie off the motion that the others agree on (RANSAC).",
+    ),
+    disparity_max: int = typer.Option(
+        USUAL.disparity_max_px,
+        metavar="PX",
+        help="Largest uL - uR; 0 is an eighth of the picture's width.",
+    ),
+) -> None:
+    """Follow points through rectified stereo pictures (PNG, JPEG, PGM, BMP, TIFF).
+
+    Corners are spread over the picture, followed there and back, matched along the row and kept
+    where RANSAC agrees; a track is written if it lived for three frames at least.
+    """
+    settings = Settings(corners, spacing, window, round_trip, row_gap, epipolar, disparity_max)
+    settings.check()
+    if times is not None and rate is not None:
+        raise typer.BadParameter("one of them, not both", param_hint="--times / --rate")
+    _require_places(target, sheet_file)
+    pairs = images.pairs(left, right)
+    t_ns = images.times(pairs, times, rate)
+    shown: dict[int, Gray] = {}
+    tracks = track_all(_read(pairs, shown), (left, right), settings)
+    files = {target: output.csv_text(t_ns, tracks).encode()}
+    if sheet_file is not None:
+        files[sheet_file] = sheet.sheet(shown, [pair.left.name for pair in pairs], tracks)
+    output.write_all(files)
+    _say(target, tracks)
+
+
+def _require_places(target: Path, sheet_file: Path | None) -> None:
+    """Before the work, not after it."""
+    for path in (target, sheet_file):
+        if path is not None and not path.parent.is_dir():
+            raise PelorusError(f"{path}: cannot be written: there is no folder {path.parent}")
+    if sheet_file is not None and sheet_file.resolve() == target.resolve():
+        raise PelorusError(f"{target}: is given for the tracks and for the sheet; two are due")
+
+
+def _read(pairs: list[Pair], shown: dict[int, Gray]) -> Iterator[tuple[Gray, Gray]]:
+    """Pair by pair, all of the first one's size; the left pictures of the sheet stay in `shown`."""
+    wanted = set(sheet.chosen(len(pairs)))
+    shape = None
+    for k, pair in enumerate(progress(pairs, "tracking", len(pairs))):
+        left, right = images.read(pair, shape)
+        shape = left.shape
+        if k in wanted:
+            shown[k] = left
+        yield left, right
+
+
+def _say(target: Path, tracks: Tracks) -> None:
+    lengths = np.bincount(tracks.id)
+    counts = tracks.counts()
+    out.print(
+        f"{escape(str(target))}: {tracks.frame_count} frames with {len(tracks)} observations of "
+        f"{len(lengths)} tracks; a frame shows {np.median(counts):.0f} "
+        f"({counts.min()} to {counts.max()}), a track lives {np.median(lengths):.0f} frames "
+        f"({lengths.min()} to {lengths.max()})"
+    )
+    empty = np.nonzero(counts == 0)[0]
+    if len(empty):
+        out.print(
+            f"    -> frames without any track: {len(empty)}, the first is frame {empty[0]} "
+            "(counted from 0); they are not in the file"
+        )

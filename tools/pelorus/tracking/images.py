@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""Two folders of rectified pictures: which belong together, when they were taken, their pixels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import ImageFile
+
+from pelorus import arrays, foreign
+from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
+from pelorus.motion import Times
+
+Gray = NDArray[np.uint8]
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff")
+PAIRS_MIN = 3  # an id is admitted after as many frames
+SIDE_MIN_PX = 64  # less shows no track worth having
+IMAGE_BYTES_MAX = 1 << 28
+NAMES_SHOWN = 3
+NS_DIGITS = (16, 19)  # of a name that is a time in ns: from 1970 to what 63 bits hold
+
+
+class Pair(NamedTuple):
+    """The files of one frame."""
+
+    left: Path
+    right: Path
+
+
+# --- which belong together ------------------------------------------------------------------------
+
+
+def pairs(left: Path, right: Path) -> list[Pair]:
+    """By equal names, sorted; the files' endings may differ."""
+    if left.resolve() == right.resolve():
+        raise PelorusError(f"{left}: is given as the left and as the right folder; two are due")
+    lefts, rights = _pictures(left), _pictures(right)
+    _require_partners(left, lefts, right, rights)
+    _require_partners(right, rights, left, lefts)
+    if len(lefts) < PAIRS_MIN:
+        raise PelorusError(
+            f"{left}: has {len(lefts)} pictures; at least {PAIRS_MIN} are due, for a track is "
+            f"admitted after {PAIRS_MIN} frames"
+        )
+    return [Pair(lefts[name], rights[name]) for name in _in_order(lefts)]
+
+
+def _in_order(names: dict[str, Path]) -> list[str]:
+    """By number where all names are numbers, for 10 comes after 9."""
+    if all(name.isdecimal() for name in names):
+        return sorted(names, key=lambda name: (int(name), name))
+    return sorted(names)
+
+
+def _pictures(folder: Path) -> dict[str, Path]:
+    try:
+        files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
+    except OSError as error:
+        raise PelorusError(
+            f"{folder}: cannot be read as a folder: {error.strerror}; a folder of pictures "
+            f"({', '.join(SUFFIXES)}) is due"
+        ) from error
+    if not files:
+        raise PelorusError(f"{folder}: holds no picture; {', '.join(SUFFIXES)} are known")
+    found: dict[str, Path] = {}
+    for path in files:
+        if path.stem in found:
+            raise PelorusError(
+                f"{path}: the folder has {found[path.stem].name} too; one picture a name is due"
+            )
+        found[path.stem] = path
+    return found
+
+
+def _require_partners(
+    here: Path, names: dict[str, Path], there: Path, partners: dict[str, Path]
+) -> None:
+    alone = [path.name for name, path in names.items() if name not in partners]
+    if alone:
+        more = f" and {len(alone) - NAMES_SHOWN} more" if len(alone) > NAMES_SHOWN else ""
+        raise PelorusError(
+            f"{there}: lacks the partner of {', '.join(alone[:NAMES_SHOWN])}{more} in {here}; the "
+            "two pictures of a frame must have the same name"
+        )
+
+
+# --- when they were taken -------------------------------------------------------------------------
+
+
+def times(found: list[Pair], file: Path | None, rate_hz: float | None) -> Times:
+    """ns: from the file (a time in s a row), from the rate, or from names that are ns."""
+    if file is not None:
+        return _times_in(file, len(found))
+    if rate_hz is not None:
+        if not 0 < rate_hz < np.inf:
+            raise PelorusError(f"a rate of {rate_hz} Hz: must be positive")
+        return np.round(np.arange(len(found)) * 1e9 / rate_hz).astype(np.int64)
+    stems = [pair.left.stem for pair in found]
+    for stem in stems:
+        if not (stem.isdecimal() and NS_DIGITS[0] <= len(stem) <= NS_DIGITS[1]):
+            raise PelorusError(
+                f"{found[0].left.parent}: the name {stem} is no time in ns: when were the pictures "
+                "taken? --times FILE (a time in s a row) or --rate HZ is due, on the twists' clock"
+            )
+    if int(stems[-1]) >= 2**63:
+        raise PelorusError(f"{found[-1].left}: the name is no time: at most {2**63 - 1} ns is due")
+    t_ns = np.array([int(stem) for stem in stems], np.int64)
+    if (np.diff(t_ns) <= 0).any():
+        raise PelorusError(f"{found[0].left.parent}: two names are the same time in ns")
+    return t_ns
+
+
+def _times_in(file: Path, count: int) -> Times:
+    seconds = foreign.numbers(file, foreign.rows(file), 1)[:, 0]
+    if len(seconds) != count:
+        raise ForeignFileError(
+            file, f"has {len(seconds)} times", due=f"{count} are due, one for each pair of pictures"
+        )
+    return arrays.nanoseconds(file, "time", seconds)
+
+
+# --- what they show -------------------------------------------------------------------------------
+
+
+def read(pair: Pair, shape: tuple[int, ...] | None = None) -> tuple[Gray, Gray]:
+    """Left and right, both of this shape (rows, columns), else of equal shape."""
+    left = gray(pair.left)
+    due = left.shape if shape is None else shape
+    _require_shape(pair.left, left, due, "the first picture has")
+    right = gray(pair.right)
+    _require_shape(pair.right, right, due, "the left ones have")
+    return left, right
+
+
+def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> None:
+    if image.shape != due:
+        raise ForeignFileError(
+            path, f"has {_size(image.shape)} pixels", due=f"{_size(due)} are due, which {who}"
+        )
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return f"{shape[1]} x {shape[0]}"
+
+
+def gray(path: Path) -> Gray:
+    """(rows, columns) of 8 bits; of 16 bits the upper eight."""
+    packed = foreign.content(path, IMAGE_BYTES_MAX)
+    try:
+        parser = ImageFile.Parser()
+        parser.feed(packed)
+        image = parser.close()
+        wide = image.mode.startswith("I")
+        pixels = np.asarray(image) >> 8 if wide else np.asarray(image.convert("L"))
+    except Exception as error:  # its decoders raise a dozen kinds on damaged files
+        raise ForeignFileError(
+            path, f"cannot be read as a picture: {error}", due="a whole PNG, JPEG or PGM is due"
+        ) from error
+    if min(pixels.shape) < SIDE_MIN_PX:
+        raise ForeignFileError(
+            path,
+            f"has {_size(pixels.shape)} pixels",
+            due=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are due",
+        )
+    return np.ascontiguousarray(np.clip(pixels, 0, 255), np.uint8)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""What pelorus track writes: the CSV that `pelorus convert csv --stereo` reads, and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from pelorus.errors import writing
+from pelorus.motion import Times
+from pelorus.tracks import Tracks
+
+COLUMNS = "t_ns,id,uL_px,vL_px,uR_px,vR_px"
+
+
+def csv_text(t_ns: Times, tracks: Tracks) -> str:
+    """A row an observation; pixels to a thousandth."""
+    rows = zip(t_ns[tracks.frame].tolist(), tracks.id.tolist(), tracks.pixels.tolist(), strict=True)
+    lines = [f"{t},{id},{','.join(f'{p:.3f}' for p in pixels)}" for t, id, pixels in rows]
+    return "\n".join([COLUMNS, *lines, ""])
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """All of them whole, or none of them anew: they get their names when all are written."""
+    parts = {path: path.with_name(path.name + ".part") for path in files}
+    try:
+        for path, part in parts.items():
+            with writing(path):
+                if path.is_dir():
+                    raise IsADirectoryError(21, "is a folder")
+                part.write_bytes(files[path])
+        for path, part in parts.items():
+            with writing(path):
+                part.replace(path)
+    finally:
+        for part in parts.values():
+            with suppress(OSError):
+                part.unlink(missing_ok=True)

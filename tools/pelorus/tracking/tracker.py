@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""The tracks of a drive, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.errors import PelorusError
+from pelorus.layout import Floats
+from pelorus.tracking import matching
+from pelorus.tracking.images import PAIRS_MIN, Gray
+from pelorus.tracking.matching import Mask, Points
+from pelorus.tracking.settings import Settings
+from pelorus.tracks import Tracks
+
+ADMITTED_AFTER = PAIRS_MIN  # frames
+LOOP_PX = 1.0  # flow in the right picture and the match from the left one must meet
+MATCHED_MIN = 0.1  # of the new corners, over the drive
+
+
+class Live(NamedTuple):
+    """The tracks of a frame."""
+
+    id: NDArray[np.int64]
+    left: Points
+    right: Points
+
+    def where(self, good: Mask) -> Live:
+        return Live(self.id[good], self.left[good], self.right[good])
+
+
+def _nothing() -> Live:
+    return Live(np.empty(0, np.int64), matching.none(), matching.none())
+
+
+@dataclass
+class Tracker:
+    """Follows points from pair to pair; `frames` has what each frame shows."""
+
+    settings: Settings = field(default_factory=Settings)
+    frames: list[Live] = field(default_factory=list)
+    corners: int = 0  # new ones, so far
+    matched: int = 0  # of them found on the right
+    _before: tuple[Gray, Gray] | None = None
+    _next_id: int = 0
+
+    def add(self, left: Gray, right: Gray) -> None:
+        """The next frame."""
+        live = _nothing()
+        if self._before is not None:
+            live = self._followed(*self._before, left, right)
+        self.frames.append(self._filled(live, left, right))
+        self._before = left, right
+
+    def _followed(self, left0: Gray, right0: Gray, left: Gray, right: Gray) -> Live:
+        """What of the last frame's tracks is seen again, in both pictures and without a doubt."""
+        live, s = self.frames[-1], self.settings
+        there, good = matching.flow(left0, left, live.left, s)
+        before, now = live.where(good), there[good]
+        agree = matching.agreeing(before.left, now, s)
+        before, now = before.where(agree), now[agree]
+        on_right, good = matching.flow(right0, right, before.right, s)
+        before, now, on_right = before.where(good), now[good], on_right[good]
+        matched, good = matching.match(left, right, now, s, on_right)
+        meets = np.linalg.norm(matched - on_right, axis=1) <= LOOP_PX
+        apart = _apart(now, s.spacing_px / 2)
+        return Live(before.id, now, matched).where(good & meets & apart)
+
+    def _filled(self, live: Live, left: Gray, right: Gray) -> Live:
+        fresh = matching.new_corners(left, live.left, self.settings)
+        on_right, good = matching.match(left, right, fresh, self.settings)
+        self.corners += len(fresh)
+        self.matched += int(good.sum())
+        id = np.arange(self._next_id, self._next_id + int(good.sum()), dtype=np.int64)
+        self._next_id += len(id)
+        return Live(
+            np.concatenate((live.id, id)),
+            np.concatenate((live.left, fresh[good])),
+            np.concatenate((live.right, on_right[good])),
+        )
+
+    def tracks(self) -> Tracks:
+        """Those that lived for three frames at least, from their first frame on, numbered anew."""
+        frame = np.repeat(np.arange(len(self.frames)), [len(f.id) for f in self.frames])
+        id = np.concatenate([f.id for f in self.frames])
+        pixels = np.concatenate([np.hstack((f.left, f.right)) for f in self.frames])
+        lives = np.bincount(id, minlength=self._next_id) >= ADMITTED_AFTER
+        kept = lives[id]
+        number = np.cumsum(lives) - 1
+        return Tracks.from_rows(
+            len(self.frames), frame[kept], number[id[kept]], pixels[kept].astype(np.float64)
+        )
+
+
+def _apart(points: Points, distance_px: float) -> Mask:
+    """Of points that have run together the older one: a track follows no other's patch."""
+    far: Floats = np.linalg.norm(points[:, None].astype(np.float64) - points, axis=2)
+    close: Mask = np.tril(far < distance_px, -1)
+    return np.asarray(~close.any(axis=1), np.bool_)
+
+
+def track(
+    images: Iterable[tuple[Gray, Gray]], where: tuple[Path, Path], settings: Settings
+) -> Tracks:
+    """All of a drive; PelorusError where there is nothing to follow."""
+    settings.check()
+    tracker = Tracker(settings)
+    for left, right in images:
+        tracker.add(left, right)
+    if tracker.matched < MATCHED_MIN * tracker.corners:
+        raise PelorusError(
+            f"{where[1]}: shows {tracker.matched} of {tracker.corners} corners of {where[0]} in "
+            "the same row, further left; a rectified pair is due (are left and right swapped, "
+            "are they rectified, is the largest disparity too small?)"
+        )
+    tracks = tracker.tracks()
+    if not len(tracks):
+        raise PelorusError(
+            f"{where[0]}: no corner could be followed for {ADMITTED_AFTER} frames; pictures with "
+            "texture that overlap from frame to frame are due"
+        )
+    return tracks
