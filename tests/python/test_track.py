@@ -26,14 +26,16 @@ from pelorus.tracks import Tracks, triangulate
 from pelorus.trajectory import Trajectory
 from replay_drive import BIN, judged
 
+Monkeypatch = pytest.MonkeyPatch
 Frames = list[tuple[images.Gray, images.Gray]]
 
 CAMERA = Camera(fx_px=300, fy_px=300, cx_px=200, cy_px=100, baseline_m=0.5)
 WIDTH, HEIGHT = 400, 200
 FRAMES, RATE_HZ, SPEED_MPS = 10, 10.0, 2.0
-WALL_M, BOARD_M, BOARD_HALF_M = 12.0, 5.0, 0.8  # a board stands before a wall
+SIDE, FALL = 60, 5  # px, and px a frame: a thing that falls
+WALL_M, BOARD_M, BOARD_HALF_M = 12.0, 5.0, 1.3  # a board stands before a wall
 DRAWS = 5
-FEW = Settings(corners=40)
+FEW = Settings(corners=60)
 
 
 # --- pictures whose points are known --------------------------------------------------------------
@@ -50,7 +52,7 @@ def seen_from(x_m: float, z_m: float, shades: list[NDArray[np.float32]]) -> imag
     """What a camera at (x, 0, z) that looks along z sees of wall and board."""
     u, v = np.meshgrid(np.arange(WIDTH, dtype=np.float32), np.arange(HEIGHT, dtype=np.float32))
     picture = np.zeros((HEIGHT, WIDTH), np.float32)
-    for shade, depth_m, dots_per_m in zip(shades, (WALL_M, BOARD_M), (30, 60), strict=True):
+    for shade, depth_m, dots_per_m in zip(shades, (WALL_M, BOARD_M), (30, 80), strict=True):
         scale = (depth_m - z_m) / CAMERA.fx_px
         x, y = (u - CAMERA.cx_px) * scale + x_m, (v - CAMERA.cy_px) * scale
         column, row = (np.asarray(a * dots_per_m + 512, np.float32) for a in (x, y))
@@ -101,9 +103,9 @@ def test_every_track_stays_on_its_point(frames: Frames) -> None:
     assert (off_m < 0.5).mean() > 0.97
     near = points[:, 2] < (WALL_M + BOARD_M) / 2
     assert 5 < near.sum() < len(near) - 5
-    for id in np.unique(tracks.id):
-        mine = points[tracks.id == id]
-        assert np.linalg.norm(mine[:, :2] - mine[0, :2], axis=1).max() < 0.15
+    way_m = [np.ptp(points[tracks.id == id, :2], axis=0).max() for id in np.unique(tracks.id)]
+    assert np.median(way_m) < 0.03
+    assert (np.array(way_m) < 0.15).mean() > 0.95  # at the board's edge a patch shows the wall too
 
 
 def test_a_track_is_written_only_if_it_lived_three_frames_and_has_no_gap(frames: Frames) -> None:
@@ -118,7 +120,7 @@ def test_a_track_is_written_only_if_it_lived_three_frames_and_has_no_gap(frames:
 
 
 def test_corners_are_no_more_than_asked_for_and_spread_over_the_picture(frames: Frames) -> None:
-    for corners in (12, 40):
+    for corners in (12, 60):
         assert followed(frames, Settings(corners=corners)).counts().max() <= corners
     one_sided = frames[0][0].copy()
     one_sided[:, : WIDTH // 2] = 128 + (one_sided[:, : WIDTH // 2].astype(int) - 128) // 4
@@ -127,17 +129,23 @@ def test_corners_are_no_more_than_asked_for_and_spread_over_the_picture(frames: 
     assert (found[:, 0] < WIDTH / 2).sum() >= FEW.corners / 3
 
 
-def test_what_moves_on_its_own_is_voted_out(frames: Frames) -> None:
+def test_what_moves_on_its_own_is_voted_out(frames: Frames, monkeypatch: Monkeypatch) -> None:
     strange = [(left.copy(), right.copy()) for left, right in frames]
-    patch = texture(3)[:50, :50].astype(np.uint8)
+    thing = np.clip(2.5 * texture(3)[:SIDE, :SIDE] - 190, 0, 255).astype(np.uint8)
     for k, (left, right) in enumerate(strange):
-        top = 20 + 5 * k  # a thing that falls
-        left[top : top + 50, 300:350] = patch
-        right[top : top + 50, 280:330] = patch
-    tracks = followed(strange)
-    u, v = tracks.pixels[:, 0], tracks.pixels[:, 1] - 5 * tracks.frame
-    on_thing = (u > 308) & (u < 342) & (v > 28) & (v < 62)
-    assert on_thing.mean() < 0.02
+        rows = slice(20 + FALL * k, 20 + FALL * k + SIDE)
+        left[rows, 330 : 330 + SIDE] = thing
+        right[rows, 310 : 310 + SIDE] = thing
+
+    def on_thing() -> int:
+        tracks = followed(strange)
+        u, v = tracks.pixels[:, 0] - 330, tracks.pixels[:, 1] - 20 - FALL * tracks.frame
+        return int(((u > 8) & (u < SIDE - 8) & (v > 8) & (v < SIDE - 8)).sum())
+
+    with_ransac = on_thing()
+    monkeypatch.setattr(matching, "agreeing", lambda before, *_: np.ones(len(before), np.bool_))
+    assert on_thing() > 30
+    assert with_ransac < 5
 
 
 # --- the command ----------------------------------------------------------------------------------
