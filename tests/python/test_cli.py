@@ -17,6 +17,7 @@ from pelorus.frames import End, Header, Stereo, Truth, Twist
 
 SUBCOMMANDS = [
     ("convert",),
+    ("track",),
     ("convert", "ece276a"),
     ("convert", "starry-night"),
     ("convert", "klt"),

@@ -22,6 +22,7 @@ PAIRS_MIN = 3  # an id is admitted after as many frames
 SIDE_MIN_PX = 64  # less shows no track worth having
 IMAGE_BYTES_MAX = 1 << 28
 NAMES_SHOWN = 3
+RATES_HZ = (1e-3, 1e5)
 NS_DIGITS = (16, 19)  # of a name that is a time in ns: from 1970 to what 63 bits hold
 
 
@@ -97,8 +98,10 @@ def times(found: list[Pair], file: Path | None, rate_hz: float | None) -> Times:
     if file is not None:
         return _times_in(file, len(found))
     if rate_hz is not None:
-        if not 0 < rate_hz < np.inf:
-            raise PelorusError(f"a rate of {rate_hz} Hz: must be positive")
+        if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
+            raise PelorusError(
+                f"a rate of {rate_hz:g} Hz: {RATES_HZ[0]:g} to {RATES_HZ[1]:g} is due"
+            )
         return np.round(np.arange(len(found)) * 1e9 / rate_hz).astype(np.int64)
     stems = [pair.left.stem for pair in found]
     for stem in stems:
