@@ -104,12 +104,13 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
 
 /* A reading of a small sensor (plr_sensor) at reading->t_ns; predicts the pose to that time with the
  * last twist. A position corrects the whole state at once. A velocity (wheel, standstill) holds from
- * its sensor's second reading until the next one, at most for two intervals: in each step of the
+ * its sensor's second reading until the next one, at most for two intervals, which may be
+ * half a second each: in each step of the
  * motion it is weighed against the twist, and their difference corrects the twists' biases with the
- * next frame. One beyond the setting gate-d2 is rejected: PLR_OK, and result->used is false. `result`
+ * next frame. One beyond the setting gate-d2, and a position more than 900 m off, is rejected: PLR_OK, and result->used is false. `result`
  * may be NULL.
- * PLR_E_ARGUMENT no such sensor, axes outside 1 to 7, or a sigma that is not positive;
- * PLR_E_NOT_FINITE; PLR_E_RANGE a value beyond 1e9, an arm beyond 1 km, a sigma beyond 1e6, or the
+ * PLR_E_ARGUMENT no such sensor, axes that it cannot measure, or a sigma that is not positive;
+ * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4 or a position beyond 1e9, an arm beyond 1 km, a sigma beyond 1e6, or the
  * prediction would be more than pi rad or 1 km; PLR_E_TIME before the first twist; PLR_E_LATE earlier
  * than the filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in mapping. */
 plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,

@@ -168,6 +168,7 @@ typedef struct plr_session {
     plr_start start;
     uint32_t start_resets;
     plr_held_twists held;
+    plr_held_readings held_readings;
     plr_known_map known;
     plr_clock_watch watch;
     plr_budget budget;

@@ -10,7 +10,8 @@ extern "C" {
 #endif
 
 enum {
-    PLR_SESSION_HELD_TWISTS = 64, /* most twists that wait because of the setting twist-delay */
+    PLR_SESSION_HELD_READINGS = 24, /* most readings of small sensors that wait with them */
+    PLR_SESSION_HELD_TWISTS = 64,   /* most twists that wait because of the setting twist-delay */
     PLR_SESSION_AGREEING = 3 /* messages that must agree before the session follows a clock that
                                 has jumped: src/session/reanchor.h */
 };
@@ -33,6 +34,12 @@ typedef struct plr_held_twists {
     unsigned first, count;
     plr_twist_message twists[PLR_SESSION_HELD_TWISTS];
 } plr_held_twists;
+
+/* Readings of small sensors that wait with the twists, ascending by time. */
+typedef struct plr_held_readings {
+    unsigned count;
+    plr_reading readings[PLR_SESSION_HELD_READINGS];
+} plr_held_readings;
 
 /* Landmarks of known position, ascending by id. */
 typedef struct plr_known_map {

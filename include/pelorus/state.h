@@ -77,6 +77,7 @@ typedef struct plr_slot {
     plr_real innovation_sum[3];   /* sum of its whitened innovations, older ones weighted less */
     plr_real innovation_variance; /* the variance of innovation_sum if they are white noise */
     plr_real anchor[PLR_ROWS];    /* its pixels (uL, uR, v) when the body last began to stand */
+    plr_time_ns anchor_ns;        /* when that was */
     uint8_t anchored;             /* 1: anchor is filled */
     uint8_t known;                /* 1: given by a map source or plr_filter_insert_known */
     uint8_t moving;               /* 1: the innovations are not white: the point moves */
@@ -99,11 +100,11 @@ typedef struct plr_motion {
 /* A velocity that a small sensor measured: z = M (v, w) + noise. It holds until its next reading;
  * src/process/velocity.h. */
 typedef struct plr_held_velocity {
-    plr_time_ns t_ns, until_ns;
+    plr_time_ns t_ns, until_ns; /* of the reading; when it ceases to hold */
+    plr_time_ns interval_ns;    /* since the reading before it; 0: not known */
     plr_real z[PLR_ROWS];
     plr_real M[PLR_ROWS * PLR_POSE_DIM];
     plr_real density[PLR_ROWS]; /* variance times the seconds between readings */
-    uint32_t interval_ns;       /* between the last two held; 0: not known */
     uint8_t known;              /* 0: the sensor has never spoken */
 } plr_held_velocity;
 
@@ -224,7 +225,6 @@ typedef struct plr_filter {
     plr_real reading[PLR_POSE_DIM]; /* last twist */
     plr_motion motion;
     uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
-    plr_time_ns still_since_ns;              /* no pixel has moved since; 0: one has */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];

@@ -309,6 +309,17 @@ static uint32_t hash_of_pixels(const plr_observation *o) {
 }
 
 /* True if the motion by twists since the picture was new is larger than its noise. */
+void plr_consistency_note_motion(plr_filter *f) {
+    plr_consistency *c = &f->consistency;
+    const plr_motion *m = &f->motion;
+    plr_real turn[3];
+    plr_turn_of(turn, m->E);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        c->frozen_motion[k] += k < 3 ? m->p[k] : turn[k - 3];
+        c->frozen_variance[k] += m->Q[(PLR_POSE_DIM + 1) * k];
+    }
+}
+
 static bool has_moved(plr_filter *f) {
     plr_consistency *c = &f->consistency;
     const plr_motion *m = &f->motion;
@@ -347,14 +358,7 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
         c->frozen = 1;
         return true;
     }
-    const plr_motion *m =
-        &f->motion; /* this frame is used, and ends what is pending in f->motion */
-    plr_real turn[3];
-    plr_turn_of(turn, m->E);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        c->frozen_motion[k] += k < 3 ? m->p[k] : turn[k - 3];
-        c->frozen_variance[k] += m->Q[(PLR_POSE_DIM + 1) * k];
-    }
+    plr_consistency_note_motion(f); /* this frame is used, and ends what is pending in f->motion */
     return false;
 }
 

@@ -174,7 +174,6 @@ plr_status plr_filter_reset(plr_filter *f) {
     plr_motion_clear(&f->motion);
     plr_velocity_forget(f);
     memset(f->readings_rejected, 0, sizeof f->readings_rejected);
-    f->still_since_ns = 0;
     f->count = 0;
     f->frame_number = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;

@@ -69,6 +69,13 @@ static bool lacks_twists(plr_filter *f) {
     return refused || !f->reading_valid || held > HELD_INTERVALS * (double)f->interval_s + HELD_S;
 }
 
+static uint32_t rejected_readings(const plr_filter *f) {
+    for (unsigned i = 0; i < PLR_SENSORS; i++)
+        if (f->readings_rejected[i] >= REJECTED_READINGS)
+            return PLR_REASON_READINGS_REJECTED;
+    return 0;
+}
+
 static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
                              const plr_report *report) {
     uint32_t reasons = 0;
@@ -101,9 +108,7 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_BUDGET;
     if (events->recovered)
         reasons |= PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
-    for (unsigned i = 0; i < PLR_SENSORS; i++)
-        if (f->readings_rejected[i] >= REJECTED_READINGS)
-            reasons |= PLR_REASON_READINGS_REJECTED;
+    reasons |= rejected_readings(f);
     if (lacks_twists(f))
         reasons |= PLR_REASON_NO_TWISTS;
     return reasons;
@@ -181,6 +186,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
         (!f->reading_valid || f->totals.twists_refused != f->refused_before ||
          health->seconds_without_twist > HELD_INTERVALS * (double)f->interval_s + HELD_S))
         health->reasons |= PLR_REASON_NO_TWISTS;
+    health->reasons |= rejected_readings(f);
     health->health = health_of(health->reasons, lost_by(f, now));
     return PLR_OK;
 }

@@ -5,12 +5,14 @@
 
 #include <string.h>
 
+#include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "filter/predict.h"
 #include "math/dense.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "process/twist.h"
 #include "process/velocity.h"
 #include "sensor/sensor.h"
@@ -20,13 +22,19 @@
 /* Beyond this a lever arm or a sigma is an error of the sender, m and so on. */
 #define MAX_ARM   1e3
 #define MAX_SIGMA 1e6
+/* A correction by more than this is not one: the pose has to be set, m. */
+#define MAX_STEP PLR_R(900)
+/* A reading may be this many times epsilon sharper than its prediction, in variance: a variance that
+ * shrinks by more digits than a number has is lost. */
+#define SHARPEST PLR_R(256)
 
 static plr_status check_numbers(const plr_reading *reading) {
-    if (!plr_sensor_of(reading->sensor) || reading->axes < 1 || reading->axes > 7)
+    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
+    if (!kind || reading->axes < 1 || (reading->axes & ~kind->axes) != 0)
         return PLR_E_ARGUMENT;
     if (!plr_all_finite(reading->value, 3) || !plr_all_finite(reading->at_B_m, 3))
         return PLR_E_NOT_FINITE;
-    if (!plr_all_within(reading->value, 3, PLR_MAX_POSITION) ||
+    if (!plr_all_within(reading->value, 3, kind->most_value) ||
         !plr_all_within(reading->at_B_m, 3, MAX_ARM))
         return PLR_E_RANGE;
     for (unsigned i = 0; i < 3; i++) {
@@ -79,7 +87,7 @@ static void sandwich(plr_real S[9], const plr_real M[PLR_ROWS * PLR_POSE_DIM],
 }
 
 static bool accepts(const plr_filter *f, plr_real d2, plr_reading_result *result) {
-    result->d2 += (double)d2;
+    result->d2 += d2 > 0 ? (double)d2 : 0;
     return d2 >= 0 && plr_is_finite(d2) && (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
 }
 
@@ -123,11 +131,16 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = 1;
     kind->of_state(f, reading, &m);
+    PLR_ASSERT(m.H.terms == 1 && m.H.term[0].row == plr_row_of(f, PLR_BLOCK_POSE));
     plr_motion_pose_covariance(f, P_xi);
+    plr_consistency_enlarge(f, P_xi);
     sandwich(S, m.H.term[0].H, P_xi);
-    if (!accepts(f, distance2(S, m.R, m.r), result))
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        m.R[i] = PLR_FMA(SHARPEST * PLR_EPSILON, S[4 * i], m.R[i]);
+    if (!accepts(f, distance2(S, m.R, m.r), result) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
     if (f->motion.pending) {
+        plr_consistency_note_motion(f);
         plr_applied_motion motion;
         plr_motion_prior(f, &motion);
         plr_predict_apply(f, &motion);
@@ -136,9 +149,10 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
         const plr_measurement_source sensed = {given, &m};
         (void)plr_correct(f, &sensed, 1);
     }
-    if (f->diverged)
-        plr_filter_recover(f);
-    return true;
+    if (!f->diverged)
+        return true;
+    plr_filter_recover(f);
+    return false;
 }
 
 bool plr_measure(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
@@ -147,7 +161,8 @@ bool plr_measure(plr_filter *f, const plr_reading *reading, plr_reading_result *
         kind->of_twist ? hold(f, kind, reading, result) : apply(f, kind, reading, result);
     f->totals.readings++;
     f->totals.readings_gated += !result->used;
-    if (result->used && kind->bounds_position)
+    const uint8_t bounding = kind->bounds_position;
+    if (result->used && bounding != 0 && (reading->axes & bounding) == bounding)
         f->last_position_ns = f->t_ns;
     return result->used;
 }

@@ -27,6 +27,8 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
     f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
+    for (unsigned slot = 0; slot < f->count; slot++)
+        f->slots[slot].anchored = 0;
     if (!P_moved) {
         plr_guard_seal(f);
         return PLR_OK;

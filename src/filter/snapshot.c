@@ -201,6 +201,8 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         f->diverged = 0;
         plr_velocity_forget(f); /* their clock is not the one that goes on */
         memset(f->slots, 0, sizeof f->slots);
+        memset(f->readings_rejected, 0, sizeof f->readings_rejected);
+        f->last_position_ns = 0;
     }
     for (unsigned slot = 0; slot < count.landmarks; slot++)
         PASS(c, f ? &f->slots[slot] : NULL, slot);

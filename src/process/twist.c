@@ -61,12 +61,17 @@ static void displacement(const plr_filter *f, const plr_real reading[PLR_POSE_DI
         xi[i] = seconds * (reading[i] - f->bias[i]);
 }
 
+/* False for NaN too. */
+static bool is_within_limits(const plr_real xi[PLR_POSE_DIM]) {
+    const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
+    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
+}
+
 plr_status plr_twist_check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                            plr_real seconds) {
     plr_real xi[PLR_POSE_DIM];
     displacement(f, reading, seconds, xi);
-    const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
-    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
+    return is_within_limits(xi) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* Variances of a step's displacement, (rho, theta). */
@@ -86,14 +91,19 @@ void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
     plr_motion *m = &f->motion;
-    const bool fused = plr_velocity_is_held(f);
+    bool fused = plr_velocity_is_held(f, t_ns);
     displacement(f, reading, seconds, xi);
     step_variance(f, seconds, interval, variance);
     if (fused) {
         memset(V, 0, sizeof V);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             V[(PLR_POSE_DIM + 1) * i] = variance[i];
-        plr_velocity_fuse(f, seconds, xi, V, T);
+        plr_velocity_fuse(f, t_ns, seconds, xi, V, T);
+        if (!is_within_limits(xi)) { /* no step of a robot: the velocities are wrong */
+            plr_velocity_forget(f);
+            displacement(f, reading, seconds, xi);
+            fused = false;
+        }
     }
     plr_se3_expm1(E, p, xi);
     plr_se3_rotation(R, E);

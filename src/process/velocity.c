@@ -5,26 +5,43 @@
 
 #include "math/dense.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "state/blocks.h"
+#include "state/covariance.h"
 
 /* If the next reading does not come, the last one is held for so many of the sensor's intervals. */
 enum { HELD_INTERVALS = 2 };
 
+/* A velocity that was measured longer ago than this says too little about the present one. */
+#define LONGEST_INTERVAL_NS UINT64_C(500000000)
+/* A held velocity that differs from a step by more is dropped until the next reading: it would be
+ * one step in 5,000 by chance. In units of the setting gate-d2. */
+#define CONTRADICTED PLR_R(1.5)
+
+/* The seconds between readings, in ns: 0 where they are not known yet, or too long. Two readings of one
+ * time share their interval. */
+static plr_time_ns interval_of(const plr_held_velocity *held, plr_time_ns t_ns) {
+    if (!held->known || t_ns < held->t_ns)
+        return 0;
+    if (t_ns == held->t_ns)
+        return held->interval_ns;
+    const plr_time_ns interval = t_ns - held->t_ns;
+    return interval <= LONGEST_INTERVAL_NS ? interval : 0;
+}
+
 void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows) {
+    PLR_ASSERT(which < PLR_HELD_VELOCITIES);
+    if (!f->velocities_known)
+        plr_velocity_forget(f);
     plr_held_velocity *held = &f->velocities.held[which];
-    const bool first = !held->known || f->t_ns <= held->t_ns;
-    const plr_time_ns interval = first ? 0 : f->t_ns - held->t_ns;
-    /* after a pause, or after a lost or rejected reading, the interval of before */
-    const bool paused = held->interval_ns > 0 && held->interval_ns < interval;
-    const plr_time_ns usual = paused ? held->interval_ns : interval;
-    held->interval_ns = interval < UINT32_MAX ? (uint32_t)interval : UINT32_MAX;
+    held->interval_ns = interval_of(held, f->t_ns);
     held->known = f->velocities_known = 1;
     held->t_ns = f->t_ns;
-    held->until_ns = f->t_ns + (usual < f->par.max_gap_ns ? HELD_INTERVALS * usual : 0);
+    held->until_ns = f->t_ns + HELD_INTERVALS * held->interval_ns;
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)
-        held->density[r] = rows->R[r] * (plr_real)((double)interval * 1e-9);
+        held->density[r] = rows->R[r] * (plr_real)((double)held->interval_ns * 1e-9);
 }
 
 void plr_velocity_forget(plr_filter *f) {
@@ -37,13 +54,14 @@ void plr_velocity_forget_bias(plr_filter *f) {
     memset(f->velocities.bias_eta, 0, sizeof f->velocities.bias_eta);
 }
 
-static bool holds(const plr_filter *f, const plr_held_velocity *held) {
-    return held->known && f->t_ns < held->until_ns;
+/* For a step from the filter's time to end_ns. */
+static bool holds(const plr_filter *f, const plr_held_velocity *held, plr_time_ns end_ns) {
+    return held->known && f->t_ns >= held->t_ns && end_ns <= held->until_ns;
 }
 
-bool plr_velocity_is_held(const plr_filter *f) {
+bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
     for (unsigned i = 0; f->velocities_known && i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->velocities.held[i]))
+        if (holds(f, &f->velocities.held[i], end_ns))
             return true;
     return false;
 }
@@ -86,34 +104,75 @@ static void correct(plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE],
     memcpy(T, next, sizeof next);
 }
 
-/* Corrects a step by one held velocity: s z = M xi + noise of variance s density. */
-static void fuse_one(plr_filter *f, const plr_held_velocity *held, plr_real seconds,
-                     plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
-                     plr_real T[PLR_POSE_SQUARE]) {
-    plr_real Kt[PLR_ROWS * PLR_POSE_DIM] = {0}, Y[PLR_ROWS * PLR_POSE_DIM] = {0};
-    plr_real full[9] = {0}, S[6], e[PLR_ROWS], R[PLR_ROWS];
-    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, held->M, PLR_POSE_DIM, V, PLR_POSE_DIM, Kt,
+/* e = s z - M xi, and S = M V M^T + s density. What is below rounding in M V M^T adds to the noise. */
+static void compare(const plr_held_velocity *held, plr_real seconds,
+                    const plr_real xi[PLR_POSE_DIM], const plr_real V[PLR_POSE_SQUARE],
+                    plr_real MV[PLR_ROWS * PLR_POSE_DIM], plr_real R[PLR_ROWS],
+                    plr_real e[PLR_ROWS], plr_real S[9]) {
+    memset(MV, 0, PLR_ROWS * PLR_POSE_DIM * sizeof *MV);
+    memset(S, 0, 9 * sizeof *S);
+    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, held->M, PLR_POSE_DIM, V, PLR_POSE_DIM, MV,
                 PLR_POSE_DIM);
-    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, Kt, PLR_POSE_DIM, held->M, PLR_POSE_DIM, full,
+    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, MV, PLR_POSE_DIM, held->M, PLR_POSE_DIM, S,
                 PLR_ROWS);
-    for (unsigned r = 0, k = 0; r < PLR_ROWS; r++) {
-        R[r] = held->density[r] * seconds;
+    for (unsigned r = 0; r < PLR_ROWS; r++) {
+        R[r] = PLR_FMA(PLR_R(64) * PLR_EPSILON, S[4 * r], held->density[r] * seconds);
         e[r] = seconds * held->z[r];
         for (unsigned c = 0; c < PLR_POSE_DIM; c++)
             e[r] = PLR_FMA(-held->M[PLR_POSE_DIM * r + c], xi[c], e[r]);
-        full[4 * r] += R[r];
-        for (unsigned c = r; c < PLR_ROWS; c++)
-            S[k++] = full[3 * c + r];
+        S[4 * r] += R[r];
     }
-    if (!plr_cholesky3(S))
-        return;
+}
+
+/* U of U^T U = S + Y P_b Y^T; Y NULL: of S alone. */
+static bool factorise(const plr_filter *f, const plr_real S[9],
+                      const plr_real Y[PLR_ROWS * PLR_POSE_DIM], plr_real U[6]) {
+    plr_real sum[9];
+    memcpy(sum, S, sizeof sum);
+    if (Y) {
+        plr_real P_b[PLR_POSE_SQUARE], YP[PLR_ROWS * PLR_POSE_DIM] = {0};
+        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+        plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, Y, PLR_POSE_DIM, P_b, PLR_POSE_DIM, YP,
+                    PLR_POSE_DIM);
+        plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, YP, PLR_POSE_DIM, Y, PLR_POSE_DIM, sum,
+                    PLR_ROWS);
+    }
+    for (unsigned r = 0, k = 0; r < PLR_ROWS; r++)
+        for (unsigned c = r; c < PLR_ROWS; c++)
+            U[k++] = sum[3 * c + r];
+    return plr_cholesky3(U);
+}
+
+/* Is the difference e more than noise and the biases' uncertainty explain? Y = -s M T. */
+static bool contradicts(const plr_filter *f, const plr_real S[9],
+                        const plr_real Y[PLR_ROWS * PLR_POSE_DIM], const plr_real e[PLR_ROWS]) {
+    plr_real U[6], x[PLR_ROWS];
+    if (!factorise(f, S, plr_has_block(f, PLR_BLOCK_BIAS) ? Y : NULL, U))
+        return true;
+    memcpy(x, e, sizeof x);
+    plr_solve3_transposed(1, U, x);
+    const plr_real d2 = plr_dot3(x, x);
+    return !plr_is_finite(d2) || (f->par.gate_d2 > 0 && d2 > CONTRADICTED * f->par.gate_d2);
+}
+
+/* Corrects a step by one held velocity: s z = M xi + noise of variance s density. */
+static void fuse_one(plr_filter *f, plr_held_velocity *held, plr_real seconds,
+                     plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
+                     plr_real T[PLR_POSE_SQUARE]) {
+    plr_real Kt[PLR_ROWS * PLR_POSE_DIM], Y[PLR_ROWS * PLR_POSE_DIM] = {0};
+    plr_real S[9], U[6], e[PLR_ROWS], R[PLR_ROWS];
+    compare(held, seconds, xi, V, Kt, R, e, S);
     plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, held->M, PLR_POSE_DIM, T, PLR_POSE_DIM, Y,
                 PLR_POSE_DIM);
-    plr_solve3_transposed(PLR_POSE_DIM, S, Kt);
-    plr_solve3_transposed(PLR_POSE_DIM, S, Y);
-    plr_solve3_transposed(1, S, e);
     for (unsigned i = 0; i < PLR_ROWS * PLR_POSE_DIM; i++)
         Y[i] *= -seconds;
+    if (contradicts(f, S, Y, e) || !factorise(f, S, NULL, U)) {
+        held->until_ns = held->t_ns; /* until its next reading */
+        return;
+    }
+    plr_solve3_transposed(PLR_POSE_DIM, U, Kt);
+    plr_solve3_transposed(PLR_POSE_DIM, U, Y);
+    plr_solve3_transposed(1, U, e);
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         add_bias_information(f, Y, e);
     for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
@@ -121,20 +180,21 @@ static void fuse_one(plr_filter *f, const plr_held_velocity *held, plr_real seco
             xi[c] = PLR_FMA(Kt[PLR_POSE_DIM * r + c], e[r], xi[c]);
         /* K^T = U^-1 (U^-T M V) */
         plr_real *k0 = Kt + c, *k1 = k0 + PLR_POSE_DIM, *k2 = k1 + PLR_POSE_DIM;
-        *k2 /= S[5];
-        *k1 = PLR_FMA(-S[4], *k2, *k1) / S[3];
-        *k0 = PLR_FMA(-S[2], *k2, PLR_FMA(-S[1], *k1, *k0)) / S[0];
+        *k2 /= U[5];
+        *k1 = PLR_FMA(-U[4], *k2, *k1) / U[3];
+        *k0 = PLR_FMA(-U[2], *k2, PLR_FMA(-U[1], *k1, *k0)) / U[0];
     }
     correct(V, T, Kt, held, R);
 }
 
-void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM],
-                       plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE]) {
+void plr_velocity_fuse(plr_filter *f, plr_time_ns end_ns, plr_real seconds,
+                       plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
+                       plr_real T[PLR_POSE_SQUARE]) {
     memset(T, 0, PLR_POSE_SQUARE * sizeof *T);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         T[(PLR_POSE_DIM + 1) * i] = 1;
     for (unsigned i = 0; i < PLR_HELD_VELOCITIES; i++)
-        if (holds(f, &f->velocities.held[i]))
+        if (holds(f, &f->velocities.held[i], end_ns))
             fuse_one(f, &f->velocities.held[i], seconds, xi, V, T);
 }
 

@@ -26,13 +26,15 @@ void plr_velocity_forget(plr_filter *f);
 /* Drops the information about the biases, which a correction has used. */
 void plr_velocity_forget_bias(plr_filter *f);
 
-/* True if rows are held for a step that begins now. */
-bool plr_velocity_is_held(const plr_filter *f);
+/* True if rows are held for a step from now to end_ns. */
+bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns);
 
-/* Corrects a step of `seconds`, with displacement xi and its covariance V, 6x6, by all held rows.
+/* Corrects a step of `seconds` to end_ns, with displacement xi and its covariance V, 6x6, by all held
+ * rows. Rows that the step contradicts are dropped until their sensor's next reading.
  * The derivative of the step's error by the biases' error is then -seconds T, T 6x6. */
-void plr_velocity_fuse(plr_filter *f, plr_real seconds, plr_real xi[PLR_POSE_DIM],
-                       plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE]);
+void plr_velocity_fuse(plr_filter *f, plr_time_ns end_ns, plr_real seconds,
+                       plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
+                       plr_real T[PLR_POSE_SQUARE]);
 
 /* True if there is information about the biases for plr_velocity_bias_rows. */
 bool plr_velocity_informs_bias(const plr_filter *f);

@@ -27,4 +27,5 @@ static void measure(const plr_filter *f, const plr_reading *reading, plr_measure
     }
 }
 
-const plr_sensor_kind plr_position = {.of_state = measure, .bounds_position = true};
+const plr_sensor_kind plr_position = {
+    .of_state = measure, .axes = 7, .most_value = 1e9, .bounds_position = 3};

@@ -21,8 +21,12 @@ typedef struct plr_sensor_kind {
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 
-    /* While it is used the position cannot drift away: a dark camera alone is no LOST. */
-    bool bounds_position;
+    uint8_t axes;      /* numbers that it can measure: bits as in plr_reading.axes */
+    double most_value; /* a larger value is an error of the sender */
+
+    /* While these axes are all measured, the position cannot drift away: a dark camera alone is no
+     * LOST. 0: no such sensor. */
+    uint8_t bounds_position;
 } plr_sensor_kind;
 
 /* The kind with this number (plr_sensor); NULL if there is none. */

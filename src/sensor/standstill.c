@@ -26,7 +26,8 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
     return 2;
 }
 
-const plr_sensor_kind plr_standstill = {.of_twist = measure, .place = 1};
+const plr_sensor_kind plr_standstill = {
+    .of_twist = measure, .place = 1, .axes = 3, .most_value = 1e4};
 
 /* The squared distance of a landmark's pixels from those that it was anchored at, in their
  * noise. */
@@ -39,16 +40,19 @@ static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real
     return sum;
 }
 
-static void anchor(plr_slot *slot, const plr_real z[PLR_ROWS]) {
+static void anchor(const plr_filter *f, plr_slot *slot, const plr_real z[PLR_ROWS]) {
     memcpy(slot->anchor, z, sizeof slot->anchor);
+    slot->anchor_ns = f->t_ns;
     slot->anchored = 1;
 }
 
-/* True if the pixels of all landmarks together have not moved from their anchors. A landmark
- * without an anchor gets one. */
-static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n) {
+/* Compares the pixels of the landmarks with their anchors, and anchors those that have none. Returns
+ * whether together they have not moved; *old_rows receives the rows with an anchor of a second ago and
+ * more, which alone show that a slow body stands. */
+static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned *old_rows) {
     plr_real distance2 = 0;
     unsigned rows = 0;
+    *old_rows = 0;
     for (unsigned k = 0; k < n; k++) {
         plr_real z[PLR_ROWS];
         if (f->work.slot_of[k] == PLR_NO_SLOT)
@@ -56,35 +60,25 @@ static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n) {
         plr_slot *slot = &f->slots[f->work.slot_of[k]];
         plr_stereo_rows(z, &frame->observations[f->work.order[k]]);
         if (!slot->anchored) {
-            anchor(slot, z);
-            continue;
+            anchor(f, slot, z);
+        } else if (f->t_ns - slot->anchor_ns >= STILL_NS) {
+            distance2 += moved2(f, slot, z);
+            rows += PLR_ROWS;
         }
-        distance2 += moved2(f, slot, z);
-        rows += PLR_ROWS;
     }
+    *old_rows = rows;
     const plr_real mean = (plr_real)rows;
-    return rows >= MIN_ROWS && distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
-}
-
-static void anchor_all(plr_filter *f, const plr_frame *frame, unsigned n) {
-    for (unsigned slot = 0; slot < f->count; slot++)
-        f->slots[slot].anchored = 0;
-    for (unsigned k = 0; k < n; k++) {
-        plr_real z[PLR_ROWS];
-        if (f->work.slot_of[k] == PLR_NO_SLOT)
-            continue;
-        plr_stereo_rows(z, &frame->observations[f->work.order[k]]);
-        anchor(&f->slots[f->work.slot_of[k]], z);
-    }
+    return distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
 }
 
 bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
                             plr_reading *reading) {
+    unsigned old_rows;
     if (f->config.standstill_sigma_mps <= 0)
         return false;
-    if (!is_still(f, frame, n)) {
-        anchor_all(f, frame, n);
-        f->still_since_ns = f->t_ns;
+    if (!is_still(f, frame, n, &old_rows)) {
+        for (unsigned slot = 0; slot < f->count; slot++)
+            f->slots[slot].anchored = 0;
         return false;
     }
     memset(reading, 0, sizeof *reading);
@@ -92,5 +86,5 @@ bool plr_standstill_is_seen(plr_filter *f, const plr_frame *frame, unsigned n,
     reading->sensor = PLR_SENSOR_STANDSTILL;
     reading->axes = 3;
     reading->sigma[0] = reading->sigma[1] = f->config.standstill_sigma_mps;
-    return f->t_ns - f->still_since_ns >= STILL_NS;
+    return old_rows >= MIN_ROWS;
 }

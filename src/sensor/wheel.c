@@ -26,4 +26,4 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
     return 1;
 }
 
-const plr_sensor_kind plr_wheel = {.of_twist = measure, .place = 0};
+const plr_sensor_kind plr_wheel = {.of_twist = measure, .place = 0, .axes = 7, .most_value = 1e4};

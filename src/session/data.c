@@ -30,7 +30,22 @@ static plr_status predict(plr_session *s, const plr_twist_message *twist) {
     return status;
 }
 
+static void apply_reading(plr_session *s, const plr_reading *reading) {
+    const plr_status status = plr_filter_measure(&s->filter, reading, NULL);
+    if (status != PLR_OK)
+        plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, status, NULL);
+}
+
+/* The readings that wait and are older. */
+static void apply_readings_before(plr_session *s, plr_time_ns t_ns) {
+    plr_reading reading;
+    while (plr_held_pop_older(&s->held_readings, t_ns, &reading))
+        apply_reading(s, &reading);
+}
+
+/* A twist, after the readings that wait and are older than it. */
 static void apply_twist(plr_session *s, const plr_twist_message *twist) {
+    apply_readings_before(s, twist->t_ns);
     plr_start_apply_until(s, twist->t_ns);
     plr_status status = predict(s, twist);
     if (plr_reanchor_follow(s, twist->t_ns, status))
@@ -45,9 +60,14 @@ void plr_data_apply_held(plr_session *s, plr_time_ns until_ns) {
     plr_twist_message twist;
     while (plr_held_pop_until(&s->held, until_ns, &twist))
         apply_twist(s, &twist);
+    apply_readings_before(s, until_ns);
 }
 
-static void delay_twist(plr_session *s, const plr_twist_message *twist, plr_time_ns delay_ns) {
+static plr_time_ns delay_ns(const plr_session *s) {
+    return (plr_time_ns)(plr_filter_config(&s->filter)->twist_delay_s * 1e9 + 0.5);
+}
+
+static void delay_twist(plr_session *s, const plr_twist_message *twist) {
     plr_twist_message due;
     if (plr_held_contradicts(&s->held, twist->t_ns))
         plr_data_apply_held(s, UINT64_MAX);
@@ -56,16 +76,14 @@ static void delay_twist(plr_session *s, const plr_twist_message *twist, plr_time
         apply_twist(s, &due);
     }
     plr_held_push(&s->held, twist);
-    while (plr_held_pop_due(&s->held, delay_ns, &due))
+    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
         apply_twist(s, &due);
 }
 
 void plr_data_use_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
-    const double delay_s = plr_filter_config(&s->filter)->twist_delay_s;
-    const plr_time_ns delay_ns = (plr_time_ns)(delay_s * 1e9 + 0.5);
-    if (delay_ns > 0)
-        delay_twist(s, twist, delay_ns);
+    if (delay_ns(s) > 0)
+        delay_twist(s, twist);
     else
         apply_twist(s, twist);
 }
@@ -204,10 +222,17 @@ void plr_data_use_truth(plr_session *s) {
 
 void plr_data_use_reading(plr_session *s) {
     const plr_reading *reading = &s->in.as.reading;
-    plr_data_apply_held(s, reading->t_ns);
-    const plr_status status = plr_filter_measure(&s->filter, reading, NULL);
-    if (status != PLR_OK)
-        plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, status, NULL);
+    plr_reading oldest;
+    if (delay_ns(s) == 0) {
+        apply_reading(s, reading);
+        return;
+    }
+    if (s->held_readings.count == PLR_SESSION_HELD_READINGS &&
+        plr_held_pop_older(&s->held_readings, UINT64_MAX, &oldest)) {
+        s->totals.held_short++;
+        apply_reading(s, &oldest);
+    }
+    plr_held_insert(&s->held_readings, reading);
 }
 
 /* --- START among the data --- */

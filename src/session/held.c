@@ -46,3 +46,21 @@ bool plr_held_pop_due(plr_held_twists *held, plr_time_ns delay_ns, plr_twist_mes
         return false;
     return plr_held_pop(held, twist);
 }
+
+void plr_held_insert(plr_held_readings *held, const plr_reading *reading) {
+    PLR_ASSERT(held->count < PLR_SESSION_HELD_READINGS);
+    unsigned at = held->count++;
+    for (; at > 0 && held->readings[at - 1].t_ns > reading->t_ns; at--)
+        held->readings[at] = held->readings[at - 1];
+    held->readings[at] = *reading;
+}
+
+bool plr_held_pop_older(plr_held_readings *held, plr_time_ns t_ns, plr_reading *reading) {
+    if (held->count == 0 || held->readings[0].t_ns >= t_ns)
+        return false;
+    *reading = held->readings[0];
+    held->count--;
+    for (unsigned i = 0; i < held->count; i++)
+        held->readings[i] = held->readings[i + 1];
+    return true;
+}

@@ -31,4 +31,12 @@ bool plr_held_pop_due(plr_held_twists *held, plr_time_ns delay_ns, plr_twist_mes
 /* Removes the oldest twist; false if there is none. */
 bool plr_held_pop(plr_held_twists *held, plr_twist_message *twist);
 
+/* --- readings --- */
+
+/* Inserts a reading in order of time, behind those of the same time. There must be room. */
+void plr_held_insert(plr_held_readings *held, const plr_reading *reading);
+
+/* Removes the oldest reading, *reading, if it is older than t_ns; false if there is none such. */
+bool plr_held_pop_older(plr_held_readings *held, plr_time_ns t_ns, plr_reading *reading);
+
 #endif

@@ -12,12 +12,11 @@
 #include "support/reseal.h"
 #include "support/rig.h"
 #include "support/rigid.h"
+#include "support/small_sensors.h"
 #include "support/specimens.h"
 
 /* In a slow build fewer drives, and with them wider bounds. */
 enum { RUNS = PELORUS_SLOW_BUILD ? 4 : 20, DOF = 6 };
-
-static const double arm[3] = {0.4, -0.3, 0.2};
 
 typedef struct helpers {
     unsigned wheel_every, standstill_every, position_every; /* in steps of 10 ms; 0: none */
@@ -26,54 +25,11 @@ typedef struct helpers {
     double wheel_sigma, position_sigma;
 } helpers;
 
-static rng chance;
-
 void setUp(void) {
-    rig_set_up();
-    rig.options.landmarks = 300;
-    rig.options.most_seen = 20;
-    rig.options.velocity_sigma_mps = 0.2;
-    rig.options.gyro_sigma_radps = 0.02;
-    rig.config.pixel_sigma_px = rig.options.pixel_sigma_px;
-    each_axis(rig.config.velocity_sigma, rig.options.velocity_sigma_mps);
-    each_axis(rig.config.gyro_sigma, rig.options.gyro_sigma_radps);
-    rig.config.bias_gyro_sigma_radps = 0.002; /* so that dead reckoning stays nearly linear */
-    rig.config.gate_d2 = 40;                  /* wide: what it cuts off is missing in the errors */
+    small_sensors_set_up();
 }
 
 void tearDown(void) {
-}
-
-static plr_reading reading_of(plr_sensor sensor, uint8_t axes, double sigma) {
-    plr_reading reading = {.t_ns = rig.world.t_ns, .sensor = (uint8_t)sensor, .axes = axes};
-    each_axis(reading.sigma, sigma);
-    if (sensor != PLR_SENSOR_STANDSTILL)
-        memcpy(reading.at_B_m, arm, sizeof arm);
-    return reading;
-}
-
-static plr_reading wheel(uint8_t axes, double sigma) {
-    plr_reading reading = reading_of(PLR_SENSOR_WHEEL, axes, sigma);
-    plr_twist u;
-    scene_true_twist(&rig.world, &u);
-    const double *w = u.w_B_radps;
-    const double turn[3] = {w[1] * arm[2] - w[2] * arm[1], w[2] * arm[0] - w[0] * arm[2],
-                            w[0] * arm[1] - w[1] * arm[0]};
-    for (int i = 0; i < 3; i++)
-        reading.value[i] = u.v_B_mps[i] + turn[i] + sigma * rng_normal(&chance);
-    return reading;
-}
-
-static plr_reading position(uint8_t axes, double sigma) {
-    plr_reading reading = reading_of(PLR_SENSOR_POSITION, axes, sigma);
-    rigid_apply(reading.value, rig.world.T_WB, arm);
-    for (int i = 0; i < 3; i++)
-        reading.value[i] += sigma * rng_normal(&chance);
-    return reading;
-}
-
-static void measure(plr_reading reading) {
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(&rig.filter, &reading, NULL));
 }
 
 /* A step of 10 ms: a twist at its start, and what else is read then. */
@@ -124,10 +80,11 @@ static outcome drive(const helpers *with, unsigned steps) {
     outcome sum = {0};
     for (uint64_t seed = 1; seed <= RUNS; seed++) {
         double pose, bias, metres;
-        chance = rng_seeded(seed + 500);
+        small_sensors_chance = rng_seeded(seed + 500);
         rig.options.seed = seed;
-        rng_normals(&chance, rig.config.bias_velocity_sigma_mps, rig.options.bias, 3);
-        rng_normals(&chance, rig.config.bias_gyro_sigma_radps, rig.options.bias + 3, 3);
+        rng_normals(&small_sensors_chance, rig.config.bias_velocity_sigma_mps, rig.options.bias, 3);
+        rng_normals(&small_sensors_chance, rig.config.bias_gyro_sigma_radps, rig.options.bias + 3,
+                    3);
         rig_begin();
         for (unsigned k = 0; k < steps; k++)
             step(with, k);
@@ -209,7 +166,7 @@ static void test_positions_without_biases_too(void) {
     for (uint64_t seed = 1; seed <= RUNS; seed++) {
         plr_pose pose;
         double P[36], T[16], inverse[16], E[16], e[6], weighted[6];
-        chance = rng_seeded(seed + 900);
+        small_sensors_chance = rng_seeded(seed + 900);
         rig.options.seed = seed;
         rig_begin();
         for (unsigned k = 0; k < 1500; k++)
@@ -263,98 +220,6 @@ static void test_turning_wheels_before_a_still_picture_are_not_standing(void) {
     TEST_ASSERT_EQUAL_UINT32(0, readings_after(40));
 }
 
-/* ---------------------------------------------------------------- what is refused, and rejected */
-
-static void refuse(plr_reading reading, plr_status expected) {
-    plr_reading_result result;
-    rig_remember();
-    rig_demand_untouched(expected, plr_filter_measure(&rig.filter, &reading, &result));
-    TEST_ASSERT_EQUAL_INT(expected, result.status);
-    TEST_ASSERT_FALSE(result.used);
-    TEST_ASSERT_EQUAL_UINT32(rig.before.totals.readings_refused + 1,
-                             rig.filter.totals.readings_refused);
-}
-
-static void test_bad_readings_are_refused_and_change_nothing(void) {
-    plr_reading good = wheel(7, 0.1), bad;
-    refuse(good, PLR_E_TIME); /* before the first twist */
-    rig_twist();
-    good.t_ns = rig.world.t_ns;
-    bad = good, bad.sensor = PLR_SENSORS + 1, refuse(bad, PLR_E_ARGUMENT);
-    bad = good, bad.sensor = 0, refuse(bad, PLR_E_ARGUMENT);
-    bad = good, bad.axes = 0, refuse(bad, PLR_E_ARGUMENT);
-    bad = good, bad.axes = 8, refuse(bad, PLR_E_ARGUMENT);
-    bad = good, bad.value[1] = (double)NAN, refuse(bad, PLR_E_NOT_FINITE);
-    bad = good, bad.at_B_m[2] = (double)INFINITY, refuse(bad, PLR_E_NOT_FINITE);
-    bad = good, bad.sigma[0] = (double)NAN, refuse(bad, PLR_E_NOT_FINITE);
-    bad = good, bad.sigma[0] = 0, refuse(bad, PLR_E_ARGUMENT);
-    bad = good, bad.sigma[2] = 1e7, refuse(bad, PLR_E_RANGE);
-    bad = good, bad.value[0] = 2e9, refuse(bad, PLR_E_RANGE);
-    bad = good, bad.at_B_m[0] = 1e4, refuse(bad, PLR_E_RANGE);
-    bad = good, bad.t_ns = 1, refuse(bad, PLR_E_LATE);
-    bad = good, bad.t_ns += 10000000000U, refuse(bad, PLR_E_GAP);
-    bad = good, bad.axes = 1, bad.sigma[1] = (double)NAN; /* not measured: not looked at */
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(&rig.filter, &bad, NULL));
-}
-
-static void test_what_the_gate_rejects_changes_nothing_but_the_time(void) {
-    plr_reading_result result;
-    rig_drive(10);
-    for (int sensor = PLR_SENSOR_WHEEL; sensor <= PLR_SENSORS; sensor++) {
-        plr_reading wild = sensor == PLR_SENSOR_POSITION ? position(7, 0.1) : wheel(7, 0.01);
-        wild.sensor = (uint8_t)sensor;
-        wild.value[0] += 100;
-        each_axis(wild.sigma, 0.001);
-        plr_filter_predict(&rig.filter, rig.world.t_ns, &(plr_twist){{2, 0, 0}, {0, 0, 0}});
-        rig_remember();
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(&rig.filter, &wild, &result));
-        TEST_ASSERT_FALSE(result.used);
-        TEST_ASSERT_GREATER_THAN_DOUBLE(40, result.d2);
-        TEST_ASSERT_EQUAL_UINT32(rig.before.totals.readings_gated + 1,
-                                 rig.filter.totals.readings_gated);
-        rig.before.totals = rig.filter.totals;
-        memcpy(rig.before.readings_rejected, rig.filter.readings_rejected,
-               sizeof rig.before.readings_rejected);
-        TEST_ASSERT_TRUE(specimen_same_state(&rig.before, &rig.filter));
-        scene_move(&rig.world, RIG_STEP_NS);
-    }
-}
-
-static void test_ten_rejected_in_succession_are_a_reason(void) {
-    rig_drive(20);
-    for (int k = 0; k < 10; k++) {
-        TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
-        rig_twist();
-        plr_reading wild = position(7, 0.05);
-        wild.value[0] += 30;
-        measure(wild);
-        rig_frame();
-    }
-    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
-    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, rig.report.health);
-    rig_twist();
-    measure(position(7, 0.05));
-    rig_frame();
-    TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_READINGS_REJECTED);
-}
-
-static void test_positions_in_the_dark_are_degraded_and_not_lost(void) {
-    rig_drive(10);
-    rig.options.most_seen = rig.world.is.most_seen = 0; /* the lamp goes out */
-    for (int k = 0; k < 40; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
-        if (k % 10 == 0 && k < 20)
-            measure(position(7, 0.05));
-        rig_frame();
-        if (k == 25)
-            TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DEGRADED, rig.report.health);
-    }
-    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_NO_OBSERVATIONS);
-    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST,
-                          rig.report.health); /* the positions have ended as well */
-}
-
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_wheel_on_three_axes_improves_dead_reckoning);
@@ -368,9 +233,5 @@ int main(void) {
     RUN_TEST(test_standing_is_detected_from_the_pixels_and_only_if_asked_for);
     RUN_TEST(test_creeping_is_not_standing);
     RUN_TEST(test_turning_wheels_before_a_still_picture_are_not_standing);
-    RUN_TEST(test_bad_readings_are_refused_and_change_nothing);
-    RUN_TEST(test_what_the_gate_rejects_changes_nothing_but_the_time);
-    RUN_TEST(test_positions_in_the_dark_are_degraded_and_not_lost);
-    RUN_TEST(test_ten_rejected_in_succession_are_a_reason);
     return UNITY_END();
 }
