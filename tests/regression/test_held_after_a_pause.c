@@ -3,7 +3,7 @@
  * A velocity is held for two of its sensor's intervals if the next reading does not come. Where one had
  * been rejected or lost, that was twice as long, and after a pause as long as the pause: a robot
  * that had said that it rests, and drove off, was held back by a standstill of before (0.09 m from the
- * truth became 0.23).
+ * truth became 0.23). Of two wheels that measured at one time none was held at all.
  */
 #include <unity.h>
 
@@ -79,6 +79,17 @@ static void test_nor_does_a_pause(void) {
     demand_held_for_two_intervals();
 }
 
+static void test_of_two_wheels_at_one_time_the_last_is_held(void) {
+    for (int k = 0; k < 2; k++) {
+        wait(1);
+        say(0.1, true);
+        say(0, true);
+    }
+    demand_held_for_two_intervals();
+    TEST_ASSERT_TRUE(rig.filter.velocities.held[0].z[0] == 0);
+    TEST_ASSERT_TRUE(rig.filter.velocities.held[0].density[0] > 0);
+}
+
 static void test_a_sensor_that_becomes_slower_is_held_for_two_of_its_new_intervals(void) {
     begin();
     for (int k = 0; k < 2; k++) {
@@ -94,6 +105,7 @@ int main(void) {
     RUN_TEST(test_a_rejected_reading_does_not_prolong_the_next_one);
     RUN_TEST(test_nor_does_a_lost_one);
     RUN_TEST(test_nor_does_a_pause);
+    RUN_TEST(test_of_two_wheels_at_one_time_the_last_is_held);
     RUN_TEST(test_a_sensor_that_becomes_slower_is_held_for_two_of_its_new_intervals);
     return UNITY_END();
 }
