@@ -34,10 +34,13 @@ void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows
     if (!f->velocities_known)
         plr_velocity_forget(f);
     plr_held_velocity *held = &f->velocities.held[which];
-    held->interval_ns = interval_of(held, f->t_ns);
+    const plr_time_ns before = held->interval_ns, interval = interval_of(held, f->t_ns);
+    /* where a reading was lost or rejected, the interval of before */
+    const plr_time_ns usual = before > 0 && before < interval ? before : interval;
+    held->interval_ns = interval;
     held->known = f->velocities_known = 1;
     held->t_ns = f->t_ns;
-    held->until_ns = f->t_ns + HELD_INTERVALS * held->interval_ns;
+    held->until_ns = f->t_ns + HELD_INTERVALS * usual;
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)
