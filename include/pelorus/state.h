@@ -55,7 +55,7 @@ typedef enum plr_block_id {
     PLR_BLOCKS
 } plr_block_id;
 
-/* Where they stand: laid out once by the process. */
+/* Their rows in P, laid out once by the process. */
 typedef struct plr_layout {
     struct {
         uint8_t row, size; /* size 0: not estimated */
@@ -105,7 +105,7 @@ typedef struct plr_held_velocity {
     plr_real z[PLR_ROWS];
     plr_real M[PLR_ROWS * PLR_POSE_DIM];
     plr_real density[PLR_ROWS]; /* variance times the seconds between readings */
-    uint8_t known;              /* 0: the sensor has never spoken */
+    uint8_t known;              /* 0: no reading yet */
 } plr_held_velocity;
 
 enum { PLR_HELD_VELOCITIES = 3 }; /* a wheel's; a standstill's v, and its w */

@@ -22,7 +22,7 @@
 /* Beyond this a lever arm or a sigma is an error of the sender, m and so on. */
 #define MAX_ARM   1e3
 #define MAX_SIGMA 1e6
-/* A correction by more than this is not one: the pose has to be set, m. */
+/* A larger step is rejected, m: the pose has to be set instead. */
 #define MAX_STEP PLR_R(900)
 /* A reading may be this many times epsilon sharper than its prediction, in variance: a variance that
  * shrinks by more digits than a number has is lost. */
