@@ -69,8 +69,17 @@ static void test_time_that_repeats_or_goes_back_is_refused(void) {
 
 /* --- a late camera --- */
 
-/* Frames arrive 0.25 s late, twists at once. */
-static unsigned late_frames(double delay_s, unsigned *used) {
+static plr_message drive_position(double t_s) {
+    plr_message message = {.kind = PLR_KIND_READING};
+    message.as.reading = (plr_reading){
+        .t_ns = drive_time_ns(t_s), .sensor = PLR_SENSOR_POSITION, .axes = 7, .sigma = {1, 1, 1}};
+    const plr_pose pose = drive_pose(t_s);
+    memcpy(message.as.reading.value, pose.p, sizeof pose.p);
+    return message;
+}
+
+/* Frames arrive 0.25 s late, twists at once, and positions too. */
+static unsigned late_frames(double delay_s, bool positions, unsigned *used) {
     plr_wire_setting override = {plr_setting_by_name("twist-delay")->id, delay_s};
     unsigned late = 0;
     options.overrides = &override;
@@ -80,6 +89,8 @@ static unsigned late_frames(double delay_s, unsigned *used) {
     desk_send(drive_start(0));
     for (int k = 0; k < 100; k++) {
         desk_send(drive_twist(0.05 * k));
+        if (positions && k > 0)
+            desk_send(drive_position(0.05 * k));
         if (k % 2 == 1 && k > 5)
             desk_send(drive_stereo(0.05 * (k - 5)));
     }
@@ -95,9 +106,9 @@ static unsigned late_frames(double delay_s, unsigned *used) {
 static void test_frames_of_a_late_camera_are_refused_without_a_delay_and_used_with_one(void) {
     unsigned used;
     plr_pose pose;
-    TEST_ASSERT_EQUAL_UINT(47, late_frames(0, &used));
+    TEST_ASSERT_EQUAL_UINT(47, late_frames(0, false, &used));
     setUp();
-    TEST_ASSERT_EQUAL_UINT(0, late_frames(0.3, &used));
+    TEST_ASSERT_EQUAL_UINT(0, late_frames(0.3, false, &used));
     TEST_ASSERT_TRUE(used > 3);
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
     const plr_pose truth = drive_pose(4.95); /* finish applied the twists that were held */
@@ -105,6 +116,14 @@ static void test_frames_of_a_late_camera_are_refused_without_a_delay_and_used_wi
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &pose));
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(0.01, truth.p[i], pose.p[i]);
+}
+
+static void test_positions_wait_with_the_twists_for_a_late_camera(void) {
+    unsigned used;
+    TEST_ASSERT_EQUAL_UINT(0, late_frames(0.3, true, &used));
+    TEST_ASSERT_TRUE(used > 3);
+    TEST_ASSERT_EQUAL_UINT32(99, session.filter.totals.readings);
+    TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
 }
 
 static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void) {
@@ -192,6 +211,7 @@ int main(void) {
     RUN_TEST(test_a_frame_older_than_the_last_twist_is_refused_as_late);
     RUN_TEST(test_time_that_repeats_or_goes_back_is_refused);
     RUN_TEST(test_frames_of_a_late_camera_are_refused_without_a_delay_and_used_with_one);
+    RUN_TEST(test_positions_wait_with_the_twists_for_a_late_camera);
     RUN_TEST(test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted);
     RUN_TEST(test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back);
     RUN_TEST(test_the_budget_in_force_is_in_the_echo_and_in_the_report);

@@ -143,7 +143,7 @@ static plr_message message_of(unsigned row) {
         message.kind = PLR_KIND_READING;
         message.as.reading = (plr_reading){.t_ns = drive_time_ns(0.2),
                                            .sensor = PLR_SENSOR_STANDSTILL,
-                                           .axes = 7,
+                                           .axes = 3,
                                            .sigma = {0.01, 0.01, 0.01}};
         return message;
     case 14:
