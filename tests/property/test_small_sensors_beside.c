@@ -56,7 +56,7 @@ static void test_bad_readings_are_refused_and_change_nothing(void) {
 static void test_what_the_gate_rejects_changes_nothing_but_the_time(void) {
     plr_reading_result result;
     rig_drive(10);
-    for (int sensor = PLR_SENSOR_WHEEL; sensor <= PLR_SENSORS; sensor++) {
+    for (int sensor = PLR_SENSOR_WHEEL; sensor <= PLR_SENSOR_POSITION; sensor++) {
         plr_reading wild = sensor == PLR_SENSOR_POSITION ? position(7, 0.1) : wheel(7, 0.01);
         wild.sensor = (uint8_t)sensor;
         wild.axes = sensor == PLR_SENSOR_STANDSTILL ? 3 : 7;
