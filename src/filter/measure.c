@@ -155,12 +155,25 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     return false;
 }
 
-bool plr_measure(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
-    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
-    result->used =
-        kind->of_twist ? hold(f, kind, reading, result) : apply(f, kind, reading, result);
+static void count(plr_filter *f, const plr_reading_result *result) {
     f->totals.readings++;
     f->totals.readings_gated += !result->used;
+}
+
+bool plr_measure_twist(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
+    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
+    PLR_ASSERT(kind->of_twist);
+    result->used = hold(f, kind, reading, result);
+    count(f, result);
+    return result->used;
+}
+
+static bool measure(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
+    const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
+    if (kind->of_twist)
+        return plr_measure_twist(f, reading, result);
+    result->used = apply(f, kind, reading, result);
+    count(f, result);
     const uint8_t bounding = kind->bounds_position;
     if (result->used && bounding != 0 && (reading->axes & bounding) == bounding)
         f->last_position_ns = f->t_ns;
@@ -190,7 +203,7 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
         return refuse(f, status, got);
     plr_predict_to(f, reading->t_ns);
     uint16_t *rejected = &f->readings_rejected[reading->sensor - 1];
-    const bool used = plr_measure(f, reading, got);
+    const bool used = measure(f, reading, got);
     *rejected = used ? 0 : (uint16_t)(*rejected + (*rejected < UINT16_MAX));
     plr_guard_seal_whole(f);
     return PLR_OK;

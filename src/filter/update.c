@@ -171,7 +171,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_reading still;
     plr_reading_result unused = {0};
     if (f->reading_valid && plr_standstill_is_seen(f, frame, n, &still))
-        (void)plr_measure(f, &still, &unused);
+        (void)plr_measure_twist(f, &still, &unused);
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
                        f->config.mode == PLR_MODE_SLAM;
     const plr_correction correction =
