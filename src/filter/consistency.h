@@ -33,8 +33,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
  * matching. */
 bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n);
 
-/* Adds the accumulated motion to what plr_consistency_is_frozen compares with its noise. Call it before
- * the motion is applied without a frame. */
+/* Adds the accumulated motion to what plr_consistency_is_frozen compares with its noise. Call it
+ * before the motion is applied without a frame. */
 void plr_consistency_note_motion(plr_filter *f);
 
 /* Adds the counts of a frame; `lost`: the frame lost the pose (plr_health). Returns bits of

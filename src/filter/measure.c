@@ -24,8 +24,8 @@
 #define MAX_SIGMA 1e6
 /* A larger step is rejected, m: the pose has to be set instead. */
 #define MAX_STEP PLR_R(900)
-/* A reading may be this many times epsilon sharper than its prediction, in variance: a variance that
- * shrinks by more digits than a number has is lost. */
+/* A reading may be this many times epsilon sharper than its prediction, in variance: a variance
+ * that shrinks by more digits than a number has is lost. */
 #define SHARPEST PLR_R(256)
 
 static plr_status check_numbers(const plr_reading *reading) {

@@ -18,8 +18,8 @@ enum { HELD_INTERVALS = 2 };
  * one step in 5,000 by chance. In units of the setting gate-d2. */
 #define CONTRADICTED PLR_R(1.5)
 
-/* The seconds between readings, in ns: 0 where they are not known yet, or too long. Two readings of one
- * time share their interval. */
+/* The seconds between readings, in ns: 0 where they are not known yet, or too long. Two readings
+ * of one time share their interval. */
 static plr_time_ns interval_of(const plr_held_velocity *held, plr_time_ns t_ns) {
     if (!held->known || t_ns < held->t_ns)
         return 0;
@@ -107,7 +107,8 @@ static void correct(plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE],
     memcpy(T, next, sizeof next);
 }
 
-/* e = s z - M xi, and S = M V M^T + s density. What is below rounding in M V M^T adds to the noise. */
+/* e = s z - M xi, and S = M V M^T + s density. What is below rounding in M V M^T adds to the
+ * noise. */
 static void compare(const plr_held_velocity *held, plr_real seconds,
                     const plr_real xi[PLR_POSE_DIM], const plr_real V[PLR_POSE_SQUARE],
                     plr_real MV[PLR_ROWS * PLR_POSE_DIM], plr_real R[PLR_ROWS],

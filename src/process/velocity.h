@@ -29,9 +29,9 @@ void plr_velocity_forget_bias(plr_filter *f);
 /* True if rows are held for a step from now to end_ns. */
 bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns);
 
-/* Corrects a step of `seconds` to end_ns, with displacement xi and its covariance V, 6x6, by all held
- * rows. Rows that the step contradicts are dropped until their sensor's next reading.
- * The derivative of the step's error by the biases' error is then -seconds T, T 6x6. */
+/* Corrects a step of `seconds` to end_ns, with displacement xi and its covariance V, 6x6, by all
+ * held rows. Rows that the step contradicts are dropped until their sensor's next reading. The
+ * derivative of the step's error by the biases' error is then -seconds T, T 6x6. */
 void plr_velocity_fuse(plr_filter *f, plr_time_ns end_ns, plr_real seconds,
                        plr_real xi[PLR_POSE_DIM], plr_real V[PLR_POSE_SQUARE],
                        plr_real T[PLR_POSE_SQUARE]);

@@ -46,9 +46,9 @@ static void anchor(const plr_filter *f, plr_slot *slot, const plr_real z[PLR_ROW
     slot->anchored = 1;
 }
 
-/* Compares the pixels of the landmarks with their anchors, and anchors those that have none. Returns
- * whether together they have not moved; *old_rows receives the rows with an anchor of a second ago and
- * more, which alone show that a slow body stands. */
+/* Compares the pixels of the landmarks with their anchors, and anchors those that have none.
+ * Returns whether together they have not moved; *old_rows receives the rows with an anchor of a
+ * second ago and more, which alone show that a slow body stands. */
 static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned *old_rows) {
     plr_real distance2 = 0;
     unsigned rows = 0;

@@ -282,8 +282,8 @@ static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
 }
 
 /* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common
- * motion has brought the point: the same angle, turned by the bearing part of F (chart_jacobian), and
- * the same inverse range. */
+ * motion has brought the point: the same angle, turned by the bearing part of F (chart_jacobian),
+ * and the same inverse range. */
 static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
                       const plr_polar *from) {
     const plr_real ratio = to->r / from->r, w0 = ratio * w[0], w1 = ratio * w[1];
