@@ -26,13 +26,15 @@ typedef struct scenario {
     bool bias;
     unsigned slots;
     double max_depth_m;
+    bool slips; /* the wheels slip: from 3 to 6 s twists are half of what they were */
 } scenario;
 
 static const scenario scenarios[] = {
-    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0},
-    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20},
-    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0},
-    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0},
+    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false},
+    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20, false},
+    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0, false},
+    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0, false},
+    {"slip", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, true},
 };
 
 static plr_filter filter;
@@ -161,6 +163,14 @@ static void take_truth(const scenario *s, const plr_truth *truth) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, truth->t_ns, &truth->T_WB, P));
 }
 
+static void take_twist(const scenario *s, const plr_twist_message *message) {
+    plr_twist twist = message->twist;
+    const double t_s = (double)message->t_ns * 1e-9;
+    for (int i = 0; i < 3 && s->slips && t_s >= 3 && t_s < 6; i++)
+        twist.v_B_mps[i] *= 0.5;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, message->t_ns, &twist));
+}
+
 static void take(const scenario *s, const plr_message *message) {
     char line[LINE];
     plr_report report;
@@ -176,8 +186,7 @@ static void take(const scenario *s, const plr_message *message) {
         take_truth(s, &message->as.truth);
         break;
     case PLR_KIND_TWIST:
-        TEST_ASSERT_EQUAL_INT(
-            PLR_OK, plr_filter_predict(&filter, message->as.twist.t_ns, &message->as.twist.twist));
+        take_twist(s, &message->as.twist);
         break;
     case PLR_KIND_STEREO:
         (void)plr_filter_update(&filter, &message->as.stereo, &report);
@@ -286,11 +295,18 @@ static void test_mapping_computes_the_committed_bits(void) {
     check(&scenarios[3]);
 }
 
+/* Twists and pictures contradict each other, which no other setting has. */
+static void test_slipping_wheels_compute_the_committed_bits(void) {
+    check(&scenarios[4]);
+    TEST_ASSERT_GREATER_THAN_UINT32(0, filter.totals.contradictions);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_body_computes_the_committed_bits);
     RUN_TEST(test_world_computes_the_committed_bits);
     RUN_TEST(test_localization_computes_the_committed_bits);
     RUN_TEST(test_mapping_computes_the_committed_bits);
+    RUN_TEST(test_slipping_wheels_compute_the_committed_bits);
     return UNITY_END();
 }
