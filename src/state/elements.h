@@ -9,9 +9,14 @@
 /* B (rows x columns) = P[row.., column..], dense, on either side of the diagonal. */
 static inline void plr_get_block(const plr_filter *f, unsigned row, unsigned rows, unsigned column,
                                  unsigned columns, plr_real *B) {
-    for (unsigned i = 0; i < rows; i++)
-        for (unsigned j = 0; j < columns; j++)
-            B[i * columns + j] = f->P[plr_packed_at(row + i, column + j)];
+    for (unsigned i = 0; i < rows; i++) {
+        const unsigned r = row + i;
+        const plr_real *line = f->P + plr_packed_row(r);
+        for (unsigned j = 0; j < columns; j++) {
+            const unsigned c = column + j;
+            B[i * columns + j] = c <= r ? line[c] : f->P[plr_packed_row(c) + r];
+        }
+    }
 }
 
 /* The reverse. Of a block on the diagonal only the lower triangle is used. */

@@ -33,16 +33,13 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
  * rounding. */
 #define SHARE_OF_BIAS PLR_R(1e-4)
 
-void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
-                           plr_real M[PLR_POSE_SQUARE]) {
+void plr_motion_covariance_by_bias(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]) {
     memset(BPB, 0, PLR_POSE_SQUARE * sizeof *BPB);
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real P_b[PLR_POSE_SQUARE];
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
         plr_sandwich6(BPB, f->motion.B, P_b);
     }
-    for (int i = 0; i < PLR_POSE_SQUARE; i++)
-        M[i] = BPB[i] + f->motion.Q[i];
 }
 
 /* K = L^-1 B. */
@@ -70,7 +67,7 @@ static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scal
     memcpy(applied->p, f->motion.p, sizeof applied->p);
     if (!f->motion.noisy)
         return;
-    plr_motion_covariance(f, BPB, M);
+    plr_motion_covariance_by_bias(f, BPB);
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
         M[i] = scale * (PLR_FMA(SHARE_OF_BIAS, BPB[i], BPB[i]) + f->motion.Q[i]);
     for (int i = 0; i < PLR_POSE_DIM; i++)

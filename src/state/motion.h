@@ -25,10 +25,8 @@ typedef struct plr_applied_motion {
     plr_real z[PLR_POSE_DIM];
 } plr_applied_motion;
 
-/* M = B P_bb B^T + Q, the covariance of the accumulated motion, and its part BPB by the biases;
- * 6x6. */
-void plr_motion_covariance(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE],
-                           plr_real M[PLR_POSE_SQUARE]);
+/* BPB = B P_bb B^T, the biases' part of the accumulated motion's covariance BPB + Q; 6x6. */
+void plr_motion_covariance_by_bias(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]);
 
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);

@@ -195,7 +195,9 @@ static void check_predict_pose(void) {
     expect_motion(&motion, F, G);
     plr_real BPB[36], M[36];
     twin.filter.motion = motion;
-    plr_motion_covariance(&twin.filter, BPB, M);
+    plr_motion_covariance_by_bias(&twin.filter, BPB);
+    for (int i = 0; i < 36; i++)
+        M[i] = BPB[i] + motion.Q[i];
     plr_covariance_predict_pose(&twin.filter, A, motion.B, M);
     twin_demand_expected(200);
     free(G);
