@@ -102,23 +102,26 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
  * RECOVERED. */
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report);
 
-/* A reading of a small sensor (plr_sensor) at reading->t_ns; predicts the pose to that time with the
- * last twist. A position corrects the whole state at once. A velocity (wheel, standstill) holds from
- * its sensor's second reading until the next one, at most for two intervals, which may be
- * half a second each: in each step of the
- * motion it is weighed against the twist, and their difference corrects the twists' biases with the
- * next frame. One beyond the setting gate-d2, and a position more than 900 m off, is rejected: PLR_OK, and result->used is false. `result`
- * may be NULL.
+/* A reading of a small sensor (plr_sensor) at reading->t_ns. It predicts the pose to that time with
+ * the last twist. A position corrects the whole state at once. A velocity (wheel, standstill) holds
+ * from its sensor's second reading until the next one, at most for two intervals, and not at all
+ * where readings are more than half a second apart: in each step of the motion it is weighed
+ * against the twist, and their difference corrects the twists' biases with the next frame.
+ * Of a twist and a reading of the same time give the twist first; of a frame and a position the
+ * frame.
+ * A reading beyond the setting gate-d2, and a position more than 900 m off, is rejected: PLR_OK,
+ * and result->used is false. `result` may be NULL.
  * PLR_E_ARGUMENT no such sensor, axes that it cannot measure, or a sigma that is not positive;
- * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4 or a position beyond 1e9, an arm beyond 1 km, a sigma beyond 1e6, or the
- * prediction would be more than pi rad or 1 km; PLR_E_TIME before the first twist; PLR_E_LATE earlier
- * than the filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in mapping. */
+ * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4, a position beyond 1e9, an arm beyond 1 km, a
+ * sigma beyond 1e6, or a prediction of more than pi rad or 1 km; PLR_E_TIME before the first twist;
+ * PLR_E_LATE earlier than the filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in
+ * mapping. */
 plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
                               plr_reading_result *result);
 
 /* --- estimate at the time plr_filter_time() --- */
 
-/* Time of the estimate: that of the last accepted twist or frame. */
+/* Time of the estimate: that of the last accepted twist, frame or reading. */
 plr_time_ns plr_filter_time(const plr_filter *f);
 
 /* The pose of the body in the world, T_WB. */

@@ -32,7 +32,7 @@ typedef struct plr_map {
 typedef struct plr_totals {
     uint32_t twists;        /* accepted */
     uint32_t frames;        /* accepted */
-    uint32_t late;          /* frames refused with PLR_E_LATE */
+    uint32_t late;          /* frames and readings refused with PLR_E_LATE */
     uint32_t refused;       /* other calls refused because of their data */
     uint32_t resets;        /* poses set by plr_filter_set_pose */
     uint32_t locks;         /* times the gate rejected nearly everything: PLR_REASON_GATE_LOCKED */

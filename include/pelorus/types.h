@@ -30,7 +30,7 @@ typedef enum plr_status {
     PLR_E_NOT_FINITE = -4,  /* an input holds NaN or infinity */
     PLR_E_RANGE = -5,       /* an input is larger than allowed, for example pi rad in a step */
     PLR_E_TIME = -6,        /* time repeats or goes back */
-    PLR_E_LATE = -7,        /* a frame is older than the last predict */
+    PLR_E_LATE = -7,        /* a frame or a reading is older than the filter's time */
     PLR_E_GAP = -8,         /* time jumps forward by more than the setting max-gap */
     PLR_E_MODE = -9,        /* the call does not belong to the mode in force */
     PLR_E_FULL = -10,       /* no slot is free, or a device is too small for the state */
