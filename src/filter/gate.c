@@ -20,14 +20,12 @@ plr_verdict plr_gate_judge(const plr_filter *f, const plr_measurement *m) {
     plr_covariance_of_rows(f, &m->H, full);
     if (f->work.noise.open)
         plr_covariance_add_open_noise(f, &m->H, full);
-    for (unsigned i = 0, k = 0; i < PLR_ROWS; i++) {
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
         if (m->max_variance > 0 && !(full[4 * i] <= m->max_variance))
             return verdict;
         full[4 * i] += m->R[i];
-        for (unsigned j = i; j < PLR_ROWS; j++)
-            S[k++] = full[3 * j + i];
     }
-    if (!plr_cholesky3(S))
+    if (!plr_factorise3(S, full))
         return verdict;
     memcpy(e, m->r, sizeof e);
     plr_solve3_transposed(1, S, e);

@@ -62,28 +62,20 @@ static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
     return plr_twist_check(f, f->reading, plr_seconds(reading->t_ns - f->t_ns));
 }
 
-/* d^2 = r^T (S + R)^-1 r of three rows; negative if S + R cannot be factorised. */
-static plr_real distance2(const plr_real S[9], const plr_real R[PLR_ROWS],
+/* d^2 = r^T (M P M^T + R)^-1 r of three rows M over six numbers of covariance P; negative if that
+ * cannot be factorised. */
+static plr_real distance2(const plr_real M[PLR_ROWS * PLR_POSE_DIM],
+                          const plr_real P[PLR_POSE_SQUARE], const plr_real R[PLR_ROWS],
                           const plr_real r[PLR_ROWS]) {
-    plr_real U[6], e[PLR_ROWS];
-    for (unsigned i = 0, k = 0; i < PLR_ROWS; i++)
-        for (unsigned j = i; j < PLR_ROWS; j++)
-            U[k++] = S[3 * j + i] + (i == j ? R[i] : PLR_R(0));
-    if (!plr_cholesky3(U))
+    plr_real S[9] = {0}, MP[PLR_ROWS * PLR_POSE_DIM], U[6], e[PLR_ROWS];
+    plr_sandwich3(S, MP, M, P);
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        S[4 * i] += R[i];
+    if (!plr_factorise3(U, S))
         return -1;
     memcpy(e, r, sizeof e);
     plr_solve3_transposed(1, U, e);
     return plr_dot3(e, e);
-}
-
-/* S = M P M^T for three rows M over six numbers of covariance P. */
-static void sandwich(plr_real S[9], const plr_real M[PLR_ROWS * PLR_POSE_DIM],
-                     const plr_real P[PLR_POSE_SQUARE]) {
-    plr_real MP[PLR_ROWS * PLR_POSE_DIM] = {0};
-    memset(S, 0, 9 * sizeof *S);
-    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, M, PLR_POSE_DIM, P, PLR_POSE_DIM, MP,
-                PLR_POSE_DIM);
-    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, MP, PLR_POSE_DIM, M, PLR_POSE_DIM, S, PLR_ROWS);
 }
 
 static bool accepts(const plr_filter *f, plr_real d2, plr_reading_result *result) {
@@ -100,14 +92,13 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     const unsigned parts = kind->of_twist(reading, rows);
     plr_twist_now(f, u, P_u);
     for (unsigned part = 0; part < parts; part++) {
-        plr_real S[9], r[PLR_ROWS];
-        sandwich(S, rows[part].M, P_u);
+        plr_real r[PLR_ROWS];
         for (unsigned i = 0; i < PLR_ROWS; i++) {
             r[i] = rows[part].z[i];
             for (unsigned c = 0; c < PLR_POSE_DIM; c++)
                 r[i] = PLR_FMA(-rows[part].M[PLR_POSE_DIM * i + c], u[c], r[i]);
         }
-        accepted = accepts(f, distance2(S, rows[part].R, r), result) && accepted;
+        accepted = accepts(f, distance2(rows[part].M, P_u, rows[part].R, r), result) && accepted;
     }
     for (unsigned part = 0; accepted && part < parts; part++)
         plr_velocity_hold(f, kind->place + part, &rows[part]);
@@ -126,7 +117,7 @@ static void given(const plr_filter *f, const void *context, unsigned i, plr_meas
 static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
                   plr_reading_result *result) {
     plr_measurement m;
-    plr_real P_xi[PLR_POSE_SQUARE], S[9];
+    plr_real P_xi[PLR_POSE_SQUARE], S[9] = {0}, HP[PLR_ROWS * PLR_POSE_DIM];
     memset(&m, 0, sizeof m);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = 1;
@@ -134,17 +125,15 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     PLR_ASSERT(m.H.terms == 1 && m.H.term[0].row == plr_row_of(f, PLR_BLOCK_POSE));
     plr_motion_pose_covariance(f, P_xi);
     plr_consistency_enlarge(f, P_xi);
-    sandwich(S, m.H.term[0].H, P_xi);
+    plr_sandwich3(S, HP, m.H.term[0].H, P_xi);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = PLR_FMA(SHARPEST * PLR_EPSILON, S[4 * i], m.R[i]);
-    if (!accepts(f, distance2(S, m.R, m.r), result) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
+    if (!accepts(f, distance2(m.H.term[0].H, P_xi, m.R, m.r), result) ||
+        plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
-    if (f->motion.pending) {
+    if (f->motion.pending)
         plr_consistency_note_motion(f);
-        plr_applied_motion motion;
-        plr_motion_prior(f, &motion);
-        plr_predict_apply(f, &motion);
-    }
+    plr_predict_apply_pending(f);
     if (!f->diverged) {
         const plr_measurement_source sensed = {given, &m};
         (void)plr_correct(f, &sensed, 1);

@@ -35,12 +35,18 @@ void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
         plr_filter_diverge(f);
 }
 
-void plr_predict_apply_prior(plr_filter *f) {
+void plr_predict_apply_pending(plr_filter *f) {
     plr_applied_motion applied;
-    if (!f->motion.pending || f->diverged)
+    if (!f->motion.pending)
         return;
     plr_motion_prior(f, &applied);
     plr_predict_apply(f, &applied);
+}
+
+void plr_predict_apply_prior(plr_filter *f) {
+    if (!f->motion.pending || f->diverged)
+        return;
+    plr_predict_apply_pending(f);
     if (!f->work.noise.open)
         return;
     plr_covariance_close_noise(f, NULL);

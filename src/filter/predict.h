@@ -20,4 +20,7 @@ void plr_predict_apply_prior(plr_filter *f);
 /* Discards the accumulated motion; the biases' walk of its duration is still added. */
 void plr_predict_drop(plr_filter *f);
 
+/* Applies the accumulated motion, if there is any, at nu = 0. In `body` its noise stays open. */
+void plr_predict_apply_pending(plr_filter *f);
+
 #endif

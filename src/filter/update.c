@@ -148,11 +148,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
 static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, unsigned n,
                                       plr_report *report) {
     const plr_correction none = {0};
-    if (f->motion.pending) {
-        plr_applied_motion motion;
-        plr_motion_prior(f, &motion);
-        plr_predict_apply(f, &motion);
-    }
+    plr_predict_apply_pending(f);
     if (f->diverged)
         return none;
     gate_each(f, frame, n, report);
@@ -217,11 +213,9 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
 /* A frame of dead reckoning: applies the motion, and the velocities' information about the
  * biases. */
 static void dead_reckon(plr_filter *f) {
-    plr_applied_motion motion;
     if (f->motion.pending && plr_velocity_informs_bias(f)) {
         const plr_measurement_source nothing = {NULL, NULL};
-        plr_motion_prior(f, &motion);
-        plr_predict_apply(f, &motion);
+        plr_predict_apply_pending(f);
         if (!f->diverged)
             (void)plr_correct(f, &nothing, 0);
     } else {

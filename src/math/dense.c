@@ -190,3 +190,12 @@ void plr_factor6(plr_real L[PLR_POSE_SQUARE], const plr_real M[PLR_POSE_SQUARE])
         }
     }
 }
+
+void plr_sandwich3(plr_real S[9], plr_real MP[PLR_ROWS * PLR_POSE_DIM],
+                   const plr_real M[PLR_ROWS * PLR_POSE_DIM], const plr_real P[PLR_POSE_SQUARE]) {
+    for (unsigned i = 0; i < PLR_ROWS * PLR_POSE_DIM; i++)
+        MP[i] = 0;
+    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, M, PLR_POSE_DIM, P, PLR_POSE_DIM, MP,
+                PLR_POSE_DIM);
+    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, MP, PLR_POSE_DIM, M, PLR_POSE_DIM, S, PLR_ROWS);
+}

@@ -71,6 +71,10 @@ static inline void plr_mat6_mul_nt(plr_real C[PLR_POSE_SQUARE], const plr_real A
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 
+/* S += M P M^T, 3x3: M is 3x6, P 6x6 and symmetric. MP, 3x6, receives M P. */
+void plr_sandwich3(plr_real S[9], plr_real MP[PLR_ROWS * PLR_POSE_DIM],
+                   const plr_real M[PLR_ROWS * PLR_POSE_DIM], const plr_real P[PLR_POSE_SQUARE]);
+
 /* M = L L^T for a 6x6 that need not be definite: a direction in which M is zero, to rounding,
  * becomes a zero column of the lower triangle L. */
 void plr_factor6(plr_real L[PLR_POSE_SQUARE], const plr_real M[PLR_POSE_SQUARE]);

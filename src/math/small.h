@@ -126,6 +126,13 @@ static inline bool plr_cholesky3(plr_real S[6]) {
     return true;
 }
 
+/* U of U^T U = S for a full symmetric S, 3x3; U packed as above. False as plr_cholesky3. */
+static inline bool plr_factorise3(plr_real U[6], const plr_real S[9]) {
+    const plr_real packed[6] = {S[0], S[3], S[6], S[4], S[7], S[8]};
+    memcpy(U, packed, sizeof packed);
+    return plr_cholesky3(U);
+}
+
 /* y = U^T x: U is 3x3, packed upper; y may not be x. */
 static inline void plr_multiply3_transposed(plr_real y[3], const plr_real U[6],
                                             const plr_real x[3]) {

@@ -113,12 +113,8 @@ static void compare(const plr_held_velocity *held, plr_real seconds,
                     const plr_real xi[PLR_POSE_DIM], const plr_real V[PLR_POSE_SQUARE],
                     plr_real MV[PLR_ROWS * PLR_POSE_DIM], plr_real R[PLR_ROWS],
                     plr_real e[PLR_ROWS], plr_real S[9]) {
-    memset(MV, 0, PLR_ROWS * PLR_POSE_DIM * sizeof *MV);
     memset(S, 0, 9 * sizeof *S);
-    plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, held->M, PLR_POSE_DIM, V, PLR_POSE_DIM, MV,
-                PLR_POSE_DIM);
-    plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, MV, PLR_POSE_DIM, held->M, PLR_POSE_DIM, S,
-                PLR_ROWS);
+    plr_sandwich3(S, MV, held->M, V);
     for (unsigned r = 0; r < PLR_ROWS; r++) {
         R[r] = PLR_FMA(PLR_R(64) * PLR_EPSILON, S[4 * r], held->density[r] * seconds);
         e[r] = seconds * held->z[r];
@@ -134,17 +130,11 @@ static bool factorise(const plr_filter *f, const plr_real S[9],
     plr_real sum[9];
     memcpy(sum, S, sizeof sum);
     if (Y) {
-        plr_real P_b[PLR_POSE_SQUARE], YP[PLR_ROWS * PLR_POSE_DIM] = {0};
+        plr_real P_b[PLR_POSE_SQUARE], YP[PLR_ROWS * PLR_POSE_DIM];
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
-        plr_gemm_nn(PLR_ROWS, PLR_POSE_DIM, PLR_POSE_DIM, Y, PLR_POSE_DIM, P_b, PLR_POSE_DIM, YP,
-                    PLR_POSE_DIM);
-        plr_gemm_nt(PLR_ROWS, PLR_ROWS, PLR_POSE_DIM, YP, PLR_POSE_DIM, Y, PLR_POSE_DIM, sum,
-                    PLR_ROWS);
+        plr_sandwich3(sum, YP, Y, P_b);
     }
-    for (unsigned r = 0, k = 0; r < PLR_ROWS; r++)
-        for (unsigned c = r; c < PLR_ROWS; c++)
-            U[k++] = sum[3 * c + r];
-    return plr_cholesky3(U);
+    return plr_factorise3(U, sum);
 }
 
 /* Is the difference e more than noise and the biases' uncertainty explain? Y = -s M T. */

@@ -3,14 +3,11 @@
  * against chi-square: `body` within the bounds, `world` (which believes more than it knows) not. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 #include <unity.h>
 
 #include "support/axes.h"
 #include "support/chi_square.h"
-#include "support/oracle.h"
 #include "support/rig.h"
-#include "support/rigid.h"
 
 /* In a slow build fewer drives, and with them wider bounds. */
 enum { RUNS = PELORUS_SLOW_BUILD ? 4 : 20, FRAMES = 150, DOF = 6 };
@@ -22,26 +19,9 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-/* e^T P^-1 e, e = Log(T^^-1 T): chi-square with six degrees of freedom, if P is right. */
-static double squared_error(void) {
-    plr_pose pose;
-    double P[36], T[16], inverse[16], E[16], e[6], weighted[6], sum = 0;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
-    rigid_from_pose(T, &pose);
-    rigid_inverse(inverse, T);
-    square_multiply(4, inverse, rig.world.T_WB, E);
-    rigid_log(e, E);
-    memcpy(weighted, e, sizeof e);
-    TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
-    for (int i = 0; i < 6; i++)
-        sum += e[i] * weighted[i];
-    return sum;
-}
-
 /* Mean squared error per degree of freedom at the end of a drive, over seeds. */
 static double mean_squared_error(plr_model_kind model, bool bias) {
-    double sum = 0;
+    double sum = 0, e[6];
     rig.config.model = (uint8_t)model;
     rig.config.bias = bias;
     rig.config.pixel_sigma_px = rig.options.pixel_sigma_px;
@@ -57,7 +37,7 @@ static double mean_squared_error(plr_model_kind model, bool bias) {
         rng_normals(&chance, bias ? rig.config.bias_gyro_sigma_radps : 0, rig.options.bias + 3, 3);
         rig_begin();
         rig_drive(FRAMES);
-        sum += squared_error();
+        sum += rig_squared_error(e);
     }
     return sum / (DOF * RUNS);
 }

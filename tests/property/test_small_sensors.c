@@ -47,28 +47,16 @@ static void step(const helpers *with, unsigned k) {
         rig_frame();
 }
 
-/* e^T P^-1 e of the pose, e = Log(T^^-1 T), and of the biases. */
-static void squared_errors(double *of_pose, double *of_bias, double *metres) {
-    plr_pose pose;
-    double P[36], T[16], inverse[16], E[16], e[6], weighted[6], b[6];
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
-    rigid_from_pose(T, &pose);
-    rigid_inverse(inverse, T);
-    square_multiply(4, inverse, rig.world.T_WB, E);
-    rigid_log(e, E);
-    *metres = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-    memcpy(weighted, e, sizeof e);
-    TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
-    *of_pose = *of_bias = 0;
-    for (int i = 0; i < 6; i++)
-        *of_pose += e[i] * weighted[i];
+/* The same of the biases, as rig_squared_error of the pose. */
+static double squared_error_of_biases(void) {
+    double P[36], b[6], e[6], weighted[6], sum = 0;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
     for (int i = 0; i < 6; i++)
         e[i] = weighted[i] = rig.options.bias[i] - b[i];
     TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
     for (int i = 0; i < 6; i++)
-        *of_bias += e[i] * weighted[i];
+        sum += e[i] * weighted[i];
+    return sum;
 }
 
 typedef struct outcome {
@@ -79,7 +67,7 @@ typedef struct outcome {
 static outcome drive(const helpers *with, unsigned steps) {
     outcome sum = {0};
     for (uint64_t seed = 1; seed <= RUNS; seed++) {
-        double pose, bias, metres;
+        double e[6];
         small_sensors_chance = rng_seeded(seed + 500);
         rig.options.seed = seed;
         rng_normals(&small_sensors_chance, rig.config.bias_velocity_sigma_mps, rig.options.bias, 3);
@@ -88,10 +76,9 @@ static outcome drive(const helpers *with, unsigned steps) {
         rig_begin();
         for (unsigned k = 0; k < steps; k++)
             step(with, k);
-        squared_errors(&pose, &bias, &metres);
-        sum.nees_pose += pose / (DOF * RUNS);
-        sum.nees_bias += bias / (DOF * RUNS);
-        sum.metres += metres * metres / RUNS;
+        sum.nees_pose += rig_squared_error(e) / (DOF * RUNS);
+        sum.nees_bias += squared_error_of_biases() / (DOF * RUNS);
+        sum.metres += (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / RUNS;
     }
     sum.metres = sqrt(sum.metres);
     return sum;
@@ -159,30 +146,17 @@ static void test_a_height_alone(void) {
 
 static void test_positions_without_biases_too(void) {
     const helpers with = {.position_every = 100, .axes = 7, .position_sigma = 0.3};
-    outcome got;
+    double nees = 0, e[6];
     rig.config.bias = 0;
-    rig.config.bias_velocity_sigma_mps = rig.config.bias_gyro_sigma_radps = 0;
-    memset(&got, 0, sizeof got);
     for (uint64_t seed = 1; seed <= RUNS; seed++) {
-        plr_pose pose;
-        double P[36], T[16], inverse[16], E[16], e[6], weighted[6];
         small_sensors_chance = rng_seeded(seed + 900);
         rig.options.seed = seed;
         rig_begin();
         for (unsigned k = 0; k < 1500; k++)
             step(&with, k);
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
-        rigid_from_pose(T, &pose);
-        rigid_inverse(inverse, T);
-        square_multiply(4, inverse, rig.world.T_WB, E);
-        rigid_log(e, E);
-        memcpy(weighted, e, sizeof e);
-        TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
-        for (int i = 0; i < 6; i++)
-            got.nees_pose += e[i] * weighted[i] / (DOF * RUNS);
+        nees += rig_squared_error(e) / (DOF * RUNS);
     }
-    demand_consistent(got.nees_pose, "pose");
+    demand_consistent(nees, "pose");
 }
 
 /* ---------------------------------------------------------------- standing is detected */

@@ -38,17 +38,6 @@ static double smallest_correlation(void) {
     return smallest;
 }
 
-static void stand(unsigned frames) {
-    for (unsigned k = 0; k < frames; k++) {
-        for (unsigned i = 0; i < RIG_TWISTS; i++) {
-            const plr_twist twist = scene_read(&rig.world);
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
-            rig.world.t_ns += RIG_STEP_NS; /* and nothing moves */
-        }
-        rig_frame();
-    }
-}
-
 static void demand_still_there(void) {
     plr_pose pose;
     double P[36];
@@ -67,7 +56,7 @@ static void check_hours(bool bias) {
     rig.config.bias = bias;
     rig_begin();
     for (unsigned k = 0; k < FRAMES; k += EVERY) {
-        stand(EVERY);
+        rig_stand(EVERY);
         demand_still_there();
         TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
         /* all that is left uncertain is common to all landmarks, so their correlations are near 1,
@@ -95,7 +84,7 @@ static void test_hours_without_noise_stay_exact(void) {
     each_axis(rig.config.velocity_sigma, 0);
     each_axis(rig.config.gyro_sigma, 0);
     rig_begin();
-    stand(FRAMES);
+    rig_stand(FRAMES);
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
     TEST_ASSERT_GREATER_THAN_DOUBLE(0, smallest_correlation());
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.p_WB[0]);

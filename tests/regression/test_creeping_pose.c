@@ -22,17 +22,6 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-static void stand(unsigned frames) {
-    for (unsigned k = 0; k < frames; k++) {
-        for (unsigned i = 0; i < RIG_TWISTS; i++) {
-            const plr_twist twist = scene_read(&rig.world);
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
-            rig.world.t_ns += RIG_STEP_NS; /* and nothing moves */
-        }
-        rig_frame();
-    }
-}
-
 /* Where the landmarks stand in the world, in the mean. */
 static void centre(double p[3]) {
     const unsigned count = plr_filter_landmark_count(&rig.filter);
@@ -59,9 +48,9 @@ static void test_landmarks_and_pose_do_not_move_apart(void) {
     rig.config.pixel_sigma_px = 5;
     rig.config.bias = 0;
     rig_begin();
-    stand(SETTLE);
+    rig_stand(SETTLE);
     centre(before);
-    stand(FRAMES);
+    rig_stand(FRAMES);
     centre(after);
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(0.015, before[i], after[i]);

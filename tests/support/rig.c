@@ -4,6 +4,8 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/oracle.h"
+#include "support/rigid.h"
 #include "support/specimens.h"
 
 rig_state rig;
@@ -41,6 +43,33 @@ void rig_drive(unsigned frames) {
             rig_twist();
         rig_frame();
     }
+}
+
+void rig_stand(unsigned frames) {
+    for (unsigned k = 0; k < frames; k++) {
+        for (unsigned i = 0; i < RIG_TWISTS; i++) {
+            const plr_twist twist = scene_read(&rig.world);
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+            rig.world.t_ns += RIG_STEP_NS; /* and nothing moves */
+        }
+        rig_frame();
+    }
+}
+
+double rig_squared_error(double e[6]) {
+    plr_pose pose;
+    double P[36], T[16], inverse[16], E[16], weighted[6], sum = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    rigid_from_pose(T, &pose);
+    rigid_inverse(inverse, T);
+    square_multiply(4, inverse, rig.world.T_WB, E);
+    rigid_log(e, E);
+    memcpy(weighted, e, 6 * sizeof *e);
+    TEST_ASSERT_TRUE(oracle_solve_spd(6, 1, P, weighted));
+    for (int i = 0; i < 6; i++)
+        sum += e[i] * weighted[i];
+    return sum;
 }
 
 void rig_remember(void) {

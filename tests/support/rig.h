@@ -37,6 +37,13 @@ void rig_frame(void);
 /* So many frames, each after ten readings. */
 void rig_drive(unsigned frames);
 
+/* So many frames of a body that stands, each after ten readings of the twist that the scene has. */
+void rig_stand(unsigned frames);
+
+/* e = Log(T^^-1 T), the pose's error. Returns e^T P^-1 e: chi-square with six degrees of freedom, if
+ * the covariance is right. */
+double rig_squared_error(double e[6]);
+
 /* Keeps the state, against which rig_demand_refusal compares. */
 void rig_remember(void);
 
