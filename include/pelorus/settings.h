@@ -35,6 +35,21 @@ typedef enum plr_twist_timing {
     PLR_TWIST_MID = 2    /* between two readings their mean is valid */
 } plr_twist_timing;
 
+/* What moves the state between frames. */
+typedef enum plr_process_kind {
+    PLR_PROCESS_TWIST = 0, /* measured velocities: plr_filter_predict */
+    PLR_PROCESS_IMU = 1    /* accelerometer and gyro: plr_filter_inertial */
+} plr_process_kind;
+
+/* How the filter finds its tilt, velocity and biases with an IMU. */
+typedef enum plr_imu_start {
+    PLR_IMU_START_AUTO = 0,   /* given, if a velocity is set; else at rest, or in motion if the body
+                                 does not come to rest within 3 s */
+    PLR_IMU_START_REST = 1,   /* the body stands for a second: tilt and gyro bias are measured */
+    PLR_IMU_START_MOTION = 2, /* the body moves: tilt from a tenth of a second, velocity unknown */
+    PLR_IMU_START_GIVEN = 3   /* the pose that is set is true, and the velocity with it */
+} plr_imu_start;
+
 /* What velocity_sigma and gyro_sigma are standard deviations of. */
 typedef enum plr_noise_kind {
     PLR_NOISE_TWIST = 0, /* one twist reading, m/s and rad/s */
@@ -55,9 +70,10 @@ typedef enum plr_landmark_prior {
  * Above each field stands its row in the table: name, unit, default and limits (both included).
  * The table is in src/record/settings.c; tests/layering/settings.py compares this text with it.
  *
- * Within the limits four combinations are refused too: min_depth_m not below max_range_m;
+ * Within the limits some combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
- * in the model `body`; the independent landmark_prior without landmark_sigma_m. */
+ * in the model `body`; the independent landmark_prior without landmark_sigma_m; the process IMU in
+ * the model `world`, or without `bias`. */
 typedef struct plr_config {
     /* Setting model: one of plr_model_kind, default PLR_MODEL_BODY. */
     uint8_t model;
@@ -181,7 +197,7 @@ typedef struct plr_config {
     double max_gap_s;
 
     /* Setting twist-delay [s]: 0 to 10, default 0.
-     * Used by plr_session alone: it holds each twist for this long, so that a frame which arrives
+     * Used by plr_session alone: it holds each twist or IMU reading for this long, so that a frame which arrives
      * later than newer twists is still processed in order of time. Choose the camera's delay from
      * shutter to message. At most PLR_SESSION_HELD_TWISTS are held. */
     double twist_delay_s;
@@ -193,6 +209,63 @@ typedef struct plr_config {
      * pixels cannot tell a slower motion from none: choose about pixel-sigma times the usual depth over
      * the focal length, per second (2 px, 5 m, 500 px: 0.02 m/s). */
     double standstill_sigma_mps;
+
+    /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
+     * What moves the state. With IMU the body's axes are those of the IMU, velocity is estimated,
+     * and the biases are those of accelerometer and gyro. */
+    uint8_t process;
+
+    /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO. */
+    uint8_t imu_start;
+
+    /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.
+     * START or END only for an IMU that sends means over an interval instead of samples. */
+    uint8_t imu_timing;
+
+    /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
+     * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
+     * Take several times the data sheet's figure: vibration, scale and timing errors come on top,
+     * and with too small a figure the gate rejects what the camera sees (docs/NUMERICS.md). */
+    double gyro_noise;
+
+    /* Setting accel-noise [m/s^2/sqrt(Hz)]: 0 to 100, default 1e-2.
+     * The same of the accelerometer (1 mg/sqrt(Hz) = 0.0098). */
+    double accel_noise;
+
+    /* Setting gyro-walk [rad/s^2/sqrt(Hz)]: 0 to 1, default 1e-4.
+     * Random walk of the gyro's bias: it gains the variance gyro-walk^2 in a second. */
+    double gyro_walk;
+
+    /* Setting accel-walk [m/s^3/sqrt(Hz)]: 0 to 10, default 1e-3.
+     * The same of the accelerometer's bias. */
+    double accel_walk;
+
+    /* Setting bias-accel-sigma [m/s^2]: 1e-6 to 10, default 0.1.
+     * Standard deviation of the accelerometer's bias at the start. bias-gyro-sigma is that of the
+     * gyro. */
+    double bias_accel_sigma_mps2;
+
+    /* Setting gravity [m/s^2]: 0.1 to 30, default 9.81.
+     * Gravity at the place: 9.780 at the equator, 9.832 at the poles. */
+    double gravity_mps2;
+
+    /* Setting start-velocity-sigma [m/s]: 1e-6 to 100, default 3.
+     * Standard deviation of each component of the velocity at a start in motion, or where a pose is
+     * given without velocity. Choose the robot's usual speed. */
+    double start_velocity_sigma_mps;
+
+    /* Setting gyro-range [rad/s]: 0 to 1e3, default 0.
+     * A reading at or beyond it is refused as saturated. 0: not known. */
+    double gyro_range_radps;
+
+    /* Setting accel-range [m/s^2]: 0 to 1e4, default 0.
+     * The same of the accelerometer (16 g = 157). */
+    double accel_range_mps2;
+
+    /* Setting camera-offset [s]: -1 to 1, default 0.
+     * Used by plr_session alone: added to the time of every frame, so that it is the clock of IMU or
+     * twists (Kalibr's timeshift_cam_imu). If it is negative, twist-delay must cover it. */
+    double camera_offset_s;
 } plr_config;
 
 /* How a setting's value is written. */

@@ -127,7 +127,13 @@ typedef enum plr_reason {
     PLR_REASON_NO_TWISTS = 1 << 21,
     /* Ten successive readings of a small sensor (plr_sensor) were rejected. The sensor or the
      * estimate is wrong: check the sensor's frame, lever arm, units and sigma. */
-    PLR_REASON_READINGS_REJECTED = 1 << 22
+    PLR_REASON_READINGS_REJECTED = 1 << 22,
+    /* With an IMU: the filter has not started, because tilt and velocity are not known yet. Let the
+     * body stand for a second, or see the setting imu-start. */
+    PLR_REASON_NOT_STARTED = 1 << 23,
+    /* IMU readings are refused (saturated, repeated without end, spikes) or do not fit gravity: check
+     * units (m/s^2, rad/s), signs, axes and range of the sensor. */
+    PLR_REASON_IMU_FAULT = 1 << 24
 } plr_reason;
 
 /* A rigid motion x -> R x + p. */
@@ -141,6 +147,12 @@ typedef struct plr_twist {
     double v_B_mps[3];
     double w_B_radps[3];
 } plr_twist;
+
+/* One reading of an IMU, in the body's axes, which are those of the IMU. */
+typedef struct plr_imu {
+    double a_B_mps2[3];  /* specific force: at rest 9.81 upwards */
+    double w_B_radps[3]; /* angular rate */
+} plr_imu;
 
 /* One landmark in a rectified stereo pair. */
 typedef struct plr_observation {

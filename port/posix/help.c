@@ -20,14 +20,17 @@ static const struct {
     const char *title;
     const char *names[NAMES];
 } groups[] = {
-    {"What is estimated", {"model", "mode", "bias", "slots", "known-map"}},
+    {"What is estimated", {"model", "mode", "process", "bias", "slots", "known-map"}},
     {"Motion",
      {"twist-timing", "noise", "velocity-sigma", "gyro-sigma", "bias-velocity-sigma",
       "bias-gyro-sigma", "bias-velocity-walk", "bias-gyro-walk", "standstill-sigma"}},
+    {"IMU",
+     {"gyro-noise", "accel-noise", "gyro-walk", "accel-walk", "bias-accel-sigma", "gravity",
+      "imu-start", "start-velocity-sigma", "gyro-range", "accel-range", "imu-timing"}},
     {"Vision",
      {"pixel-sigma", "gate-d2", "gate-residual", "min-depth", "min-disparity", "max-depth",
       "max-row-gap", "max-range", "landmark-sigma", "landmark-prior"}},
-    {"Start and time", {"start-sigma", "max-gap", "twist-delay"}},
+    {"Start and time", {"start-sigma", "max-gap", "twist-delay", "camera-offset"}},
 };
 
 enum { GROUPS = sizeof groups / sizeof groups[0] };

@@ -11,6 +11,8 @@ static const char *const mode_words[] = {"slam", "mapping", "localization", "dea
 static const char *const timing_words[] = {"start", "end", "mid", NULL};
 static const char *const noise_words[] = {"twist", "step", NULL};
 static const char *const prior_words[] = {"correlated", "independent", NULL};
+static const char *const process_words[] = {"twist", "imu", NULL};
+static const char *const imu_start_words[] = {"auto", "rest", "motion", "given", NULL};
 static const char *const switch_words[] = {"off", "on", NULL};
 
 /* How a field of plr_config is stored. */
@@ -54,13 +56,26 @@ static const plr_row rows[] = {
     {{22, "landmark-sigma", "m", "initial landmark, world model; 0 = from the pixels", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0}, AT(landmark_sigma_m), STORE_DOUBLE},
     {{23, "max-range", "m", "greatest distance of any landmark", PLR_SETTING_NUMBER, NULL, 1, 1e6, 1e5}, AT(max_range_m), STORE_DOUBLE},
     {{24, "max-gap", "s", "longest pause in the data that is bridged", PLR_SETTING_NUMBER, NULL, 1e-3, 60, 2}, AT(max_gap_s), STORE_DOUBLE},
-    {{25, "twist-delay", "s", "twists wait so long for a late camera", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
+    {{25, "twist-delay", "s", "twists and IMU readings wait so long for a late camera", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
     {{26, "landmark-prior", "", "does a new landmark of world share the pose's error?", PLR_SETTING_CHOICE, prior_words, 0, 1, PLR_PRIOR_CORRELATED}, AT(landmark_prior), STORE_U8},
     {{27, "velocity-sigma-y", "m/s", "of the y axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[1]), STORE_DOUBLE},
     {{28, "velocity-sigma-z", "m/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[2]), STORE_DOUBLE},
     {{29, "gyro-sigma-y", "rad/s", "of the y axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma[1]), STORE_DOUBLE},
     {{30, "gyro-sigma-z", "rad/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma[2]), STORE_DOUBLE},
     {{31, "standstill-sigma", "m/s", "detected standing is measured with it, m/s and rad/s; 0 = off", PLR_SETTING_NUMBER, NULL, 0, 1, 0}, AT(standstill_sigma_mps), STORE_DOUBLE},
+    {{32, "process", "", "what moves the state between frames", PLR_SETTING_CHOICE, process_words, 0, 1, PLR_PROCESS_TWIST}, AT(process), STORE_U8},
+    {{33, "gyro-noise", "rad/s/sqrt(Hz)", "noise density of the gyro", PLR_SETTING_NUMBER, NULL, 0, 10, 1e-3}, AT(gyro_noise), STORE_DOUBLE},
+    {{34, "accel-noise", "m/s^2/sqrt(Hz)", "noise density of the accelerometer", PLR_SETTING_NUMBER, NULL, 0, 100, 1e-2}, AT(accel_noise), STORE_DOUBLE},
+    {{35, "gyro-walk", "rad/s^2/sqrt(Hz)", "random walk of the IMU's gyro bias", PLR_SETTING_NUMBER, NULL, 0, 1, 1e-4}, AT(gyro_walk), STORE_DOUBLE},
+    {{36, "accel-walk", "m/s^3/sqrt(Hz)", "random walk of the accelerometer's bias", PLR_SETTING_NUMBER, NULL, 0, 10, 1e-3}, AT(accel_walk), STORE_DOUBLE},
+    {{37, "bias-accel-sigma", "m/s^2", "prior of the accelerometer's bias", PLR_SETTING_NUMBER, NULL, 1e-6, 10, 0.1}, AT(bias_accel_sigma_mps2), STORE_DOUBLE},
+    {{38, "gravity", "m/s^2", "gravity at the place", PLR_SETTING_NUMBER, NULL, 0.1, 30, 9.81}, AT(gravity_mps2), STORE_DOUBLE},
+    {{39, "imu-start", "", "how tilt and velocity are found with an IMU", PLR_SETTING_CHOICE, imu_start_words, 0, 3, PLR_IMU_START_AUTO}, AT(imu_start), STORE_U8},
+    {{40, "start-velocity-sigma", "m/s", "velocity at a start in motion", PLR_SETTING_NUMBER, NULL, 1e-6, 100, 3}, AT(start_velocity_sigma_mps), STORE_DOUBLE},
+    {{41, "gyro-range", "rad/s", "readings from there on are saturated; 0 = not known", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0}, AT(gyro_range_radps), STORE_DOUBLE},
+    {{42, "accel-range", "m/s^2", "the same of the accelerometer", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0}, AT(accel_range_mps2), STORE_DOUBLE},
+    {{43, "camera-offset", "s", "added to the time of every frame", PLR_SETTING_NUMBER, NULL, -1, 1, 0}, AT(camera_offset_s), STORE_DOUBLE},
+    {{44, "imu-timing", "", "which interval an IMU reading stands for", PLR_SETTING_CHOICE, timing_words, 0, 2, PLR_TWIST_MID}, AT(imu_timing), STORE_U8},
 };
 /* clang-format on */
 
@@ -214,6 +229,8 @@ plr_status plr_config_check(const plr_config *config, const plr_setting **culpri
         if (config->landmark_sigma_m <= 0)
             return refuse(culprit, plr_setting_by_name("landmark-sigma"));
     }
+    if (config->process == PLR_PROCESS_IMU && (config->model != PLR_MODEL_BODY || !config->bias))
+        return refuse(culprit, plr_setting_by_name("process"));
     if (config->min_depth_m >= config->max_range_m)
         return refuse(culprit, plr_setting_by_name("min-depth"));
     if (config->max_depth_m > 0 && config->min_depth_m >= config->max_depth_m)
