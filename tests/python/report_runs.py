@@ -35,5 +35,6 @@ def compared(path: Path, programs: Programs, *settings: str) -> Comparison:
     """Carry out the runs of a report."""
     folder = path.parent / "runs"
     folder.mkdir()
-    plans, subject = plan_runs(programs, path, settings or SETTINGS), read_subject(path)
+    plans = plan_runs(programs, path, settings or SETTINGS, ("course", "world"))
+    subject = read_subject(path)
     return Comparison(subject, [carry_out(plan, subject, folder) for plan in plans])

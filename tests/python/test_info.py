@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -133,8 +134,7 @@ def test_a_recording_that_was_cut_short_says_so(tmp_path: Path, pelorus: Run) ->
 
 
 @pytest.mark.parametrize(
-    ("messages", "said"),
-    [(twists(0, 10), "there is no HEADER"), ([HEADER], "there are no data")],
+    ("messages", "said"), [(twists(0, 10), "there is no HEADER"), ([HEADER], "there are no data")]
 )
 def test_a_recording_of_no_use_has_a_status_that_says_so(
     tmp_path: Path, pelorus: Run, messages: list[Message], said: str
@@ -180,6 +180,26 @@ def test_random_bytes_never_break_the_reader(tmp_path: Path, pelorus: Run) -> No
         data[hit] = chance.integers(0, 256, len(hit))
         path.write_bytes(data.tobytes()[: chance.integers(1, len(data))])
         assert pelorus("info", path).status in (0, 1)
+
+
+def test_info_as_json_holds_what_is_shown(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(duration_s=6.0)
+    drive.write(tmp_path / "drive.plr")
+    said = pelorus("info", tmp_path / "drive.plr", "--json")
+    assert said.status == 0
+    found = json.loads(said.out)
+    assert found["frames"]["STEREO"] == found["streams"]["STEREO"]["count"] == 61
+    assert found["streams"]["STEREO"]["rate_hz"] == pytest.approx(10)
+    assert found["header"]["baseline_m"] == 0.2
+    assert found["header"]["suggests"]["pixel_sigma_px"] == 0.5
+    assert found["tracks"]["observations"] == len(drive.tracks)
+    assert found["health"] is None  # no filter has answered
+    assert found["damage"]["damaged"] == 0
+    path = write(tmp_path / "x.plr", [replace(HEADER, camera=Camera(np.nan, 1, 1, 1, np.inf))])
+    bare = pelorus("info", path, "--json")
+    assert bare.status == 1
+    assert json.loads(bare.out)["header"]["fx_px"] is None
+    assert json.loads(bare.out)["useful"] is False
 
 
 def test_words_in_a_recording_do_not_command_the_terminal(tmp_path: Path, pelorus: Run) -> None:

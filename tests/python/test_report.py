@@ -31,8 +31,9 @@ from replay_drive import run as run_replay
 from report_runs import built_programs, compared, recorded
 
 ALWAYS = {"top-view", "map", "covariance", "bias", "observations", "time"}
-WITH_TRUTH = ALWAYS | {"error-body", "error-world", "error-course", "nees", "hero"}
-RUNS = ("dead-reckoning", "body", "course", "world")
+WITH_TRUTH = ALWAYS | {"error-yours", "nees", "hero"}
+ALSO = ("--also", "course", "--also", "world")
+RUNS = ("yours", "dead-reckoning", "course", "world")
 
 
 @pytest.fixture
@@ -59,7 +60,7 @@ def test_mean_NEES_is_the_one_that_the_replay_reports(tmp_path: Path, programs: 
 
 def test_error_is_the_one_of_the_summary(tmp_path: Path, programs: Programs) -> None:
     found = compared(recorded(tmp_path, drive()), programs)
-    body = found.accuracy["body"]
+    body = found.accuracy["yours"]
     rotation = np.degrees(np.sqrt(np.mean(np.sum(body.error[:, 3:] ** 2, axis=1))))
     assert rotation == pytest.approx(found.main.summary["rot_deg"], rel=1e-4)
     assert np.all(body.sigma > 0)
@@ -69,7 +70,7 @@ def test_poses_of_the_log_are_those_of_the_trajectory_file(
     tmp_path: Path, programs: Programs
 ) -> None:
     found = compared(recorded(tmp_path, drive()), programs)
-    written = read_tum(Outputs.named(tmp_path / "runs", "body").trajectory)
+    written = read_tum(Outputs.named(tmp_path / "runs", "yours").trajectory)
     assert np.array_equal(written.t_ns, found.main.trajectory.t_ns)
     assert np.allclose(written.poses.p, found.main.trajectory.poses.p, atol=1e-7)
 
@@ -126,7 +127,7 @@ def test_poses_between_the_frames_are_left_out() -> None:
 def test_a_refused_frame_has_no_estimate_but_its_counts(tmp_path: Path) -> None:
     t = 1_699_999_999_000_000_001
     seen = Stereo(t, np.zeros(0, np.uint32), np.zeros((0, 4), np.float32))
-    good = Report(t, Kind.STEREO, used=4), Report(t, Kind.STEREO, status=-6, health=2, used=7)
+    good = (Report(t, Kind.STEREO, used=4), Report(t, Kind.STEREO, status=-6, health=2, used=7))
     pose = Pose(t, after_stereo=True, trace=2.5)
     between = Pose(t, p_WB_m=np.ones(3))  # after a twist
     log = [seen, pose, good[0], between, seen, good[1]]  # the same time again is refused
@@ -160,11 +161,11 @@ def test_settings_hold_for_all_runs_but_the_course(tmp_path: Path, programs: Pro
     found = compared(recorded(tmp_path, drive()), programs, "--pixel-sigma", "0.625")
     sigmas = {run.name: run.summary["pixel_sigma"] for run in found.runs}
     assert tuple(sigmas) == RUNS
-    assert sigmas["body"] == sigmas["world"] == sigmas["dead-reckoning"] == 0.625
+    assert sigmas["yours"] == sigmas["world"] == sigmas["dead-reckoning"] == 0.625
     assert sigmas["course"] == pytest.approx(math.sqrt(5))
     precisions = [run.summary["precision"] for run in found.runs]
     assert precisions == ["float32", "float32", "float64", "float64"]
-    models = [found.run(name).summary["model"] for name in ("body", "course", "world")]
+    models = [found.run(name).summary["model"] for name in ("yours", "course", "world")]
     assert models == ["body", "world", "world"]
     assert found.run("dead-reckoning").summary["used"] == 0
 
@@ -187,12 +188,12 @@ def test_report_leaves_page_pictures_and_runs(
     pelorus: Command, tmp_path: Path, programs: Programs
 ) -> None:
     path, out = recorded(tmp_path, drive()), tmp_path / "a" / "out"
-    said = pelorus("report", path, "--out", out, "--bin", programs.float32.parent)
+    said = pelorus("report", path, "--out", out, "--bin", programs.float32.parent, *ALSO)
     assert said.status == 0, said.err
-    assert pictures_in(out) == WITH_TRUTH
-    assert set(pictures.NAMES) == WITH_TRUTH
+    assert pictures_in(out) == set(pictures.NAMES)
+    assert said.out.splitlines()[0].split() == list(RUNS)
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == len(WITH_TRUTH) - 1  # hero is for a README
+    assert page.count("data:image/png;base64,") == len(pictures.NAMES) - 1  # hero is for a README
     assert not re.search(r"(src|href)=\"(?!data:)", page)
     for name in RUNS:
         assert name in said.out
@@ -213,8 +214,11 @@ def test_without_truth_no_error_is_claimed(
     assert said.status == 0, said.err
     (tmp_path / "mine.png").unlink()
     assert pictures_in(tmp_path) == ALWAYS
-    row = next(line for line in said.out.splitlines() if line.startswith("body"))
-    assert row.split()[1:5] == ["-"] * 4
+    rows = said.out.splitlines()
+    assert rows[0].split() == ["yours", "dead-reckoning"]
+    for title in ("err0 m", "ATE m", "rotation deg", "NEES/6"):
+        row = next(line for line in rows if line.startswith(title))
+        assert row.removeprefix(title).split() == ["-", "-"]
     assert "no truth" in said.out
 
 
@@ -228,6 +232,39 @@ def test_a_handful_of_frames_is_enough(
     assert pictures_in(tmp_path) == due
     assert "Too few frames have truth" in said.out
     assert "NEES/6 is" not in said.out
+
+
+def test_the_report_leads_with_the_users_own_run_and_the_others_are_asked_for(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    path = recorded(tmp_path, drive())
+    options = ("--bin", programs.float32.parent, "--set", "model=world", "--also", "course")
+    said = pelorus("report", path, "--out", tmp_path, *options)
+    assert said.status == 0, said.err
+    assert said.out.splitlines()[0].split() == ["yours", "dead-reckoning", "course"]
+    own = json.loads((tmp_path / "runs" / "yours.json").read_text(encoding="utf-8"))
+    assert own["model"] == "world"  # the settings are the user's, whatever they say
+    assert not (tmp_path / "runs" / "world.plr").exists()
+
+
+def test_the_report_says_from_when_to_when_health_was_not_good_and_why(
+    pelorus: Command, tmp_path: Path, programs: Programs
+) -> None:
+    messages = drive(60)
+    seen = [k for k, m in enumerate(messages) if isinstance(m, Stereo)]
+    for k in range(30, 50):  # t = 3.0 to 4.9 s: the camera repeats a picture
+        frozen = messages[seen[29]]
+        assert isinstance(frozen, Stereo)
+        messages[seen[k]] = replace(frozen, t_ns=t_ns(k))
+    path = recorded(tmp_path, messages)
+    said = pelorus("report", path, "--out", tmp_path, "--bin", programs.float32.parent)
+    assert said.status == 0, said.err
+    lines = [line.strip() for line in said.out.splitlines()]
+    assert any(re.match(r"lost from 3\.9 to 4\.9 s \(\d+ frames\): identical", x) for x in lines)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(line in page for line in lines if line.startswith(("lost", "degraded")))
+    shown = pelorus("info", tmp_path / "runs" / "yours.plr").out
+    assert any(line.strip().startswith("lost from 3.9 to 4.9 s") for line in shown.splitlines())
 
 
 def test_a_replay_that_fails_ends_the_report_with_its_words(
@@ -293,15 +330,15 @@ def lines_with(found: Comparison, **changes: Any) -> str:
 
 def test_verdicts_name_what_is_off(tmp_path: Path, programs: Programs) -> None:
     found = compared(recorded(tmp_path, drive()), programs)
-    assert "body:" not in lines_with(found, nees_per_dof=1.0, ate_m=0.0)
-    assert "body: believes more than it knows" in lines_with(found, nees_per_dof=16.0)
+    assert "yours:" not in lines_with(found, nees_per_dof=1.0, ate_m=0.0)
+    assert "yours: believes more than it knows" in lines_with(found, nees_per_dof=16.0)
     assert "4 times as large" in lines_with(found, nees_per_dof=16.0)
-    assert "body: knows more than it believes" in lines_with(found, nees_per_dof=0.01)
-    assert "body: slower than real time" in lines_with(found, realtime_factor=0.5)
-    assert "body: the gate rejects 50%" in lines_with(found, gated=500, matched=1000)
-    assert "body: lost in 9 of 40 frames" in lines_with(found, frames_lost=9)
-    assert "body: 7 of 47 frames were refused" in lines_with(found, frames_refused=7)
-    assert "body: no better than dead reckoning" in lines_with(found, ate_m=99.0)
+    assert "yours: knows more than it believes" in lines_with(found, nees_per_dof=0.01)
+    assert "yours: slower than real time" in lines_with(found, realtime_factor=0.5)
+    assert "yours: the gate rejects 50%" in lines_with(found, gated=500, matched=1000)
+    assert "yours: lost in 9 of 40 frames" in lines_with(found, frames_lost=9)
+    assert "yours: 7 of 47 frames were refused" in lines_with(found, frames_refused=7)
+    assert "yours: no better than dead reckoning" in lines_with(found, ate_m=99.0)
     assert "found no slot" in lines_with(found, no_room=found.main.summary["observations"])
 
 
@@ -312,11 +349,11 @@ def test_verdicts_say_when_a_run_diverged_and_whether_its_gate_is_inert(
     reasons = found.main.frames["reasons"]
     reasons[12:] = words.NOT_POSITIVE
     assert found.main.frames.t_ns[12] - t_ns(0) == 1_200_000_000
-    assert "body: diverged at t = 1.2 s" in lines_with(found)
+    assert "yours: diverged at t = 1.2 s" in lines_with(found)
     reasons[:] = words.GATE_INERT
-    assert "body: gate inert in 40 frames" in lines_with(found)
+    assert "yours: gate inert in 40 frames" in lines_with(found)
     reasons[:] = words.GATE_LOCKED
-    assert "body: gate locked in 40 frames" in lines_with(found)
+    assert "yours: gate locked in 40 frames" in lines_with(found)
 
 
 @pytest.mark.parametrize("name", ["GATE_LOCKED", "GATE_INERT", "NIS_HIGH", "NOT_POSITIVE"])
@@ -344,14 +381,14 @@ def test_where_poses_are_given_the_map_is_judged_and_not_the_poses(
 ) -> None:
     path = recorded(tmp_path, [header(), *known(), *drive()[1:]])
     options = ("--bin", programs.float32.parent, "--set", "pixel-sigma=0.5")
-    said = pelorus("report", path, "--out", tmp_path, *options, "--set", "mode=mapping")
+    said = pelorus("report", path, "--out", tmp_path, *options, "--set", "mode=mapping", *ALSO)
     assert said.status == 0, said.err
-    assert "body: its poses were given; the map of" in said.out
+    assert "yours: its poses were given; the map of" in said.out
     assert "not positive" not in said.out  # the given poses have no covariance
-    assert not {"error-body", "error-world", "hero"} & pictures_in(tmp_path)
+    assert not {"error-yours", "error-world", "hero"} & pictures_in(tmp_path)
     assert "error-course" in pictures_in(tmp_path)  # its preset has a mode of its own
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    body = re.search(r"<tr><td>body</td>(.*?)</tr>", page)
+    body = re.search(r"<tr><td>yours</td>(.*?)</tr>", page)
     assert body is not None
     cells = re.findall(r"<td>(.*?)</td>", body.group(1))
     assert cells[:4] == ["-"] * 4

@@ -63,7 +63,7 @@ def test_a_run_that_strays_does_not_blow_up_the_picture(tmp_path: Path, programs
     course.trajectory.poses.p[-1] += 1e6
     wild = top_view.view(found)
     assert wild.box.side < 3 * calm.box.side
-    for path in (wild.paths["body"], wild.truth):
+    for path in (wild.paths["yours"], wild.truth):
         assert path is not None
         assert (path >= wild.box.low).all()
         assert (path <= wild.box.high).all()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from rich.console import Console
@@ -52,3 +53,13 @@ err = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterator[Item]:
     """A bar on a terminal, nothing elsewhere."""
     yield from track(items, what, total, console=err, transient=True, disable=not err.is_terminal)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """For one piece of work that cannot say how far it is: a sign of life on a terminal."""
+    if not err.is_terminal:
+        yield
+        return
+    with err.status(what):
+        yield

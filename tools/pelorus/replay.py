@@ -15,7 +15,7 @@ from typing import Any
 from rich.markup import escape
 
 from pelorus import packed_file
-from pelorus.console import err
+from pelorus.console import err, waiting
 from pelorus.errors import PelorusError, writing
 from pelorus.frames import Kind, Message, Pose
 from pelorus.wire import Writer, messages_of
@@ -132,7 +132,8 @@ def run_program(program: Path, recording: Path, options: Sequence[str]) -> tuple
     name, unpacked = packed_file.for_program(recording)
     command = [str(program), name, *options]
     try:
-        done = subprocess.run(command, input=unpacked, capture_output=True, check=False)
+        with waiting(f"replaying {recording.name}"):
+            done = subprocess.run(command, input=unpacked, capture_output=True, check=False)
     except OSError as error:
         raise PelorusError(f"{program}: cannot be run: {error.strerror}") from error
     stdout, stderr = (said.decode("utf-8", "replace") for said in (done.stdout, done.stderr))

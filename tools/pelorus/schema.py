@@ -71,6 +71,9 @@ SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["set
 STATUSES = _words("status")
 HEALTHS = _words("health")
 REASONS = _words("reason")
+REASON_NAMES: dict[int, str] = {
+    int(row["number"]): row["name"] for row in _TABLES["words"] if row["of"] == "reason"
+}
 
 
 def number(of: str, name: str) -> int:

@@ -65,7 +65,7 @@ PENS = {
     "dead-reckoning": Pen(GREY, (0, (1, 1.2)), "dead reckoning", 3),
     "course": Pen(ORANGE, (0, (6, 2)), "course", 4),
     "world": Pen(VERMILLION, (0, (6, 1.5, 1, 1.5)), "world", 5),
-    "body": Pen(BLUE, "-", "body", 7),
+    "yours": Pen(BLUE, "-", "your run", 7),
 }
 TRUTH = Pen(BLACK, (0, (2.5, 1.5)), "truth", 8)
 

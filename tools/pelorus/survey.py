@@ -13,6 +13,7 @@ import numpy as np
 from pelorus import wire
 from pelorus.errors import PelorusError
 from pelorus.frames import Config, End, Header, Kind, Landmark, Message, Reading, Stereo, Text
+from pelorus.health import TimeLine, time_line
 from pelorus.small_sensors import name_of
 from pelorus.wire import Counts, Received
 
@@ -73,7 +74,15 @@ class Survey:
     sensors: dict[str, SmallSensor]
     tracks: Tracks | None
     end: End | None
+    health: TimeLine | None = None  # of a result
     remarks: list[str] = field(default_factory=list)
+
+    @property
+    def origin_ns(self) -> int:
+        """The first time of any stream: time 0 of what is shown."""
+        sensors = (sensor.stream for sensor in self.sensors.values())
+        streams = (*self.streams.values(), *sensors)
+        return min((stream.first_ns for stream in streams), default=0)
 
     @property
     def useful(self) -> bool:
@@ -105,6 +114,7 @@ def survey(path: Path) -> Survey:
         sensors=_sensors([m for m in messages if isinstance(m, Reading)]),
         tracks=_tracks(stereos) if stereos else None,
         end=end,
+        health=time_line(messages),
     )
     found.remarks.extend(_remarks(found, received))
     return found

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from pelorus import cobs, packed_file, schema
+from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.frames import KINDS, End, Header, Kind, Message
 from pelorus.layout import MalformedPayload
@@ -234,7 +235,9 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
     reader = Reader()
     received: list[Received] = []
     try:
-        for piece in packed_file.pieces(path, piece_bytes):
+        count = path.stat().st_size // piece_bytes if path.is_file() else None
+        pieces = packed_file.pieces(path, piece_bytes)
+        for piece in progress(pieces, f"reading {path.name}", count):
             received.extend(reader.feed(piece))
     except packed_file.PackingDamaged as error:
         reader.lose(str(error))

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
+from pelorus import survey_json
 from pelorus.console import out
 from pelorus.frames import Config, Header, Kind
 from pelorus.settings import describe
@@ -16,6 +18,7 @@ from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.survey import Survey, Tracks, require_useful, survey
 
 GAPS_SHOWN = 5
+SPELLS_SHOWN = 40
 FAULTS_SHOWN = 10
 SEVERITIES = ("info", "warning", "error")
 
@@ -27,12 +30,18 @@ def register(parent: typer.Typer) -> None:
 
 def info(
     recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to look into."),
+    as_json: bool = typer.Option(False, "--json", help="The same as one JSON object."),
 ) -> None:
-    """Show what a recording holds: header, settings, counts, rates, gaps, damage.
+    """Show what a recording holds: header, settings, counts, rates, gaps, damage, and of a filter's
+    result from when to when it was not good, and why.
 
     The exit status is 1 if nothing in it can be used.
     """
     found = survey(recording)
+    if as_json:
+        out.print(json.dumps(survey_json.of(found), indent=2), markup=False)
+        require_useful(found)
+        return
     out.print(f"[bold]{escape(str(found.path))}[/]  {found.counts.bytes} bytes")
     if found.header is not None:
         _show_header(found.header)
@@ -46,6 +55,7 @@ def info(
     for text in found.texts:
         severity = SEVERITIES[text.severity] if text.severity < len(SEVERITIES) else "?"
         out.print(f"{severity}: {escape(text.text)}")
+    _show_health(found)
     _show_damage(found)
     require_useful(found)
 
@@ -100,7 +110,7 @@ def _show_streams(found: Survey) -> None:
     streams |= {f"READING {name}": sensor.stream for name, sensor in found.sensors.items()}
     if not streams:
         return
-    origin = min(stream.first_ns for stream in streams.values())
+    origin = found.origin_ns
     table = Table(
         "stream", "from s", "to s", "rate Hz", "gaps", "longest s", box=None, pad_edge=False
     )
@@ -140,6 +150,17 @@ def _show_tracks(tracks: Tracks) -> None:
         f"(least, median, most), of {tracks.landmarks} ids seen in "
         f"{tracks.frames_per_landmark:g} frames (median); {tracks.no_disparity} without disparity"
     )
+
+
+def _show_health(found: Survey) -> None:
+    if found.health is None:
+        return
+    out.print(f"health: {found.health.summary()}")
+    for spell in found.health.spells[:SPELLS_SHOWN]:
+        out.print(f"  {spell.words(found.origin_ns)}")
+    more = len(found.health.spells) - SPELLS_SHOWN
+    if more > 0:
+        out.print(f"  and {more} more, all of them with --json")
 
 
 def _show_damage(found: Survey) -> None:

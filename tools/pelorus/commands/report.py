@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,13 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 
 
+class Also(StrEnum):
+    """Runs for comparison."""
+
+    COURSE = "course"
+    WORLD = "world"
+
+
 def register(parent: typer.Typer) -> None:
     """Add `report` to the command line."""
     parent.command(
@@ -36,18 +44,22 @@ def report(
         ..., "--out", metavar="DIR", help="Where report.html, the pictures and runs/ go."
     ),
     config: Path | None = typer.Option(
-        None, metavar="FILE", help="Settings of all runs but course, as pelorus-replay takes them."
+        None,
+        metavar="FILE",
+        help="Your settings, as pelorus-replay takes them; course has its own.",
     ),
     settings: list[str] = SETTINGS,
+    also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
     programs: Path | None = PROGRAMS,
 ) -> None:
-    """Replay a recording four ways, and draw what came out.
+    """Replay a recording with your settings and by dead reckoning, and draw what came out.
 
-    Dead reckoning and body in float32, the course's preset and world in float64.
-    Without a depth limit in the settings, world gets one of 60 m.
+    With --also course the course report's filter stands beside them, with --also world the
+    textbook's, both in float64. Without a depth limit in the settings, world gets one of 60 m.
     """
     subject = read_subject(recording)
-    plans = plan_runs(find_programs(programs), recording, replay_options(config, settings))
+    options = replay_options(config, settings)
+    plans = plan_runs(find_programs(programs), recording, options, also)
     runs_folder = made(folder / "runs")
     runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
 
@@ -73,14 +85,18 @@ def _publish(compared: Comparison, folder: Path) -> None:
 
 
 def _tell(compared: Comparison, lines: list[str], page: Path) -> None:
-    table = Table(box=None, pad_edge=False)
-    for title in words.titles(compared):
-        name = title == "run"
-        table.add_column(title, justify="left" if name else "right", no_wrap=name, overflow="fold")
-    table.columns[0].min_width = max(len(run.name) for run in compared.runs)
-    for run in compared.runs:
-        table.add_row(*words.row(compared, run))
+    rows = (words.titles(compared), *(words.row(compared, run) for run in compared.runs))
+    head, *figures = zip(*rows, strict=True)
+    table = Table(box=None, pad_edge=False)  # a column a run: that fits on the narrowest terminal
+    for k, title in enumerate(head):
+        table.add_column(title if k else "", justify="right" if k else "left", no_wrap=True)
+    for row in figures:
+        table.add_row(*row)
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")
+    health = compared.main.health
+    out.print(f"health: {health.summary()}")
+    for spell in health.spells:
+        out.print(f"  {escape(spell.words(compared.origin_ns))}")
     out.print(f"report: {escape(str(page))}")

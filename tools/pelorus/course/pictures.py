@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 
 from pelorus.course.trial import Trial
 from pelorus.layout import Floats
+from pelorus.report.results import OWN
 from pelorus.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
 
 NAMES = {
     "dead-reckoning": "dead reckoning",
     "course": "the course's filter",
-    "body": "Pelorus (body)",
+    OWN: "Pelorus (body)",
 }
 COLUMN_IN, HEIGHT_1_IN, HEIGHT_2_IN = 7.0, 6.4, 6.0
 MARGIN = 0.08  # of the larger side
@@ -44,7 +45,7 @@ def figure_1(trials: Sequence[Trial]) -> Figure:
 def _trajectories(axes: Axes, trial: Trial) -> None:
     paths = {run.name: trial.flat(run.name, run.trajectory.poses.p) for run in trial.runs}
     true = trial.true_path
-    for name, colour in (("course", ORANGE), ("body", GREEN)):
+    for name, colour in (("course", ORANGE), (OWN, GREEN)):
         points = trial.scatter(name)
         axes.plot(*points.T, ".", color=colour, markersize=2, markeredgewidth=0, alpha=0.6,
                   label=f"landmarks of {NAMES[name]}")  # fmt: skip
@@ -65,7 +66,7 @@ def _trajectories(axes: Axes, trial: Trial) -> None:
 
 def _limit(axes: Axes, paths: dict[str, Floats], true: Floats | None) -> None:
     """Around the two filters and the reference; dead reckoning may stray so far and no farther."""
-    core = np.concatenate([paths["course"], paths["body"], *([] if true is None else [true])])
+    core = np.concatenate([paths["course"], paths[OWN], *([] if true is None else [true])])
     low, high = core.min(axis=0), core.max(axis=0)
     side = max(float((high - low).max()), 1e-3)
     everything = np.concatenate((core, paths["dead-reckoning"]))

@@ -18,11 +18,11 @@ from pelorus.grid.sightings import sightings
 from pelorus.layout import Floats
 from pelorus.replay import Programs
 from pelorus.report.comparison import COURSE, Comparison, Traces
-from pelorus.report.results import Run, Subject, carry_out, plan_runs
+from pelorus.report.results import OWN, Run, Subject, carry_out, plan_runs
 from pelorus.road import RoadFit
 from pelorus.se3 import apply
 
-RUNS = ("dead-reckoning", "course", "body")
+RUNS = ("dead-reckoning", "course", OWN)
 SKIP_M = 45.0  # the digitised road begins later than the drive
 NEAR_M, SIGMA_MOST_M = (
     40.0,
@@ -108,7 +108,8 @@ def carry_out_trial(
     subject: Subject, reference: Reference, programs: Programs, options: Options, folder: Path
 ) -> Trial:
     """Replay the recording; the files of the runs stay in the folder."""
-    planned = {plan.name: plan for plan in plan_runs(programs, subject.path, options.ours)}
+    found = plan_runs(programs, subject.path, options.ours, (COURSE,))
+    planned = {plan.name: plan for plan in found}
     preset = planned[COURSE]
     planned[COURSE] = replace(preset, options=(*preset.options, *options.course))
     plans = progress([planned[name] for name in RUNS], f"replaying {subject.path.name}")

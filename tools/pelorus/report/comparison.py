@@ -31,7 +31,7 @@ from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
 from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.report.results import Run, Subject
+from pelorus.report.results import OWN, Run, Subject
 from pelorus.settings import in_force
 
 DIAGONAL = (0, 2, 5)  # of a packed 3 x 3
@@ -77,7 +77,7 @@ def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
     return Traces(times, columns[:, 1], columns[:, 2], len(ids))
 
 
-MAIN = "body"  # the default model: what the report is about
+MAIN = OWN
 COURSE = "course"
 
 
@@ -111,6 +111,10 @@ class Comparison:
             return occupancy(sightings(self.main.log, self.main.messages), Wish())
         except PelorusError:
             return None
+
+    @property
+    def has_course(self) -> bool:
+        return any(run.name == COURSE for run in self.runs)
 
     @cached_property
     def whole_map(self) -> Traces:

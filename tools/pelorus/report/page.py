@@ -32,10 +32,10 @@ MEANING = (
     "and gated: observations. Map: RMS distance of the landmarks from where the recording knows "
     "them to be, with its NEES an axis; poses that were given, in mode mapping, have no error. The "
     "last column: time of the recording over time of the computing. "
-    "Dead reckoning and body run in float32, course and world in float64. Body is the filter as it "
-    "is meant to be used; world, for comparison, is the textbook's EKF with landmarks in world "
-    "coordinates, and course the same with the settings of the course report that Pelorus grew "
-    "from, whatever settings the others have."
+    "Yours is the filter with the settings that were given, in float32 like dead reckoning, which "
+    "is the twists alone. Where they were asked for: world is the textbook's EKF with landmarks in "
+    "world coordinates, and course the same with the settings of the course report that Pelorus "
+    "grew from, whatever settings the others have; both in float64."
 )
 
 
@@ -53,6 +53,7 @@ def write(
         _table(compared),
         f"<p>{escape(MEANING)}</p>",
         _list("What is off", lines),
+        _list("Health", _health(compared)),
         *(_figure(picture, file) for picture, file in drawn if picture.caption),
         _commands(compared.runs),
         "</body>\n</html>\n",
@@ -71,6 +72,12 @@ def _facts(compared: Comparison) -> str:
         f"path {summary['path_m']:.1f} m; body axes "
         f"{header.body_axes.name.lower().replace('_', '-')}."
     )
+
+
+def _health(compared: Comparison) -> list[str]:
+    """Of the user's own run: every spell, for a page has room."""
+    found = compared.main.health
+    return [found.summary(), *(spell.words(compared.origin_ns) for spell in found.spells)]
 
 
 def _table(compared: Comparison) -> str:

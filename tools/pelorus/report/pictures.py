@@ -41,9 +41,10 @@ from pelorus.style import (
 )
 from pelorus.trajectory import POSE_SIZE
 
+JUDGED = (MAIN, "world", COURSE)  # dead reckoning has no error worth a picture
 CURVE_MIN = 2  # frames: one point is no curve
 NAMES = (
-    *("top-view", "error-body", "error-world", "error-course", "nees", "covariance", "bias"),
+    *("top-view", "error-yours", "error-world", "error-course", "nees", "covariance", "bias"),
     *("observations", "time", "map", "hero"),
 )
 
@@ -71,15 +72,17 @@ def pictures(compared: Comparison) -> list[Picture]:
     truths = [len(accuracy.t_ns) for accuracy in compared.accuracy.values()]
     judged = min(truths, default=0) >= CURVE_MIN
     if judged:
-        for run in (compared.run(name) for name in ("body", "world", "course")):
+        for run in (run for run in compared.runs if run.name in JUDGED):
             if not run.poses_given:
                 draw = partial(errors, name=run.name)
-                add(f"error-{run.name}", f"Error of {run.name}", ERRORS, draw)
+                add(f"error-{run.name}", f"Error of {PENS[run.name].label}", ERRORS, draw)
         add("nees", "Consistency", NEES, nees)
-    whole_map = COVARIANCE.format(ids=compared.whole_map.ids)
-    add("covariance", "Trace of the covariance", whole_map, covariance)
+    words = COVARIANCE
+    if compared.has_course:
+        words = f"{COVARIANCE} {WHOLE_MAP.format(ids=compared.whole_map.ids)}"
+    add("covariance", "Trace of the covariance", words, covariance)
     if compared.main.summary["bias"] == "on":
-        add("bias", "Biases", "The biases of the twist as body estimates them.", biases)
+        add("bias", "Biases", "The biases of the twist as your run estimates them.", biases)
     add("observations", "Observations", OBSERVATIONS, observations)
     add("time", "Time a frame", TIMES, times)
     if judged and not compared.main.poses_given:
@@ -99,11 +102,13 @@ NEES = (
 )
 COVARIANCE = (
     "Above, of the state as it is: pose and the landmarks in its slots, more of them at one time "
-    "than at another. In the middle, of the whole map, the course's figure 2, for the course's "
-    "filter: all {ids} landmarks of the recording, those not seen yet at their prior of 6 m², "
-    "those that have left with the covariance with which they left. The models count landmarks in "
-    "different units (world in metres, body in angles and inverse range), so compare the runs "
-    "below, where it is the position alone."
+    "than at another. The models count landmarks in different units (world in metres, body in "
+    "angles and inverse range), so compare the runs below, where it is the position alone."
+)
+WHOLE_MAP = (
+    "In the middle, of the whole map, the course's figure 2, for the course's filter: all {ids} "
+    "landmarks of the recording, those not seen yet at their prior of 6 m², those that have left "
+    "with the covariance with which they left."
 )
 OBSERVATIONS = (
     "What became of a frame's observations: used in the update, rejected by the gate, or the "
@@ -118,7 +123,7 @@ def _top_view(compared: Comparison) -> Picture:
         f"Seen in {seen.plane.why}, for the recording does not say which way is up."
     )  # fmt: skip
     if seen.uncertain:
-        words += f" {seen.uncertain} landmarks of body are too uncertain to be drawn."
+        words += f" {seen.uncertain} landmarks of your run are too uncertain to be drawn."
     if seen.truth is not None:
         words += " The truth is brought to the estimate's start."
     return Picture("top-view", "Trajectories", words, partial(top_view.draw, compared))
@@ -130,8 +135,8 @@ def _map(compared: Comparison) -> list[Picture]:
         return []
     words = (
         f"Cells of {grid.resolution_m:g} m, {heights(grid.band)}, from the rays between the camera "
-        "and the landmarks of body, weighted by the landmarks' covariance. `pelorus map` draws it "
-        "with other settings, and writes it for nav2's map_server."
+        "and the landmarks of your run, weighted by the landmarks' covariance. `pelorus map` draws "
+        "it with other settings, and writes it for nav2's map_server."
     )
     title = f"{compared.subject.title}: {grid.plane.why}"
     return [Picture("map", "Free and occupied", words, partial(picture.draw, grid, title))]
@@ -203,17 +208,17 @@ def covariance(compared: Comparison) -> Figure:
     """Trace of the state's covariance, of the whole map's (the course's figure 2), and of the
     position block.
     """
-    figure = new_figure(WIDTH_IN, 9.0)
-    state, whole, position = figure.subplots(3, 1, sharex=True)
+    rows = 3 if compared.has_course else 2
+    figure = new_figure(WIDTH_IN, 3.0 * rows)
+    panels = figure.subplots(rows, 1, sharex=True)
+    state, position = panels[0], panels[-1]
     for run in _in_layers(compared):
         t = compared.seconds(run.frames.t_ns)
         _positive(state, t, run.frames["trace"], run)
         _positive(position, t, run.frames.stack(*POSITION).sum(axis=-1), run)
-    found = compared.whole_map
-    whole.plot(compared.seconds(found.t_ns), found.whole, **PENS[COURSE].line)
-    whole.set_ylim(bottom=0)
+    if compared.has_course:
+        _whole_map(panels[1], compared)
     state.set_ylabel("trace of P, state\n(mixed units)")
-    whole.set_ylabel("trace of P, whole map\n(course: m², rad²)")
     position.set_ylabel("trace of position block\n(m²)")
     position.set_xlabel(TIME)
     for axes in (state, position):
@@ -222,8 +227,16 @@ def covariance(compared: Comparison) -> Figure:
     return figure
 
 
+def _whole_map(axes: Axes, compared: Comparison) -> None:
+    found = compared.whole_map
+    axes.plot(compared.seconds(found.t_ns), found.whole, **PENS[COURSE].line)
+    axes.set_ylim(bottom=0)
+    axes.set_ylabel("trace of P, whole map\n(course: m², rad²)")
+
+
 def _in_layers(compared: Comparison) -> list[Run]:
-    return [compared.run(name) for name in PENS]
+    runs = {run.name: run for run in compared.runs}
+    return [runs[name] for name in PENS if name in runs]
 
 
 def _positive(axes: Axes, t: Floats, values: Floats, run: Run) -> None:
@@ -260,7 +273,7 @@ def biases(compared: Comparison) -> Figure:
         value, three_sigma = frames[name], 3 * np.sqrt(np.clip(frames[f"var_{name}"], 0, None))
         axes.fill_between(t, value - three_sigma, value + three_sigma, color=SKY, alpha=0.35,
                           linewidth=0, label=f"± 3 {SIGMA}")  # fmt: skip
-        axes.plot(t, value, color=BLUE, label="estimate (body)")
+        axes.plot(t, value, color=BLUE, label="estimate")
         axes.axhline(0, color=GREY, linewidth=1)
         axes.set_title(f"$b_{{{name[-2]}{name[-1]}}}$")
     panels[0, 0].set_ylabel("velocity bias (m/s)")
@@ -286,10 +299,10 @@ def observations(compared: Comparison) -> Figure:
         colors=(SKY, VERMILLION, ORANGE),
         step="mid",
     )
-    fates.set_ylabel("observations a frame (body)")
+    fates.set_ylabel("observations (a frame)")
     slots.plot(t, frames["active"], color=BLUE, label="active landmarks")
     slots.plot(t, frames["evicted"], color=PURPLE, linewidth=1, label="evicted in the frame")
-    slots.set_ylabel("landmarks (body)")
+    slots.set_ylabel("landmarks (held)")
     slots.set_xlabel(TIME)
     for axes in (fates, slots):
         axes.set_ylim(bottom=0)
@@ -348,5 +361,5 @@ def _position_errors(figure: Figure, compared: Comparison) -> None:
         axes.set_ylabel(f"{RHO} {name} (m)")
         axes.tick_params(labelbottom=name == "z")
         if name == "x":
-            axes.set_title(f"position error of body (black) in its 3 {SIGMA} band", loc="left")
+            axes.set_title(f"position error (black) in its 3 {SIGMA} band", loc="left")
     axes.set_xlabel("time (s)")

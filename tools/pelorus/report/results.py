@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from pelorus.errors import PelorusError
 from pelorus.evaluation import judge, known_in, made_in, sigmas_m
 from pelorus.frame_table import FrameTable, frame_table
 from pelorus.frames import Header, Landmark, Message
+from pelorus.health import TimeLine, time_line
 from pelorus.layout import Floats
 from pelorus.replay import Outputs, Programs, depth_limit_m, replay
 from pelorus.trajectory import Trajectory, estimate_in, truth_in
@@ -46,6 +48,7 @@ def read_subject(path: Path) -> Subject:
     return Subject(path, header, truth_in(messages), known_in(messages))
 
 
+OWN = "yours"  # the run with the settings that were given, and what the report is about
 WORLD_DEPTH_M = 60.0  # the world model must leave far points out
 
 
@@ -58,21 +61,25 @@ class Plan:
     options: tuple[str, ...]
 
 
-def plan_runs(programs: Programs, recording: Path, settings: Sequence[str]) -> list[Plan]:
-    """The runs in the order of the table.
+def plan_runs(
+    programs: Programs, recording: Path, settings: Sequence[str], also: Sequence[str] = ()
+) -> list[Plan]:
+    """The user's own run, dead reckoning, and of `course` and `world` what is asked for.
 
     `settings` hold for all but `course`, whose preset is the whole point of it.
     """
-    world = (*settings, "--model", "world")
-    if depth_limit_m(programs.float64, recording, world) == 0:
-        world = (*world, "--max-depth", f"{WORLD_DEPTH_M:g}")
-    dead_reckoning = (*settings, "--mode", "dead_reckoning")
-    return [
-        Plan("dead-reckoning", programs.float32, dead_reckoning),
-        Plan("body", programs.float32, (*settings, "--model", "body")),
-        Plan("course", programs.float64, ("--preset", "course")),
-        Plan("world", programs.float64, world),
+    plans = [
+        Plan(OWN, programs.float32, tuple(settings)),
+        Plan("dead-reckoning", programs.float32, (*settings, "--mode", "dead_reckoning")),
     ]
+    if "course" in also:
+        plans.append(Plan("course", programs.float64, ("--preset", "course")))
+    if "world" in also:
+        world = (*settings, "--model", "world")
+        if depth_limit_m(programs.float64, recording, world) == 0:
+            world = (*world, "--max-depth", f"{WORLD_DEPTH_M:g}")
+        plans.append(Plan("world", programs.float64, world))
+    return plans
 
 
 class Points(NamedTuple):
@@ -101,6 +108,15 @@ class Run:
     @property
     def name(self) -> str:
         return self.plan.name
+
+    @property
+    def health(self) -> TimeLine:
+        """From when to when it was not good, and why."""
+        return self._health or TimeLine(0, {}, ())
+
+    @cached_property
+    def _health(self) -> TimeLine | None:
+        return time_line(self.messages)
 
     @property
     def poses_given(self) -> bool:

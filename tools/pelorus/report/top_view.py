@@ -111,7 +111,7 @@ def fill(axes: Axes, seen: View, width_to_height: float) -> None:
     dots: dict[str, Any] = {"color": GREEN, "marker": ".", "linestyle": "none"}
     size = 3 if len(seen.landmarks) > FEW else 7
     axes.plot(*seen.landmarks.T, markersize=size, alpha=0.6, markeredgewidth=0, **dots)
-    axes.plot([], [], markersize=8, label="landmarks (body)", **dots)
+    axes.plot([], [], markersize=8, label="landmarks", **dots)
     if len(seen.known):
         axes.scatter(
             seen.known[:, 0],
@@ -122,7 +122,8 @@ def fill(axes: Axes, seen: View, width_to_height: float) -> None:
             label="known landmarks",
         )
     for name, pen in PENS.items():
-        axes.plot(*seen.paths[name].T, **pen.line)
+        if name in seen.paths:
+            axes.plot(*seen.paths[name].T, **pen.line)
     if seen.truth is not None:
         axes.plot(*seen.truth.T, **TRUTH.line)
     _mark_ends(axes, seen)
@@ -143,4 +144,4 @@ def _mark_ends(axes: Axes, seen: View) -> None:
         "zorder": 10,
     }
     axes.plot(*path[0], marker="o", markersize=9, label="start", **style)
-    axes.plot(*path[-1], marker="s", markersize=9, label="end (body)", **style)
+    axes.plot(*path[-1], marker="s", markersize=9, label="end", **style)

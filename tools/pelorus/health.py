@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""Health as a time line: from when to when the filter was not good, and why, in words.
+
+A result holds a REPORT for each frame. Frames in a row with the same health are a spell; spells of
+the same health with less than a second between them are one, for a filter that says DEGRADED in
+every third frame is degraded all the time. Where no frame came there is no REPORT either: a pause
+of more than a second is a spell of its own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from pelorus import schema
+from pelorus.frames import Kind, Message, Report
+
+GOOD, LOST = 0, 2
+PAUSE_NS = 1_000_000_000  # after so long the filter itself says NO_FRAMES
+NO_FRAMES = "no frames came"
+
+SHORT = {
+    "FEW_OBSERVATIONS": "fewer than 3 points used",
+    "NO_OBSERVATIONS": "no point used for long",
+    "GATE_LOCKED": "nearly all matches rejected, landmarks dropped",
+    "BLOCK_FAILED": "an update could not be computed",
+    "SINK_FAILED": "the map sink refused landmarks",
+    "REFUSED_INPUT": "observations malformed, or an id twice in a frame",
+    "NIS_HIGH": "innovations larger than the noise explains",
+    "RANGE_LIMITED": "a landmark's correction was limited",
+    "NOT_POSITIVE": "a variance ceased to be positive",
+    "BUDGET": "no time for all observations",
+    "TWIST_CONTRADICTED": "vision contradicts the twists",
+    "POSE_MAY_BE_WRONG": "the pose may be wrong",
+    "BIAS_OFF_PRIOR": "a bias is far from its prior",
+    "FROZEN_IMAGE": "identical pixels",
+    "SCENE_DISAGREES": "the points do not agree on one motion",
+    "RECOVERED": "landmarks dropped and covariance widened",
+    "NO_FRAMES": NO_FRAMES,
+    "STATE_DAMAGED": "the filter's memory was changed",
+    "NO_TWISTS": "twists missing, refused or too old",
+    "READINGS_REJECTED": "readings of a small sensor rejected",
+}
+# What follows from a cause; where the cause is known too, it is told first.
+SYMPTOMS = tuple(
+    SHORT[name] for name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS", "NO_OBSERVATIONS")
+)
+# They leave the estimate as good as it should be.
+HARMLESS = ("GATE_INERT", "NO_ROOM", "NIS_LOW")
+
+
+@dataclass(frozen=True)
+class Spell:
+    """From the first frame that is not good to the last; `why`: causes before symptoms, of each the
+    most frequent first.
+    """
+
+    health: int
+    from_ns: int
+    to_ns: int
+    frames: int
+    why: tuple[str, ...]
+
+    def words(self, origin_ns: int) -> str:
+        """`lost from 37.0 to 40.1 s (31 frames): identical pixels`."""
+        start, end = (f"{(t - origin_ns) * 1e-9:.1f}" for t in (self.from_ns, self.to_ns))
+        when = f"at {start} s" if start == end else f"from {start} to {end} s"
+        frames = f" ({self.frames} frame{'s' if self.frames > 1 else ''})" if self.frames else ""
+        return f"{schema.HEALTHS[self.health]} {when}{frames}: {', '.join(self.why)}"
+
+
+@dataclass(frozen=True)
+class TimeLine:
+    """All spells in the order of time, and how many frames had which health."""
+
+    frames: int
+    by_health: dict[str, int]
+    spells: tuple[Spell, ...]
+
+    def summary(self) -> str:
+        """`good in 380 of 410 frames, lost in 30`."""
+        good = self.by_health.get(schema.HEALTHS[GOOD], 0)
+        others = [
+            f"{name} in {count}"
+            for name, count in self.by_health.items()
+            if count and name != schema.HEALTHS[GOOD]
+        ]
+        return ", ".join((f"good in {good} of {self.frames} frames", *others))
+
+
+def time_line(messages: Iterable[Message]) -> TimeLine | None:
+    """Of a filter's result; None where there is no answer to a frame."""
+    answers = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STEREO]
+    if not answers:
+        return None
+    counts = Counter(answer.health for answer in answers)
+    by_health = {words: counts[number] for number, words in schema.HEALTHS.items()}
+    told = answers[1:] if _why(answers[0]) == (SHORT["FEW_OBSERVATIONS"],) else answers
+    spells = sorted(  # the first frame makes landmarks, and has none to use yet
+        (*_of_frames(told), *_pauses(answers)), key=lambda spell: (spell.from_ns, spell.to_ns)
+    )
+    return TimeLine(len(answers), by_health, tuple(spells))
+
+
+def reasons(bits: int) -> tuple[str, ...]:
+    """What a mask says, in words, without what is harmless; one of a later version by number."""
+    found = []
+    for k in range(bits.bit_length()):
+        if not bits >> k & 1:
+            continue
+        name = schema.REASON_NAMES.get(1 << k, "")
+        if name not in HARMLESS:
+            found.append(SHORT.get(name) or schema.REASONS.get(1 << k, f"reason {k}"))
+    return tuple(found)
+
+
+def _why(answer: Report) -> tuple[str, ...]:
+    if answer.status == 0:
+        return reasons(answer.reasons)
+    # its reasons are those of the frame before
+    words = schema.STATUSES.get(answer.status, f"status {answer.status}")
+    return (f"frame refused, {words.partition(':')[0].partition(';')[0]}",)
+
+
+def _of_frames(answers: Sequence[Report]) -> Iterator[Spell]:
+    """Each health by itself, so that a moment of LOST does not hide in a long DEGRADED."""
+    for health in sorted(set(schema.HEALTHS) - {GOOD}):
+        why: Counter[str] = Counter()
+        open_: Spell | None = None
+        for answer in (answer for answer in answers if answer.health == health):
+            if open_ is not None and answer.t_ns - open_.to_ns > PAUSE_NS:
+                yield replace(open_, why=_ordered(why))
+                open_, why = None, Counter()
+            why.update(_why(answer))
+            first = answer.t_ns if open_ is None else open_.from_ns
+            frames = 1 if open_ is None else open_.frames + 1
+            open_ = Spell(health, first, max(answer.t_ns, first), frames, ())
+        if open_ is not None:
+            yield replace(open_, why=_ordered(why))
+
+
+def _ordered(why: Counter[str]) -> tuple[str, ...]:
+    words = [words for words, _ in why.most_common()] or ["no reason given"]
+    return tuple(sorted(words, key=lambda word: word in SYMPTOMS))
+
+
+def _pauses(answers: Sequence[Report]) -> Iterator[Spell]:
+    times = [answer.t_ns for answer in answers if answer.status == 0]
+    for before, after in pairwise(times):
+        if after - before > PAUSE_NS:
+            yield Spell(LOST, before, after, 0, (NO_FRAMES,))
