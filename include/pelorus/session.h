@@ -130,7 +130,7 @@ typedef enum plr_step {
 
 /* Counts since init or since the HEADER that followed an END. */
 typedef struct plr_session_totals {
-    uint32_t twists, stereos, truths, landmarks, readings; /* received */
+    uint32_t twists, stereos, truths, landmarks, readings, imus; /* messages received */
     uint32_t refused; /* messages of any kind that were refused; frames that the reader skipped
                                are in reader.counts */
     uint32_t without_truth; /* mapping: frames without a TRUTH of the same time */

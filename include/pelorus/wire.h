@@ -32,17 +32,19 @@ typedef enum plr_kind {
     PLR_KIND_TEXT = 10,
     PLR_KIND_END = 11,
     PLR_KIND_STATE = 12,
-    PLR_KIND_READING = 13
+    PLR_KIND_READING = 13,
+    PLR_KIND_IMU = 14
 } plr_kind;
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 3,
-    PLR_WIRE_KINDS = 13,     /* kinds are 1 to this */
+    PLR_WIRE_VERSION_MINOR = 4,
+    PLR_WIRE_KINDS = 14,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
     PLR_WIRE_MAX_SETTINGS = 64,
     PLR_WIRE_MAX_OBSERVATIONS = 4096,
+    PLR_WIRE_MAX_IMU = 20, /* readings in one IMU message: it is shorter than the longest CONFIG */
     PLR_WIRE_MAX_TEXT = 240
 };
 
@@ -76,6 +78,13 @@ typedef struct plr_header {
     /* Along the body's x, y and z, where they differ; 0 or negative: the value for all axes
      * above. */
     double velocity_sigma_axes_mps[3], gyro_sigma_axes_radps[3];
+    /* What moves the body: plr_process_kind. Senders before format 1.4 say PLR_PROCESS_TWIST. */
+    uint8_t process;
+    /* Suggestions for the settings of an IMU; negative: no suggestion, as from senders before format
+     * 1.4. */
+    double gyro_noise, accel_noise; /* rad/s/sqrt(Hz), m/s^2/sqrt(Hz) */
+    double gyro_walk, accel_walk;   /* rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz) */
+    double bias_accel_sigma_mps2, gravity_mps2;
     char name[PLR_WIRE_NAME_SIZE];
 } plr_header;
 
@@ -98,13 +107,25 @@ typedef struct plr_start {
     plr_pose T_WB;
     bool has_covariance, has_bias;
     double P_xi[21]; /* covariance of (rho, theta): lower triangle, row by row; m^2, rad^2 */
-    double bias[6], bias_variance[6]; /* (b_v, b_w), m/s and rad/s */
+    /* (b_v, b_w), m/s and rad/s; with an IMU (b_a, b_g), m/s^2 and rad/s */
+    double bias[6], bias_variance[6];
+    double velocity[3];          /* along the body's axes, m/s */
+    double velocity_variance[3]; /* (m/s)^2. Not all above 0: the velocity is not given, as from
+                                    senders before format 1.4 */
 } plr_start;
 
 typedef struct plr_twist_message {
     plr_time_ns t_ns;
     plr_twist twist;
 } plr_twist_message;
+
+/* Successive readings of an IMU at a constant rate: reading k is of t_ns + k period_ns. */
+typedef struct plr_imu_message {
+    plr_time_ns t_ns;
+    uint32_t period_ns; /* 0 where there is one reading */
+    uint8_t count;      /* 1 to PLR_WIRE_MAX_IMU */
+    plr_imu readings[PLR_WIRE_MAX_IMU]; /* the frame has float32 */
+} plr_imu_message;
 
 typedef struct plr_truth {
     plr_time_ns t_ns;
@@ -131,12 +152,12 @@ typedef struct plr_pose_message {
     plr_pose T_WB;
     double P_xi[21]; /* covariance of (rho, theta): lower triangle, row by row; m^2, rad^2 */
     plr_twist velocity;
-    double bias[6]; /* (b_v, b_w), m/s and rad/s */
+    double bias[6]; /* (b_v, b_w), m/s and rad/s; with an IMU (b_a, b_g), m/s^2 and rad/s */
     double P_u[21]; /* covariance of velocity, in the order (v, w); packed like P_xi */
     double trace;   /* of the whole covariance, landmarks included; negative: not known. Known after
                        a STEREO alone, and not from senders before format 1.3 */
-    double bias_variance[6]; /* of bias, in the order (b_v, b_w); negative: not known, as above. The
-                                frame has float32 */
+    double bias_variance[6]; /* of bias, in its order; negative: not known, as above. The frame has
+                                float32 */
 } plr_pose_message;
 
 /* What a REPORT tells besides its status. */
@@ -172,6 +193,7 @@ typedef enum plr_counted {
     PLR_COUNTED_TRUTH,
     PLR_COUNTED_LANDMARK,
     PLR_COUNTED_READING,
+    PLR_COUNTED_IMU,
     PLR_COUNTED
 } plr_counted;
 
@@ -179,6 +201,7 @@ typedef struct plr_end {
     /* How many frames of each kind, and of all kinds, the sender has written before this one. */
     uint32_t twists, stereos, truths, landmarks, frames;
     uint32_t readings; /* 0 from senders before format 1.3 */
+    uint32_t imus;     /* 0 from senders before format 1.4 */
     /* Where this END answers another: bit i is set if of kind i (plr_counted) another number arrived
      * than that END says, and arrived[i] is that number; else it is 0. */
     uint8_t differs;
@@ -214,6 +237,7 @@ typedef struct plr_message {
         plr_end end;
         plr_state_message state;
         plr_reading reading;
+        plr_imu_message imu;
     } as;
 } plr_message;
 

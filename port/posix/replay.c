@@ -90,6 +90,8 @@ static uint32_t number_of(const plr_session_totals *totals, plr_kind kind) {
         return totals->landmarks;
     case PLR_KIND_READING:
         return totals->readings;
+    case PLR_KIND_IMU:
+        return totals->imus;
     default:
         return 0;
     }

@@ -54,6 +54,11 @@ static void pass_settings(plr_codec *c, plr_config_message *m) {
         plr_codec_fields(c, &m->settings[i], CONFIG_rows, LENGTH(CONFIG_rows));
 }
 
+static void pass_imu(plr_codec *c, plr_imu_message *m) {
+    for (unsigned i = 0; i < rows_of(c, m->count) && c->status == PLR_OK; i++)
+        plr_codec_fields(c, &m->readings[i], IMU_rows, LENGTH(IMU_rows));
+}
+
 /* What is read goes to the reader's room; what is written comes from the message, which is only
  * looked at. */
 static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_room *room) {
@@ -80,6 +85,8 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
         pass_settings(c, content);
     if (kind == PLR_KIND_STEREO)
         pass_observations(c, content, room);
+    if (kind == PLR_KIND_IMU)
+        pass_imu(c, content);
     if (kind == PLR_KIND_LANDMARK && plr_codec_reads(c)) {
         plr_landmark_message *m = content;
         m->landmark.times_gated = 0;

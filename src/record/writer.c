@@ -73,6 +73,8 @@ static void count(plr_end *counts, plr_kind kind) {
         counts->landmarks++;
     if (kind == PLR_KIND_READING)
         counts->readings++;
+    if (kind == PLR_KIND_IMU)
+        counts->imus++;
 }
 
 plr_status plr_writer_put(plr_writer *w, const plr_message *message) {

@@ -15,11 +15,11 @@
 
 /* END says how many there were: ", 10 of 12 TWIST" if 10 arrived. */
 static void compare_counts(plr_session *s) {
-    static const char *const names[PLR_COUNTED] = {" TWIST", " STEREO", " TRUTH", " LANDMARK",
-                                                   " READING"};
+    static const char *const names[PLR_COUNTED] = {" TWIST",    " STEREO",  " TRUTH",
+                                                   " LANDMARK", " READING", " IMU"};
     const plr_end *end = &s->in.as.end;
-    const uint32_t sent[PLR_COUNTED] = {end->twists, end->stereos, end->truths, end->landmarks,
-                                        end->readings};
+    const uint32_t sent[PLR_COUNTED] = {end->twists,    end->stereos,  end->truths,
+                                        end->landmarks, end->readings, end->imus};
     plr_end answer;
     plr_text *line = &s->out.as.text;
     plr_send_describe_end(s, &answer);
@@ -121,6 +121,7 @@ static void count(plr_session *s) {
     s->totals.truths += s->in.kind == PLR_KIND_TRUTH;
     s->totals.landmarks += s->in.kind == PLR_KIND_LANDMARK;
     s->totals.readings += s->in.kind == PLR_KIND_READING;
+    s->totals.imus += s->in.kind == PLR_KIND_IMU;
     s->is_log = s->is_log || is_in_force(&s->in);
 }
 

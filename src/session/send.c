@@ -150,10 +150,10 @@ void plr_send_text(plr_session *s) {
 void plr_send_describe_end(const plr_session *s, plr_end *end) {
     const plr_session_totals *got = &s->totals;
     const plr_end *told = &s->in.as.end;
-    const uint32_t arrived[PLR_COUNTED] = {got->twists, got->stereos, got->truths, got->landmarks,
-                                           got->readings};
-    const uint32_t sent[PLR_COUNTED] = {told->twists, told->stereos, told->truths, told->landmarks,
-                                        told->readings};
+    const uint32_t arrived[PLR_COUNTED] = {got->twists,    got->stereos,  got->truths,
+                                           got->landmarks, got->readings, got->imus};
+    const uint32_t sent[PLR_COUNTED] = {told->twists,    told->stereos,  told->truths,
+                                        told->landmarks, told->readings, told->imus};
     memset(end, 0, sizeof *end);
     for (unsigned i = 0; i < PLR_COUNTED && s->in.kind == PLR_KIND_END; i++)
         if (arrived[i] != sent[i]) {

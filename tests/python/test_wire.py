@@ -21,11 +21,13 @@ from pelorus.frames import (
     Config,
     End,
     Header,
+    Imu,
     Kind,
     Landmark,
     Message,
     Noise,
     Pose,
+    Process,
     Reading,
     Report,
     Role,
@@ -66,14 +68,16 @@ MESSAGES: list[Message] = [
     Pose(5, CHANCE.normal(size=3), real_bytes=4, after_stereo=True, trace=0.5),
     Report(8, 5, -7, 3, 0xFFFF, 60, *COUNTS, nis=1.5, update_us=2**32 - 1, notice=3),  # type: ignore[misc]
     Text("grün", 2),
-    End(1, 2, 3, 4, 5, 6, 31, (7, 8, 9, 10, 11)),
+    End(1, 2, 3, 4, 5, 6, 63, (7, 8, 9, 10, 11), 12, 13),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
     Reading(10, SENSORS["wheel"], 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
+    Imu(11, CHANCE.normal(size=(1, 3)), CHANCE.normal(size=(1, 3))),
+    Imu(11, CHANCE.normal(size=(20, 3)), CHANCE.normal(size=(20, 3)), 2_500_000),
 ]
 SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 settings
-    Kind.HEADER: [250 + 9],
+    Kind.HEADER: [299 + 9],
     Kind.CONFIG: [11 + 9 * 3],
-    Kind.START: [369],
+    Kind.START: [417],
     Kind.TWIST: [56],
     Kind.STEREO: [12 + 20 * n for n in (5, 0, 4096)],
     Kind.TRUTH: [104],
@@ -81,9 +85,10 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.POSE: [36 + 63 * 8 + 32, 36 + 63 * 4 + 32],
     Kind.REPORT: [56],
     Kind.TEXT: [1 + 5],
-    Kind.END: [45],
+    Kind.END: [53],
     Kind.STATE: [57],
     Kind.READING: [58],
+    Kind.IMU: [13 + 24 * n for n in (1, 20)],
 }
 
 
@@ -135,9 +140,11 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 3, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 4, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:211] == "Straße 7".encode()
     assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
+    assert header[259] == Process.TWIST
+    assert np.array_equal(np.frombuffer(header, "<f8", 6, 260), np.full(6, -1.0))
     assert struct.unpack_from("<5d", header, 10) == (700.5, 701.5, 320.1, 240.2, 0.54)
     assert np.array_equal(np.frombuffer(header, "<f8", 9, 50), R.ravel())
     assert np.array_equal(np.frombuffer(header, "<f8", 7, 146), np.full(7, -1.0))
@@ -241,10 +248,10 @@ def test_a_header_of_format_1_1_tells_nothing_of_single_axes() -> None:
     noise = Noise(0.5, gyro_sigma_x_radps=0.1, gyro_sigma_z_radps=0.4)
     header = Header(Camera(1, 1, 1, 1, 1), noise=noise, name="old")
     assert Header.unpack(header.pack()) == header
-    assert Header.unpack(header.pack()[:-48]) == replace(header, noise=Noise(0.5))
+    assert Header.unpack(header.pack()[: -48 - 49]) == replace(header, noise=Noise(0.5))
 
 
-@pytest.mark.parametrize(("kind", "added"), [(Pose, 32), (Report, 2), (End, 25)])
+@pytest.mark.parametrize(("kind", "added"), [(Pose, 32), (Report, 2), (End, 25 + 8)])
 def test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2(
     kind: type[Message], added: int
 ) -> None:
@@ -257,9 +264,50 @@ def test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2(
     assert told == {name: getattr(old, name) for name in told} != {}
     if isinstance(old, Pose):
         assert (old.bias_variance == -1).all()
-    for cut in range(1, added):
+    for cut in set(range(1, added)) - {8 if kind is End else 0}:  # 8: a payload of 1.3
         with pytest.raises(MalformedPayload):
             kind.unpack(payload[:-cut])
+
+
+def test_what_came_with_format_1_4_is_absent_in_payloads_of_1_3() -> None:
+    noise = Noise(0.5, gyro_sigma_x_radps=0.1, gyro_noise=1e-3, gravity=9.8)
+    header = Header(Camera(1, 1, 1, 1, 1), noise=noise, name="old", process=Process.IMU)
+    assert Header.unpack(header.pack()) == header
+    older = replace(noise, gyro_noise=-1.0, gravity=-1.0)
+    assert Header.unpack(header.pack()[:-49]) == replace(header, noise=older, process=Process.TWIST)
+    start = Start(1, bias_mean=np.ones(6), velocity=np.ones(3), velocity_variance=np.ones(3))
+    assert Start.unpack(start.pack()) == start
+    assert Start.unpack(start.pack()[:-48]) == Start(1, bias_mean=np.ones(6))
+    end = End(1, 2, 3, 4, 5, 6, 63, (7, 8, 9, 10, 11), 12, 13)
+    assert End.unpack(end.pack()[:-8]) == replace(end, imus=0, imus_arrived=0)
+    for message, added in ((header, 49), (start, 48), (end, 8)):
+        for cut in range(1, added):
+            with pytest.raises(MalformedPayload):
+                type(message).unpack(message.pack()[:-cut])
+
+
+def test_readings_of_an_imu_are_float32_rows_at_their_times() -> None:
+    a, w = np.array([[0.1, 0.2, 9.81], [1.0, 1e300, 3.0]]), np.array([[4, 5, 6], [7, 8, 9.5]])
+    with np.errstate(over="ignore"):
+        rows = np.hstack([a, w]).astype("<f4")
+    imu = Imu(1000, a, w, 2_500_000)
+    assert imu.times_ns == [1000, 2_501_000]
+    assert imu.pack() == struct.pack("<QIB", 1000, 2_500_000, 2) + rows.tobytes()
+    back = Imu.unpack(imu.pack())
+    assert np.array_equal(back.a_B_mps2, rows[:, :3])
+    assert np.array_equal(back.w_B_radps, rows[:, 3:])
+    assert (back.t_ns, back.period_ns) == (1000, 2_500_000)
+
+
+@pytest.mark.parametrize("count", [0, 21])
+def test_no_reading_of_an_imu_or_too_many_do_not_fit_a_frame(count: int) -> None:
+    with pytest.raises(ValueError, match=f"{count} readings in one IMU frame, 1 to 20 fit"):
+        Imu(1, np.zeros((count, 3)), np.zeros((count, 3))).pack()
+
+
+def test_readings_of_an_imu_in_another_shape_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"shapes \(3,\) and \(3, 3\) where \(3, 3\) is due"):
+        Imu(1, np.zeros(3), np.zeros((3, 3))).pack()
 
 
 def test_a_report_of_format_1_1_has_the_lower_reasons_alone() -> None:
@@ -281,6 +329,9 @@ WRONG_BYTES = [  # kind, offset in the payload, value: choices and counts that n
     (Kind.REPORT, 9, 1),
     (Kind.REPORT, 10, 4),
     (Kind.TEXT, 0, 3),
+    (Kind.HEADER, 259, 2),
+    (Kind.IMU, 12, 0),
+    (Kind.IMU, 12, 21),
 ]
 
 
@@ -314,12 +365,13 @@ def test_a_frame_without_end_is_given_up_once_and_reading_goes_on() -> None:
 def test_the_writer_counts_and_closes_with_end() -> None:
     stream = io.BytesIO()
     writer = Writer(stream)
-    for message in (MESSAGES[0], Twist(1), Twist(2), Truth(2), stereo(3), MESSAGES[8]):
+    header, landmark, imu = MESSAGES[0], MESSAGES[8], MESSAGES[-1]
+    for message in (header, Twist(1), Twist(2), Truth(2), stereo(3), landmark, imu):
         writer.write(message)
     writer.end()
     received, counts = read(stream.getvalue())
-    assert received[-1].message == End(twists=2, stereos=1, truths=1, landmarks=1, frames=6)
-    assert received[-1].sequence == 6
+    assert received[-1].message == End(twists=2, stereos=1, truths=1, landmarks=1, frames=7, imus=1)
+    assert received[-1].sequence == 7
     assert counts.clean
 
 

@@ -58,7 +58,8 @@ def a_header(random: np.random.Generator) -> Message:
         twist_timing=frames.TwistTiming(int(random.integers(3))),
         image_width_px=whole(random, 16),
         image_height_px=whole(random, 16),
-        noise=frames.Noise(*reals(random, 13)),
+        noise=frames.Noise(*reals(random, 19)),
+        process=frames.Process(int(random.integers(2))),
         name=a_text(random, frames.NAME_BYTES_MAX),
     )
 
@@ -85,6 +86,8 @@ def a_start(random: np.random.Generator) -> Message:
         covariance=reals(random, 21),
         bias_mean=reals(random, 6),
         bias_variance=reals(random, 6),
+        velocity=reals(random, 3),
+        velocity_variance=reals(random, 3),
     )
 
 
@@ -167,6 +170,16 @@ def a_reading(random: np.random.Generator) -> Message:
     )
 
 
+def an_imu(random: np.random.Generator) -> Message:
+    count = int(random.choice([1, 2, frames.IMU_READINGS_MAX]))
+    return frames.Imu(
+        t_ns=whole(random, 64),
+        a_B_mps2=narrow_reals(random, count, 3),
+        w_B_radps=narrow_reals(random, count, 3),
+        period_ns=whole(random, 32),
+    )
+
+
 MAKERS = [
     a_header,
     a_config,
@@ -180,6 +193,7 @@ MAKERS = [
     a_remark,
     a_state,
     a_reading,
+    an_imu,
 ]
 
 

@@ -34,6 +34,9 @@ size_t wire_unstuff(const uint8_t *stuffed, size_t n, uint8_t *body);
 /* The payload that plr_writer_put makes of a message; returns its length. */
 size_t wire_payload(const plr_message *message, uint8_t *payload, size_t capacity);
 
+/* Reads n bytes of a payload, and no byte beyond them: the sanitizers would find out. */
+plr_status wire_read_payload(plr_kind kind, const uint8_t *payload, size_t n, plr_message *m);
+
 /* A reader with room for any frame, over static memory: one at a time. */
 plr_reader wire_reader(void);
 

@@ -84,6 +84,14 @@ static void test_a_stereo_of_too_many_or_no_observations_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, put(&m));
 }
 
+static void test_an_imu_of_no_reading_or_too_many_is_refused(void) {
+    plr_message m = wire_sample(PLR_KIND_IMU, WIRE_SAMPLE_COMMON);
+    m.as.imu.count = 0;
+    assert_refused(&m);
+    m.as.imu.count = PLR_WIRE_MAX_IMU + 1;
+    assert_refused(&m);
+}
+
 static void test_results_that_contradict_themselves_are_refused(void) {
     plr_message m = wire_sample(PLR_KIND_LANDMARK, WIRE_SAMPLE_COMMON);
     m.as.landmark.role = PLR_LANDMARK_FINAL + 1;
@@ -136,10 +144,10 @@ static void test_the_sequence_goes_from_0_and_wraps(void) {
 }
 
 static void test_an_end_tells_what_was_written_whatever_it_says(void) {
-    const plr_kind kinds[] = {PLR_KIND_HEADER, PLR_KIND_TWIST,    PLR_KIND_TWIST, PLR_KIND_TWIST,
-                              PLR_KIND_STEREO, PLR_KIND_STEREO,   PLR_KIND_TRUTH, PLR_KIND_LANDMARK,
-                              PLR_KIND_TWIST,  PLR_KIND_LANDMARK, PLR_KIND_TRUTH, PLR_KIND_TRUTH,
-                              PLR_KIND_READING};
+    const plr_kind kinds[] = {
+        PLR_KIND_HEADER, PLR_KIND_TWIST, PLR_KIND_TWIST,    PLR_KIND_TWIST, PLR_KIND_STEREO,
+        PLR_KIND_STEREO, PLR_KIND_TRUTH, PLR_KIND_LANDMARK, PLR_KIND_TWIST, PLR_KIND_LANDMARK,
+        PLR_KIND_TRUTH,  PLR_KIND_TRUTH, PLR_KIND_READING,  PLR_KIND_IMU,   PLR_KIND_IMU};
     enum { FRAMES = sizeof kinds / sizeof *kinds };
     for (unsigned i = 0; i < FRAMES; i++)
         TEST_ASSERT_EQUAL_INT(PLR_OK, put_sample(kinds[i]));
@@ -152,7 +160,7 @@ static void test_an_end_tells_what_was_written_whatever_it_says(void) {
     plr_reader r = wire_reader();
     size_t taken;
     TEST_ASSERT_EQUAL_INT(PLR_READ_MESSAGE, plr_reader_feed(&r, bytes, sink.length, &taken, &back));
-    end.as.end = (plr_end){4, 2, 3, 2, FRAMES, 1, 16, {0, 0, 0, 0, 9}};
+    end.as.end = (plr_end){4, 2, 3, 2, FRAMES, 1, 2, 16, {0, 0, 0, 0, 9, 0}};
     wire_assert_same(&end, &back);
 }
 
@@ -234,6 +242,7 @@ int main(void) {
     RUN_TEST(test_a_header_that_contradicts_itself_is_refused_and_nothing_is_written);
     RUN_TEST(test_a_config_of_too_many_settings_is_refused);
     RUN_TEST(test_a_stereo_of_too_many_or_no_observations_is_refused);
+    RUN_TEST(test_an_imu_of_no_reading_or_too_many_is_refused);
     RUN_TEST(test_results_that_contradict_themselves_are_refused);
     RUN_TEST(test_a_text_without_an_end_or_of_no_severity_is_refused);
     RUN_TEST(test_a_header_is_of_the_writer_s_version_whatever_it_says);

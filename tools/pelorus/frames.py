@@ -9,19 +9,41 @@ bytes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from enum import IntEnum, IntFlag
+from enum import IntFlag
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import schema
-from pelorus.layout import Floats, Layout, need, row_type
+from pelorus.layout import Floats, need, row_type
+from pelorus.message import (
+    BodyAxes,
+    Kind,
+    Message,
+    Notice,
+    Process,
+    Role,
+    StateAction,
+    TwistTiming,
+)
+
+# Of pelorus.message, for those who use the dataclasses below.
+__all__ = [
+    "BodyAxes",
+    "Kind",
+    "Message",
+    "Notice",
+    "Process",
+    "Role",
+    "StateAction",
+    "TwistTiming",
+]
 
 NO_BUDGET = schema.LIMITS["no_budget"]
 OBSERVATIONS_MAX = schema.LIMITS["observations"]
+IMU_READINGS_MAX = schema.LIMITS["imu_readings"]  # in one frame
 NAME_BYTES_MAX = schema.LIMITS["name_bytes"]
 TEXT_BYTES_MAX = schema.LIMITS["text_bytes"]
 UNKNOWN_VARIANCE = float(schema.LIMITS["unknown_variance"])  # of a filter that has diverged
@@ -29,70 +51,11 @@ OBSERVATION = row_type(schema.MESSAGES["STEREO"].rows)
 SETTING = row_type(schema.MESSAGES["CONFIG"].rows)
 
 
-class Kind(IntEnum):
-    """A frame's first byte."""
-
-    HEADER = schema.kind("HEADER")
-    CONFIG = schema.kind("CONFIG")
-    START = schema.kind("START")
-    TWIST = schema.kind("TWIST")
-    STEREO = schema.kind("STEREO")
-    TRUTH = schema.kind("TRUTH")
-    LANDMARK = schema.kind("LANDMARK")
-    POSE = schema.kind("POSE")
-    REPORT = schema.kind("REPORT")
-    TEXT = schema.kind("TEXT")
-    END = schema.kind("END")
-    STATE = schema.kind("STATE")
-    READING = schema.kind("READING")
-
-
-class BodyAxes(IntEnum):
-    """Which way the body's x, y and z point."""
-
-    FORWARD_LEFT_UP = schema.number("body_axes", "FORWARD_LEFT_UP")
-    FORWARD_RIGHT_DOWN = schema.number("body_axes", "FORWARD_RIGHT_DOWN")
-    OTHER = schema.number("body_axes", "OTHER")
-
-
-class TwistTiming(IntEnum):
-    """When a reading holds: START on [t_j, t_j+1), END on (t_j-1, t_j], MID the mean of both."""
-
-    START = schema.number("twist_timing", "START")
-    END = schema.number("twist_timing", "END")
-    MID = schema.number("twist_timing", "MID")
-
-
 class StartFlag(IntFlag):
     """Which fields of a START are given."""
 
     COVARIANCE = 1
     BIAS_PRIOR = 2
-
-
-class StateAction(IntEnum):
-    """What a STATE asks for."""
-
-    SAVE = schema.number("action", "SAVE")
-    RESTORE = schema.number("action", "RESTORE")
-
-
-class Notice(IntEnum):
-    """What a REPORT tells besides its status."""
-
-    NONE = schema.number("notice", "NONE")
-    # the sender has just started: whatever it was told before is lost
-    STARTED = schema.number("notice", "STARTED")
-    SAVED = schema.number("notice", "SAVED")
-    RESTORED = schema.number("notice", "RESTORED")  # the filter goes on from a saved state
-
-
-class Role(IntEnum):
-    """Where a landmark comes from."""
-
-    KNOWN = schema.number("role", "KNOWN")
-    EVICTED = schema.number("role", "EVICTED")
-    FINAL = schema.number("role", "FINAL")
 
 
 def header_name(words: str) -> str:
@@ -117,43 +80,6 @@ def unknown(*shape: int) -> Any:
 def identity() -> Any:
     """A dataclass field: the rotation that does nothing by default."""
     return field(default_factory=lambda: np.eye(3))
-
-
-class Message:
-    """A frame's content. `kind` is its number on the wire."""
-
-    kind: ClassVar[Kind]
-    layout: ClassVar[Layout]
-    choices: ClassVar[Mapping[str, Callable[[int], Any]]] = {}  # what a number is made into
-
-    def __init_subclass__(cls, kind: Kind | None = None) -> None:
-        if kind is not None:
-            cls.kind = kind
-            cls.layout = Layout(schema.MESSAGES[kind.name])
-
-    def pack(self) -> bytes:
-        return self.layout.pack(self.values())
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> Self:
-        values, end = cls.layout.unpack(payload)
-        chosen = {name: choose(values[name]) for name, choose in cls.choices.items()}
-        return cls.of_values(values | chosen, payload, end)
-
-    def values(self) -> dict[str, Any]:
-        """By the names of the table."""
-        return vars(self)
-
-    @classmethod
-    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
-        """The values are those before `end` in the payload; only rows lie behind it."""
-        return cls(**values)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and self.pack() == other.pack()
-
-    def __hash__(self) -> int:
-        return hash((self.kind, self.pack()))
 
 
 # --- what a recorder, a robot or a reference writes -----------------------------------------------
@@ -187,6 +113,12 @@ class Noise:
     gyro_sigma_x_radps: float = -1.0
     gyro_sigma_y_radps: float = -1.0
     gyro_sigma_z_radps: float = -1.0
+    gyro_noise: float = -1.0  # of an IMU, as Kalibr gives them: rad/s/sqrt(Hz)
+    accel_noise: float = -1.0  # m/s^2/sqrt(Hz)
+    gyro_walk: float = -1.0  # rad/s^2/sqrt(Hz)
+    accel_walk: float = -1.0  # m/s^3/sqrt(Hz)
+    bias_accel_sigma: float = -1.0  # m/s^2
+    gravity: float = -1.0  # m/s^2
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,8 +137,9 @@ class Header(Message, kind=Kind.HEADER):
     version_major: int = schema.LIMITS["version_major"]
     version_minor: int = schema.LIMITS["version_minor"]
     units: int = 0
+    process: Process = Process.TWIST
 
-    choices: ClassVar = {"body_axes": BodyAxes, "twist_timing": TwistTiming}
+    choices: ClassVar = {"body_axes": BodyAxes, "twist_timing": TwistTiming, "process": Process}
 
     def values(self) -> dict[str, Any]:
         noise = vars(self.noise)
@@ -233,7 +166,11 @@ BY_AXIS = {
 
 @dataclass(frozen=True, eq=False)
 class Start(Message, kind=Kind.START):
-    """The pose at the beginning; covariance of (rho, theta) packed, bias prior of (b_v, b_w)."""
+    """The pose at the beginning; covariance of (rho, theta) packed, bias prior of (b_v, b_w).
+
+    With an IMU the biases are (b_a, b_g), and `velocity` is along the body's axes; it is given
+    where each of its variances is above 0.
+    """
 
     t_ns: int
     R_WB: Floats = identity()
@@ -242,6 +179,8 @@ class Start(Message, kind=Kind.START):
     covariance: Floats = zeros(21)
     bias_mean: Floats = zeros(6)
     bias_variance: Floats = zeros(6)
+    velocity: Floats = unknown(3)
+    velocity_variance: Floats = unknown(3)
 
     choices: ClassVar = {"flags": lambda value: StartFlag(value & 3)}
 
@@ -253,6 +192,45 @@ class Twist(Message, kind=Kind.TWIST):
     t_ns: int
     v_B_mps: Floats = zeros(3)
     w_B_radps: Floats = zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Imu(Message, kind=Kind.IMU):
+    """One to IMU_READINGS_MAX readings of an IMU, (n, 3) each, in body axes; kept as float32.
+
+    Reading k is of `t_ns` + k `period_ns`. `a_B_mps2` is specific force: at rest 9.81 upwards.
+    """
+
+    t_ns: int
+    a_B_mps2: Floats
+    w_B_radps: Floats
+    period_ns: int = 0  # of a single reading
+
+    @property
+    def times_ns(self) -> list[int]:
+        """When each reading was taken."""
+        return [self.t_ns + k * self.period_ns for k in range(len(self.a_B_mps2))]
+
+    def values(self) -> dict[str, Any]:
+        return vars(self) | {"count": len(self.a_B_mps2)}
+
+    def pack(self) -> bytes:
+        count = len(self.a_B_mps2)
+        if not 1 <= count <= IMU_READINGS_MAX:
+            raise ValueError(f"{count} readings in one IMU frame, 1 to {IMU_READINGS_MAX} fit")
+        if np.shape(self.a_B_mps2) != (count, 3) or np.shape(self.w_B_radps) != (count, 3):
+            raise ValueError(
+                f"readings of shapes {np.shape(self.a_B_mps2)} and {np.shape(self.w_B_radps)} "
+                f"where ({count}, 3) is due"
+            )
+        with np.errstate(over="ignore", invalid="ignore"):  # beyond float32: infinite
+            rows = np.hstack([self.a_B_mps2, self.w_B_radps]).astype("<f4")
+        return super().pack() + rows.tobytes()
+
+    @classmethod
+    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
+        rows = _rows(payload, end, _IMU_ROW, values["count"])["numbers"].astype(np.float64)
+        return cls(values["t_ns"], rows[:, :3], rows[:, 3:], values["period_ns"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +266,10 @@ _STEREO_ROW = np.dtype(
     [("id", OBSERVATION["id"]), ("pixels", "<f4", (len(OBSERVATION.names or ()) - 1,))]
 )
 assert _STEREO_ROW.itemsize == OBSERVATION.itemsize
+
+
+_IMU_ROW = np.dtype([("numbers", "<f4", (6,))])
+assert _IMU_ROW.itemsize == row_type(schema.MESSAGES["IMU"].rows).itemsize
 
 
 def _rows(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[Any]:
@@ -339,14 +321,19 @@ class End(Message, kind=Kind.END):
     frames: int
     readings: int = 0
     differs: int = 0
-    arrived: tuple[int, ...] = (0, 0, 0, 0, 0)
+    arrived: tuple[int, ...] = (0,) * 5
+    imus: int = 0
+    imus_arrived: int = 0
 
-    COUNTED: ClassVar = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.LANDMARK, Kind.READING)
+    COUNTED: ClassVar = (
+        *(Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.LANDMARK, Kind.READING),
+        Kind.IMU,
+    )
 
     @property
     def incomplete(self) -> dict[Kind, int]:
         """How many arrived, of the kinds of which that is another number than was sent."""
-        counts = zip(self.COUNTED, self.arrived, strict=True)
+        counts = zip(self.COUNTED, (*self.arrived, self.imus_arrived), strict=True)
         return {kind: count for at, (kind, count) in enumerate(counts) if self.differs >> at & 1}
 
 

@@ -197,6 +197,7 @@ def _end_differences(end: End, counts: Counts) -> list[str]:
         Kind.TRUTH: end.truths,
         Kind.LANDMARK: end.landmarks,
         Kind.READING: end.readings,
+        Kind.IMU: end.imus,
     }
     return [
         f"END tells of {due} {kind.name} frames, {counts.frames[kind]} can be read"

@@ -206,9 +206,14 @@ def end_of(counts: Counter[Kind], heard: End | None = None) -> End:
         truths=counts[Kind.TRUTH],
         landmarks=counts[Kind.LANDMARK],
         readings=counts[Kind.READING],
+        imus=counts[Kind.IMU],
         frames=sum(counts.values()),
     )
-    return sent if heard is None else replace(sent, differs=heard.differs, arrived=heard.arrived)
+    if heard is None:
+        return sent
+    return replace(
+        sent, differs=heard.differs, arrived=heard.arrived, imus_arrived=heard.imus_arrived
+    )
 
 
 class Writer:

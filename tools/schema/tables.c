@@ -69,6 +69,8 @@ const word schema_enums[] = {
     {"twist_timing", "START", PLR_TWIST_START, ""},
     {"twist_timing", "END", PLR_TWIST_END, ""},
     {"twist_timing", "MID", PLR_TWIST_MID, ""},
+    {"process", "TWIST", PLR_PROCESS_TWIST, ""},
+    {"process", "IMU", PLR_PROCESS_IMU, ""},
     {"role", "KNOWN", PLR_LANDMARK_KNOWN, ""},
     {"role", "EVICTED", PLR_LANDMARK_EVICTED, ""},
     {"role", "FINAL", PLR_LANDMARK_FINAL, ""},
@@ -94,6 +96,7 @@ const limit schema_limits[] = {
     {"text_bytes", PLR_WIRE_MAX_TEXT},
     {"settings", PLR_WIRE_MAX_SETTINGS},
     {"observations", PLR_WIRE_MAX_OBSERVATIONS},
+    {"imu_readings", PLR_WIRE_MAX_IMU},
     {"no_budget", PLR_NO_BUDGET},
     {"unknown_variance", PLR_WIRE_UNKNOWN_VARIANCE},
 };

@@ -21,13 +21,13 @@ from pelorus.arrays import Arrays
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
+from pelorus.frames import BY_AXIS, Header, Landmark, Noise, Role, TwistTiming, header_name
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 
-BY_AXIS = [name for name in vars(Noise()) if name.split("_")[2] in ("x", "y", "z")]
+SIGMAS_OF_AXES = [name for names in BY_AXIS.values() for name in names]
 LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by a motion capture system
 
 
@@ -124,7 +124,7 @@ def _noise(file: Arrays) -> Noise:
         for key in ("v_var", "w_var")
         for sigma in np.sqrt(np.broadcast_to(_by_axis(file, key, variances[key]), 3))
     ]
-    return replace(Noise(*mean), **dict(zip(BY_AXIS, axes, strict=True)))
+    return replace(Noise(*mean), **dict(zip(SIGMAS_OF_AXES, axes, strict=True)))
 
 
 def _by_axis(file: Arrays, key: str, variance: Floats) -> Floats:

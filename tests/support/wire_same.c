@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: MIT
+#include <unity.h>
+
+#include "support/wire_samples.h"
+
+/* Structures without padding, or single fields. */
+#define SAME(field) TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&e->field, &a->field, sizeof e->field, #field)
+
+static void same_header(const plr_header *e, const plr_header *a) {
+    SAME(version_major);
+    SAME(version_minor);
+    SAME(body_axes);
+    SAME(twist_timing);
+    SAME(image_width_px);
+    SAME(image_height_px);
+    SAME(calibration);
+    SAME(pixel_sigma_px);
+    SAME(velocity_sigma_mps);
+    SAME(gyro_sigma_radps);
+    SAME(bias_velocity_sigma_mps);
+    SAME(bias_gyro_sigma_radps);
+    SAME(bias_velocity_walk);
+    SAME(bias_gyro_walk);
+    SAME(velocity_sigma_axes_mps);
+    SAME(gyro_sigma_axes_radps);
+    SAME(process);
+    SAME(gyro_noise);
+    SAME(accel_noise);
+    SAME(gyro_walk);
+    SAME(accel_walk);
+    SAME(bias_accel_sigma_mps2);
+    SAME(gravity_mps2);
+    TEST_ASSERT_EQUAL_STRING(e->name, a->name);
+}
+
+static void same_config(const plr_config_message *e, const plr_config_message *a) {
+    SAME(build_fingerprint);
+    SAME(max_landmarks);
+    SAME(max_observations);
+    SAME(block_observations);
+    SAME(real_bytes);
+    SAME(count);
+    for (unsigned i = 0; i < e->count; i++) {
+        SAME(settings[i].id);
+        SAME(settings[i].value);
+    }
+}
+
+static void same_start(const plr_start *e, const plr_start *a) {
+    SAME(t_ns);
+    SAME(T_WB);
+    SAME(has_covariance);
+    SAME(has_bias);
+    SAME(P_xi);
+    SAME(bias);
+    SAME(bias_variance);
+    SAME(velocity);
+    SAME(velocity_variance);
+}
+
+static void same_stereo(const plr_frame *e, const plr_frame *a) {
+    SAME(t_ns);
+    SAME(budget);
+    SAME(count);
+    for (unsigned i = 0; i < e->count; i++)
+        SAME(observations[i]);
+}
+
+static void same_landmark(const plr_landmark_message *e, const plr_landmark_message *a) {
+    SAME(role);
+    SAME(landmark.id);
+    SAME(landmark.times_seen);
+    SAME(landmark.times_gated);
+    SAME(landmark.last_seen_ns);
+    SAME(landmark.known);
+    SAME(landmark.p_W_m);
+    SAME(landmark.P_W_m2);
+}
+
+static void same_pose(const plr_pose_message *e, const plr_pose_message *a) {
+    SAME(t_ns);
+    SAME(real_bytes);
+    SAME(after_update);
+    SAME(reset_count);
+    SAME(T_WB);
+    SAME(P_xi);
+    SAME(velocity);
+    SAME(bias);
+    SAME(P_u);
+    SAME(trace);
+    SAME(bias_variance);
+}
+
+static void same_report(const plr_report_message *e, const plr_report_message *a) {
+    SAME(subject);
+    SAME(notice);
+    SAME(update_us);
+    SAME(report.t_ns);
+    SAME(report.status);
+    SAME(report.health);
+    SAME(report.reasons);
+    SAME(report.budget);
+    SAME(report.observations);
+    SAME(report.matched);
+    SAME(report.used);
+    SAME(report.gated);
+    SAME(report.created);
+    SAME(report.evicted);
+    SAME(report.refused);
+    SAME(report.duplicates);
+    SAME(report.no_room);
+    SAME(report.poor);
+    SAME(report.left_out);
+    SAME(report.blocks_failed);
+    SAME(report.active);
+    SAME(report.nis_dof);
+    SAME(report.nis);
+}
+
+static void same_end(const plr_end *e, const plr_end *a) {
+    SAME(twists);
+    SAME(stereos);
+    SAME(truths);
+    SAME(landmarks);
+    SAME(frames);
+    SAME(readings);
+    SAME(imus);
+    SAME(differs);
+    SAME(arrived);
+}
+
+static void same_reading(const plr_reading *e, const plr_reading *a) {
+    SAME(t_ns);
+    SAME(sensor);
+    SAME(axes);
+    SAME(value);
+    SAME(sigma);
+    SAME(at_B_m);
+}
+
+static void same_imu(const plr_imu_message *e, const plr_imu_message *a) {
+    SAME(t_ns);
+    SAME(period_ns);
+    SAME(count);
+    for (unsigned i = 0; i < e->count; i++)
+        SAME(readings[i]);
+}
+
+void wire_assert_same(const plr_message *e, const plr_message *a) {
+    TEST_ASSERT_EQUAL_INT(e->kind, a->kind);
+    switch (e->kind) {
+    case PLR_KIND_HEADER:
+        same_header(&e->as.header, &a->as.header);
+        break;
+    case PLR_KIND_CONFIG:
+        same_config(&e->as.config, &a->as.config);
+        break;
+    case PLR_KIND_START:
+        same_start(&e->as.start, &a->as.start);
+        break;
+    case PLR_KIND_TWIST:
+        SAME(as.twist);
+        break;
+    case PLR_KIND_STEREO:
+        same_stereo(&e->as.stereo, &a->as.stereo);
+        break;
+    case PLR_KIND_TRUTH:
+        SAME(as.truth);
+        break;
+    case PLR_KIND_LANDMARK:
+        same_landmark(&e->as.landmark, &a->as.landmark);
+        break;
+    case PLR_KIND_POSE:
+        same_pose(&e->as.pose, &a->as.pose);
+        break;
+    case PLR_KIND_REPORT:
+        same_report(&e->as.report, &a->as.report);
+        break;
+    case PLR_KIND_TEXT:
+        TEST_ASSERT_EQUAL_UINT8(e->as.text.severity, a->as.text.severity);
+        TEST_ASSERT_EQUAL_STRING(e->as.text.text, a->as.text.text);
+        break;
+    case PLR_KIND_END:
+        same_end(&e->as.end, &a->as.end);
+        break;
+    case PLR_KIND_STATE:
+        SAME(as.state.t_ns);
+        SAME(as.state.action);
+        SAME(as.state.moved_variance);
+        break;
+    case PLR_KIND_READING:
+        same_reading(&e->as.reading, &a->as.reading);
+        break;
+    case PLR_KIND_IMU:
+        same_imu(&e->as.imu, &a->as.imu);
+        break;
+    case PLR_KIND_NONE:
+        break;
+    }
+}
