@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from pelorus import se3
 from pelorus.converters import csv as csv_converter
 from pelorus.frames import BodyAxes, Header, Stereo, Truth, Twist, TwistTiming
 from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from pelorus.tracks import project, triangulate
+from rigs import Cameras, camchain, write_yaml
 from scipy.spatial.transform import Rotation
 
 
@@ -68,6 +72,13 @@ def csv_files(folder: Path, recording: Recording) -> list[Any]:
     ]
 
 
+def sources_in(folder: Path) -> csv_converter.Sources:
+    """Of the files that `csv_files` wrote."""
+    return csv_converter.Sources(
+        folder / "twists.csv", folder / "stereo.csv", (folder / "camera.json",)
+    )
+
+
 def test_a_users_own_csv_arrives_whole(tmp_path: Path, pelorus: Run) -> None:
     drive = clean(twist_rate_hz=50.0, **SHORT)
     target = tmp_path / "mine.plr"
@@ -97,8 +108,7 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
     tmp_path: Path,
 ) -> None:
     csv_files(tmp_path, clean(3, velocity_sigma_mps=0.5, gyro_sigma_radps=0.05))
-    names = ("twists.csv", "stereo.csv", "camera.json")
-    sources = csv_converter.Sources(*(tmp_path / name for name in names))
+    sources = sources_in(tmp_path)
     recording, findings = csv_converter.convert(sources)
     assert findings[-1].subject == "twist noise"
     assert findings[-1].found
@@ -113,8 +123,7 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
 def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
     drive = clean(3)
     csv_files(tmp_path, with_turned_axes(drive))
-    names = ("twists.csv", "stereo.csv", "camera.json")
-    sources = csv_converter.Sources(*(tmp_path / name for name in names))
+    sources = sources_in(tmp_path)
     mended, findings = csv_converter.convert(sources)
     assert [finding.found for finding in findings] == [False, True, False, False]
     assert np.allclose(mended.T_CB.R, drive.T_CB.R)
@@ -229,3 +238,34 @@ def test_twists_and_frames_of_different_clocks_are_refused(tmp_path: Path, pelor
     outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
     assert outcome.status == 1
     assert "do not overlap" in outcome.err
+
+
+# --- calibrations of other programs ---------------------------------------------------------------
+
+
+def test_raw_tracks_and_a_camchain_become_those_of_a_rectified_pair(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    drive, cameras = clean(**SHORT), Cameras()
+    q_C = triangulate(drive.header.camera, drive.tracks.pixels)
+    raw = replace(drive.tracks, pixels=cameras.see(q_C))
+    seen = replace(drive, tracks=raw)
+    options = csv_files(tmp_path, seen)
+    shift_s = 0.013
+    kalibr = write_yaml(
+        tmp_path / "camchain.yaml", camchain(cameras, (2000, 2000), timeshift_cam_imu=shift_s)
+    )
+    options[options.index("--calibration") + 1] = kalibr
+    target = tmp_path / "mine.plr"
+    outcome = pelorus("convert", "csv", *options, "--fix", "none", target)
+    assert outcome.status == 0, outcome.err
+    header, stereos = messages_of(target, Header)[0], messages_of(target, Stereo)
+    T_CL = Poses(header.R_CB @ cameras.T_LB.R.T, np.zeros(3))
+    assert np.allclose(header.t_CB_m, T_CL.R @ cameras.T_LB.p)
+    far = q_C[:, 2] > 0.5
+    due = project(header.camera, se3.apply(T_CL, q_C[far]))
+    ids = np.concatenate([m.ids for m in stereos])
+    assert len(ids) == len(q_C)
+    pixels = np.concatenate([m.pixels for m in stereos])[far]
+    assert np.abs(pixels - due).max() < 0.01
+    assert [m.t_ns for m in stereos] == (drive.frame_t_ns + 13_000_000).tolist()

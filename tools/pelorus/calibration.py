@@ -12,7 +12,7 @@ from pelorus import arrays, foreign, se3
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import BodyAxes, Header, Noise, TwistTiming, header_name
-from pelorus.layout import Floats
+from pelorus.named import Named
 from pelorus.se3 import Poses
 
 CAMERA = ("fx_px", "fy_px", "cx_px", "cy_px", "baseline_m")
@@ -23,7 +23,6 @@ AXES = {
     "other": BodyAxes.OTHER,
 }
 IMAGE_SIZE_MAX = 65535
-SHOWN_MAX = 60  # characters of a bad value
 
 
 def read(path: Path) -> Header:
@@ -31,16 +30,22 @@ def read(path: Path) -> Header:
     return _Calibration(path, foreign.json_object(path)).header()
 
 
+def read_extrinsic(path: Path) -> Poses:
+    """T_CB of a file that holds nothing else, or of a whole calibration."""
+    return _Calibration(path, foreign.json_object(path)).extrinsic()
+
+
 class _Calibration:
     def __init__(self, path: Path, content: dict[str, Any]) -> None:
         self.path = path
         self.content = content
+        self.named = Named(path, content)
 
     def header(self) -> Header:
         known = {*CAMERA, "R_CB", "t_CB_m", "R_BC", "t_BC_m", *OPTIONAL}
         self._only(self.content, known, "the calibration")
-        T_CB = self._extrinsic()
-        numbers = [float(self._array(name)) for name in CAMERA]
+        T_CB = self.extrinsic()
+        numbers = [self.named.number(name) for name in CAMERA]
         axes = self._choice("body_axes", AXES, body_axes(T_CB.R))
         timings = {timing.name.lower(): timing for timing in TwistTiming}
         return Header(
@@ -58,15 +63,10 @@ class _Calibration:
     def _name(self) -> str:
         name = self.content.get("name", self.path.stem)
         if not isinstance(name, str):
-            raise self._error("name", name, "words are due")
+            raise self.named.error("name", name, "words are due")
         return header_name(name)
 
-    def _error(self, name: str, value: Any, due: str) -> ForeignFileError:
-        shown = repr(value)
-        shown = shown if len(shown) <= SHOWN_MAX else f"{shown[:SHOWN_MAX]}..."
-        return ForeignFileError(self.path, f"{name} is {shown}", due=due)
-
-    def _extrinsic(self) -> Poses:
+    def extrinsic(self) -> Poses:
         given = [pair for pair in ("CB", "BC") if f"R_{pair}" in self.content]
         if len(given) != 1:
             raise ForeignFileError(
@@ -76,35 +76,22 @@ class _Calibration:
                 "(the camera's pose in the body) are due",
             )
         pair = given[0]
-        R = arrays.rotation(self.path, f"R_{pair}", self._array(f"R_{pair}", 3, 3))
-        T = Poses(R, self._array(f"t_{pair}_m", 3))
+        R = arrays.rotation(self.path, f"R_{pair}", self.named.array(f"R_{pair}", 3, 3))
+        T = Poses(R, self.named.array(f"t_{pair}_m", 3))
         return T if pair == "CB" else se3.inverse(T)
-
-    def _array(self, name: str, *shape: int) -> Floats:
-        if name not in self.content:
-            there = ", ".join(self.content) or "none"
-            raise ForeignFileError(self.path, f"lacks {name}", due=f"there are: {there}")
-        try:
-            array = np.array(self.content[name], dtype=np.float64)
-        except (TypeError, ValueError):
-            array = np.array([np.nan])
-        if array.shape != shape or not np.isfinite(array).all():
-            due = f"an array of shape {shape} of finite numbers" if shape else "a finite number"
-            raise self._error(name, self.content[name], f"{due} is due")
-        return array
 
     def _choice(self, name: str, choices: dict[str, Any], standard: Any) -> Any:
         if name not in self.content:
             return standard
         word = self.content[name]
         if not isinstance(word, str) or word not in choices:
-            raise self._error(name, word, f"{' or '.join(choices)} is due")
+            raise self.named.error(name, word, f"{' or '.join(choices)} is due")
         return choices[word]
 
     def _size(self, name: str) -> int:
         size = self.content.get(name, 0)
         if not isinstance(size, int) or not 0 <= size <= IMAGE_SIZE_MAX:
-            raise self._error(name, size, f"0 to {IMAGE_SIZE_MAX} is due")
+            raise self.named.error(name, size, f"0 to {IMAGE_SIZE_MAX} is due")
         return size
 
     def _noise(self) -> Noise:
@@ -113,7 +100,7 @@ class _Calibration:
             isinstance(value, (int, float)) and np.isfinite(float(value))
             for value in given.values()
         ):
-            raise self._error("noise", given, "names with numbers are due")
+            raise self.named.error("noise", given, "names with numbers are due")
         self._only(given, set(vars(Noise())), "noise")
         return Noise(**{name: float(value) for name, value in given.items()})
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every file that somebody else wrote is opened here: text, CSV, JSON, .npz and .mat.
+"""Every file that somebody else wrote is opened here: text, CSV, JSON, YAML, .npz and .mat.
 
 Each reader has a limit of size, and one way to fail: ForeignFileError, whatever the file holds. The
 rest of the package opens no foreign file; tests/python/test_foreign.py sees to it.
@@ -17,13 +17,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from ruamel.yaml import YAML
+from ruamel.yaml.constructor import SafeConstructor
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from pelorus import matfile
 from pelorus.errors import PelorusError
 from pelorus.layout import Floats
 
 TEXT_BYTES_MAX = 1 << 30
-JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred
+JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred; YAML too
 ARRAYS_BYTES_MAX = 1 << 31  # unpacked; the course's largest drive has 0.2 GB
 INTEGER_DIGITS_MAX = 20  # 2^64 has as many
 PIECE_BYTES = 1 << 20
@@ -198,6 +201,47 @@ def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         names = [name for name, _ in pairs]
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"holds the name {twice!r} twice")
+    return found
+
+
+# --- YAML -----------------------------------------------------------------------------------------
+
+OPENCV_DIRECTIVE = "%YAML:1.0"  # no YAML: the colon is OpenCV's own
+OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
+
+
+class _Constructor(SafeConstructor):
+    """OpenCV's matrices are objects with the names rows, cols, dt and data."""
+
+
+_Constructor.add_constructor(
+    OPENCV_MATRIX, lambda constructor, node: constructor.construct_mapping(node, deep=True)
+)
+
+
+def yaml_object(path: Path) -> dict[str, Any]:
+    """An object with names: of Kalibr, of OpenCV, of a data set's sensor.yaml. YAML 1.2: 1e-3 is a
+    number.
+    """
+    words = text(path, JSON_BYTES_MAX)
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Constructor = _Constructor
+    try:
+        found = yaml.load(words.removeprefix(OPENCV_DIRECTIVE))
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        at = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise ForeignFileError(
+            path, f"is no YAML: {error.problem or error.context}", at=at
+        ) from None
+    except RecursionError:
+        raise ForeignFileError(
+            path, "is nested too deep", due="names with numbers, words and lists of them are due"
+        ) from None
+    except (YAMLError, ValueError) as error:
+        raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
+    if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
+        raise ForeignFileError(path, "is YAML without names", due="names with values are due")
     return found
 
 

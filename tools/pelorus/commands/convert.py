@@ -20,6 +20,7 @@ from pelorus.converters import landmark_map, matlab, readings_csv
 from pelorus.faults.finding import Finding
 from pelorus.frames import TEXT_BYTES_MAX, Text
 from pelorus.recording import Recording
+from pelorus.rig.lens import LensModel
 from pelorus.small_sensors import SMALL_SENSORS
 
 SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
@@ -30,6 +31,15 @@ FIX = typer.Option(
     Fix.AUTO,
     help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "
     "and mend them; none: leave the data as they are.",
+)
+EXTRINSIC = typer.Option(
+    None,
+    metavar="FILE",
+    help="JSON with R_CB, as three rows of three, and t_CB_m (body to left camera), or R_BC and "
+    "t_BC_m, where the calibration does not say it or is of another body.",
+)
+LENS = typer.Option(
+    None, help="Of an OpenCV calibration whose four numbers may be of a fisheye or not."
 )
 
 app = typer.Typer(
@@ -133,18 +143,21 @@ def csv(
         ...,
         help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame.",
     ),
-    calibration: Path = typer.Option(
+    calibration: list[Path] = typer.Option(
         ...,
-        help="JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and R_CB, as three rows of "
-        "three, with t_CB_m (body to left camera) or R_BC with t_BC_m (the camera's pose in the "
-        "body); optional image_width_px, image_height_px, body_axes (forward-left-up, "
-        "forward-right-down, other), twist_timing (start, end, mid), name, and noise, an object "
-        "with some of pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, "
+        help="Kalibr's camchain YAML (and a second time, its IMU file), OpenCV's stereo YAML (one "
+        "file or two), or, of a rectified pair, JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and "
+        "R_CB, as three rows of three, with t_CB_m (body to left camera) or R_BC with t_BC_m (the "
+        "camera's pose in the body); optional image_width_px, image_height_px, body_axes "
+        "(forward-left-up, forward-right-down, other), twist_timing (start, end, mid), name, and "
+        "noise, an object with some of pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, "
         "bias_velocity_sigma_mps, bias_gyro_sigma_radps.",
     ),
     truth: Path | None = typer.Option(
         None, help="Columns t_s (or t_ns), px_m, py_m, pz_m, qx, qy, qz, qw: body to world."
     ),
+    extrinsic: Path | None = EXTRINSIC,
+    lens: LensModel | None = LENS,
     fix: Fix = FIX,
     twist_timing: Timing | None = typer.Option(
         None, help="When a twist reading holds; else the calibration says it, else start."
@@ -153,7 +166,7 @@ def csv(
 ) -> None:
     """Convert your own data: CSV files with named columns in any order, and a JSON file."""
     recording, findings = csv_converter.convert(
-        csv_converter.Sources(twists, stereo, calibration, truth),
+        csv_converter.Sources(twists, stereo, tuple(calibration), truth, extrinsic, lens),
         fix is Fix.AUTO,
         twist_timing.value_in_header if twist_timing else None,
         readings,

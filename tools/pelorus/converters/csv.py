@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A user's own data: CSV files with a row of column names, in any order, and a calibration (JSON).
+"""A user's own data: CSV files with a row of column names, in any order, and a calibration.
 
 twists   t_s or t_ns, vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps
 stereo   t_s or t_ns, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
@@ -11,13 +11,12 @@ And those of small sensors: readings_csv.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import calibration
 from pelorus.converters import readings_csv, twist_noise
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
@@ -25,6 +24,9 @@ from pelorus.foreign import ForeignFileError
 from pelorus.frames import Reading, TwistTiming
 from pelorus.motion import Times
 from pelorus.recording import Recording
+from pelorus.rig import read as rig_files
+from pelorus.rig.lens import LensModel
+from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.table import Table
@@ -34,13 +36,16 @@ ID_MAX = 2**32 - 1
 QUATERNION_NORM_TOLERANCE = 1e-2
 
 
-class Sources(NamedTuple):
-    """The files of one recording."""
+@dataclass(frozen=True)
+class Sources:
+    """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them."""
 
     twists: Path
     stereo: Path
-    calibration: Path
+    calibration: tuple[Path, ...]
     truth: Path | None = None
+    extrinsic: Path | None = None
+    lens: LensModel | None = None
 
 
 def convert(
@@ -65,12 +70,17 @@ def convert(
 
 def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Recording:
     """The files as they are."""
-    header = calibration.read(sources.calibration)
+    calibrated = rig_files.read(
+        sources.calibration, sources.stereo.stem, sources.extrinsic, sources.lens
+    )
     twists = Table.read(sources.twists)
     v = twists.numbers("vx_mps", "vy_mps", "vz_mps")
     w = twists.numbers("wx_radps", "wy_radps", "wz_radps")
     twist_t_ns = twists.ascending_times()
     frame_t_ns, tracks = _stereo(sources.stereo)
+    if calibrated.rig is not None:
+        frame_t_ns = calibrated.rig.on_body_clock(frame_t_ns)
+        tracks = rectified(tracks, calibrated.rig, sources.stereo)
     if frame_t_ns[-1] < twist_t_ns[0] or twist_t_ns[-1] < frame_t_ns[0]:
         raise ForeignFileError(
             sources.stereo,
@@ -78,7 +88,7 @@ def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Recording:
             f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap",
         )
     recording = Recording(
-        header,
+        calibrated.header,
         twist_t_ns,
         v,
         w,
@@ -130,6 +140,19 @@ def _stereo(path: Path) -> tuple[Times, Tracks]:
             f"rows {rows[0]} and {rows[1]}",
         )
     return frame_t_ns, tracks
+
+
+def rectified(tracks: Tracks, rig: Rig, source: Path) -> Tracks:
+    """Of the pixels that the cameras took; without those that no ray of the lens reaches."""
+    pixels = rig.rectification().pixels(tracks.pixels)
+    good = np.isfinite(pixels).all(axis=1)
+    if not good.any():
+        raise ForeignFileError(
+            source,
+            f"no pixel is one of the lenses of {rig.path}",
+            due="pixels as the cameras took them are due, of that calibration's resolution",
+        )
+    return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
 
 
 def _truth(path: Path) -> tuple[Times, Poses]:

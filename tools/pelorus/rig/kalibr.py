@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Kalibr's camchain and IMU files, and the sensor.yaml of an EuRoC folder, which are much alike.
+
+Which way a transform goes is in its name, and nothing else is believed:
+
+T_cam_imu    brings points of the IMU to the camera
+T_imu_cam    the other way round (OpenVINS writes its Kalibr files so)
+T_cn_cnm1    brings points of the camera before to this one
+T_BS         of sensor.yaml: brings points of the sensor to the body
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pelorus import se3
+from pelorus.foreign import ForeignFileError
+from pelorus.layout import Floats
+from pelorus.named import Named, as_numbers
+from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
+from pelorus.rig.rig import ImuNoise, Rig, rigid
+from pelorus.se3 import Poses
+
+LENSES = {
+    "none": LensModel.NONE,
+    "radtan": LensModel.RADTAN,
+    "radial-tangential": LensModel.RADTAN,
+    "plumb_bob": LensModel.RADTAN,
+    "equidistant": LensModel.EQUIDISTANT,
+    "equi": LensModel.EQUIDISTANT,
+}
+TO_CAMERA, FROM_CAMERA = ("T_cam_imu",), ("T_imu_cam", "T_BS")
+STEP = "T_cn_cnm1"
+AGREE = 1e-3  # m and rad: two ways to the same camera
+NOISE = {
+    "gyro_noise": "gyroscope_noise_density",
+    "accel_noise": "accelerometer_noise_density",
+    "gyro_walk": "gyroscope_random_walk",
+    "accel_walk": "accelerometer_random_walk",
+}
+
+
+def is_camchain(content: Named) -> bool:
+    """Cameras one after the other, as Kalibr writes them."""
+    return "cam0" in content
+
+
+def is_sensor(content: Named) -> bool:
+    """The sensor.yaml of one camera."""
+    return "intrinsics" in content and "camera_model" in content
+
+
+def is_imu(content: Named) -> bool:
+    """An IMU's noise."""
+    return "imu0" in content or any(name in content for name in NOISE.values())
+
+
+def camchain(content: Named) -> Rig:
+    """Of the first two cameras."""
+    if "cam1" not in content:
+        raise ForeignFileError(content.path, "has one camera, cam0", due="cam0 and cam1 are due")
+    return pair(content.object("cam0"), content.object("cam1"))
+
+
+def pair(first: Named, second: Named) -> Rig:
+    """Two cameras of one file, or of one each."""
+    T_1B, T_2B = _on_body(first), _on_body(second)
+    steps = rigid(second.path, STEP, matrix(second, STEP, 4, 4)) if STEP in second else None
+    if steps is None:
+        if T_1B is None or T_2B is None:
+            raise ForeignFileError(
+                second.path,
+                f"{second.at or 'the second camera'} does not say where it stands",
+                due=f"{STEP} is due, or {' or '.join((*TO_CAMERA, *FROM_CAMERA))} of both cameras",
+            )
+        steps = se3.compose(T_2B, se3.inverse(T_1B))
+    elif T_1B is not None and T_2B is not None:
+        _require_same(second, steps, se3.compose(T_2B, se3.inverse(T_1B)))
+    rig = Rig.of_cameras(second.path, _lens(first), _lens(second), steps, T_1B)
+    offset = _offset(second if rig.swapped else first)
+    topics = [str(c.content["rostopic"]) for c in (first, second) if "rostopic" in c]
+    ordered = tuple(reversed(topics)) if rig.swapped else tuple(topics)
+    return replace(rig, offset_s=offset, topics=ordered)
+
+
+def imu(content: Named) -> ImuNoise:
+    """What the file says of its noise."""
+    own = content.object("imu0") if "imu0" in content else content
+    told = {name: own.number(key) for name, key in NOISE.items() if key in own}
+    for name, value in told.items():
+        if value < 0:
+            raise own.error(NOISE[name], value, "a number that is not negative is due")
+    return ImuNoise(**told)
+
+
+def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:
+    """Rows of numbers, or OpenCV's and EuRoC's object with rows, cols and data."""
+    value = content.get(name)
+    if isinstance(value, dict):
+        inner = content.object(name)
+        value = as_numbers(inner.get("data"))
+        size = int(inner.number("rows")), int(inner.number("cols"))
+        value = value.reshape(size) if value is not None and value.size == size[0] * size[1] else 0
+    found = as_numbers(value)
+    if found is None or found.shape != (rows, columns) or not np.isfinite(found).all():
+        raise content.error(name, content.get(name), f"{rows} x {columns} finite numbers are due")
+    return found
+
+
+def _on_body(camera: Named) -> Poses | None:
+    given = [name for name in (*TO_CAMERA, *FROM_CAMERA) if name in camera]
+    if not given:
+        return None
+    if len(given) > 1:
+        raise ForeignFileError(
+            camera.path, f"has {' and '.join(given)}", at=camera.at, due="one of them is due"
+        )
+    T = rigid(camera.path, given[0], matrix(camera, given[0], 4, 4))
+    return T if given[0] in TO_CAMERA else se3.inverse(T)
+
+
+def _require_same(second: Named, steps: Poses, other: Poses) -> None:
+    off = se3.log(se3.compose(steps, se3.inverse(other)))
+    if np.abs(off).max() > AGREE:
+        raise ForeignFileError(
+            second.path,
+            f"{STEP} and the cameras' transforms to the IMU differ by "
+            f"{np.linalg.norm(off[:3]):.3g} m and {np.linalg.norm(off[3:]):.3g} rad",
+            at=second.at,
+            due="they should agree: is one of them of another calibration, or inverted?",
+        )
+
+
+def _lens(camera: Named) -> Lens:
+    if "camera_model" in camera:
+        camera.word("camera_model", ("pinhole",))
+    numbers = camera.array("intrinsics", 4).tolist()
+    if min(numbers[:2]) <= 0:
+        raise camera.error("intrinsics", numbers, "[fx, fy, cx, cy] in px is due")
+    model = LENSES[camera.word("distortion_model", tuple(LENSES))]
+    if "resolution" not in camera:
+        width, height = 0, 0
+    else:
+        width, height = camera.size("resolution")
+    return Lens(model, tuple(numbers), _coefficients(camera, model), width, height)
+
+
+def _coefficients(camera: Named, model: LensModel) -> tuple[float, ...]:
+    if model is LensModel.NONE:
+        return ()
+    both = ("distortion_coeffs", "distortion_coefficients")
+    name = next((name for name in both if name in camera), both[0])
+    value = camera.get(name)
+    found = as_numbers(value)
+    if found is None or found.ndim != 1 or len(found) not in COEFFICIENTS[model]:
+        due = " or ".join(map(str, COEFFICIENTS[model]))
+        raise camera.error(name, value, f"{due} numbers are due for {model}")
+    return tuple(camera.array(name, len(found)).tolist())
+
+
+def _offset(camera: Named) -> float:
+    name = "timeshift_cam_imu"  # IMU time = camera time + shift
+    return camera.number(name) if name in camera else 0.0

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""A pinhole with its lens: from rays to pixels and back, as OpenCV and Kalibr compute them.
+
+none         no distortion
+radtan       radial and tangential: k1 k2 p1 p2, and of OpenCV k3 and more
+equidistant  fisheye (Kannala and Brandt 2006): k1 k2 k3 k4
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import cv2
+import numpy as np
+
+from pelorus.layout import Floats
+
+
+class LensModel(StrEnum):
+    """How the lens bends a ray."""
+
+    NONE = "none"
+    RADTAN = "radtan"
+    EQUIDISTANT = "equidistant"
+
+
+# How many numbers each may have.
+COEFFICIENTS = {
+    LensModel.NONE: (0,),
+    LensModel.RADTAN: (4, 5, 8, 12, 14),
+    LensModel.EQUIDISTANT: (4,),
+}
+NEWTON_STEPS = 10
+DIFFERENCE = 1e-6  # of a ray, for derivatives
+MISS_MAX_PX = 0.01  # a ray must come back to its pixel
+
+
+@dataclass(frozen=True)
+class Lens:
+    """fx, fy, cx, cy in px; a width of 0 is not known."""
+
+    model: LensModel
+    intrinsics: tuple[float, float, float, float]
+    coefficients: tuple[float, ...] = ()
+    width_px: int = 0
+    height_px: int = 0
+
+    def sized(self, width_px: int, height_px: int) -> Lens:
+        return replace(self, width_px=width_px, height_px=height_px)
+
+    @property
+    def K(self) -> Floats:
+        fx, fy, cx, cy = self.intrinsics
+        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+
+    def distort(self, rays: Floats) -> Floats:
+        """(n, 2) x/z and y/z in the camera -> (n, 2) px."""
+        if not len(rays):
+            return np.empty((0, 2))
+        points = np.column_stack((rays, np.ones(len(rays))))[:, None]
+        project = cv2.fisheye.projectPoints if self._is_fisheye else cv2.projectPoints
+        zero = np.zeros(3)
+        pixels, _ = project(points, zero, zero, self.K, self._D)
+        return np.asarray(pixels, np.float64).reshape(-1, 2)
+
+    def undistort(self, pixels: Floats) -> Floats:
+        """(n, 2) px -> (n, 2) x/z and y/z; NaN where the lens has no ray for a pixel.
+
+        OpenCV's few iterations to begin with, then Newton's, until a ray meets its pixel.
+        """
+        if not len(pixels):
+            return np.empty((0, 2))
+        find = cv2.fisheye.undistortPoints if self._is_fisheye else cv2.undistortPoints
+        rays = np.asarray(
+            find(np.ascontiguousarray(pixels[:, None], np.float64), self.K, self._D), np.float64
+        ).reshape(-1, 2)
+        for _ in range(NEWTON_STEPS):
+            J = np.stack(
+                [
+                    (self.distort(rays + step) - self.distort(rays - step)) / (2 * DIFFERENCE)
+                    for step in DIFFERENCE * np.eye(2)
+                ],
+                axis=-1,
+            )
+            sound = np.abs(np.linalg.det(J)) > 1  # px^2: else the lens folds there
+            miss = pixels - self.distort(rays)
+            rays[sound] += np.linalg.solve(J[sound], miss[sound, :, None])[..., 0]
+        off = np.linalg.norm(pixels - self.distort(rays), axis=1)
+        rays[~(off < MISS_MAX_PX)] = np.nan
+        return rays
+
+    @property
+    def _is_fisheye(self) -> bool:
+        return self.model is LensModel.EQUIDISTANT
+
+    @property
+    def _D(self) -> Floats:
+        return np.array(self.coefficients or (0.0,) * 4)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""What calibrations of every kind say of a stereo camera on a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pelorus import arrays, se3
+from pelorus.errors import PelorusError
+from pelorus.faults.axes import body_axes
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import Header, header_name
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.rig.lens import Lens, LensModel
+from pelorus.rig.rectification import Rectification
+from pelorus.se3 import Poses
+
+BASELINES_M = (1e-3, 5.0)
+SAME = 1e-9  # so little off, a pair counts as rectified
+
+
+@dataclass(frozen=True)
+class ImuNoise:
+    """Densities and walks of an IMU, in SI units; negative: not told."""
+
+    gyro_noise: float = -1.0  # rad/s/sqrt(Hz)
+    accel_noise: float = -1.0  # m/s^2/sqrt(Hz)
+    gyro_walk: float = -1.0  # rad/s^2/sqrt(Hz)
+    accel_walk: float = -1.0  # m/s^3/sqrt(Hz)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """q_R = T_RL q_L; q_L = T_LB s_B, None where the file says nothing of a body."""
+
+    path: Path
+    left: Lens
+    right: Lens
+    T_RL: Poses
+    T_LB: Poses | None = None
+    imu: ImuNoise = ImuNoise()
+    offset_s: float = 0.0  # the body's clock = the cameras' + offset
+    swapped: bool = False  # the file's second camera is the left one
+    topics: tuple[str, ...] = ()  # of the left and the right camera, where the file names them
+
+    @classmethod
+    def of_cameras(
+        cls, path: Path, first: Lens, second: Lens, T_21: Poses, T_1B: Poses | None = None
+    ) -> Rig:
+        """Whichever of the two stands on the left becomes the left one."""
+        _require_baseline(path, T_21)
+        x = -(T_21.R.T @ T_21.p)[0]
+        if x > 0:
+            return cls(path, first, second, T_21, T_1B)
+        T_2B = None if T_1B is None else se3.compose(T_21, T_1B)
+        return cls(path, second, first, se3.inverse(T_21), T_2B, swapped=True)
+
+    def on_body(self, T_LB: Poses) -> Rig:
+        return replace(self, T_LB=T_LB)
+
+    @property
+    def is_rectified(self) -> bool:
+        """Whether its pixels are those of a HEADER's camera as they are."""
+        T = self.T_RL
+        apart = np.abs(T.R - np.eye(3)).max() + np.abs(T.p[1:]).max()
+        plain = self.left.model is LensModel.NONE and self.right.model is LensModel.NONE
+        return plain and self.left.intrinsics == self.right.intrinsics and bool(apart < SAME)
+
+    def rectification(self) -> Rectification:
+        try:
+            return Rectification.of(self.left, self.right, self.T_RL)
+        except ValueError as error:
+            raise ForeignFileError(
+                self.path, str(error), due="cameras side by side are due"
+            ) from None
+
+    def header(self, rectification: Rectification, name: str) -> Header:
+        """Of the rectified camera."""
+        if self.T_LB is None:
+            raise ForeignFileError(
+                self.path,
+                "does not say where the camera sits on the body",
+                due="a file with T_cam_imu or T_imu_cam is due (camchain-imucam), or --extrinsic "
+                "FILE: JSON with R_CB and t_CB_m, or R_BC and t_BC_m",
+            )
+        R = rectification.left.R
+        T_CB = Poses(R @ self.T_LB.R, R @ self.T_LB.p)
+        return Header(
+            rectification.camera,
+            T_CB.R,
+            T_CB.p,
+            body_axes=body_axes(T_CB.R),
+            image_width_px=rectification.width_px,
+            image_height_px=rectification.height_px,
+            name=header_name(name),
+        )
+
+    def on_body_clock(self, t_ns: Times) -> Times:
+        """Times of pictures, which the cameras' clock gave."""
+        shifted = t_ns + round(self.offset_s * 1e9)
+        if len(shifted) and shifted[0] < 0:
+            raise PelorusError(
+                f"{self.path}: an offset of {self.offset_s} s brings the first picture before 0 s"
+            )
+        return shifted
+
+
+def _require_baseline(path: Path, T_21: Poses) -> None:
+    length = float(np.linalg.norm(T_21.p))
+    if not BASELINES_M[0] <= length <= BASELINES_M[1]:
+        raise ForeignFileError(
+            path,
+            f"the cameras stand {length:g} apart",
+            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are due: are these millimetres, or "
+            "squares of the board? Divide T so that it is in metres",
+        )
+
+
+def rigid(path: Path, name: str, matrix: Floats) -> Poses:
+    """The 4 x 4 matrix as a pose. Files round: its rotation is made one."""
+    if np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-9:
+        raise ForeignFileError(path, f"the last row of {name} is {matrix[3]}", due="0 0 0 1 is due")
+    R = arrays.rotation(path, name, matrix[:3, :3])
+    return Poses(se3.nearest_rotation(R), matrix[:3, 3].copy())
