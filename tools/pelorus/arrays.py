@@ -54,6 +54,16 @@ class Arrays:
             raise ForeignFileError(self.path, "is not finite", at=f"{key}{list(where)}")
         return array
 
+    def words(self, key: str) -> str:
+        """A text that was saved as an array."""
+        array = self._arrays[self.one_of(key)]
+        if array.size != 1 or array.dtype.kind not in "US":
+            raise ForeignFileError(
+                self.path, f"{key} is {array.size} of type {array.dtype}", due="one text is due"
+            )
+        item = array.reshape(()).item()
+        return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
+
     def scalar(self, key: str) -> float:
         array = self.get(key)
         if array.size != 1:

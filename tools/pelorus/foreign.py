@@ -153,7 +153,11 @@ def csv_rows(path: Path) -> list[list[str]]:
 
 def json_object(path: Path) -> dict[str, Any]:
     """An object with names: numbers that a double holds, strings that UTF-8 holds."""
-    words = text(path, JSON_BYTES_MAX)
+    return json_words(path, text(path, JSON_BYTES_MAX))
+
+
+def json_words(path: Path, words: str) -> dict[str, Any]:
+    """The same from words that stand in the file."""
     try:
         found = json.loads(
             words, parse_int=_integer, parse_float=_real, object_pairs_hook=_named_once

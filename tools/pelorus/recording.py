@@ -12,10 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from pelorus import motion, packed_file, se3
+from pelorus import inertial, motion, packed_file, se3
 from pelorus.console import progress
 from pelorus.errors import PelorusError, writing
-from pelorus.frames import Header, Landmark, Message, Reading, Stereo, Text, Truth, Twist
+from pelorus.frames import (
+    IMU_READINGS_MAX,
+    Header,
+    Landmark,
+    Message,
+    Reading,
+    Start,
+    Stereo,
+    Text,
+    Truth,
+    Twist,
+)
+from pelorus.inertial import NO_READINGS, Inertial
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
@@ -25,7 +37,9 @@ from pelorus.wire import Writer
 
 @dataclass(frozen=True)
 class Recording:
-    """Twists (m, 3) at `twist_t_ns`, frame k of the tracks at `frame_t_ns[k]`, body poses."""
+    """Twists (m, 3) at `twist_t_ns` or readings of an IMU, frame k of the tracks at
+    `frame_t_ns[k]`, body poses.
+    """
 
     header: Header
     twist_t_ns: Times
@@ -39,7 +53,10 @@ class Recording:
     readings: list[Reading] = field(default_factory=list)  # of small sensors, in any order
     remarks: list[Text] = field(default_factory=list)
     camera_delay_ns: int = 0  # frames stand so much later in the file, as they come off a robot
-    twist_delay_ns: int = 0  # twists likewise
+    twist_delay_ns: int = 0  # twists likewise, and readings of an IMU
+    inertial: Inertial = NO_READINGS  # in place of twists
+    imu_batch: int = IMU_READINGS_MAX  # readings of a message, at most
+    start: Start | None = None
 
     def with_header(self, **changes: Any) -> Recording:
         return replace(self, header=replace(self.header, **changes))
@@ -77,17 +94,25 @@ class Recording:
         yield self.header
         yield from self.remarks
         yield from self.known
-        streams = (self._twists(), self._small(), self._truths(), self._stereos())
+        if self.start is not None:
+            yield self.start
+        streams = (self._twists(), self._imu(), self._small(), self._truths(), self._stereos())
         for _, _, message in heapq.merge(*streams, key=lambda entry: entry[:2]):
             yield message
 
     def __len__(self) -> int:
         data = len(self.twist_t_ns) + len(self.truth_t_ns) + len(self.frame_t_ns)
+        data += len(self.inertial.t_ns) // self.imu_batch
         return 1 + len(self.remarks) + len(self.known) + len(self.readings) + data
 
     def _twists(self) -> Iterator[tuple[int, int, Message]]:
         for t, v, w in zip(self.twist_t_ns.tolist(), self.v_B_mps, self.w_B_radps, strict=True):
             yield t + self.twist_delay_ns, 0, Twist(t, v, w)
+
+    def _imu(self) -> Iterator[tuple[int, int, Message]]:
+        """A message stands where its last reading was taken."""
+        for t, message in inertial.messages(self.inertial, self.frame_t_ns, self.imu_batch):
+            yield t + self.twist_delay_ns, 0, message
 
     def _small(self) -> Iterator[tuple[int, int, Message]]:
         for reading in sorted(self.readings, key=lambda m: (m.t_ns, m.sensor)):
@@ -126,6 +151,7 @@ class Recording:
     def _check(self, path: Path) -> None:
         for name, times in (
             ("twist", self.twist_t_ns),
+            ("IMU reading", self.inertial.t_ns),
             ("frame", self.frame_t_ns),
             ("truth", self.truth_t_ns),
         ):

@@ -16,6 +16,7 @@ from pelorus.commands.choices import Fix, Timing, TimingOrAuto
 from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
+from pelorus.converters import imu_npz as imu_npz_converter
 from pelorus.converters import landmark_map, matlab, readings_csv
 from pelorus.faults.finding import Finding
 from pelorus.frames import TEXT_BYTES_MAX, Text
@@ -175,6 +176,48 @@ def csv(
 
 
 @app.command(
+    "imu-npz",
+    epilog="Example:  pelorus convert imu-npz tum_corridor1-60-seed0.npz corridor.plr --seed 3",
+)
+def imu_npz(
+    source: Path = SOURCE,
+    target: Path = TARGET,
+    keep_ids: bool = typer.Option(
+        False,
+        "--keep-ids",
+        help="Landmarks that come back keep their id, so that loops close. Else, as of a tracker, "
+        "an id is new after a frame's absence.",
+    ),
+    seed: int | None = typer.Option(
+        None,
+        min=0,
+        metavar="N",
+        help="Draw a simulated recording anew: the noise of every pixel, and new ids at random. "
+        "The landmarks are placed by all that the true poses see of them. Else the pixels are the "
+        "file's, and the ids count up.",
+    ),
+    pixel_sigma: float = typer.Option(
+        0.0,
+        min=0,
+        metavar="PX",
+        help="Noise to be added to what the pixels have; the seed's, or 0's.",
+    ),
+    start_sigmas: str = typer.Option(
+        ",".join(f"{sigma:g}" for sigma in imu_npz_converter.StartSigmas()),
+        metavar="M,RAD,M/S,M/S^2,RAD/S",
+        help="How well the state of init is known, of each axis: position, rotation, velocity, "
+        "biases of accelerometer and gyro.",
+    ),
+) -> None:
+    """Convert a .npz file with the raw readings of an IMU, stereo tracks and the truth."""
+    choices = imu_npz_converter.Choices(
+        keep_ids, seed, pixel_sigma, imu_npz_converter.start_sigmas(start_sigmas)
+    )
+    recording, findings = imu_npz_converter.convert(source, choices)
+    _write(recording, findings, target)
+
+
+@app.command(
     "map",
     epilog="Example:  pelorus convert map landmarks.csv map.plr --like drive.plr",
 )
@@ -213,16 +256,22 @@ def _verdict(finding: Finding) -> str:
     return "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
 
 
+def motion_in(recording: Recording) -> str:
+    """What there is of it, counted."""
+    readings = len(recording.inertial.t_ns)
+    return f"{readings} IMU readings" if readings else f"{len(recording.twist_t_ns)} twists"
+
+
 def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
     """Say what was found, keep it in the recording as TEXT, and write the file."""
     for finding in findings:
         out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
         out.print(f"    -> {escape(finding.action)}")
     remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found]
-    size = replace(recording, remarks=remarks).write(target)
+    size = replace(recording, remarks=[*recording.remarks, *remarks]).write(target)
     tracks = recording.tracks
     out.print(
-        f"{escape(str(target))}: {size} bytes, {len(recording.twist_t_ns)} twists, "
+        f"{escape(str(target))}: {size} bytes, {motion_in(recording)}, "
         f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
         f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
         + (f", {len(recording.readings)} readings" if recording.readings else "")

@@ -1,0 +1,350 @@
+# SPDX-License-Identifier: MIT
+"""Raw IMU with stereo tracks in one .npz, with the truth.
+
+`imu_t` (n) s and `imu` (n, 6), gyro rad/s, then specific force m/s^2, in body axes, which are the
+IMU's; `stereo_t`, `stereo_id`, `stereo_px` (m, 4) uL vL uR vR, a row an observation;
+`truth_t`, `truth` (k, 10): quaternion x y z w, body to world, position, velocity in the world;
+`bias_t`, `bias` (k, 6), gyro and accelerometer; `init` (17): t, quaternion, position, velocity,
+biases; `calib`: JSON with fx fy cx cy, width height, baseline_m, T_imu_cam0 (p_imu = R p_cam + t),
+gravity_world, pixel_sigma and the noises of the IMU.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pelorus import arrays, foreign, se3
+from pelorus.arrays import Arrays
+from pelorus.converters import imu_noise, renewal
+from pelorus.errors import PelorusError
+from pelorus.faults.axes import body_axes
+from pelorus.faults.finding import Finding
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import (
+    Header,
+    Noise,
+    Process,
+    Start,
+    StartFlag,
+    TwistTiming,
+    header_name,
+)
+from pelorus.inertial import Inertial
+from pelorus.layout import Floats, pack_symmetric
+from pelorus.motion import Times
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from pelorus.tracks import Tracks
+
+QUATERNION_NORM_TOLERANCE = 1e-3
+ALIGNED_M = 1e-4  # the right camera's place in the left one: (baseline, 0, 0)
+GRAVITY_TILT = 1e-6
+SAME_TIME_NS = 1000  # a start is at the reading that is so near
+
+
+class StartSigmas(NamedTuple):
+    """How well the state of `init` is known."""
+
+    position_m: float = 1e-3
+    rotation_rad: float = 1e-3
+    velocity_mps: float = 1e-2
+    bias_accel_mps2: float = 2e-2
+    bias_gyro_radps: float = 1e-3
+
+
+START_SIGMAS = StartSigmas()
+
+
+def start_sigmas(words: str) -> StartSigmas:
+    """From what the option has."""
+    try:
+        numbers = [float(word) for word in words.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != len(StartSigmas._fields) or not all(0 < x < np.inf for x in numbers):
+        due = f"{len(StartSigmas._fields)} positive numbers parted by commas are due"
+        raise PelorusError(f"--start-sigmas is {words!r}: {due}")
+    return StartSigmas(*numbers)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What may be asked of the conversion."""
+
+    keep_ids: bool = False
+    seed: int | None = None
+    extra_sigma_px: float = 0.0
+    start: StartSigmas = START_SIGMAS
+
+
+def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
+    """The recording, and how its readings fit its truth."""
+    recording, truth = read(source, choices.start)
+    findings = [imu_noise.compare(recording, truth)]
+    chance = np.random.Generator(np.random.PCG64(choices.seed or 0))
+    if choices.seed is not None:
+        recording, finding = renewal.renew(source, recording, chance)
+        findings.append(finding)
+    if choices.extra_sigma_px:
+        recording = renewal.with_noise(recording, choices.extra_sigma_px, chance)
+    if not choices.keep_ids:
+        tracks = recording.tracks
+        shuffle = None if choices.seed is None else chance
+        recording = replace(recording, tracks=renewal.with_new_ids(tracks, shuffle))
+    return recording, findings
+
+
+def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, imu_noise.TrueMotion]:
+    """The file as it is, and what it tells of the true motion."""
+    file = arrays.read_npz(source)
+    calib = _Calib(source, foreign.json_words(source, file.words("calib")))
+    readings = _readings(file)
+    init = file.get("init", shape=(17,))
+    begin_ns = _start_time(source, float(init[0]), readings.t_ns)
+    frame_t_ns, tracks = _tracks(file)
+    truth = _truth(file)
+    inside = (frame_t_ns >= begin_ns) & (frame_t_ns <= readings.t_ns[-1])
+    if not inside.any():
+        raise ForeignFileError(
+            source,
+            f"no frame lies between the start of init ({begin_ns * 1e-9:.6f} s) and the last "
+            f"reading ({readings.t_ns[-1] * 1e-9:.6f} s)",
+        )
+    frame_t_ns, tracks = frame_t_ns[inside], _only(tracks, inside)
+    tracks.check(source)
+    recording = Recording(
+        calib.header(source.stem),
+        np.empty(0, np.int64),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+        frame_t_ns,
+        tracks,
+        truth.t_ns,
+        Poses(truth.R, truth.p),
+        inertial=readings.at(readings.t_ns >= begin_ns),
+        start=_start(source, begin_ns, init, start),
+    )
+    return recording, truth
+
+
+# --- arrays ---------------------------------------------------------------------------------------
+
+
+def _times(file: Arrays, key: str) -> Times:
+    return arrays.nanoseconds(file.path, key, file.get(key, shape=(None,)))
+
+
+def _readings(file: Arrays) -> Inertial:
+    t_ns = _times(file, "imu_t")
+    numbers = file.get("imu", shape=(len(t_ns), 6))
+    return Inertial(t_ns, numbers[:, 3:], numbers[:, :3])
+
+
+def _tracks(file: Arrays) -> tuple[Times, Tracks]:
+    """Rows of one time are a frame."""
+    path = file.path
+    seconds = file.get("stereo_t", shape=(None,))
+    count = len(seconds)
+    if not count:
+        raise ForeignFileError(path, "holds no observation at all")
+    arrays.check_seconds(path, "stereo_t", seconds)
+    back = np.nonzero(np.diff(seconds) < 0)[0]
+    if len(back):
+        raise ForeignFileError(
+            path, "stereo_t goes back", at=f"row {back[0] + 1}", due="rows in order of time are due"
+        )
+    id = file.get("stereo_id", shape=(count,))
+    whole = (id == np.floor(id)) & (id >= 0) & (id < 2.0**32)
+    if not whole.all():
+        row = int(np.argmin(whole))
+        raise ForeignFileError(
+            path,
+            f"stereo_id is {id[row]:g}",
+            at=f"row {row}",
+            due="a whole number below 2^32 is due",
+        )
+    t_ns, frame = np.unique(np.round(seconds * 1e9).astype(np.int64), return_inverse=True)
+    tracks = Tracks.from_rows(
+        len(t_ns), frame, id.astype(np.int64), file.get("stereo_px", shape=(count, 4))
+    )
+    twice = np.nonzero((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0))[0]
+    if len(twice):
+        k = twice[0]
+        raise ForeignFileError(
+            path,
+            f"id {tracks.id[k]} stands twice in the frame of {t_ns[tracks.frame[k]] * 1e-9:.6f} s",
+        )
+    return t_ns, tracks
+
+
+def _only(tracks: Tracks, frames: NDArray[np.bool_]) -> Tracks:
+    """The tracks of these frames, numbered anew."""
+    rows = frames[tracks.frame]
+    number = np.cumsum(frames) - 1
+    return Tracks(
+        int(frames.sum()), number[tracks.frame[rows]], tracks.id[rows], tracks.pixels[rows]
+    )
+
+
+def _truth(file: Arrays) -> imu_noise.TrueMotion:
+    t_ns = _times(file, "truth_t")
+    numbers = file.get("truth", shape=(len(t_ns), 10))
+    R = _rotations(file.path, "truth", numbers[:, :4])
+    v_B = np.einsum("nji,nj->ni", R, numbers[:, 7:])
+    bias_t_ns = _times(file, "bias_t")
+    bias = file.get("bias", shape=(len(bias_t_ns), 6))
+    own = Inertial(bias_t_ns, bias[:, 3:], bias[:, :3]).between(t_ns)
+    return imu_noise.TrueMotion(t_ns, R, numbers[:, 4:7], v_B, own.a_B_mps2, own.w_B_radps)
+
+
+def _rotations(path: Path, key: str, quaternions: Floats) -> Floats:
+    """x y z w, body to world."""
+    norms = np.linalg.norm(quaternions, axis=1)
+    wrong = np.nonzero(np.abs(norms - 1) > QUATERNION_NORM_TOLERANCE)[0]
+    if len(wrong):
+        row = int(wrong[0])
+        raise ForeignFileError(
+            path,
+            f"the quaternion's norm is {norms[row]:.4f}",
+            at=f"{key} row {row}",
+            due="1 is due, in the order x y z w",
+        )
+    return np.asarray(Rotation.from_quat(quaternions).as_matrix())
+
+
+# --- the start ------------------------------------------------------------------------------------
+
+
+def _start_time(path: Path, seconds: float, t_ns: Times) -> int:
+    """That of `init`, or of the reading at that very time: a stamp is rounded."""
+    arrays.check_seconds(path, "init[0]", np.array([seconds]))
+    told = round(seconds * 1e9)
+    nearest = int(t_ns[np.abs(t_ns - told).argmin()])
+    if not t_ns[0] - SAME_TIME_NS <= told < t_ns[-1]:
+        raise ForeignFileError(
+            path,
+            f"init is of {seconds:.6f} s, the readings of {t_ns[0] * 1e-9:.6f} to "
+            f"{t_ns[-1] * 1e-9:.6f} s",
+            due="a state within them is due",
+        )
+    return nearest if abs(nearest - told) <= SAME_TIME_NS else told
+
+
+def _start(path: Path, t_ns: int, init: Floats, sigmas: StartSigmas) -> Start:
+    """Pose, velocity in body axes and biases (b_a, b_g), with their variances."""
+    R = _rotations(path, "init", init[None, 1:5])[0]
+    pose = np.repeat([sigmas.position_m, sigmas.rotation_rad], 3)
+    bias = np.repeat([sigmas.bias_accel_mps2, sigmas.bias_gyro_radps], 3)
+    return Start(
+        t_ns,
+        R,
+        init[5:8],
+        StartFlag.COVARIANCE | StartFlag.BIAS_PRIOR,
+        pack_symmetric(np.diag(pose**2)),
+        np.concatenate((init[14:17], init[11:14])),
+        bias**2,
+        velocity=R.T @ init[8:11],
+        velocity_variance=np.full(3, sigmas.velocity_mps**2),
+    )
+
+
+# --- calib ----------------------------------------------------------------------------------------
+
+NOISES = {  # in a HEADER, and in calib
+    "pixel_sigma_px": "pixel_sigma",
+    "gyro_noise": "gyro_noise_density",
+    "accel_noise": "accel_noise_density",
+    "gyro_walk": "gyro_random_walk",
+    "accel_walk": "accel_random_walk",
+}
+
+
+class _Calib:
+    def __init__(self, path: Path, content: dict[str, Any]) -> None:
+        self.path = path
+        self.content = content
+
+    def header(self, name: str) -> Header:
+        fx, fy, cx, cy, baseline = (
+            self._number(key) for key in ("fx", "fy", "cx", "cy", "baseline_m")
+        )
+        T_CB = se3.inverse(self._extrinsic(baseline))
+        if self._number("cam_imu_time_offset_s", 0.0):
+            raise self._error("cam_imu_time_offset_s", "0 is due: times on one clock")
+        return Header(
+            arrays.camera_of(self.path, fx, fy, cx, cy, baseline),
+            T_CB.R,
+            T_CB.p,
+            body_axes=body_axes(T_CB.R),
+            twist_timing=TwistTiming.MID,
+            image_width_px=int(self._number("width", 0.0)),
+            image_height_px=int(self._number("height", 0.0)),
+            noise=Noise(gravity=self._gravity(), **self._noises()),
+            name=header_name(name),
+            process=Process.IMU,
+        )
+
+    def _error(self, key: str, due: str) -> ForeignFileError:
+        return ForeignFileError(self.path, f"{key} is {self.content[key]!r}", at="calib", due=due)
+
+    def _number(self, key: str, standard: float | None = None) -> float:
+        value = self._value(key) if standard is None else self.content.get(key, standard)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise self._error(key, "a number is due")
+        return float(value)
+
+    def _value(self, key: str) -> Any:
+        if key not in self.content:
+            there = ", ".join(self.content) or "none"
+            raise ForeignFileError(self.path, f"lacks {key}", at="calib", due=f"there are: {there}")
+        return self.content[key]
+
+    def _array(self, key: str, *shape: int) -> Floats:
+        try:
+            array = np.array(self._value(key), dtype=np.float64)
+        except (TypeError, ValueError):
+            array = np.array(np.nan)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise self._error(key, f"{' x '.join(map(str, shape))} numbers are due")
+        return array
+
+    def _pose(self, key: str) -> Poses:
+        matrix = self._array(key, 4, 4)
+        return Poses(arrays.rotation(self.path, f"calib: {key}", matrix[:3, :3]), matrix[:3, 3])
+
+    def _extrinsic(self, baseline: float) -> Poses:
+        """The left camera's pose in the body; the right one's must be a rectified pair's."""
+        left = self._pose("T_imu_cam0")
+        if "T_imu_cam1" in self.content:
+            right = se3.compose(se3.inverse(left), self._pose("T_imu_cam1"))
+            off = max(
+                float(np.abs(right.R - np.eye(3)).max()),
+                float(np.abs(right.p - [baseline, 0.0, 0.0]).max()),
+            )
+            if off > ALIGNED_M:
+                raise self._error(
+                    "T_imu_cam1",
+                    f"that of a rectified pair is due, baseline_m = {baseline:g} to the right of "
+                    "T_imu_cam0",
+                )
+        return left
+
+    def _gravity(self) -> float:
+        """Its size; it must point down the world's z."""
+        g = self._array("gravity_world", 3)
+        if not g[2] < 0 or np.abs(g[:2]).max() > GRAVITY_TILT:
+            raise self._error("gravity_world", "(0, 0, -9.81) or so is due: z of the world is up")
+        return float(-g[2])
+
+    def _noises(self) -> dict[str, float]:
+        found = {name: self._number(key) for name, key in NOISES.items()}
+        for name, sigma in found.items():
+            if not sigma > 0:
+                raise self._error(NOISES[name], "a positive number is due")
+        return found
