@@ -71,6 +71,12 @@ class Recording:
     def T_CB(self) -> Poses:
         return Poses(np.asarray(self.header.R_CB), np.asarray(self.header.t_CB_m))
 
+    @property
+    def motion_words(self) -> str:
+        """What there is of motion, counted."""
+        readings = len(self.inertial.t_ns)
+        return f"{readings} IMU readings" if readings else f"{len(self.twist_t_ns)} twists"
+
     def dead_reckoning(self) -> Poses:
         """The body's poses at the frames, from the twists alone; the first twist is the origin."""
         timing = self.header.twist_timing

@@ -256,12 +256,6 @@ def _verdict(finding: Finding) -> str:
     return "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
 
 
-def motion_in(recording: Recording) -> str:
-    """What there is of it, counted."""
-    readings = len(recording.inertial.t_ns)
-    return f"{readings} IMU readings" if readings else f"{len(recording.twist_t_ns)} twists"
-
-
 def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
     """Say what was found, keep it in the recording as TEXT, and write the file."""
     for finding in findings:
@@ -271,7 +265,7 @@ def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
     size = replace(recording, remarks=[*recording.remarks, *remarks]).write(target)
     tracks = recording.tracks
     out.print(
-        f"{escape(str(target))}: {size} bytes, {motion_in(recording)}, "
+        f"{escape(str(target))}: {size} bytes, {recording.motion_words}, "
         f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
         f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
         + (f", {len(recording.readings)} readings" if recording.readings else "")

@@ -16,6 +16,7 @@ from pelorus.console import err, out
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
+from pelorus.simulation.imu import Imu, ImuFaults
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.readings import Sensing, options_without_meaning
 from pelorus.simulation.settings import Numbers, Span, option_name, settings_of
@@ -33,14 +34,17 @@ def register(parent: typer.Typer) -> None:
                 "target", inspect.Parameter.KEYWORD_ONLY, default=TARGET, annotation=Path
             ),
             *_parameters(Options, None),
+            *_parameters(Imu, "IMU in place of twists"),
             *_parameters(Mishaps, "What goes wrong"),
+            *_parameters(ImuFaults, "What goes wrong with an IMU"),
             *(p for sensor in SMALL_SENSORS for p in _of_sensor(sensor)),
         ]
     )
     parent.command(
         "simulate",
         epilog="Example:  pelorus simulate slip.plr --slip 0.5 --slip-from 20 --slip-for 5\n\n"
-        "pelorus simulate gnss.plr --position-rate 5 --position-sigma 0.05 --position-at 0.2,0,1.1",
+        "pelorus simulate gnss.plr --position-rate 5 --position-sigma 0.05 --position-at 0.2,0,1.1"
+        "\n\npelorus simulate carried.plr --imu-rate 400 --rest 2 --start none",
     )(run)
 
 
@@ -48,17 +52,23 @@ def run(target: Path, **given: Any) -> None:
     """Simulate a drive through a field of landmarks, with the truth.
 
     And what may go wrong on it: slipping wheels, a frozen camera, a moving scene. And small sensors
-    beside twists and camera, whose noise is as their readings say. All times are counted from the
-    beginning of the drive.
+    beside twists and camera, whose noise is as their readings say. With --imu-rate an IMU stands
+    in place of the twists. All times are counted from the beginning of the drive.
     """
     mishaps = Mishaps(**_values(Mishaps, given))
     readings = {sensor.name: Sensing(**_sensing(sensor, given)) for sensor in SMALL_SENSORS}
-    options = Options(**_values(Options, given), mishaps=mishaps, readings=readings)
+    options = Options(
+        **_values(Options, given),
+        mishaps=mishaps,
+        readings=readings,
+        imu=Imu(**_values(Imu, given)),
+        imu_faults=ImuFaults(**_values(ImuFaults, given)),
+    )
     recording = simulate(options).recording
     _tell_blindness(recording)
     size = recording.write(target)
     out.print(
-        f"{escape(str(target))}: {size} bytes, {len(recording.twist_t_ns)} twists, "
+        f"{escape(str(target))}: {size} bytes, {recording.motion_words}, "
         f"{len(recording.frame_t_ns)} frames with {len(recording.tracks)} observations, "
         f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
         + (f", {len(recording.readings)} readings" if recording.readings else "")

@@ -63,7 +63,11 @@ def stood(t_ns: Times) -> Drive:
 
 def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
     """Linear and angular velocity (n, 3) in a forward-left-up body."""
-    t = np.asarray(t_ns * 1e-9, np.float64)
+    return profile_at(np.asarray(t_ns * 1e-9, np.float64), speed_mps, lap_s)
+
+
+def profile_at(t: Floats, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
+    """The same at times in seconds."""
     lap_rate = 6.283185307179586 / lap_s
     v = np.stack(
         (
@@ -80,11 +84,29 @@ def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats
     return v, w
 
 
+def profile_slope(t: Floats, speed_mps: float) -> Floats:
+    """The derivative of the linear velocity (n, 3)."""
+    return np.stack(
+        (
+            0.2 / 17.0 * speed_mps * wave_slope(t / 17.0),
+            0.02 / 5.0 * speed_mps * wave_slope(t / 5.0),
+            0.02 / 3.0 * speed_mps * wave_slope(t / 3.0),
+        ),
+        axis=-1,
+    )
+
+
 def wave(x: Floats) -> Floats:
     """A sine's likeness of period 1 and amplitude 1, from parabolas."""
     x = x - np.floor(x)
     half = x < 0.5
     return np.where(half, 16 * x * (0.5 - x), -16 * (x - 0.5) * (1 - x))
+
+
+def wave_slope(x: Floats) -> Floats:
+    """The derivative of `wave`, which is continuous."""
+    x = x - np.floor(x)
+    return np.where(x < 0.5, 8 - 32 * x, 32 * x - 24)
 
 
 def exp(rho: Floats, theta: Floats) -> Poses:

@@ -79,6 +79,13 @@ class Mishaps:
         require("moving", self.moving, going or not self.moving, due)
         require("moving", self.moving, bool(self.moving) or not going, "the share that moves")
 
+    def check_beside(self, an_imu: bool) -> None:
+        """Those of wheels make no sense without wheels."""
+        for name in ("slip", "dead_encoder", "twist_delay_s"):
+            given = getattr(self, name)
+            usual = given == getattr(NO_MISHAPS, name)
+            require(name, given, usual or not an_imu, "twists, so no --imu-rate beside it,")
+
     def true_camera(self, told: Camera) -> Camera:
         """The camera that makes the images, where the HEADER tells of another."""
         focal = 1 + self.focal_error_percent / 100

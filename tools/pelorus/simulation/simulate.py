@@ -26,8 +26,9 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.simulation import scene, sensors, settings
+from pelorus.simulation import by_imu, scene, sensors, settings, smooth
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
+from pelorus.simulation.imu import NO_FAULTS, NO_IMU, Imu, ImuFaults, Sensed
 from pelorus.simulation.mishaps import NO_MISHAPS, Drift, Flags, Mishaps
 from pelorus.simulation.readings import Sensing, read
 from pelorus.simulation.settings import (
@@ -105,13 +106,18 @@ class Options:
     stop: Span | None = setting(None, "From then on the robot rests.")
     mishaps: Mishaps = NO_MISHAPS
     readings: Mapping[str, Sensing] = field(default_factory=dict)  # of small sensors, by name
+    imu: Imu = NO_IMU
+    imu_faults: ImuFaults = NO_FAULTS
 
     def check(self) -> None:
         """Refuse what makes no sense, by the option's name."""
         settings.check(self)
+        settings.check(self.imu)
         deeper = not self.max_depth_m or self.max_depth_m > self.min_depth_m
         require("max_depth_m", self.max_depth_m, deeper, "more than --min-depth")
         self.mishaps.check()
+        self.imu_faults.check(self.imu)
+        self.mishaps.check_beside(self.imu.is_there)
         for sensor in self.small_sensors:
             self.readings[sensor.name].check(sensor, self.twist_rate_hz)
         ratio = self.twist_rate_hz / self.frame_rate_hz
@@ -140,6 +146,15 @@ class Options:
         return max(self.range_m, 2 * deepest)
 
     @property
+    def way(self) -> smooth.Way:
+        """Of a body with an IMU, which needs accelerations."""
+        return smooth.Way(self.speed_mps, self.lap_s, self.imu.rest_s, self.stop, self.parked)
+
+    @property
+    def imu_drive(self) -> by_imu.ImuDrive:
+        return by_imu.ImuDrive(self.way, self.imu, self.imu_faults, self.bias_gyro_sigma_radps)
+
+    @property
     def camera(self) -> Camera:
         """As the HEADER tells it."""
         return replace(scene.CAMERA, baseline_m=self.baseline_m)
@@ -164,7 +179,8 @@ class _Chances:
     def __init__(self, seed: int) -> None:
         names = ("scene", "tracker", "pixels", "outliers", "drops", "velocity", "gyro", "bias_v")
         later = ("bias_w", "drift", "moving", "moving_ways")
-        self._names = (*names, *later, *(sensor.name for sensor in SMALL_SENSORS))
+        latest = ("imu", "imu_faults", "start")
+        self._names = (*names, *later, *(sensor.name for sensor in SMALL_SENSORS), *latest)
         seeds = np.random.SeedSequence(seed).spawn(len(self._names))
         self._streams = [np.random.Generator(np.random.PCG64(s)) for s in seeds]
 
@@ -181,22 +197,19 @@ class Simulation:
     bias_velocity_mps: Floats  # (twists, 3)
     bias_gyro_radps: Floats
     outlier: Flags  # of each observation
+    imu: Sensed | None = None
 
 
 def simulate(options: Options) -> Simulation:
     """Drive, look, and measure."""
     options.check()
     chances = _Chances(options.seed)
-    beyond = drive(
-        _node_times(options, options.lookahead_s),
-        options.twist_timing,
-        options.speed_mps,
-        options.lap_s,
-        options.stop,
-    )
-    points = scene.landmarks(beyond.poses, options.landmarks, chances["scene"], options.depths)
+    points = _landmarks(options, chances)
     t_ns = _node_times(options)
-    way = stood(t_ns) if options.parked else beyond.until(len(t_ns))
+    if options.imu.is_there:
+        way, sensed = by_imu.drive_and_read(options.imu_drive, t_ns, chances)
+    else:
+        way, sensed = _way(options, t_ns), None
     v, w, bias_v, bias_w = _readings(options, way, chances)
     at_frames = np.arange(options.frames) * options.twists_per_frame
     frame_t_ns = t_ns[at_frames]
@@ -217,7 +230,27 @@ def simulate(options: Options) -> Simulation:
         camera_delay_ns=round(options.camera_delay_s * 1e9),
         twist_delay_ns=round(options.mishaps.twist_delay_s * 1e9),
     )
-    return Simulation(recording, points, bias_v, bias_w, outlier)
+    if sensed is not None:
+        recording = by_imu.driven(recording, options.imu_drive, sensed, chances["start"])
+    return Simulation(recording, points, bias_v, bias_w, outlier, sensed)
+
+
+def _landmarks(options: Options, chances: _Chances) -> Floats:
+    """Beside the way, and beyond its end. A parked body sees those of the way that it could go."""
+    t_ns = _node_times(options, options.lookahead_s)
+    if options.imu.is_there:
+        poses = smooth.poses(t_ns, options.way._replace(parked=False))
+    else:
+        poses = _way(replace(options, parked=False), t_ns).poses
+    return scene.landmarks(poses, options.landmarks, chances["scene"], options.depths)
+
+
+def _way(options: Options, t_ns: Times) -> Drive:
+    """By twists."""
+    if options.parked:
+        return stood(t_ns)
+    timing, speed, lap = options.twist_timing, options.speed_mps, options.lap_s
+    return drive(t_ns, timing, speed, lap, options.stop)
 
 
 def blindness(recording: Recording) -> str:
@@ -256,8 +289,10 @@ def _readings(
 
 
 def _small_readings(options: Options, way: Drive, chances: _Chances) -> list[Reading]:
-    held = (motion.held(x, options.twist_timing) for x in (way.v_B_mps, way.w_B_radps))
-    v, w = (np.concatenate((x, x[-1:])) for x in held)
+    v, w = way.v_B_mps, way.w_B_radps
+    if not options.imu.is_there:
+        held = (motion.held(x, options.twist_timing) for x in (v, w))
+        v, w = (np.concatenate((x, x[-1:])) for x in held)
     moves = Motion(options.mishaps.jumped(way.t_ns, way.poses), v, w)
     found: list[Reading] = []
     for sensor in options.small_sensors:

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""The drive of a body with an IMU: from the way to what stands in the recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from pelorus.frames import Noise, Process, Start, StartFlag
+from pelorus.inertial import Inertial
+from pelorus.layout import Floats, pack_symmetric
+from pelorus.motion import Times
+from pelorus.recording import Recording
+from pelorus.simulation import imu as sensor
+from pelorus.simulation import smooth
+from pelorus.simulation.drive import Drive, exp
+from pelorus.simulation.imu import Imu, ImuFaults, Sensed, StartGiven
+
+
+class ImuDrive(NamedTuple):
+    """What of the options an IMU depends on."""
+
+    way: smooth.Way
+    imu: Imu
+    faults: ImuFaults
+    bias_gyro_sigma_radps: float
+
+
+class Chances(Protocol):
+    """Streams of chance by name."""
+
+    def __getitem__(self, name: str) -> np.random.Generator: ...
+
+
+def drive_and_read(given: ImuDrive, t_ns: Times, chances: Chances) -> tuple[Drive, Sensed]:
+    """The motion at t_ns, and the readings over the same time."""
+    own = given.imu.times(int(t_ns[-1]))
+    times = np.union1d(t_ns, own)
+    poses = smooth.poses(times, given.way)
+    v, w = given.way.velocities(smooth.seconds(times))
+    at, nodes = np.searchsorted(times, own), np.searchsorted(times, t_ns)
+    a = smooth.specific_force(own, given.way, poses.R[at], given.imu.gravity_mps2)
+    sensed = sensor.read(
+        given.imu,
+        given.faults,
+        given.bias_gyro_sigma_radps,
+        Inertial(own, a, w[at]),
+        chances["imu"],
+        chances["imu_faults"],
+    )
+    return Drive(t_ns, v[nodes], w[nodes], poses.at(nodes)), sensed
+
+
+def driven(
+    recording: Recording, given: ImuDrive, sensed: Sensed, chance: np.random.Generator
+) -> Recording:
+    """The recording with an IMU's readings in place of twists."""
+    none: Floats = np.empty((0, 3))
+    early_ns = round(given.faults.camera_offset_s * 1e9)
+    recording = replace(
+        recording,
+        twist_t_ns=np.empty(0, np.int64),
+        v_B_mps=none,
+        w_B_radps=none,
+        frame_t_ns=recording.frame_t_ns - early_ns,
+        inertial=sensed.readings,
+        imu_batch=given.imu.imu_batch,
+        twist_delay_ns=round(given.faults.imu_delay_s * 1e9),
+        start=_start(recording, given, chance),
+    )
+    noise = recording.header.noise
+    return recording.with_header(process=Process.IMU, noise=_noise(noise, given))
+
+
+def _noise(noise: Noise, given: ImuDrive) -> Noise:
+    """As it is; what there is none of is no suggestion."""
+    imu = given.imu
+    told = {
+        "gyro_noise": imu.gyro_noise,
+        "accel_noise": imu.accel_noise,
+        "gyro_walk": imu.gyro_walk,
+        "accel_walk": imu.accel_walk,
+        "bias_accel_sigma": imu.bias_accel_sigma_mps2,
+    }
+    kept = {
+        name: value
+        for name, value in vars(noise).items()
+        if name in ("pixel_sigma_px", "bias_gyro_sigma_radps")
+    }
+    suggested = {name: value if value > 0 else -1.0 for name, value in told.items()}
+    return Noise(**kept, **suggested, gravity=imu.gravity_mps2)
+
+
+def _start(recording: Recording, given: ImuDrive, chance: np.random.Generator) -> Start | None:
+    """The first pose, with roll and pitch wrong by their sigma, and the velocity, by its own.
+
+    Position and yaw are free, so they are as they are: nothing can be learnt of them.
+    """
+    imu = given.imu
+    if imu.start is StartGiven.NONE:
+        return None
+    R, p = recording.truth.at(0)
+    v, _ = given.way.velocities(smooth.seconds(recording.truth_t_ns[:1]))
+    wrong = imu.start_tilt_sigma_rad * chance.standard_normal(3)
+    wrong[2] = 0.0
+    faulty = v[0] + imu.start_velocity_sigma_mps * chance.standard_normal(3)
+    tilt = np.eye(3) - np.outer(R[2], R[2])
+    covariance: Floats = np.zeros((6, 6))
+    covariance[3:, 3:] = imu.start_tilt_sigma_rad**2 * tilt
+    start = Start(
+        int(recording.truth_t_ns[0]),
+        _turned(wrong) @ R,
+        p,
+        StartFlag.COVARIANCE,
+        pack_symmetric(covariance),
+    )
+    if imu.start is StartGiven.POSE:
+        return start
+    variance = np.full(3, imu.start_velocity_sigma_mps**2)
+    return replace(start, velocity=faulty, velocity_variance=variance)
+
+
+def _turned(small: Floats) -> Floats:
+    """Exp of a small rotation of the world."""
+    R: Floats = exp(np.zeros((1, 3)), small[None]).R[0]
+    return R
