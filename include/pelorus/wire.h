@@ -127,9 +127,16 @@ typedef struct plr_imu_message {
     plr_imu readings[PLR_WIRE_MAX_IMU]; /* the frame has float32 */
 } plr_imu_message;
 
+/* The velocity and the biases are for whoever judges a result: no filter looks at them. */
+enum { PLR_TRUTH_VELOCITY = 1, PLR_TRUTH_BIAS = 2 };
+
 typedef struct plr_truth {
     plr_time_ns t_ns;
     plr_pose T_WB;
+    double v_B_mps[3]; /* along the body's axes */
+    double bias[6];    /* as in plr_start */
+    uint8_t knows;     /* PLR_TRUTH_VELOCITY, PLR_TRUTH_BIAS: what of them is given; 0 from senders
+                          before format 1.4 */
 } plr_truth;
 
 typedef enum plr_landmark_role {

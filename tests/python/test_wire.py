@@ -38,6 +38,7 @@ from pelorus.frames import (
     Stereo,
     Text,
     Truth,
+    TruthKnows,
     Twist,
 )
 from pelorus.layout import MalformedPayload
@@ -62,7 +63,7 @@ MESSAGES: list[Message] = [
     stereo(5),
     stereo(0),
     stereo(4096),
-    Truth(12, R, CHANCE.normal(size=3)),
+    Truth(12, R, np.ones(3), TruthKnows(3), np.arange(3.0), np.arange(6.0)),
     Landmark(2**32 - 1, CHANCE.normal(size=3), CHANCE.normal(size=6), Role.FINAL, 99, 7),
     Pose(5, CHANCE.normal(size=3), R, CHANCE.normal(size=21), real_bytes=8, reset_count=3),
     Pose(5, CHANCE.normal(size=3), real_bytes=4, after_stereo=True, trace=0.5),
@@ -80,7 +81,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.START: [417],
     Kind.TWIST: [56],
     Kind.STEREO: [12 + 20 * n for n in (5, 0, 4096)],
-    Kind.TRUTH: [104],
+    Kind.TRUTH: [177],
     Kind.LANDMARK: [90],
     Kind.POSE: [36 + 63 * 8 + 32, 36 + 63 * 4 + 32],
     Kind.REPORT: [56],

@@ -102,7 +102,14 @@ def a_stereo(random: np.random.Generator) -> Message:
 
 
 def a_truth(random: np.random.Generator) -> Message:
-    return frames.Truth(whole(random, 64), reals(random, 3, 3), reals(random, 3))
+    return frames.Truth(
+        t_ns=whole(random, 64),
+        R_WB=reals(random, 3, 3),
+        p_WB_m=reals(random, 3),
+        knows=frames.TruthKnows(int(random.integers(4))),
+        velocity=reals(random, 3),
+        bias=reals(random, 6),
+    )
 
 
 def a_landmark(random: np.random.Generator) -> Message:

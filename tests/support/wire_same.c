@@ -165,7 +165,11 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         same_stereo(&e->as.stereo, &a->as.stereo);
         break;
     case PLR_KIND_TRUTH:
-        SAME(as.truth);
+        SAME(as.truth.t_ns);
+        SAME(as.truth.T_WB);
+        SAME(as.truth.v_B_mps);
+        SAME(as.truth.bias);
+        SAME(as.truth.knows);
         break;
     case PLR_KIND_LANDMARK:
         same_landmark(&e->as.landmark, &a->as.landmark);

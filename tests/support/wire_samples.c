@@ -267,6 +267,9 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         m.as.truth.t_ns = time_of(variant);
         fill(m.as.truth.T_WB.R, 9, variant, 0);
         fill(m.as.truth.T_WB.p, 3, variant, 9);
+        fill(m.as.truth.v_B_mps, 3, variant, 12);
+        fill(m.as.truth.bias, 6, variant, 15);
+        m.as.truth.knows = whole8(variant, UINT8_MAX, PLR_TRUTH_BIAS);
         break;
     case PLR_KIND_LANDMARK:
         make_landmark(&m.as.landmark, variant);

@@ -140,10 +140,13 @@ static void test_stereo_fields_lie_where_the_page_says(void) {
 
 static void test_truth_fields_lie_where_the_page_says(void) {
     const plr_truth m = encode(PLR_KIND_TRUTH).as.truth;
-    TEST_ASSERT_EQUAL_size_t(104, length);
+    TEST_ASSERT_EQUAL_size_t(177, length);
     ASSERT_NUMBER(0, 8, m.t_ns);
     assert_f64s(8, m.T_WB.R, 9);
     assert_f64s(80, m.T_WB.p, 3);
+    ASSERT_NUMBER(104, 1, PLR_TRUTH_BIAS);
+    assert_f64s(105, m.v_B_mps, 3);
+    assert_f64s(129, m.bias, 6);
 }
 
 static void test_landmark_fields_lie_where_the_page_says(void) {

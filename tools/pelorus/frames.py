@@ -58,6 +58,13 @@ class StartFlag(IntFlag):
     BIAS_PRIOR = 2
 
 
+class TruthKnows(IntFlag):
+    """What a TRUTH gives besides the pose."""
+
+    VELOCITY = 1
+    BIAS = 2
+
+
 def header_name(words: str) -> str:
     """The words as a HEADER can hold them: whole characters of UTF-8, and not too many.
 
@@ -279,11 +286,19 @@ def _rows(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[An
 
 @dataclass(frozen=True, eq=False)
 class Truth(Message, kind=Kind.TRUTH):
-    """A reference pose, body to world."""
+    """A reference pose, body to world, and what `knows` says is known besides.
+
+    That is the velocity along the body's axes, and the biases of the readings, in START's order.
+    """
 
     t_ns: int
     R_WB: Floats = identity()
     p_WB_m: Floats = zeros(3)
+    knows: TruthKnows = TruthKnows(0)
+    velocity: Floats = zeros(3)
+    bias: Floats = zeros(6)
+
+    choices: ClassVar = {"knows": lambda value: TruthKnows(value & 3)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from pelorus.frames import (
     Stereo,
     Text,
     Truth,
+    TruthKnows,
     Twist,
 )
 from pelorus.inertial import NO_READINGS, Inertial
@@ -49,6 +50,8 @@ class Recording:
     tracks: Tracks
     truth_t_ns: Times = field(default_factory=lambda: np.empty(0, np.int64))
     truth: Poses = field(default_factory=lambda: Poses(np.empty((0, 3, 3)), np.empty((0, 3))))
+    truth_velocity: Floats | None = None  # (truth, 3) in body axes
+    truth_bias: Floats | None = None  # (truth, 6) of the readings, as in START
     known: list[Landmark] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)  # of small sensors, in any order
     remarks: list[Text] = field(default_factory=list)
@@ -62,7 +65,7 @@ class Recording:
         return replace(self, header=replace(self.header, **changes))
 
     def with_truth(self, t_ns: Times, poses: Poses) -> Recording:
-        return replace(self, truth_t_ns=t_ns, truth=poses)
+        return replace(self, truth_t_ns=t_ns, truth=poses, truth_velocity=None, truth_bias=None)
 
     def with_extrinsic(self, T_CB: Poses) -> Recording:
         return self.with_header(R_CB=T_CB.R, t_CB_m=T_CB.p)
@@ -125,8 +128,17 @@ class Recording:
             yield reading.t_ns, 1, reading
 
     def _truths(self) -> Iterator[tuple[int, int, Message]]:
-        for t, R, p in zip(self.truth_t_ns.tolist(), *self.truth, strict=True):
-            yield t, 2, Truth(t, R, p)
+        count = len(self.truth_t_ns)
+        knows = TruthKnows(0)
+        if self.truth_velocity is not None:
+            knows |= TruthKnows.VELOCITY
+        if self.truth_bias is not None:
+            knows |= TruthKnows.BIAS
+        v_B = np.zeros((count, 3)) if self.truth_velocity is None else self.truth_velocity
+        bias = np.zeros((count, 6)) if self.truth_bias is None else self.truth_bias
+        times = self.truth_t_ns.tolist()
+        for t, R, p, v, b in zip(times, *self.truth, v_B, bias, strict=True):
+            yield t, 2, Truth(t, R, p, knows, v, b)
 
     def _stereos(self) -> Iterator[tuple[int, int, Message]]:
         bounds = self.tracks.bounds()

@@ -127,6 +127,8 @@ def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, im
         tracks,
         truth.t_ns,
         Poses(truth.R, truth.p),
+        truth.v_B,
+        np.hstack((truth.bias_accel, truth.bias_gyro)),
         inertial=readings.at(readings.t_ns >= begin_ns),
         start=_start(source, begin_ns, init, start),
     )

@@ -69,9 +69,17 @@ def driven(
         imu_batch=given.imu.imu_batch,
         twist_delay_ns=round(given.faults.imu_delay_s * 1e9),
         start=_start(recording, given, chance),
+        truth_velocity=given.way.velocities(smooth.seconds(recording.truth_t_ns))[0],
+        truth_bias=_biases(sensed, recording.truth_t_ns),
     )
     noise = recording.header.noise
     return recording.with_header(process=Process.IMU, noise=_noise(noise, given))
+
+
+def _biases(sensed: Sensed, t_ns: Times) -> Floats:
+    """(n, 6) at these times, in the order of START."""
+    own = sensed.true._replace(a_B_mps2=sensed.bias_accel, w_B_radps=sensed.bias_gyro)
+    return np.hstack(own.between(t_ns)[1:])
 
 
 def _noise(noise: Noise, given: ImuDrive) -> Noise:

@@ -93,10 +93,10 @@ class Imu:
 class ImuFaults:
     """What goes wrong with an IMU. Without them nothing does."""
 
-    vibration_mps2: float = setting(
+    accel_vibration_mps2: float = setting(
         0.0, "A motor shakes the accelerometer, all axes, by this amplitude.", "M/S^2"
     )
-    vibration_radps: float = setting(0.0, "And the gyro by this one.", "RAD/S")
+    gyro_vibration_radps: float = setting(0.0, "And the gyro by this one.", "RAD/S")
     vibration_rate_hz: float = setting(87.0, "How often a second.", "HZ", POSITIVE)
     accel_range_mps2: float = setting(0.0, "Readings beyond it stay at it; 0: none are.", "M/S^2")
     gyro_range_radps: float = setting(0.0, "The same of the gyro.", "RAD/S")
@@ -187,7 +187,7 @@ def read(
 def _with_faults(faults: ImuFaults, readings: Inertial, bad: np.random.Generator) -> Inertial:
     t_ns, a, w = readings
     shaken = wave(t_ns[:, None] * 1e-9 * faults.vibration_rate_hz + np.array([0.0, 0.3, 0.7]))
-    a, w = a + faults.vibration_mps2 * shaken, w + faults.vibration_radps * shaken
+    a, w = a + faults.accel_vibration_mps2 * shaken, w + faults.gyro_vibration_radps * shaken
     a, w = _spiking(faults.imu_spikes, a, w, bad)
     a, w = _clipped(a, faults.accel_range_mps2), _clipped(w, faults.gyro_range_radps)
     if faults.imu_frozen is not None:

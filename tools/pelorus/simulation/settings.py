@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 
-UNITS = ("_s", "_hz", "_mps", "_radps", "_px", "_m", "_percent")  # an option's name has no unit
+UNITS = (
+    "_s",
+    "_hz",
+    "_mps",
+    "_mps2",
+    "_radps",
+    "_rad",
+    "_px",
+    "_m",
+    "_percent",
+)  # an option's name has no unit
 
 
 Numbers = tuple[float, ...]  # an option of several, parted by commas
