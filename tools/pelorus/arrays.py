@@ -114,13 +114,15 @@ def nanoseconds(path: Path, what: str, seconds: Floats) -> NDArray[np.int64]:
     return t_ns
 
 
-def check_seconds(path: Path, what: str, seconds: Floats) -> None:
-    """Refuse times that are no seconds: negative ones, or nanoseconds by mistake."""
-    if seconds.min() < 0 or seconds.max() > SECONDS_MAX:
+def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) -> None:
+    """Refuse times that are none of this unit: negative ones, or nanoseconds by mistake."""
+    most = SECONDS_MAX * 1e9 / unit_ns
+    if numbers.min() < 0 or numbers.max() > most:
+        name = {1e9: "seconds", 1e6: "milliseconds", 1e3: "microseconds"}[unit_ns]
         raise ForeignFileError(
             path,
-            f"{what} spans {seconds.min():g} to {seconds.max():g}",
-            due=f"seconds from 0 to {SECONDS_MAX:g} are due",
+            f"{what} spans {numbers.min():g} to {numbers.max():g}",
+            due=f"{name} from 0 to {most:g} are due",
         )
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from pelorus.layout import Floats
 
 DIGITS_MAX = 19  # 2^63 has as many
 SHOWN_MAX = 40
+TIME_UNITS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}  # a column t_ms and so on; in ns
 
 
 class Table:
@@ -22,6 +24,7 @@ class Table:
     def __init__(self, path: Path, columns: dict[str, list[str]]) -> None:
         self.path = path
         self._columns = columns
+        self._factor: dict[str, float] = {}
 
     @classmethod
     def read(cls, path: Path) -> Table:
@@ -31,6 +34,24 @@ class Table:
         if twice:
             raise ForeignFileError(path, f"names the column {twice[0]} twice", at="row 1")
         return cls(path, {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)})
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._columns)
+
+    @property
+    def count(self) -> int:
+        """Of the rows."""
+        return len(next(iter(self._columns.values())))
+
+    def rename(self, column: str, name: str, factor: float) -> None:
+        """Give a column another name; its numbers are `factor` times what stands there."""
+        if name != column and name in self._columns:
+            raise ForeignFileError(
+                self.path, f"has the column {name}, and {column} is to be called so", at="row 1"
+            )
+        self._columns = {name if old == column else old: c for old, c in self._columns.items()}
+        self._factor[name] = factor
 
     def require(self, *names: str) -> None:
         """Refuse a file without these columns."""
@@ -73,17 +94,24 @@ class Table:
         return [cell.strip() for cell in self._columns[name]]
 
     def times(self) -> NDArray[np.int64]:
-        """ns from the column t_ns, or from t_s; not yet checked to ascend."""
-        if "t_ns" in self._columns:
-            t_ns = self.integers("t_ns", 2**63 - 1)
+        """ns from the column t_ns, t_us, t_ms or t_s; not yet checked to ascend."""
+        unit = next((unit for unit in TIME_UNITS if f"t_{unit}" in self._columns), "s")
+        name = f"t_{unit}"
+        if unit == "ns":
+            t_ns = self.integers(name, 2**63 - 1)
         else:
-            seconds = self.numbers("t_s")[:, 0]
-            if len(seconds):
-                arrays.check_seconds(self.path, "t_s", seconds)
-            t_ns = np.round(seconds * 1e9).astype(np.int64)
+            numbers = self.numbers(name)[:, 0]
+            if len(numbers):
+                arrays.check_seconds(self.path, name, numbers, TIME_UNITS[unit])
+            t_ns = self._exact_ns(name, TIME_UNITS[unit])
         if not len(t_ns):
             raise ForeignFileError(self.path, "holds column names but no row")
         return t_ns
+
+    def _exact_ns(self, name: str, factor: float) -> NDArray[np.int64]:
+        """As decimals: a double would round today's clock to 0.2 microseconds."""
+        exact = (Decimal(cell.strip()) * int(factor) for cell in self._columns[name])
+        return np.array([int(t.to_integral_value()) for t in exact], np.int64)
 
     def ascending_times(self) -> NDArray[np.int64]:
         t_ns = self.times()
@@ -108,7 +136,8 @@ class Table:
         if not np.isfinite(column).all():
             row = int(np.nonzero(~np.isfinite(column))[0][0])
             raise ForeignFileError(self.path, f"{name} is not finite", at=f"row {row + 2}")
-        return column
+        factor = self._factor.get(name, 1.0)
+        return column if factor == 1.0 else column * factor
 
 
 def _shown(cell: str) -> str:

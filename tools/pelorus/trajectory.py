@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Trajectories with times: TUM files (`t x y z qx qy qz qw`), recordings, KITTI poses."""
+"""Trajectories with times: TUM files (`t x y z qx qy qz qw`), EuRoC's, recordings, KITTI poses."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from pelorus.se3 import Poses
 POSE_SIZE = 6
 TUM_COLUMNS = 8
 KITTI_COLUMNS = 12
+EUROC_COLUMNS = (8, 17)  # t x y z qw qx qy qz, and velocity and biases behind them
+NS_DIGITS = (16, 19)  # of today's time in ns; seconds have 10 before the point
 QUATERNION_NORM_TOLERANCE = 1e-2
 CELL_SHOWN = 40  # characters of a bad one
 
@@ -45,21 +47,47 @@ def read_tum(path: Path) -> Trajectory:
                 due=f"{TUM_COLUMNS} are due: t x y z qx qy qz qw",
             )
     t_ns = _times(path, rows)
+    numbers = foreign.numbers(path, [Row(line, cells[1:]) for line, cells in rows])
+    return _checked(path, rows, t_ns, numbers[:, :3], numbers[:, 3:])
+
+
+def read_stamped(path: Path) -> Trajectory:
+    """A TUM file, or EuRoC's: its times are whole ns, and the quaternion begins with w."""
+    rows = foreign.rows(path)
+    cells = rows[0].cells
+    stamp = cells[0].isdecimal() and NS_DIGITS[0] <= len(cells[0]) <= NS_DIGITS[1]
+    if not (stamp and len(cells) in EUROC_COLUMNS):
+        return read_tum(path)
+    numbers = foreign.numbers(path, rows)
+    t_ns = np.array([whole_ns(path, row) for row in rows], np.int64)
+    return _checked(path, rows, t_ns, numbers[:, 1:4], np.roll(numbers[:, 4:8], -1, axis=1))
+
+
+def whole_ns(path: Path, row: Row) -> int:
+    """The time that the row begins with."""
+    cell = row.cells[0]
+    if not cell.isdecimal() or len(cell) > NS_DIGITS[1] or int(cell) >= 2**63:
+        at = f"line {row.line}"
+        raise ForeignFileError(path, f"{cell[:CELL_SHOWN]!r} is no time in ns", at=at)
+    return int(cell)
+
+
+def _checked(path: Path, rows: list[Row], t_ns: Times, p: Floats, q: Floats) -> Trajectory:
+    """Ascending times, and quaternions x y z w."""
     back = np.nonzero(np.diff(t_ns) <= 0)[0]
     if len(back):
         raise ForeignFileError(path, "time does not ascend", at=f"line {rows[back[0] + 1].line}")
-    numbers = foreign.numbers(path, [Row(line, cells[1:]) for line, cells in rows])
-    norms = np.linalg.norm(numbers[:, 3:], axis=1)
+    norms = np.linalg.norm(q, axis=1)
     wrong = np.nonzero(np.abs(norms - 1) > QUATERNION_NORM_TOLERANCE)[0]
     if len(wrong):
         raise ForeignFileError(
             path, "the quaternion's norm is not 1", at=f"line {rows[wrong[0]].line}"
         )
-    return Trajectory(t_ns, Poses(Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3]))
+    return Trajectory(t_ns, Poses(Rotation.from_quat(q).as_matrix(), p))
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:
-    """A reference: a recording with TRUTH, a TUM file, or KITTI poses.
+    """A reference: a recording with TRUTH, a TUM file, EuRoC's, or KITTI poses.
 
     KITTI poses need times: a file with one time in seconds a row, or the recording, whose frame k
     row k belongs to; with the recording they are brought from the camera to the body.
@@ -69,14 +97,14 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
     if is_recording(path):
         return truth_of(path)
     columns = len(foreign.rows(path)[0].cells)
-    if columns == TUM_COLUMNS:
-        return read_tum(path)
+    if columns in EUROC_COLUMNS:  # as many as TUM's
+        return read_stamped(path)
     if columns == KITTI_COLUMNS:
         return _kitti(path, times, recording)
     raise ForeignFileError(
         path,
         f"rows of {columns} numbers",
-        due=f"{TUM_COLUMNS} (TUM) or {KITTI_COLUMNS} (KITTI) are due",
+        due=f"{TUM_COLUMNS} or {EUROC_COLUMNS[1]} (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are due",
     )
 
 

@@ -5,57 +5,46 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import typer
 from rich.markup import escape
 
+from pelorus.commands import importers
 from pelorus.commands.choices import Fix, Timing, TimingOrAuto
+from pelorus.commands.conversion import write
+from pelorus.commands.importers import OWN_DATA
+from pelorus.commands.own import COLUMNS, EXTRINSIC, FIX, IMU, LENS, MEASURED, TARGET, TRUTH, TWISTS
 from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
 from pelorus.converters import imu_npz as imu_npz_converter
 from pelorus.converters import landmark_map, matlab, readings_csv
-from pelorus.faults.finding import Finding
-from pelorus.frames import TEXT_BYTES_MAX, Text
-from pelorus.recording import Recording
+from pelorus.converters.columns import Columns
 from pelorus.rig.lens import LensModel
 from pelorus.small_sensors import SMALL_SENSORS
 
 SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
-TARGET = typer.Argument(
-    ..., metavar="OUT.plr", help="The recording to write; as OUT.plr.zst it is packed."
-)
-FIX = typer.Option(
-    Fix.AUTO,
-    help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "
-    "and mend them; none: leave the data as they are.",
-)
-EXTRINSIC = typer.Option(
-    None,
-    metavar="FILE",
-    help="JSON with R_CB, as three rows of three, and t_CB_m (body to left camera), or R_BC and "
-    "t_BC_m, where the calibration does not say it or is of another body.",
-)
-LENS = typer.Option(
-    None, help="Of an OpenCV calibration whose four numbers may be of a fisheye or not."
-)
+DATA_SETS = "Files of known data sets"
 
 app = typer.Typer(
-    help="Convert other formats to a .plr recording.",
+    help="Make a recording (.plr) of other formats. Which is yours? docs/CONVERT.md has a command "
+    "for each.",
     no_args_is_help=True,
-    epilog="Example:  pelorus convert ece276a 0027.npz 0027.plr --truth kitti-07.txt",
+    epilog="Example:  pelorus convert euroc V1_01_easy V1_01.plr",
 )
 
 
 def register(parent: typer.Typer) -> None:
     """Add `convert` to the command line."""
+    importers.register(app)
+    app.registered_commands.sort(key=lambda command: command.rich_help_panel != OWN_DATA)
     parent.add_typer(app, name="convert")
 
 
 @app.command(
+    rich_help_panel=DATA_SETS,
     epilog="Example:  pelorus convert ece276a 0027.npz 0027.plr --truth kitti-07.txt",
 )
 def ece276a(
@@ -75,15 +64,16 @@ def ece276a(
         help="Leave stale tracks under the ids that the file gives them.",
     ),
 ) -> None:
-    """Convert a .npz file of UCSD's ECE276A project 3 (visual-inertial SLAM)."""
+    """A .npz of UCSD's ECE276A project 3 (visual-inertial SLAM)."""
     recording, findings = ece276a_converter.convert(
         source, truth, fix is Fix.AUTO, twist_timing.value_in_header, keep_ids
     )
-    _write(recording, findings, target)
+    write(recording, findings, target)
 
 
 @app.command(
     "starry-night",
+    rich_help_panel=DATA_SETS,
     epilog="Example:  pelorus convert starry-night dataset3.mat starry.plr",
 )
 def starry_night(
@@ -96,12 +86,13 @@ def starry_night(
         help="Standard deviation of the known landmarks, each axis.",
     ),
 ) -> None:
-    """Convert UTIAS's Starry Night, with its landmarks as known ones."""
+    """A .mat of UTIAS's Starry Night, with its landmarks as known ones."""
     recording = matlab.starry_night(source, twist_timing.value_in_header, landmark_sigma)
-    _write(recording, [], target)
+    write(recording, [], target)
 
 
 @app.command(
+    rich_help_panel=DATA_SETS,
     epilog="Example:  pelorus convert klt 2011_09_26_drive_0001_sync_KLT.mat drive.plr",
 )
 def klt(
@@ -109,8 +100,8 @@ def klt(
     target: Path = TARGET,
     twist_timing: Timing = typer.Option(Timing.MID, help="When a twist reading holds."),
 ) -> None:
-    """Convert a KITTI drive with KLT stereo tracks (.mat)."""
-    _write(matlab.klt(source, twist_timing.value_in_header), [], target)
+    """A KITTI drive with KLT stereo tracks (.mat)."""
+    write(matlab.klt(source, twist_timing.value_in_header), [], target)
 
 
 def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
@@ -131,15 +122,15 @@ def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @app.command(
+    rich_help_panel=OWN_DATA,
     epilog="Example:  pelorus convert csv --twists twists.csv --stereo stereo.csv "
     "--calibration camera.json --wheel wheel.csv mine.plr",
 )
 @_with_small_sensors
 def csv(
     target: Path = TARGET,
-    twists: Path = typer.Option(
-        ..., help="Columns t_s (or t_ns), vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps."
-    ),
+    twists: Path | None = TWISTS,
+    imu: Path | None = IMU,
     stereo: Path = typer.Option(
         ...,
         help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame.",
@@ -154,9 +145,9 @@ def csv(
         "noise, an object with some of pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, "
         "bias_velocity_sigma_mps, bias_gyro_sigma_radps.",
     ),
-    truth: Path | None = typer.Option(
-        None, help="Columns t_s (or t_ns), px_m, py_m, pz_m, qx, qy, qz, qw: body to world."
-    ),
+    truth: Path | None = TRUTH,
+    columns: list[str] = COLUMNS,
+    measured: str = MEASURED,
     extrinsic: Path | None = EXTRINSIC,
     lens: LensModel | None = LENS,
     fix: Fix = FIX,
@@ -165,18 +156,29 @@ def csv(
     ),
     **readings: list[Path],
 ) -> None:
-    """Convert your own data: CSV files with named columns in any order, and a JSON file."""
+    """CSV files: stereo tracks, and twists, a wheel speed alone or an IMU; your own columns."""
     recording, findings = csv_converter.convert(
-        csv_converter.Sources(twists, stereo, tuple(calibration), truth, extrinsic, lens),
+        csv_converter.Sources(
+            stereo=stereo,
+            twists=twists,
+            imu=imu,
+            calibration=tuple(calibration),
+            extrinsic=extrinsic,
+            lens=lens,
+            truth=truth,
+            measured=csv_converter.measured_of(measured),
+            columns=Columns.of(columns),
+        ),
         fix is Fix.AUTO,
         twist_timing.value_in_header if twist_timing else None,
         readings,
     )
-    _write(recording, findings, target)
+    write(recording, findings, target)
 
 
 @app.command(
     "imu-npz",
+    rich_help_panel=DATA_SETS,
     epilog="Example:  pelorus convert imu-npz tum_corridor1-60-seed0.npz corridor.plr --seed 3",
 )
 def imu_npz(
@@ -209,12 +211,12 @@ def imu_npz(
         "biases of accelerometer and gyro.",
     ),
 ) -> None:
-    """Convert a .npz file with the raw readings of an IMU, stereo tracks and the truth."""
+    """A .npz with the raw readings of an IMU, stereo tracks and the truth."""
     choices = imu_npz_converter.Choices(
         keep_ids, seed, pixel_sigma, imu_npz_converter.start_sigmas(start_sigmas)
     )
     recording, findings = imu_npz_converter.convert(source, choices)
-    _write(recording, findings, target)
+    write(recording, findings, target)
 
 
 @app.command(
@@ -247,26 +249,4 @@ def map_(
     out.print(
         f"{escape(str(target))}: {size} bytes, {len(sigma)} known landmarks, sigma "
         f"{min(sigma):.3g} to {max(sigma):.3g} m"
-    )
-
-
-def _verdict(finding: Finding) -> str:
-    if not finding.told:
-        return "[yellow]cannot tell[/]"
-    return "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
-
-
-def _write(recording: Recording, findings: list[Finding], target: Path) -> None:
-    """Say what was found, keep it in the recording as TEXT, and write the file."""
-    for finding in findings:
-        out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
-        out.print(f"    -> {escape(finding.action)}")
-    remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found]
-    size = replace(recording, remarks=[*recording.remarks, *remarks]).write(target)
-    tracks = recording.tracks
-    out.print(
-        f"{escape(str(target))}: {size} bytes, {recording.motion_words}, "
-        f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
-        f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
-        + (f", {len(recording.readings)} readings" if recording.readings else "")
     )

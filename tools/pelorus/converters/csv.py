@@ -1,51 +1,69 @@
 # SPDX-License-Identifier: MIT
 """A user's own data: CSV files with a row of column names, in any order, and a calibration.
 
-twists   t_s or t_ns, vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps
-stereo   t_s or t_ns, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
-truth    t_s or t_ns, px_m, py_m, pz_m, qx, qy, qz, qw: body to world (optional)
+twists   t_s (or t_ms, t_us, t_ns), vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, wz_radps
+imu      t_s, ax_mps2, ay_mps2, az_mps2, wx_radps, wy_radps, wz_radps, in place of twists
+stereo   t_s, id, uL_px, vL_px, uR_px, vR_px; the rows of one time are one frame
+truth    t_s, px_m, py_m, pz_m, qx, qy, qz, qw: body to world (optional); or a TUM or EuRoC file
 
-And those of small sensors: readings_csv.
+And those of small sensors: readings_csv. Columns with other names: columns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus.converters import readings_csv, twist_noise
+from pelorus import foreign, trajectory
+from pelorus.converters import readings_csv, streams
+from pelorus.converters.columns import Columns
+from pelorus.converters.streams import Readings, Seen, Streams, Twists
+from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
-from pelorus.faults.mend import mend
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Reading, TwistTiming
+from pelorus.inertial import Inertial
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import LensModel
-from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.table import Table
 from pelorus.tracks import Tracks
+from pelorus.trajectory import Trajectory
 
 ID_MAX = 2**32 - 1
 QUATERNION_NORM_TOLERANCE = 1e-2
+VELOCITIES = {
+    f"{kind}{axis}": f"{kind}{axis}_{unit}"
+    for kind, unit in (("v", "mps"), ("w", "radps"))
+    for axis in "xyz"
+}
+FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
+NAMES_ITS_COLUMNS = 0.5  # of the first row's cells: letters, where others have numbers
 
 
 @dataclass(frozen=True)
 class Sources:
-    """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them."""
+    """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them.
 
-    twists: Path
+    Twists or an IMU: one of them. `measured` are the velocities that the twists' file has.
+    """
+
+    twists: Path | None
     stereo: Path
     calibration: tuple[Path, ...]
     truth: Path | None = None
     extrinsic: Path | None = None
     lens: LensModel | None = None
+    imu: Path | None = None
+    measured: frozenset[str] = frozenset(VELOCITIES)
+    columns: Columns = field(default_factory=Columns)
 
 
 def convert(
@@ -58,71 +76,116 @@ def convert(
 
     `readings` are the files of small sensors, by name.
     """
-    recording = read(sources, readings or {})
+    found = read(sources, readings or {})
+    recording = streams.recording(found)
     if twist_timing is not None:
         recording = recording.with_header(twist_timing=twist_timing)
     if not fix:
         return recording, []
-    recording, findings = mend(recording)
-    recording, finding = twist_noise.suggest(recording)
-    return recording, [*findings, finding]
+    whole = isinstance(found.motion, Twists) and found.motion.is_whole
+    return streams.examined(recording, whole)
 
 
-def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Recording:
+def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Streams:
     """The files as they are."""
+    columns = sources.columns
     calibrated = rig_files.read(
         sources.calibration, sources.stereo.stem, sources.extrinsic, sources.lens
     )
-    twists = Table.read(sources.twists)
-    v = twists.numbers("vx_mps", "vy_mps", "vz_mps")
-    w = twists.numbers("wx_radps", "wy_radps", "wz_radps")
-    twist_t_ns = twists.ascending_times()
-    frame_t_ns, tracks = _stereo(sources.stereo)
-    if calibrated.rig is not None:
-        frame_t_ns = calibrated.rig.on_body_clock(frame_t_ns)
-        tracks = rectified(tracks, calibrated.rig, sources.stereo)
-    if frame_t_ns[-1] < twist_t_ns[0] or twist_t_ns[-1] < frame_t_ns[0]:
-        raise ForeignFileError(
-            sources.stereo,
-            f"spans {frame_t_ns[0]} to {frame_t_ns[-1]} ns, {sources.twists} "
-            f"{twist_t_ns[0]} to {twist_t_ns[-1]} ns: they do not overlap",
-        )
-    recording = Recording(
-        calibrated.header,
-        twist_t_ns,
-        v,
-        w,
-        frame_t_ns,
-        tracks,
-        readings=_readings(readings, sources, twist_t_ns),
+    motion = motion_of(sources.twists, sources.imu, sources.measured, columns)
+    frame_t_ns, tracks = _stereo(columns.read(sources.stereo, "stereo"))
+    found = Streams(
+        calibrated,
+        Seen(sources.stereo, frame_t_ns, tracks),
+        motion,
+        None if sources.truth is None else truth_of(sources.truth, columns),
+        _readings(readings, motion, columns),
     )
-    if sources.truth is None:
-        return recording
-    truth_t_ns, truth = _truth(sources.truth)
-    return recording.with_truth(truth_t_ns, truth)
-
-
-def _readings(
-    paths: Mapping[str, list[Path]], sources: Sources, twist_t_ns: Times
-) -> list[Reading]:
-    """Of all small sensors, from the first twist on: with it the filter begins."""
-    found: list[Reading] = []
-    files = [(sensor, path) for sensor in SMALL_SENSORS for path in paths.get(sensor.name, [])]
-    for sensor, path in files:
-        own = readings_csv.read(path, sensor)
-        first, last = own[0].t_ns, own[-1].t_ns
-        if last < twist_t_ns[0] or twist_t_ns[-1] < first:
-            raise ForeignFileError(
-                path,
-                f"spans {first} to {last} ns, {sources.twists} {twist_t_ns[0]} to "
-                f"{twist_t_ns[-1]} ns: they do not overlap",
-            )
-        found += [reading for reading in own if reading.t_ns >= twist_t_ns[0]]
+    columns.require_used()
     return found
 
 
-def _stereo(path: Path) -> tuple[Times, Tracks]:
-    table = Table.read(path)
+# --- motion ---------------------------------------------------------------------------------------
+
+
+def motion_of(
+    twists: Path | None, imu: Path | None, measured: frozenset[str], columns: Columns
+) -> Twists | Readings:
+    """Of the file that there is."""
+    if twists is not None and imu is None:
+        return _twists(twists, measured, columns)
+    if imu is not None and twists is None:
+        table = columns.read(imu, "imu")
+        a, w = table.numbers(*FORCES), table.numbers(*list(VELOCITIES.values())[3:])
+        return Readings(imu, Inertial(table.ascending_times(), a, w))
+    raise PelorusError(
+        f"{'--twists and --imu' if imu else 'neither --twists nor --imu'} given; one is due: "
+        "twists (wheels, odometry, a wheel speed alone) or the raw readings of an IMU"
+    )
+
+
+def measured_of(words: str) -> frozenset[str]:
+    """vx,wz and such, as --measured has them."""
+    found = [word.strip() for word in words.split(",")]
+    if not set(found) <= set(VELOCITIES) or not found:
+        raise PelorusError(
+            f"--measured {words}: some of {', '.join(VELOCITIES)} are due, parted by commas"
+        )
+    return frozenset(found)
+
+
+def _twists(path: Path, measured: frozenset[str], columns: Columns) -> Twists:
+    table = columns.read(path, "twists")
+    lacking = [
+        name for short, name in VELOCITIES.items() if short in measured and not table.has(name)
+    ]
+    if lacking and len(lacking) < len(measured):
+        there = [short for short, name in VELOCITIES.items() if table.has(name)]
+        raise ForeignFileError(
+            path,
+            f"lacks the column {', '.join(lacking)}",
+            due=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
+            f"{','.join(there)}. If they are called otherwise: --columns {_example(lacking[0])}",
+        )
+    table.require(*lacking)
+    numbers = [
+        table.numbers(name)[:, 0] if short in measured else np.zeros(table.count)
+        for short, name in VELOCITIES.items()
+    ]
+    whole = np.stack(numbers, axis=-1)
+    return Twists(path, table.ascending_times(), whole[:, :3], whole[:, 3:], measured)
+
+
+def _example(column: str) -> str:
+    name, _, unit = column.partition("_")
+    return f"{name}=COLUMN:{unit}"
+
+
+def _readings(
+    paths: Mapping[str, list[Path]], motion: Twists | Readings, columns: Columns
+) -> list[Reading]:
+    """Of all small sensors."""
+    found: list[Reading] = []
+    t_ns = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
+    files = [(sensor, path) for sensor in SMALL_SENSORS for path in paths.get(sensor.name, [])]
+    for sensor, path in files:
+        own = readings_csv.read(columns.read(path, sensor.name), sensor)
+        first, last = own[0].t_ns, own[-1].t_ns
+        if last < t_ns[0] or t_ns[-1] < first:
+            raise ForeignFileError(
+                path,
+                f"spans {first} to {last} ns, {motion.where} {t_ns[0]} to "
+                f"{t_ns[-1]} ns: they do not overlap",
+            )
+        found += own
+    return found
+
+
+# --- tracks and truth -----------------------------------------------------------------------------
+
+
+def _stereo(table: Table) -> tuple[Times, Tracks]:
+    path = table.path
     row_t_ns = table.times()
     frame_t_ns, frame = np.unique(row_t_ns, return_inverse=True)
     id = table.integers("id", ID_MAX)
@@ -142,21 +205,12 @@ def _stereo(path: Path) -> tuple[Times, Tracks]:
     return frame_t_ns, tracks
 
 
-def rectified(tracks: Tracks, rig: Rig, source: Path) -> Tracks:
-    """Of the pixels that the cameras took; without those that no ray of the lens reaches."""
-    pixels = rig.rectification().pixels(tracks.pixels)
-    good = np.isfinite(pixels).all(axis=1)
-    if not good.any():
-        raise ForeignFileError(
-            source,
-            f"no pixel is one of the lenses of {rig.path}",
-            due="pixels as the cameras took them are due, of that calibration's resolution",
-        )
-    return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
-
-
-def _truth(path: Path) -> tuple[Times, Poses]:
-    table = Table.read(path)
+def truth_of(path: Path, columns: Columns) -> Trajectory:
+    """A CSV with named columns, else a TUM file or EuRoC's."""
+    first = next((line for line in foreign.text(path).splitlines() if line.strip()), "")
+    if not _names_columns(first.split(",")):
+        return trajectory.read_stamped(path)
+    table = columns.read(path, "truth")
     t_ns = table.ascending_times()
     quaternions = table.numbers("qx", "qy", "qz", "qw")
     off = np.abs(np.linalg.norm(quaternions, axis=1) - 1)
@@ -166,6 +220,13 @@ def _truth(path: Path) -> tuple[Times, Poses]:
             "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
             at=f"row {int(off.argmax()) + 2}",
         )
-    return t_ns, Poses(
+    poses = Poses(
         Rotation.from_quat(quaternions).as_matrix(), table.numbers("px_m", "py_m", "pz_m")
     )
+    return Trajectory(t_ns, poses)
+
+
+def _names_columns(cells: Sequence[str]) -> bool:
+    """Whether the first row holds names; one behind a # is a comment of EuRoC's and TUM's files."""
+    words = [cell for cell in cells if cell.strip()[:1].isalpha()]
+    return not cells[0].startswith("#") and len(words) > NAMES_ITS_COLUMNS * len(cells)

@@ -9,8 +9,6 @@ position     px_m, py_m, pz_m in the world; sigma_m or sigma_px_m, ...; at_x_m, 
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from pelorus.foreign import ForeignFileError
@@ -36,9 +34,9 @@ def columns_of(sensor: SmallSensor) -> str:
     return f"Columns t_s (or t_ns), {numbers}{each}; {sigmas}{apart}{arm}; repeatable."
 
 
-def read(path: Path, sensor: SmallSensor) -> list[Reading]:
+def read(table: Table, sensor: SmallSensor) -> list[Reading]:
     """The file's rows."""
-    table = Table.read(path)
+    path = table.path
     t_ns = table.ascending_times()
     value, sigma = np.zeros((2, len(t_ns), 3))
     measured = ""

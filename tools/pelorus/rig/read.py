@@ -10,7 +10,7 @@ sensor.yaml     those of an EuRoC folder's two cameras and of its IMU
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pelorus import calibration, foreign
@@ -19,7 +19,7 @@ from pelorus.frames import Header
 from pelorus.named import Named
 from pelorus.rig import kalibr, opencv
 from pelorus.rig.lens import LensModel
-from pelorus.rig.rig import Rig
+from pelorus.rig.rig import ImuNoise, Rig
 
 KNOWN = (
     "Kalibr's camchain (cam0, cam1), its IMU file (gyroscope_noise_density), OpenCV's stereo "
@@ -33,6 +33,7 @@ class Calibrated:
 
     header: Header
     rig: Rig | None = None
+    imu: ImuNoise = field(default_factory=ImuNoise)
 
 
 def read(
@@ -51,7 +52,8 @@ def read(
     rig = read_rig(paths, lens)
     if extrinsic is not None:
         rig = rig.on_body(calibration.read_extrinsic(extrinsic))
-    return Calibrated(rig.header(rig.rectification(), name), None if rig.is_rectified else rig)
+    header = rig.header(rig.rectification(), name)
+    return Calibrated(header, None if rig.is_rectified else rig, rig.imu)
 
 
 def read_rig(paths: Sequence[Path], lens: LensModel | None = None) -> Rig:

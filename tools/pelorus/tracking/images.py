@@ -40,7 +40,7 @@ def pairs(left: Path, right: Path) -> list[Pair]:
     """By equal names, sorted; the files' endings may differ."""
     if left.resolve() == right.resolve():
         raise PelorusError(f"{left}: is given as the left and as the right folder; two are due")
-    lefts, rights = _pictures(left), _pictures(right)
+    lefts, rights = pictures(left), pictures(right)
     _require_partners(left, lefts, right, rights)
     _require_partners(right, rights, left, lefts)
     if len(lefts) < PAIRS_MIN:
@@ -58,7 +58,8 @@ def _in_order(names: dict[str, Path]) -> list[str]:
     return sorted(names)
 
 
-def _pictures(folder: Path) -> dict[str, Path]:
+def pictures(folder: Path) -> dict[str, Path]:
+    """By name, without its ending."""
     try:
         files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
     except OSError as error:
@@ -147,13 +148,27 @@ def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> N
         )
 
 
+def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> None:
+    """A picture must be as large as its calibration says: (width, height), 0 where it does not."""
+    if known[0] and (shape[1], shape[0]) != known:
+        raise ForeignFileError(
+            path,
+            f"the pictures have {_size(shape)} pixels",
+            due=f"{known[0]} x {known[1]} are due, for which the calibration was made",
+        )
+
+
 def _size(shape: tuple[int, ...]) -> str:
     return f"{shape[1]} x {shape[0]}"
 
 
 def gray(path: Path) -> Gray:
     """(rows, columns) of 8 bits; of 16 bits the upper eight."""
-    packed = foreign.content(path, IMAGE_BYTES_MAX)
+    return decoded(path, foreign.content(path, IMAGE_BYTES_MAX))
+
+
+def decoded(path: Path, packed: bytes) -> Gray:
+    """The same of the bytes of a picture's file; `path` is for those who read of an error."""
     try:
         parser = ImageFile.Parser()
         parser.feed(packed)

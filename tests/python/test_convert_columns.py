@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: MIT
+"""CSV files as users have them: other names and units, a wheel speed alone, an IMU, any truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from converted import SHORT, Run, messages_of
+from drives import PERFECT, clean
+from pelorus.frames import Header, Imu, Process, Reading, Stereo, Truth, Twist
+from pelorus.recording import Recording
+from pelorus.simulation.simulate import simulate
+from replay_drive import BIN, judged
+from scipy.spatial.transform import Rotation
+from test_convert_csv import csv_files, write_csv
+
+TODAY_NS = 1_763_822_000_123_456_789  # a double has no such nanoseconds
+
+
+def options_of(folder: Path, drive: Recording, *without: str) -> list[Any]:
+    """Of `convert csv`, without some of the files."""
+    words = csv_files(folder, drive)
+    pairs = zip(words[::2], words[1::2], strict=True)
+    return [word for name, path in pairs if name not in without for word in (name, path)]
+
+
+def test_columns_with_other_names_and_units_mean_what_the_mapping_says(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive, "--twists", "--truth", "--stereo")
+    v, w, tracks = drive.v_B_mps.T, drive.w_B_radps.T, drive.tracks
+    stamps = [f"{(TODAY_NS + t) // 10**6}.{(TODAY_NS + t) % 10**6:06d}" for t in drive.twist_t_ns]
+    twists = {
+        "stamp_ms": stamps,
+        "speed_kmh": (v[0] * 3.6).tolist(),
+        "left": (v[1] * 1e3).tolist(),
+        "up_mps": v[2].tolist(),
+        "roll_rate_degps": np.degrees(w[0]).tolist(),
+        "pitch_rate_dps": np.degrees(w[1]).tolist(),
+        "yaw rate": np.degrees(w[2]).tolist(),
+    }
+    stereo = {
+        "when": [str((TODAY_NS + t) // 1000) for t in drive.frame_t_ns[tracks.frame]],
+        "track": tracks.id.tolist(),
+        **dict(zip(("x1", "y1", "x2", "y2"), tracks.pixels.T.tolist(), strict=True)),
+    }
+    names = (
+        "t=stamp_ms,v=speed_kmh,vy=left:mmps,vz=up_mps,wx=roll_rate_degps,wy=pitch_rate_dps",
+        "w=yaw rate:deg/s,stereo.t=when:us,id=track,uL=x1,vL=y1,uR=x2,vR=y2",
+    )
+    target = tmp_path / "mine.plr"
+    outcome = pelorus(
+        *("convert", "csv", *options, target, "--fix", "none"),
+        *("--twists", write_csv(tmp_path / "odometry.csv", twists)),
+        *("--stereo", write_csv(tmp_path / "points.csv", stereo)),
+        *(word for mapping in names for word in ("--columns", mapping)),
+    )
+    assert outcome.status == 0, outcome.err
+    found = messages_of(target, Twist)
+    assert [m.t_ns for m in found] == [TODAY_NS + t for t in drive.twist_t_ns]
+    assert np.allclose([m.v_B_mps for m in found], drive.v_B_mps, rtol=1e-12)
+    assert np.allclose([m.w_B_radps for m in found], drive.w_B_radps, rtol=1e-12)
+    frames = messages_of(target, Stereo)
+    assert [m.t_ns for m in frames] == [(TODAY_NS + t) // 1000 * 1000 for t in drive.frame_t_ns]
+    pixels = np.concatenate([m.pixels for m in frames])
+    assert np.array_equal(pixels, tracks.pixels.astype(np.float32))
+
+
+def test_an_imu_in_place_of_twists_with_a_wheel_beside_it(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive, "--twists")
+    times = drive.twist_t_ns.tolist()
+    names = ("ax_mps2", "ay_mps2", "wx_radps", "wy_radps", "wz_radps")
+    imu = {name: [k + 0.01 * j for j in range(len(times))] for k, name in enumerate(names)}
+    imu |= {"t_ns": times, "up_g": [1.0] * len(times)}
+    wheel = {"t_ns": times, "speed": [36.0] * len(times), "sigma_mps": [0.1] * len(times)}
+    target = tmp_path / "mine.plr"
+    outcome = pelorus(
+        *("convert", "csv", *options, target),
+        *("--imu", write_csv(tmp_path / "imu.csv", imu)),
+        *("--wheel", write_csv(tmp_path / "wheel.csv", wheel)),
+        *("--columns", "az=up_g,wheel.v=speed:km/h"),
+    )
+    assert outcome.status == 0, outcome.err
+    assert messages_of(target, Header)[0].process is Process.IMU
+    assert messages_of(target, Twist) == []
+    found = messages_of(target, Imu)
+    a = np.concatenate([m.a_B_mps2 for m in found])
+    assert np.allclose(a, np.stack((imu["ax_mps2"], imu["ay_mps2"], [9.80665] * len(times)), -1))
+    w = np.concatenate([m.w_B_radps for m in found])
+    assert np.allclose(w[:, 2], imu["wz_radps"])
+    readings = messages_of(target, Reading)
+    assert readings[0].value[0] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("form", ["tum", "euroc", "euroc-poses"])
+def test_the_truth_may_be_a_file_of_tum_or_euroc(tmp_path: Path, pelorus: Run, form: str) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive, "--truth")
+    path, rows = tmp_path / "truth", []
+    for t, R, p in zip(drive.truth_t_ns.tolist(), *drive.truth, strict=True):
+        x, y, z, w = Rotation.from_matrix(R).as_quat()
+        if form == "tum":
+            rows.append(f"{t / 1e9:.9f} {p[0]} {p[1]} {p[2]} {x} {y} {z} {w}")
+        else:
+            more = ",0" * 9 if form == "euroc" else ""
+            rows.append(f"{t + 10**18},{p[0]},{p[1]},{p[2]},{w},{x},{y},{z}{more}")
+    path.write_text("# a comment\n" + "\n".join(rows) + "\n")
+    if form != "tum":  # its times are today's
+        for name in ("twists.csv", "stereo.csv"):
+            _on_todays_clock(tmp_path / name)
+    target = tmp_path / "mine.plr"
+    outcome = pelorus("convert", "csv", *options, "--truth", path, target)
+    assert outcome.status == 0, outcome.err
+    found = messages_of(target, Truth)
+    assert len(found) == len(drive.truth_t_ns)
+    assert np.allclose([m.R_WB for m in found], drive.truth.R)
+    assert np.allclose([m.p_WB_m for m in found], drive.truth.p)
+
+
+def _on_todays_clock(path: Path) -> None:
+    names, *rows = path.read_text().splitlines()
+    at = names.split(",").index("t_ns")
+    cells = [row.split(",") for row in rows]
+    shifted = [[*row[:at], str(int(row[at]) + 10**18), *row[at + 1 :]] for row in cells]
+    path.write_text("\n".join([names, *(",".join(row) for row in shifted), ""]))
+
+
+def test_frames_between_two_true_poses_get_one_between_them(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive)
+    path = tmp_path / "truth.csv"
+    names, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([names, *rows[::2], ""]))
+    target = tmp_path / "mine.plr"
+    assert pelorus("convert", "csv", *options, target).status == 0
+    found = messages_of(target, Truth)
+    assert [m.t_ns for m in found] == drive.truth_t_ns.tolist()
+    assert np.abs(np.array([m.p_WB_m for m in found]) - drive.truth.p).max() < 0.02
+    path.write_text("\n".join([names, *rows[::8], ""]))  # 0.8 s: too far apart to make one up
+    assert pelorus("convert", "csv", *options, target).status == 0
+    assert len(messages_of(target, Truth)) == len(rows[::8])
+
+
+def test_a_wheel_speed_alone_and_pictures_find_the_way(tmp_path: Path, pelorus: Run) -> None:
+    if not (BIN / "pelorus-replay").exists():
+        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
+    drive = simulate(PERFECT).recording
+    options = options_of(tmp_path, drive, "--twists")
+    speed = {"t_ns": drive.twist_t_ns.tolist(), "speed_mps": drive.v_B_mps[:, 0].tolist()}
+    target = tmp_path / "mine.plr"
+    outcome = pelorus(
+        *("convert", "csv", *options, target, "--columns", "v=speed_mps", "--measured", "vx"),
+        *("--twists", write_csv(tmp_path / "speed.csv", speed)),
+    )
+    assert outcome.status == 0, outcome.err
+    noise = messages_of(target, Header)[0].noise
+    assert noise.velocity_sigma_x_mps < 0 < noise.velocity_sigma_y_mps
+    assert noise.gyro_sigma_x_radps == noise.gyro_sigma_z_radps == 0.5
+    alone = judged(target, "--mode", "dead_reckoning")["err0_m"]
+    together = judged(target, "--pixel-sigma", "0.5")["err0_m"]
+    assert alone > 5
+    assert together < 0.05 * alone
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--columns", "v=vx_mps,q=x"), "--columns q=x: NAME=COLUMN is due, such as v=speed_mps"),
+        (("--columns", "v"), "--columns v: NAME=COLUMN is due"),
+        (("--columns", "v=pace"), "in which unit is pace? v=pace:UNIT is due, with mps or m/s or"),
+        (("--columns", "t=stamp:min"), "t=stamp:UNIT is due, with ns or us or ms or s"),
+        (("--columns", "v=pace_mps"), "no file has the column pace_mps; there are: "),
+        (("--columns", "vy=vx_mps"), "has the column vy_mps, and vx_mps is to be called so"),
+        (("--measured", "vx,yaw"), "--measured vx,yaw: some of vx, vy, vz, wx, wy, wz are due"),
+        (("--imu", "imu.csv"), "--twists and --imu given; one is due"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused_with_what_would_be_right(
+    tmp_path: Path, pelorus: Run, words: tuple[str, str], said: str
+) -> None:
+    outcome = pelorus(
+        "convert", "csv", *csv_files(tmp_path, clean(**SHORT)), *words, tmp_path / "out.plr"
+    )
+    assert outcome.status == 1
+    assert said in outcome.err
+    assert not list(tmp_path.glob("out*"))
+
+
+def test_velocities_that_are_not_there_are_named_with_what_to_do(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive, "--twists")
+    few = {"t_ns": drive.twist_t_ns.tolist(), "vx_mps": [1] * 61, "wz_radps": [0] * 61}
+    outcome = pelorus(
+        *("convert", "csv", *options, tmp_path / "out.plr"),
+        *("--twists", write_csv(tmp_path / "few.csv", few)),
+    )
+    assert outcome.status == 1
+    assert "lacks the column vy_mps, vz_mps, wx_radps, wy_radps; there are: " in outcome.err
+    assert "--measured vx,wz. If they are called otherwise: --columns vy=COLUMN:mps" in outcome.err
+
+
+def test_the_first_screen_of_convert_tells_whose_data_are_for_which_command(pelorus: Run) -> None:
+    said = pelorus("convert", "--help").out
+    own, known = said.index("Your own data"), said.index("Files of known data sets")
+    assert own < said.index("euroc") < known < said.index("starry-night")
+    assert own < said.index(" csv ") < known

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: MIT
+"""Folders like EuRoC's, rendered through known lenses: what went in must come out."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from converted import Run, messages_of
+from pelorus import se3
+from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist
+from pelorus.se3 import Poses
+from pelorus.tracks import triangulate
+from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene, write_picture
+from rigs import IMU_NOISE, camchain, matrix, write_yaml
+from scipy.spatial.transform import Rotation
+
+IMU_HZ = 200
+IMU_OF_BODY = Poses(Rotation.from_rotvec([0.0, 0.0, 0.3]).as_matrix(), np.array([0.1, 0.2, 0.3]))
+
+
+def sensor(T_BS: Poses, **more: Any) -> dict[str, Any]:
+    whole = np.array(matrix(T_BS)).ravel().tolist()
+    return {"T_BS": {"cols": 4, "rows": 4, "data": whole}, **more}
+
+
+def write_folder(top: Path, T_BI: Poses | None = None) -> Path:
+    """`T_BI`: where the IMU sits on the folder's body; its axes unless told otherwise."""
+    scene = Scene()
+    T_BI = T_BI or Poses(np.eye(3), np.zeros(3))
+    cameras = scene.cameras
+    on_imu = (cameras.T_LB, se3.compose(cameras.T_RL, cameras.T_LB))
+    for k, intrinsics in enumerate((cameras.left, cameras.right)):
+        folder = top / "mav0" / f"cam{k}"
+        for frame, t_ns in enumerate(scene.t_ns):
+            write_picture(folder / "data" / f"{t_ns}.png", scene.pair(frame)[k])
+        listed = "".join(f"{t},{t}.png\n" for t in scene.t_ns)
+        (folder / "data.csv").write_text("#timestamp [ns],filename\n" + listed)
+        content = sensor(
+            se3.compose(T_BI, se3.inverse(on_imu[k])),
+            camera_model="pinhole",
+            intrinsics=list(intrinsics),
+            distortion_model="radial-tangential",
+            distortion_coefficients=list(cameras.coefficients),
+            resolution=[WIDTH, HEIGHT],
+        )
+        write_yaml(folder / "sensor.yaml", content)
+    write_imu(top / "mav0" / "imu0", T_BI)
+    write_truth(top / "mav0" / "state_groundtruth_estimate0", T_BI)
+    return top
+
+
+def imu_times() -> list[int]:
+    return [BEGIN_NS - 10**8 + k * 10**9 // IMU_HZ for k in range(IMU_HZ)]
+
+
+def write_imu(folder: Path, T_BI: Poses) -> None:
+    folder.mkdir(parents=True)
+    lines = [f"{t},0.1,0.2,{k},4.0,5.0,9.5\n" for k, t in enumerate(imu_times())]
+    names = "#timestamp [ns],w_RS_S_x [rad s^-1],w y,w z,a_RS_S_x [m s^-2],a y,a z\n"
+    (folder / "data.csv").write_text(names + "".join(lines))
+    write_yaml(folder / "sensor.yaml", sensor(T_BI, sensor_type="imu", rate_hz=200, **IMU_NOISE))
+
+
+def write_truth(folder: Path, T_BI: Poses) -> None:
+    """Of the folder's body, between the frames: 30 ms before and behind each."""
+    folder.mkdir(parents=True)
+    of_imu = Scene().body()
+    T_IB = se3.inverse(T_BI)
+    lines = []
+    for shift_s in (-0.03, 0.03):
+        moved = Poses(of_imu.R, of_imu.p + SPEED_MPS * shift_s * np.eye(3)[2])
+        R, p = se3.compose(moved, T_IB)
+        for k, t in enumerate(Scene().t_ns):
+            x, y, z, w = Rotation.from_matrix(R[k]).as_quat()
+            row = [*p[k], w, x, y, z, *[0.0] * 9]
+            lines.append(f"{t + round(shift_s * 1e9)},{','.join(map(repr, map(float, row)))}\n")
+    names = "#timestamp, p_RS_R_x [m], and so on\n"
+    (folder / "data.csv").write_text(names + "".join(sorted(lines)))
+    write_yaml(folder / "sensor.yaml", sensor(Poses(np.eye(3), np.zeros(3))))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, once: Callable[..., Path]) -> Path:
+    own = tmp_path / "V9_01"
+    shutil.copytree(once("euroc", write_folder), own)
+    return own
+
+
+def assert_on_surfaces(target: Path) -> None:
+    """Every track's point, brought to the world by the truth, lies on wall or board."""
+    header, stereos = messages_of(target, Header)[0], messages_of(target, Stereo)
+    truth = {m.t_ns: m for m in messages_of(target, Truth)}
+    T_BC = se3.inverse(Poses(header.R_CB, header.t_CB_m))
+    off = []
+    for frame in stereos:
+        pose = truth[frame.t_ns]
+        points = triangulate(header.camera, frame.pixels.astype(np.float64))
+        p_W = se3.apply(se3.compose(Poses(pose.R_WB, pose.p_WB_m), T_BC), points)
+        off.append(Scene().off_surface(p_W))
+    off_m = np.concatenate(off)
+    assert len(off_m) > 150
+    assert np.median(off_m) < 0.08
+    assert (off_m < 0.5).mean() > 0.95
+
+
+def test_a_folder_of_pictures_arrives_as_tracks_of_a_rectified_pair_with_imu_and_truth(
+    folder: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    target = tmp_path / "out.plr"
+    outcome = pelorus("convert", "euroc", folder, target)
+    assert outcome.status == 0, outcome.err
+    header = messages_of(target, Header)[0]
+    assert header.process is Process.IMU
+    assert header.name == "V9_01"
+    assert (header.image_width_px, header.image_height_px) == (WIDTH, HEIGHT)
+    assert header.noise.gyro_noise == IMU_NOISE["gyroscope_noise_density"]
+    assert header.noise.accel_walk == IMU_NOISE["accelerometer_random_walk"]
+    assert [m.t_ns for m in messages_of(target, Stereo)] == Scene().t_ns
+    imu = messages_of(target, Imu)
+    a = np.concatenate([m.a_B_mps2 for m in imu])
+    w = np.concatenate([m.w_B_radps for m in imu])
+    assert np.allclose(a, [4.0, 5.0, 9.5])
+    assert np.allclose(w[:, 2], np.arange(IMU_HZ))
+    assert imu[0].t_ns == imu_times()[0]
+    assert_on_surfaces(target)
+
+
+def test_the_recordings_body_is_the_imu_wherever_it_sits_on_the_folders(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    target = tmp_path / "out.plr"
+    write_folder(tmp_path / "x", IMU_OF_BODY)
+    assert pelorus("convert", "euroc", tmp_path / "x" / "mav0", target).status == 0
+    header = messages_of(target, Header)[0]
+    camera = np.linalg.norm(header.t_CB_m)
+    assert camera == pytest.approx(np.linalg.norm(Scene().cameras.T_LB.p), abs=1e-6)
+    assert_on_surfaces(target)
+
+
+def test_wheels_and_a_camchain_in_place_of_the_folders_imu_and_sensor_yaml(
+    folder: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    shutil.rmtree(folder / "mav0" / "imu0")
+    for k in range(2):
+        (folder / "mav0" / f"cam{k}" / "sensor.yaml").unlink()
+    cameras = write_yaml(tmp_path / "c.yaml", camchain(Scene().cameras, (WIDTH, HEIGHT)))
+    rows = [f"{t // 10**6}.{t % 10**6:06d},7.2\n" for t in Scene().t_ns]
+    (tmp_path / "wheel.csv").write_text("stamp_ms,speed_kmh\n" + "".join(rows))
+    target = tmp_path / "out.plr"
+    words = ("--columns", "t=stamp_ms,v=speed_kmh", "--measured", "vx")
+    outcome = pelorus(
+        *("convert", "euroc", folder, target, "--calibration", cameras),
+        *("--twists", tmp_path / "wheel.csv", *words),
+    )
+    assert outcome.status == 0, outcome.err
+    header, twists = messages_of(target, Header)[0], messages_of(target, Twist)
+    assert header.process is Process.TWIST
+    assert [m.t_ns for m in twists] == Scene().t_ns
+    assert np.allclose([m.v_B_mps for m in twists], [SPEED_MPS, 0, 0])
+    assert header.noise.velocity_sigma_x_mps < 0
+    assert header.noise.velocity_sigma_y_mps == header.noise.velocity_sigma_z_mps == 0.2
+    assert header.noise.gyro_sigma_z_radps == 0.5
+    assert_on_surfaces(target)
+
+
+def test_pictures_without_a_partner_are_left_out_if_they_are_few(
+    folder: Path, tmp_path: Path, pelorus: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("data.csv", f"data/{Scene().t_ns[2]}.png"):
+        (folder / "mav0" / "cam1" / name).unlink()
+    target = tmp_path / "out.plr"
+    monkeypatch.setattr("pelorus.converters.euroc.ALONE_MAX", 0.3)
+    assert pelorus("convert", "euroc", folder, target).status == 0
+    assert len(messages_of(target, Stereo)) == FRAMES - 1
+    assert "1 pictures have no partner" in pelorus("info", target).out
+    monkeypatch.undo()
+    outcome = pelorus("convert", "euroc", folder, tmp_path / "no.plr")
+    assert outcome.status == 1
+    assert "5 pairs have equal times, 1 pictures are alone" in outcome.err
+
+
+def _small(path: Path) -> None:
+    for picture in path.glob("mav0/cam*/data/*.png"):
+        cv2.imwrite(str(picture), np.zeros((HEIGHT // 2, WIDTH // 2), np.uint8))
+
+
+def _later(path: Path) -> None:
+    imu = path / "mav0/imu0/data.csv"
+    imu.write_text(imu.read_text().replace("14036", "15036"))
+
+
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        (lambda p: shutil.rmtree(p / "mav0/cam1"), "has no folders cam0 and cam1, nor mav0"),
+        (lambda p: (p / "mav0/cam1/sensor.yaml").unlink(), "cam1/sensor.yaml: there is no such"),
+        (lambda p: (p / "mav0/imu0/data.csv").unlink(), "--twists FILE, or --imu FILE is due"),
+        (
+            lambda p: (p / f"mav0/cam0/data/{BEGIN_NS}.png").unlink(),
+            f"cam0/data.csv: line 2: names {{folder}}/mav0/cam0/data/{BEGIN_NS}.png, which is not",
+        ),
+        (lambda p: (p / "mav0/cam0/data.csv").write_text("a,b\n"), "a time in ns, a file are due"),
+        (lambda p: (p / "mav0/imu0/data.csv").write_text("1,2,3\n"), "has 3 numbers; 7 a row are"),
+        (lambda p: (p / "mav0/imu0/data.csv").write_bytes(b""), "imu0/data.csv: the file is empty"),
+        (_small, f"188 x 120 pixels; {WIDTH} x {HEIGHT} are due, for which the calibration"),
+        (_later, "they do not overlap"),
+    ],
+)
+def test_a_folder_that_lacks_something_is_told_what_and_where(
+    folder: Path, tmp_path: Path, pelorus: Run, harm: Callable[[Path], object], said: str
+) -> None:
+    harm(folder)
+    outcome = pelorus("convert", "euroc", folder, tmp_path / "out.plr")
+    assert outcome.status == 1
+    assert said.format(folder=folder) in outcome.err
+    assert not list(tmp_path.glob("out*"))

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""What every converter says of the recording that it made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from rich.markup import escape
+
+from pelorus.console import out
+from pelorus.faults.finding import Finding
+from pelorus.frames import TEXT_BYTES_MAX, Text
+from pelorus.recording import Recording
+
+
+def _verdict(finding: Finding) -> str:
+    if not finding.told:
+        return "[yellow]cannot tell[/]"
+    return "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
+
+
+def write(recording: Recording, findings: list[Finding], target: Path) -> None:
+    """Say what was found, keep it in the recording as TEXT, and write the file."""
+    for finding in findings:
+        out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
+        out.print(f"    -> {escape(finding.action)}")
+    remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found]
+    size = replace(recording, remarks=[*recording.remarks, *remarks]).write(target)
+    tracks = recording.tracks
+    out.print(
+        f"{escape(str(target))}: {size} bytes, {recording.motion_words}, "
+        f"{len(recording.frame_t_ns)} frames with {len(tracks)} observations, "
+        f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
+        + (f", {len(recording.readings)} readings" if recording.readings else "")
+    )

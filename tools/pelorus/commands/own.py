@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""Options that the importers of a user's own data share."""
+
+from __future__ import annotations
+
+import typer
+
+from pelorus.commands.choices import Fix
+
+TARGET = typer.Argument(
+    ..., metavar="OUT.plr", help="The recording to write; as OUT.plr.zst it is packed."
+)
+FIX = typer.Option(
+    Fix.AUTO,
+    help="auto: find stale tracks, turned axes and a malformed lever from the data alone, say so "
+    "and mend them; none: leave the data as they are.",
+)
+CALIBRATION = typer.Option(
+    [],
+    metavar="FILE",
+    help="Kalibr's camchain YAML (and a second time, its IMU file), or OpenCV's stereo YAML (one "
+    "file or two).",
+)
+TWISTS = typer.Option(
+    None,
+    help="Columns t_s (or t_ms, t_us, t_ns), vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, "
+    "wz_radps, in body axes; some of them alone: --measured.",
+)
+IMU = typer.Option(
+    None,
+    help="In place of twists, an IMU's raw readings: columns t_s, ax_mps2, ay_mps2, az_mps2 (9.81 "
+    "upwards at rest), wx_radps, wy_radps, wz_radps. The body is the IMU then.",
+)
+TRUTH = typer.Option(
+    None,
+    help="Columns t_s, px_m, py_m, pz_m, qx, qy, qz, qw: body to world; or a file of TUM "
+    "(t x y z qx qy qz qw) or EuRoC (ns, position, quaternion w x y z).",
+)
+COLUMNS = typer.Option(
+    [],
+    metavar="NAME=COLUMN,...",
+    help="Columns that are called otherwise, with the unit behind the last underscore or a colon: "
+    "v=speed_kmh,w=yaw_rate:deg/s,t=stamp_ms; for one file: stereo.t=stamp_ms.",
+)
+MEASURED = typer.Option(
+    "vx,vy,vz,wx,wy,wz",
+    metavar="NAMES",
+    help="Which velocities the twists' file has: vx for a wheel speed alone, vx,wz for wheels that "
+    "tell a turn. The others are taken as 0 and little believed.",
+)
+EXTRINSIC = typer.Option(
+    None,
+    metavar="FILE",
+    help="JSON with R_CB, as three rows of three, and t_CB_m (body to left camera), or R_BC and "
+    "t_BC_m, where the calibration does not say it or is of another body.",
+)
+LENS = typer.Option(
+    None, help="Of an OpenCV calibration whose four numbers may be of a fisheye or not."
+)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""How the columns of a user's CSV are called, and their units: `--columns v=speed_kmh,t=stamp_ms`.
+
+NAME=COLUMN gives a column of the file the project's name; the unit is what stands behind its last
+underscore, or behind a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file alone. A number
+without a unit is refused, not guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import pi
+from pathlib import Path
+
+from pelorus.errors import PelorusError
+from pelorus.table import TIME_UNITS, Table
+
+VELOCITY = {"mps": 1.0, "m/s": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "km/h": 1 / 3.6, "mmps": 1e-3}
+RATE = {"radps": 1.0, "rad/s": 1.0, "degps": pi / 180, "dps": pi / 180, "deg/s": pi / 180}
+FORCE = {"mps2": 1.0, "m/s2": 1.0, "m/s^2": 1.0, "g": 9.80665}
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+NUMBER = {"": 1.0}  # a unit is not needed
+
+# What --columns may name, the column that the converters ask for, and units with their factors.
+NAMES: dict[str, tuple[str, Mapping[str, float]]] = {
+    "t": ("t", TIME_UNITS),
+    **{f"v{a}": (f"v{a}_mps", VELOCITY) for a in "xyz"},
+    "v": ("vx_mps", VELOCITY),
+    **{f"w{a}": (f"w{a}_radps", RATE) for a in "xyz"},
+    "w": ("wz_radps", RATE),
+    **{f"a{a}": (f"a{a}_mps2", FORCE) for a in "xyz"},
+    **{f"p{a}": (f"p{a}_m", LENGTH) for a in "xyz"},
+    **{f"q{a}": (f"q{a}", NUMBER) for a in "xyzw"},
+    "id": ("id", NUMBER),
+    **{f"{axis}{side}": (f"{axis}{side}_px", NUMBER) for side in "LR" for axis in "uv"},
+}
+
+
+@dataclass
+class Column:
+    """One NAME=COLUMN."""
+
+    words: str
+    file: str  # for this file alone; empty: for all
+    target: str
+    column: str
+    factor: float
+    used: bool = False
+
+
+@dataclass(frozen=True)
+class Columns:
+    """All of them; `read` is how the converters read a CSV file."""
+
+    given: list[Column] = field(default_factory=list)
+    seen: dict[Path, list[str]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, words: list[str]) -> Columns:
+        """Of the options' words."""
+        return cls([_column(part) for word in words for part in word.split(",") if part.strip()])
+
+    def read(self, path: Path, file: str) -> Table:
+        """The file's columns under the project's names; `file` is its option's name."""
+        table = Table.read(path)
+        self.seen[path] = table.names
+        for one in self.given:
+            if one.file in ("", file) and table.has(one.column):
+                table.rename(one.column, one.target, one.factor)
+                one.used = True
+        return table
+
+    def require_used(self) -> None:
+        """Refuse a name of which no file has the column: it is a typing error."""
+        for one in self.given:
+            if not one.used:
+                there = "; ".join(f"{p}: {', '.join(names)}" for p, names in self.seen.items())
+                raise PelorusError(
+                    f"--columns {one.words}: no file has the column {one.column}; there are: "
+                    f"{there}"
+                )
+
+
+def _column(words: str) -> Column:
+    name, equals, rest = words.strip().partition("=")
+    file, _, short = name.rpartition(".")
+    column, colon, unit = rest.partition(":")
+    if not equals or not column or short not in NAMES:
+        raise PelorusError(
+            f"--columns {words}: NAME=COLUMN is due, such as v=speed_mps,t=stamp_ms; names are "
+            f"{', '.join(NAMES)}, also for one file: wheel.t=stamp_ms"
+        )
+    target, units = NAMES[short]
+    unit = unit if colon else column.rpartition("_")[2]
+    if units is NUMBER:
+        return Column(words, file, target, column, 1.0)
+    if unit not in units:
+        raise PelorusError(
+            f"--columns {words}: in which unit is {column}? {short}={column}:UNIT is due, with "
+            f"{' or '.join(units)}"
+        )
+    if units is TIME_UNITS:
+        return Column(words, file, f"t_{unit}", column, 1.0)
+    return Column(words, file, target, column, units[unit])

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: MIT
+"""What somebody's own data are, whatever their format: streams with times, and a calibration.
+
+Each importer reads one format into Streams; `recording` makes a recording of them: pictures are
+rectified and tracked, raw tracks rectified, frames brought to the body's clock, the truth to the
+frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from pelorus.console import progress
+from pelorus.converters import twist_noise
+from pelorus.errors import PelorusError
+from pelorus.faults import stale
+from pelorus.faults.finding import Finding
+from pelorus.faults.mend import mend
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import Header, Noise, Process, Reading, Text
+from pelorus.inertial import NO_READINGS, Inertial
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.recording import Recording
+from pelorus.rig.read import Calibrated
+from pelorus.rig.rectification import Gray, Rectification
+from pelorus.se3 import Poses
+from pelorus.tracking.images import require_size
+from pelorus.tracking.settings import Settings
+from pelorus.tracking.tracker import track
+from pelorus.tracks import Tracks
+from pelorus.trajectory import Trajectory
+
+TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up for a frame
+BLIND_VELOCITY_MPS = (
+    0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
+)
+BLIND_GYRO_RADPS = 0.5  # about one: the pictures find the rotation
+
+
+@dataclass(frozen=True)
+class Twists:
+    """Velocities in body axes; zeros where `measured` says that nobody measured them."""
+
+    where: Path
+    t_ns: Times
+    v_B_mps: Floats
+    w_B_radps: Floats
+    measured: frozenset[str] = frozenset(("vx", "vy", "vz", "wx", "wy", "wz"))
+
+    @property
+    def is_whole(self) -> bool:
+        return len(self.measured) == 6
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Those of an IMU."""
+
+    where: Path
+    inertial: Inertial
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Stereo pairs as the left and the right camera took them; `read` gives them in order."""
+
+    where: tuple[Path, Path]
+    t_ns: Times
+    read: Callable[[], Iterator[tuple[Gray, Gray]]]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Tracks, in the pixels of the calibration's cameras."""
+
+    where: Path
+    t_ns: Times
+    tracks: Tracks
+
+
+@dataclass(frozen=True)
+class Streams:
+    """Twists or an IMU, and what the cameras saw."""
+
+    calibrated: Calibrated
+    frames: Pictures | Seen
+    motion: Twists | Readings
+    truth: Trajectory | None = None
+    small: list[Reading] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+
+def recording(streams: Streams, settings: Settings | None = None) -> Recording:
+    """`settings` are those of the tracker."""
+    calibrated, frames = streams.calibrated, streams.frames
+    t_ns = frames.t_ns
+    if calibrated.rig is not None:
+        t_ns = calibrated.rig.on_body_clock(t_ns)
+    _require_overlap(frames, t_ns, streams.motion)
+    if isinstance(frames, Pictures):
+        header, tracks = _tracked(frames, calibrated, settings or Settings())
+    else:
+        header, tracks = calibrated.header, frames.tracks
+        if calibrated.rig is not None:
+            tracks = _rectified(tracks, calibrated.rig.rectification(), frames.where)
+    made = _with_motion(header, streams, t_ns, tracks)
+    if streams.truth is None:
+        return made
+    return made.with_truth(*_at_frames(streams.truth, t_ns))
+
+
+def examined(made: Recording, whole_twists: bool = True) -> tuple[Recording, list[Finding]]:
+    """Mended as far as its own data tell, and the twists' noise measured.
+
+    Without all six velocities only the tracks can be judged, without twists nothing.
+    """
+    if not len(made.twist_t_ns):
+        return made, []
+    if not whole_twists:
+        made, finding = stale.mend(made)
+        return made, [finding]
+    made, findings = mend(made)
+    made, finding = twist_noise.suggest(made)
+    return made, [*findings, finding]
+
+
+# --- motion ---------------------------------------------------------------------------------------
+
+
+def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
+    remarks = [Text(words) for words in streams.remarks]
+    motion = streams.motion
+    if isinstance(motion, Twists):
+        header = replace(header, noise=_with_blind_axes(header.noise, motion.measured))
+        moved = (motion.t_ns, motion.v_B_mps, motion.w_B_radps)
+        inertial, first_ns = NO_READINGS, int(motion.t_ns[0])
+    else:
+        told = {name: s for name, s in vars(streams.calibrated.imu).items() if s >= 0}
+        header = replace(header, process=Process.IMU, noise=replace(header.noise, **told))
+        moved = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
+        inertial = motion.inertial
+        first_ns = int(inertial.t_ns[0])
+    # with its first twist or reading the filter begins
+    small = [reading for reading in streams.small if reading.t_ns >= first_ns]
+    return Recording(
+        header, *moved, t_ns, tracks, readings=small, remarks=remarks, inertial=inertial
+    )
+
+
+def _with_blind_axes(noise: Noise, measured: frozenset[str]) -> Noise:
+    """Sigmas for what nobody measured, unless the calibration tells some."""
+    given = {
+        **{f"velocity_sigma_{a}_mps": BLIND_VELOCITY_MPS for a in "xyz" if f"v{a}" not in measured},
+        **{f"gyro_sigma_{a}_radps": BLIND_GYRO_RADPS for a in "xyz" if f"w{a}" not in measured},
+    }
+    told = vars(noise)
+    return replace(noise, **{name: s for name, s in given.items() if told[name] <= 0})
+
+
+def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
+    own = motion.t_ns if isinstance(motion, Twists) else motion.inertial.t_ns
+    if t_ns[-1] < own[0] or own[-1] < t_ns[0]:
+        where = frames.where if isinstance(frames, Seen) else frames.where[0]
+        raise ForeignFileError(
+            where,
+            f"spans {t_ns[0]} to {t_ns[-1]} ns, {motion.where} {own[0]} to {own[-1]} ns: "
+            "they do not overlap",
+        )
+
+
+# --- frames ---------------------------------------------------------------------------------------
+
+
+def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
+    """Of the pixels that the cameras took; without those that no ray of the lens reaches."""
+    pixels = rectification.pixels(tracks.pixels)
+    good = np.isfinite(pixels).all(axis=1)
+    if not good.any():
+        raise ForeignFileError(
+            source,
+            "no pixel is one of the calibration's lenses",
+            due="pixels as the cameras took them are due, of the calibration's resolution",
+        )
+    return Tracks(tracks.frame_count, tracks.frame[good], tracks.id[good], pixels[good])
+
+
+def _tracked(
+    pictures: Pictures, calibrated: Calibrated, settings: Settings
+) -> tuple[Header, Tracks]:
+    """The HEADER of the rectified pictures, and the tracks in them."""
+    pairs = pictures.read()
+    first = next(pairs)
+    height, width = first[0].shape
+    header, rig = calibrated.header, calibrated.rig
+    known = (rig.left.width_px, rig.left.height_px) if rig else _size(header)
+    require_size(pictures.where[0], first[0].shape, known)
+    show = None
+    if rig is not None:
+        whole = replace(
+            rig, left=rig.left.sized(width, height), right=rig.right.sized(width, height)
+        )
+        rectification = whole.rectification()
+        header, show = whole.header(rectification, header.name), rectification.pictures
+    header = replace(header, image_width_px=width, image_height_px=height)
+
+    def shown() -> Iterator[tuple[Gray, Gray]]:
+        yield first if show is None else show(*first)
+        for pair in pairs:
+            yield pair if show is None else show(*pair)
+
+    return header, track(
+        progress(shown(), "tracking", len(pictures.t_ns)), pictures.where, settings
+    )
+
+
+def _size(header: Header) -> tuple[int, int]:
+    return header.image_width_px, header.image_height_px
+
+
+# --- truth ----------------------------------------------------------------------------------------
+
+
+def _at_frames(truth: Trajectory, frame_t_ns: Times) -> tuple[Times, Poses]:
+    """The truth, and between its poses one at each frame without one: there it is compared."""
+    t_ns = truth.t_ns
+    if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
+        raise PelorusError(
+            f"the truth spans {t_ns[0]} to {t_ns[-1]} ns, the frames {frame_t_ns[0]} to "
+            f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are due"
+        )
+    lacking = np.setdiff1d(frame_t_ns, t_ns)
+    lacking = lacking[(lacking > t_ns[0]) & (lacking < t_ns[-1])]
+    after = np.searchsorted(t_ns, lacking)
+    near = t_ns[after] - t_ns[after - 1] <= TRUTH_GAP_NS
+    lacking, after = lacking[near], after[near]
+    if not len(lacking):
+        return t_ns, truth.poses
+    first = t_ns[0]
+    seconds, own = (lacking - first) * 1e-9, (t_ns - first) * 1e-9
+    R = Slerp(own, Rotation.from_matrix(truth.poses.R))(seconds).as_matrix()
+    p = np.stack([np.interp(seconds, own, x) for x in truth.poses.p.T], axis=-1)
+    together = np.concatenate((t_ns, lacking))
+    order = np.argsort(together)
+    poses = Poses(np.concatenate((truth.poses.R, R)), np.concatenate((truth.poses.p, p)))
+    return together[order], poses.at(order)
