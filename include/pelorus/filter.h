@@ -68,7 +68,8 @@ plr_status plr_filter_reset(plr_filter *f);
 plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB,
                                const double *P_xi);
 
-/* Sets mean and variances of the bias prior, 6 each: (b_v, b_w), m/s and rad/s. Only before the
+/* Sets mean and variances of the bias prior, 6 each: (b_v, b_w), m/s and rad/s; with an IMU
+ * (b_a, b_g), m/s^2 and rad/s. Only before the
  * first twist and the first frame.
  * PLR_E_MODE if bias is off, in mapping, or after those; PLR_E_NOT_FINITE; PLR_E_ARGUMENT a
  * negative variance; PLR_E_RANGE a bias beyond 1e4 or a variance beyond 1e12. */
@@ -83,6 +84,26 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
  * max_gap_s ahead; PLR_E_NOT_FINITE; PLR_E_RANGE the step to t_ns, or a next step of the same
  * length with this reading, would be more than pi rad or 1 km. */
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist);
+
+/* With the setting process = imu, in place of plr_filter_predict: a reading of accelerometer and gyro
+ * taken at t_ns. Until tilt and velocity are known (setting imu-start) readings are averaged, the
+ * pose stays, and health says NOT_STARTED. Takes the same time for any number of landmarks.
+ * Refused readings count in plr_filter_totals().twists_refused; where the sensor is to blame,
+ * plr_filter_imu_fault says how, and health says IMU_FAULT.
+ * Statuses as of plr_filter_predict, and: PLR_E_RANGE at the limit of gyro_range or accel_range, or
+ * a spike; PLR_E_ARGUMENT the same numbers ten times; PLR_E_MODE the process is another. */
+plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
+
+/* With an IMU: sets the velocity of the body in its own axes, m/s, and its variances. It starts the
+ * filter with the pose that was set before it by plr_filter_set_pose.
+ * PLR_E_MODE another process, no pose was set, or there are landmarks or readings since;
+ * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e4 m/s or a variance of 1e12; PLR_E_ARGUMENT a negative
+ * variance. */
+plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
+                                   const double variance[3]);
+
+/* What is wrong with the IMU, if anything. */
+plr_imu_fault plr_filter_imu_fault(const plr_filter *f);
 
 /* mapping only: sets the body's pose at t_ns, which is taken as exact; the landmarks keep their
  * place in the world. The first call sets the time.

@@ -50,8 +50,9 @@ typedef struct plr_totals {
 
 /* The blocks of the state's error before the landmarks, in their order in P. */
 typedef enum plr_block_id {
-    PLR_BLOCK_POSE, /* (rho, theta): T_WB Exp(rho, theta) is the truth; m, rad */
-    PLR_BLOCK_BIAS, /* (b_v, b_w), of the twists; m/s, rad/s */
+    PLR_BLOCK_POSE,     /* (rho, theta): T_WB Exp(rho, theta) is the truth; m, rad */
+    PLR_BLOCK_VELOCITY, /* of the body in its own axes, with an IMU; m/s */
+    PLR_BLOCK_BIAS, /* (b_v, b_w) of twists, m/s and rad/s; (b_a, b_g) of an IMU, m/s^2 and rad/s */
     PLR_BLOCKS
 } plr_block_id;
 
@@ -60,7 +61,9 @@ typedef struct plr_layout {
     struct {
         uint8_t row, size; /* size 0: not estimated */
     } block[PLR_BLOCKS];
-    uint8_t core; /* rows of all blocks: the first landmark's row */
+    uint8_t core;            /* rows of all blocks: the first landmark's row */
+    uint8_t driver, drivers; /* first and number of the rows that a motion depends on: the biases of
+                                twists; with an IMU theta, velocity and biases */
 } plr_layout;
 
 /* One landmark slot. */
@@ -87,15 +90,62 @@ typedef struct plr_slot {
 } plr_slot;
 
 /* Motion that is already in the pose but not yet in the covariance: D = (I + E, p) with
- * xi+ = Ad(D^-1) xi + B db + N(0, Q), docs/MATH.md 4. */
+ * xi+ = Ad(D^-1) xi + n, n = B x_d + N(0, Q), docs/MATH.md 4. x_d are the drivers, plr_layout. */
 typedef struct plr_motion {
     plr_real E[9], p[3];         /* 3x3 and m */
     plr_real Q[PLR_POSE_SQUARE]; /* 6x6 */
-    plr_real B[PLR_POSE_SQUARE]; /* 6x6 */
+    plr_real B[PLR_MOTION_BY];   /* 6 x drivers, leading dimension PLR_DRIVERS */
     plr_real seconds;            /* duration, for the bias walk */
     uint8_t pending;             /* 1 if any motion is accumulated */
     uint8_t noisy;               /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
+
+/* The rest of the core in the same motion, with an IMU (docs/MATH.md 19): its velocity becomes V x_d
+ * plus noise, its biases only gain noise. Q_nc and Q_cc are the covariances of the noise of velocity
+ * and biases with that of n, and with itself. */
+typedef struct plr_core_motion {
+    plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS];
+    plr_real Q_nc[PLR_POSE_DIM * PLR_REST_DIM];
+    plr_real Q_cc[PLR_REST_DIM * PLR_REST_DIM];
+} plr_core_motion;
+
+/* Where a point was in the left picture when the average below began. */
+typedef struct plr_watched_point {
+    uint32_t id;
+    float u_px, v_px;
+    uint32_t used; /* 1: filled */
+} plr_watched_point;
+
+enum { PLR_WATCHED_POINTS = 8 };
+
+/* Readings of an IMU before the filter has started: src/process/alignment.h. */
+typedef struct plr_alignment {
+    plr_time_ns begin_ns,
+        first_ns; /* of the stretch that is being averaged; of the first reading */
+    uint32_t count;
+    plr_real mean[PLR_POSE_DIM];      /* (a, w) over the stretch, m/s^2 and rad/s */
+    plr_real half_mean[PLR_POSE_DIM]; /* over its first half */
+    plr_real spread2[2];              /* sums of squares about the mean, linear and angular */
+    plr_watched_point points[PLR_WATCHED_POINTS];
+} plr_alignment;
+
+/* What an IMU adds to the state: src/process/imu.c. */
+typedef struct plr_inertial {
+    plr_real velocity[PLR_VELOCITY_DIM]; /* of the body in its own axes, m/s */
+    plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */
+    plr_real change2[2]; /* mean square of the difference between successive readings */
+    plr_real usual_s;    /* usual interval between readings */
+    plr_alignment alignment;
+    plr_time_ns started_ns;
+    plr_time_ns still_ns; /* of the last standstill that was measured */
+    uint16_t repeated;    /* successive readings of the same numbers */
+    uint16_t out_of_line; /* successive readings refused as spikes */
+    uint16_t frames;      /* that used observations since the start, up to the anchor */
+    uint8_t started;      /* 1: tilt and velocity are known */
+    uint8_t pose_given;   /* 1: plr_filter_set_pose was called */
+    uint8_t anchored;     /* 1: position and yaw have been fixed after a start in motion */
+    uint8_t fault;        /* plr_imu_fault, found at the start or since */
+} plr_inertial;
 
 /* A velocity that a small sensor measured: z = M (v, w) + noise. It holds until its next reading;
  * src/process/velocity.h. */
@@ -160,6 +210,9 @@ typedef struct plr_parameters {
     plr_real landmark_variance;
     plr_real min_inverse_range;
     plr_time_ns max_gap_ns;
+    plr_real gravity;                                            /* m/s^2 */
+    plr_real accel_density, gyro_density, accel_walk, gyro_walk; /* squared, of an IMU */
+    plr_real start_velocity_variance;
 } plr_parameters;
 
 /* The noise of a frame's motion. It is kept apart from P until the frame's observations have been
@@ -234,8 +287,11 @@ typedef struct plr_filter {
 
     plr_consistency consistency;
     plr_velocities velocities; /* part of the "small" checksum while any is known */
-    uint32_t frame_number;     /* from here on part of the "small" checksum */
-    uint8_t health;            /* plr_health of the last frame, and why */
+    plr_core_motion
+        core_motion; /* with an IMU, and then part of the "small" checksum, as the next */
+    plr_inertial inertial;
+    uint32_t frame_number; /* from here on part of the "small" checksum */
+    uint8_t health;        /* plr_health of the last frame, and why */
     uint32_t reasons;
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */

@@ -122,8 +122,8 @@ typedef struct plr_twist_message {
 /* Successive readings of an IMU at a constant rate: reading k is of t_ns + k period_ns. */
 typedef struct plr_imu_message {
     plr_time_ns t_ns;
-    uint32_t period_ns; /* 0 where there is one reading */
-    uint8_t count;      /* 1 to PLR_WIRE_MAX_IMU */
+    uint32_t period_ns;                 /* 0 where there is one reading */
+    uint8_t count;                      /* 1 to PLR_WIRE_MAX_IMU */
     plr_imu readings[PLR_WIRE_MAX_IMU]; /* the frame has float32 */
 } plr_imu_message;
 

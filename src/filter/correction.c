@@ -173,6 +173,9 @@ plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, 
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
             f->bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
+            f->inertial.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
     plr_velocity_forget_bias(f);
     result.cut = plr_model_of(f)->retract(f, f->work.dx);
     plr_pose_correct(f, f->work.dx);

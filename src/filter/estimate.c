@@ -5,7 +5,7 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
@@ -61,10 +61,10 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
-    for (int i = 0; i < 3; i++) {
-        velocity->v_B_mps[i] = (double)(f->reading[i] - f->bias[i]);
-        velocity->w_B_radps[i] = (double)(f->reading[3 + i] - f->bias[3 + i]);
-    }
+    plr_real u[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
+    plr_process_of(f)->now(f, u, P_u);
+    to_double(velocity->v_B_mps, u, 3);
+    to_double(velocity->w_B_radps, u + 3, 3);
     return PLR_OK;
 }
 
@@ -77,7 +77,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     if (f->diverged)
         return PLR_E_DIVERGED;
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
-    plr_twist_now(f, u, P);
+    plr_process_of(f)->now(f, u, P);
     to_double(P_u, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
@@ -91,7 +91,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     if (f->diverged && P_b)
         return PLR_E_DIVERGED;
     plr_real P[PLR_POSE_SQUARE];
-    plr_twist_bias_covariance(f, P);
+    plr_process_of(f)->bias_covariance(f, P);
     to_double(b, f->bias, PLR_POSE_DIM);
     if (P_b)
         to_double(P_b, P, PLR_POSE_SQUARE);
@@ -110,7 +110,7 @@ double plr_filter_trace(const plr_filter *f) {
     if (plr_has_block(f, PLR_BLOCK_BIAS)) {
         plr_real before[PLR_POSE_SQUARE];
         plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before);
-        plr_twist_bias_covariance(f, P_b);
+        plr_process_of(f)->bias_covariance(f, P_b);
         for (int i = 0; i < PLR_POSE_DIM; i++)
             trace += (double)P_b[(PLR_POSE_DIM + 1) * i] - (double)before[(PLR_POSE_DIM + 1) * i];
     }

@@ -11,7 +11,8 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
-#include "process/twist.h"
+#include "process/alignment.h"
+#include "process/process.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -74,6 +75,12 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     par->min_depth = (plr_real)c->min_depth_m;
     par->landmark_variance = squared(c->landmark_sigma_m);
     par->min_inverse_range = (plr_real)(1 / c->max_range_m);
+    par->gravity = (plr_real)c->gravity_mps2;
+    par->accel_density = squared(c->accel_noise);
+    par->gyro_density = squared(c->gyro_noise);
+    par->accel_walk = squared(c->accel_walk);
+    par->gyro_walk = squared(c->gyro_walk);
+    par->start_velocity_variance = squared(c->start_velocity_sigma_mps);
     par->max_gap_ns = (plr_time_ns)(c->max_gap_s * 1e9);
 }
 
@@ -103,7 +110,7 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
         f->map = *map;
     f->model = config->model;
     set_parameters(&f->par, calibration, config);
-    plr_twist_lay_out(f);
+    plr_process_of(f)->lay_out(f);
     f->magic = PLR_FILTER_MAGIC;
     plr_guard_seal_constant(f);
     return plr_filter_reset(f);
@@ -118,11 +125,8 @@ static void start_covariance(const plr_filter *f, double P_xi[PLR_POSE_SQUARE]) 
 }
 
 void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
-    double P_b[PLR_BIAS_DIM * PLR_BIAS_DIM] = {0};
-    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-        P_b[(PLR_BIAS_DIM + 1) * i] = variance[i];
     plr_velocity_forget_bias(f);
-    plr_covariance_begin(f, PLR_BLOCK_BIAS, P_b);
+    plr_covariance_begin_diagonal(f, PLR_BLOCK_BIAS, variance);
 }
 
 static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
@@ -139,8 +143,10 @@ static void start_bias(plr_filter *f) {
     double variance[PLR_POSE_DIM] = {0};
     if (f->config.mode != PLR_MODE_MAPPING)
         for (int i = 0; i < PLR_POSE_DIM; i++) {
-            const double sigma =
-                i < 3 ? f->config.bias_velocity_sigma_mps : f->config.bias_gyro_sigma_radps;
+            const double linear = f->config.process == PLR_PROCESS_IMU
+                                      ? f->config.bias_accel_sigma_mps2
+                                      : f->config.bias_velocity_sigma_mps;
+            const double sigma = i < 3 ? linear : f->config.bias_gyro_sigma_radps;
             variance[i] = sigma * sigma;
         }
     set_bias_prior(f, zero, variance);
@@ -171,8 +177,9 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(f->p_WB, 0, sizeof f->p_WB);
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->R_WB);
-    plr_motion_clear(&f->motion);
+    plr_motion_clear(f);
     plr_velocity_forget(f);
+    plr_alignment_clear(f);
     memset(f->readings_rejected, 0, sizeof f->readings_rejected);
     f->count = 0;
     f->frame_number = 0;
@@ -187,6 +194,11 @@ plr_status plr_filter_reset(plr_filter *f) {
     start_covariance(f, P_xi);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_filter_store_for_recovery(f);
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY)) {
+        const double v = (double)f->par.start_velocity_variance;
+        const double P_v[PLR_VELOCITY_DIM] = {v, v, v};
+        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, P_v);
+    }
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         start_bias(f);
     plr_guard_seal_whole(f);
@@ -199,7 +211,7 @@ void plr_filter_forget_reading(plr_filter *f) {
     plr_velocity_forget(f);
     f->reading_valid = 0;
     f->interval_s = 0;
-    memcpy(f->reading, f->bias, sizeof f->reading);
+    plr_process_of(f)->rest(f, f->reading);
 }
 
 plr_status plr_filter_refuse(plr_filter *f, plr_status status) {
@@ -259,6 +271,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     f->count = 0;
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi ? P_xi : P_start);
     store_pose(f, t_ns, T_WB);
+    f->inertial.pose_given = 1;
     plr_consistency_clear(f);
     plr_filter_store_for_recovery(f);
     f->diverged = 0;

@@ -70,6 +70,8 @@ static uint64_t small_sum(const plr_filter *f) {
     add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
     add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
     add_between(&sum, f, offsetof(plr_filter, frame_number), offsetof(plr_filter, guard));
+    if (f->config.process == PLR_PROCESS_IMU)
+        add_between(&sum, f, offsetof(plr_filter, core_motion), offsetof(plr_filter, frame_number));
     if (f->velocities_known)
         add(&sum, &f->velocities, sizeof f->velocities);
     return mixed(&sum);
@@ -89,8 +91,9 @@ bool plr_guard_is_in_range(const plr_filter *f) {
     const plr_config *c = &f->config;
     return c->model <= PLR_MODEL_WORLD && f->model == c->model &&
            c->mode <= PLR_MODE_DEAD_RECKONING && c->twist_timing <= PLR_TWIST_MID &&
-           c->noise <= PLR_NOISE_STEP && c->bias <= 1 && c->known_map <= 1 &&
-           c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
+           c->noise <= PLR_NOISE_STEP && c->process <= PLR_PROCESS_IMU &&
+           c->imu_start <= PLR_IMU_START_GIVEN && c->imu_timing <= PLR_TWIST_MID && c->bias <= 1 &&
+           c->known_map <= 1 && c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
            c->slots <= PLR_MAX_LANDMARKS && f->count <= c->slots && f->clock_started <= 1 &&
            f->reading_valid <= 1 && f->diverged <= 1 && f->motion.pending <= 1 &&
            f->motion.noisy <= 1;

@@ -30,7 +30,9 @@ enum {
 /* Reasons that do not apply in dead reckoning. */
 #define OBSERVATION_REASONS (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)
 /* Reasons by which the pose is lost. */
-#define LOST (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES)
+#define LOST                                                                                       \
+    (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES |                  \
+     PLR_REASON_NOT_STARTED)
 
 bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report) {
     const bool rejects =
@@ -76,6 +78,20 @@ static uint32_t rejected_readings(const plr_filter *f) {
     return 0;
 }
 
+/* What an IMU has to say. A faulty reading counts while readings are refused, a fault of the start
+ * for as long as it stands. */
+static uint32_t imu_reasons(const plr_filter *f) {
+    uint32_t reasons = 0;
+    const plr_imu_fault fault = (plr_imu_fault)f->inertial.fault;
+    if (f->config.process != PLR_PROCESS_IMU || f->config.mode == PLR_MODE_MAPPING)
+        return 0;
+    if (!f->inertial.started)
+        reasons |= PLR_REASON_NOT_STARTED;
+    if (fault != PLR_IMU_FAULT_NONE && fault != PLR_IMU_FAULT_MOVES)
+        reasons |= PLR_REASON_IMU_FAULT;
+    return reasons;
+}
+
 static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
                              const plr_report *report) {
     uint32_t reasons = 0;
@@ -111,7 +127,9 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
     reasons |= rejected_readings(f);
     if (lacks_twists(f))
         reasons |= PLR_REASON_NO_TWISTS;
-    return reasons;
+    else if (f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
+        f->inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
+    return reasons | imu_reasons(f);
 }
 
 /* The reasons by which the pose is lost at a time. A position that was used not long ago does for
@@ -119,7 +137,7 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
 static uint32_t lost_by(const plr_filter *f, plr_time_ns now) {
     const bool positioned =
         f->last_position_ns != 0 && seconds_since(f->last_position_ns, now) <= POSITION_S;
-    return positioned ? PLR_REASON_GATE_LOCKED : LOST;
+    return positioned ? PLR_REASON_GATE_LOCKED | PLR_REASON_NOT_STARTED : LOST;
 }
 
 static plr_health health_of(uint32_t reasons, uint32_t lost) {
@@ -141,6 +159,16 @@ void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report 
         f->last_use_ns = f->t_ns;
         plr_filter_store_for_recovery(f);
     }
+    f->health = (uint8_t)report->health;
+    f->reasons = report->reasons;
+}
+
+void plr_health_waits(plr_filter *f, plr_report *report) {
+    report->reasons = imu_reasons(f);
+    if (lacks_twists(f))
+        report->reasons |= PLR_REASON_NO_TWISTS;
+    report->health = PLR_HEALTH_LOST;
+    f->last_frame_ns = f->t_ns;
     f->health = (uint8_t)report->health;
     f->reasons = report->reasons;
 }
@@ -186,7 +214,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
         (!f->reading_valid || f->totals.twists_refused != f->refused_before ||
          health->seconds_without_twist > HELD_INTERVALS * (double)f->interval_s + HELD_S))
         health->reasons |= PLR_REASON_NO_TWISTS;
-    health->reasons |= rejected_readings(f);
+    health->reasons |= rejected_readings(f) | imu_reasons(f);
     health->health = health_of(health->reasons, lost_by(f, now));
     return PLR_OK;
 }

@@ -27,6 +27,9 @@ bool plr_health_fixed_gate_is_open(const plr_filter *f);
 /* Fills health and reasons of a frame that was processed. */
 void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report *report);
 
+/* Fills health of a frame that came before an IMU's start. */
+void plr_health_waits(plr_filter *f, plr_report *report);
+
 /* Fills health of a frame that was refused. */
 void plr_health_after_refusal(const plr_filter *f, plr_report *report);
 

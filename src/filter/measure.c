@@ -8,12 +8,13 @@
 #include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
+#include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/predict.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "process/velocity.h"
 #include "sensor/sensor.h"
 #include "state/blocks.h"
@@ -53,13 +54,15 @@ static plr_status check_numbers(const plr_reading *reading) {
 static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
     if (f->config.mode == PLR_MODE_MAPPING)
         return PLR_E_MODE;
+    if (!plr_process_has_started(f))
+        return PLR_E_NOT_READY;
     if (!f->clock_started || !f->reading_valid)
         return PLR_E_TIME;
     if (reading->t_ns < f->t_ns)
         return PLR_E_LATE;
     if (reading->t_ns - f->t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_twist_check(f, f->reading, plr_seconds(reading->t_ns - f->t_ns));
+    return plr_process_of(f)->check(f, f->reading, plr_seconds(reading->t_ns - f->t_ns));
 }
 
 /* d^2 = r^T (M P M^T + R)^-1 r of three rows M over six numbers of covariance P; negative if that
@@ -90,7 +93,7 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     plr_real u[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
     bool accepted = true;
     const unsigned parts = kind->of_twist(reading, rows);
-    plr_twist_now(f, u, P_u);
+    plr_process_of(f)->now(f, u, P_u);
     for (unsigned part = 0; part < parts; part++) {
         plr_real r[PLR_ROWS];
         for (unsigned i = 0; i < PLR_ROWS; i++) {
@@ -105,11 +108,43 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     return accepted;
 }
 
-/* plr_measurement_source.measure: the context is the measurement. */
+/* plr_measurement_source.measure: the context holds the measurements. */
 static void given(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
     (void)f;
-    (void)i;
-    *m = *(const plr_measurement *)context;
+    *m = ((const plr_measurement *)context)[i];
+}
+
+/* Corrects the state by measurements that were accepted. */
+static bool correct(plr_filter *f, const plr_measurement *m, unsigned count) {
+    const plr_measurement_source sensed = {given, m};
+    if (!f->diverged)
+        (void)plr_correct(f, &sensed, count);
+    if (!f->diverged)
+        return true;
+    plr_filter_recover(f);
+    return false;
+}
+
+/* Where velocity is estimated, a reading of the twist is one of the state: gates it, and applies
+ * it. */
+static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
+                              const plr_reading *reading, plr_reading_result *result) {
+    plr_twist_rows rows[2];
+    plr_measurement m[2];
+    bool accepted = true;
+    const unsigned parts = kind->of_twist(reading, rows);
+    if (f->motion.pending)
+        plr_consistency_note_motion(f);
+    plr_predict_apply_pending(f);
+    memset(m, 0, sizeof m);
+    for (unsigned part = 0; part < parts && !f->diverged; part++) {
+        plr_process_of(f)->measure(f, &rows[part], &m[part].H, m[part].r, m[part].R);
+        const plr_verdict verdict = plr_gate_judge(f, &m[part]);
+        result->d2 += (double)verdict.d2;
+        accepted = accepted && verdict.accepted;
+    }
+    f->inertial.still_ns = f->t_ns;
+    return correct(f, m, accepted ? parts : 0) && accepted;
 }
 
 /* Gates a reading of the state by the pose's present covariance, and applies it. A rejected one
@@ -134,14 +169,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     if (f->motion.pending)
         plr_consistency_note_motion(f);
     plr_predict_apply_pending(f);
-    if (!f->diverged) {
-        const plr_measurement_source sensed = {given, &m};
-        (void)plr_correct(f, &sensed, 1);
-    }
-    if (!f->diverged)
-        return true;
-    plr_filter_recover(f);
-    return false;
+    return correct(f, &m, 1);
 }
 
 static void count(plr_filter *f, const plr_reading_result *result) {
@@ -152,7 +180,8 @@ static void count(plr_filter *f, const plr_reading_result *result) {
 bool plr_measure_twist(plr_filter *f, const plr_reading *reading, plr_reading_result *result) {
     const plr_sensor_kind *kind = plr_sensor_of(reading->sensor);
     PLR_ASSERT(kind->of_twist);
-    result->used = hold(f, kind, reading, result);
+    result->used = plr_process_of(f)->measure ? apply_to_velocity(f, kind, reading, result)
+                                              : hold(f, kind, reading, result);
     count(f, result);
     return result->used;
 }

@@ -9,7 +9,7 @@
 #include "filter/guard.h"
 #include "math/dense.h"
 #include "math/small.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -17,9 +17,15 @@
 
 /* ---------------------------------------------------------------- applying what is accumulated */
 
+static void finish_motion(plr_filter *f) {
+    plr_process_of(f)->walk(f, f->motion.seconds);
+    plr_motion_clear(f);
+}
+
 void plr_predict_drop(plr_filter *f) {
-    plr_twist_walk(f, f->motion.seconds);
-    plr_motion_clear(&f->motion);
+    if (f->motion.pending)
+        plr_covariance_carry_core(f);
+    finish_motion(f);
 }
 
 void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
@@ -30,7 +36,7 @@ void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     }
     plr_model_of(f)->propagate(f, applied);
     plr_filter_propagate_recovery(f);
-    plr_predict_drop(f);
+    finish_motion(f);
     if (!plr_covariance_is_positive(f))
         plr_filter_diverge(f);
 }
@@ -66,27 +72,17 @@ static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
 }
 
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
-    if (f->clock_started && t_ns > f->t_ns) {
+    if (f->clock_started && t_ns > f->t_ns && plr_process_has_started(f)) {
         const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
         const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
         const plr_real interval = noise_interval(f, h0, h1);
-        plr_twist_step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
+        plr_process_of(f)->step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
     }
     f->t_ns = t_ns;
     f->clock_started = 1;
 }
 
 /* ---------------------------------------------------------------- twists */
-
-/* The twist of the step that ends with this reading. */
-static void twist_of_step(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
-                          plr_real held[PLR_POSE_DIM]) {
-    const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
-    for (int i = 0; i < PLR_POSE_DIM; i++)
-        held[i] = timing == PLR_TWIST_END     ? reading[i]
-                  : timing == PLR_TWIST_START ? f->reading[i]
-                                              : PLR_R(0.5) * (f->reading[i] + reading[i]);
-}
 
 static plr_status check_time(const plr_filter *f, plr_time_ns t_ns) {
     if (!f->clock_started)
@@ -105,7 +101,7 @@ static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_
     if (f->interval_s > 0 &&
         f->interval_s < seconds) /* a longer pause is not expected to be repeated */
         seconds = f->interval_s;
-    return plr_twist_check(f, reading, seconds);
+    return plr_process_of(f)->check(f, reading, seconds);
 }
 
 static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
@@ -122,41 +118,63 @@ static plr_status refuse_twist(plr_filter *f, plr_status status) {
     return plr_filter_refuse(f, status);
 }
 
+plr_status plr_predict_check(const plr_filter *f, plr_time_ns t_ns,
+                             const plr_real reading[PLR_POSE_DIM], plr_real *interval) {
+    plr_real held[PLR_POSE_DIM];
+    *interval = 0;
+    if (f->config.mode == PLR_MODE_MAPPING)
+        return PLR_OK;
+    const plr_status in_time = check_time(f, t_ns);
+    if (in_time != PLR_OK)
+        return in_time;
+    plr_process_of(f)->mean(f, t_ns, reading, held);
+    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
+    *interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
+    return plr_process_of(f)->check(f, held, seconds) == PLR_OK &&
+                   check_reading(f, reading, *interval) == PLR_OK
+               ? PLR_OK
+               : PLR_E_RANGE;
+}
+
+plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                              plr_status status) {
+    if (status != PLR_OK)
+        return refuse_twist(f, status);
+    if (f->config.mode == PLR_MODE_MAPPING) {
+        f->totals.twists++;
+        plr_guard_seal(f);
+        return PLR_OK;
+    }
+    plr_real held[PLR_POSE_DIM];
+    plr_process_of(f)->mean(f, t_ns, reading, held);
+    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
+    const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
+    if (seconds > 0 && plr_process_has_started(f))
+        plr_process_of(f)->step(f, t_ns, held, seconds, interval);
+    f->t_ns = t_ns;
+    f->clock_started = 1;
+    store_reading(f, t_ns, reading, interval);
+    plr_guard_seal(f);
+    return PLR_OK;
+}
+
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
     if (!f || !twist)
         return PLR_E_ARGUMENT;
     const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
+    if (f->config.process != PLR_PROCESS_TWIST)
+        return refuse_twist(f, PLR_E_MODE);
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
         return refuse_twist(f, PLR_E_NOT_FINITE);
 
-    plr_real reading[PLR_POSE_DIM], held[PLR_POSE_DIM];
+    plr_real reading[PLR_POSE_DIM], interval;
     for (int i = 0; i < 3; i++) {
         reading[i] = (plr_real)twist->v_B_mps[i];
         reading[3 + i] = (plr_real)twist->w_B_radps[i];
         if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
             return refuse_twist(f, PLR_E_RANGE);
     }
-    if (f->config.mode == PLR_MODE_MAPPING) {
-        f->totals.twists++;
-        plr_guard_seal(f);
-        return PLR_OK;
-    }
-    const plr_status in_time = check_time(f, t_ns);
-    if (in_time != PLR_OK)
-        return refuse_twist(f, in_time);
-    twist_of_step(f, reading, held);
-    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
-    if (plr_twist_check(f, held, seconds) != PLR_OK ||
-        check_reading(f, reading, interval) != PLR_OK)
-        return refuse_twist(f, PLR_E_RANGE);
-    if (seconds > 0)
-        plr_twist_step(f, t_ns, held, seconds, interval);
-    f->t_ns = t_ns;
-    f->clock_started = 1;
-    store_reading(f, t_ns, reading, interval);
-    plr_guard_seal(f);
-    return PLR_OK;
+    return plr_predict_accept(f, t_ns, reading, plr_predict_check(f, t_ns, reading, &interval));
 }

@@ -9,6 +9,15 @@
 /* Carries the pose to t_ns by the last reading. */
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
 
+/* Whether a reading of the process (process/process.h) can be accepted at t_ns. *interval receives
+ * the seconds since the reading before it, or since the pose was set. */
+plr_status plr_predict_check(const plr_filter *f, plr_time_ns t_ns,
+                             const plr_real reading[PLR_POSE_DIM], plr_real *interval);
+
+/* Moves the state by a reading with that status, or counts a refused one. */
+plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                              plr_status status);
+
 /* Applies D' to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
  * noise is kept in work.noise, not in P, until plr_covariance_close_noise. Sets f->diverged if a
  * variance is no longer positive. */

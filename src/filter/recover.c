@@ -30,19 +30,35 @@ void plr_filter_store_for_recovery(plr_filter *f) {
     pack(f, P);
 }
 
+/* S, drivers x drivers: the covariance of biases and velocity when the filter began, and of theta
+ * in P. */
+static void prior_of_drivers(const plr_filter *f, const plr_real P[PLR_POSE_SQUARE], plr_real *S) {
+    const unsigned first = f->layout.driver, drivers = f->layout.drivers;
+    for (unsigned d = 0; d < drivers; d++) {
+        const unsigned row = first + d, bias = plr_row_of(f, PLR_BLOCK_BIAS);
+        plr_real *own = &S[(drivers + 1) * d];
+        if (row >= bias)
+            *own = f->bias_prior_sigma[row - bias] * f->bias_prior_sigma[row - bias];
+        else if (row >= PLR_POSE_DIM)
+            *own = f->par.start_velocity_variance;
+        else
+            for (unsigned e = 0; first + e < PLR_POSE_DIM; e++)
+                S[drivers * d + e] = P[PLR_POSE_DIM * row + first + e];
+    }
+}
+
 /* P <- Ad(D^-1) P Ad(D^-1)^T + Q + B S B^T, with S the covariance of the biases' prior, because
  * their present covariance may be wrong. */
 void plr_filter_propagate_recovery(plr_filter *f) {
     const plr_motion *m = &f->motion;
     plr_real R[9], A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], carried[PLR_POSE_SQUARE],
-        S[PLR_POSE_SQUARE] = {0}, BSB[PLR_POSE_SQUARE];
+        S[PLR_DRIVERS * PLR_DRIVERS] = {0}, BSB[PLR_POSE_SQUARE];
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
     unpack(f, P);
     plr_sandwich6(carried, A, P);
-    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
-        S[(PLR_POSE_DIM + 1) * i] = f->bias_prior_sigma[i] * f->bias_prior_sigma[i];
-    plr_sandwich6(BSB, m->B, S);
+    prior_of_drivers(f, P, S);
+    plr_sandwich_drivers(BSB, f->layout.drivers, m->B, S);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         carried[i] += m->Q[i] + BSB[i];
     pack(f, carried);
@@ -64,10 +80,15 @@ void plr_filter_recover(plr_filter *f) {
     f->totals.widened++;
     f->frames_without_use = f->frames_mostly_gated = 0;
     f->work.noise.open = 0;
-    plr_motion_clear(&f->motion);
+    plr_motion_clear(f);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_consistency_clear(f);
     f->consistency.doubtful = 1;
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY)) {
+        const double v = (double)f->par.start_velocity_variance;
+        const double P_v[PLR_VELOCITY_DIM] = {v, v, v};
+        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, P_v);
+    }
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 /* Continuing after an interruption, with another clock and perhaps at another place. */
+#include <string.h>
+
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
 
 static plr_status check_moved(const plr_filter *f, const double *P_moved) {
     if (!f->clock_started || (P_moved && f->config.mode == PLR_MODE_MAPPING))
@@ -27,6 +31,11 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
     f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY)) { /* it is not what it was then */
+        const plr_real v = f->par.start_velocity_variance, variance[3] = {v, v, v};
+        memset(f->inertial.velocity, 0, sizeof f->inertial.velocity);
+        plr_covariance_forget(f, PLR_BLOCK_VELOCITY, variance);
+    }
     for (unsigned slot = 0; slot < f->count; slot++)
         f->slots[slot].anchored = 0;
     if (!P_moved) {

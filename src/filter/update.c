@@ -13,6 +13,7 @@
 #include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/health.h"
+#include "filter/inertial.h"
 #include "filter/matching.h"
 #include "filter/measure.h"
 #include "filter/motion_first.h"
@@ -20,7 +21,7 @@
 #include "filter/tracks.h"
 #include "math/order.h"
 #include "math/small.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "process/velocity.h"
 #include "sensor/sensor.h"
 #include "sensor/stereo.h"
@@ -166,7 +167,9 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
         n = 0; /* it does not show the present */
     plr_reading still;
     plr_reading_result unused = {0};
-    if (f->reading_valid && plr_standstill_is_seen(f, frame, n, &still))
+    const bool stands = f->reading_valid && plr_standstill_is_seen(f, frame, n, &still);
+    const bool is_state = plr_process_of(f)->measure != NULL;
+    if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
                        f->config.mode == PLR_MODE_SLAM;
@@ -191,8 +194,18 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
         events.recovered = true;
         plr_match_slots(f, seen, n);
         plr_births_from_unmatched(f, frame, n, &events, report);
+    } else if (stands && is_state) {
+        (void)plr_measure_twist(f, &still, &unused);
     }
+    plr_filter_anchor(f, report);
     plr_health_judge(f, &events, report);
+}
+
+/* Before an IMU's start nothing moves; the pictures only say whether the body stands. */
+static void wait_for_start(plr_filter *f, const plr_frame *frame, plr_report *report) {
+    const unsigned n = plr_match_in_order(f, frame, report);
+    plr_filter_watch_start(f, frame, n);
+    plr_health_waits(f, report);
 }
 
 /* Checks the frame's time and the mode. */
@@ -207,7 +220,7 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
         return PLR_E_LATE;
     if (frame->t_ns - f->t_ns > f->par.max_gap_ns)
         return PLR_E_GAP;
-    return plr_twist_check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
+    return plr_process_of(f)->check(f, f->reading, plr_seconds(frame->t_ns - f->t_ns));
 }
 
 /* A frame of dead reckoning: applies the motion, and the velocities' information about the
@@ -249,7 +262,9 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     plr_predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
-    if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
+    if (!plr_process_has_started(f)) {
+        wait_for_start(f, frame, r);
+    } else if (f->config.mode != PLR_MODE_DEAD_RECKONING) {
         process(f, frame, r);
     } else {
         dead_reckon(f);

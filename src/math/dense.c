@@ -17,6 +17,19 @@ void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
     }
 }
 
+void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real B[PLR_MOTION_BY],
+                          const plr_real *P) {
+    plr_real BP[PLR_MOTION_BY] = {0};
+    plr_gemm_nn(PLR_POSE_DIM, m, m, B, PLR_DRIVERS, P, m, BP, PLR_DRIVERS);
+    memset(S, 0, PLR_POSE_SQUARE * sizeof *S);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
+        plr_gemm_nt(1, i + 1, m, BP + PLR_DRIVERS * i, PLR_DRIVERS, B, PLR_DRIVERS,
+                    S + PLR_POSE_DIM * i, PLR_POSE_DIM);
+        for (unsigned j = 0; j < i; j++)
+            S[PLR_POSE_DIM * j + i] = S[PLR_POSE_DIM * i + j];
+    }
+}
+
 enum { STRIP = PLR_TILE_COLUMNS };
 
 /* x[c] = from[c] - sum_l U(l, i) y_l[c] for a strip of columns, l = 0 .. i-1, y_l = y + sum of the

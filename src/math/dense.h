@@ -71,6 +71,11 @@ static inline void plr_mat6_mul_nt(plr_real C[PLR_POSE_SQUARE], const plr_real A
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 
+/* S = B P B^T, 6x6: B is 6 x m with leading dimension PLR_DRIVERS, P m x m and symmetric, m at most
+ * PLR_DRIVERS. For m = 6 the same bits as plr_sandwich6. */
+void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real B[PLR_MOTION_BY],
+                          const plr_real *P);
+
 /* S += M P M^T, 3x3: M is 3x6, P 6x6 and symmetric. MP, 3x6, receives M P. */
 void plr_sandwich3(plr_real S[9], plr_real MP[PLR_ROWS * PLR_POSE_DIM],
                    const plr_real M[PLR_ROWS * PLR_POSE_DIM], const plr_real P[PLR_POSE_SQUARE]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "process/twist.h"
+/* The process `twist`: measured velocity and angular rate move the pose (docs/MATH.md 4). */
+#include "process/process.h"
 
 #include "math/dense.h"
 #include "math/se3.h"
@@ -14,23 +15,25 @@
 #define MAX_TURN PLR_R(3.1415926)
 #define MAX_WAY  PLR_R(1000)
 
-void plr_twist_lay_out(plr_filter *f) {
+static void lay_out(plr_filter *f) {
     const uint8_t bias = f->config.bias ? PLR_BIAS_DIM : 0;
     f->layout.block[PLR_BLOCK_POSE].row = 0;
     f->layout.block[PLR_BLOCK_POSE].size = PLR_POSE_DIM;
     f->layout.block[PLR_BLOCK_BIAS].row = PLR_POSE_DIM;
     f->layout.block[PLR_BLOCK_BIAS].size = bias;
     f->layout.core = (uint8_t)(PLR_POSE_DIM + bias);
+    f->layout.driver = PLR_POSE_DIM; /* the biases */
+    f->layout.drivers = bias;
 }
 
-void plr_twist_walk(plr_filter *f, plr_real seconds) {
+static void walk(plr_filter *f, plr_real seconds) {
     plr_real variance[PLR_BIAS_DIM];
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         variance[i] = seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
     plr_covariance_add_variance(f, PLR_BLOCK_BIAS, variance);
 }
 
-void plr_twist_bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
+static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
     memset(P_b, 0, PLR_POSE_SQUARE * sizeof *P_b);
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
@@ -40,12 +43,12 @@ void plr_twist_bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE
             f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
 }
 
-void plr_twist_now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
+static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
     /* with noise = step the sigmas are those of a displacement: divide by the step */
     const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
                                ? PLR_R(1) / (f->interval_s * f->interval_s)
                                : PLR_R(1);
-    plr_twist_bias_covariance(f, P_u);
+    bias_covariance(f, P_u);
     for (int i = 0; i < 3; i++) {
         P_u[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
         P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
@@ -67,8 +70,8 @@ static bool is_within_limits(const plr_real xi[PLR_POSE_DIM]) {
     return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
 }
 
-plr_status plr_twist_check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
-                           plr_real seconds) {
+static plr_status check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                        plr_real seconds) {
     plr_real xi[PLR_POSE_DIM];
     displacement(f, reading, seconds, xi);
     return is_within_limits(xi) ? PLR_OK : PLR_E_RANGE;
@@ -86,8 +89,22 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
     }
 }
 
-void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                    plr_real seconds, plr_real interval) {
+static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
+                 plr_real held[PLR_READING_DIM]) {
+    const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
+    (void)t_ns;
+    for (int i = 0; i < PLR_READING_DIM; i++)
+        held[i] = timing == PLR_TWIST_END     ? reading[i]
+                  : timing == PLR_TWIST_START ? f->reading[i]
+                                              : PLR_R(0.5) * (f->reading[i] + reading[i]);
+}
+
+static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
+    memcpy(reading, f->bias, PLR_READING_DIM * sizeof *reading);
+}
+
+static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                 plr_real seconds, plr_real interval) {
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
     plr_motion *m = &f->motion;
@@ -127,11 +144,26 @@ void plr_twist_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_
             plr_mat6_mul(next, Jr, T);
             memcpy(Jr, next, sizeof Jr);
         }
-        plr_mat6_mul(next, A, m->B);
-        for (int i = 0; i < PLR_POSE_SQUARE; i++)
-            m->B[i] = PLR_FMA(-seconds, Jr[i], next[i]);
+        plr_real AB[PLR_POSE_SQUARE] = {0};
+        plr_gemm_nn(PLR_POSE_DIM, PLR_BIAS_DIM, PLR_POSE_DIM, A, PLR_POSE_DIM, m->B, PLR_DRIVERS,
+                    AB, PLR_BIAS_DIM);
+        for (int i = 0; i < PLR_POSE_DIM; i++)
+            for (int j = 0; j < PLR_BIAS_DIM; j++)
+                m->B[PLR_DRIVERS * i + j] =
+                    PLR_FMA(-seconds, Jr[PLR_BIAS_DIM * i + j], AB[PLR_BIAS_DIM * i + j]);
     }
     m->seconds += seconds;
     m->pending = 1;
     m->noisy = 1;
 }
+
+const plr_process plr_process_twist = {
+    .lay_out = lay_out,
+    .check = check,
+    .step = step,
+    .mean = mean,
+    .rest = rest,
+    .walk = walk,
+    .now = now,
+    .bias_covariance = bias_covariance,
+};

@@ -32,6 +32,31 @@ void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own
         }
 }
 
+void plr_covariance_begin_diagonal(plr_filter *f, plr_block_id block, const double *variance) {
+    const unsigned size = plr_block_size(f, block);
+    double P_own[PLR_WIDEST_BLOCK * PLR_WIDEST_BLOCK] = {0};
+    for (unsigned i = 0; i < size; i++)
+        P_own[(size + 1) * i] = variance[i];
+    plr_covariance_begin(f, block, P_own);
+}
+
+void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, const plr_real *P) {
+    PLR_ASSERT(plr_row_of(f, rows) > plr_row_of(f, columns));
+    for (unsigned i = 0; i < plr_block_size(f, rows); i++)
+        for (unsigned j = 0; j < plr_block_size(f, columns); j++)
+            f->P[plr_packed_at(plr_row_of(f, rows) + i, plr_row_of(f, columns) + j)] =
+                P[plr_block_size(f, columns) * i + j];
+}
+
+void plr_covariance_forget(plr_filter *f, plr_block_id block, const plr_real *variance) {
+    const unsigned row = plr_row_of(f, block), n = plr_covariance_dim(f);
+    for (unsigned i = row; i < row + plr_block_size(f, block); i++) {
+        for (unsigned j = 0; j < n; j++)
+            f->P[plr_packed_at(i, j)] = 0;
+        f->P[plr_packed_at(i, i)] = variance[i - row];
+    }
+}
+
 void plr_covariance_add(plr_filter *f, plr_block_id block, const plr_real *C) {
     const unsigned row = plr_row_of(f, block), size = plr_block_size(f, block);
     for (unsigned i = 0; i < size; i++)
@@ -48,6 +73,10 @@ void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_re
 void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P) {
     plr_get_block(f, plr_row_of(f, rows), plr_block_size(f, rows), plr_row_of(f, columns),
                   plr_block_size(f, columns), P);
+}
+
+void plr_covariance_with_drivers(const plr_filter *f, unsigned row, unsigned rows, plr_real *P) {
+    plr_get_block(f, row, rows, f->layout.driver, f->layout.drivers, P);
 }
 
 void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]) {

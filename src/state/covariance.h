@@ -28,6 +28,16 @@ unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
  * Only without landmarks. */
 void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own);
 
+/* The same with a diagonal. */
+void plr_covariance_begin_diagonal(plr_filter *f, plr_block_id block, const double *variance);
+
+/* Sets the part between two different blocks, row by row; the one of the rows comes later in the
+ * state. */
+void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, const plr_real *P);
+
+/* Sets a block's variances and makes it uncorrelated with all others, landmarks too. */
+void plr_covariance_forget(plr_filter *f, plr_block_id block, const plr_real *variance);
+
 /* A block's own covariance += C, size x size and symmetric. */
 void plr_covariance_add(plr_filter *f, plr_block_id block, const plr_real *C);
 
@@ -36,6 +46,10 @@ void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_re
 
 /* The part of P between two blocks, row by row. */
 void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P);
+
+/* P between `rows` rows of the state, from `row` on, and the drivers of a motion (plr_layout):
+ * rows x drivers. */
+void plr_covariance_with_drivers(const plr_filter *f, unsigned row, unsigned rows, plr_real *P);
 
 /* A landmark's own block, 3x3. */
 void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]);
@@ -63,8 +77,11 @@ bool plr_covariance_is_positive(const plr_filter *f);
 /* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. */
 void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F);
 
+/* The pose's rows alone: xi <- A xi. */
+void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]);
+
 /* Moves the part of P that is correlated with the motion's noise from P to W: with
- * C = P_(:,b) B^T and nu = L^-1 n,
+ * C = P_(:,d) B^T, d the drivers, and nu = L^-1 n,
  *   P -= (C L^-T) (C L^-T)^T,  W += C L^-T,  Lambda = I,  eta = -z,  dx = C L^-T z,
  * so that the state is x + W (nu - z) with x and nu independent. Before the call W^T (6 x dim,
  * leading dimension plr_covariance_ld) must hold the motion's direct effect. */
@@ -75,15 +92,20 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
  * if plr_covariance_open_noise was not called. */
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
 
-/* V = C L^-T = P_(:,b) K^T for `rows` rows of the state from `row` on, rows x 6: their covariance
+/* V = C L^-T = P_(:,d) K^T for `rows` rows of the state from `row` on, rows x 6: their covariance
  * with nu. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real K[PLR_POSE_SQUARE], plr_real *V);
+                                 const plr_real K[PLR_MOTION_BY], plr_real *V);
 
-/* The pose's rows alone: xi <- A xi + n, n = B db + N(0, Q), with M = B P_bb B^T + Q. */
+/* The pose's rows alone, for drivers behind the pose: xi <- A xi + n, n = B x_d + N(0, Q), with
+ * M = B P_dd B^T + Q. */
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
-                                 const plr_real B[PLR_POSE_SQUARE],
+                                 const plr_real B[PLR_MOTION_BY],
                                  const plr_real M[PLR_POSE_SQUARE]);
+
+/* Where there is a velocity: its covariance and the biases' after the accumulated motion, without
+ * the pose's and the landmarks' part. */
+void plr_covariance_carry_core(plr_filter *f);
 
 /* --- update --- */
 

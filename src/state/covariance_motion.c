@@ -73,33 +73,114 @@ static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[P
     plr_set_block(f, s, 3, s, 3, FDFt);
 }
 
-void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F) {
-    plr_real P_xi[PLR_POSE_SQUARE], turned[PLR_POSE_SQUARE], At[PLR_POSE_SQUARE];
+/* The pose's own covariance, and its columns in the rows before `end`. */
+static void turn_pose(plr_filter *f, unsigned end, const plr_real A[PLR_POSE_SQUARE],
+                      plr_real At[PLR_POSE_SQUARE]) {
+    plr_real P_xi[PLR_POSE_SQUARE], turned[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     plr_sandwich6(turned, A, P_xi);
     plr_set_block(f, POSE_ROW, PLR_POSE_DIM, POSE_ROW, PLR_POSE_DIM, turned);
     transpose6(At, A);
-    for (unsigned i = PLR_POSE_DIM; i < plr_core_dim(f); i++)
+    for (unsigned i = PLR_POSE_DIM; i < end; i++)
         turn_pose_columns(f->P + plr_packed_row(i), At);
+}
+
+void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]) {
+    plr_real At[PLR_POSE_SQUARE];
+    turn_pose(f, plr_covariance_dim(f), A, At);
+}
+
+void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F) {
+    plr_real At[PLR_POSE_SQUARE];
+    turn_pose(f, plr_core_dim(f), A, At);
     for (unsigned slot = 0; slot < f->count; slot++)
         transport_landmark(f, slot, At, F);
 }
 
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real K[PLR_POSE_SQUARE], plr_real *V) {
-    const unsigned bias = plr_row_of(f, PLR_BLOCK_BIAS);
+                                 const plr_real K[PLR_MOTION_BY], plr_real *V) {
+    const unsigned first = f->layout.driver, drivers = f->layout.drivers;
     memset(V, 0, PLR_POSE_DIM * rows * sizeof *V);
-    if (!plr_has_block(f, PLR_BLOCK_BIAS))
-        return;
     for (unsigned i = row; i < row + rows; i++) {
-        plr_real before[PLR_POSE_DIM];
-        const plr_real *P_ib = f->P + plr_packed_row(i) + bias;
-        if (i < bias + PLR_BIAS_DIM) { /* a part of it is above the diagonal */
-            plr_get_block(f, i, 1, bias, PLR_POSE_DIM, before);
-            P_ib = before;
+        plr_real before[PLR_DRIVERS];
+        const plr_real *P_id = f->P + plr_packed_row(i) + first;
+        if (i < first + drivers) { /* a part of it is above the diagonal */
+            plr_covariance_with_drivers(f, i, 1, before);
+            P_id = before;
         }
-        plr_gemm_nt(1, PLR_POSE_DIM, PLR_POSE_DIM, P_ib, PLR_POSE_DIM, K, PLR_POSE_DIM,
-                    V + PLR_POSE_DIM * (i - row), PLR_POSE_DIM);
+        if (drivers == PLR_BIAS_DIM) /* a constant size is faster */
+            plr_gemm_nt(1, PLR_POSE_DIM, PLR_BIAS_DIM, P_id, PLR_BIAS_DIM, K, PLR_DRIVERS,
+                        V + PLR_POSE_DIM * (i - row), PLR_POSE_DIM);
+        else
+            plr_gemm_nt(1, PLR_POSE_DIM, drivers, P_id, PLR_DRIVERS, K, PLR_DRIVERS,
+                        V + PLR_POSE_DIM * (i - row), PLR_POSE_DIM);
+    }
+}
+
+/* X, rows x drivers with leading dimension PLR_DRIVERS, is a derivative by the drivers before a
+ * motion (I + E, p). Y becomes the same by the drivers after the pose's transport: theta is turned
+ * by it, all others stay. */
+static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsigned rows,
+                                 const plr_real *X, plr_real *Y) {
+    memcpy(Y, X, rows * PLR_DRIVERS * sizeof *Y);
+    if (f->layout.driver >= PLR_POSE_DIM)
+        return;
+    for (unsigned r = 0; r < rows; r++) {
+        plr_real turned[3];
+        plr_mat3_tvec(turned, E, X + PLR_DRIVERS * r);
+        for (unsigned c = 0; c < 3; c++)
+            Y[PLR_DRIVERS * r + c] += turned[c];
+    }
+}
+
+/* The covariance of velocity and biases after the motion: v <- V x_d + noise, b <- b + noise, where
+ * V is by the drivers as they stand in P. */
+static void carry_core_covariance(plr_filter *f, const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS]) {
+    enum { D = PLR_DRIVERS, C = PLR_VELOCITY_DIM };
+    const plr_core_motion *m = &f->core_motion;
+    const unsigned n = plr_covariance_dim(f), first = f->layout.driver;
+    const unsigned velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
+    plr_real P_xd[PLR_CORE_DIM * D], VP[C * PLR_CORE_DIM] = {0}, P_vv[C * C] = {0};
+    plr_covariance_with_drivers(f, 0, PLR_CORE_DIM, P_xd);
+    plr_gemm_nt(C, PLR_CORE_DIM, D, V, D, P_xd, D, VP, PLR_CORE_DIM);
+    plr_gemm_nt(C, C, D, VP + first, PLR_CORE_DIM, V, D, P_vv, C);
+    for (unsigned i = plr_core_dim(f); i < n; i++) { /* the rows of landmarks */
+        plr_real *P_id = f->P + plr_packed_row(i) + first, v[C] = {0};
+        plr_gemm_nn(C, 1, D, V, D, P_id, 1, v, 1);
+        memcpy(P_id + (velocity - first), v, sizeof v);
+    }
+    for (unsigned r = 0; r < C; r++) {
+        for (unsigned i = 0; i < PLR_CORE_DIM; i++)
+            f->P[plr_packed_at(velocity + r, i)] = VP[r * PLR_CORE_DIM + i];
+        for (unsigned c = 0; c <= r; c++)
+            f->P[plr_packed_at(velocity + r, velocity + c)] = P_vv[C * r + c];
+    }
+    PLR_ASSERT(plr_row_of(f, PLR_BLOCK_BIAS) == velocity + C);
+    for (unsigned r = 0; r < PLR_REST_DIM; r++)
+        for (unsigned c = 0; c <= r; c++)
+            f->P[plr_packed_at(velocity + r, velocity + c)] += m->Q_cc[PLR_REST_DIM * r + c];
+}
+
+void plr_covariance_carry_core(plr_filter *f) {
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        carry_core_covariance(f, f->core_motion.V);
+}
+
+/* The same, and the rows of velocity and biases in Vt, their covariance with nu, which gains that
+ * of their noise with the motion's. */
+static void carry_core(plr_filter *f, const plr_applied_motion *motion, plr_real *Vt, size_t ld) {
+    const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
+    plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], X[PLR_POSE_DIM * PLR_REST_DIM];
+    drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, f->core_motion.V, V);
+    carry_core_covariance(f, V);
+    memcpy(X, f->core_motion.Q_nc, sizeof X);
+    plr_motion_solve(motion->L, PLR_REST_DIM, X, PLR_REST_DIM);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_real *row = Vt + k * ld, v[PLR_VELOCITY_DIM] = {0};
+        plr_gemm_nn(PLR_VELOCITY_DIM, 1, PLR_DRIVERS, V, PLR_DRIVERS, row + first, 1, v, 1);
+        memcpy(row + velocity, v, sizeof v);
+        for (unsigned c = 0; c < PLR_REST_DIM; c++)
+            row[velocity + c] += X[PLR_REST_DIM * k + c];
     }
 }
 
@@ -113,20 +194,26 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
         noise->z[k] = motion->z[k];
     }
     noise->open = 1;
-    if (!plr_has_block(f, PLR_BLOCK_BIAS))
+    if (f->layout.drivers == 0)
         return;
-    plr_real *Vt = f->work.Vt;
+    plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY];
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         memset(Vt + k * ld + n, 0, (ld - n) * sizeof *Vt);
+    drivers_after_motion(f, motion->E, PLR_POSE_DIM, motion->K, K);
     for (unsigned i = 0; i < n; i++) {
         plr_real v[PLR_POSE_DIM];
-        plr_covariance_motion_share(f, i, 1, motion->K, v);
-        for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        plr_covariance_motion_share(f, i, 1, K, v);
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             Vt[k * ld + i] = v[k];
-            noise->Wt[k * ld + i] += v[k];
-            f->work.dx[i] = PLR_FMA(v[k], motion->z[k], f->work.dx[i]);
-        }
     }
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        carry_core(f, motion, Vt, ld);
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+            const plr_real v = Vt[k * ld + i];
+            noise->Wt[k * ld + i] += v;
+            f->work.dx[i] = PLR_FMA(v, motion->z[k], f->work.dx[i]);
+        }
     plr_packed_subtract(n, PLR_POSE_DIM, Vt, Vt, ld, f->P);
 }
 
@@ -162,18 +249,20 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
 }
 
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
-                                 const plr_real B[PLR_POSE_SQUARE],
+                                 const plr_real B[PLR_MOTION_BY],
                                  const plr_real M[PLR_POSE_SQUARE]) {
-    const unsigned n = plr_covariance_dim(f), bias = plr_row_of(f, PLR_BLOCK_BIAS);
-    const bool biased = plr_has_block(f, PLR_BLOCK_BIAS);
+    const unsigned n = plr_covariance_dim(f), drivers = f->layout.drivers;
+    PLR_ASSERT(drivers == 0 || f->layout.driver >= PLR_POSE_DIM);
     plr_real P_xi[PLR_POSE_SQUARE], turned[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     plr_sandwich6(turned, A, P_xi);
-    if (biased) {
-        plr_real P_xib[PLR_POSE_SQUARE], AP[PLR_POSE_SQUARE], cross[PLR_POSE_SQUARE];
-        plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_BIAS, P_xib);
-        plr_mat6_mul(AP, A, P_xib);
-        plr_mat6_mul_nt(cross, AP, B);
+    if (drivers > 0) {
+        plr_real P_xd[PLR_MOTION_BY], AP[PLR_MOTION_BY] = {0}, cross[PLR_POSE_SQUARE] = {0};
+        plr_covariance_with_drivers(f, POSE_ROW, PLR_POSE_DIM, P_xd);
+        plr_gemm_nn(PLR_POSE_DIM, drivers, PLR_POSE_DIM, A, PLR_POSE_DIM, P_xd, drivers, AP,
+                    drivers);
+        plr_gemm_nt(PLR_POSE_DIM, PLR_POSE_DIM, drivers, AP, drivers, B, PLR_DRIVERS, cross,
+                    PLR_POSE_DIM);
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
             for (unsigned j = 0; j < PLR_POSE_DIM; j++)
                 turned[PLR_POSE_DIM * i + j] +=
@@ -188,12 +277,9 @@ void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE
     transpose6(At, A);
     for (unsigned i = PLR_POSE_DIM; i < n; i++) {
         plr_real *row = f->P + plr_packed_row(i);
-        plr_real P_ib[PLR_POSE_DIM] = {0};
-        if (biased)
-            plr_get_block(f, i, 1, bias, PLR_POSE_DIM, P_ib);
+        plr_real P_id[PLR_DRIVERS] = {0};
+        plr_covariance_with_drivers(f, i, 1, P_id);
         turn_pose_columns(row, At);
-        if (biased)
-            plr_gemm_nt(1, PLR_POSE_DIM, PLR_POSE_DIM, P_ib, PLR_POSE_DIM, B, PLR_POSE_DIM, row,
-                        PLR_POSE_DIM);
+        plr_gemm_nt(1, PLR_POSE_DIM, drivers, P_id, PLR_DRIVERS, B, PLR_DRIVERS, row, PLR_POSE_DIM);
     }
 }

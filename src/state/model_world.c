@@ -27,7 +27,7 @@ static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
     (void)motion; /* the pose alone moves, by f->motion */
     plr_se3_rotation(R, f->motion.E);
     plr_se3_adjoint_inverse(A, R, f->motion.p);
-    plr_motion_covariance_by_bias(f, BPB);
+    plr_motion_covariance_by_state(f, BPB);
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
         M[i] = BPB[i] + f->motion.Q[i];
     plr_covariance_predict_pose(f, A, f->motion.B, M);

@@ -8,8 +8,14 @@
 #include "state/blocks.h"
 #include "state/covariance.h"
 
-void plr_motion_clear(plr_motion *motion) {
-    memset(motion, 0, sizeof *motion);
+void plr_motion_clear(plr_filter *f) {
+    memset(&f->motion, 0, sizeof f->motion);
+    if (!plr_has_block(f, PLR_BLOCK_VELOCITY))
+        return;
+    const unsigned own = plr_row_of(f, PLR_BLOCK_VELOCITY) - f->layout.driver;
+    memset(&f->core_motion, 0, sizeof f->core_motion);
+    for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
+        f->core_motion.V[PLR_DRIVERS * i + own + i] = 1;
 }
 
 void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
@@ -28,32 +34,28 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
     memcpy(f->p_WB, p_WB, sizeof f->p_WB);
 }
 
-/* This part of B P_bb B^T is added to M as noise. Otherwise, with Q = 0, M would depend on the
- * biases alone, and to know the motion would leave the biases a variance of zero, give or take
+/* This part of B P_dd B^T is added to M as noise. Otherwise, with Q = 0, M would depend on the
+ * drivers alone, and to know the motion would leave them a variance of zero, give or take
  * rounding. */
-#define SHARE_OF_BIAS PLR_R(1e-4)
+#define SHARE_OF_STATE PLR_R(1e-4)
 
-void plr_motion_covariance_by_bias(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]) {
-    memset(BPB, 0, PLR_POSE_SQUARE * sizeof *BPB);
-    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_real P_b[PLR_POSE_SQUARE];
-        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
-        plr_sandwich6(BPB, f->motion.B, P_b);
-    }
+void plr_motion_covariance_by_state(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]) {
+    const unsigned m = f->layout.drivers;
+    plr_real P_dd[PLR_DRIVERS * PLR_DRIVERS];
+    plr_covariance_with_drivers(f, f->layout.driver, m, P_dd);
+    plr_sandwich_drivers(BPB, m, f->motion.B, P_dd);
 }
 
-/* K = L^-1 B. */
-static void solve_for_bias(const plr_real L[PLR_POSE_SQUARE], const plr_real B[PLR_POSE_SQUARE],
-                           plr_real K[PLR_POSE_SQUARE]) {
-    memcpy(K, B, PLR_POSE_SQUARE * sizeof *K);
+void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_real *X,
+                      unsigned ld) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         const plr_real inverse =
             L[(PLR_POSE_DIM + 1) * k] > 0 ? PLR_R(1) / L[(PLR_POSE_DIM + 1) * k] : PLR_R(0);
-        for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
-            plr_real sum = K[PLR_POSE_DIM * k + c];
+        for (unsigned c = 0; c < columns; c++) {
+            plr_real sum = X[ld * k + c];
             for (unsigned l = 0; l < k; l++)
-                sum = PLR_FMA(-L[PLR_POSE_DIM * k + l], K[PLR_POSE_DIM * l + c], sum);
-            K[PLR_POSE_DIM * k + c] = sum * inverse;
+                sum = PLR_FMA(-L[PLR_POSE_DIM * k + l], X[ld * l + c], sum);
+            X[ld * k + c] = sum * inverse;
         }
     }
 }
@@ -67,14 +69,14 @@ static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scal
     memcpy(applied->p, f->motion.p, sizeof applied->p);
     if (!f->motion.noisy)
         return;
-    plr_motion_covariance_by_bias(f, BPB);
+    plr_motion_covariance_by_state(f, BPB);
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
-        M[i] = scale * (PLR_FMA(SHARE_OF_BIAS, BPB[i], BPB[i]) + f->motion.Q[i]);
+        M[i] = scale * (PLR_FMA(SHARE_OF_STATE, BPB[i], BPB[i]) + f->motion.Q[i]);
     for (int i = 0; i < PLR_POSE_DIM; i++)
         M[(PLR_POSE_DIM + 1) * i] += i < 3 ? way2 : turn2;
     plr_factor6(applied->L, M);
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
-        solve_for_bias(applied->L, f->motion.B, applied->K);
+    memcpy(applied->K, f->motion.B, sizeof applied->K);
+    plr_motion_solve(applied->L, f->layout.drivers, applied->K, PLR_DRIVERS);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
 
@@ -104,31 +106,29 @@ void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
 
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     const plr_motion *m = &f->motion;
-    plr_real A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], R[9], BPB[PLR_POSE_SQUARE] = {0};
+    const unsigned drivers = f->layout.drivers;
+    plr_real A[PLR_POSE_SQUARE], P[PLR_POSE_SQUARE], R[9], BPB[PLR_POSE_SQUARE];
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
     plr_sandwich6(P_xi, A, P);
     for (int i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] += m->Q[i];
-    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
-        plr_sandwich6(BPB, m->B, P);
-    }
+    plr_motion_covariance_by_state(f, BPB);
     /* the terms that follow may cancel most of a variance: this covers their rounding */
     for (int i = 0; i < PLR_POSE_DIM; i++)
         P_xi[(PLR_POSE_DIM + 1) * i] = PLR_FMA(
             PLR_R(8) * PLR_EPSILON, P_xi[(PLR_POSE_DIM + 1) * i] + BPB[(PLR_POSE_DIM + 1) * i],
             P_xi[(PLR_POSE_DIM + 1) * i]);
-    if (plr_has_block(f, PLR_BLOCK_BIAS)) {
-        plr_real AP[PLR_POSE_SQUARE], cross[PLR_POSE_SQUARE];
-        plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_BIAS, P);
-        plr_mat6_mul(AP, A, P);
-        plr_mat6_mul_nt(cross, AP, m->B);
-        for (int i = 0; i < PLR_POSE_DIM; i++)
-            for (int j = 0; j < PLR_POSE_DIM; j++)
-                P_xi[PLR_POSE_DIM * i + j] += cross[PLR_POSE_DIM * i + j] +
-                                              cross[PLR_POSE_DIM * j + i] +
-                                              BPB[PLR_POSE_DIM * i + j];
-    }
+    if (drivers == 0)
+        return;
+    plr_real P_xd[PLR_MOTION_BY], AP[PLR_MOTION_BY] = {0}, cross[PLR_POSE_SQUARE] = {0};
+    plr_covariance_with_drivers(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P_xd);
+    plr_gemm_nn(PLR_POSE_DIM, drivers, PLR_POSE_DIM, A, PLR_POSE_DIM, P_xd, drivers, AP, drivers);
+    plr_gemm_nt(PLR_POSE_DIM, PLR_POSE_DIM, drivers, AP, drivers, m->B, PLR_DRIVERS, cross,
+                PLR_POSE_DIM);
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        for (int j = 0; j < PLR_POSE_DIM; j++)
+            P_xi[PLR_POSE_DIM * i + j] += cross[PLR_POSE_DIM * i + j] +
+                                          cross[PLR_POSE_DIM * j + i] + BPB[PLR_POSE_DIM * i + j];
 }

@@ -8,8 +8,8 @@
 
 #include "pelorus/state.h"
 
-/* Nothing accumulated: D = I, Q = 0, B = 0. */
-void plr_motion_clear(plr_motion *motion);
+/* Nothing accumulated: D = I, Q = 0, B = 0; velocity and biases as they are. */
+void plr_motion_clear(plr_filter *f);
 
 /* T <- T_WB without noise (mapping). */
 void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], const double p_WB[3]);
@@ -18,15 +18,20 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], co
  * found from the frame's observations (docs/MATH.md 4 and 10). */
 typedef struct plr_applied_motion {
     plr_real E[9], p[3];          /* D' = D Exp(L z) = (I + E, p) */
-    plr_real L[PLR_POSE_SQUARE];  /* lower triangle: L L^T = B P_bb B^T + Q; columns may be zero */
-    plr_real K[PLR_POSE_SQUARE];  /* L^-1 B: derivative of nu by the biases; zero rows where L
-                                     has zero columns */
+    plr_real L[PLR_POSE_SQUARE];  /* lower triangle: L L^T = B P_dd B^T + Q; columns may be zero */
+    plr_real K[PLR_MOTION_BY];    /* L^-1 B, 6 x drivers: derivative of nu by the drivers; zero rows
+                                     where L has zero columns */
     plr_real JL[PLR_POSE_SQUARE]; /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
     plr_real z[PLR_POSE_DIM];
 } plr_applied_motion;
 
-/* BPB = B P_bb B^T, the biases' part of the accumulated motion's covariance BPB + Q; 6x6. */
-void plr_motion_covariance_by_bias(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]);
+/* BPB = B P_dd B^T, the drivers' part of the accumulated motion's covariance BPB + Q; 6x6. */
+void plr_motion_covariance_by_state(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]);
+
+/* X <- L^-1 X, 6 x columns with leading dimension ld: L is a lower triangle as in
+ * plr_applied_motion. */
+void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_real *X,
+                      unsigned ld);
 
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);

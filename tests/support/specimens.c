@@ -137,9 +137,14 @@ void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion) {
     for (int i = 0; i < 36; i++)
         motion->Q[i] = (plr_real)(Q[i] * 1e-4);
     for (int i = 0; f->config.bias && i < 36; i++)
-        motion->B[i] = (plr_real)(0.05 * rng_normal(r));
+        motion->B[PLR_DRIVERS * (i / 6) + i % 6] = (plr_real)(0.05 * rng_normal(r));
     motion->seconds = PLR_R(0.1);
     motion->pending = motion->noisy = 1;
+}
+
+void specimen_bias_derivative(const plr_motion *motion, double B[36]) {
+    for (int i = 0; i < 6; i++)
+        to_doubles(B + 6 * i, motion->B + PLR_DRIVERS * i, 6);
 }
 
 plr_measurement specimen_measurement(const plr_filter *f, unsigned slot,

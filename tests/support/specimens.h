@@ -22,6 +22,9 @@ void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, uns
 /* P, dim x dim in double; to be freed. */
 double *specimen_covariance(const plr_filter *f);
 
+/* B of a motion by twists, 6x6: the derivative by their biases. */
+void specimen_bias_derivative(const plr_motion *motion, double B[36]);
+
 /* A random twist in `motion`: what 0.1 s of driving accumulates, with Q and, if the filter has
  * biases, B. The pose is not moved. */
 void specimen_motion(const plr_filter *f, rng *r, plr_motion *motion);

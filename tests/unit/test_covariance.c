@@ -6,7 +6,7 @@
 #include <unity.h>
 
 #include "math/packed.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "support/covariance_twin.h"
@@ -167,7 +167,7 @@ static void test_transport_agrees(void) {
 /* P of x <- F x + G (B db + noise), F given, with noise covariance Q. */
 static void expect_motion(const plr_motion *motion, double *F, const double *G) {
     double B[36], Q[36], *GB = specimen_zeros(twin.n, 6), *noise = specimen_zeros(twin.n, twin.n);
-    to_doubles(B, motion->B, 36);
+    specimen_bias_derivative(motion, B);
     to_doubles(Q, motion->Q, 36);
     if (twin.filter.config.bias) {
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, twin.n, 6, 6, 1, G, B, 0, GB);
@@ -195,7 +195,7 @@ static void check_predict_pose(void) {
     expect_motion(&motion, F, G);
     plr_real BPB[36], M[36];
     twin.filter.motion = motion;
-    plr_motion_covariance_by_bias(&twin.filter, BPB);
+    plr_motion_covariance_by_state(&twin.filter, BPB);
     for (int i = 0; i < 36; i++)
         M[i] = BPB[i] + motion.Q[i];
     plr_covariance_predict_pose(&twin.filter, A, motion.B, M);
@@ -213,7 +213,7 @@ static void check_walk(void) {
         return;
     twin.filter.par.bias_velocity_walk = PLR_R(0.125);
     twin.filter.par.bias_gyro_walk = PLR_R(0.03125);
-    plr_twist_walk(&twin.filter, 2);
+    plr_process_twist.walk(&twin.filter, 2);
     for (unsigned i = 6; i < 12; i++)
         twin.expected[i * twin.n + i] += i < 9 ? 0.25 : 0.0625;
     twin_demand_expected(1);

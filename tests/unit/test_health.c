@@ -5,7 +5,7 @@
 
 #include "filter/consistency.h"
 #include "filter/health.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "support/specimens.h"
 
 static plr_filter filter;
@@ -233,7 +233,7 @@ static void test_a_scene_that_disagrees_with_itself_is_said(void) {
 
 static void test_a_bias_beyond_its_prior_is_said(void) {
     filter.config.bias = 1;
-    plr_twist_lay_out(&filter);
+    plr_process_twist.lay_out(&filter);
     for (int k = 0; k < 6; k++) {
         filter.bias[k] = filter.bias_prior[k] = PLR_R(0.2);
         filter.bias_prior_sigma[k] = PLR_R(0.01);

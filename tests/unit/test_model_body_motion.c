@@ -8,7 +8,7 @@
 
 #include "filter/predict.h"
 #include "math/packed.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -75,7 +75,7 @@ static void drive_filter(void) {
         to_reals(reading, drive.twist[k], 6);
         to_doubles(drive.twist[k], reading, 6);
         drive.seconds[k] = (double)PLR_R(0.02);
-        plr_twist_step(&filter, filter.t_ns + 20000000, reading, PLR_R(0.02), PLR_R(0.02));
+        plr_process_twist.step(&filter, filter.t_ns + 20000000, reading, PLR_R(0.02), PLR_R(0.02));
     }
     to_doubles(drive.bias, filter.bias, 6);
     displacement((const double[6]){0}, drive.estimate);

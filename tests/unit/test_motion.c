@@ -8,7 +8,7 @@
 
 #include "filter/predict.h"
 #include "math/packed.h"
-#include "process/twist.h"
+#include "process/process.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/pose.h"
@@ -66,20 +66,22 @@ static void random_reading(plr_real reading[6], double same[6]) {
 /* ---------------------------------------------------------------- clear and check */
 
 static void test_cleared_motion_is_none(void) {
-    plr_motion motion;
-    memset(&motion, 0xFF, sizeof motion);
-    plr_motion_clear(&motion);
+    memset(&filter.motion, 0xFF, sizeof filter.motion);
+    plr_motion_clear(&filter);
+    const plr_motion motion = filter.motion;
     double D[16], identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     to_small_motion(D, motion.E, motion.p);
     TEST_ASSERT_DOUBLE_WITHIN(0, 0, largest_difference(identity, D, 16));
     for (int i = 0; i < 36; i++)
-        TEST_ASSERT_TRUE(motion.Q[i] == 0 && motion.B[i] == 0);
+        TEST_ASSERT_TRUE(motion.Q[i] == 0);
+    for (int i = 0; i < PLR_MOTION_BY; i++)
+        TEST_ASSERT_TRUE(motion.B[i] == 0);
     TEST_ASSERT_TRUE(motion.pending == 0 && motion.noisy == 0 && motion.seconds == 0);
 }
 
 static plr_status check(double v, double w, double seconds) {
     const plr_real reading[6] = {(plr_real)v, 0, 0, 0, (plr_real)w, 0};
-    return plr_twist_check(&filter, reading, (plr_real)seconds);
+    return plr_process_twist.check(&filter, reading, (plr_real)seconds);
 }
 
 static void test_a_step_holds_up_to_pi_and_a_kilometre(void) {
@@ -114,7 +116,7 @@ static void test_steps_move_the_pose_by_exponentials(void) {
         rigid_exp(D, xi);
         square_multiply(4, T, D, next);
         memcpy(T, next, sizeof T);
-        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     pose_of(got);
     TEST_ASSERT_DOUBLE_WITHIN(30 * STEPS * eps, 0, largest_difference(T, got, 16));
@@ -130,7 +132,7 @@ static void test_far_from_the_origin_small_steps_are_not_lost(void) {
         filter.R_WB[i] = i % 4 == 0;
     filter.p_WB[0] = 1e4;
     for (int k = 0; k < 10000; k++)
-        plr_twist_step(&filter, filter.t_ns + 10000000, creep, PLR_R(0.01), PLR_R(0.01));
+        plr_process_twist.step(&filter, filter.t_ns + 10000000, creep, PLR_R(0.01), PLR_R(0.01));
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1e4 + 1, filter.p_WB[0]);
 }
 
@@ -141,7 +143,7 @@ static void test_the_motion_accumulates_as_a_product(void) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
-        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     pose_of(end);
     rigid_inverse(inverse, start);
@@ -177,11 +179,11 @@ static void test_noise_and_bias_jacobian_follow_their_recursions(void) {
         oracle_gemm(ORACLE_PLAIN, ORACLE_PLAIN, 6, 6, 6, 1, A, B, 0, next);
         for (int i = 0; i < 36; i++)
             B[i] = next[i] - tau * Jr[i];
-        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     double got_Q[36], got_B[36];
     to_doubles(got_Q, filter.motion.Q, 36);
-    to_doubles(got_B, filter.motion.B, 36);
+    specimen_bias_derivative(&filter.motion, got_B);
     TEST_ASSERT_DOUBLE_WITHIN(30 * STEPS * eps, 0, specimen_gap(6, Q, got_Q));
     TEST_ASSERT_DOUBLE_WITHIN(30 * STEPS * eps, 0, largest_difference(B, got_B, 36));
 }
@@ -193,7 +195,7 @@ static void test_bias_jacobian_agrees_with_differences(void) {
     for (int k = 0; k < STEPS; k++) {
         plr_real reading[6];
         random_reading(reading, twists[k]);
-        plr_twist_step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
+        plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
     for (int j = 0; j < 6; j++) {
         double D[3][16];
@@ -217,7 +219,7 @@ static void test_bias_jacobian_agrees_with_differences(void) {
         rigid_vee(behind, product);
         for (int i = 0; i < 6; i++)
             TEST_ASSERT_DOUBLE_WITHIN(1e-8 + 30 * STEPS * eps, (ahead[i] - behind[i]) / (2 * h),
-                                      (double)filter.motion.B[6 * i + j]);
+                                      (double)filter.motion.B[PLR_DRIVERS * i + j]);
     }
 }
 
@@ -229,7 +231,8 @@ static double charged(plr_noise_kind noise, double part_s, int parts) {
     filter.config.noise = (uint8_t)noise;
     filter.par.velocity_variance[0] = PLR_R(4);
     for (int k = 0; k < parts; k++)
-        plr_twist_step(&filter, filter.t_ns + 1000000, standing, (plr_real)part_s, PLR_R(0.1));
+        plr_process_twist.step(&filter, filter.t_ns + 1000000, standing, (plr_real)part_s,
+                               PLR_R(0.1));
     return (double)filter.motion.Q[0];
 }
 
@@ -262,7 +265,9 @@ static void test_a_jump_is_exact_and_free_of_noise(void) {
     TEST_ASSERT_DOUBLE_WITHIN(50 * eps, 0, largest_difference(expected, got, 16));
     TEST_ASSERT_EQUAL_UINT8(0, filter.motion.noisy);
     for (int i = 0; i < 36; i++)
-        TEST_ASSERT_TRUE(filter.motion.Q[i] == 0 && filter.motion.B[i] == 0);
+        TEST_ASSERT_TRUE(filter.motion.Q[i] == 0);
+    for (int i = 0; i < PLR_MOTION_BY; i++)
+        TEST_ASSERT_TRUE(filter.motion.B[i] == 0);
 }
 
 static double distance_from_rotation(void) {
@@ -298,7 +303,7 @@ static void test_a_correction_makes_the_rotation_one_again(void) {
 static void test_the_rotation_stays_one_through_an_hour_of_steps(void) {
     const plr_real turning[6] = {PLR_R(1), 0, 0, PLR_R(0.1), PLR_R(-0.3), PLR_R(0.5)};
     for (int k = 0; k < 360000; k++)
-        plr_twist_step(&filter, filter.t_ns + 10000000, turning, PLR_R(0.01), PLR_R(0.01));
+        plr_process_twist.step(&filter, filter.t_ns + 10000000, turning, PLR_R(0.01), PLR_R(0.01));
     TEST_ASSERT_DOUBLE_WITHIN(10 * eps, 0, distance_from_rotation());
 }
 
@@ -309,7 +314,7 @@ static void drive(void) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
-        plr_twist_step(&filter, filter.t_ns + 10000000, reading, PLR_R(0.01), PLR_R(0.01));
+        plr_process_twist.step(&filter, filter.t_ns + 10000000, reading, PLR_R(0.01), PLR_R(0.01));
     }
 }
 
@@ -319,7 +324,7 @@ static void add_share_of_bias(double P[36]) {
     double B[36], same[36], share[36];
     plr_covariance_get(&before, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     to_doubles(same, P_b, 36);
-    to_doubles(B, before.motion.B, 36);
+    specimen_bias_derivative(&before.motion, B);
     oracle_sandwich(6, 6, B, same, share);
     for (int i = 0; i < 36; i++)
         P[i] += 1e-4 * share[i];

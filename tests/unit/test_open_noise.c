@@ -61,7 +61,8 @@ static void take_specimen(noise_kind kind, bool bias, bool shifted) {
     filter.par.bias_velocity_walk = filter.par.bias_gyro_walk = 0; /* tests of motion.c */
     set_noise(kind, &filter.motion);
     for (unsigned i = 0; bias && i < 36; i++) /* as a tenth of a second of driving leaves it */
-        filter.motion.B[i] = (plr_real)(0.01 * rng_normal(&chance) - (i % 7 == 0 ? 0.1 : 0));
+        filter.motion.B[PLR_DRIVERS * (i / 6) + i % 6] =
+            (plr_real)(0.01 * rng_normal(&chance) - (i % 7 == 0 ? 0.1 : 0));
     plr_motion_prior(&filter, &motion);
     rng_normals(&chance, kind == HUGE_NOISE ? 0.01 : 1, z_double, 6);
     if (shifted)
@@ -88,7 +89,7 @@ static void check_factor(noise_kind kind, bool bias, bool shifted) {
         plr_real real[36];
         plr_covariance_get(&filter, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, real);
         to_doubles(P_b, real, 36);
-        to_doubles(B, filter.motion.B, 36);
+        specimen_bias_derivative(&filter.motion, B);
         oracle_sandwich(6, 6, B, P_b, share);
         for (unsigned i = 0; i < 36; i++)
             M[i] += 1.0001 * share[i];
@@ -138,7 +139,7 @@ static void add_motion(double *P, bool bias) {
     double *GJ = entrance(), *C = specimen_zeros(n, 6), *X = specimen_zeros(n, n);
     double L[36], M[36], B[36], *own = specimen_zeros(n, n);
     to_doubles(L, motion.L, 36);
-    to_doubles(B, filter.motion.B, 36);
+    specimen_bias_derivative(&filter.motion, B);
     oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, 6, 6, 6, 1, L, L, 0, M);
     for (unsigned i = 0; bias && i < n; i++)
         oracle_gemm(ORACLE_PLAIN, ORACLE_TRANSPOSED, 1, 6, 6, 1, P + i * n + 6, B, 0, C + 6 * i);

@@ -181,7 +181,20 @@ static void test_every_field_is_carried(void) {
         *counts[i] = (uint32_t)rng_bits(&chance);
     for (unsigned i = 0; i < sizeof sums / sizeof *sums; i++)
         *sums[i] = rng_bits(&chance);
-    fill_reals(&chance, driven.motion.B, 36);
+    fill_reals(&chance, driven.motion.B, PLR_MOTION_BY);
+    fill_reals(&chance, (plr_real *)(void *)&driven.core_motion,
+               sizeof driven.core_motion / sizeof(plr_real));
+    fill_reals(&chance, driven.inertial.velocity, PLR_VELOCITY_DIM);
+    fill_reals(&chance, driven.inertial.slow, PLR_POSE_DIM);
+    fill_reals(&chance, driven.inertial.change2, 2);
+    fill_reals(&chance, &driven.inertial.usual_s, 1);
+    driven.inertial.started_ns = rng_bits(&chance);
+    driven.inertial.still_ns = rng_bits(&chance);
+    driven.inertial.repeated = 0x1A2B;
+    driven.inertial.out_of_line = 0x3C4D;
+    driven.inertial.frames = 0x5E6F;
+    driven.inertial.started = driven.inertial.pose_given = driven.inertial.anchored = 1;
+    driven.inertial.fault = PLR_IMU_FAULT_SPIKE;
     fill_reals(&chance, driven.bias, PLR_BIAS_DIM);
     fill_reals(&chance, driven.bias_prior, PLR_BIAS_DIM);
     fill_reals(&chance, driven.bias_prior_sigma, PLR_BIAS_DIM);
@@ -262,9 +275,9 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 /* docs/STATE-FORMAT.md, by its own figures. */
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
-    const uint32_t count_at = 13 + 9 * 31 + 17 * real;
-    const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 107 * real;
-    const uint32_t health_at = frames_at + 4 + 6 + 4 + 144 * real;
+    const uint32_t count_at = 13 + 9 * 44 + 17 * real;
+    const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 143 * real;
+    const uint32_t health_at = frames_at + 4 + 16 + 10 + 6 + 4 + 327 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
     const uint32_t slots_at = totals_at + 68 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
@@ -273,9 +286,9 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t dim = 12 + 3 * driven.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
-    TEST_ASSERT_EQUAL_UINT32(2, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(3, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
-    TEST_ASSERT_EQUAL_UINT(31, state.bytes[12]);
+    TEST_ASSERT_EQUAL_UINT(44, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.frame_number, number_at(frames_at, 4));
@@ -287,7 +300,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(511 + 268 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(654 + 487 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
                              state.length);
 }

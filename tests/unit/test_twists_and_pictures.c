@@ -202,7 +202,7 @@ static void test_twists_that_are_contradicted_are_believed_less(void) {
 /* As long as it lasts the pose's covariance reaches from one story to the other. */
 static void test_the_covariance_covers_both_stories(void) {
     plr_real C[36] = {0};
-    plr_motion_clear(&filter.motion);
+    plr_motion_clear(&filter);
     plr_consistency_enlarge(&filter, C);
     for (unsigned i = 0; i < 36; i++)
         TEST_ASSERT_EQUAL_DOUBLE(0, (double)C[i]);

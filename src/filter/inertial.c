@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: MIT
+/* Readings of an IMU: bad ones are refused, those of before the start are averaged, all others move
+ * the state. */
+#include "filter/inertial.h"
+
+#include <string.h>
+
+#include "filter/filter_internal.h"
+#include "filter/guard.h"
+#include "filter/predict.h"
+#include "math/small.h"
+#include "process/alignment.h"
+#include "process/process.h"
+
+enum {
+    MOST_REPEATED = 10, /* successive readings of the same six numbers: noise never does that */
+    MOST_SPIKES = 2     /* successive ones: a third is no fault of the sensor but a shock */
+};
+
+/* A spike differs from the reading before by this many times what readings usually differ, and by
+ * no less than this. */
+#define SPIKE_CHANGES PLR_R(30)
+#define SPIKE_ACCEL   PLR_R(60) /* m/s^2 */
+#define SPIKE_GYRO    PLR_R(10) /* rad/s */
+/* What an average keeps of a new interval, and of a new difference. */
+#define INTERVAL_SHARE PLR_R(0.0625)
+#define CHANGE_SHARE   PLR_R(0.015625)
+/* The mean reading covers about this much, s. */
+#define SLOW_S PLR_R(0.5)
+/* The largest velocity that can be set, m/s. */
+#define MAX_VELOCITY 1e4
+
+static plr_status refuse(plr_filter *f, plr_status status, plr_imu_fault fault) {
+    if (fault != PLR_IMU_FAULT_NONE)
+        f->inertial.fault = (uint8_t)fault;
+    f->totals.twists_refused++;
+    return plr_filter_refuse(f, status);
+}
+
+static bool is_at(double value, double range) {
+    return range > 0 && (value >= range || value <= -range);
+}
+
+/* The square of the difference from the last reading, of three numbers from `first` on. */
+static plr_real change2_of(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                           unsigned first) {
+    plr_real off[3];
+    for (unsigned i = 0; i < 3; i++)
+        off[i] = reading[first + i] - f->reading[first + i];
+    return plr_dot3(off, off);
+}
+
+static bool is_spike(const plr_filter *f, const plr_real change2[2]) {
+    const plr_real least[2] = {SPIKE_ACCEL, SPIKE_GYRO};
+    if (!f->reading_valid || f->inertial.out_of_line >= MOST_SPIKES)
+        return false;
+    for (unsigned i = 0; i < 2; i++)
+        if (change2[i] > least[i] * least[i] &&
+            change2[i] > SPIKE_CHANGES * SPIKE_CHANGES * f->inertial.change2[i])
+            return true;
+    return false;
+}
+
+/* What is wrong with a reading by itself and beside the last one; counts repetitions. */
+static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
+                                const plr_real reading[PLR_POSE_DIM], const plr_real change2[2]) {
+    plr_inertial *s = &f->inertial;
+    for (unsigned i = 0; i < 3; i++)
+        if (is_at(imu->a_B_mps2[i], f->config.accel_range_mps2) ||
+            is_at(imu->w_B_radps[i], f->config.gyro_range_radps))
+            return PLR_IMU_FAULT_SATURATED;
+    const bool same = f->reading_valid && memcmp(reading, f->reading, sizeof f->reading) == 0;
+    s->repeated = same ? (uint16_t)(s->repeated + (s->repeated < UINT16_MAX)) : 0;
+    if (s->repeated >= MOST_REPEATED)
+        return PLR_IMU_FAULT_FROZEN;
+    if (is_spike(f, change2)) {
+        s->out_of_line++;
+        return PLR_IMU_FAULT_SPIKE;
+    }
+    s->out_of_line = 0;
+    return PLR_IMU_FAULT_NONE;
+}
+
+/* Averages over the readings: their interval, how much they change, and their mean. */
+static void learn(plr_filter *f, const plr_real reading[PLR_POSE_DIM], plr_real interval,
+                  const plr_real change2[2]) {
+    plr_inertial *s = &f->inertial;
+    if (!(interval > 0))
+        return;
+    if (!(s->usual_s > 0) || interval < PLR_R(0.5) * s->usual_s)
+        s->usual_s = interval;
+    else if (interval < PLR_R(1.5) * s->usual_s)
+        s->usual_s = PLR_FMA(INTERVAL_SHARE, interval - s->usual_s, s->usual_s);
+    for (unsigned i = 0; i < 2; i++)
+        s->change2[i] = PLR_FMA(CHANGE_SHARE, change2[i] / PLR_R(3) - s->change2[i], s->change2[i]);
+    const plr_real share = interval < SLOW_S ? interval / SLOW_S : PLR_R(1);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        s->slow[i] = PLR_FMA(share, reading[i] - s->slow[i], s->slow[i]);
+}
+
+plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
+    plr_real reading[PLR_POSE_DIM];
+    if (!f || !imu)
+        return PLR_E_ARGUMENT;
+    const plr_status sound = plr_guard_check(f);
+    if (sound != PLR_OK)
+        return sound;
+    if (f->config.process != PLR_PROCESS_IMU)
+        return refuse(f, PLR_E_MODE, PLR_IMU_FAULT_NONE);
+    for (unsigned i = 0; i < 3; i++) {
+        reading[i] = (plr_real)imu->a_B_mps2[i];
+        reading[3 + i] = (plr_real)imu->w_B_radps[i];
+    }
+    if (!plr_all_finite(imu->a_B_mps2, 3) || !plr_all_finite(imu->w_B_radps, 3))
+        return refuse(f, PLR_E_NOT_FINITE, PLR_IMU_FAULT_NOT_FINITE);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        if (!plr_is_finite(reading[i]))
+            return refuse(f, PLR_E_RANGE, PLR_IMU_FAULT_NONE);
+
+    plr_real interval = 0;
+    plr_status status = plr_predict_check(f, t_ns, reading, &interval);
+    if (status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
+        return plr_predict_accept(f, t_ns, reading, status);
+    const plr_real change2[2] = {change2_of(f, reading, 0), change2_of(f, reading, 3)};
+    const plr_imu_fault fault = find_fault(f, imu, reading, change2);
+    if (fault != PLR_IMU_FAULT_NONE)
+        return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
+    if (f->reading_valid)
+        learn(f, reading, interval, change2);
+    if (f->inertial.started)
+        return plr_predict_accept(f, t_ns, reading, PLR_OK);
+    (void)plr_alignment_add(f, t_ns, reading);
+    status = plr_predict_accept(f, t_ns, reading, PLR_OK);
+    plr_guard_seal_whole(f); /* the start sets P */
+    return status;
+}
+
+/* ---------------------------------------------------------------- frames and the start */
+
+/* A point that has moved by more than this many sigmas of its pixel, in the mean. */
+#define MOVED_SIGMAS PLR_R(4)
+
+/* The watched point of this id, or a free place for it; NULL if there is none. */
+static plr_watched_point *watched(plr_alignment *at, uint32_t id) {
+    plr_watched_point *free = NULL;
+    for (unsigned i = 0; i < PLR_WATCHED_POINTS; i++) {
+        if (at->points[i].used && at->points[i].id == id)
+            return &at->points[i];
+        if (!at->points[i].used && !free)
+            free = &at->points[i];
+    }
+    return free;
+}
+
+void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
+    plr_real moved2 = 0;
+    unsigned seen = 0;
+    for (unsigned k = 0; k < n; k++) {
+        const plr_observation *o = &frame->observations[f->work.order[k]];
+        plr_watched_point *point = watched(&f->inertial.alignment, o->id);
+        if (!point)
+            continue;
+        if (!point->used) {
+            point->used = 1;
+            point->id = o->id;
+            point->u_px = o->uL_px;
+            point->v_px = o->vL_px;
+            continue;
+        }
+        const plr_real du = (plr_real)(o->uL_px - point->u_px);
+        const plr_real dv = (plr_real)(o->vL_px - point->v_px);
+        moved2 += du * du + dv * dv;
+        seen++;
+    }
+    const plr_real still2 = PLR_R(4) * f->par.pixel_variance; /* of two differences of two pixels */
+    if (seen < 3 || moved2 <= MOVED_SIGMAS * still2 * (plr_real)seen)
+        return;
+    plr_alignment_restart(f);
+    f->inertial.fault = PLR_IMU_FAULT_MOVES;
+}
+
+void plr_filter_anchor(plr_filter *f, const plr_report *report) {
+    if (f->config.process != PLR_PROCESS_IMU)
+        return;
+    f->inertial.frames =
+        (uint16_t)(f->inertial.frames + (report->used > 0 && f->inertial.frames < UINT16_MAX));
+    if (plr_alignment_wants_anchor(f))
+        plr_alignment_anchor(f);
+}
+
+plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
+                                   const double variance[3]) {
+    plr_real v[3], P_v[3];
+    if (!f || !v_B_mps || !variance)
+        return PLR_E_ARGUMENT;
+    const plr_status sound = plr_guard_check_whole(f);
+    if (sound != PLR_OK)
+        return sound;
+    if (f->config.process != PLR_PROCESS_IMU || !f->inertial.pose_given || f->count > 0 ||
+        f->motion.pending)
+        return plr_filter_refuse(f, PLR_E_MODE);
+    if (!plr_all_finite(v_B_mps, 3) || !plr_all_finite(variance, 3))
+        return plr_filter_refuse(f, PLR_E_NOT_FINITE);
+    if (!plr_all_within(v_B_mps, 3, MAX_VELOCITY) || !plr_all_within(variance, 3, PLR_MAX_VARIANCE))
+        return plr_filter_refuse(f, PLR_E_RANGE);
+    for (unsigned i = 0; i < 3; i++) {
+        if (variance[i] < 0)
+            return plr_filter_refuse(f, PLR_E_ARGUMENT);
+        v[i] = (plr_real)v_B_mps[i];
+        P_v[i] = (plr_real)variance[i];
+    }
+    plr_alignment_given(f, v, P_v);
+    plr_guard_seal_whole(f);
+    return PLR_OK;
+}
+
+plr_imu_fault plr_filter_imu_fault(const plr_filter *f) {
+    return f && f->magic == PLR_FILTER_MAGIC && f->inertial.fault < PLR_IMU_FAULTS
+               ? (plr_imu_fault)f->inertial.fault
+               : PLR_IMU_FAULT_NONE;
+}

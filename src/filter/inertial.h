@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+/* What a frame does for the start of an IMU. */
+#ifndef PLR_FILTER_INERTIAL_H
+#define PLR_FILTER_INERTIAL_H
+
+#include "pelorus/filter.h"
+
+/* A frame of before the start, with n valid observations in work.order: if its points have moved
+ * since the readings began to be averaged, the body does not stand, and they begin anew. */
+void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n);
+
+/* After a frame: fixes position and yaw anew some time after a start in motion. */
+void plr_filter_anchor(plr_filter *f, const plr_report *report);
+
+#endif

@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: MIT
+#include "process/alignment.h"
+
+#include <string.h>
+
+#include "math/dense.h"
+#include "math/small.h"
+#include "math/so3.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
+#include "state/pose.h"
+
+/* At rest this much is averaged, and after so long without rest the body counts as moving. */
+#define REST_NS   UINT64_C(1000000000)
+#define MOVING_NS UINT64_C(3000000000)
+/* A start in motion takes gravity from this much. */
+#define GLANCE_NS UINT64_C(100000000)
+/* At rest the readings spread by no more than this about their mean, besides their noise, and the
+ * means of both halves agree to a part of it: a running engine is allowed, a walking hand is not. */
+#define SPREAD_ACCEL PLR_R(0.5)  /* m/s^2 */
+#define SPREAD_GYRO  PLR_R(0.05) /* rad/s */
+#define DRIFT_SHARE  PLR_R(0.2)
+/* A gyro at rest that shows more than so many sigmas of its bias, and this, is turning. */
+#define BIAS_SIGMAS PLR_R(5)
+#define SLOW_TURN   PLR_R(0.02) /* rad/s */
+/* What is known of velocity at rest, m/s, and of tilt at a start in motion, rad. */
+#define REST_VELOCITY PLR_R(0.01)
+#define TILT          PLR_R(0.2)
+/* Nothing is known better, as a variance: rad^2, m^2. */
+#define LEAST PLR_R(1e-8)
+/* A mean reading differs so much from gravity, m/s^2, that its units or the sensor are wrong. */
+#define NOT_GRAVITY PLR_R(1.5)
+/* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
+#define OTHER_TILT PLR_R(0.06)
+/* The anchor comes this much after a start in motion, if this many frames were used. */
+#define ANCHOR_NS UINT64_C(2000000000)
+enum { ANCHOR_FRAMES = 10 };
+
+void plr_alignment_clear(plr_filter *f) {
+    memset(&f->inertial, 0, sizeof f->inertial);
+}
+
+void plr_alignment_restart(plr_filter *f) {
+    const plr_time_ns first = f->inertial.alignment.first_ns;
+    memset(&f->inertial.alignment, 0, sizeof f->inertial.alignment);
+    f->inertial.alignment.first_ns = first;
+}
+
+/* Mean and spread of the readings so far (Welford). */
+static void average(plr_alignment *at, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
+    if (at->first_ns == 0)
+        at->first_ns = t_ns;
+    if (at->count == 0)
+        at->begin_ns = t_ns;
+    at->count++;
+    const plr_real share = PLR_R(1) / (plr_real)at->count;
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
+        const plr_real off = reading[i] - at->mean[i];
+        at->mean[i] = PLR_FMA(share, off, at->mean[i]);
+        plr_real *spread = &at->spread2[i / 3];
+        *spread = PLR_FMA(off, reading[i] - at->mean[i], *spread);
+    }
+    if (2 * (t_ns - at->begin_ns) <= REST_NS)
+        memcpy(at->half_mean, at->mean, sizeof at->half_mean);
+}
+
+/* True if three numbers spread and drift no more than a body at rest. `noise` is the variance of one
+ * reading. */
+static bool is_steady(const plr_alignment *at, unsigned first, plr_real allowed, plr_real noise) {
+    const plr_real readings = (plr_real)at->count, limit = allowed * allowed + PLR_R(4) * noise;
+    plr_real drift[3];
+    for (unsigned i = 0; i < 3; i++)
+        drift[i] = at->mean[first + i] - at->half_mean[first + i];
+    const plr_real most =
+        DRIFT_SHARE * DRIFT_SHARE * allowed * allowed + PLR_R(36) * noise / readings;
+    return at->spread2[first / 3] <= PLR_R(3) * limit * readings && plr_dot3(drift, drift) <= most;
+}
+
+static bool is_at_rest(const plr_filter *f, const plr_alignment *at, plr_real interval) {
+    const plr_real sigma = f->bias_prior_sigma[3], turn = BIAS_SIGMAS * sigma + SLOW_TURN;
+    plr_real rate[3];
+    for (unsigned i = 0; i < 3; i++)
+        rate[i] = at->mean[3 + i] - f->bias_prior[3 + i];
+    return is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval) &&
+           is_steady(at, 3, SPREAD_GYRO, f->par.gyro_density / interval) &&
+           plr_dot3(rate, rate) <= turn * turn;
+}
+
+/* ---------------------------------------------------------------- the start */
+
+/* Turns R_WB by the smallest angle that makes R_WB^T e_z = u, the measured up. */
+static void tilt(plr_filter *f, const plr_real u[3]) {
+    static const plr_real half_turn[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+    plr_real before[9], axis[3], W[9], turn[9];
+    memcpy(before, f->R_WB, sizeof before);
+    if (plr_dot3(u, before + 6) < PLR_R(-0.9)) /* the formula below has no answer there */
+        plr_mat3_mul(f->R_WB, before, half_turn);
+    const plr_real *up = f->R_WB + 6; /* R_WB^T e_z, to which u is to be turned */
+    plr_cross3(axis, u, up);
+    const plr_real share = PLR_R(1) / (PLR_R(1) + plr_dot3(u, up));
+    plr_skew(W, axis);
+    plr_mat3_mul(turn, W, W);
+    for (int i = 0; i < 9; i++)
+        turn[i] = PLR_FMA(share, turn[i], W[i]) + (i % 4 == 0 ? PLR_R(1) : PLR_R(0));
+    memcpy(before, f->R_WB, sizeof before);
+    plr_mat3_mul(f->R_WB, before, turn);
+    plr_so3_orthonormalise(f->R_WB);
+    plr_so3_orthonormalise(f->R_WB);
+}
+
+/* The pose's covariance with what is known of the tilt: position and heading stay as they were set.
+ * `theta` is the covariance of the tilt, 3x3, across u. */
+static void set_tilt_covariance(plr_filter *f, const plr_real u[3], const plr_real theta[9]) {
+    plr_real P[PLR_POSE_SQUARE], Pu[3], heading;
+    double P_xi[PLR_POSE_SQUARE] = {0};
+    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
+    for (unsigned i = 0; i < 3; i++)
+        Pu[i] = plr_dot3(P + PLR_POSE_DIM * (3 + i) + 3, u);
+    heading = plr_dot3(Pu, u);
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++) {
+            P_xi[PLR_POSE_DIM * i + j] = (double)P[PLR_POSE_DIM * i + j];
+            P_xi[PLR_POSE_DIM * (3 + i) + 3 + j] =
+                (double)(theta[3 * i + j] + heading * u[i] * u[j] + (i == j ? LEAST : PLR_R(0)));
+        }
+    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
+}
+
+static void set_velocity(plr_filter *f, const plr_real v[3], const plr_real variance[3]) {
+    double P_v[PLR_VELOCITY_DIM * PLR_VELOCITY_DIM] = {0};
+    for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++) {
+        f->inertial.velocity[i] = v[i];
+        P_v[(PLR_VELOCITY_DIM + 1) * i] = (double)variance[i];
+    }
+    plr_covariance_begin(f, PLR_BLOCK_VELOCITY, P_v);
+}
+
+static void set_unknown_velocity(plr_filter *f, plr_real variance) {
+    static const plr_real none[3] = {0};
+    const plr_real same[3] = {variance, variance, variance};
+    set_velocity(f, none, same);
+}
+
+static void begin(plr_filter *f, plr_time_ns t_ns, plr_real interval) {
+    plr_inertial *s = &f->inertial;
+    s->started = 1;
+    s->started_ns = s->still_ns = t_ns;
+    s->usual_s = interval;
+    memcpy(s->slow, s->alignment.mean, sizeof s->slow);
+}
+
+/* The unit vector of the mean specific force less its bias; returns its length, m/s^2. */
+static plr_real measured_up(const plr_filter *f, plr_real u[3]) {
+    for (unsigned i = 0; i < 3; i++)
+        u[i] = f->inertial.alignment.mean[i] - f->bias[i];
+    const plr_real length = PLR_SQRT(plr_dot3(u, u));
+    for (unsigned i = 0; i < 3 && length > 0; i++)
+        u[i] /= length;
+    return length;
+}
+
+/* What speaks against a start by this mean specific force, if anything. */
+static plr_imu_fault find_fault(const plr_filter *f, const plr_real u[3], plr_real length,
+                                bool at_rest) {
+    const plr_real g = f->par.gravity;
+    if (length < PLR_R(0.3) * g && length > PLR_R(0.05) * g)
+        return PLR_IMU_FAULT_IN_G;
+    if (at_rest && plr_abs(length - g) > NOT_GRAVITY)
+        return PLR_IMU_FAULT_NOT_GRAVITY;
+    if (!f->inertial.pose_given)
+        return PLR_IMU_FAULT_NONE;
+    const plr_real cosine = plr_dot3(u, f->R_WB + 6);
+    if (cosine < PLR_R(-0.7))
+        return PLR_IMU_FAULT_UPSIDE_DOWN;
+    return at_rest && PLR_R(1) - cosine > OTHER_TILT ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
+}
+
+/* At rest: the mean rate is the gyro's bias, and the mean specific force points up, but for the
+ * accelerometer's bias: theta = [u]x db_a / g. */
+static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, const plr_real u[3]) {
+    enum { A = 0, G = 3 };
+    const plr_alignment *at = &f->inertial.alignment;
+    const plr_real seconds = interval * (plr_real)at->count;
+    const plr_real measured = f->par.gyro_density / seconds;
+    const plr_real flicker = f->par.accel_density / (seconds * f->par.gravity * f->par.gravity);
+    plr_real L[9], theta[9], cross[PLR_POSE_DIM * PLR_BIAS_DIM] = {0};
+    double variance[PLR_BIAS_DIM];
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
+    for (unsigned i = 0; i < 3; i++)
+        if (variance[G + i] > (double)measured) {
+            f->bias[G + i] = at->mean[G + i];
+            variance[G + i] = (double)measured;
+        }
+    plr_skew(L, u);
+    for (unsigned i = 0; i < 9; i++)
+        L[i] /= f->par.gravity;
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++) {
+            theta[3 * i + j] = flicker * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
+            for (unsigned k = 0; k < 3; k++)
+                theta[3 * i + j] += L[3 * i + k] * L[3 * j + k] * (plr_real)variance[A + k];
+            cross[PLR_POSE_DIM * (A + j) + 3 + i] = L[3 * i + j] * (plr_real)variance[A + j];
+        }
+    tilt(f, u);
+    plr_covariance_begin_diagonal(f, PLR_BLOCK_BIAS, variance);
+    set_unknown_velocity(f, REST_VELOCITY * REST_VELOCITY);
+    set_tilt_covariance(f, u, theta);
+    plr_covariance_set(f, PLR_BLOCK_BIAS, PLR_BLOCK_POSE, cross);
+    begin(f, t_ns, interval);
+    f->inertial.anchored = 1;
+}
+
+/* In motion: the tilt from a moment's mean, with a velocity that the first frames will find. */
+static void start_in_motion(plr_filter *f, plr_time_ns t_ns, plr_real interval,
+                            const plr_real u[3]) {
+    plr_real theta[9];
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++)
+            theta[3 * i + j] = TILT * TILT * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
+    tilt(f, u);
+    set_unknown_velocity(f, f->par.start_velocity_variance);
+    set_tilt_covariance(f, u, theta);
+    begin(f, t_ns, interval);
+}
+
+void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
+                         const plr_real variance[PLR_VELOCITY_DIM]) {
+    set_velocity(f, v, variance);
+    begin(f, f->t_ns, 0);
+    f->inertial.anchored = 1;
+}
+
+/* Starts if the stretch that was averaged is good for it. */
+static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
+    plr_alignment *at = &f->inertial.alignment;
+    plr_real u[3];
+    const plr_real interval =
+        (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
+    const plr_real length = measured_up(f, u);
+    if (at_rest && !is_at_rest(f, at, interval)) {
+        const bool turns = is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval);
+        f->inertial.fault = turns ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES;
+        return false;
+    }
+    f->inertial.fault = (uint8_t)find_fault(f, u, length, at_rest);
+    if (f->inertial.fault != PLR_IMU_FAULT_NONE && f->inertial.fault != PLR_IMU_FAULT_TILT)
+        return false;
+    if (at_rest)
+        start_at_rest(f, t_ns, interval, u);
+    else
+        start_in_motion(f, t_ns, interval, u);
+    return true;
+}
+
+bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
+    const plr_imu_start kind = (plr_imu_start)f->config.imu_start;
+    plr_alignment *at = &f->inertial.alignment;
+    if (kind == PLR_IMU_START_GIVEN) {
+        if (!f->inertial.pose_given)
+            return false;
+        set_unknown_velocity(f, f->par.start_velocity_variance);
+        begin(f, t_ns, 0);
+        return true;
+    }
+    average(at, t_ns, reading);
+    const plr_time_ns stretch = t_ns - at->begin_ns;
+    const bool may_move = kind == PLR_IMU_START_MOTION ||
+                          (kind == PLR_IMU_START_AUTO && t_ns - at->first_ns >= MOVING_NS);
+    bool started = false;
+    if (stretch >= REST_NS && kind != PLR_IMU_START_MOTION)
+        started = try_to_start(f, t_ns, true);
+    if (!started && may_move && stretch >= GLANCE_NS && at->count > 1)
+        started = try_to_start(f, t_ns, false);
+    if (!started && stretch >= REST_NS)
+        plr_alignment_restart(f);
+    return started;
+}
+
+/* ---------------------------------------------------------------- the anchor */
+
+bool plr_alignment_wants_anchor(const plr_filter *f) {
+    const plr_inertial *s = &f->inertial;
+    return s->started && !s->anchored && s->frames >= ANCHOR_FRAMES &&
+           f->t_ns - s->started_ns >= ANCHOR_NS && !f->motion.pending;
+}
+
+void plr_alignment_anchor(plr_filter *f) {
+    const plr_real variance = (plr_real)(f->config.start_sigma * f->config.start_sigma);
+    const plr_real *u = f->R_WB + 6;
+    plr_real A[PLR_POSE_SQUARE] = {0}, C[PLR_POSE_SQUARE] = {0};
+    for (unsigned i = 0; i < 3; i++) {
+        C[(PLR_POSE_DIM + 1) * i] = variance;
+        for (unsigned j = 0; j < 3; j++) {
+            const plr_real along = u[i] * u[j];
+            A[PLR_POSE_DIM * (3 + i) + 3 + j] = (i == j ? PLR_R(1) : PLR_R(0)) - along;
+            C[PLR_POSE_DIM * (3 + i) + 3 + j] = variance * along;
+        }
+    }
+    plr_covariance_turn_pose(f, A);
+    plr_covariance_add(f, PLR_BLOCK_POSE, C);
+    f->inertial.anchored = 1;
+}

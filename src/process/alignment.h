@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The start with an IMU (docs/MATH.md 19): tilt, velocity and biases, from readings at rest or in
+ * motion. Position and heading cannot be measured; they stay as they were set.
+ */
+#ifndef PLR_PROCESS_ALIGNMENT_H
+#define PLR_PROCESS_ALIGNMENT_H
+
+#include <stdbool.h>
+
+#include "pelorus/state.h"
+
+/* Not started, nothing averaged. */
+void plr_alignment_clear(plr_filter *f);
+
+/* Adds a reading (a, w) of before the start. True if the filter has started by it: pose, velocity
+ * and biases are set, with their covariance. There may be no landmarks. */
+bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]);
+
+/* The stretch that is averaged begins anew: the pictures show that the body moves. */
+void plr_alignment_restart(plr_filter *f);
+
+/* Starts with velocity v and the pose as they were set. */
+void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
+                         const plr_real variance[PLR_VELOCITY_DIM]);
+
+/* True if position and yaw are to be fixed anew, some time after a start in motion. */
+bool plr_alignment_wants_anchor(const plr_filter *f);
+
+/* Lays the world anew so that the present position and yaw are exact, or known to start_sigma: both
+ * are free. What tilt and velocity had added to their errors is gone. No motion may be pending. */
+void plr_alignment_anchor(plr_filter *f);
+
+#endif

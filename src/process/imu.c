@@ -1,0 +1,408 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The process `imu`: accelerometer and gyro move pose and velocity (docs/MATH.md 19). The body's axes
+ * are those of the IMU. The state before the landmarks is (rho, theta, v, b_a, b_g), with v in body
+ * axes: then a shift of the world, or a turn about the vertical, changes nothing but the pose, and
+ * the filter learns nothing of either.
+ */
+#include "process/process.h"
+
+#include <string.h>
+
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "math/so3.h"
+#include "process/imu.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
+#include "state/pose.h"
+
+/* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
+#define MAX_TURN PLR_R(3.1415926)
+#define MAX_WAY  PLR_R(1000)
+/* A reading that is held for more of the usual intervals than this is no mean any more. */
+#define LONG_INTERVALS PLR_R(2.5)
+
+/* Rows in the core, and columns among the drivers (theta, v, b_a, b_g). */
+enum { THETA = 3, VEL = 6, ACCEL = 9, GYRO = 12, DIM = PLR_CORE_DIM, D = PLR_DRIVERS };
+enum { D_THETA = 0, D_VEL = 3, D_ACCEL = 6, D_GYRO = 9 };
+enum { MOVED = 9 }; /* rows that a step changes: rho, theta, v */
+
+static void lay_out(plr_filter *f) {
+    static const uint8_t size[PLR_BLOCKS] = {PLR_POSE_DIM, PLR_VELOCITY_DIM, PLR_BIAS_DIM};
+    for (unsigned block = 0, row = 0; block < PLR_BLOCKS; row += size[block++]) {
+        f->layout.block[block].row = (uint8_t)row;
+        f->layout.block[block].size = size[block];
+    }
+    f->layout.core = DIM;
+    f->layout.driver = THETA;
+    f->layout.drivers = D;
+}
+
+void plr_imu_gravity(const plr_filter *f, plr_real gamma[3]) {
+    for (int i = 0; i < 3; i++)
+        gamma[i] = -f->par.gravity * f->R_WB[6 + i];
+}
+
+/* ---------------------------------------------------------------- one step */
+
+/* A step of constant rate w and specific force a, both without bias, over tau seconds. */
+typedef struct plr_imu_step {
+    plr_real tau;
+    plr_real a[3], gamma[3]; /* gamma: gravity in body axes before the step */
+    plr_real E[9], Et[9];    /* (I + E) = Exp(tau w); Et = Exp(tau w)^T */
+    plr_real G1[9], G2[9];   /* integrals of Exp(s w), once and twice, over tau and tau^2 */
+    plr_real d[3], v[3];     /* the way, in axes before the step; the velocity after it */
+} plr_imu_step;
+
+/* I c + s_1 W + s_2 W^2 */
+static void series(plr_real G[9], plr_real c, plr_real s1, plr_real s2, const plr_real W[9],
+                   const plr_real WW[9]) {
+    for (int i = 0; i < 9; i++)
+        G[i] = PLR_FMA(s2, WW[i], s1 * W[i]);
+    for (int i = 0; i < 9; i += 4)
+        G[i] += c;
+}
+
+static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DIM], plr_real tau,
+                      plr_imu_step *s) {
+    plr_real phi[3], W[9], WW[9], g1[3], g2[3], next[3];
+    plr_so3_series c;
+    s->tau = tau;
+    for (int i = 0; i < 3; i++) {
+        s->a[i] = reading[i] - f->bias[i];
+        phi[i] = tau * (reading[3 + i] - f->bias[3 + i]);
+    }
+    plr_imu_gravity(f, s->gamma);
+    plr_so3_series_at(&c, plr_dot3(phi, phi));
+    plr_skew(W, phi);
+    plr_mat3_mul(WW, W, W);
+    series(s->E, 0, c.a, c.b, W, WW);
+    series(s->G1, 1, c.b, c.c, W, WW);
+    series(s->G2, PLR_R(0.5), c.c, c.d, W, WW);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            s->Et[3 * i + j] = s->E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
+    plr_mat3_vec(g1, s->G1, s->a);
+    plr_mat3_vec(g2, s->G2, s->a);
+    const plr_real *v = f->inertial.velocity;
+    for (int i = 0; i < 3; i++) {
+        s->d[i] = tau * PLR_FMA(tau, PLR_FMA(PLR_R(0.5), s->gamma[i], g2[i]), v[i]);
+        next[i] = PLR_FMA(tau, s->gamma[i] + g1[i], v[i]);
+    }
+    plr_mat3_vec(s->v, s->Et, next);
+}
+
+static plr_status check(const plr_filter *f, const plr_real reading[PLR_READING_DIM],
+                        plr_real seconds) {
+    plr_real turn2 = 0, way2 = 0;
+    for (int i = 0; i < 3; i++) {
+        const plr_real turn = seconds * (reading[3 + i] - f->bias[3 + i]);
+        const plr_real way = seconds * (plr_abs(f->inertial.velocity[i]) +
+                                        seconds * (plr_abs(reading[i]) + f->par.gravity));
+        turn2 += turn * turn;
+        way2 += way * way;
+    }
+    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
+}
+
+/* ---------------------------------------------------------------- accumulation */
+
+/* C (3 x n, leading dimension ldc) <- s E^T A (3 x n, leading dimension lda) */
+static void turn_back(unsigned n, const plr_real Et[9], plr_real s, const plr_real *A, unsigned lda,
+                      plr_real *C, unsigned ldc) {
+    for (unsigned j = 0; j < n; j++) {
+        const plr_real x[3] = {s * A[j], s * A[lda + j], s * A[2 * lda + j]};
+        plr_real y[3];
+        plr_mat3_vec(y, Et, x);
+        for (unsigned i = 0; i < 3; i++)
+            C[i * ldc + j] = y[i];
+    }
+}
+
+static void put(plr_real *F, const plr_real block[9]) {
+    for (unsigned i = 0; i < 3; i++)
+        memcpy(F + DIM * i, block + 3 * i, 3 * sizeof *block);
+}
+
+/* The rows of F for rho, theta, v, 9 x 15: x+ = F x. Those of the biases are the identity. */
+static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
+    plr_real block[9], skew[9], forward[9], tau = s->tau;
+    plr_real *rho = F, *theta = F + THETA * DIM, *vel = F + VEL * DIM;
+    memset(F, 0, MOVED * DIM * sizeof *F);
+    put(rho, s->Et);
+    put(theta + THETA, s->Et);
+    put(vel + VEL, s->Et);
+    for (int i = 0; i < 3; i++) /* E^T (tau^2/2 gamma - d)x */
+        forward[i] = PLR_FMA(PLR_R(0.5) * tau * tau, s->gamma[i], -s->d[i]);
+    plr_skew(skew, forward);
+    turn_back(3, s->Et, 1, skew, 3, rho + THETA, DIM);
+    plr_skew(skew, s->gamma);
+    turn_back(3, s->Et, tau, skew, 3, vel + THETA, DIM);
+    for (int i = 0; i < 9; i++)
+        block[i] = tau * s->Et[i];
+    put(rho + VEL, block);
+    turn_back(3, s->Et, -tau * tau, s->G2, 3, rho + ACCEL, DIM);
+    turn_back(3, s->Et, -tau, s->G1, 3, vel + ACCEL, DIM);
+    for (int i = 0; i < 3; i++) /* -tau Jr, Jr = G1^T */
+        for (int j = 0; j < 3; j++)
+            theta[DIM * i + GYRO + j] = -tau * s->G1[3 * j + i];
+    plr_skew(skew, s->a);
+    turn_back(3, s->Et, tau * tau * tau / PLR_R(6), skew, 3, rho + GYRO, DIM);
+    turn_back(3, s->Et, PLR_R(0.5) * tau * tau, skew, 3, vel + GYRO, DIM);
+    plr_skew(skew, s->v); /* -tau [v+]x Jr */
+    for (int i = 0; i < 3; i++)
+        plr_gemm_nn(1, 3, 3, skew + 3 * i, 3, theta + GYRO, DIM, vel + DIM * i + GYRO, DIM);
+}
+
+/* The derivatives of the whole motion by the drivers: B of its error n, V of the velocity. */
+static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
+                                   const plr_real F[MOVED * DIM]) {
+    plr_real *B = f->motion.B, *V = f->core_motion.V, tau = s->tau;
+    plr_real theta[3 * D] = {0}, way[3 * D], speed[3 * D], cross[3];
+    for (unsigned i = 0; i < 3; i++) { /* theta now by the drivers: R_D^T theta + B_theta */
+        memcpy(theta + D * i, B + D * (THETA + i), D * sizeof *B);
+        for (unsigned j = 0; j < 3; j++)
+            theta[D * i + D_THETA + j] += f->motion.E[3 * j + i] + (i == j ? PLR_R(1) : PLR_R(0));
+    }
+    for (unsigned c = 0; c < D; c++) {
+        const plr_real turned[3] = {theta[c], theta[D + c], theta[2 * D + c]};
+        const plr_real error[3] = {B[THETA * D + c], B[(THETA + 1) * D + c],
+                                   B[(THETA + 2) * D + c]};
+        plr_cross3(cross, s->gamma, turned);
+        for (unsigned i = 0; i < 3; i++) {
+            const plr_real v = V[D * i + c];
+            speed[D * i + c] = PLR_FMA(tau, cross[i], v);
+            way[D * i + c] = PLR_FMA(tau, PLR_FMA(PLR_R(0.5) * tau, cross[i], v), B[D * i + c]);
+        }
+        plr_cross3(cross, s->d, error);
+        for (unsigned i = 0; i < 3; i++)
+            way[D * i + c] -= cross[i];
+    }
+    memcpy(theta, B + THETA * D, sizeof theta);
+    turn_back(D, s->Et, 1, way, D, B, D);
+    turn_back(D, s->Et, 1, theta, D, B + THETA * D, D);
+    turn_back(D, s->Et, 1, speed, D, V, D);
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned c = D_ACCEL; c < D; c++) {
+            B[D * i + c] += F[DIM * i + THETA + c];
+            B[D * (THETA + i) + c] += F[DIM * (THETA + i) + THETA + c];
+            V[D * i + c] += F[DIM * (VEL + i) + THETA + c];
+        }
+}
+
+/* The covariance of the motion's noise: of n, velocity and biases together, 15 x 15. */
+static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
+    const plr_core_motion *m = &f->core_motion;
+    for (unsigned i = 0; i < DIM; i++)
+        for (unsigned j = 0; j <= i; j++) {
+            plr_real q;
+            if (i < VEL)
+                q = f->motion.Q[PLR_POSE_DIM * i + j];
+            else if (j < VEL)
+                q = m->Q_nc[PLR_REST_DIM * j + i - VEL];
+            else
+                q = m->Q_cc[PLR_REST_DIM * (i - VEL) + j - VEL];
+            Q[DIM * i + j] = Q[DIM * j + i] = q;
+        }
+}
+
+static void set_noise(plr_filter *f, const plr_real Q[DIM * DIM]) {
+    plr_core_motion *m = &f->core_motion;
+    for (unsigned i = 0; i < VEL; i++) {
+        memcpy(f->motion.Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
+        memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
+    }
+    for (unsigned i = 0; i < PLR_REST_DIM; i++)
+        memcpy(m->Q_cc + PLR_REST_DIM * i, Q + DIM * (VEL + i) + VEL, PLR_REST_DIM * sizeof *Q);
+}
+
+static void gemm(unsigned m, unsigned n, unsigned k, const plr_real *A, const plr_real *B,
+                 plr_real *C) {
+    plr_gemm_nn(m, n, k, A, DIM, B, DIM, C, DIM);
+}
+
+/* Q <- F Q F^T, where the rows of the biases do not change and those of theta depend on theta and
+ * gyro bias alone. */
+static void transport_noise(const plr_real F[MOVED * DIM], plr_real Q[DIM * DIM]) {
+    plr_real X[MOVED * DIM] = {0};
+    gemm(3, DIM, DIM, F, Q, X);
+    gemm(3, DIM, 3, F + THETA * DIM + THETA, Q + THETA * DIM, X + THETA * DIM);
+    gemm(3, DIM, 3, F + THETA * DIM + GYRO, Q + GYRO * DIM, X + THETA * DIM);
+    gemm(3, DIM, DIM - THETA, F + VEL * DIM + THETA, Q + THETA * DIM, X + VEL * DIM);
+    for (unsigned i = 0; i < MOVED; i++) {
+        for (unsigned j = 0; j <= i; j++) {
+            const unsigned from = j < THETA ? 0 : THETA;
+            plr_real sum = 0;
+            for (unsigned l = from; l < DIM; l++)
+                sum = PLR_FMA(X[DIM * i + l], F[DIM * j + l], sum);
+            Q[DIM * i + j] = Q[DIM * j + i] = sum;
+        }
+        for (unsigned j = MOVED; j < DIM; j++)
+            Q[DIM * i + j] = Q[DIM * j + i] = X[DIM * i + j];
+    }
+}
+
+/* The densities of the readings' noise, squared. A reading that is held for longer than usual, since
+ * others were lost, is wrong by what changes meanwhile. */
+static void densities(const plr_filter *f, plr_real interval, plr_real density[2]) {
+    const plr_inertial *at = &f->inertial;
+    density[0] = f->par.accel_density;
+    density[1] = f->par.gyro_density;
+    if (!(at->usual_s > 0) || interval <= LONG_INTERVALS * at->usual_s)
+        return;
+    for (int i = 0; i < 2; i++)
+        density[i] = PLR_FMA(at->change2[i] * (interval / at->usual_s), interval, density[i]);
+}
+
+/* The noise of the readings enters as the biases do, and the biases walk. */
+static void add_noise(const plr_filter *f, const plr_real F[MOVED * DIM], plr_real tau,
+                      plr_real interval, plr_real Q[DIM * DIM]) {
+    plr_real density[2];
+    densities(f, interval, density);
+    const plr_real accel = density[0] / tau, gyro = density[1] / tau;
+    for (unsigned i = 0; i < MOVED; i++)
+        for (unsigned j = 0; j <= i; j++) {
+            const plr_real *a = F + DIM * i + ACCEL, *b = F + DIM * j + ACCEL;
+            const plr_real q = PLR_FMA(gyro, plr_dot3(a + 3, b + 3), accel * plr_dot3(a, b));
+            Q[DIM * i + j] += q;
+            Q[DIM * j + i] = Q[DIM * i + j];
+        }
+    for (unsigned i = ACCEL; i < DIM; i++)
+        Q[(DIM + 1) * i] =
+            PLR_FMA(i < GYRO ? f->par.accel_walk : f->par.gyro_walk, tau, Q[(DIM + 1) * i]);
+}
+
+static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
+                 plr_real seconds, plr_real interval) {
+    plr_imu_step s;
+    plr_real F[MOVED * DIM], Q[DIM * DIM];
+    plr_motion *m = &f->motion;
+    integrate(f, reading, seconds, &s);
+    transition(&s, F);
+    accumulate_derivatives(f, &s, F);
+    get_noise(f, Q);
+    transport_noise(F, Q);
+    add_noise(f, F, seconds, interval, Q);
+    set_noise(f, Q);
+    plr_pose_move(f, s.E, s.d);
+    memcpy(f->inertial.velocity, s.v, sizeof s.v);
+    plr_se3_append(m->E, m->p, s.E, s.d);
+    plr_so3_orthonormalise_small(m->E);
+    f->t_ns = t_ns;
+    m->seconds += seconds;
+    m->pending = 1;
+    m->noisy = 1;
+}
+
+/* ---------------------------------------------------------------- readings */
+
+/* Between two samples of a signal that changes smoothly its mean is that of both ends. Where a frame
+ * came in between, the first part of the interval was bridged by the older one: the second makes up
+ * for it, so that the integral is right. */
+static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
+                 plr_real held[PLR_READING_DIM]) {
+    const uint8_t timing = f->reading_valid ? f->config.imu_timing : PLR_TWIST_END;
+    const plr_real whole = (plr_real)((double)(t_ns - f->reading_ns) * 1e-9);
+    const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
+                              ? (plr_real)((double)(f->t_ns - f->reading_ns) * 1e-9)
+                              : PLR_R(0);
+    for (int i = 0; i < PLR_READING_DIM; i++) {
+        const plr_real target = timing == PLR_TWIST_END ? reading[i]
+                                : timing == PLR_TWIST_START
+                                    ? f->reading[i]
+                                    : PLR_R(0.5) * (f->reading[i] + reading[i]);
+        held[i] = done > 0 && whole > done
+                      ? PLR_FMA(done / (whole - done), target - f->reading[i], target)
+                      : target;
+    }
+}
+
+/* The accumulated motion's noise holds the walk already. */
+static void walk(plr_filter *f, plr_real seconds) {
+    (void)f;
+    (void)seconds;
+}
+
+static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
+    plr_real gamma[3];
+    plr_imu_gravity(f, gamma);
+    for (int i = 0; i < 3; i++) {
+        reading[i] = f->bias[i] - gamma[i];
+        reading[3 + i] = f->bias[3 + i];
+    }
+}
+
+/* ---------------------------------------------------------------- the estimate */
+
+static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
+    const plr_real *Q = f->core_motion.Q_cc;
+    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
+            P_b[PLR_BIAS_DIM * i + j] +=
+                Q[PLR_REST_DIM * (PLR_VELOCITY_DIM + i) + PLR_VELOCITY_DIM + j];
+}
+
+/* v with its covariance now, and w = w_m - b_g, correlated by the gyro's bias. */
+static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
+    enum { V = PLR_VELOCITY_DIM };
+    const plr_core_motion *m = &f->core_motion;
+    plr_real P_dd[D * D], VP[V * D] = {0}, P_vv[V * V] = {0}, P_b[PLR_POSE_SQUARE];
+    plr_covariance_with_drivers(f, f->layout.driver, D, P_dd);
+    plr_gemm_nn(V, D, D, m->V, D, P_dd, D, VP, D);
+    plr_gemm_nt(V, V, D, VP, D, m->V, D, P_vv, V);
+    bias_covariance(f, P_b);
+    const plr_real per_reading =
+        f->inertial.usual_s > 0 ? f->par.gyro_density / f->inertial.usual_s : f->par.gyro_density;
+    for (unsigned i = 0; i < V; i++) {
+        u[i] = f->inertial.velocity[i];
+        u[V + i] = f->reading[V + i] - f->bias[V + i];
+        for (unsigned j = 0; j < V; j++) {
+            P_u[PLR_POSE_DIM * i + j] = P_vv[V * i + j] + m->Q_cc[PLR_REST_DIM * i + j];
+            P_u[PLR_POSE_DIM * i + V + j] = P_u[PLR_POSE_DIM * (V + j) + i] =
+                -VP[D * i + D_GYRO + j] - m->Q_cc[PLR_REST_DIM * i + PLR_POSE_DIM + j];
+            P_u[PLR_POSE_DIM * (V + i) + V + j] =
+                P_b[PLR_POSE_DIM * (V + i) + V + j] + (i == j ? per_reading : PLR_R(0));
+        }
+    }
+}
+
+/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g with w_m the mean
+ * reading of the last half second, whose noise adds to the measurement's. */
+static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
+                    plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
+    const plr_real since = (plr_real)((double)(f->t_ns - f->inertial.still_ns) * 1e-9);
+    const plr_real mean_of = since > 0 && since < PLR_R(0.5) ? since : PLR_R(0.5);
+    memset(H, 0, sizeof *H);
+    H->terms = 2;
+    H->term[0].row = plr_row_of(f, PLR_BLOCK_VELOCITY);
+    H->term[0].columns = PLR_VELOCITY_DIM;
+    H->term[1].row = plr_row_of(f, PLR_BLOCK_BIAS);
+    H->term[1].columns = PLR_BIAS_DIM;
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
+        const plr_real *M = rows->M + PLR_POSE_DIM * i;
+        r[i] = rows->z[i];
+        R[i] = PLR_FMA(f->par.gyro_density / mean_of, plr_dot3(M + 3, M + 3), rows->R[i]);
+        for (unsigned c = 0; c < 3; c++) {
+            const plr_real w = f->inertial.slow[3 + c] - f->bias[3 + c];
+            r[i] = PLR_FMA(-M[c], f->inertial.velocity[c], r[i]);
+            r[i] = PLR_FMA(-M[3 + c], w, r[i]);
+            H->term[0].H[PLR_VELOCITY_DIM * i + c] = M[c];
+            H->term[1].H[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];
+        }
+    }
+}
+
+const plr_process plr_process_imu = {
+    .lay_out = lay_out,
+    .check = check,
+    .step = step,
+    .mean = mean,
+    .rest = rest,
+    .walk = walk,
+    .now = now,
+    .bias_covariance = bias_covariance,
+    .measure = measure,
+};

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+/*
+ * A process moves the state between frames by the readings of one kind of sensor: six numbers,
+ * linear ones first. It lays out the blocks of the state that it needs, carries pose (and velocity)
+ * along with each reading, and accumulates in f->motion what a frame will apply to the covariance.
+ * So a reading costs the same for any number of landmarks.
+ */
+#ifndef PLR_PROCESS_PROCESS_H
+#define PLR_PROCESS_PROCESS_H
+
+#include "pelorus/state.h"
+#include "state/rows.h"
+
+enum { PLR_READING_DIM = PLR_POSE_DIM };
+
+typedef struct plr_process {
+    /* Lays out the state's blocks. */
+    void (*lay_out)(plr_filter *f);
+
+    /* PLR_OK if the reading may be held for `seconds`; PLR_E_RANGE if it turns the body by more than
+     * pi rad or moves it by more than 1 km. */
+    plr_status (*check)(const plr_filter *f, const plr_real reading[PLR_READING_DIM],
+                        plr_real seconds);
+
+    /* One step to t_ns: the mean reading over `seconds`. `interval` is the time for which the
+     * reading stands, so that the parts of an interval add up to the noise of the whole. Sets the
+     * time. */
+    void (*step)(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
+                 plr_real seconds, plr_real interval);
+
+    /* The mean reading of the step that ends with `reading`, from that and the last one. */
+    void (*mean)(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
+                 plr_real mean[PLR_READING_DIM]);
+
+    /* The reading of a body that keeps its velocity: assumed while there is none. */
+    void (*rest)(const plr_filter *f, plr_real reading[PLR_READING_DIM]);
+
+    /* Velocity and biases of a motion that is applied or dropped: what it adds to their covariance
+     * besides plr_covariance_carry_core. */
+    void (*walk)(plr_filter *f, plr_real seconds);
+
+    /* The body's present twist (v, w) with its covariance, 6x6. */
+    void (*now)(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
+
+    /* The covariance of the biases at the time of the estimate, 6x6; zeros if they are not
+     * estimated. */
+    void (*bias_covariance)(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]);
+
+    /* Turns a measurement of the body's twist into one of the state, r = H x + N(0, R), if velocity
+     * is estimated. NULL: it is held instead, and weighed against the readings of this process
+     * (process/velocity.h). */
+    void (*measure)(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
+                    plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]);
+} plr_process;
+
+extern const plr_process plr_process_twist;
+extern const plr_process plr_process_imu;
+
+/* False until an IMU has been aligned with gravity: the state does not move before. */
+static inline bool plr_process_has_started(const plr_filter *f) {
+    return f->config.process != PLR_PROCESS_IMU || f->inertial.started != 0;
+}
+
+static inline const plr_process *plr_process_of(const plr_filter *f) {
+    return f->config.process == PLR_PROCESS_IMU ? &plr_process_imu : &plr_process_twist;
+}
+
+#endif
