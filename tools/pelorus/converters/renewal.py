@@ -29,6 +29,7 @@ from pelorus.trajectory import Trajectory
 PASSES = 8  # of Gauss-Newton: a point from stereo is near
 DISPARITY_MIN_PX = 0.5
 DEPTH_MIN_M = 0.1
+FLOOR = 1e-6  # px^2/m^2: of a point at 1 km stereo alone gives 1e-3
 MISFIT_MAX = 1.5  # times pixel sigma: beyond that the tracks are not those of fixed points
 
 
@@ -64,13 +65,13 @@ def renew(
     whose, landmarks = np.unique(tracks.id, return_inverse=True)
     points = _points(recording.header.camera, tracks, T_CW, landmarks)
     q = se3.apply(T_CW, points[landmarks])
-    if q[:, 2].min() < DEPTH_MIN_M:
+    if not q[:, 2].min() >= DEPTH_MIN_M:
         row = int(q[:, 2].argmin())
         raise _no_fixed_points(source, f"id {tracks.id[row]} would stand behind the camera")
     exact = project(recording.header.camera, q)
     numbers = tracks.pixels.size - 3 * len(whose)
     misfit = float(np.sqrt(np.sum((tracks.pixels - exact) ** 2) / numbers))
-    if misfit > MISFIT_MAX * sigma:
+    if not misfit <= MISFIT_MAX * sigma:
         raise _no_fixed_points(source, f"they are {misfit:.2f} px off, pixel_sigma is {sigma:g} px")
     pixels = exact + sigma * chance.standard_normal(exact.shape)
     drawn = replace(recording, tracks=replace(tracks, pixels=pixels))
@@ -129,6 +130,7 @@ def _points(camera: Camera, tracks: Tracks, T_CW: Poses, landmarks: Indices) -> 
         r = tracks.pixels - project(camera, q)
         N = _sums(landmarks, np.einsum("nki,nkj->nij", J, J))
         b = _sums(landmarks, np.einsum("nki,nk->ni", J, r))
+        N += FLOOR * np.eye(3)  # what nothing sees stays where it is
         points = points + np.linalg.solve(N, b[..., None])[..., 0]
     return points
 
