@@ -39,11 +39,10 @@ class Inertial(NamedTuple):
 
     def between(self, t_ns: Times) -> Inertial:
         """By linear interpolation at any times; beyond the ends the first and last reading hold."""
-        own, at = self.t_ns.astype(np.float64), t_ns.astype(np.float64)
-        columns = np.hstack((self.a_B_mps2, self.w_B_radps)).T
         # times from the beginning: a double has no nanoseconds of today's clock
-        first = own[:1]
-        found = np.stack([np.interp(at - first, own - first, x) for x in columns], axis=-1)
+        own, at = self.t_ns - self.t_ns[:1], t_ns - self.t_ns[:1]
+        columns = np.hstack((self.a_B_mps2, self.w_B_radps)).T
+        found = np.stack([np.interp(at, own, x) for x in columns], axis=-1)
         return Inertial(t_ns, found[:, :3], found[:, 3:])
 
 
