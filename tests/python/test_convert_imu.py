@@ -55,6 +55,8 @@ def test_everything_of_the_file_arrives(tmp_path: Path, source: Path, pelorus: R
     pixels = np.concatenate([m.pixels for m in stereos])
     assert np.array_equal(pixels, drive.tracks.pixels.astype(np.float32))
     truths = messages_of(target, Truth)
+    assert drive.truth_velocity is not None
+    assert drive.truth_bias is not None
     assert np.allclose([m.R_WB for m in truths], drive.truth.R)
     assert np.allclose([m.p_WB_m for m in truths], drive.truth.p)
     assert np.allclose([m.velocity for m in truths], drive.truth_velocity)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from imu_drives import options
 from pelorus import inertial, se3
-from pelorus.frames import IMU_READINGS_MAX
+from pelorus.frames import IMU_READINGS_MAX, Imu
 from pelorus.inertial import Inertial, Moving
-from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.simulation.imu import Imu
+from pelorus.simulation.imu import Imu as Sensor
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import simulate
 from scipy.linalg import expm
@@ -19,12 +18,8 @@ from scipy.linalg import expm
 G = np.array([0.0, 0.0, -9.81])
 
 
-def exact(rate: float) -> Imu:
-    return Imu(rate, *(0.0,) * 5)
-
-
-def first_of(R: Floats, p: Floats, v: Floats) -> Moving:
-    return Moving(R, p, v)
+def exact(rate: float) -> Sensor:
+    return Sensor(rate, *(0.0,) * 5)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 0.3])
@@ -51,7 +46,7 @@ def test_perfect_readings_lead_along_the_truth_better_by_the_square_of_the_rate(
     """Frames, axes and gravity are those of the equations, and the drive has its accelerations."""
     errors = []
     for rate in (100.0, 200.0, 400.0):
-        imu = Imu(rate, *(0.0,) * 5, rest_s=rest)
+        imu = Sensor(rate, *(0.0,) * 5, rest_s=rest)
         drive = simulate(options(imu, stop=stop)).recording
         assert drive.truth_velocity is not None
         first = Moving(drive.truth.R[0], drive.truth.p[0], drive.truth_velocity[0])
@@ -93,8 +88,8 @@ def batches(t_ns: Times, cuts: Times, most: int = IMU_READINGS_MAX) -> list[list
     return [m.times_ns for _, m in found]
 
 
-def ends(t_ns: Times, found: list[tuple[int, object]]) -> list[int]:
-    last = np.cumsum([len(m.a_B_mps2) for _, m in found]) - 1  # type: ignore[attr-defined]
+def ends(t_ns: Times, found: list[tuple[int, Imu]]) -> list[int]:
+    last = np.cumsum([len(m.a_B_mps2) for _, m in found]) - 1
     return [int(t) for t in t_ns[last]]
 
 

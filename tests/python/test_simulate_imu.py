@@ -184,7 +184,7 @@ def test_a_fault_makes_of_the_readings_what_it_says(
     faults: ImuFaults, makes: Callable[[Floats, Floats], Floats]
 ) -> None:
     plain, faulty = drive(imu=NOISY), drive(faults, imu=NOISY)
-    due = makes(told(plain), plain.recording.inertial.t_ns * 1e-9)
+    due = makes(told(plain), np.asarray(plain.recording.inertial.t_ns * 1e-9))
     assert np.allclose(told(faulty), due, rtol=1e-12)
     assert not np.array_equal(due, told(plain))
     assert np.array_equal(faulty.recording.tracks.pixels, plain.recording.tracks.pixels)
