@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 
 import typer
+from rich.markup import escape
 
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
@@ -21,14 +23,26 @@ from pelorus.commands.own import (
     TRUTH,
     TWISTS,
 )
-from pelorus.converters import csv, euroc, streams
+from pelorus.console import out
+from pelorus.converters import bag, csv, euroc, ros, streams
 from pelorus.converters.asked import Asked
+from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
+from pelorus.converters.ros_frames import Cameras
 from pelorus.converters.streams import Streams, Twists
+from pelorus.errors import PelorusError
 from pelorus.rig.lens import LensModel
 
 TIMING = typer.Option(Timing.START, help="When a twist reading holds.")
 OWN_DATA = "Your own data"
+RADIUS_MAX_M = 5.0
+
+
+class Stamps(StrEnum):
+    """Of a bag's messages."""
+
+    HEADER = bag.HEADER
+    LOG = bag.LOG
 
 
 def register(app: typer.Typer) -> None:
@@ -38,6 +52,11 @@ def register(app: typer.Typer) -> None:
         rich_help_panel=OWN_DATA,
         epilog="Example:  pelorus convert euroc V1_01_easy V1_01.plr",
     )(euroc_)
+    app.command(
+        "ros",
+        rich_help_panel=OWN_DATA,
+        epilog="Example:  pelorus convert ros drive.mcap drive.plr --calibration camchain.yaml",
+    )(ros_)
 
 
 def euroc_(
@@ -59,6 +78,70 @@ def euroc_(
     _convert(euroc.read(folder, asked), target, twist_timing, fix)
 
 
+def ros_(
+    source: Path = typer.Argument(
+        ..., metavar="BAG", help="ROS 1 (.bag), ROS 2 (a folder with metadata.yaml), .mcap or .db3."
+    ),
+    target: Path = TARGET,
+    calibration: list[Path] = CALIBRATION,
+    extrinsic: Path | None = EXTRINSIC,
+    lens: LensModel | None = LENS,
+    left_topic: str = typer.Option("", help="Pictures; else of the calibration, or called left."),
+    right_topic: str = typer.Option("", help="Likewise, of the right camera."),
+    pair_within: float = typer.Option(
+        2.0, metavar="MS", help="Pictures of a pair may be so far apart in time."
+    ),
+    tracks_topic: str = typer.Option(
+        "",
+        help="In place of pictures, tracks: PointCloud2 or PointCloud with id, uL, vL, uR, vR, or "
+        "features with id, u0, v0, u1, v1 as of msckf_vio.",
+    ),
+    twist_topic: str = typer.Option(
+        "", help="Odometry, TwistStamped or TwistWithCovarianceStamped; else the only one."
+    ),
+    imu_topic: str = typer.Option("", help="Or: the raw readings of an IMU move the body."),
+    joint_topic: str = typer.Option("", help="Or: JointState with the speeds of wheels, rad/s."),
+    joints: list[str] = typer.Option([], "--joint", help="A wheel's joint, left ones first."),
+    wheel_radius: float = typer.Option(0.0, metavar="M", help="Of the wheels of --joint."),
+    track_width: float = typer.Option(
+        0.0, metavar="M", help="Between the first and the last --joint: then they tell turns too."
+    ),
+    truth_topic: str = typer.Option(
+        "", help="Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped."
+    ),
+    stamps: Stamps = typer.Option(Stamps.HEADER, help="Times of the headers, or of the arrival."),
+    twists: Path | None = TWISTS,
+    imu: Path | None = IMU,
+    truth: Path | None = TRUTH,
+    columns: list[str] = COLUMNS,
+    measured: str = MEASURED,
+    twist_timing: Timing = TIMING,
+    fix: Fix = FIX,
+) -> None:
+    """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
+    asked = _asked(calibration, extrinsic, lens, twists, imu, truth, columns, measured)
+    topics = ros.Topics(
+        Cameras(left_topic, right_topic, tracks_topic, round(pair_within * 1e6)),
+        twist_topic,
+        imu_topic,
+        truth_topic,
+        _wheels(joint_topic, joints, wheel_radius, track_width),
+        csv.measured_of(measured),
+    )
+    with Bag(source, stamps.value) as opened:
+        _convert(ros.read(opened, topics, asked), target, twist_timing, fix)
+
+
+def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> ros.Wheels | None:
+    if not topic and not joints:
+        return None
+    if not topic or not joints or not 0 < radius_m < RADIUS_MAX_M or track_m < 0:
+        raise PelorusError(
+            "wheels: --joint-topic TOPIC, --joint NAME (once or more) and --wheel-radius M are due"
+        )
+    return ros.Wheels(topic, tuple(joints), radius_m, track_m)
+
+
 def _asked(
     calibration: list[Path],
     extrinsic: Path | None,
@@ -78,6 +161,8 @@ def _asked(
 
 
 def _convert(found: Streams, target: Path, twist_timing: Timing, fix: Fix) -> None:
+    for remark in found.remarks:
+        out.print(escape(remark))
     recording = streams.recording(found).with_header(twist_timing=twist_timing.value_in_header)
     if fix is Fix.NONE:
         write(recording, [], target)

@@ -49,7 +49,11 @@ def read(
             T = calibration.read_extrinsic(extrinsic)
             header = replace(header, R_CB=T.R, t_CB_m=T.p)
         return Calibrated(header)
-    rig = read_rig(paths, lens)
+    return of_rig(read_rig(paths, lens), name, extrinsic)
+
+
+def of_rig(rig: Rig, name: str, extrinsic: Path | None = None) -> Calibrated:
+    """What a rig says."""
     if extrinsic is not None:
         rig = rig.on_body(calibration.read_extrinsic(extrinsic))
     header = rig.header(rig.rectification(), name)

@@ -148,6 +148,11 @@ def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> N
         )
 
 
+def require_same_size(path: Path, image: Gray, other: Gray) -> None:
+    """Both pictures of a pair are equally large."""
+    _require_shape(path, image, other.shape, "the left ones have")
+
+
 def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> None:
     """A picture must be as large as its calibration says: (width, height), 0 where it does not."""
     if known[0] and (shape[1], shape[0]) != known:

@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: MIT
+"""Bags of ROS 1, ROS 2 and MCAP: what a robot recorded must come out."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from bags import NS, Recorder
+from converted import SHORT, Run, messages_of
+from drives import clean
+from numpy.typing import NDArray
+from pelorus.converters import ros_frames
+from pelorus.converters.bag import Bag
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from PIL import Image
+from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene
+from rigs import RADTAN, camchain, write_yaml
+from test_convert_csv import csv_files
+from test_convert_euroc import assert_on_surfaces
+
+RIGHT_LATE_NS = 1_000_000
+FORMS = ["ros1", "sqlite3", "mcap", "lone mcap"]
+
+
+def written(recorder: Recorder, folder: Path, form: str) -> Path:
+    if form == "ros1":
+        return recorder.write(folder / "drive.bag")
+    path = recorder.write(folder / "drive", mcap="mcap" in form)
+    return next(path.glob("*.mcap")) if form == "lone mcap" else path
+
+
+@pytest.fixture
+def pairs(kept: Callable[..., Any]) -> list[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
+    """The scene's pictures."""
+    found: list[tuple[NDArray[np.uint8], NDArray[np.uint8]]] = kept(
+        "rendered raw pairs", lambda: [Scene().pair(k) for k in range(FRAMES)]
+    )
+    return found
+
+
+def with_pictures(recorder: Recorder, pairs: list[Any]) -> Recorder:
+    """On /cam0 and /cam1, the right ones a little later."""
+    for t_ns, (left, right) in zip(Scene().t_ns, pairs, strict=True):
+        recorder.image("/cam0/image_raw", t_ns, left, pad=24)
+        recorder.image("/cam1/image_raw", t_ns + RIGHT_LATE_NS, right)
+    return recorder
+
+
+def with_odometry(recorder: Recorder) -> Recorder:
+    R, p = Scene().body()
+    for k, t_ns in enumerate(Scene().t_ns):
+        v = (SPEED_MPS, 0.01 * k, 0.0)
+        recorder.odometry("/odom", t_ns, v, (0, 0, 0.1 * k), Poses(R[k], p[k]))
+    return recorder
+
+
+@pytest.fixture
+def kalibr(tmp_path: Path) -> Path:
+    return write_yaml(tmp_path / "c.yaml", camchain(Scene().cameras, (WIDTH, HEIGHT)))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_pictures_odometry_and_truth_of_a_bag_become_a_recording(
+    form: str, pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_odometry(with_pictures(Recorder(1 if form == "ros1" else 2), pairs))
+    bag, target = written(recorder, tmp_path, form), tmp_path / "out.plr"
+    words = ("--calibration", kalibr, "--truth-topic", "/odom", "--twist-topic", "/odom")
+    outcome = pelorus("convert", "ros", bag, target, *words, "--fix", "none")
+    assert outcome.status == 0, outcome.err
+    assert "/odom: twists of the frame 'base_link'" in outcome.out
+    twists = messages_of(target, Twist)
+    assert [m.t_ns for m in twists] == Scene().t_ns
+    assert np.allclose([m.v_B_mps[1] for m in twists], 0.01 * np.arange(FRAMES))
+    assert np.allclose([m.w_B_radps[2] for m in twists], 0.1 * np.arange(FRAMES))
+    assert [m.t_ns for m in messages_of(target, Stereo)] == Scene().t_ns
+    assert np.allclose([m.p_WB_m for m in messages_of(target, Truth)], Scene().body().p)
+    assert_on_surfaces(target)
+
+
+def test_an_imu_moves_the_body_if_nothing_else_does(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_pictures(Recorder(), pairs)
+    for k in range(200):
+        recorder.imu("/imu", BEGIN_NS + k * 5_000_000, (1, 2, k), (4, 5, 6))
+    target = tmp_path / "out.plr"
+    noise = write_yaml(tmp_path / "imu.yaml", {"gyroscope_noise_density": 0.003})
+    words = ("--calibration", kalibr, "--calibration", noise)
+    outcome = pelorus("convert", "ros", written(recorder, tmp_path, "mcap"), target, *words)
+    assert outcome.status == 0, outcome.err
+    header = messages_of(target, Header)[0]
+    assert header.process is Process.IMU
+    assert header.noise.gyro_noise == 0.003
+    a = np.concatenate([m.a_B_mps2 for m in messages_of(target, Imu)])
+    assert np.array_equal(a[:, 2], np.arange(200))
+
+
+def test_wheels_give_the_speed_and_with_a_track_width_the_turn(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_pictures(Recorder(), pairs)
+    for t_ns in Scene().t_ns:
+        recorder.joints("/joints", t_ns, {"arm": 99.0, "left": 9.0, "right": 11.0})
+    bag, target = written(recorder, tmp_path, "sqlite3"), tmp_path / "out.plr"
+    words = ["--calibration", kalibr, "--joint-topic", "/joints", "--joint", "left"]
+    words += ["--joint", "right", "--wheel-radius", "0.2"]
+    assert pelorus("convert", "ros", bag, target, *words).status == 0
+    twists, noise = messages_of(target, Twist), messages_of(target, Header)[0].noise
+    assert np.allclose([m.v_B_mps for m in twists], [2.0, 0, 0])
+    assert np.allclose([m.w_B_radps for m in twists], 0)
+    assert noise.gyro_sigma_z_radps == 0.5
+    assert pelorus("convert", "ros", bag, target, *words, "--track-width", "0.5").status == 0
+    twists, noise = messages_of(target, Twist), messages_of(target, Header)[0].noise
+    assert np.allclose([m.w_B_radps for m in twists], [0, 0, 0.8])
+    assert noise.gyro_sigma_z_radps < 0 < noise.gyro_sigma_x_radps
+    outcome = pelorus("convert", "ros", bag, target, *words, "--joint", "tail")
+    assert "has the joints arm, left, right with 3 velocities; left, right, tail" in outcome.err
+
+
+# --- camera_info ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_camera_info_of_raw_pictures_rectifies_them(
+    ros: int, pairs: list[Any], tmp_path: Path, pelorus: Run
+) -> None:
+    cameras = Scene().cameras
+    recorder = with_odometry(Recorder(ros))
+    for t_ns, pair in zip(Scene().t_ns, pairs, strict=True):
+        for side, picture in zip(("left", "right"), pair, strict=True):
+            recorder.image(f"/stereo/{side}/image_raw", t_ns, picture)
+    Ks = []
+    for fx, fy, cx, cy in (cameras.left, cameras.right):
+        Ks.append(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
+    R1, R2, P1, P2, *_ = cv2.stereoRectify(
+        Ks[0],
+        np.array(RADTAN),
+        Ks[1],
+        np.array(RADTAN),
+        (WIDTH, HEIGHT),
+        cameras.T_RL.R,
+        cameras.T_RL.p[:, None],
+    )
+    for side, K, R, P in (("left", Ks[0], R1, P1), ("right", Ks[1], R2, P2)):
+        matrices = {"K": K, "D": np.array([*RADTAN, 0.0]), "R": R, "P": P}
+        recorder.camera_info(
+            f"/stereo/{side}/camera_info", (WIDTH, HEIGHT), distortion_model="plumb_bob", **matrices
+        )
+    R_CB, t_CB = cameras.T_LB
+    body = tmp_path / "body.json"
+    body.write_text(f'{{"R_CB": {R_CB.tolist()}, "t_CB_m": {t_CB.tolist()}}}')
+    target = tmp_path / "out.plr"
+    bag = written(recorder, tmp_path, "ros1" if ros == 1 else "mcap")
+    outcome = pelorus("convert", "ros", bag, target, "--extrinsic", body, "--truth-topic", "/odom",
+                      "--twist-topic", "/odom", "--fix", "none")  # fmt: skip
+    assert outcome.status == 0, outcome.err
+    assert_on_surfaces(target)
+
+
+def test_pictures_that_are_rectified_have_the_camera_of_p(tmp_path: Path, pelorus: Run) -> None:
+    recorder = with_odometry(Recorder())
+    blobs = np.random.default_rng(1).uniform(0, 255, (240, 500)).astype(np.uint8)
+    scene = cv2.GaussianBlur(blobs, (0, 0), 2)
+    for k, t_ns in enumerate(Scene().t_ns):
+        recorder.image("/cam/left/image_rect", t_ns, scene[:, 50 + k : 370 + k].copy())
+        recorder.image("/cam/right/image_rect", t_ns, scene[:, 60 + k : 380 + k].copy())
+    P = np.array([[250.0, 0, 160, 0], [0, 250, 120, 0], [0, 0, 1, 0]])
+    for side, shift in (("left", 0.0), ("right", -25.0)):
+        P[0, 3] = shift
+        matrices = {"K": 9 * np.eye(3), "D": np.ones(5), "R": np.eye(3), "P": P}
+        recorder.camera_info(
+            f"/cam/{side}/camera_info", (320, 240), distortion_model="plumb_bob", **matrices
+        )
+    body = tmp_path / "body.json"
+    body.write_text('{"R_CB": [[1,0,0],[0,1,0],[0,0,1]], "t_CB_m": [0, 0, 0]}')
+    target = tmp_path / "out.plr"
+    bag = written(recorder, tmp_path, "mcap")
+    outcome = pelorus("convert", "ros", bag, target, "--extrinsic", body, "--fix", "none")
+    assert outcome.status == 0, outcome.err
+    camera, stereos = messages_of(target, Header)[0].camera, messages_of(target, Stereo)
+    assert (camera.fx_px, camera.cx_px, camera.cy_px) == (250, 160, 120)
+    assert camera.baseline_m == pytest.approx(0.1)
+    pixels = np.concatenate([m.pixels for m in stereos])
+    assert np.median(pixels[:, 0] - pixels[:, 2]) == pytest.approx(10, abs=0.05)
+
+
+# --- tracks ---------------------------------------------------------------------------------------
+
+
+def tracked(recorder: Recorder, drive: Recording, topic: str, rays: bool) -> Recorder:
+    camera, tracks, bounds = drive.header.camera, drive.tracks, drive.tracks.bounds()
+    for k, t in enumerate(drive.frame_t_ns.tolist()):
+        rows = slice(bounds[k], bounds[k + 1])
+        pixels, id = tracks.pixels[rows], tracks.id[rows]
+        if rays:
+            middle = np.tile([camera.cx_px, camera.cy_px], 2)
+            focal = np.tile([camera.fx_px, camera.fy_px], 2)
+            numbers = np.column_stack((id, (pixels - middle) / focal))
+            recorder.features(topic, t + NS, numbers)
+        else:
+            names = dict(zip(("uL", "vL", "uR", "vR"), pixels.T, strict=True))
+            recorder.cloud(topic, t + NS, {"id": id, **names})
+    for t, v, w in zip(drive.twist_t_ns.tolist(), drive.v_B_mps, drive.w_B_radps, strict=True):
+        recorder.twist_stamped("/twist", t + NS, v, w)
+    return recorder
+
+
+@pytest.mark.parametrize(("ros", "rays"), [(1, True), (2, False), (2, True)])
+def test_tracks_of_a_bag_arrive_as_they_are(
+    ros: int, rays: bool, tmp_path: Path, pelorus: Run
+) -> None:
+    drive = clean(**SHORT)
+    csv_files(tmp_path, drive)
+    recorder = tracked(Recorder(ros), drive, "/tracks", rays)
+    target = tmp_path / "out.plr"
+    words = ("--tracks-topic", "/tracks", "--calibration", tmp_path / "camera.json")
+    bag = written(recorder, tmp_path, "ros1" if ros == 1 else "sqlite3")
+    outcome = pelorus("convert", "ros", bag, target, *words, "--fix", "none")
+    assert outcome.status == 0, outcome.err
+    frames, twists = messages_of(target, Stereo), messages_of(target, Twist)
+    assert [m.t_ns for m in frames] == (drive.frame_t_ns + NS).tolist()
+    assert np.array_equal(np.concatenate([m.ids for m in frames]), drive.tracks.id)
+    pixels = np.concatenate([m.pixels for m in frames])
+    assert np.abs(pixels - drive.tracks.pixels).max() < 1e-4
+    assert np.array_equal([m.v_B_mps for m in twists], drive.v_B_mps)
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("encoding", "made"),
+    [
+        ("mono8", lambda g: g),
+        ("mono16", lambda g: g.astype("<u2") << 8),
+        ("rgb8", lambda g: np.dstack([g] * 3)),
+        ("bgra8", lambda g: np.dstack([g, g, g, 255 - g])),
+    ],
+)
+def test_a_picture_of_any_encoding_is_the_same_in_grey(
+    encoding: str, made: Callable[[Any], Any]
+) -> None:
+    grey = np.random.default_rng(2).integers(0, 256, (80, 100)).astype(np.uint8)
+    recorder = Recorder()
+    recorder.image("/x", NS, made(grey), encoding, pad=4)
+    assert np.array_equal(ros_frames.gray(Path("x"), recorder.found[0][3]), grey)
+    content = io.BytesIO()
+    Image.fromarray(grey).save(content, "PNG")
+    recorder.compressed("/x", NS, content.getvalue())
+    assert np.array_equal(ros_frames.gray(Path("x"), recorder.found[1][3]), grey)
+
+
+def test_an_encoding_that_is_not_known_is_told() -> None:
+    recorder = Recorder()
+    recorder.image("/x", NS, np.zeros((80, 100), np.uint8), "yuv422")
+    with pytest.raises(ForeignFileError, match="encoded as yuv422; mono8, 8UC1"):
+        ros_frames.gray(Path("x"), recorder.found[0][3])
+    recorder.found[0][3].encoding = "rgb8"
+    with pytest.raises(ForeignFileError, match="a picture of 100 x 80 has 8000 bytes"):
+        ros_frames.gray(Path("x"), recorder.found[0][3])
+
+
+# --- bad input ------------------------------------------------------------------------------------
+
+
+def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    bag = written(with_odometry(with_pictures(Recorder(), pairs)), tmp_path, "mcap")
+    target, given = tmp_path / "out.plr", ("--calibration", kalibr)
+    for words, said in (
+        ((*given, "--imu-topic", "/imu0"), "has no topic /imu0; there are:"),
+        ((*given, "--imu-topic", "/odom"), "/odom holds 6 messages of nav_msgs/msg/Odometry; some"),
+        ((*given, "--left-topic", "/l", "--right-topic", "/r"), "has no topic /l; there are:"),
+        ((), "which topics are the left and the right camera? --left-topic and --right-topic"),
+        (
+            ("--left-topic", "/cam0/image_raw", "--right-topic", "/cam1/image_raw"),
+            "has no two topics of sensor_msgs/msg/CameraInfo for its cameras; --calibration FILE",
+        ),
+        ((*given, "--truth-topic", "/odom"), "what moves the body? 0 topics hold twists"),
+        ((*given, "--pair-within", "0.5"), "0 have one of /cam1/image_raw within 0.5 ms (median 1"),
+        ((*given, "--joint", "left"), "wheels: --joint-topic TOPIC, --joint NAME (once or more)"),
+        ((*given, "--tracks-topic", "/odom"), "holds no tracks: lacks id, uL, vL, uR, vR"),
+    ):
+        outcome = pelorus("convert", "ros", bag, target, *words)
+        assert outcome.status == 1
+        assert said in outcome.err, outcome.err
+        if "there are:" in said:
+            assert "/cam0/image_raw  sensor_msgs/msg/Image  6 messages, 9.98 Hz" in outcome.err
+        assert not list(tmp_path.glob("out*"))
+
+
+def test_headers_without_a_time_are_told_and_the_arrival_taken_instead(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_pictures(Recorder(), pairs)
+    for t_ns in Scene().t_ns:
+        recorder.twist_stamped("/twist", 0, (1, 0, 0), (0, 0, 0))
+        topic, kind, _, message = recorder.found.pop()
+        recorder.found.append((topic, kind, t_ns, message))
+    bag, target = written(recorder, tmp_path, "mcap"), tmp_path / "out.plr"
+    outcome = pelorus("convert", "ros", bag, target, "--calibration", kalibr)
+    assert outcome.status == 1
+    assert "/twist: 6 of 6 headers have no time; times in header.stamp are due, or --stamps" in (
+        outcome.err
+    )
+    words = ("--calibration", kalibr, "--stamps", "log", "--fix", "none")
+    assert pelorus("convert", "ros", bag, target, *words).status == 0
+    assert [m.t_ns for m in messages_of(target, Twist)] == Scene().t_ns
+
+
+def test_what_is_no_bag_is_told_and_a_cut_one_too(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    whole = written(with_odometry(with_pictures(Recorder(1), pairs)), tmp_path, "ros1")
+    content = whole.read_bytes()
+    for name, bytes_, said in (
+        ("cut.bag", content[: len(content) // 2], "cannot be read as a bag: "),
+        ("empty.bag", b"", "cannot be read as a bag: "),
+        ("words.mcap", b"no bag\n" * 100, "cannot be read as a bag: "),
+        ("zeros.db3", bytes(5000), "cannot be read as a bag: "),
+        ("x.txt", b"1 2 3\n", "cannot be read as a bag: "),
+    ):
+        path = tmp_path / name
+        path.write_bytes(bytes_)
+        outcome = pelorus("convert", "ros", path, tmp_path / "out.plr", "--calibration", kalibr)
+        assert outcome.status == 1
+        assert f"{path}: {said}" in outcome.err
+        assert "rosbag reindex" in outcome.err
+    outcome = pelorus("convert", "ros", tmp_path / "nix", tmp_path / "out.plr")
+    assert "nix: there is no such file or folder" in outcome.err
+    (tmp_path / "folder").mkdir()
+    outcome = pelorus("convert", "ros", tmp_path / "folder", tmp_path / "out.plr")
+    assert "is a folder without metadata.yaml; a ROS 1 bag (.bag)" in outcome.err
+    assert not list(tmp_path.glob("out*"))
+
+
+def test_a_bag_is_closed_again(tmp_path: Path) -> None:
+    bag = written(with_odometry(Recorder()), tmp_path, "mcap")
+    with Bag(bag) as opened:
+        assert len(list(opened.messages(["/odom"]))) == FRAMES
+    with pytest.raises(ForeignFileError, match="not open"):
+        list(opened.messages(["/odom"]))

@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: MIT
+"""What a bag's cameras saw: stereo pictures, or features that somebody tracked already.
+
+Tracks are sensor_msgs/PointCloud2 or PointCloud with the fields (or channels) id, uL, vL, uR, vR,
+px, or messages with a list `features` of id, u0, v0, u1, v1 (msckf_vio): rays x/z and y/z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from pelorus import se3
+from pelorus.console import progress
+from pelorus.converters.bag import Bag
+from pelorus.converters.streams import Pictures, Seen
+from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
+from pelorus.rig.read import Calibrated
+from pelorus.rig.rectification import Gray
+from pelorus.rig.rig import Rig
+from pelorus.se3 import Poses
+from pelorus.tracking import images
+from pelorus.tracks import Tracks
+
+IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+CLOUD2, CLOUD = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud"
+FIELDS = ("id", "uL", "vL", "uR", "vR")
+RAYS = ("id", "u0", "v0", "u1", "v1")
+LENSES = {
+    "plumb_bob": LensModel.RADTAN,
+    "rational_polynomial": LensModel.RADTAN,
+    "equidistant": LensModel.EQUIDISTANT,
+    "": LensModel.NONE,
+}
+TO_GRAY = {
+    "rgb8": cv2.COLOR_RGB2GRAY,
+    "bgr8": cv2.COLOR_BGR2GRAY,
+    "8UC3": cv2.COLOR_BGR2GRAY,
+    "rgba8": cv2.COLOR_RGBA2GRAY,
+    "bgra8": cv2.COLOR_BGRA2GRAY,
+    "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
+    "bayer_bggr8": cv2.COLOR_BayerBGGR2GRAY,
+    "bayer_gbrg8": cv2.COLOR_BayerGBRG2GRAY,
+    "bayer_grbg8": cv2.COLOR_BayerGRBG2GRAY,
+}
+CHANNELS = {"rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
+PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
+WAITING_MAX = 200  # pictures of one side that wait for the other
+# The numbers of PointCloud2's types.
+TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """Topics of pictures, or of tracks; pictures of a pair may be so far apart in time."""
+
+    left: str = ""
+    right: str = ""
+    tracks: str = ""
+    apart_ns: int = 2_000_000
+
+
+def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Cameras:
+    """The user's topics; else the calibration's; else those that are called left and right."""
+    if cameras.tracks:
+        return cameras
+    there = bag.of_type(IMAGE, COMPRESSED)
+    if cameras.left and cameras.right:
+        for topic in (cameras.left, cameras.right):
+            bag.require(topic, IMAGE, COMPRESSED)
+        return cameras
+    if len(of_calibration) == 2 and all(topic in there for topic in of_calibration):
+        return replace(cameras, left=of_calibration[0], right=of_calibration[1])
+    lefts, rights = ([t for t in there if word in t.lower()] for word in ("left", "right"))
+    if len(lefts) == len(rights) == 1:
+        return replace(cameras, left=lefts[0], right=rights[0])
+    tracked = bag.of_type(CLOUD, CLOUD2)
+    if not there and len(tracked) == 1:
+        return replace(cameras, tracks=tracked[0])
+    raise PelorusError(
+        f"{bag.path}: which topics are the left and the right camera? --left-topic and "
+        f"--right-topic are due ({IMAGE}, {COMPRESSED}), or --tracks-topic; {bag.listing()}"
+    )
+
+
+def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]) -> Pictures | Seen:
+    """Pictures, or tracks."""
+    if cameras.tracks:
+        return _tracks(bag, cameras.tracks, calibrated)
+    return _pictures(bag, cameras, remarks)
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
+    """Pairs by the times of their headers: of each left picture the nearest right one."""
+    topics = [cameras.left, cameras.right]
+    stamps: dict[str, list[int]] = {topic: [] for topic in topics}
+    for topic, t_ns, _ in progress(bag.messages(topics), "finding pictures", bag.count(topics)):
+        stamps[topic].append(t_ns)
+    left, right = (np.unique(np.array(stamps[topic], np.int64)) for topic in topics)
+    pairs = _paired(bag, cameras, left, right)
+    alone = len(left) + len(right) - 2 * len(pairs)
+    if alone:
+        remarks.append(f"{alone} pictures have no partner and are left out")
+    where = bag.path / cameras.left.lstrip("/"), bag.path / cameras.right.lstrip("/")
+
+    def pixels() -> Iterator[tuple[Gray, Gray]]:
+        return _in_pairs(bag, cameras, pairs)
+
+    return Pictures(where, pairs[:, 0], pixels)
+
+
+def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
+    """(n, 2) times."""
+    at = np.clip(np.searchsorted(right, left), 1, max(len(right) - 1, 1))
+    before, after = right[at - 1], right[np.minimum(at, len(right) - 1)]
+    nearest = np.where(left - before <= after - left, before, after)
+    near = np.abs(nearest - left) <= cameras.apart_ns
+    if near.sum() < max(len(left) // 2, images.PAIRS_MIN):
+        apart_ms = np.median(np.abs(nearest - left)) * 1e-6
+        raise PelorusError(
+            f"{bag.path}: of {len(left)} pictures of {cameras.left} {int(near.sum())} have one of "
+            f"{cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median {apart_ms:.3g} ms); "
+            "cameras that are triggered together are due, or --pair-within MS"
+        )
+    return np.stack((left[near], nearest[near]), axis=-1)
+
+
+def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times) -> Iterator[tuple[Gray, Gray]]:
+    """One pass through the bag; what comes early waits for its partner."""
+    wanted = {cameras.left: set(pairs[:, 0].tolist()), cameras.right: set(pairs[:, 1].tolist())}
+    waiting: dict[str, dict[int, Gray]] = {cameras.left: {}, cameras.right: {}}
+    due = iter(pairs.tolist())
+    first, second = next(due)
+    for topic, t_ns, message in bag.messages([cameras.left, cameras.right]):
+        if t_ns not in wanted[topic] or t_ns in waiting[topic]:
+            continue
+        waiting[topic][t_ns] = gray(bag.path / topic.lstrip("/"), message)
+        if len(waiting[topic]) > WAITING_MAX:
+            raise PelorusError(f"{bag.path}: {topic}: pictures lie in no order of time")
+        while first in waiting[cameras.left] and second in waiting[cameras.right]:
+            pair = waiting[cameras.left].pop(first), waiting[cameras.right].pop(second)
+            images.require_same_size(bag.path / cameras.right.lstrip("/"), pair[1], pair[0])
+            yield pair
+            wanted[cameras.left].discard(first)
+            wanted[cameras.right].discard(second)
+            following = next(due, None)
+            if following is None:
+                return
+            first, second = following
+
+
+def gray(where: Path, message: Any) -> Gray:
+    """(rows, columns) of 8 bits."""
+    if hasattr(message, "format"):
+        return images.decoded(where, bytes(message.data))
+    encoding = message.encoding
+    channels = CHANNELS.get(encoding, 1)
+    if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
+        known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
+        raise ForeignFileError(where, f"pictures are encoded as {encoding}", due=f"{known} are due")
+    size = 2 if encoding in DEEP else 1
+    rows, columns, step = int(message.height), int(message.width), int(message.step)
+    packed = np.asarray(message.data, np.uint8)
+    if len(packed) < rows * step or step < columns * channels * size:
+        raise ForeignFileError(
+            where, f"a picture of {columns} x {rows} has {len(packed)} bytes in rows of {step}"
+        )
+    lines = packed[: rows * step].reshape(rows, step)[:, : columns * channels * size]
+    if size == 2:
+        high = lines[:, 0::2] if message.is_bigendian else lines[:, 1::2]
+        return np.ascontiguousarray(high)
+    plain = np.ascontiguousarray(lines)
+    if encoding in PLAIN:
+        return plain
+    shaped = plain.reshape(rows, columns, channels) if channels > 1 else plain
+    return np.asarray(cv2.cvtColor(shaped, TO_GRAY[encoding]), np.uint8)
+
+
+# --- tracks ---------------------------------------------------------------------------------------
+
+
+def _tracks(bag: Bag, topic: str, calibrated: Calibrated) -> Seen:
+    if topic not in bag.types:
+        raise PelorusError(f"{bag.path}: has no topic {topic}; {bag.listing()}")
+    rows: dict[int, Floats] = {}
+    for _, t_ns, message in progress(bag.messages([topic]), f"reading {topic}", bag.count([topic])):
+        rows.setdefault(t_ns, _observations(bag.path / topic.lstrip("/"), message, calibrated))
+    times = sorted(rows)
+    if not times or times[0] <= 0:
+        raise ForeignFileError(
+            bag.path,
+            "headers have no time" if times else "there is no message",
+            at=topic,
+            due="times in header.stamp are due, or --stamps log",
+        )
+    table = np.concatenate([rows[t] for t in times])
+    frame = np.repeat(np.arange(len(times)), [len(rows[t]) for t in times])
+    tracks = Tracks.from_rows(len(times), frame, table[:, 0].astype(np.int64), table[:, 1:])
+    tracks.check(bag.path)
+    if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
+        raise ForeignFileError(bag.path, "an id stands twice in a message", at=topic)
+    return Seen(bag.path / topic.lstrip("/"), np.array(times, np.int64), tracks)
+
+
+def _observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
+    """(n, 5): id, uL, vL, uR, vR in px."""
+    if hasattr(message, "features"):
+        found = [[float(getattr(f, name)) for name in RAYS] for f in message.features]
+        rows = np.array(found).reshape(-1, len(RAYS))
+        left, right = _lenses(calibrated)
+        pixels = left.distort(rows[:, 1:3]), right.distort(rows[:, 3:5])
+        return np.hstack((rows[:, :1], *pixels))
+    if hasattr(message, "channels"):
+        columns = {channel.name: np.asarray(channel.values, float) for channel in message.channels}
+    elif hasattr(message, "point_step"):
+        columns = _fields(where, message)
+    else:
+        columns = {}
+    lacking = [name for name in FIELDS if name not in columns]
+    if lacking:
+        raise ForeignFileError(
+            where,
+            f"holds no tracks: lacks {', '.join(lacking)}",
+            due=f"{CLOUD2} or {CLOUD} with {', '.join(FIELDS)} is due, or features of "
+            f"{', '.join(RAYS)}; there are: {', '.join(columns) or 'none of them'}",
+        )
+    return np.stack([columns[name] for name in FIELDS], axis=-1)
+
+
+def _fields(where: Path, message: Any) -> dict[str, Floats]:
+    order = ">" if message.is_bigendian else "<"
+    known = [field for field in message.fields if field.datatype in TYPES]
+    row = np.dtype(
+        {
+            "names": [field.name for field in known],
+            "formats": [order + TYPES[field.datatype] for field in known],
+            "offsets": [field.offset for field in known],
+            "itemsize": message.point_step,
+        }
+    )
+    count = int(message.width) * int(message.height)
+    packed = np.asarray(message.data, np.uint8).tobytes()
+    if len(packed) < count * row.itemsize:
+        raise ForeignFileError(where, f"{count} points have {len(packed)} bytes")
+    table = np.frombuffer(packed, row, count)
+    return {name: table[name].astype(np.float64) for name in row.names or ()}
+
+
+def _lenses(calibrated: Calibrated) -> tuple[Lens, Lens]:
+    if calibrated.rig is not None:
+        return calibrated.rig.left, calibrated.rig.right
+    c = calibrated.header.camera
+    plain = Lens(LensModel.NONE, (c.fx_px, c.fy_px, c.cx_px, c.cy_px))
+    return plain, plain
+
+
+# --- camera_info ----------------------------------------------------------------------------------
+
+
+def camera_info_rig(bag: Bag, cameras: Cameras) -> Rig | None:
+    """Of the first camera_info beside each picture topic; None where there are not two."""
+    beside = [_info_topic(bag, topic) for topic in (cameras.left, cameras.right)]
+    if not all(beside):
+        return None
+    infos = [next(bag.messages([topic])).message for topic in beside]
+    rectified = "rect" in cameras.left.rpartition("/")[2]
+    left, right = (_lens(bag, *pair, rectified) for pair in zip(beside, infos, strict=True))
+    P = np.reshape(_numbers(infos[1], "p"), (3, 4))
+    turns = [np.reshape(_numbers(info, "r"), (3, 3)) for info in infos]
+    R_left, R_right = (np.eye(3), np.eye(3)) if rectified else turns
+    shift = Poses(np.eye(3), np.array([P[0, 3] / P[0, 0], 0.0, 0.0]))  # q_right = q_left + it
+    outer = Poses(R_right.T, np.zeros(3)), Poses(R_left, np.zeros(3))
+    T_RL = se3.compose(se3.compose(outer[0], shift), outer[1])
+    return Rig.of_cameras(bag.path / beside[1].lstrip("/"), left, right, T_RL)
+
+
+def _info_topic(bag: Bag, topic: str) -> str:
+    """/left/camera_info for /left/image_raw, or for /left/image_raw/compressed."""
+    there = bag.of_type(CAMERA_INFO)
+    parts = topic.split("/")
+    beside = ("/".join([*parts[:k], "camera_info"]) for k in range(len(parts) - 1, 0, -1))
+    return next((name for name in beside if name in there), "")
+
+
+def _numbers(info: Any, name: str) -> list[float]:
+    """ROS 1 has capital letters, ROS 2 small ones."""
+    return [float(x) for x in getattr(info, name if hasattr(info, name) else name.upper())]
+
+
+def _lens(bag: Bag, topic: str, info: Any, rectified: bool) -> Lens:
+    P, K, D = (_numbers(info, name) for name in "pkd")
+    if P[0] <= 0 or K[0] <= 0:
+        raise ForeignFileError(
+            bag.path,
+            "the camera is not calibrated: K or P is 0",
+            at=topic,
+            due="--calibration is due",
+        )
+    if rectified:
+        return Lens(LensModel.NONE, (P[0], P[5], P[2], P[6]), (), info.width, info.height)
+    model = LENSES.get(info.distortion_model, LensModel.NONE) if any(D) else LensModel.NONE
+    if any(D) and (info.distortion_model not in LENSES or len(D) not in COEFFICIENTS[model]):
+        raise ForeignFileError(
+            bag.path,
+            f"distortion model {info.distortion_model!r} with {len(D)} numbers",
+            at=topic,
+            due=f"{' or '.join(filter(None, LENSES))} is due",
+        )
+    intrinsics = (K[0], K[4], K[2], K[5])
+    coefficients = tuple(D) if any(D) else ()
+    return Lens(model, intrinsics, coefficients, info.width, info.height)
