@@ -291,6 +291,10 @@ OWN = (
 )
 
 
+# Bags have a reader of their own, which few commands need; it fails in the same way.
+BAGS = "converters/bag.py"
+
+
 def test_foreign_files_are_opened_in_one_place() -> None:
     package = Path(pelorus.__file__).parent
     opening = {
@@ -298,4 +302,4 @@ def test_foreign_files_are_opened_in_one_place() -> None:
         for path in package.rglob("*.py")
         if OPENS.search(path.read_text(encoding="utf-8"))
     }
-    assert opening == {"foreign.py", *OWN}
+    assert opening == {"foreign.py", BAGS, *OWN}
