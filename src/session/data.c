@@ -193,7 +193,7 @@ void plr_data_use_stereo(plr_session *s) {
 /* mapping: the pose is used as it is. */
 static void move_to(plr_session *s, const plr_truth *truth) {
     plr_status status = PLR_E_RANGE;
-    if (plr_plausible_pose(&truth->T_WB))
+    if (plr_plausible(PLR_GROUP_POSE, &truth->T_WB))
         status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);
     if (plr_reanchor_follow(s, truth->t_ns, status))
         status = plr_filter_move_to(&s->filter, truth->t_ns, &truth->T_WB);

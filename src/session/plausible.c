@@ -1,7 +1,44 @@
 // SPDX-License-Identifier: MIT
 #include "session/plausible.h"
 
-static const double SPEED_MPS = 1e4, RATE_RADPS = 1e3, POSITION_M = 1e9, VARIANCE = 1e12;
+/* The greatest value of each limit. */
+#define GROUP(name, type, what)
+#define BOUND(group, type, member, count, limit)
+#define BOUND_IF(group, type, member, count, limit, flag)
+#define LIMIT(name, most, what, unit) AT_##name,
+enum {
+#include "session/limits.def"
+    LIMITS
+};
+#undef LIMIT
+#define LIMIT(name, most, what, unit) [AT_##name] = (most),
+static const double limits[LIMITS] = {
+#include "session/limits.def"
+};
+
+/* Where the numbers of a group stand in its struct. */
+#undef LIMIT
+#undef BOUND
+#undef BOUND_IF
+#define LIMIT(name, most, what, unit)
+#define BOUND(group_, type, member, count_, limit_)                                                \
+    {.offset = offsetof(type, member),                                                             \
+     .group = PLR_GROUP_##group_,                                                                  \
+     .count = (count_),                                                                            \
+     .limit = AT_##limit_},
+#define BOUND_IF(group_, type, member, count_, limit_, flag)                                       \
+    {.offset = offsetof(type, member),                                                             \
+     .given = offsetof(type, flag),                                                                \
+     .group = PLR_GROUP_##group_,                                                                  \
+     .count = (count_),                                                                            \
+     .limit = AT_##limit_},
+static const struct {
+    uint16_t offset;
+    uint16_t given; /* a bool; 0: in any case, since none is the first member */
+    uint8_t group, count, limit;
+} bounds[] = {
+#include "session/limits.def"
+};
 
 static bool is_finite(double x) {
     return x - x == 0;
@@ -20,36 +57,30 @@ static bool all_within(const double *x, unsigned n, double limit) {
     return true;
 }
 
-bool plr_plausible_pose(const plr_pose *pose) {
-    return all_within(pose->p, 3, POSITION_M);
-}
-
-bool plr_plausible_bias(const plr_start *start) {
-    return all_within(start->bias, 3, SPEED_MPS) && all_within(start->bias + 3, 3, RATE_RADPS) &&
-           all_within(start->bias_variance, 6, VARIANCE);
-}
-
-bool plr_plausible_variance(const double *variance, unsigned n) {
-    return all_within(variance, n, VARIANCE);
+bool plr_plausible(plr_group group, const void *object) {
+    const unsigned char *bytes = object;
+    for (unsigned i = 0; i < sizeof bounds / sizeof *bounds; i++) {
+        if (bounds[i].group != group)
+            continue;
+        if (bounds[i].given > 0 && !*(const bool *)(bytes + bounds[i].given))
+            continue;
+        const void *numbers = bytes + bounds[i].offset;
+        if (!all_within(numbers, bounds[i].count, limits[bounds[i].limit]))
+            return false;
+    }
+    return true;
 }
 
 bool plr_plausible_message(const plr_message *message) {
-    const plr_twist *twist = &message->as.twist.twist;
-    const plr_start *start = &message->as.start;
-    const plr_landmark *landmark = &message->as.landmark.landmark;
-    const plr_reading *reading = &message->as.reading;
     switch (message->kind) {
     case PLR_KIND_TWIST:
-        return all_within(twist->v_B_mps, 3, SPEED_MPS) &&
-               all_within(twist->w_B_radps, 3, RATE_RADPS);
+        return plr_plausible(PLR_GROUP_TWIST, &message->as);
     case PLR_KIND_START:
-        return plr_plausible_pose(&start->T_WB) &&
-               (!start->has_covariance || all_within(start->P_xi, 21, VARIANCE));
+        return plr_plausible(PLR_GROUP_START, &message->as);
     case PLR_KIND_LANDMARK:
-        return all_within(landmark->p_W_m, 3, POSITION_M) &&
-               all_within(landmark->P_W_m2, 9, VARIANCE);
+        return plr_plausible(PLR_GROUP_LANDMARK, &message->as);
     case PLR_KIND_READING:
-        return all_within(reading->value, 3, POSITION_M);
+        return plr_plausible(PLR_GROUP_READING, &message->as);
     default:
         return true;
     }

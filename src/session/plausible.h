@@ -1,34 +1,31 @@
 // SPDX-License-Identifier: MIT
-/*
- * Finds numbers that no sensor measures. A speed of 1e30 m/s is finite, and a filter that used it
- * could never continue. A message with a number beyond one of these limits is refused with
- * PLR_E_RANGE:
- *
- *     speed, and its bias          1e4 m/s
- *     turn rate, and its bias      1e3 rad/s
- *     position                     1e9 m
- *     variance, covariance         1e12, in any unit
- *
- * NaN and infinity are within the limits here, because the filter refuses them with a status of
- * their own.
- */
+/* Finds numbers that no sensor measures, by the table of limits.def. */
 #ifndef PLR_SESSION_PLAUSIBLE_H
 #define PLR_SESSION_PLAUSIBLE_H
 
 #include "pelorus/wire.h"
 
-/* A TWIST; a START's pose and, where it is given, its covariance; a LANDMARK; the value of a READING.
- * Of other kinds true. */
+/* What is looked at as one: the groups of limits.def, with the structs that it names. */
+#define LIMIT(name, most, what, unit)
+#define GROUP(name, type, what) PLR_GROUP_##name,
+#define BOUND(group, type, member, count, limit)
+#define BOUND_IF(group, type, member, count, limit, flag)
+typedef enum plr_group {
+#include "session/limits.def"
+    PLR_GROUPS
+} plr_group;
+#undef LIMIT
+#undef GROUP
+#undef BOUND
+#undef BOUND_IF
+
+/* True if all numbers of the group are within their limits; `object` is of the group's struct. */
+bool plr_plausible(plr_group group, const void *object);
+
+/* The same of a message as a whole: TWIST, START, LANDMARK, READING. Of other kinds true. */
 bool plr_plausible_message(const plr_message *message);
-
-bool plr_plausible_pose(const plr_pose *pose);
-
-/* A START's bias prior. */
-bool plr_plausible_bias(const plr_start *start);
 
 /* True if all n numbers are finite. */
 bool plr_plausible_finite(const double *x, unsigned n);
-
-bool plr_plausible_variance(const double *variance, unsigned n);
 
 #endif

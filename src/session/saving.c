@@ -87,14 +87,15 @@ void plr_saving_save(plr_session *s, plr_time_ns t_ns) {
 
 /* ---------------------------------------------------------------- restore */
 
-static plr_status check_moved(const double variance[6]) {
+static plr_status check_moved(const plr_state_message *wanted) {
+    const double *variance = wanted->moved_variance;
     for (unsigned i = 0; i < 6; i++) {
         if (!(variance[i] - variance[i] == 0))
             return PLR_E_NOT_FINITE;
         if (variance[i] < 0)
             return PLR_E_ARGUMENT;
     }
-    return plr_plausible_variance(variance, 6) ? PLR_OK : PLR_E_RANGE;
+    return plr_plausible(PLR_GROUP_RESTORE, wanted) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* True if t_ns is later than the estimate by at most max-gap. */
@@ -147,7 +148,7 @@ static plr_status restore(plr_session *s, const plr_state_message *wanted, plr_s
                           plr_time_ns *of_ns) {
     if (s->options.store == NULL)
         return PLR_E_MODE;
-    const plr_status status = check_moved(wanted->moved_variance);
+    const plr_status status = check_moved(wanted);
     if (status != PLR_OK)
         return status;
     plr_phase_change(&s->phase, PLR_EVENT_RESTORE);

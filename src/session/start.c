@@ -190,7 +190,7 @@ void plr_start_set_bias(plr_session *s) {
     if (!s->start.has_bias || plr_filter_config(&s->filter)->bias == 0)
         return;
     plr_status status = PLR_E_RANGE;
-    if (plr_plausible_bias(&s->start))
+    if (plr_plausible(PLR_GROUP_BIAS, &s->start))
         status = plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance);
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
@@ -199,7 +199,7 @@ void plr_start_set_bias(plr_session *s) {
 void plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, const plr_pose *T_WB,
                         const double *P_xi) {
     plr_status status = PLR_E_RANGE;
-    if (plr_plausible_pose(T_WB))
+    if (plr_plausible(PLR_GROUP_POSE, T_WB))
         status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
     if (status != PLR_OK) {
         plr_send_refusal(s, subject, t_ns, status, NULL);

@@ -5,43 +5,73 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
 #include "pelorus/wire.h"
-#include "record/bytes.h"
+#include "record/codec.h"
 
 /* ---------------------------------------------------------------- header: docs/STATE-FORMAT.md */
 
 typedef struct slot_header {
+    uint32_t magic, version;
     uint64_t generation;
     uint32_t length, crc; /* of the state */
+    uint32_t own_crc;
 } slot_header;
 
-enum { STORE_VERSION = 1, MAGIC = 0, VERSION = 4, GENERATION = 8, LENGTH = 16, CRC = 20, OWN = 24 };
+static const plr_field header_fields[] = {
+#define FIELD(member, kind_, about)                                                                \
+    {.offset = offsetof(slot_header, member), .kind = PLR_FIELD_##kind_, .count = 1},
+#include "session/slot.def"
+};
 
-static const uint8_t magic[4] = {'P', 'L', 'R', 'S'};
+/* "PLRS" */
+#define SLOT_MAGIC 0x53524C50U
 
-static void write_header(uint8_t bytes[PLR_STORE_HEADER], const slot_header *header) {
-    memcpy(bytes + MAGIC, magic, sizeof magic);
-    plr_bytes_put(bytes + VERSION, 4, STORE_VERSION);
-    plr_bytes_put(bytes + GENERATION, 8, header->generation);
-    plr_bytes_put(bytes + LENGTH, 4, header->length);
-    plr_bytes_put(bytes + CRC, 4, header->crc);
-    plr_bytes_put(bytes + OWN, 4, plr_crc32(0, bytes, OWN));
+enum { STORE_VERSION = 1, OWN_CRC = PLR_STORE_HEADER - 4 /* where the last field begins */ };
+
+/* Moves the next bytes of a header that is written or read. */
+static bool write_bytes(void *context, uint8_t *bytes, unsigned n) {
+    uint8_t **at = context;
+    memcpy(*at, bytes, n);
+    *at += n;
+    return true;
+}
+
+static bool take_bytes(void *context, uint8_t *bytes, unsigned n) {
+    const uint8_t **at = context;
+    memcpy(bytes, *at, n);
+    *at += n;
+    return true;
+}
+
+static void pass_header(plr_codec *c, slot_header *header) {
+    plr_codec_fields(c, header, header_fields, sizeof header_fields / sizeof *header_fields);
+    PLR_ASSERT(c->status == PLR_OK && c->left == 0);
+}
+
+static void write_header(uint8_t bytes[PLR_STORE_HEADER], slot_header header) {
+    for (unsigned pass = 0; pass < 2;
+         pass++) { /* the second with the CRC of what the first wrote */
+        uint8_t *at = bytes;
+        plr_codec codec = {.direction = PLR_CODEC_WRITE, .move = write_bytes, .context = &at};
+        pass_header(&codec, &header);
+        header.own_crc = plr_crc32(0, bytes, OWN_CRC);
+    }
 }
 
 /* PLR_OK; PLR_E_NOT_READY the bytes are no header at all; PLR_E_CORRUPT one that is damaged;
- * PLR_E_FOREIGN of another version: only the generation is set. */
+ * PLR_E_FOREIGN of another version: only the generation means something. */
 static plr_status read_header(const uint8_t bytes[PLR_STORE_HEADER], slot_header *header) {
+    const uint8_t *at = bytes;
+    plr_codec codec = {
+        .direction = PLR_CODEC_READ, .move = take_bytes, .context = &at, .left = PLR_STORE_HEADER};
     memset(header, 0, sizeof *header);
-    if (memcmp(bytes + MAGIC, magic, sizeof magic) != 0)
+    pass_header(&codec, header);
+    if (header->magic != SLOT_MAGIC)
         return PLR_E_NOT_READY;
-    if (plr_bytes_get(bytes + OWN, 4) != plr_crc32(0, bytes, OWN))
+    if (header->own_crc != plr_crc32(0, bytes, OWN_CRC))
         return PLR_E_CORRUPT;
-    header->generation = plr_bytes_get(bytes + GENERATION, 8);
-    if (plr_bytes_get(bytes + VERSION, 4) != STORE_VERSION)
-        return PLR_E_FOREIGN;
-    header->length = (uint32_t)plr_bytes_get(bytes + LENGTH, 4);
-    header->crc = (uint32_t)plr_bytes_get(bytes + CRC, 4);
-    return PLR_OK;
+    return header->version == STORE_VERSION ? PLR_OK : PLR_E_FOREIGN;
 }
 
 /* ---------------------------------------------------------------- geometry */
@@ -208,7 +238,7 @@ static bool erase_blocks(const plr_state_store *store, uint32_t offset, uint32_t
 static bool program_header(plr_state_store *store, unsigned slot, const slot_header *header) {
     uint8_t back[PLR_STORE_HEADER];
     memset(store->buffer, 0, header_space(store));
-    write_header(store->buffer, header);
+    write_header(store->buffer, *header);
     return program(store, slot_start(store, slot), header_space(store)) &&
            read_bytes(store, slot_start(store, slot), back, sizeof back) &&
            memcmp(back, store->buffer, sizeof back) == 0;
@@ -227,7 +257,11 @@ static plr_status write_slot(plr_state_store *store, unsigned slot, uint64_t gen
         return status;
     if (!flush(&writer) || !read_crc(store, state, writer.length, &crc) || crc != writer.crc)
         return PLR_E_IO;
-    const slot_header header = {generation, writer.length, writer.crc};
+    const slot_header header = {.magic = SLOT_MAGIC,
+                                .version = STORE_VERSION,
+                                .generation = generation,
+                                .length = writer.length,
+                                .crc = writer.crc};
     if (!program_header(store, slot, &header))
         return PLR_E_IO;
     describe(saved, slot, &header);

@@ -44,7 +44,17 @@ def tables_without_a_place(files: dict[Path, str]) -> list[str]:
     shown = {found[1] for text in files.values() for found in TABLE.finditer(text)}
     schema = next(text for path, text in files.items() if path.suffix == ".json")
     named = re.findall(r'"kind": \d+, "name": "(\w+)"', schema)
-    wanted = {*named, "kinds", "settings", "statuses", "reasons", "sensors", "state"}
+    wanted = {
+        *named,
+        "kinds",
+        "settings",
+        "statuses",
+        "reasons",
+        "sensors",
+        "state",
+        "slot",
+        "bounds",
+    }
     return sorted(wanted - shown)
 
 

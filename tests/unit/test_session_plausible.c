@@ -32,14 +32,14 @@ static void test_a_limit_is_included_and_what_is_beyond_is_not(void) {
     plr_twist twist = {{1e4, -1e4, 0}, {1e3, -1e3, 0}};
     plr_pose pose = {.p = {1e9, -1e9, 0}};
     TEST_ASSERT_TRUE(plausible_twist(&twist));
-    TEST_ASSERT_TRUE(plr_plausible_pose(&pose));
+    TEST_ASSERT_TRUE(plr_plausible(PLR_GROUP_POSE, &pose));
     twist.v_B_mps[1] = -1.0001e4;
     TEST_ASSERT_FALSE(plausible_twist(&twist));
     twist.v_B_mps[1] = 0;
     twist.w_B_radps[2] = 1.0001e3;
     TEST_ASSERT_FALSE(plausible_twist(&twist));
     pose.p[2] = 1.0001e9;
-    TEST_ASSERT_FALSE(plr_plausible_pose(&pose));
+    TEST_ASSERT_FALSE(plr_plausible(PLR_GROUP_POSE, &pose));
 }
 
 static void test_a_covariance_counts_only_where_it_is_given(void) {
@@ -59,7 +59,7 @@ static void test_each_number_of_a_bias_and_a_landmark_is_looked_at(void) {
         memset(&landmark, 0, sizeof landmark);
         *(i < 6 ? &start.bias[i] : &start.bias_variance[i - 6]) = -2e12;
         *(i < 3 ? &landmark.p_W_m[i] : &landmark.P_W_m2[i - 3]) = 2e12;
-        TEST_ASSERT_FALSE(plr_plausible_bias(&start));
+        TEST_ASSERT_FALSE(plr_plausible(PLR_GROUP_BIAS, &start));
         TEST_ASSERT_FALSE(plausible_landmark(&landmark));
     }
 }

@@ -66,6 +66,7 @@ SENSORS: dict[str, int] = {  # the small ones, by name
     row["name"].lower(): int(row["number"]) for row in _TABLES["enums"] if row["of"] == "sensor"
 }
 LIMITS: dict[str, int] = _TABLES["limits"]
+PLAUSIBLE: dict[str, float] = _TABLES["plausible"]  # what a session refuses is beyond
 MESSAGES: dict[str, MessageTable] = {row["name"]: _message(row) for row in _TABLES["messages"]}
 SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["settings"]}
 STATUSES = _words("status")

@@ -179,9 +179,23 @@ static void print_limit_table(void) {
     printf("  },\n");
 }
 
+/* The greatest values that a sensor may give. */
+static void print_bounds(void) {
+    const char *between = "";
+    printf("  \"plausible\": {");
+    for (size_t i = 0; i < schema_bound_rows; i++)
+        if (schema_bounds[i].kind == BOUND_LIMIT) {
+            printf("%s\n    \"%s\": ", between, schema_bounds[i].name);
+            print_number(schema_bounds[i].most);
+            between = ",";
+        }
+    printf("\n  },\n");
+}
+
 void schema_print_json(void) {
     printf("{\n  \"about\": \"Printed by tools/schema; see tests/layering/schema.py.\",\n");
     print_limit_table();
+    print_bounds();
     print_messages();
     print_settings();
     print_all_words("enums", schema_enums, schema_enum_rows, ",");

@@ -4,7 +4,8 @@
  *
  *     pelorus-schema json                  schema.json, which the Python tools read
  *     pelorus-schema markdown TABLE        a table of the docs; TABLE is kinds, settings, statuses,
- *                                          reasons, sensors, state, or the name of a message
+ *                                          reasons, sensors, state, slot, bounds, or the name of a
+ *                                          message
  *
  * tests/layering/schema.py compares what it prints with the files, or writes them.
  */
@@ -23,6 +24,7 @@ int main(int argc, char **argv) {
     fprintf(
         stderr,
         "usage: pelorus-schema json | pelorus-schema markdown TABLE\n"
-        "TABLE: kinds, settings, statuses, reasons, sensors, state, or the name of a message\n");
+        "TABLE: kinds, settings, statuses, reasons, sensors, state, slot, bounds, or the name of a "
+        "message\n");
     return 2;
 }

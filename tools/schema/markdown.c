@@ -188,6 +188,42 @@ static void print_state(void) {
     }
 }
 
+static void print_slot(void) {
+    place at = {0, 0, NULL, NULL};
+    printf("| at | type | field | unit | |\n|---|---|---|---|---|\n");
+    for (size_t i = 0; i < schema_slot_rows; i++) {
+        print_field(&at, &schema_slot[i]);
+        step_over(&at, &schema_slot[i]);
+    }
+}
+
+/* --- numbers that no sensor measures --- */
+
+static const bound *limit_of(const bound *numbers) {
+    const bound *b = schema_bounds;
+    while (b->kind != BOUND_LIMIT || strcmp(b->name, numbers->name) != 0)
+        b++;
+    return b;
+}
+
+static void print_bounds(void) {
+    const char *what = "";
+    printf("| refused is | for | beyond | |\n|---|---|---|---|\n");
+    for (size_t i = 0; i < schema_bound_rows; i++) {
+        const bound *b = &schema_bounds[i];
+        if (b->kind == BOUND_GROUP)
+            what = b->text;
+        if (b->kind != BOUND_NUMBERS)
+            continue;
+        const bound *due = limit_of(b);
+        printf("| %s | `%s`", what, b->text);
+        if (b->unit[0])
+            printf(", where `%s`", b->unit);
+        printf(" | %g %s | %s |\n", due->most, due->unit, due->text);
+        what = "";
+    }
+}
+
 bool schema_print_markdown(const char *table) {
     const row *message = message_of(table);
     if (message)
@@ -204,6 +240,10 @@ bool schema_print_markdown(const char *table) {
         print_words("sensor", "sensor", schema_enums, schema_enum_rows);
     else if (strcmp(table, "state") == 0)
         print_state();
+    else if (strcmp(table, "slot") == 0)
+        print_slot();
+    else if (strcmp(table, "bounds") == 0)
+        print_bounds();
     else
         return false;
     return true;

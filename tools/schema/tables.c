@@ -51,6 +51,36 @@ const row schema_state[] = {
 };
 const size_t schema_state_rows = LENGTH(schema_state);
 
+/* --- the header of a slot --- */
+
+#undef FIELD
+#define FIELD(member_, type_, about_)                                                              \
+    {.kind = ROW_FIELD,                                                                            \
+     .name = #member_,                                                                             \
+     .type = #type_,                                                                               \
+     .count = 1,                                                                                   \
+     .unit = "",                                                                                   \
+     .about = (about_)},
+const row schema_slot[] = {
+#include "session/slot.def"
+};
+const size_t schema_slot_rows = LENGTH(schema_slot);
+
+/* --- numbers that no sensor measures --- */
+
+#define LIMIT(name_, most_, what_, unit_)                                                          \
+    {.kind = BOUND_LIMIT, .name = #name_, .most = (most_), .text = (what_), .unit = (unit_)},
+#define BOUND(group_, type_, member_, count_, limit_)                                              \
+    {.kind = BOUND_NUMBERS, .name = #limit_, .count = (count_), .text = #member_, .unit = ""},
+#define BOUND_IF(group_, type_, member_, count_, limit_, flag_)                                    \
+    {.kind = BOUND_NUMBERS, .name = #limit_, .count = (count_), .text = #member_, .unit = #flag_},
+#undef GROUP
+#define GROUP(name_, type_, what_) {.kind = BOUND_GROUP, .name = #name_, .text = (what_)},
+const bound schema_bounds[] = {
+#include "session/limits.def"
+};
+const size_t schema_bound_rows = LENGTH(schema_bounds);
+
 /* --- words --- */
 
 #define STATUS(number_, text_) {"status", #number_, number_, text_},

@@ -24,6 +24,18 @@ typedef struct row {
     const char *unit, *about;
 } row;
 
+typedef enum bound_kind { BOUND_LIMIT, BOUND_GROUP, BOUND_NUMBERS } bound_kind;
+
+/* One line of session/limits.def. */
+typedef struct bound {
+    bound_kind kind;
+    const char *name; /* of the limit or the group; of numbers that of their limit */
+    double most;
+    unsigned count;
+    const char *text; /* what is limited or refused; of numbers the member */
+    const char *unit; /* of numbers the flag, "" where there is none */
+} bound;
+
 /* A line of words.def, or a name of an enum. */
 typedef struct word {
     const char *of, *name;
@@ -36,10 +48,11 @@ typedef struct limit {
     double value;
 } limit;
 
-extern const row schema_messages[], schema_state[];
+extern const row schema_messages[], schema_state[], schema_slot[];
+extern const bound schema_bounds[];
 extern const word schema_words[], schema_enums[];
 extern const limit schema_limits[];
-extern const size_t schema_message_rows, schema_state_rows, schema_word_rows, schema_enum_rows,
-    schema_limit_rows;
+extern const size_t schema_message_rows, schema_state_rows, schema_slot_rows, schema_bound_rows,
+    schema_word_rows, schema_enum_rows, schema_limit_rows;
 
 #endif

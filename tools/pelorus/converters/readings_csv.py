@@ -14,12 +14,13 @@ import numpy as np
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Reading
 from pelorus.layout import Floats
+from pelorus.schema import PLAUSIBLE
 from pelorus.small_sensors import SmallSensor
 from pelorus.table import Table
 
 ARM = ("at_x_m", "at_y_m", "at_z_m")
 # Beyond these the filter refuses a reading (plr_filter_measure).
-VALUE_MAX, SIGMA_MAX, ARM_MAX_M = 1e9, 1e6, 1e3
+VALUE_MAX, SIGMA_MAX, ARM_MAX_M = PLAUSIBLE["VALUE"], 1e6, 1e3
 
 
 def columns_of(sensor: SmallSensor) -> str:
