@@ -151,6 +151,15 @@ static void make_stereo(plr_frame *m, unsigned variant) {
         memcpy(&o[1].vL_px, &signalling, sizeof signalling);
 }
 
+static void make_truth(plr_truth *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    fill(m->T_WB.R, 9, variant, 0);
+    fill(m->T_WB.p, 3, variant, 9);
+    fill(m->v_B_mps, 3, variant, 12);
+    fill(m->bias, 6, variant, 15);
+    m->knows = whole8(variant, UINT8_MAX, PLR_TRUTH_BIAS);
+}
+
 static void make_landmark(plr_landmark_message *m, unsigned variant) {
     m->role = whole8(variant, PLR_LANDMARK_FINAL, PLR_LANDMARK_EVICTED);
     m->landmark.last_seen_ns = time_of(variant);
@@ -264,12 +273,7 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         make_stereo(&m.as.stereo, variant);
         break;
     case PLR_KIND_TRUTH:
-        m.as.truth.t_ns = time_of(variant);
-        fill(m.as.truth.T_WB.R, 9, variant, 0);
-        fill(m.as.truth.T_WB.p, 3, variant, 9);
-        fill(m.as.truth.v_B_mps, 3, variant, 12);
-        fill(m.as.truth.bias, 6, variant, 15);
-        m.as.truth.knows = whole8(variant, UINT8_MAX, PLR_TRUTH_BIAS);
+        make_truth(&m.as.truth, variant);
         break;
     case PLR_KIND_LANDMARK:
         make_landmark(&m.as.landmark, variant);

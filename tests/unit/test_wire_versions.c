@@ -32,10 +32,11 @@ static plr_status read_payload(plr_kind kind, size_t n, plr_message *m) {
 }
 
 /* By how much a payload of format 1.3 is shorter: what is suggested for an IMU, the velocity at the
- * start, the count of IMU messages. */
+ * start, velocity and biases of a truth, the count of IMU messages. */
 static size_t since_1_3(plr_kind kind) {
     return kind == PLR_KIND_HEADER  ? 49
            : kind == PLR_KIND_START ? 48
+           : kind == PLR_KIND_TRUTH ? 73
            : kind == PLR_KIND_END   ? 8
                                     : 0;
 }
@@ -90,8 +91,16 @@ static void forget_imu(plr_header *expected) {
     expected->bias_accel_sigma_mps2 = expected->gravity_mps2 = -1;
 }
 
+static void forget_all_but_the_pose(plr_truth *expected) {
+    expected->knows = 0;
+    for (unsigned i = 0; i < 3; i++)
+        expected->v_B_mps[i] = -1;
+    for (unsigned i = 0; i < 6; i++)
+        expected->bias[i] = -1;
+}
+
 static void test_what_came_with_format_1_4_is_absent_in_a_payload_of_1_3(void) {
-    static const plr_kind kinds[] = {PLR_KIND_HEADER, PLR_KIND_START, PLR_KIND_END};
+    static const plr_kind kinds[] = {PLR_KIND_HEADER, PLR_KIND_START, PLR_KIND_TRUTH, PLR_KIND_END};
     for (unsigned i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         plr_message m, expected = encode(kinds[i]);
         const size_t old = length - since_1_3(kinds[i]);
@@ -100,6 +109,8 @@ static void test_what_came_with_format_1_4_is_absent_in_a_payload_of_1_3(void) {
             forget_imu(&expected.as.header);
         for (unsigned j = 0; j < 3 && kinds[i] == PLR_KIND_START; j++)
             expected.as.start.velocity[j] = expected.as.start.velocity_variance[j] = -1;
+        if (kinds[i] == PLR_KIND_TRUTH)
+            forget_all_but_the_pose(&expected.as.truth);
         if (kinds[i] == PLR_KIND_END)
             expected.as.end.imus = expected.as.end.arrived[PLR_COUNTED_IMU] = 0;
         wire_assert_same(&expected, &m);
