@@ -11,9 +11,9 @@
  *         plr_session_step(&session);                   // at most one message, bounded time
  *
  * Messages in (docs/REPLAY-FORMAT.md), in this order: HEADER; CONFIG and known LANDMARKs, as
- * needed; START, or instead of it STATE (restore); then TWIST, STEREO, TRUTH and READING, and at
- * any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a REPORT after each
- * frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END. No input stops the
+ * needed; START, or instead of it STATE (restore); then TWIST or IMU, STEREO, TRUTH and READING,
+ * and at any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a REPORT
+ * after each frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END. No input stops the
  * session: a message that it cannot use is counted and answered with a REPORT that says what was
  * refused (subject) and why (status). After END it waits for the next HEADER.
  *
@@ -56,7 +56,7 @@ typedef enum plr_start_choice {
 typedef enum plr_output {
     PLR_OUTPUT_CONFIG = 1 << 0,     /* the settings in use and the build, before the first data */
     PLR_OUTPUT_POSE = 1 << 1,       /* after each STEREO */
-    PLR_OUTPUT_TWIST_POSE = 1 << 2, /* after each TWIST */
+    PLR_OUTPUT_TWIST_POSE = 1 << 2, /* after each TWIST, or each reading of an IMU */
     PLR_OUTPUT_REPORT = 1 << 3,     /* after each STEREO, and for every refused message */
     PLR_OUTPUT_LANDMARK = 1 << 4,   /* those that are evicted, and at END all in the filter */
     PLR_OUTPUT_TEXT = 1 << 5,       /* warnings */
@@ -77,7 +77,8 @@ enum {
 typedef struct plr_frame_result {
     const plr_frame *frame;       /* as received, with the budget that was applied */
     const plr_report *report;     /* its status says whether the frame was refused */
-    const plr_pose_message *pose; /* NULL if there is no estimate for the frame's time */
+    const plr_pose_message *pose; /* at the frame's time moved by the setting camera-offset; NULL if
+                                     there is no estimate for it */
     uint64_t compute_ns;          /* time of its update and of the predicts since the last frame */
 } plr_frame_result;
 
@@ -88,7 +89,7 @@ typedef struct plr_session_observer {
     /* Before the first data; plr_filter_config(&session->filter) has the final settings. */
     void (*started)(void *context);
     void (*frame)(void *context, const plr_frame_result *result);
-    /* After each frame; after each twist too if PLR_OUTPUT_TWIST_POSE is set. */
+    /* After each frame; after each twist or IMU reading too if PLR_OUTPUT_TWIST_POSE is set. */
     void (*pose)(void *context, const plr_pose_message *pose);
     void (*truth)(void *context, const plr_truth *truth);
     void (*landmark)(void *context, const plr_landmark_message *landmark);
@@ -131,11 +132,15 @@ typedef enum plr_step {
 /* Counts since init or since the HEADER that followed an END. */
 typedef struct plr_session_totals {
     uint32_t twists, stereos, truths, landmarks, readings, imus; /* messages received */
-    uint32_t refused; /* messages of any kind that were refused; frames that the reader skipped
-                               are in reader.counts */
+    /* Messages of any kind that were refused; frames that the reader skipped are in reader.counts. */
+    uint32_t refused;
+    uint32_t imu_refused;   /* IMU readings that were refused; of those that follow one another for
+                               the same reason only the first counts in `refused` */
+    uint32_t other_process; /* TWISTs with process = imu, IMUs with process = twist: not used; only
+                               the first counts in `refused` */
     uint32_t without_truth; /* mapping: frames without a TRUTH of the same time */
     uint32_t reanchored;    /* times the session followed a jump of the clock */
-    uint32_t held_short;    /* twists that waited less than twist-delay, for want of room */
+    uint32_t held_short;    /* steps that waited less than twist-delay, for want of room */
     uint32_t over_deadline; /* frames that took longer than the deadline */
     uint32_t not_sent;      /* messages that could not be written to the port */
 } plr_session_totals;
@@ -167,13 +172,15 @@ typedef struct plr_session {
     bool start_pending;        /* `start` sets the pose when its time has come */
     plr_start start;
     uint32_t start_resets;
-    plr_held_twists held;
+    plr_held_steps held;
     plr_held_readings held_readings;
     plr_known_map known;
     plr_clock_watch watch;
     plr_budget budget;
-    uint64_t predict_ns; /* computing time since the last frame */
-    plr_report last;     /* of the last frame */
+    uint64_t predict_ns;   /* computing time since the last frame */
+    plr_report last;       /* of the last frame */
+    plr_status imu_status; /* of the last IMU reading */
+    uint32_t imu_faults;   /* bits of plr_imu_fault that were told in this drive */
 } plr_session;
 
 /* --- use --- */
@@ -197,8 +204,8 @@ static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
 }
 
 /* Reads the bytes that are there, up to the end of one frame, and handles its message. The work of
- * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update and, at END, one LANDMARK
- * for each slot. */
+ * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU readings
+ * and those that waited, and, at END, one LANDMARK for each slot. */
 plr_step plr_session_step(plr_session *s);
 
 /* Does what END does, for a stream that stopped without one: applies the twists that still wait,

@@ -11,7 +11,8 @@ extern "C" {
 
 enum {
     PLR_SESSION_HELD_READINGS = 24, /* most readings of small sensors that wait with them */
-    PLR_SESSION_HELD_TWISTS = 64,   /* most twists that wait because of the setting twist-delay */
+    PLR_SESSION_HELD_TWISTS = 64,   /* most twists, or readings of an IMU, that wait because of the
+                                       setting twist-delay */
     PLR_SESSION_AGREEING = 3 /* messages that must agree before the session follows a clock that
                                 has jumped: src/session/reanchor.h */
 };
@@ -29,13 +30,22 @@ typedef enum plr_session_phase {
     PLR_PHASES
 } plr_session_phase;
 
-/* Twists that wait because of the setting twist-delay: a ring, oldest first. */
-typedef struct plr_held_twists {
-    unsigned first, count;
-    plr_twist_message twists[PLR_SESSION_HELD_TWISTS];
-} plr_held_twists;
+/* What moves the body: a twist, or a reading of an IMU. The setting `process` says which. */
+typedef struct plr_held_step {
+    plr_time_ns t_ns;
+    union {
+        plr_twist twist;
+        plr_imu imu;
+    } by;
+} plr_held_step;
 
-/* Readings of small sensors that wait with the twists, ascending by time. */
+/* Those that wait because of the setting twist-delay: a ring, oldest first. */
+typedef struct plr_held_steps {
+    unsigned first, count;
+    plr_held_step steps[PLR_SESSION_HELD_TWISTS];
+} plr_held_steps;
+
+/* Readings of small sensors that wait with them, ascending by time. */
 typedef struct plr_held_readings {
     unsigned count;
     plr_reading readings[PLR_SESSION_HELD_READINGS];

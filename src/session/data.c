@@ -4,97 +4,21 @@
 #include <string.h>
 
 #include "session/budget.h"
-#include "session/held.h"
+#include "session/clock.h"
 #include "session/line.h"
 #include "session/plausible.h"
 #include "session/reanchor.h"
 #include "session/send.h"
 #include "session/start.h"
-
-static uint64_t now_ns(const plr_session *s) {
-    return s->port.now_ns != NULL ? s->port.now_ns(s->port.context) : 0;
-}
-
-/* Since then; 0 if the clock went back. */
-static uint64_t elapsed_ns(const plr_session *s, uint64_t since) {
-    const uint64_t now = now_ns(s);
-    return now > since ? now - since : 0;
-}
-
-/* --- TWIST --- */
-
-static plr_status predict(plr_session *s, const plr_twist_message *twist) {
-    const uint64_t begin = now_ns(s);
-    const plr_status status = plr_filter_predict(&s->filter, twist->t_ns, &twist->twist);
-    s->predict_ns += elapsed_ns(s, begin);
-    return status;
-}
-
-static void apply_reading(plr_session *s, const plr_reading *reading) {
-    const plr_status status = plr_filter_measure(&s->filter, reading, NULL);
-    if (status != PLR_OK)
-        plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, status, NULL);
-}
-
-/* The readings that wait and are older. */
-static void apply_readings_before(plr_session *s, plr_time_ns t_ns) {
-    plr_reading reading;
-    while (plr_held_pop_older(&s->held_readings, t_ns, &reading))
-        apply_reading(s, &reading);
-}
-
-/* A twist, after the readings that wait and are older than it. */
-static void apply_twist(plr_session *s, const plr_twist_message *twist) {
-    apply_readings_before(s, twist->t_ns);
-    plr_start_apply_until(s, twist->t_ns);
-    plr_status status = predict(s, twist);
-    if (plr_reanchor_follow(s, twist->t_ns, status))
-        status = predict(s, twist);
-    if (status != PLR_OK)
-        plr_send_refusal(s, PLR_KIND_TWIST, twist->t_ns, status, NULL);
-    else if ((s->options.output & PLR_OUTPUT_TWIST_POSE) != 0)
-        (void)plr_send_pose(s, false);
-}
-
-void plr_data_apply_held(plr_session *s, plr_time_ns until_ns) {
-    plr_twist_message twist;
-    while (plr_held_pop_until(&s->held, until_ns, &twist))
-        apply_twist(s, &twist);
-    apply_readings_before(s, until_ns);
-}
-
-static plr_time_ns delay_ns(const plr_session *s) {
-    return (plr_time_ns)(plr_filter_config(&s->filter)->twist_delay_s * 1e9 + 0.5);
-}
-
-static void delay_twist(plr_session *s, const plr_twist_message *twist) {
-    plr_twist_message due;
-    if (plr_held_contradicts(&s->held, twist->t_ns))
-        plr_data_apply_held(s, UINT64_MAX);
-    if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
-        s->totals.held_short++;
-        apply_twist(s, &due);
-    }
-    plr_held_push(&s->held, twist);
-    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
-        apply_twist(s, &due);
-}
-
-void plr_data_use_twist(plr_session *s) {
-    const plr_twist_message *twist = &s->in.as.twist;
-    if (delay_ns(s) > 0)
-        delay_twist(s, twist);
-    else
-        apply_twist(s, twist);
-}
+#include "session/steps.h"
 
 /* --- STEREO --- */
 
 static plr_status update(plr_session *s, const plr_frame *frame, plr_report *report,
                          uint64_t *compute_ns) {
-    const uint64_t begin = now_ns(s);
+    const uint64_t begin = plr_clock_now_ns(s);
     const plr_status status = plr_filter_update(&s->filter, frame, report);
-    *compute_ns = elapsed_ns(s, begin);
+    *compute_ns = plr_clock_elapsed_ns(s, begin);
     return status;
 }
 
@@ -148,12 +72,12 @@ static bool is_repeated(const plr_session *s, const plr_frame *frame) {
            s->last.t_ns == frame->t_ns;
 }
 
-static void use_frame(plr_session *s, const plr_frame *frame) {
+static void use_frame(plr_session *s, const plr_frame *frame, const plr_frame *moved) {
     uint64_t update_ns;
     plr_report report;
-    plr_status status = update(s, frame, &report, &update_ns);
-    if (plr_reanchor_follow(s, frame->t_ns, status))
-        status = update(s, frame, &report, &update_ns);
+    plr_status status = update(s, moved, &report, &update_ns);
+    if (plr_reanchor_follow(s, moved->t_ns, status))
+        status = update(s, moved, &report, &update_ns);
     if (status != PLR_OK && status != PLR_E_DIVERGED) {
         if (status == PLR_E_MODE)
             s->totals.without_truth++;
@@ -163,6 +87,7 @@ static void use_frame(plr_session *s, const plr_frame *frame) {
     if (status != PLR_OK)
         s->totals.refused++;
     s->last = report;
+    s->last.t_ns = frame->t_ns; /* by which its sender knows it */
     learn(s, update_ns);
     answer(s, frame, update_ns + s->predict_ns);
     s->predict_ns = 0;
@@ -175,17 +100,35 @@ void plr_data_limit_frame(plr_session *s) {
         s->in.as.stereo.budget = budget;
 }
 
+/* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there are
+ * none: a frame has the time of its TRUTH.) False if there is no such time. */
+static bool move_frame(const plr_session *s, plr_frame *frame) {
+    const plr_config *config = plr_filter_config(&s->filter);
+    const double offset_ns = config->mode == PLR_MODE_MAPPING ? 0 : config->camera_offset_s * 1e9;
+    const bool back = offset_ns < 0;
+    const plr_time_ns by_ns = (plr_time_ns)((back ? -offset_ns : offset_ns) + 0.5);
+    if (back ? frame->t_ns < by_ns : frame->t_ns > UINT64_MAX - by_ns)
+        return false;
+    frame->t_ns = back ? frame->t_ns - by_ns : frame->t_ns + by_ns;
+    return true;
+}
+
 void plr_data_use_stereo(plr_session *s) {
     const plr_frame *frame = &s->in.as.stereo;
-    plr_data_apply_held(s, frame->t_ns);
-    if (s->phase == PLR_PHASE_STARTING)
-        plr_start_choose(s, frame->t_ns);
+    plr_frame moved = *frame;
+    if (!move_frame(s, &moved)) {
+        plr_data_refuse_frame(s, PLR_E_TIME);
+        return;
+    }
+    plr_steps_apply_held(s, moved.t_ns);
+    if (s->phase == PLR_PHASE_STARTING) /* a START of the frame's own time counts, too */
+        plr_start_choose(s, moved.t_ns > frame->t_ns ? moved.t_ns : frame->t_ns);
     if (s->phase == PLR_PHASE_STARTING)
         plr_data_refuse_frame(s, PLR_E_NOT_READY);
     else if (is_repeated(s, frame))
         plr_data_refuse_frame(s, PLR_E_TIME);
     else
-        use_frame(s, frame);
+        use_frame(s, frame, &moved);
 }
 
 /* --- TRUTH --- */
@@ -210,35 +153,18 @@ static bool starts_here(const plr_session *s) {
 void plr_data_use_truth(plr_session *s) {
     const plr_truth *truth = &s->in.as.truth;
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
-        plr_data_apply_held(s, truth->t_ns);
+        plr_steps_apply_held(s, truth->t_ns);
         move_to(s, truth);
     } else if (starts_here(s)) {
-        plr_data_apply_held(s, truth->t_ns);
+        plr_steps_apply_held(s, truth->t_ns);
         plr_start_set_pose(s, PLR_KIND_TRUTH, truth->t_ns, &truth->T_WB, NULL);
     }
-}
-
-/* --- READING --- */
-
-void plr_data_use_reading(plr_session *s) {
-    const plr_reading *reading = &s->in.as.reading;
-    plr_reading oldest;
-    if (delay_ns(s) == 0) {
-        apply_reading(s, reading);
-        return;
-    }
-    if (s->held_readings.count == PLR_SESSION_HELD_READINGS &&
-        plr_held_pop_older(&s->held_readings, UINT64_MAX, &oldest)) {
-        s->totals.held_short++;
-        apply_reading(s, &oldest);
-    }
-    plr_held_insert(&s->held_readings, reading);
 }
 
 /* --- START among the data --- */
 
 void plr_data_use_start(plr_session *s) {
     s->start = s->in.as.start;
-    plr_data_apply_held(s, UINT64_MAX);
+    plr_steps_apply_held(s, UINT64_MAX);
     plr_start_apply(s);
 }

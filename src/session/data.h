@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: MIT
-/* What happens to data: TWIST, STEREO, TRUTH and READING, and a START among them. The message is in
- * s->in. */
+/* What happens to STEREO, TRUTH and a START among the data. The message is in s->in. */
 #ifndef PLR_SESSION_DATA_H
 #define PLR_SESSION_DATA_H
 
 #include "pelorus/session.h"
 
 /* Each applies its message to the filter, which must be initialised. */
-void plr_data_use_twist(plr_session *s);
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
-void plr_data_use_reading(plr_session *s);
 
 /* Sets the filter's pose to that of a START. */
 void plr_data_use_start(plr_session *s);
@@ -21,8 +18,5 @@ void plr_data_limit_frame(plr_session *s);
 
 /* Answers a STEREO that is refused. */
 void plr_data_refuse_frame(plr_session *s, plr_status status);
-
-/* Applies those of the delayed twists (setting twist-delay) whose time is at most until_ns. */
-void plr_data_apply_held(plr_session *s, plr_time_ns until_ns);
 
 #endif

@@ -3,48 +3,48 @@
 
 #include "pelorus/assertions.h"
 
-void plr_held_init(plr_held_twists *held) {
+void plr_held_init(plr_held_steps *held) {
     held->first = 0;
     held->count = 0;
 }
 
-bool plr_held_full(const plr_held_twists *held) {
+bool plr_held_full(const plr_held_steps *held) {
     return held->count == PLR_SESSION_HELD_TWISTS;
 }
 
-static const plr_twist_message *newest(const plr_held_twists *held) {
-    return &held->twists[(held->first + held->count - 1u) % PLR_SESSION_HELD_TWISTS];
+static const plr_held_step *newest(const plr_held_steps *held) {
+    return &held->steps[(held->first + held->count - 1u) % PLR_SESSION_HELD_TWISTS];
 }
 
-void plr_held_push(plr_held_twists *held, const plr_twist_message *twist) {
+void plr_held_push(plr_held_steps *held, const plr_held_step *step) {
     PLR_ASSERT(!plr_held_full(held));
-    held->twists[(held->first + held->count) % PLR_SESSION_HELD_TWISTS] = *twist;
+    held->steps[(held->first + held->count) % PLR_SESSION_HELD_TWISTS] = *step;
     held->count++;
 }
 
-bool plr_held_contradicts(const plr_held_twists *held, plr_time_ns t_ns) {
+bool plr_held_contradicts(const plr_held_steps *held, plr_time_ns t_ns) {
     return held->count > 0 && t_ns <= newest(held)->t_ns;
 }
 
-bool plr_held_pop(plr_held_twists *held, plr_twist_message *twist) {
+bool plr_held_pop(plr_held_steps *held, plr_held_step *step) {
     if (held->count == 0)
         return false;
-    *twist = held->twists[held->first];
+    *step = held->steps[held->first];
     held->first = (held->first + 1u) % PLR_SESSION_HELD_TWISTS;
     held->count--;
     return true;
 }
 
-bool plr_held_pop_until(plr_held_twists *held, plr_time_ns t_ns, plr_twist_message *twist) {
-    if (held->count == 0 || held->twists[held->first].t_ns > t_ns)
+bool plr_held_pop_until(plr_held_steps *held, plr_time_ns t_ns, plr_held_step *step) {
+    if (held->count == 0 || held->steps[held->first].t_ns > t_ns)
         return false;
-    return plr_held_pop(held, twist);
+    return plr_held_pop(held, step);
 }
 
-bool plr_held_pop_due(plr_held_twists *held, plr_time_ns delay_ns, plr_twist_message *twist) {
-    if (held->count == 0 || newest(held)->t_ns - held->twists[held->first].t_ns < delay_ns)
+bool plr_held_pop_due(plr_held_steps *held, plr_time_ns delay_ns, plr_held_step *step) {
+    if (held->count == 0 || newest(held)->t_ns - held->steps[held->first].t_ns < delay_ns)
         return false;
-    return plr_held_pop(held, twist);
+    return plr_held_pop(held, step);
 }
 
 void plr_held_insert(plr_held_readings *held, const plr_reading *reading) {

@@ -10,6 +10,7 @@
 #include "session/saving.h"
 #include "session/send.h"
 #include "session/start.h"
+#include "session/steps.h"
 
 /* --- END --- */
 
@@ -69,10 +70,11 @@ static const struct {
     [PLR_KIND_LANDMARK] = {{EARLY,  USE,   USE,     USE,     USE,     USE},  plr_start_add_landmark},
     [PLR_KIND_START]    = {{EARLY,  KEEP,  KEEP,    KEEP,    ECHO,    USE},  plr_data_use_start},
     [RESTORE]           = {{EARLY,  USE,   USE,     LATE,    USE,     LATE}, plr_saving_restore},
-    [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_twist},
+    [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_twist},
+    [PLR_KIND_IMU]      = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_imu},
     [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_stereo},
     [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_data_use_truth},
-    [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_reading},
+    [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_reading},
     [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
     [PLR_KIND_TEXT]     = {{ECHO,   ECHO,  ECHO,    ECHO,    ECHO,    ECHO}, NULL},
     [PLR_KIND_END]      = {{USE,    USE,   USE,     USE,     USE,     USE},  compare_counts},
@@ -105,6 +107,8 @@ static plr_time_ns time_of(const plr_message *in) {
         return in->as.state.t_ns;
     case PLR_KIND_READING:
         return in->as.reading.t_ns;
+    case PLR_KIND_IMU:
+        return in->as.imu.t_ns;
     default:
         return 0;
     }

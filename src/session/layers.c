@@ -24,7 +24,8 @@ static void suggest_axes(plr_config *config, const char *name, double all, const
 
 static void apply_header(plr_config *config, const plr_header *header, bool sigmas_of_a_reading) {
     const double v = header->bias_velocity_sigma_mps, w = header->bias_gyro_sigma_radps;
-    const double has_bias = v > 0 || w > 0 ? 1 : v >= 0 && w >= 0 ? 0 : -1;
+    const bool has_none = v >= 0 && w >= 0 && header->process == PLR_PROCESS_TWIST;
+    const double has_bias = v > 0 || w > 0 ? 1 : has_none ? 0 : -1;
     const plr_suggestion suggestions[] = {
         {"twist-timing", header->twist_timing},
         {"pixel-sigma", header->pixel_sigma_px},
@@ -32,6 +33,13 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
         {"bias-gyro-sigma", header->bias_gyro_sigma_radps},
         {"bias-velocity-walk", header->bias_velocity_walk},
         {"bias-gyro-walk", header->bias_gyro_walk},
+        {"process", header->process},
+        {"gyro-noise", header->gyro_noise},
+        {"accel-noise", header->accel_noise},
+        {"gyro-walk", header->gyro_walk},
+        {"accel-walk", header->accel_walk},
+        {"bias-accel-sigma", header->bias_accel_sigma_mps2},
+        {"gravity", header->gravity_mps2},
         /* only a sensor that is said to have none does without: else the filter would believe more
          * than it knows */
         {"bias", has_bias},

@@ -3,13 +3,13 @@
 
 #include <string.h>
 
-#include "session/data.h"
 #include "session/input.h"
 #include "session/layers.h"
 #include "session/phase.h"
 #include "session/saving.h"
 #include "session/send.h"
 #include "session/start.h"
+#include "session/steps.h"
 
 void plr_session_options_default(plr_session_options *options) {
     memset(options, 0, sizeof *options);
@@ -121,7 +121,7 @@ plr_step plr_session_step(plr_session *s) {
 void plr_session_finish(plr_session *s) {
     if (s->phase >= PLR_PHASE_STARTING) {
         plr_landmark landmark;
-        plr_data_apply_held(s, UINT64_MAX);
+        plr_steps_apply_held(s, UINT64_MAX);
         if ((s->options.output & PLR_OUTPUT_STATE) != 0)
             plr_saving_save(s, plr_filter_time(&s->filter));
         for (unsigned slot = 0; slot < plr_filter_landmark_count(&s->filter); slot++)

@@ -24,6 +24,8 @@ void plr_start_clear(plr_session *s) {
     s->start.has_bias = false;
     s->start_resets = 0;
     s->predict_ns = 0;
+    s->imu_status = PLR_OK;
+    s->imu_faults = 0;
     plr_held_init(&s->held);
     s->held_readings.count = 0;
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
@@ -39,6 +41,13 @@ static bool same_axes(const double a[3], const double b[3]) {
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
+static bool same_imu(const plr_header *a, const plr_header *b) {
+    return a->process == b->process && a->gyro_noise == b->gyro_noise &&
+           a->accel_noise == b->accel_noise && a->gyro_walk == b->gyro_walk &&
+           a->accel_walk == b->accel_walk && a->bias_accel_sigma_mps2 == b->bias_accel_sigma_mps2 &&
+           a->gravity_mps2 == b->gravity_mps2;
+}
+
 /* Everything that an estimate depends on; the name and the image size are not that. */
 static bool same_header(const plr_header *a, const plr_header *b) {
     return memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
@@ -50,7 +59,8 @@ static bool same_header(const plr_header *a, const plr_header *b) {
            same_axes(a->gyro_sigma_axes_radps, b->gyro_sigma_axes_radps) &&
            a->bias_velocity_sigma_mps == b->bias_velocity_sigma_mps &&
            a->bias_gyro_sigma_radps == b->bias_gyro_sigma_radps &&
-           a->bias_velocity_walk == b->bias_velocity_walk && a->bias_gyro_walk == b->bias_gyro_walk;
+           a->bias_velocity_walk == b->bias_velocity_walk &&
+           a->bias_gyro_walk == b->bias_gyro_walk && same_imu(a, b);
 }
 
 bool plr_start_in_force(const plr_session *s) {
@@ -196,19 +206,33 @@ void plr_start_set_bias(plr_session *s) {
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
 }
 
-void plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, const plr_pose *T_WB,
-                        const double *P_xi) {
+plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns,
+                              const plr_pose *T_WB, const double *P_xi) {
     plr_status status = PLR_E_RANGE;
     if (plr_plausible(PLR_GROUP_POSE, T_WB))
         status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
     if (status != PLR_OK) {
         plr_send_refusal(s, subject, t_ns, status, NULL);
-        return;
+        return status;
     }
     plr_clock_watch_init(&s->watch);
     if (s->phase == PLR_PHASE_STARTING)
         plr_send_resets_from_here(s);
     plr_phase_change(&s->phase, PLR_EVENT_POSE);
+    return PLR_OK;
+}
+
+/* The velocity of a START, with an IMU and where it is given. */
+static void set_velocity(plr_session *s) {
+    const double *variance = s->start.velocity_variance;
+    if (plr_filter_config(&s->filter)->process != PLR_PROCESS_IMU ||
+        !(variance[0] > 0 && variance[1] > 0 && variance[2] > 0))
+        return;
+    plr_status status = PLR_E_RANGE;
+    if (plr_plausible(PLR_GROUP_VELOCITY, &s->start))
+        status = plr_filter_set_velocity(&s->filter, s->start.velocity, variance);
+    if (status != PLR_OK)
+        plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
 }
 
 void plr_start_apply(plr_session *s) {
@@ -217,8 +241,9 @@ void plr_start_apply(plr_session *s) {
         for (unsigned j = 0; j <= i; j++, k++)
             P[6 * i + j] = P[6 * j + i] = s->start.P_xi[k];
     s->start_pending = false;
-    plr_start_set_pose(s, PLR_KIND_START, s->start.t_ns, &s->start.T_WB,
-                       s->start.has_covariance ? P : NULL);
+    if (plr_start_set_pose(s, PLR_KIND_START, s->start.t_ns, &s->start.T_WB,
+                           s->start.has_covariance ? P : NULL) == PLR_OK)
+        set_velocity(s);
 }
 
 void plr_start_apply_until(plr_session *s, plr_time_ns t_ns) {

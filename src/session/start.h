@@ -37,10 +37,10 @@ void plr_start_set_bias(plr_session *s);
 
 /* Sets the filter's pose, which is the start pose if none was set before. P_xi as in
  * plr_filter_set_pose. If it is refused, a REPORT of that subject is sent. */
-void plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns, const plr_pose *T_WB,
-                        const double *P_xi);
+plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns,
+                              const plr_pose *T_WB, const double *P_xi);
 
-/* Sets the pose to that of s->start. */
+/* Sets the pose to that of s->start, and with an IMU the velocity. */
 void plr_start_apply(plr_session *s);
 
 /* Call before data of time t_ns: applies the stored START if its time has come. */

@@ -77,6 +77,8 @@ static void require_whole(const plr_reader *r, const plr_message *message) {
         REQUIRE(memchr(message->as.header.name, 0, PLR_WIRE_NAME_SIZE) != NULL);
     if (message->kind == PLR_KIND_CONFIG)
         REQUIRE(message->as.config.count <= PLR_WIRE_MAX_SETTINGS);
+    if (message->kind == PLR_KIND_IMU)
+        REQUIRE(message->as.imu.count >= 1 && message->as.imu.count <= PLR_WIRE_MAX_IMU);
     if (message->kind == PLR_KIND_STEREO)
         REQUIRE(message->as.stereo.count <= r->max_observations &&
                 message->as.stereo.observations == r->observations);

@@ -58,7 +58,10 @@ SESSION_PARTS = (
     "phase",
     "state_store",
 )
-SESSION_FILES = (*SESSION_PARTS, "send", "reanchor", "start", "saving", "data", "input", "session")
+SESSION_FILES = (
+    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "steps", "data", "input"),
+    "session",
+)
 # What a public header may include of its siblings: wire.h must stay free of the filter.
 SIBLINGS: dict[str, set[str]] = {
     "assertions.h": set(),

@@ -7,7 +7,7 @@
 #include "pelorus/settings.h"
 #include "support/random.h"
 
-static const double SPEED = 1, RATE = 0.2;
+static const double SPEED = 1, RATE = 0.2, GRAVITY = 9.81;
 static const double FOCAL = 320, CENTRE_X = 320, CENTRE_Y = 240, BASELINE = 0.25;
 
 plr_time_ns drive_time_ns(double t_s) {
@@ -31,6 +31,8 @@ plr_message drive_header(void) {
     h->pixel_sigma_px = h->velocity_sigma_mps = h->gyro_sigma_radps = -1;
     h->bias_velocity_sigma_mps = h->bias_gyro_sigma_radps = -1;
     h->bias_velocity_walk = h->bias_gyro_walk = -1;
+    h->gyro_noise = h->accel_noise = h->gyro_walk = h->accel_walk = -1;
+    h->bias_accel_sigma_mps2 = h->gravity_mps2 = -1;
     strcpy(h->name, "circle");
     return m;
 }
@@ -48,6 +50,32 @@ plr_message drive_twist(double t_s) {
     m.as.twist.t_ns = drive_time_ns(t_s);
     m.as.twist.twist.v_B_mps[0] = SPEED;
     m.as.twist.twist.w_B_radps[2] = RATE;
+    return m;
+}
+
+/* No sensor gives the same numbers again and again. */
+static double whisper(double t_s, unsigned i) {
+    return 1e-3 * sin(1e3 * t_s + 2 * i);
+}
+
+plr_message drive_imu(double t_s, unsigned count, double period_s) {
+    plr_message m;
+    memset(&m, 0, sizeof m);
+    m.kind = PLR_KIND_IMU;
+    m.as.imu.t_ns = drive_time_ns(t_s);
+    m.as.imu.period_ns = count > 1 ? (uint32_t)llround(period_s * 1e9) : 0;
+    m.as.imu.count = (uint8_t)count;
+    for (unsigned k = 0; k < count; k++) {
+        const double at_s = t_s + k * period_s;
+        plr_imu *reading = &m.as.imu.readings[k];
+        for (unsigned i = 0; i < 3; i++) {
+            reading->a_B_mps2[i] = whisper(at_s, i);
+            reading->w_B_radps[i] = whisper(at_s, 3 + i);
+        }
+        reading->a_B_mps2[1] += SPEED * RATE;
+        reading->a_B_mps2[2] += GRAVITY;
+        reading->w_B_radps[2] += RATE;
+    }
     return m;
 }
 
@@ -130,5 +158,8 @@ plr_message drive_start(double t_s) {
     m.kind = PLR_KIND_START;
     m.as.start.t_ns = drive_time_ns(t_s);
     m.as.start.T_WB = drive_pose(t_s);
+    m.as.start.velocity[0] = SPEED;
+    for (unsigned i = 0; i < 3; i++)
+        m.as.start.velocity_variance[i] = 1e-4;
     return m;
 }

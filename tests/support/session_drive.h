@@ -23,6 +23,9 @@ plr_pose drive_pose(double t_s);
 plr_message drive_twist(double t_s);
 plr_message drive_truth(double t_s);
 
+/* So many readings of an IMU from t_s on. */
+plr_message drive_imu(double t_s, unsigned count, double period_s);
+
 /* At most DRIVE_MOST_SEEN landmarks in view. The observations stand in static memory until the next
  * call. */
 plr_message drive_stereo(double t_s);
@@ -33,7 +36,7 @@ plr_message drive_known(uint32_t id, double sigma_m);
 /* A CONFIG of wanted settings that holds one of them. */
 plr_message drive_config(const char *name, double value);
 
-/* START at the true pose. */
+/* START at the true pose, with the true velocity, which only an IMU needs. */
 plr_message drive_start(double t_s);
 
 #endif

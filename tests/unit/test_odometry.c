@@ -70,6 +70,28 @@ static void test_level_body_has_its_own_covariance_as_that_of_roll_pitch_and_yaw
     }
 }
 
+/* With an IMU velocity is estimated, and its errors belong together: signs go on both sides. */
+static void test_velocity_comes_with_its_covariance_in_the_axes_of_the_autopilot(void) {
+    plr_pose_message pose = level();
+    plr_odometry o;
+    for (unsigned i = 0; i < 21; i++)
+        pose.P_u[i] = 0.01 * (i + 1);
+    for (unsigned i = 0; i < 3; i++) {
+        pose.velocity.v_B_mps[i] = 1.0 + i;
+        pose.velocity.w_B_radps[i] = 0.1 + i;
+    }
+    TEST_ASSERT_EQUAL(PLR_OK, plr_odometry_from_pose(&o, &pose, PLR_AXES_FLU, PLR_HEALTH_GOOD));
+    static const double sign[6] = {1, -1, -1, 1, -1, -1};
+    for (unsigned i = 0; i < 3; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, sign[i] * (1.0 + i), (double)o.v[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, sign[i] * (0.1 + i), (double)o.w[i]);
+    }
+    for (unsigned i = 0, k = 0; i < 6; i++)
+        for (unsigned j = i; j < 6; j++, k++)
+            TEST_ASSERT_DOUBLE_WITHIN(1e-6, sign[i] * sign[j] * pose.P_u[j * (j + 1) / 2 + i],
+                                      (double)o.velocity_covariance[k]);
+}
+
 static void test_covariance_is_unknown_where_euler_angles_have_no_meaning(void) {
     static const double y[3] = {0.0, 1.0, 0.0};
     plr_pose_message pose = level();
@@ -134,6 +156,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_quaternion_gives_the_rotation_back_for_every_largest_component);
     RUN_TEST(test_level_body_has_its_own_covariance_as_that_of_roll_pitch_and_yaw);
+    RUN_TEST(test_velocity_comes_with_its_covariance_in_the_axes_of_the_autopilot);
     RUN_TEST(test_covariance_is_unknown_where_euler_angles_have_no_meaning);
     RUN_TEST(test_covariances_are_unknown_once_the_filter_has_diverged);
     RUN_TEST(test_health_becomes_quality);

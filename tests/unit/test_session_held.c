@@ -4,7 +4,7 @@
 
 #include "session/held.h"
 
-static plr_held_twists held;
+static plr_held_steps held;
 
 void setUp(void) {
     plr_held_init(&held);
@@ -14,28 +14,28 @@ void tearDown(void) {
 }
 
 static void push(plr_time_ns t_ns) {
-    const plr_twist_message twist = {.t_ns = t_ns};
-    plr_held_push(&held, &twist);
+    const plr_held_step step = {.t_ns = t_ns};
+    plr_held_push(&held, &step);
 }
 
 static void test_twists_come_out_in_the_order_they_went_in(void) {
-    plr_twist_message twist;
+    plr_held_step step;
     for (plr_time_ns t = 1; t <= 3; t++)
         push(t);
     for (plr_time_ns t = 1; t <= 3; t++) {
-        TEST_ASSERT_TRUE(plr_held_pop(&held, &twist));
-        TEST_ASSERT_EQUAL_UINT64(t, twist.t_ns);
+        TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
+        TEST_ASSERT_EQUAL_UINT64(t, step.t_ns);
     }
-    TEST_ASSERT_FALSE(plr_held_pop(&held, &twist));
+    TEST_ASSERT_FALSE(plr_held_pop(&held, &step));
 }
 
 static void test_the_ring_goes_round_many_times(void) {
-    plr_twist_message twist;
+    plr_held_step step;
     for (plr_time_ns t = 1; t <= 5 * PLR_SESSION_HELD_TWISTS; t++) {
         push(t);
         if (t > 10) {
-            TEST_ASSERT_TRUE(plr_held_pop(&held, &twist));
-            TEST_ASSERT_EQUAL_UINT64(t - 10, twist.t_ns);
+            TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
+            TEST_ASSERT_EQUAL_UINT64(t - 10, step.t_ns);
         }
     }
 }
@@ -49,25 +49,25 @@ static void test_it_is_full_at_its_capacity_and_not_before(void) {
 }
 
 static void test_a_twist_is_due_when_the_newest_is_the_delay_ahead(void) {
-    plr_twist_message twist;
+    plr_held_step step;
     push(100);
     push(149);
-    TEST_ASSERT_FALSE(plr_held_pop_due(&held, 50, &twist));
+    TEST_ASSERT_FALSE(plr_held_pop_due(&held, 50, &step));
     push(150);
-    TEST_ASSERT_TRUE(plr_held_pop_due(&held, 50, &twist));
-    TEST_ASSERT_EQUAL_UINT64(100, twist.t_ns);
-    TEST_ASSERT_FALSE(plr_held_pop_due(&held, 50, &twist));
+    TEST_ASSERT_TRUE(plr_held_pop_due(&held, 50, &step));
+    TEST_ASSERT_EQUAL_UINT64(100, step.t_ns);
+    TEST_ASSERT_FALSE(plr_held_pop_due(&held, 50, &step));
 }
 
 static void test_a_frame_takes_the_twists_up_to_its_time(void) {
-    plr_twist_message twist;
+    plr_held_step step;
     push(10);
     push(20);
     push(30);
-    TEST_ASSERT_TRUE(plr_held_pop_until(&held, 20, &twist));
-    TEST_ASSERT_TRUE(plr_held_pop_until(&held, 20, &twist));
-    TEST_ASSERT_EQUAL_UINT64(20, twist.t_ns);
-    TEST_ASSERT_FALSE(plr_held_pop_until(&held, 20, &twist));
+    TEST_ASSERT_TRUE(plr_held_pop_until(&held, 20, &step));
+    TEST_ASSERT_TRUE(plr_held_pop_until(&held, 20, &step));
+    TEST_ASSERT_EQUAL_UINT64(20, step.t_ns);
+    TEST_ASSERT_FALSE(plr_held_pop_until(&held, 20, &step));
     TEST_ASSERT_EQUAL_UINT(1, held.count);
 }
 

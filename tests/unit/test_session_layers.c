@@ -85,6 +85,35 @@ static void test_the_header_says_twist_timing_and_all_seven_noises(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0, config.bias_gyro_walk);
 }
 
+static void test_the_header_says_the_process_and_what_an_imu_needs(void) {
+    header.process = PLR_PROCESS_IMU;
+    header.gyro_noise = 0.25;
+    header.accel_noise = 0.5;
+    header.gyro_walk = 0.125;
+    header.accel_walk = 0.0625;
+    header.bias_accel_sigma_mps2 = 0.75;
+    header.gravity_mps2 = 9.75;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(PLR_PROCESS_IMU, config.process);
+    TEST_ASSERT_EQUAL_DOUBLE(0.25, config.gyro_noise);
+    TEST_ASSERT_EQUAL_DOUBLE(0.5, config.accel_noise);
+    TEST_ASSERT_EQUAL_DOUBLE(0.125, config.gyro_walk);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0625, config.accel_walk);
+    TEST_ASSERT_EQUAL_DOUBLE(0.75, config.bias_accel_sigma_mps2);
+    TEST_ASSERT_EQUAL_DOUBLE(9.75, config.gravity_mps2);
+    override("process", PLR_PROCESS_TWIST);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(PLR_PROCESS_TWIST, config.process);
+}
+
+/* Biases of an IMU are always estimated: what a HEADER says of those of twists switches nothing off. */
+static void test_a_header_without_biases_of_twists_leaves_those_of_an_imu(void) {
+    header.process = PLR_PROCESS_IMU;
+    header.bias_velocity_sigma_mps = header.bias_gyro_sigma_radps = 0;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_UINT8(1, config.bias);
+}
+
 static void test_the_header_may_tell_the_sigmas_of_single_axes(void) {
     const double way[3] = {0.25, 0.5, 0.75}, turn[3] = {0.125, 0.0625, 0.125};
     header.velocity_sigma_mps = 1;
@@ -210,6 +239,8 @@ int main(void) {
     RUN_TEST(test_with_nothing_said_everything_is_at_its_default);
     RUN_TEST(test_each_layer_wins_over_those_below);
     RUN_TEST(test_the_header_says_twist_timing_and_all_seven_noises);
+    RUN_TEST(test_the_header_says_the_process_and_what_an_imu_needs);
+    RUN_TEST(test_a_header_without_biases_of_twists_leaves_those_of_an_imu);
     RUN_TEST(test_the_header_may_tell_the_sigmas_of_single_axes);
     RUN_TEST(test_what_is_wanted_for_all_axes_last_takes_the_place_of_single_ones);
     RUN_TEST(test_a_bias_is_estimated_unless_the_header_tells_that_there_is_none);

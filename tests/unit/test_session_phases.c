@@ -104,6 +104,7 @@ static const struct {
     {"STEREO", {{EARLY, WAITING}, {EARLY, STARTING}, {EARLY, REJECTED}, {EARLY, STARTING}, {OK, RUNNING}, {OK, RUNNING}}},
     {"TRUTH", {{OK, WAITING}, {OK, STARTING}, {OK, REJECTED}, {OK, STARTING}, {OK, RUNNING}, {OK, RUNNING}}},
     {"READING", {{EARLY, WAITING}, {NO_TWIST, STARTING}, {EARLY, REJECTED}, {OK, STARTING}, {NO_TWIST, RUNNING}, {OK, RUNNING}}},
+    {"IMU, with process = twist", {{EARLY, WAITING}, {LATE, STARTING}, {EARLY, REJECTED}, {LATE, STARTING}, {LATE, RUNNING}, {LATE, RUNNING}}},
     {"TEXT", {{OK, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"POSE", {{OK, WAITING}, {OK, READY}, {OK, REJECTED}, {OK, STARTING}, {OK, RESTORED}, {OK, RUNNING}}},
     {"END", {{OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}, {OK, WAITING}}},
@@ -146,11 +147,13 @@ static plr_message message_of(unsigned row) {
                                            .axes = 3,
                                            .sigma = {0.01, 0.01, 0.01}};
         return message;
-    case 14:
+    case 13:
+        return drive_imu(0.2, 1, 0);
+    case 15:
         message.kind = PLR_KIND_POSE;
         message.as.pose.real_bytes = 8;
         return message;
-    case 15:
+    case 16:
         return end_message();
     default:
         return message;
@@ -249,8 +252,8 @@ static void test_a_message_is_echoed_whether_it_is_used_or_refused(void) {
         {1, PLR_KIND_HEADER, 1},   {3, PLR_KIND_CONFIG, 1},   {4, PLR_KIND_START, 1},
         {5, PLR_KIND_LANDMARK, 1}, {6, PLR_KIND_LANDMARK, 0}, {7, PLR_KIND_STATE, 1},
         {8, PLR_KIND_STATE, 1},    {9, PLR_KIND_TWIST, 1},    {10, PLR_KIND_STEREO, 1},
-        {11, PLR_KIND_TRUTH, 1},   {12, PLR_KIND_READING, 1}, {13, PLR_KIND_TEXT, 1},
-        {14, PLR_KIND_POSE, 0},
+        {11, PLR_KIND_TRUTH, 1},   {12, PLR_KIND_READING, 1}, {13, PLR_KIND_IMU, 1},
+        {14, PLR_KIND_TEXT, 1},    {15, PLR_KIND_POSE, 0},
     };
     for (unsigned i = 0; i < sizeof tried / sizeof tried[0]; i++)
         for (unsigned phase = 0; phase < PLR_PHASES; phase++) {

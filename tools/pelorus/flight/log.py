@@ -7,6 +7,7 @@ each of its lives is a drive of its own, from its HEADER to the next REPORT that
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,9 +34,10 @@ from pelorus.frames import (
 )
 from pelorus.robot.stream import is_restore
 from pelorus.schema import STATUSES, number
+from pelorus.settings import IDS, mode_in_force
 from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
 
-DATA_KINDS = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.READING)
+DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING)
 # Statuses of what was damaged on the way.
 NOT_ARRIVED = tuple(number("status", name) for name in ("ARGUMENT", "CORRUPT", "FOREIGN"))
 FULL = number("status", "FULL")
@@ -226,6 +228,7 @@ class _Walk:
         self._before = frames_before
         self._begun = False  # a HEADER has come
         self._waiting: defaultdict[int, deque[Frame]] = defaultdict(deque)  # by time
+        self._offset_ns = 0  # of a POSE from its frame, by the settings in force
 
     def lose(self, words: str) -> None:
         """Something is missing here; it may touch the frame that is not answered yet.
@@ -246,8 +249,10 @@ class _Walk:
             case Stereo():
                 self.frames.append(Frame(self._before + len(self.frames) + 1, message))
                 self._waiting[message.t_ns].append(self.frames[-1])
+            case Config() if message.build_fingerprint:
+                self._offset_ns = _camera_offset_ns(message)
             case Pose() if message.after_stereo:
-                waiting = self._waiting[message.t_ns]
+                waiting = self._waiting[message.t_ns - self._offset_ns]
                 if waiting:
                     waiting[0].pose = message
                 else:
@@ -278,6 +283,14 @@ def _is_input(message: Message) -> bool:
     if isinstance(message, Landmark):
         return message.role == Role.KNOWN
     return is_restore(message) or message.kind in (*DATA_KINDS, Kind.HEADER, Kind.START)
+
+
+def _camera_offset_ns(config: Config) -> int:
+    """As the session rounds it; in mapping frames keep their time."""
+    offset_s = config.settings.get(IDS["camera-offset"], 0.0)
+    if mode_in_force([config]) == "mapping":
+        return 0
+    return int(math.copysign(int(abs(offset_s) * 1e9 + 0.5), offset_s))
 
 
 def _is_restored(messages: Sequence[Message]) -> bool:

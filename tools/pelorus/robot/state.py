@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from pelorus.errors import PelorusError
-from pelorus.frames import Kind, Message, Reading, State, StateAction, Stereo, Truth, Twist
+from pelorus.frames import Imu, Kind, Message, Reading, State, StateAction, Stereo, Truth, Twist
 from pelorus.layout import Floats
 
-Data = Twist | Reading | Truth | Stereo
+Data = Twist | Imu | Reading | Truth | Stereo
 
 
 def restored(messages: list[Message], moved: tuple[float, float] = (0.0, 0.0)) -> list[Message]:

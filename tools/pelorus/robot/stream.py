@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 import numpy as np
@@ -27,6 +27,7 @@ from pelorus.frames import (
     Message,
     Notice,
     Pose,
+    Process,
     Report,
     Start,
     StartFlag,
@@ -38,6 +39,7 @@ from pelorus.frames import (
 from pelorus.robot.flight_log import SETUP_KINDS, FlightLog
 from pelorus.robot.link import Link
 from pelorus.robot.status import refusal
+from pelorus.settings import IDS
 from pelorus.wire import DELIMITER, Counts, Reader, encode, end_of
 
 ANSWER_S = 5.0  # a board that emulates slowly on a busy machine takes tenths
@@ -283,7 +285,12 @@ class Streamer:
             if isinstance(message, State) and not self.outcome.poses:
                 self._await_state(message)
         if self.outcome.poses:
-            self._put(start_from(self.outcome.poses[-1]))
+            self._put(start_from(self.outcome.poses[-1], self._is_inertial()))
+
+    def _is_inertial(self) -> bool:
+        """Whether the board is moved by an IMU, by its settings in force."""
+        config = self.outcome.config
+        return config is not None and config.settings.get(IDS["process"]) == Process.IMU
 
     def _note(self, remark: str) -> None:
         """The host's own word on what went wrong, for who reads the log."""
@@ -296,12 +303,22 @@ def is_restore(message: Message) -> bool:
     return isinstance(message, State) and message.action == StateAction.RESTORE
 
 
-def start_from(pose: Pose) -> Start:
-    """A START that goes on from a pose."""
-    return Start(
+def start_from(pose: Pose, inertial: bool = False) -> Start:
+    """A START that goes on from a pose; with an IMU its velocity and biases go on too."""
+    start = Start(
         t_ns=pose.t_ns,
         R_WB=np.asarray(pose.R_WB),
         p_WB_m=np.asarray(pose.p_WB_m),
         flags=StartFlag.COVARIANCE,
         covariance=np.asarray(pose.covariance),
+    )
+    if not inertial or (pose.bias_variance <= 0).any():
+        return start
+    return replace(
+        start,
+        flags=StartFlag.COVARIANCE | StartFlag.BIAS_PRIOR,
+        bias_mean=np.asarray(pose.bias),
+        bias_variance=np.asarray(pose.bias_variance),
+        velocity=np.asarray(pose.v_B_mps),
+        velocity_variance=np.asarray(pose.velocity_covariance)[[0, 2, 5]],
     )

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+#include "session/steps.h"
+
+#include "session/clock.h"
+#include "session/held.h"
+#include "session/line.h"
+#include "session/plausible.h"
+#include "session/reanchor.h"
+#include "session/send.h"
+#include "session/start.h"
+
+static bool is_inertial(const plr_session *s) {
+    return plr_filter_config(&s->filter)->process == PLR_PROCESS_IMU;
+}
+
+static plr_kind kind_of_steps(const plr_session *s) {
+    return is_inertial(s) ? PLR_KIND_IMU : PLR_KIND_TWIST;
+}
+
+/* --- refusing --- */
+
+static void refuse(plr_session *s, plr_time_ns t_ns, plr_status status) {
+    if (!is_inertial(s)) {
+        plr_send_refusal(s, PLR_KIND_TWIST, t_ns, status, NULL);
+        return;
+    }
+    s->totals.imu_refused++;
+    if (status != s->imu_status)
+        plr_send_refusal(s, PLR_KIND_IMU, t_ns, status, NULL);
+    s->imu_status = status;
+}
+
+/* The message is of the other process. */
+static void refuse_other(plr_session *s, plr_kind kind, plr_time_ns t_ns) {
+    if (s->totals.other_process++ > 0)
+        return;
+    plr_send_refusal(s, kind, t_ns, PLR_E_MODE, plr_setting_by_name("process"));
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING);
+    plr_line_text(
+        &s->out.as.text,
+        kind == PLR_KIND_IMU
+            ? "IMU readings come, and the setting process is twist: none of them is used. "
+              "Set process = imu, or let the HEADER say so"
+            : "TWISTs come, and the setting process is imu: none of them is used. Send "
+              "measured speeds as READINGs of a wheel, or set process = twist");
+    plr_send_text(s);
+}
+
+/* Each fault of the IMU is told once in a drive. */
+static void report_fault(plr_session *s) {
+    const plr_imu_fault fault = plr_filter_imu_fault(&s->filter);
+    const uint32_t bit = UINT32_C(1) << fault;
+    if (fault == PLR_IMU_FAULT_NONE || (s->imu_faults & bit) != 0)
+        return;
+    s->imu_faults |= bit;
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING);
+    plr_line_text(&s->out.as.text, "the IMU: ");
+    plr_line_text(&s->out.as.text, plr_imu_fault_text(fault));
+    plr_send_text(s);
+}
+
+/* --- applying --- */
+
+static void apply_reading(plr_session *s, const plr_reading *reading) {
+    const plr_status status = plr_filter_measure(&s->filter, reading, NULL);
+    if (status != PLR_OK)
+        plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, status, NULL);
+}
+
+/* The readings that wait and are older. */
+static void apply_readings_before(plr_session *s, plr_time_ns t_ns) {
+    plr_reading reading;
+    while (plr_held_pop_older(&s->held_readings, t_ns, &reading))
+        apply_reading(s, &reading);
+}
+
+static plr_status move(plr_session *s, const plr_held_step *step) {
+    const uint64_t begin = plr_clock_now_ns(s);
+    const plr_status status = is_inertial(s)
+                                  ? plr_filter_inertial(&s->filter, step->t_ns, &step->by.imu)
+                                  : plr_filter_predict(&s->filter, step->t_ns, &step->by.twist);
+    s->predict_ns += plr_clock_elapsed_ns(s, begin);
+    return status;
+}
+
+/* A step, after the readings that wait and are older than it. */
+static void apply(plr_session *s, const plr_held_step *step) {
+    apply_readings_before(s, step->t_ns);
+    plr_start_apply_until(s, step->t_ns);
+    plr_status status = move(s, step);
+    if (plr_reanchor_follow(s, step->t_ns, status))
+        status = move(s, step);
+    if (is_inertial(s))
+        report_fault(s);
+    if (status != PLR_OK) {
+        refuse(s, step->t_ns, status);
+        return;
+    }
+    s->imu_status = PLR_OK;
+    if ((s->options.output & PLR_OUTPUT_TWIST_POSE) != 0)
+        (void)plr_send_pose(s, false);
+}
+
+void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
+    plr_held_step step;
+    while (plr_held_pop_until(&s->held, until_ns, &step))
+        apply(s, &step);
+    apply_readings_before(s, until_ns);
+}
+
+/* --- now, or later --- */
+
+static plr_time_ns delay_ns(const plr_session *s) {
+    return (plr_time_ns)(plr_filter_config(&s->filter)->twist_delay_s * 1e9 + 0.5);
+}
+
+static void delay(plr_session *s, const plr_held_step *step) {
+    plr_held_step due;
+    if (plr_held_contradicts(&s->held, step->t_ns))
+        plr_steps_apply_held(s, UINT64_MAX);
+    if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
+        s->totals.held_short++;
+        apply(s, &due);
+    }
+    plr_held_push(&s->held, step);
+    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
+        apply(s, &due);
+}
+
+static void use(plr_session *s, const plr_held_step *step) {
+    if (delay_ns(s) > 0)
+        delay(s, step);
+    else
+        apply(s, step);
+}
+
+void plr_steps_use_twist(plr_session *s) {
+    const plr_twist_message *twist = &s->in.as.twist;
+    const plr_held_step step = {.t_ns = twist->t_ns, .by.twist = twist->twist};
+    if (kind_of_steps(s) == PLR_KIND_TWIST)
+        use(s, &step);
+    else
+        refuse_other(s, PLR_KIND_TWIST, twist->t_ns);
+}
+
+void plr_steps_use_imu(plr_session *s) {
+    const plr_imu_message *imu = &s->in.as.imu;
+    if (kind_of_steps(s) != PLR_KIND_IMU) {
+        refuse_other(s, PLR_KIND_IMU, imu->t_ns);
+        return;
+    }
+    for (unsigned i = 0; i < imu->count; i++) {
+        const plr_held_step step = {.t_ns = imu->t_ns + (plr_time_ns)i * imu->period_ns,
+                                    .by.imu = imu->readings[i]};
+        if (step.t_ns < imu->t_ns) /* beyond the clock's end */
+            refuse(s, imu->t_ns, PLR_E_TIME);
+        else if (!plr_plausible(PLR_GROUP_IMU, &step.by.imu))
+            refuse(s, step.t_ns, PLR_E_RANGE);
+        else
+            use(s, &step);
+    }
+}
+
+void plr_steps_use_reading(plr_session *s) {
+    const plr_reading *reading = &s->in.as.reading;
+    plr_reading oldest;
+    if (delay_ns(s) == 0) {
+        apply_reading(s, reading);
+        return;
+    }
+    if (s->held_readings.count == PLR_SESSION_HELD_READINGS &&
+        plr_held_pop_older(&s->held_readings, UINT64_MAX, &oldest)) {
+        s->totals.held_short++;
+        apply_reading(s, &oldest);
+    }
+    plr_held_insert(&s->held_readings, reading);
+}

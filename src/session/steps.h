@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+/*
+ * What moves the body: TWIST or IMU, as the setting `process` says, and the READINGs of small sensors
+ * among them. With the setting twist-delay all of them wait. The message is in s->in.
+ *
+ * A TWIST with process = imu, or an IMU with process = twist, is refused once in a drive, with a TEXT
+ * that says what would be right; the others are only counted (totals.other_process). IMU readings that
+ * are refused for the same reason one after the other are answered once, for the first of them; all
+ * are counted (totals.imu_refused).
+ */
+#ifndef PLR_SESSION_STEPS_H
+#define PLR_SESSION_STEPS_H
+
+#include "pelorus/session.h"
+
+/* Each applies its message to the filter, which must be initialised, or delays it. */
+void plr_steps_use_twist(plr_session *s);
+void plr_steps_use_imu(plr_session *s);
+void plr_steps_use_reading(plr_session *s);
+
+/* Applies those of the delayed ones whose time is at most until_ns. */
+void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns);
+
+#endif
