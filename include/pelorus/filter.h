@@ -251,9 +251,11 @@ const plr_config *plr_filter_config(const plr_filter *f);
 /* A sentence about a status: what is wrong and how to correct it. Never NULL. */
 const char *plr_status_text(plr_status status);
 
-/* A phrase that explains a single bit of plr_report.reasons, or a health. Never NULL. */
+/* A phrase that explains a single bit of plr_report.reasons, a health, or a fault of an IMU. Never
+ * NULL. */
 const char *plr_reason_text(plr_reason reason);
 const char *plr_health_text(plr_health health);
+const char *plr_imu_fault_text(plr_imu_fault fault);
 
 /* "1.0.0" and a number that differs between builds whose bits may differ: version, arithmetic
  * (PLR_ARITHMETIC), precision, capacity, block size. */

@@ -134,6 +134,7 @@ typedef struct plr_session_totals {
     uint32_t twists, stereos, truths, landmarks, readings, imus; /* messages received */
     /* Messages of any kind that were refused; frames that the reader skipped are in reader.counts. */
     uint32_t refused;
+    uint32_t imu_readings;  /* in those messages */
     uint32_t imu_refused;   /* IMU readings that were refused; of those that follow one another for
                                the same reason only the first counts in `refused` */
     uint32_t other_process; /* TWISTs with process = imu, IMUs with process = twist: not used; only

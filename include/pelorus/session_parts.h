@@ -31,18 +31,23 @@ typedef enum plr_session_phase {
 } plr_session_phase;
 
 /* What moves the body: a twist, or a reading of an IMU. The setting `process` says which. */
+typedef union plr_moved_by {
+    plr_twist twist;
+    plr_imu imu;
+} plr_moved_by;
+
 typedef struct plr_held_step {
     plr_time_ns t_ns;
-    union {
-        plr_twist twist;
-        plr_imu imu;
-    } by;
+    plr_moved_by by;
+    bool leads; /* it is the first of its message */
 } plr_held_step;
 
 /* Those that wait because of the setting twist-delay: a ring, oldest first. */
 typedef struct plr_held_steps {
-    unsigned first, count;
-    plr_held_step steps[PLR_SESSION_HELD_TWISTS];
+    uint8_t first, count;
+    uint64_t leads; /* bit i: that of place i leads its message */
+    plr_time_ns t_ns[PLR_SESSION_HELD_TWISTS];
+    plr_moved_by by[PLR_SESSION_HELD_TWISTS];
 } plr_held_steps;
 
 /* Readings of small sensors that wait with them, ascending by time. */

@@ -13,7 +13,7 @@ static const char *const kind_names[COMPLAINT_KINDS] = {
     [PLR_KIND_START] = "START",   [PLR_KIND_TWIST] = "TWIST",       [PLR_KIND_STEREO] = "STEREO",
     [PLR_KIND_TRUTH] = "TRUTH",   [PLR_KIND_LANDMARK] = "LANDMARK", [PLR_KIND_POSE] = "POSE",
     [PLR_KIND_REPORT] = "REPORT", [PLR_KIND_TEXT] = "TEXT",         [PLR_KIND_END] = "END",
-    [PLR_KIND_STATE] = "STATE",   [PLR_KIND_READING] = "READING", [PLR_KIND_IMU] = "IMU",
+    [PLR_KIND_STATE] = "STATE",   [PLR_KIND_READING] = "READING",   [PLR_KIND_IMU] = "IMU",
 };
 
 static const char *const skip_words[COMPLAINT_SKIPS] = {
@@ -57,6 +57,8 @@ static const char *cause(plr_kind kind, plr_status status) {
         return "it differs from the HEADER in force; a calibration cannot change in mid-flight";
     if (status == PLR_E_MODE && kind == PLR_KIND_CONFIG)
         return "it differs from the settings in force; they cannot change in mid-flight";
+    if (status == PLR_E_MODE && (kind == PLR_KIND_TWIST || kind == PLR_KIND_IMU))
+        return "another one moves the body; this and all that follow of the kind are not used";
     if (status == PLR_E_MODE && kind == PLR_KIND_STEREO)
         return "in mapping a frame needs a TRUTH of equal time";
     if (status == PLR_E_CONFIG && kind == PLR_KIND_CONFIG)

@@ -125,9 +125,22 @@ static void print_readings(const plr_session *session) {
            totals.readings_refused);
 }
 
+/* What moved the body, and what came of the other kind. */
+static void print_steps(const plr_session *session) {
+    const plr_session_totals *totals = &session->totals;
+    if (totals->imus > 0)
+        printf("%" PRIu32 " IMU readings, %" PRIu32 " refused%s", totals->imu_readings,
+               totals->imu_refused, totals->twists > 0 ? "; " : "");
+    if (totals->twists > 0 || totals->imus == 0)
+        printf("%" PRIu32 " twists", totals->twists);
+    if (totals->other_process > 0)
+        printf("; %" PRIu32 " messages not used, see the setting process", totals->other_process);
+    printf("\n");
+}
+
 static void print_counts(const summary *s, const plr_session *session) {
-    printf("frames        %" PRIu64 " used, %" PRIu64 " refused; %" PRIu32 " twists\n", s->frames,
-           s->frames_refused, session->totals.twists);
+    printf("frames        %" PRIu64 " used, %" PRIu64 " refused; ", s->frames, s->frames_refused);
+    print_steps(session);
     printf("observations  %" PRIu64 ": %" PRIu64 " used, %" PRIu64 " gated (%.1f %% of matched), "
            "%" PRIu64 " new, %" PRIu64 " evicted\n",
            s->observations, s->used, s->gated, percent(s->gated, s->matched), s->created,

@@ -77,6 +77,15 @@ static void put_readings(json_object *o, const plr_session *session) {
     json_count(o, "readings_refused", totals.readings_refused);
 }
 
+static void put_steps(json_object *o, const plr_session *session) {
+    if (session->totals.imus > 0) {
+        json_count(o, "imu_readings", session->totals.imu_readings);
+        json_count(o, "imu_refused", session->totals.imu_refused);
+    }
+    if (session->totals.other_process > 0)
+        json_count(o, "other_process", session->totals.other_process);
+}
+
 static void put_damage(json_object *o, const summary *s, const plr_session *session) {
     const plr_reader_counts *c = &session->reader.counts;
     json_count(o, "bytes", c->bytes);
@@ -104,6 +113,7 @@ void summary_print_json(summary *s, const plr_session *session, const char *path
     put_figures(&o, s, &figures);
     put_counts(&o, s, session);
     put_readings(&o, session);
+    put_steps(&o, session);
     put_damage(&o, s, session);
     put_settings(&o, plr_filter_config(&session->filter));
     json_end(&o);

@@ -10,6 +10,7 @@ typedef struct plr_words {
 #define STATUS(status, text) {status, text},
 #define HEALTH(health, text)
 #define REASON(reason, text)
+#define IMU_FAULT(fault, text)
 static const plr_words statuses[] = {
 #include "record/words.def"
 };
@@ -27,6 +28,14 @@ static const plr_words healths[] = {
 #define HEALTH(health, text)
 #define REASON(reason, text) {reason, text},
 static const plr_words reasons[] = {
+#include "record/words.def"
+};
+
+#undef REASON
+#undef IMU_FAULT
+#define REASON(reason, text)
+#define IMU_FAULT(fault, text) {fault, text},
+static const plr_words imu_faults[] = {
 #include "record/words.def"
 };
 
@@ -49,6 +58,10 @@ const char *plr_reason_text(plr_reason reason) {
 
 const char *plr_health_text(plr_health health) {
     return find(healths, LENGTH(healths), (int)health, "no health of this version");
+}
+
+const char *plr_imu_fault_text(plr_imu_fault fault) {
+    return find(imu_faults, LENGTH(imu_faults), (int)fault, "no fault of this version");
 }
 
 const char *plr_version(void) {

@@ -126,6 +126,7 @@ static void count(plr_session *s) {
     s->totals.landmarks += s->in.kind == PLR_KIND_LANDMARK;
     s->totals.readings += s->in.kind == PLR_KIND_READING;
     s->totals.imus += s->in.kind == PLR_KIND_IMU;
+    s->totals.imu_readings += s->in.kind == PLR_KIND_IMU ? s->in.as.imu.count : 0;
     s->is_log = s->is_log || is_in_force(&s->in);
 }
 

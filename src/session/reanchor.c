@@ -9,6 +9,8 @@
 /* The most that is ever claimed not to be known. */
 #define MAX_POSITION_VARIANCE 1e6                /* (1 km)^2 */
 #define MAX_ANGLE_VARIANCE    3.2898681336964528 /* pi^2 / 3 */
+/* A body with an IMU may turn like this at any time, rad/s. */
+#define USUAL_RATE 1.0
 
 void plr_clock_watch_init(plr_clock_watch *watch) {
     watch->agreeing = 0;
@@ -63,12 +65,19 @@ static double wandered(double speed, double seconds, double limit) {
 /* The last pose with a covariance that a gap of so many seconds leaves. */
 static plr_status widen(double P[36], const plr_filter *f, double seconds) {
     const plr_config *config = plr_filter_config(f);
+    const bool inertial = config->process == PLR_PROCESS_IMU;
     const bool of_reading = config->noise == PLR_NOISE_TWIST;
+    double beside_v = of_reading ? largest3(config->velocity_sigma) : 0;
+    double beside_w = of_reading ? largest3(config->gyro_sigma) : 0;
     plr_twist u;
+    if (inertial) {
+        beside_v = config->start_velocity_sigma_mps;
+        beside_w = USUAL_RATE;
+    }
     if (plr_filter_velocity(f, &u) != PLR_OK || plr_filter_pose_covariance(f, P) != PLR_OK)
         return PLR_E_NOT_READY;
-    const double speed = sum3(u.v_B_mps) + (of_reading ? largest3(config->velocity_sigma) : 0);
-    const double rate = sum3(u.w_B_radps) + (of_reading ? largest3(config->gyro_sigma) : 0);
+    const double speed = sum3(u.v_B_mps) + beside_v;
+    const double rate = sum3(u.w_B_radps) + beside_w;
     for (unsigned i = 0; i < 3; i++) {
         P[7 * i] += wandered(speed, seconds, MAX_POSITION_VARIANCE);
         P[7 * (i + 3)] += wandered(rate, seconds, MAX_ANGLE_VARIANCE);
@@ -113,14 +122,49 @@ static plr_status carry_pose(plr_filter *f, plr_time_ns t_ns, double seconds) {
     return status;
 }
 
+/* With an IMU tilt and velocity are lost too: the filter starts anew, with the last place and heading,
+ * and with the biases that it knows. A controller sees the jump in reset_count. */
+static plr_status start_anew(plr_session *s, plr_time_ns t_ns, double seconds) {
+    plr_filter *f = &s->filter;
+    const uint32_t resets = plr_send_resets(s);
+    double P[36], bias[6], P_b[36], variance[6];
+    plr_pose pose;
+    plr_status status = plr_filter_pose(f, &pose);
+    if (status == PLR_OK)
+        status = widen(P, f, seconds);
+    if (status == PLR_OK)
+        status = plr_filter_bias(f, bias, P_b);
+    if (status == PLR_OK)
+        status = plr_filter_reset(f);
+    if (status != PLR_OK)
+        return status;
+    for (unsigned i = 0; i < 6; i++)
+        variance[i] = P_b[7 * i];
+    (void)plr_filter_set_bias(f, bias,
+                              variance); /* those of a filter that diverged are not taken */
+    status = plr_filter_set_pose(f, t_ns, &pose, P);
+    if (status == PLR_E_ARGUMENT) {
+        know_nothing(P);
+        status = plr_filter_set_pose(f, t_ns, &pose, P);
+    }
+    plr_send_resets_become(s, resets + 1);
+    return status;
+}
+
 static plr_status reanchor(plr_session *s, plr_time_ns t_ns) {
     plr_filter *f = &s->filter;
     const plr_time_ns from_ns = plr_filter_time(f);
     const double seconds = (double)distance_ns(from_ns, t_ns) * 1e-9;
 
     (void)plr_filter_flush_map(f); /* the session's sink accepts all */
-    const bool mapping = plr_filter_config(f)->mode == PLR_MODE_MAPPING;
-    const plr_status status = mapping ? plr_filter_reset(f) : carry_pose(f, t_ns, seconds);
+    const plr_config *config = plr_filter_config(f);
+    plr_status status;
+    if (config->mode == PLR_MODE_MAPPING)
+        status = plr_filter_reset(f);
+    else if (config->process == PLR_PROCESS_IMU)
+        status = start_anew(s, t_ns, seconds);
+    else
+        status = carry_pose(f, t_ns, seconds);
     if (status == PLR_OK) {
         s->totals.reanchored++;
         report(s, from_ns, t_ns);

@@ -19,7 +19,9 @@
  *   ((w + sigma_w) gap)^2, at most pi^2 / 3, the variance of an angle of which nothing is known.
  *   The gap is the whole jump: how much of it is the clock's alone the session cannot know.
  *
- *   In mapping every pose comes as a TRUTH, so there the filter just begins anew.
+ *   In mapping every pose comes as a TRUTH, so there the filter just begins anew. With an IMU it
+ *   starts anew (setting imu-start), with the last pose and biases; sigma_v is start-velocity-sigma
+ *   then, and sigma_w 1 rad/s. Of a batch of readings only the first counts.
  *
  * The third message is then used. The jump is counted, and a TEXT reports it.
  */

@@ -67,7 +67,15 @@ static uint32_t resets(const plr_filter *f) {
 }
 
 void plr_send_resets_from_here(plr_session *s) {
-    s->start_resets = resets(&s->filter);
+    plr_send_resets_become(s, 0);
+}
+
+uint32_t plr_send_resets(const plr_session *s) {
+    return resets(&s->filter) - s->start_resets;
+}
+
+void plr_send_resets_become(plr_session *s, uint32_t number) {
+    s->start_resets = resets(&s->filter) - number; /* modulo 2^32 */
 }
 
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
@@ -79,7 +87,7 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update) {
     pose->t_ns = plr_filter_time(&s->filter);
     pose->real_bytes = (uint8_t)sizeof(plr_real);
     pose->after_update = after_update;
-    pose->reset_count = (uint16_t)(resets(&s->filter) - s->start_resets);
+    pose->reset_count = (uint16_t)plr_send_resets(s);
     put(s, after_update ? PLR_OUTPUT_POSE : PLR_OUTPUT_TWIST_POSE, &s->out);
     if (s->options.observer.pose != NULL)
         s->options.observer.pose(s->options.observer.context, pose);

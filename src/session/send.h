@@ -20,6 +20,10 @@ const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 /* Sets the reset_count of a POSE to 0. */
 void plr_send_resets_from_here(plr_session *s);
 
+/* reset_count of POSE, before it is cut to 16 bits; and to make it another number. */
+uint32_t plr_send_resets(const plr_session *s);
+void plr_send_resets_become(plr_session *s, uint32_t number);
+
 /* Sends the report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
 

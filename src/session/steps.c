@@ -88,7 +88,8 @@ static void apply(plr_session *s, const plr_held_step *step) {
     apply_readings_before(s, step->t_ns);
     plr_start_apply_until(s, step->t_ns);
     plr_status status = move(s, step);
-    if (plr_reanchor_follow(s, step->t_ns, status))
+    /* of a batch the first speaks for the sender's clock: the others have their times from it */
+    if ((step->leads || status == PLR_OK) && plr_reanchor_follow(s, step->t_ns, status))
         status = move(s, step);
     if (is_inertial(s))
         report_fault(s);
@@ -136,7 +137,7 @@ static void use(plr_session *s, const plr_held_step *step) {
 
 void plr_steps_use_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
-    const plr_held_step step = {.t_ns = twist->t_ns, .by.twist = twist->twist};
+    const plr_held_step step = {.t_ns = twist->t_ns, .by.twist = twist->twist, .leads = true};
     if (kind_of_steps(s) == PLR_KIND_TWIST)
         use(s, &step);
     else
@@ -151,7 +152,8 @@ void plr_steps_use_imu(plr_session *s) {
     }
     for (unsigned i = 0; i < imu->count; i++) {
         const plr_held_step step = {.t_ns = imu->t_ns + (plr_time_ns)i * imu->period_ns,
-                                    .by.imu = imu->readings[i]};
+                                    .by.imu = imu->readings[i],
+                                    .leads = i == 0};
         if (step.t_ns < imu->t_ns) /* beyond the clock's end */
             refuse(s, imu->t_ns, PLR_E_TIME);
         else if (!plr_plausible(PLR_GROUP_IMU, &step.by.imu))

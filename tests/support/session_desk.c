@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "support/session_desk.h"
 
+#include <string.h>
 #include <unity.h>
 
 plr_session session;
@@ -53,4 +54,22 @@ void desk_assert_refused(plr_kind subject, plr_status status) {
 void desk_assert_nothing_refused(void) {
     plr_report_message report;
     TEST_ASSERT_FALSE(desk_next_refusal(&report));
+}
+
+unsigned desk_texts_with(const char *words) {
+    plr_message answer;
+    unsigned n = 0;
+    faulty_port_answers_again(&port);
+    while (faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer))
+        n += strstr(answer.as.text.text, words) != NULL;
+    faulty_port_answers_again(&port);
+    return n;
+}
+
+void desk_use_setting(const char *name, double value) {
+    static plr_wire_setting overrides[2];
+    overrides[options.override_count].id = plr_setting_by_name(name)->id;
+    overrides[options.override_count].value = value;
+    options.overrides = overrides;
+    options.override_count++;
 }

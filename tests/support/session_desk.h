@@ -38,4 +38,10 @@ void desk_assert_refused(plr_kind subject, plr_status status);
 
 void desk_assert_nothing_refused(void);
 
+/* How many TEXTs hold those words; the next answer is the first again. */
+unsigned desk_texts_with(const char *words);
+
+/* Overrides one setting more, two at most, in the options of the next session. */
+void desk_use_setting(const char *name, double value);
+
 #endif

@@ -6,6 +6,7 @@
 
 #include "pelorus/config.h"
 #include "pelorus/filter.h"
+#include "pelorus/wire.h"
 
 enum { LAST_STATUS = PLR_E_SIZE, REASONS = 25 };
 
@@ -50,6 +51,15 @@ static void test_every_health_has_a_phrase_of_its_own(void) {
     demand_distinct(texts, PLR_HEALTH_DIVERGED + 2);
 }
 
+static void test_every_fault_of_an_imu_has_a_phrase_of_its_own(void) {
+    const char *texts[PLR_IMU_FAULTS + 1];
+    for (unsigned fault = 0; fault <= PLR_IMU_FAULTS; fault++)
+        texts[fault] = plr_imu_fault_text((plr_imu_fault)fault); /* the last: of no version */
+    demand_distinct(texts, PLR_IMU_FAULTS + 1);
+    for (unsigned fault = 0; fault < PLR_IMU_FAULTS; fault++)
+        TEST_ASSERT_LESS_THAN_UINT(PLR_WIRE_MAX_TEXT - 10, strlen(texts[fault]));
+}
+
 static void test_version_is_the_number_of_the_header_as_text(void) {
     char expected[32];
     snprintf(expected, sizeof expected, "%d.%d.%d", PLR_VERSION_NUMBER >> 16,
@@ -85,6 +95,7 @@ int main(void) {
     RUN_TEST(test_every_status_has_a_sentence_of_its_own);
     RUN_TEST(test_every_reason_has_a_phrase_of_its_own);
     RUN_TEST(test_every_health_has_a_phrase_of_its_own);
+    RUN_TEST(test_every_fault_of_an_imu_has_a_phrase_of_its_own);
     RUN_TEST(test_version_is_the_number_of_the_header_as_text);
     RUN_TEST(test_fingerprint_tells_builds_apart);
     return UNITY_END();

@@ -4,8 +4,8 @@
  *
  *     pelorus-schema json                  schema.json, which the Python tools read
  *     pelorus-schema markdown TABLE        a table of the docs; TABLE is kinds, settings, statuses,
- *                                          reasons, sensors, state, slot, bounds, or the name of a
- *                                          message
+ *                                          reasons, imu_faults, sensors, state, slot, bounds, or the
+ *                                          name of a message
  *
  * tests/layering/schema.py compares what it prints with the files, or writes them.
  */
@@ -21,10 +21,9 @@ int main(int argc, char **argv) {
     }
     if (argc == 3 && strcmp(argv[1], "markdown") == 0 && schema_print_markdown(argv[2]))
         return 0;
-    fprintf(
-        stderr,
-        "usage: pelorus-schema json | pelorus-schema markdown TABLE\n"
-        "TABLE: kinds, settings, statuses, reasons, sensors, state, slot, bounds, or the name of a "
-        "message\n");
+    fprintf(stderr, "usage: pelorus-schema json | pelorus-schema markdown TABLE\n"
+                    "TABLE: kinds, settings, statuses, reasons, imu_faults, sensors, state, slot, "
+                    "bounds, or the name of a "
+                    "message\n");
     return 2;
 }

@@ -236,6 +236,8 @@ bool schema_print_markdown(const char *table) {
         print_words("status", "status", schema_words, schema_word_rows);
     else if (strcmp(table, "reasons") == 0)
         print_words("reason", "bit", schema_words, schema_word_rows);
+    else if (strcmp(table, "imu_faults") == 0)
+        print_words("imu_fault", "fault", schema_words, schema_word_rows);
     else if (strcmp(table, "sensors") == 0)
         print_words("sensor", "sensor", schema_enums, schema_enum_rows);
     else if (strcmp(table, "state") == 0)

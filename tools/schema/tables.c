@@ -83,9 +83,10 @@ const size_t schema_bound_rows = LENGTH(schema_bounds);
 
 /* --- words --- */
 
-#define STATUS(number_, text_) {"status", #number_, number_, text_},
-#define HEALTH(number_, text_) {"health", #number_, number_, text_},
-#define REASON(number_, text_) {"reason", #number_, number_, text_},
+#define STATUS(number_, text_)    {"status", #number_, number_, text_},
+#define HEALTH(number_, text_)    {"health", #number_, number_, text_},
+#define REASON(number_, text_)    {"reason", #number_, number_, text_},
+#define IMU_FAULT(number_, text_) {"imu_fault", #number_, number_, text_},
 const word schema_words[] = {
 #include "record/words.def"
 };

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+/* A session that is moved by an IMU, and its clocks: a camera that is late, a camera with a clock of
+ * its own, a clock that jumps. */
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#include "support/session_inertial.h"
+
+void setUp(void) {
+    desk_clear(1);
+}
+
+void tearDown(void) {
+}
+
+/* --- late cameras, other clocks --- */
+
+static void test_readings_wait_for_a_late_camera_as_twists_do(void) {
+    const inertial_manner late = {.batch = 1, .frames_late_s = 0.2},
+                          late_batches = {.batch = 5, .frames_late_s = 0.2};
+    const inertial_result in_time = inertial_result_of(&inertial_plain);
+    desk_clear(1);
+    inertial_run(&late);
+    desk_assert_refused(PLR_KIND_STEREO, PLR_E_LATE);
+    for (unsigned i = 0; i < 2; i++) {
+        desk_clear(1);
+        desk_use_setting("twist-delay", 0.25);
+        inertial_run(i == 0 ? &late : &late_batches);
+        desk_assert_nothing_refused();
+        faulty_port_answers_again(&port);
+        const inertial_result found = inertial_read();
+        inertial_assert_same(&in_time, &found);
+        TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
+    }
+}
+
+static void test_what_does_not_fit_the_delay_is_used_early_and_counted(void) {
+    desk_clear(1);
+    desk_use_setting("twist-delay", 10);
+    inertial_run(&inertial_plain);
+    const unsigned readings = INERTIAL_PER_FRAME * (INERTIAL_FRAMES - 1) + 1;
+    desk_assert_nothing_refused();
+    TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short); /* each frame empties the ring */
+    desk_clear(1);
+    desk_use_setting("twist-delay", 10);
+    desk_begin();
+    desk_send(inertial_header());
+    desk_send(drive_start(0));
+    inertial_send_readings(&inertial_plain, 0, (int)readings);
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT32(readings - PLR_SESSION_HELD_TWISTS, session.totals.held_short);
+}
+
+static void test_a_frame_is_used_at_the_time_that_camera_offset_gives_it(void) {
+    const inertial_manner ahead = {.batch = 1, .camera_ahead_s = 0.03};
+    const inertial_result aligned = inertial_result_of(&inertial_plain);
+    desk_clear(1);
+    desk_use_setting("camera-offset", -0.03);
+    inertial_run(&ahead);
+    desk_assert_nothing_refused();
+    faulty_port_answers_again(&port);
+    const inertial_result found = inertial_read();
+    inertial_assert_same(&aligned, &found);
+    TEST_ASSERT_EQUAL_UINT64(drive_time_ns(INERTIAL_FRAME_S * (INERTIAL_FRAMES - 1)),
+                             found.pose.t_ns);
+}
+
+static void test_a_report_has_the_time_that_the_frame_was_sent_with(void) {
+    const inertial_manner behind = {.batch = 1, .camera_ahead_s = -0.03};
+    plr_message answer;
+    unsigned k = 0;
+    desk_use_setting("camera-offset", 0.03);
+    inertial_run(&behind);
+    while (faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer)) {
+        TEST_ASSERT_EQUAL_INT(PLR_OK, answer.as.report.report.status);
+        TEST_ASSERT_EQUAL_UINT64(drive_time_ns(INERTIAL_FRAME_S * k - 0.03),
+                                 answer.as.report.report.t_ns);
+        k++;
+    }
+    TEST_ASSERT_EQUAL_UINT(INERTIAL_FRAMES, k);
+}
+
+static void test_a_frame_whose_moved_time_no_clock_has_is_refused(void) {
+    static const struct {
+        double offset_s;
+        plr_time_ns t_ns;
+    } tried[] = {{-0.5, 400000000}, {0.5, UINT64_MAX - 400000000}};
+    for (unsigned i = 0; i < 2; i++) {
+        plr_message frame = drive_stereo(0);
+        frame.as.stereo.t_ns = tried[i].t_ns;
+        desk_clear(1);
+        desk_use_setting("camera-offset", tried[i].offset_s);
+        desk_begin();
+        desk_send(inertial_header());
+        desk_send(frame);
+        desk_run();
+        desk_assert_refused(PLR_KIND_STEREO, PLR_E_TIME);
+        TEST_ASSERT_EQUAL_UINT32(0, session.last.observations);
+    }
+}
+
+/* --- clocks that jump --- */
+
+static void send_batch(double t_s) {
+    desk_send(drive_imu(t_s, INERTIAL_PER_FRAME, INERTIAL_READING_S));
+}
+
+static void test_a_single_batch_of_another_time_changes_nothing(void) {
+    const inertial_manner batches = {.batch = INERTIAL_PER_FRAME};
+    const inertial_result expected = inertial_result_of(&batches);
+    for (unsigned delayed = 0; delayed < 2; delayed++) {
+        desk_clear(1);
+        if (delayed)
+            desk_use_setting("twist-delay", 0.25);
+        desk_begin();
+        desk_send(inertial_header());
+        desk_send(drive_start(0));
+        for (int k = 0; k < INERTIAL_FRAMES; k++) {
+            inertial_send_readings(&batches, k == 0 ? 0 : INERTIAL_PER_FRAME * (k - 1) + 1,
+                                   INERTIAL_PER_FRAME * k + 1);
+            inertial_send_frame(&batches, k);
+            if (k == 10)
+                send_batch(5000);
+        }
+        desk_run();
+        const inertial_result found = inertial_read();
+        inertial_assert_same(&expected, &found);
+        TEST_ASSERT_EQUAL_UINT32(0, session.totals.reanchored);
+        desk_assert_refused(PLR_KIND_IMU, PLR_E_GAP);
+        desk_assert_nothing_refused();
+        TEST_ASSERT_EQUAL_UINT32(INERTIAL_PER_FRAME, session.totals.imu_refused);
+    }
+}
+
+static void test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was(void) {
+    const inertial_manner batches = {.batch = INERTIAL_PER_FRAME};
+    const inertial_result before = inertial_result_of(&batches);
+    double bias[6];
+    plr_pose pose;
+    send_batch(5000);
+    send_batch(5000.1);
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT32(0, session.totals.reanchored);
+    send_batch(5000.2);
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT32(1, session.totals.reanchored);
+    TEST_ASSERT_EQUAL_UINT64(drive_time_ns(5000.29), plr_filter_time(&session.filter));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &pose));
+    TEST_ASSERT_EQUAL_MEMORY(before.pose.T_WB.p, pose.p, sizeof pose.p);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&session.filter, bias, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(before.pose.bias, bias, sizeof bias);
+    plr_health_state health;
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_filter_health(&session.filter, drive_time_ns(5000.3), &health));
+    TEST_ASSERT_TRUE(health.reasons & PLR_REASON_NOT_STARTED);
+    for (int k = 3; k < 50; k++) { /* it moves: it starts in motion after three seconds */
+        send_batch(5000 + 0.1 * k);
+        desk_send(drive_stereo(5000 + 0.1 * k + 0.09));
+    }
+    desk_run();
+    const inertial_result after = inertial_read();
+    TEST_ASSERT_EQUAL_UINT16(before.pose.reset_count + 1, after.pose.reset_count);
+    TEST_ASSERT_TRUE(session.last.used > 3);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_readings_wait_for_a_late_camera_as_twists_do);
+    RUN_TEST(test_what_does_not_fit_the_delay_is_used_early_and_counted);
+    RUN_TEST(test_a_frame_is_used_at_the_time_that_camera_offset_gives_it);
+    RUN_TEST(test_a_report_has_the_time_that_the_frame_was_sent_with);
+    RUN_TEST(test_a_frame_whose_moved_time_no_clock_has_is_refused);
+    RUN_TEST(test_a_single_batch_of_another_time_changes_nothing);
+    RUN_TEST(test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was);
+    return UNITY_END();
+}
