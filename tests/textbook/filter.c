@@ -145,6 +145,27 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
     return the.ready ? the_filter_refuses(PLR_E_MODE) : PLR_E_NOT_READY;
 }
 
+/* Nor an IMU. */
+plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading) {
+    (void)f;
+    (void)t_ns;
+    (void)reading;
+    return the.ready ? the_filter_refuses(PLR_E_MODE) : PLR_E_NOT_READY;
+}
+
+plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
+                                   const double variance[3]) {
+    (void)f;
+    (void)v_B_mps;
+    (void)variance;
+    return the.ready ? the_filter_refuses(PLR_E_MODE) : PLR_E_NOT_READY;
+}
+
+plr_imu_fault plr_filter_imu_fault(const plr_filter *f) {
+    (void)f;
+    return PLR_IMU_FAULT_NONE;
+}
+
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
     (void)f;
     if (!the.ready)
