@@ -24,7 +24,7 @@ from pelorus.commands.own import (
     TWISTS,
 )
 from pelorus.console import out
-from pelorus.converters import bag, csv, euroc, ros, streams
+from pelorus.converters import bag, csv, euroc, kitti, ros, streams
 from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
@@ -53,6 +53,11 @@ def register(app: typer.Typer) -> None:
         epilog="Example:  pelorus convert euroc V1_01_easy V1_01.plr",
     )(euroc_)
     app.command(
+        "kitti",
+        rich_help_panel=OWN_DATA,
+        epilog="Example:  pelorus convert kitti 2011_09_30/2011_09_30_drive_0020_sync 0020.plr",
+    )(kitti_)
+    app.command(
         "ros",
         rich_help_panel=OWN_DATA,
         epilog="Example:  pelorus convert ros drive.mcap drive.plr --calibration camchain.yaml",
@@ -76,6 +81,36 @@ def euroc_(
     """A folder like EuRoC's or TUM-VI's (mav0): pictures, an IMU or your wheels, the truth."""
     asked = _asked(calibration, extrinsic, lens, twists, imu, truth, columns, measured)
     _convert(euroc.read(folder, asked), target, twist_timing, fix)
+
+
+def kitti_(
+    folder: Path = typer.Argument(
+        ..., metavar="FOLDER", help="DATE_drive_NNNN_sync, or sequences/NN of the benchmark."
+    ),
+    target: Path = TARGET,
+    calibration: list[Path] = CALIBRATION,
+    extrinsic: Path | None = EXTRINSIC,
+    lens: LensModel | None = LENS,
+    twists: Path | None = TWISTS,
+    imu: Path | None = IMU,
+    truth: Path | None = TRUTH,
+    columns: list[str] = COLUMNS,
+    measured: str = MEASURED,
+    velocity_sigma: float = typer.Option(
+        0.5, metavar="M/S", help="Noise of the twists that are made from the benchmark's poses."
+    ),
+    gyro_sigma: float = typer.Option(0.05, metavar="RAD/S", help="Likewise."),
+    seed: int = typer.Option(1, help="Of that noise."),
+    twist_timing: Timing | None = typer.Option(
+        None, help="When a twist reading holds; else end for a raw drive, start for the others."
+    ),
+    fix: Fix = FIX,
+) -> None:
+    """A raw drive of KITTI with its OXTS, or a sequence of its odometry benchmark."""
+    asked = _asked(calibration, extrinsic, lens, twists, imu, truth, columns, measured)
+    usual = Timing.END if kitti.is_raw(folder) and asked.motion is None else Timing.START
+    found = kitti.read(folder, asked, kitti.Made(velocity_sigma, gyro_sigma, seed))
+    _convert(found, target, twist_timing or usual, fix)
 
 
 def ros_(

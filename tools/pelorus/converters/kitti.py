@@ -1,0 +1,307 @@
+# SPDX-License-Identifier: MIT
+"""KITTI's own folders.
+
+raw        DATE_drive_NNNN_sync/image_00, image_01 (or 02, 03), oxts; calib_*.txt in DATE above it
+odometry   sequences/NN/image_0, image_1 (or 2, 3), calib.txt, times.txt; poses/NN.txt beside them
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pelorus import arrays, foreign, se3, trajectory
+from pelorus.console import progress
+from pelorus.converters.asked import Asked
+from pelorus.converters.streams import Pictures, Streams, Twists
+from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.rig import read as rig_files
+from pelorus.rig.lens import Lens, LensModel
+from pelorus.rig.read import Calibrated
+from pelorus.rig.rectification import Gray
+from pelorus.rig.rig import Rig
+from pelorus.se3 import Poses
+from pelorus.tracking import images
+from pelorus.trajectory import Trajectory
+
+EARTH_M = 6378137.0
+OXTS_NUMBERS = 30
+RAW_PAIRS = (("image_00", "image_01"), ("image_02", "image_03"))
+ODOMETRY_PAIRS = (("image_0", "image_1"), ("image_2", "image_3"))
+AHEAD = np.array([[0, -1.0, 0], [0, 0, -1], [1, 0, 0]])  # of a body x forward, y left, z up
+# Of an OXTS packet.
+LAT, LON, ALT, ROLL, PITCH, YAW, VF, WX = 0, 1, 2, 3, 4, 5, 8, 17
+
+
+class Made(NamedTuple):
+    """White noise of twists that are made from the truth, where a drive has none of its own."""
+
+    velocity_sigma_mps: float = 0.5
+    gyro_sigma_radps: float = 0.05
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class _Folder:
+    """The two cameras' folders, and the numbers by which the calibration calls them."""
+
+    path: Path
+    left: str
+    right: str
+
+    @property
+    def numbers(self) -> tuple[int, int]:
+        return int(self.left[-1]), int(self.right[-1])
+
+
+def is_raw(folder: Path) -> bool:
+    """Whether it is a raw drive: its inertial measurements lie in oxts."""
+    return (folder / "oxts").is_dir()
+
+
+def read(folder: Path, asked: Asked, made: Made) -> Streams:
+    """A raw drive or a sequence of the odometry benchmark."""
+    return _raw(folder, asked) if is_raw(folder) else _odometry(folder, asked, made)
+
+
+# --- raw ------------------------------------------------------------------------------------------
+
+
+def _raw(folder: Path, asked: Asked) -> Streams:
+    cameras = _cameras(folder, RAW_PAIRS)
+    rig = _raw_rig(folder.resolve().parent, cameras)
+    pairs = images.pairs(folder / cameras.left / "data", folder / cameras.right / "data")
+    t_ns = _stamps(folder / cameras.left / "timestamps.txt", len(pairs))
+    packets, oxts_t_ns = _oxts(folder / "oxts")
+    truth = asked.truth or Trajectory(oxts_t_ns, _oxts_poses(packets))
+    motion = asked.motion or _oxts_twists(folder / "oxts", oxts_t_ns, packets)
+    return Streams(_calibrated(folder, rig, asked), _pictures(pairs, t_ns), motion, truth)
+
+
+def _raw_rig(date: Path, cameras: _Folder) -> Rig:
+    """Of the rectified pictures; the body is the OXTS unit's: x forward, y left, z up."""
+    path = date / "calib_cam_to_cam.txt"
+    cam = _Calib(path)
+    first, second = cameras.numbers
+    P = [cam.array(f"P_rect_{k:02d}", 3, 4) for k in (first, second)]
+    size = cam.array(f"S_rect_{first:02d}", 2)
+    R_rect = Poses(_near(path, "R_rect_00", cam.array("R_rect_00", 3, 3)), np.zeros(3))
+    velo = _Calib(date / "calib_velo_to_cam.txt").pose()
+    imu = _Calib(date / "calib_imu_to_velo.txt").pose()
+    T_LB = se3.compose(se3.compose(se3.compose(_shift(P[0]), R_rect), velo), imu)
+    return replace(_rectified(path, P, (int(size[0]), int(size[1]))), T_LB=T_LB)
+
+
+def _oxts(folder: Path) -> tuple[Floats, Times]:
+    """(n, 30) numbers, and their times."""
+    files = sorted((folder / "data").glob("*.txt"))
+    if not files:
+        raise PelorusError(f"{folder / 'data'}: holds no OXTS packet (0000000000.txt and so on)")
+    packets = [
+        foreign.numbers(path, foreign.rows(path)[:1], OXTS_NUMBERS)[0]
+        for path in progress(files, "reading oxts", len(files))
+    ]
+    return np.array(packets), _stamps(folder / "timestamps.txt", len(files))
+
+
+def _oxts_twists(where: Path, t_ns: Times, packets: Floats) -> Twists:
+    """Velocities are told over the level ground (forward, left, up); the body rolls and pitches."""
+    level = packets[:, VF : VF + 3]
+    tilt = Rotation.from_euler("YX", packets[:, [PITCH, ROLL]])
+    return Twists(where, t_ns, tilt.inv().apply(level), packets[:, WX : WX + 3])
+
+
+def _oxts_poses(packets: Floats) -> Poses:
+    """East, north, up from the first packet on; Mercator at its latitude, as KITTI's devkit."""
+    scale = np.cos(np.radians(packets[0, LAT]))
+    east = scale * EARTH_M * np.radians(packets[:, LON])
+    north = scale * EARTH_M * np.log(np.tan(np.radians(90 + packets[:, LAT]) / 2))
+    p = np.stack((east, north, packets[:, ALT]), axis=-1)
+    R = Rotation.from_euler("ZYX", packets[:, [YAW, PITCH, ROLL]]).as_matrix()
+    return Poses(R, p - p[0])
+
+
+def _stamps(path: Path, count: int) -> Times:
+    """2011-09-30 12:40:25.069324302, a row each."""
+    lines = [line.strip() for line in foreign.text(path).splitlines() if line.strip()]
+    if len(lines) != count:
+        raise ForeignFileError(
+            path, f"has {len(lines)} times", due=f"{count} are due, one for each file in data"
+        )
+    t_ns = np.array([_stamp(path, k, line) for k, line in enumerate(lines, 1)], np.int64)
+    back = np.nonzero(np.diff(t_ns) <= 0)[0]
+    if len(back):
+        raise ForeignFileError(path, "time does not ascend", at=f"line {int(back[0]) + 2}")
+    return t_ns
+
+
+def _stamp(path: Path, line: int, words: str) -> int:
+    whole, _, fraction = words.partition(".")
+    try:
+        seconds = datetime.strptime(whole, "%Y-%m-%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
+        return int(seconds) * 10**9 + int(fraction.ljust(9, "0")[:9] or 0)
+    except ValueError:
+        due = "2011-09-30 12:40:25.069324302 or such is due"
+        raise ForeignFileError(
+            path, f"{words[:40]!r} is no time", at=f"line {line}", due=due
+        ) from None
+
+
+# --- odometry -------------------------------------------------------------------------------------
+
+
+def _odometry(folder: Path, asked: Asked, made: Made) -> Streams:
+    cameras = _cameras(folder, ODOMETRY_PAIRS)
+    path = folder / "calib.txt"
+    calib = _Calib(path)
+    P = [calib.array(f"P{k}", 3, 4) for k in cameras.numbers]
+    rig = replace(_rectified(path, P, (0, 0)), T_LB=Poses(AHEAD, np.zeros(3)))
+    pairs = images.pairs(folder / cameras.left, folder / cameras.right)
+    t_ns = images.times(pairs, folder / "times.txt", None)
+    calibrated = _calibrated(folder, rig, asked)
+    truth = asked.truth or _poses(folder, t_ns, P[0], calibrated)
+    if asked.motion is not None:
+        return Streams(calibrated, _pictures(pairs, t_ns), asked.motion, truth)
+    if truth is None:
+        raise PelorusError(
+            f"{folder}: the benchmark has no twists, and there is no {_poses_file(folder)} to make "
+            "some from; --twists FILE, --imu FILE or --truth FILE is due"
+        )
+    noise = replace(
+        calibrated.header.noise,
+        velocity_sigma_mps=made.velocity_sigma_mps,
+        gyro_sigma_radps=made.gyro_sigma_radps,
+    )
+    calibrated = replace(calibrated, header=replace(calibrated.header, noise=noise))
+    said = (
+        f"the twists are made from the truth, with white noise of {made.velocity_sigma_mps:g} m/s "
+        f"and {made.gyro_sigma_radps:g} rad/s (seed {made.seed}): KITTI's benchmark has none"
+    )
+    motion = _made_twists(folder, truth, made)
+    return Streams(calibrated, _pictures(pairs, t_ns), motion, truth, remarks=[said])
+
+
+def _poses_file(folder: Path) -> Path:
+    own = folder.resolve()
+    return own.parents[1] / "poses" / f"{own.name}.txt"
+
+
+def _poses(folder: Path, t_ns: Times, P: Floats, calibrated: Calibrated) -> Trajectory | None:
+    """Those of camera 0, brought to the body; row k is frame k."""
+    path = _poses_file(folder)
+    if not path.is_file():
+        return None
+    poses = trajectory.read_kitti(path)
+    if len(poses.p) > len(t_ns):
+        raise ForeignFileError(path, f"{len(poses.p)} poses for {len(t_ns)} frames")
+    T_0B = se3.compose(
+        se3.inverse(_shift(P)), Poses(calibrated.header.R_CB, calibrated.header.t_CB_m)
+    )
+    return Trajectory(t_ns[: len(poses.p)], trajectory.body_poses(poses, T_0B))
+
+
+def _made_twists(where: Path, truth: Trajectory, made: Made) -> Twists:
+    """What moves each pose to the next one, and noise; a reading holds from its time on."""
+    if min(made.velocity_sigma_mps, made.gyro_sigma_radps) < 0 or made.seed < 0:
+        raise PelorusError("--velocity-sigma, --gyro-sigma and --seed: none may be negative")
+    tau = (np.diff(truth.t_ns) * 1e-9)[:, None]
+    before, after = truth.poses.at(slice(None, -1)), truth.poses.at(slice(1, None))
+    rate = se3.log(se3.compose(se3.inverse(before), after)) / tau
+    rate = np.concatenate((rate, rate[-1:]))
+    noise = np.random.Generator(np.random.PCG64(made.seed)).standard_normal(rate.shape)
+    noise *= np.repeat([made.velocity_sigma_mps, made.gyro_sigma_radps], 3)
+    rate += noise
+    return Twists(where, truth.t_ns, rate[:, :3], rate[:, 3:])
+
+
+# --- both -----------------------------------------------------------------------------------------
+
+
+def _cameras(folder: Path, known: Sequence[tuple[str, str]]) -> _Folder:
+    for left, right in known:
+        if (folder / left).is_dir() and (folder / right).is_dir():
+            return _Folder(folder, left, right)
+    words = " or ".join(" and ".join(pair) for pair in known)
+    try:
+        there = ", ".join(sorted(path.name for path in folder.iterdir())[:10]) or "none"
+    except OSError as error:
+        raise PelorusError(f"{folder}: cannot be read as a folder: {error.strerror}") from error
+    raise PelorusError(
+        f"{folder}: has no {words}; a raw drive (..._sync, with oxts) or a sequence of the "
+        f"odometry benchmark is due; there are: {there}"
+    )
+
+
+def _calibrated(folder: Path, rig: Rig, asked: Asked) -> Calibrated:
+    name = folder.resolve().name
+    if asked.calibration:
+        return rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
+    return rig_files.of_rig(rig, name, asked.extrinsic)
+
+
+def _pictures(pairs: list[images.Pair], t_ns: Times) -> Pictures:
+    def pixels() -> Iterator[tuple[Gray, Gray]]:
+        shape = None
+        for pair in pairs:
+            left, right = images.read(pair, shape)
+            shape = left.shape
+            yield left, right
+
+    return Pictures((pairs[0].left.parent, pairs[0].right.parent), t_ns, pixels)
+
+
+def _shift(P: Floats) -> Poses:
+    """From the rectified camera 0 to the one of this projection, which stands beside it."""
+    return Poses(np.eye(3), np.array([P[0, 3] / P[0, 0], P[1, 3] / P[1, 1], P[2, 3]]))
+
+
+def _rectified(path: Path, P: list[Floats], size: tuple[int, int]) -> Rig:
+    lenses = [Lens(LensModel.NONE, (p[0, 0], p[1, 1], p[0, 2], p[1, 2]), (), *size) for p in P]
+    baseline = P[0][0, 3] / P[0][0, 0] - P[1][0, 3] / P[1][0, 0]
+    if min(P[0][0, 0], P[0][1, 1], baseline) <= 0:
+        raise ForeignFileError(path, "has no positive focal length and baseline")
+    # what the second one is off by in y and z is less than a tenth of a pixel
+    T_RL = Poses(np.eye(3), np.array([-float(baseline), 0.0, 0.0]))
+    return Rig.of_cameras(path, lenses[0], replace(lenses[0]), T_RL)
+
+
+def _near(path: Path, name: str, R: Floats) -> Floats:
+    return se3.nearest_rotation(arrays.rotation(path, name, R))
+
+
+class _Calib:
+    """Lines of NAME: numbers."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        lines = (line.partition(":") for line in foreign.text(path).splitlines())
+        self._lines = {name.strip(): words.split() for name, colon, words in lines if colon}
+
+    def array(self, name: str, *shape: int) -> Floats:
+        if name not in self._lines:
+            there = ", ".join(self._lines) or "none"
+            raise ForeignFileError(self.path, f"lacks {name}", due=f"there are: {there}")
+        try:
+            numbers = np.array(self._lines[name], np.float64)
+        except ValueError:
+            raise ForeignFileError(self.path, f"{name} holds something that is no number") from None
+        if numbers.size != int(np.prod(shape)) or not np.isfinite(numbers).all():
+            raise ForeignFileError(
+                self.path,
+                f"{name} has {numbers.size} numbers",
+                due=f"{int(np.prod(shape))} finite ones are due",
+            )
+        return numbers.reshape(shape)
+
+    def pose(self) -> Poses:
+        """R and T."""
+        return Poses(_near(self.path, "R", self.array("R", 3, 3)), self.array("T", 3))
