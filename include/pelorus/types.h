@@ -263,6 +263,13 @@ typedef struct plr_report {
     float nis;              /* sum of d^2, the squared Mahalanobis distances, over all observations
                                that the gate accepted, within the budget or not; its expected value
                                is nis_dof (docs/MATH.md 8) */
+    uint16_t innovation_rows; /* rows of all that was applied: 3 for each observation used, and
+                               those of the biases */
+    float innovation_d2;      /* y^T S^-1 y of these rows together, y the innovation and S its
+                               covariance as the filter believed it; its expected value is
+                               innovation_rows */
+    float innovation_log_det; /* ln det S. d2 + log_det + rows ln(2 pi) is -2 ln of the likelihood:
+                               of two settings the better one has the smaller sum over a drive */
 } plr_report;
 
 /* The filter's health at some time, with or without a frame: plr_filter_health. A time since an

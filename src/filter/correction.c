@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "math/dense.h"
+#include "math/log_product.h"
 #include "math/small.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
@@ -23,6 +24,40 @@ typedef struct plr_batch {
     plr_measurement measured[PLR_BLOCK_OBSERVATIONS];
     plr_real E[WIDE * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
 } plr_batch;
+
+/* The sums behind a plr_innovation. */
+typedef struct plr_evidence {
+    plr_real d2;
+    plr_log_product det_root; /* of S */
+    unsigned rows;
+} plr_evidence;
+
+/* Adds an applied batch, whose S = U^T U has been factorised, and y = U^-T (r - H dx): by the chain
+ * rule, its innovation given the batches before, and given the motion's noise where that is kept
+ * beside P. */
+static void add_evidence(plr_evidence *e, const plr_workspace *w, unsigned rows) {
+    for (unsigned r = 0; r < rows; r++) {
+        e->d2 = PLR_FMA(w->y[r], w->y[r], e->d2);
+        plr_log_product_multiply(&e->det_root, w->S[plr_upper_row(rows, r)]);
+    }
+    e->rows += rows;
+}
+
+/* Takes the motion's noise into account, once its Lambda = U^T U has been factorised, with its
+ * estimate nu: with the information of the batches and the prior N(0, I), linearised at z,
+ * d2 = |z|^2 + sum |y|^2 - |U (nu - z)|^2 and det S = det Lambda prod det S_k. */
+static void add_evidence_of_motion(plr_evidence *e, const plr_noise *noise,
+                                   const plr_real nu[PLR_POSE_DIM]) {
+    e->d2 += plr_norm2_of_6(noise->z);
+    for (unsigned r = 0; r < PLR_POSE_DIM; r++) {
+        const plr_real *row = noise->Lambda + plr_upper_row(PLR_POSE_DIM, r);
+        plr_real eta = 0;
+        for (unsigned k = r; k < PLR_POSE_DIM; k++)
+            eta = PLR_FMA(row[k - r], nu[k] - noise->z[k], eta);
+        e->d2 = PLR_FMA(-eta, eta, e->d2);
+        plr_log_product_multiply(&e->det_root, row[0]);
+    }
+}
 
 /* S = H (P H^T) + R, packed upper, from the rows of (P H^T)^T. */
 static void fill_S(const plr_filter *f, const plr_batch *batch, plr_real *S) {
@@ -143,6 +178,7 @@ plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, 
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
         memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
+    plr_evidence evidence = {0, plr_log_product_one(), 0};
     const unsigned all = count + (plr_velocity_informs_bias(f) ? BIAS_MEASUREMENTS : 0);
     unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
     for (; batches > 0 && !f->diverged; batches--) {
@@ -153,9 +189,10 @@ plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, 
         batch.count =
             (all - at + batches - 1) / batches; /* of like size: the cost grows with its square */
         stack(f, sensed, count, at, &batch);
-        if (apply_batch(f, &batch, &factorised))
+        if (apply_batch(f, &batch, &factorised)) {
             result.applied += at >= count ? 0 : at + batch.count > count ? count - at : batch.count;
-        else if (!factorised)
+            add_evidence(&evidence, &f->work, PLR_ROWS * batch.count);
+        } else if (!factorised)
             result.failed_batches++;
         else
             plr_filter_diverge(f);
@@ -164,6 +201,11 @@ plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, 
     result.moved = f->work.noise.open;
     memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
     plr_covariance_close_noise(f, result.nu);
+    if (result.moved)
+        add_evidence_of_motion(&evidence, &f->work.noise, result.nu);
+    result.innovation.d2 = evidence.d2;
+    result.innovation.log_det = 2 * plr_log_product_value(&evidence.det_root);
+    result.innovation.rows = evidence.rows;
     if (result.applied == 0 && !result.moved && all == count)
         return result;
     if (!is_applicable(f, n)) {

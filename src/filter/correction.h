@@ -6,6 +6,14 @@
 #include "pelorus/state.h"
 #include "sensor/measurement.h"
 
+/* All innovations of a correction taken together, as the filter believed them to be distributed
+ * before it saw them: -2 ln of their density is d2 + log_det + rows ln(2 pi). */
+typedef struct plr_innovation {
+    plr_real d2;      /* y^T S^-1 y */
+    plr_real log_det; /* ln det S */
+    unsigned rows;    /* of y */
+} plr_innovation;
+
 /* The result of a correction. */
 typedef struct plr_correction {
     unsigned applied;          /* measurements in batches that were applied */
@@ -14,7 +22,8 @@ typedef struct plr_correction {
     plr_real nu[PLR_POSE_DIM]; /* estimated noise of the motion, in units of its sigmas */
     plr_real Lambda
         [PLR_POSE_TRIANGLE]; /* information about nu, prior included: 6x6, packed upper triangle */
-    bool moved;              /* a motion with noise was applied: nu and Lambda are filled */
+    plr_innovation innovation; /* of all that was applied */
+    bool moved;                /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
 /* Where measurements come from: measure() fills number i, linearised at the current estimate. */

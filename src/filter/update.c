@@ -177,6 +177,9 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
         finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_batches;
+    report->innovation_rows = (uint16_t)correction.innovation.rows;
+    report->innovation_d2 = (float)correction.innovation.d2;
+    report->innovation_log_det = (float)correction.innovation.log_det;
     report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
     events.cut = correction.cut;
     if (!f->diverged) {

@@ -353,9 +353,12 @@ static void pass_field(plr_codec *c, const plr_field *f, unsigned char *at) {
 /* READ: the bytes end before the field, which a later version added. */
 static void set_unknown(const plr_field *f, unsigned char *at) {
     static const double unknown = -1;
+    static const float narrow = -1;
     for (unsigned i = 0; i < f->count; i++) {
         if (f->kind == PLR_FIELD_F64 || f->kind == PLR_FIELD_NARROW)
             memcpy(at + i * sizeof unknown, &unknown, sizeof unknown);
+        else if (f->kind == PLR_FIELD_F32)
+            memcpy(at + i * sizeof narrow, &narrow, sizeof narrow);
         else if (is_whole(f->kind))
             memset(at + i * size_in_memory(f->kind), 0, size_in_memory(f->kind));
     }

@@ -114,6 +114,9 @@ static void same_report(const plr_report_message *e, const plr_report_message *a
     SAME(report.blocks_failed);
     SAME(report.active);
     SAME(report.nis_dof);
+    SAME(report.innovation_rows);
+    SAME(report.innovation_d2);
+    SAME(report.innovation_log_det);
     SAME(report.nis);
 }
 

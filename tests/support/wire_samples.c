@@ -248,6 +248,9 @@ static void make_report(plr_report_message *m, unsigned variant) {
     r->active = whole16(variant, 113);
     r->nis_dof = whole16(variant, 114);
     r->nis = real_of_f32(variant, 3);
+    r->innovation_rows = whole16(variant, 115);
+    r->innovation_d2 = real_of_f32(variant, 4);
+    r->innovation_log_det = real_of_f32(variant, 5);
 }
 
 plr_message wire_sample(plr_kind kind, unsigned variant) {

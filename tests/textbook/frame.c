@@ -109,6 +109,9 @@ static void process(const plr_frame *given, plr_report *r) {
     r->gated = (uint16_t)came.gated;
     r->nis = (float)came.nis;
     r->nis_dof = (uint16_t)(TEXTBOOK_ROWS * (came.matched - came.gated));
+    r->innovation_rows = (uint16_t)(3 * came.used);
+    r->innovation_d2 = (float)came.d2;
+    r->innovation_log_det = (float)came.log_det;
     r->blocks_failed = came.failed;
     const bool locked = is_locked(r);
     if (!the.book.diverged)

@@ -77,6 +77,9 @@ typedef struct textbook_report {
     unsigned matched, used, gated;
     bool failed; /* S could not be factorised: nothing was used */
     double nis;
+    double d2,
+        log_det; /* y^T S^-1 y and ln det S of all that was used; with vL and vR as their mean,
+                           as the filter takes them: without what their difference adds */
 } textbook_report;
 
 bool textbook_is_body(const textbook *t);

@@ -144,12 +144,24 @@ static bool is_sound(const textbook *t, unsigned n) {
     return true;
 }
 
+/* The innovation's d2 and ln det S, S = L L^T factorised and y = L^-1 r. vL - vR is no function of
+ * the state, and of the variance 2 sigma^2: mean and difference have a Jacobian of one. */
+static void weigh(const textbook *t, unsigned m, textbook_report *report) {
+    const double difference = 2 * t->config.pixel_sigma_px * t->config.pixel_sigma_px;
+    for (unsigned i = 0; i < m; i++) {
+        report->d2 += t->innovation[i] * t->innovation[i];
+        report->log_det += 2 * log(t->S[i * (size_t)m + i]);
+    }
+    report->log_det -= m / ROWS * log(difference);
+}
+
 /* m rows of H P, S and r are stacked. False if S is not positive: then nothing is changed. */
-static bool gain(textbook *t, unsigned n, unsigned m) {
+static bool gain(textbook *t, unsigned n, unsigned m, textbook_report *report) {
     if (!oracle_cholesky(m, t->S))
         return false;
     oracle_solve_lower(m, n, t->S, t->rows);
     oracle_solve_lower(m, 1, t->S, t->innovation);
+    weigh(t, m, report);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, 1, m, 1, t->rows, t->innovation, 1,
                 t->correction);
     oracle_downdate(n, m, t->rows, t->P, t->ld);
@@ -188,6 +200,8 @@ static void take(textbook *t, unsigned n, const plr_observation *seen, unsigned 
     }
     project(t, n, landmark, &line, out);
     memcpy(t->innovation + ROWS * *passed, line.r, sizeof line.r);
+    const double gap = (line.r[1] - line.r[3]) / t->config.pixel_sigma_px;
+    report->d2 -= 0.5 * gap * gap; /* weigh() adds it */
     report->nis += d2;
     ++*passed;
 }
@@ -233,7 +247,7 @@ textbook_report textbook_update(textbook *t, plr_time_ns t_ns, const plr_frame *
         walk(t);
     whole_rows(t, n, 0, POSE, t->pose);
     const unsigned passed = stack_frame(t, n, t_ns, frame, judged, &report);
-    report.failed = passed > 0 && !gain(t, n, ROWS * passed);
+    report.failed = passed > 0 && !gain(t, n, ROWS * passed, &report);
     report.used = report.failed || t->diverged ? 0 : passed;
     if (!t->pending && !t->diverged)
         retract(t);

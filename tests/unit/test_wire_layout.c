@@ -204,7 +204,7 @@ static void test_pose_fields_of_float32_lie_where_the_page_says(void) {
 
 static void test_report_fields_lie_where_the_page_says(void) {
     const plr_report_message m = encode(PLR_KIND_REPORT).as.report;
-    TEST_ASSERT_EQUAL_size_t(56, length);
+    TEST_ASSERT_EQUAL_size_t(66, length);
     ASSERT_NUMBER(0, 8, m.report.t_ns);
     ASSERT_NUMBER(8, 1, m.subject);
     ASSERT_NUMBER(9, 1, 256 - 7); /* PLR_E_LATE */
@@ -218,6 +218,9 @@ static void test_report_fields_lie_where_the_page_says(void) {
     ASSERT_NUMBER(52, 2, PLR_REASON_STATE_DAMAGED >> 16);
     ASSERT_NUMBER(54, 1, PLR_NOTICE_RESTORED);
     ASSERT_NUMBER(55, 1, 0);
+    ASSERT_NUMBER(56, 2, m.report.innovation_rows);
+    ASSERT_F32(58, m.report.innovation_d2);
+    ASSERT_F32(62, m.report.innovation_log_det);
 }
 
 static void test_text_fills_the_payload_to_its_end(void) {

@@ -29,6 +29,7 @@ REPORT = (
     *("status", "health", "reasons", "budget", "observations", "matched", "used", "gated"),
     *("created", "evicted", "refused", "duplicates", "no_room", "poor", "left_out"),
     *("blocks_failed", "active", "nis", "nis_dof", "update_us"),
+    *("innovation_rows", "innovation_d2", "innovation_log_det"),
 )
 DIAGONAL = [i * (i + 3) // 2 for i in range(6)]  # of a packed 6 x 6
 

@@ -459,6 +459,9 @@ class Report(Message, kind=Kind.REPORT):
     nis: float = 0.0
     update_us: int = 0
     notice: int = Notice.NONE  # Notice, or one of a later version
+    innovation_rows: int = 0
+    innovation_d2: float = -1.0  # with no rows: not known
+    innovation_log_det: float = -1.0
 
     def values(self) -> dict[str, Any]:
         upper, lower = divmod(self.reasons, 1 << 16)
