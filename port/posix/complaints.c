@@ -59,6 +59,10 @@ static const char *cause(plr_kind kind, plr_status status) {
         return "it differs from the settings in force; they cannot change in mid-flight";
     if (status == PLR_E_MODE && (kind == PLR_KIND_TWIST || kind == PLR_KIND_IMU))
         return "another one moves the body; this and all that follow of the kind are not used";
+    if (kind == PLR_KIND_IMU && status == PLR_E_RANGE)
+        return "at the setting gyro-range or accel-range, a spike, or a step beyond all reason";
+    if (kind == PLR_KIND_IMU && status == PLR_E_ARGUMENT)
+        return "the same numbers again and again";
     if (status == PLR_E_MODE && kind == PLR_KIND_STEREO)
         return "in mapping a frame needs a TRUTH of equal time";
     if (status == PLR_E_CONFIG && kind == PLR_KIND_CONFIG)
