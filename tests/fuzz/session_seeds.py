@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pelorus import wire
+from pelorus import frames, wire
 from pelorus.frames import (
     Config,
     End,
@@ -35,6 +35,7 @@ from pelorus.frames import (
     Twist,
 )
 from pelorus.schema import SENSORS
+from pelorus.simulation.imu import Imu
 from pelorus.simulation.simulate import Options, simulate
 
 Data = Twist | Stereo | Truth
@@ -109,6 +110,10 @@ def seeds() -> dict[str, bytes]:
         "gate-locks": choices(SLAM) + records(locked()),
         "readings": choices(BIAS | SLAM) + records(measured(recording)),
         "stream": choices(STREAM | BIAS) + stream(recording),
+        "imu": choices(BIAS | SLAM) + records(by_imu()),
+        "imu-late": choices(BIAS | SLAM, DELAY) + records(by_imu()),
+        "imu-from-rest": choices(BIAS | SLAM, 2) + records(from_rest()),
+        "imu-spoilt": choices(BIAS | STORAGE) + records(spoilt(by_imu())),
     }
 
 
@@ -157,6 +162,35 @@ def measured(recording: list[Message]) -> list[Message]:
                 out.append(Reading(t_ns, SENSORS["position"], 7, p + R @ arm, np.full(3, 0.3), arm))
                 out.append(Reading(t_ns, SENSORS["standstill"], 2, sigma=np.full(3, 0.05)))
     return out
+
+
+def by_imu(**changes: Any) -> list[Message]:
+    """Batches of an IMU at 100 Hz in place of the twists."""
+    imu = Imu(imu_rate_hz=100.0, imu_batch=5)
+    return drive(known=False, imu=imu, **changes)
+
+
+def from_rest() -> list[Message]:
+    """Without a START: the filter finds its tilt while the body stands, for 1.2 s."""
+    imu = Imu(imu_rate_hz=100.0, imu_batch=20, rest_s=1.2)
+    messages = drive(known=False, imu=imu, duration_s=1.6, observations=3)
+    return [m for m in messages if not isinstance(m, Start | Truth)]
+
+
+def spoilt(recording: list[Message]) -> list[Message]:
+    """Absurd readings, none at all, twists among them, a clock that jumps; saved in the end."""
+    half = len(recording) // 2
+    out: list[Message] = []
+    for at, message in enumerate(recording):
+        if isinstance(message, frames.Imu) and at % 3 == 0:
+            a = message.a_B_mps2.copy()
+            a[0] = np.nan, 1e30, -1e5
+            out += [replace(message, a_B_mps2=a), Twist(message.t_ns)]
+        elif isinstance(message, frames.Imu | Stereo | Truth) and at > half:
+            out.append(replace(message, t_ns=message.t_ns + 10**13))
+        else:
+            out.append(message)
+    return [*out, State(0, StateAction.SAVE)]
 
 
 def locked() -> list[Message]:
