@@ -85,20 +85,8 @@ static void random_covariance(plr_filter *f, rng *r) {
     free(A);
 }
 
-void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, unsigned landmarks) {
-    plr_config config;
-    plr_calibration calibration;
-    plr_pose T_WB;
-    specimen_config(&config, model, bias);
-    scene_calibration(&calibration);
-    random_rotation(r, T_WB.R);
-    rng_normals(r, 5, T_WB.p, 3);
-    if (plr_filter_init(f, &calibration, &config, NULL) != PLR_OK ||
-        plr_filter_set_pose(f, UINT64_C(1000000000), &T_WB, NULL) != PLR_OK)
-        abort();
-    f->totals.resets = 0;
-    for (int i = 0; bias && i < 6; i++)
-        f->bias[i] = (plr_real)(0.01 * rng_normal(r));
+/* Landmarks and a covariance for a filter that was initialised. */
+static void fill(plr_filter *f, rng *r, unsigned landmarks) {
     f->frame_number = 1;
     for (f->count = 0; f->count < landmarks; f->count++) {
         plr_slot *slot = &f->slots[f->count];
@@ -113,6 +101,43 @@ void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, uns
     }
     random_covariance(f, r);
     reseal(f);
+}
+
+/* Initialised, at a random pose. */
+static void place(plr_filter *f, rng *r, const plr_config *config) {
+    plr_calibration calibration;
+    plr_pose T_WB;
+    scene_calibration(&calibration);
+    random_rotation(r, T_WB.R);
+    rng_normals(r, 5, T_WB.p, 3);
+    if (plr_filter_init(f, &calibration, config, NULL) != PLR_OK ||
+        plr_filter_set_pose(f, UINT64_C(1000000000), &T_WB, NULL) != PLR_OK)
+        abort();
+    f->totals.resets = 0;
+}
+
+void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, unsigned landmarks) {
+    plr_config config;
+    specimen_config(&config, model, bias);
+    place(f, r, &config);
+    for (int i = 0; bias && i < 6; i++)
+        f->bias[i] = (plr_real)(0.01 * rng_normal(r));
+    fill(f, r, landmarks);
+}
+
+void specimen_imu(plr_filter *f, rng *r, unsigned landmarks) {
+    static const double variance[3] = {1, 1, 1};
+    double v[3];
+    plr_config config;
+    specimen_config(&config, PLR_MODEL_BODY, true);
+    config.process = PLR_PROCESS_IMU;
+    place(f, r, &config);
+    rng_normals(r, 2, v, 3);
+    if (plr_filter_set_velocity(f, v, variance) != PLR_OK)
+        abort();
+    for (int i = 0; i < 6; i++)
+        f->bias[i] = (plr_real)((i < 3 ? 0.1 : 0.01) * rng_normal(r));
+    fill(f, r, landmarks);
 }
 
 double *specimen_covariance(const plr_filter *f) {

@@ -19,6 +19,9 @@ void specimen_config(plr_config *config, plr_model_kind model, bool bias);
  * Camera: support/scene.h's. */
 void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, unsigned landmarks);
 
+/* The same with an IMU, at a few m/s: the rows before the landmarks are (rho, theta, v, b_a, b_g). */
+void specimen_imu(plr_filter *f, rng *r, unsigned landmarks);
+
 /* P, dim x dim in double; to be freed. */
 double *specimen_covariance(const plr_filter *f);
 
