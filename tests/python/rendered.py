@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -56,7 +57,8 @@ class Scene:
         return np.minimum(abs(p_W[:, 2] - WALL_M), abs(p_W[:, 2] - BOARD_M))
 
     def _seen(self, T_WC: Poses, intrinsics: tuple[float, ...]) -> Gray:
-        rays = self._rays(intrinsics) @ T_WC.R.T
+        cameras = self.cameras
+        rays = _rays(cameras.model, intrinsics, cameras.coefficients) @ T_WC.R.T
         picture = np.zeros((HEIGHT, WIDTH), np.float32)
         for shade, depth_m, dots_per_m in zip(
             self.shades, (WALL_M, BOARD_M), (30, 60), strict=True
@@ -69,17 +71,17 @@ class Scene:
             picture = np.where(there, plane, picture)
         return np.clip(np.round(picture), 0, 255).astype(np.uint8)
 
-    def _rays(self, intrinsics: tuple[float, ...]) -> Floats:
-        """Of every pixel: the formula of the lens, inverted by trial and error."""
-        u, v = np.meshgrid(np.arange(WIDTH, dtype=float), np.arange(HEIGHT, dtype=float))
-        wanted = np.stack((u.ravel(), v.ravel()), axis=-1)
-        rays = (wanted - intrinsics[2:]) / intrinsics[:2]
-        for _ in range(INVERSIONS):
-            at = np.column_stack((rays, np.ones(len(rays))))
-            cameras = self.cameras
-            off = lens(cameras.model, intrinsics, cameras.coefficients, at) - wanted
-            rays -= off / intrinsics[:2]
-        return np.column_stack((rays, np.ones(len(rays))))
+
+@cache
+def _rays(model: str, intrinsics: tuple[float, ...], D: tuple[float, ...]) -> Floats:
+    """Of every pixel: the formula of the lens, inverted by trial and error."""
+    u, v = np.meshgrid(np.arange(WIDTH, dtype=float), np.arange(HEIGHT, dtype=float))
+    wanted = np.stack((u.ravel(), v.ravel()), axis=-1)
+    rays = (wanted - intrinsics[2:]) / intrinsics[:2]
+    for _ in range(INVERSIONS):
+        at = np.column_stack((rays, np.ones(len(rays))))
+        rays -= (lens(model, intrinsics, D, at) - wanted) / intrinsics[:2]
+    return np.column_stack((rays, np.ones(len(rays))))
 
 
 def _texture(seed: int) -> NDArray[np.float32]:

@@ -97,6 +97,50 @@ def test_an_imu_in_place_of_twists_with_a_wheel_beside_it(tmp_path: Path, peloru
     assert readings[0].value[0] == pytest.approx(10.0)
 
 
+@pytest.mark.parametrize("timing", ["start", "end", "mid"])
+def test_a_wheel_and_a_gyro_in_files_of_their_own_make_twists_that_turn_as_the_gyro(
+    timing: str, tmp_path: Path, pelorus: Run
+) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive, "--twists")
+    times = drive.twist_t_ns.tolist()
+    fast = np.arange(times[0], times[-1] + 1, 5_000_000)
+    rate = np.sin(fast * 3e-9)  # turns by the integral of it
+    gyro = {"t_ns": fast.tolist(), "gz_degps": np.degrees(rate).tolist()}
+    gyro |= {"wx_radps": [0.1] * len(fast), "wy_radps": [-0.2] * len(fast)}
+    speed = {"t_ns": times, "vx_mps": [2.0] * len(times)}
+    target = tmp_path / "mine.plr"
+    outcome = pelorus(
+        *("convert", "csv", *options, target, "--measured", "vx", "--columns", "wz=gz_degps"),
+        *("--twists", write_csv(tmp_path / "wheel.csv", speed), "--twist-timing", timing),
+        *("--gyro", write_csv(tmp_path / "gyro.csv", gyro)),
+    )
+    assert outcome.status == 0, outcome.err
+    twists, noise = messages_of(target, Twist), messages_of(target, Header)[0].noise
+    assert noise.gyro_sigma_x_radps < 0 < noise.velocity_sigma_y_mps
+    w = np.array([m.w_B_radps for m in twists])
+    assert np.allclose(w[:, :2], [0.1, -0.2])
+    t = np.array(times)
+    turned = np.diff(-np.cos(t * 3e-9) / 3)
+    held = {"start": w[:-1, 2], "end": w[1:, 2], "mid": 0.5 * (w[1:, 2] + w[:-1, 2])}[timing]
+    off = np.abs(held * np.diff(t) * 1e-9 - turned)[1:-1]  # nothing is known beyond the ends
+    assert off.max() < (1.3e-3 if timing == "mid" else 1e-4)
+
+
+def test_an_imu_in_g_or_without_gravity_is_refused(tmp_path: Path, pelorus: Run) -> None:
+    options = options_of(tmp_path, clean(**SHORT), "--twists")
+    for up, said in (
+        (1.0, "is 1 m/s^2 in the median; about 9.81 is due: is it in g"),
+        (0.0, "is 0"),
+    ):
+        names = ("ax_mps2", "ay_mps2", "wx_radps", "wy_radps", "wz_radps")
+        imu = {"t_s": [0.0, 3.0, 6.0], "az_mps2": [up] * 3, **{name: [0.0] * 3 for name in names}}
+        path = write_csv(tmp_path / "imu.csv", imu)
+        outcome = pelorus("convert", "csv", *options, "--imu", path, tmp_path / "out.plr")
+        assert outcome.status == 1
+        assert f"imu.csv: the specific force {said}" in outcome.err
+
+
 @pytest.mark.parametrize("form", ["tum", "euroc", "euroc-poses"])
 def test_the_truth_may_be_a_file_of_tum_or_euroc(tmp_path: Path, pelorus: Run, form: str) -> None:
     drive = clean(**SHORT)

@@ -75,7 +75,9 @@ def csv_files(folder: Path, recording: Recording) -> list[Any]:
 def sources_in(folder: Path) -> csv_converter.Sources:
     """Of the files that `csv_files` wrote."""
     return csv_converter.Sources(
-        folder / "twists.csv", folder / "stereo.csv", (folder / "camera.json",)
+        csv_converter.MotionFiles(folder / "twists.csv"),
+        folder / "stereo.csv",
+        (folder / "camera.json",),
     )
 
 

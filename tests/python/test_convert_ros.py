@@ -92,7 +92,7 @@ def test_an_imu_moves_the_body_if_nothing_else_does(
 ) -> None:
     recorder = with_pictures(Recorder(), pairs)
     for k in range(200):
-        recorder.imu("/imu", BEGIN_NS + k * 5_000_000, (1, 2, k), (4, 5, 6))
+        recorder.imu("/imu", BEGIN_NS + k * 5_000_000, (1, 2, 9 + k / 100), (4, 5, 6))
     target = tmp_path / "out.plr"
     noise = write_yaml(tmp_path / "imu.yaml", {"gyroscope_noise_density": 0.003})
     words = ("--calibration", kalibr, "--calibration", noise)
@@ -102,7 +102,24 @@ def test_an_imu_moves_the_body_if_nothing_else_does(
     assert header.process is Process.IMU
     assert header.noise.gyro_noise == 0.003
     a = np.concatenate([m.a_B_mps2 for m in messages_of(target, Imu)])
-    assert np.array_equal(a[:, 2], np.arange(200))
+    assert np.allclose(a[:, 2], 9 + np.arange(200) / 100)
+
+
+def test_odometry_takes_its_turns_from_the_gyro_that_is_named(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_odometry(with_pictures(Recorder(), pairs))
+    for k in range(-20, 200):
+        recorder.imu("/imu", BEGIN_NS + k * 5_000_000, (0, 0, 9.81), (0.1, 0.2, 0.3))
+    bag, target = written(recorder, tmp_path, "mcap"), tmp_path / "out.plr"
+    words = ("--calibration", kalibr, "--fix", "none")
+    outcome = pelorus("convert", "ros", bag, target, *words)
+    assert "/imu: not used; --imu-topic or --gyro-topic would use it" in outcome.out
+    assert pelorus("convert", "ros", bag, target, *words, "--gyro-topic", "/imu").status == 0
+    assert np.allclose([m.w_B_radps for m in messages_of(target, Twist)], [0.1, 0.2, 0.3])
+    outcome = pelorus("convert", "ros", bag, target, "--imu-topic", "/imu", "--gyro-topic", "/imu",
+                      "--calibration", kalibr)  # fmt: skip
+    assert "it goes with twists or wheels, an IMU has its own" in outcome.err
 
 
 def test_wheels_give_the_speed_and_with_a_track_width_the_turn(

@@ -13,6 +13,7 @@ import io
 import json
 import math
 import zipfile
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,7 +28,9 @@ from pelorus.errors import PelorusError
 from pelorus.layout import Floats
 
 TEXT_BYTES_MAX = 1 << 30
-JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred; YAML too
+JSON_BYTES_MAX = 1 << 20  # a calibration has some hundred
+YAML_BYTES_MAX = 1 << 18  # its reader is slow
+YAML_DEPTH_MAX = 50
 ARRAYS_BYTES_MAX = 1 << 31  # unpacked; the course's largest drive has 0.2 GB
 INTEGER_DIGITS_MAX = 20  # 2^64 has as many
 PIECE_BYTES = 1 << 20
@@ -228,7 +231,8 @@ def yaml_object(path: Path) -> dict[str, Any]:
     """An object with names: of Kalibr, of OpenCV, of a data set's sensor.yaml. YAML 1.2: 1e-3 is a
     number.
     """
-    words = text(path, JSON_BYTES_MAX)
+    words = text(path, YAML_BYTES_MAX)
+    _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
     yaml.Constructor = _Constructor
     try:
@@ -239,15 +243,20 @@ def yaml_object(path: Path) -> dict[str, Any]:
         raise ForeignFileError(
             path, f"is no YAML: {error.problem or error.context}", at=at
         ) from None
-    except RecursionError:
-        raise ForeignFileError(
-            path, "is nested too deep", due="names with numbers, words and lists of them are due"
-        ) from None
-    except (YAMLError, ValueError) as error:
+    except (YAMLError, RecursionError, ValueError) as error:
         raise ForeignFileError(path, f"is no YAML: {_first_line(error)}") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
         raise ForeignFileError(path, "is YAML without names", due="names with values are due")
     return found
+
+
+def _require_shallow(path: Path, words: str) -> None:
+    """Its reader takes minutes over thousands of brackets within each other."""
+    deepest = max(accumulate((c in "[{") - (c in "]}") for c in words), default=0)
+    if deepest > YAML_DEPTH_MAX:
+        raise ForeignFileError(
+            path, "is nested too deep", due="names with numbers, words and lists of them are due"
+        )
 
 
 # --- arrays ---------------------------------------------------------------------------------------

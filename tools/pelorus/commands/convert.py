@@ -11,11 +11,10 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from pelorus.commands import importers
+from pelorus.commands import importers, own
 from pelorus.commands.choices import Fix, Timing, TimingOrAuto
 from pelorus.commands.conversion import write
 from pelorus.commands.importers import OWN_DATA
-from pelorus.commands.own import COLUMNS, EXTRINSIC, FIX, IMU, LENS, MEASURED, TARGET, TRUTH, TWISTS
 from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
@@ -49,11 +48,11 @@ def register(parent: typer.Typer) -> None:
 )
 def ece276a(
     source: Path = SOURCE,
-    target: Path = TARGET,
+    target: Path = own.TARGET,
     truth: Path | None = typer.Option(
         None, metavar="POSES.txt", help="KITTI poses of the left camera; row k is frame k."
     ),
-    fix: Fix = FIX,
+    fix: Fix = own.FIX,
     twist_timing: TimingOrAuto = typer.Option(
         TimingOrAuto.AUTO,
         help="When a twist reading holds; auto: end if the data say so clearly, else start.",
@@ -78,7 +77,7 @@ def ece276a(
 )
 def starry_night(
     source: Path = SOURCE,
-    target: Path = TARGET,
+    target: Path = own.TARGET,
     twist_timing: Timing = typer.Option(Timing.START, help="When a twist reading holds."),
     landmark_sigma: float = typer.Option(
         matlab.LANDMARK_SIGMA_M,
@@ -97,7 +96,7 @@ def starry_night(
 )
 def klt(
     source: Path = SOURCE,
-    target: Path = TARGET,
+    target: Path = own.TARGET,
     twist_timing: Timing = typer.Option(Timing.MID, help="When a twist reading holds."),
 ) -> None:
     """A KITTI drive with KLT stereo tracks (.mat)."""
@@ -128,9 +127,10 @@ def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:
 )
 @_with_small_sensors
 def csv(
-    target: Path = TARGET,
-    twists: Path | None = TWISTS,
-    imu: Path | None = IMU,
+    target: Path = own.TARGET,
+    twists: Path | None = own.TWISTS,
+    gyro: Path | None = own.GYRO,
+    imu: Path | None = own.IMU,
     stereo: Path = typer.Option(
         ...,
         help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame.",
@@ -145,29 +145,25 @@ def csv(
         "noise, an object with some of pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps, "
         "bias_velocity_sigma_mps, bias_gyro_sigma_radps.",
     ),
-    truth: Path | None = TRUTH,
-    columns: list[str] = COLUMNS,
-    measured: str = MEASURED,
-    extrinsic: Path | None = EXTRINSIC,
-    lens: LensModel | None = LENS,
-    fix: Fix = FIX,
-    twist_timing: Timing | None = typer.Option(
-        None, help="When a twist reading holds; else the calibration says it, else start."
-    ),
+    truth: Path | None = own.TRUTH,
+    columns: list[str] = own.COLUMNS,
+    measured: str = own.MEASURED,
+    extrinsic: Path | None = own.EXTRINSIC,
+    lens: LensModel | None = own.LENS,
+    fix: Fix = own.FIX,
+    twist_timing: Timing | None = own.TIMING,
     **readings: list[Path],
 ) -> None:
     """CSV files: stereo tracks, and twists, a wheel speed alone or an IMU; your own columns."""
     recording, findings = csv_converter.convert(
         csv_converter.Sources(
-            stereo=stereo,
-            twists=twists,
-            imu=imu,
-            calibration=tuple(calibration),
-            extrinsic=extrinsic,
-            lens=lens,
-            truth=truth,
-            measured=csv_converter.measured_of(measured),
-            columns=Columns.of(columns),
+            csv_converter.MotionFiles(twists, gyro, imu, csv_converter.measured_of(measured)),
+            stereo,
+            tuple(calibration),
+            truth,
+            extrinsic,
+            lens,
+            Columns.of(columns),
         ),
         fix is Fix.AUTO,
         twist_timing.value_in_header if twist_timing else None,
@@ -183,7 +179,7 @@ def csv(
 )
 def imu_npz(
     source: Path = SOURCE,
-    target: Path = TARGET,
+    target: Path = own.TARGET,
     keep_ids: bool = typer.Option(
         False,
         "--keep-ids",

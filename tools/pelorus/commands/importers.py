@@ -3,26 +3,18 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 import typer
 from rich.markup import escape
 
+from pelorus.commands import own
 from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
-from pelorus.commands.own import (
-    CALIBRATION,
-    COLUMNS,
-    EXTRINSIC,
-    FIX,
-    IMU,
-    LENS,
-    MEASURED,
-    TARGET,
-    TRUTH,
-    TWISTS,
-)
 from pelorus.console import out
 from pelorus.converters import bag, csv, euroc, kitti, ros, streams
 from pelorus.converters.asked import Asked
@@ -31,11 +23,25 @@ from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
 from pelorus.converters.streams import Streams, Twists
 from pelorus.errors import PelorusError
+from pelorus.frames import TwistTiming
 from pelorus.rig.lens import LensModel
 
-TIMING = typer.Option(Timing.START, help="When a twist reading holds.")
 OWN_DATA = "Your own data"
 RADIUS_MAX_M = 5.0
+# The options of all of them; a command gets what they say as its argument `asked`.
+SHARED: dict[str, tuple[Any, Any]] = {
+    "calibration": (list[Path], own.CALIBRATION),
+    "extrinsic": (Path | None, own.EXTRINSIC),
+    "lens": (LensModel | None, own.LENS),
+    "twists": (Path | None, own.TWISTS),
+    "gyro": (Path | None, own.GYRO),
+    "imu": (Path | None, own.IMU),
+    "truth": (Path | None, own.TRUTH),
+    "columns": (list[str], own.COLUMNS),
+    "measured": (str, own.MEASURED),
+    "twist_timing": (Timing | None, own.TIMING),
+    "fix": (Fix, own.FIX),
+}
 
 
 class Stamps(StrEnum):
@@ -47,80 +53,102 @@ class Stamps(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the commands to `convert`."""
-    app.command(
-        "euroc",
-        rich_help_panel=OWN_DATA,
-        epilog="Example:  pelorus convert euroc V1_01_easy V1_01.plr",
-    )(euroc_)
-    app.command(
-        "kitti",
-        rich_help_panel=OWN_DATA,
-        epilog="Example:  pelorus convert kitti 2011_09_30/2011_09_30_drive_0020_sync 0020.plr",
-    )(kitti_)
-    app.command(
-        "ros",
-        rich_help_panel=OWN_DATA,
-        epilog="Example:  pelorus convert ros drive.mcap drive.plr --calibration camchain.yaml",
-    )(ros_)
+    for name, command, example in (
+        ("euroc", _euroc, "V1_01_easy V1_01.plr"),
+        ("ros", _ros, "drive.mcap drive.plr --calibration camchain.yaml"),
+        ("kitti", _kitti, "2011_09_30/2011_09_30_drive_0020_sync 0020.plr"),
+    ):
+        app.command(
+            name,
+            rich_help_panel=OWN_DATA,
+            epilog=f"Example:  pelorus convert {name} {example}",
+        )(_with_shared_options(command))
 
 
-def euroc_(
+def _with_shared_options(command: Callable[..., None]) -> Callable[..., None]:
+    def run(**given: Any) -> None:
+        shared = {name: given.pop(name) for name in SHARED}
+        command(asked=_asked(**shared), **given)
+
+    parameters = inspect.signature(command, eval_str=True).parameters.values()
+    own_ones = [p.replace(kind=p.KEYWORD_ONLY) for p in parameters if p.name != "asked"]
+    shared = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind)
+        for name, (kind, option) in SHARED.items()
+    ]
+    run.__dict__["__signature__"] = inspect.Signature([*own_ones, *shared])
+    run.__doc__ = command.__doc__
+    return run
+
+
+def _asked(
+    calibration: list[Path],
+    extrinsic: Path | None,
+    lens: LensModel | None,
+    twists: Path | None,
+    gyro: Path | None,
+    imu: Path | None,
+    truth: Path | None,
+    columns: list[str],
+    measured: str,
+    twist_timing: Timing | None,
+    fix: Fix,
+) -> Asked:
+    named = Columns.of(columns)
+    timing = twist_timing.value_in_header if twist_timing else None
+    files = csv.MotionFiles(twists, gyro, imu, csv.measured_of(measured))
+    motion = None
+    if twists or imu:
+        motion = csv.motion_of(files, named, timing or TwistTiming.START)
+    elif gyro:
+        raise PelorusError("--gyro: it goes with --twists FILE, whose velocities lack a gyro")
+    poses = csv.truth_of(truth, named) if truth else None
+    named.require_used()
+    return Asked(
+        tuple(calibration),
+        extrinsic,
+        lens,
+        motion,
+        poses,
+        files.measured,
+        timing,
+        fix is Fix.AUTO,
+    )
+
+
+def _euroc(
+    asked: Asked,
     folder: Path = typer.Argument(..., metavar="FOLDER", help="With mav0/cam0, cam1, imu0."),
-    target: Path = TARGET,
-    calibration: list[Path] = CALIBRATION,
-    extrinsic: Path | None = EXTRINSIC,
-    lens: LensModel | None = LENS,
-    twists: Path | None = TWISTS,
-    imu: Path | None = IMU,
-    truth: Path | None = TRUTH,
-    columns: list[str] = COLUMNS,
-    measured: str = MEASURED,
-    twist_timing: Timing = TIMING,
-    fix: Fix = FIX,
+    target: Path = own.TARGET,
 ) -> None:
     """A folder like EuRoC's or TUM-VI's (mav0): pictures, an IMU or your wheels, the truth."""
-    asked = _asked(calibration, extrinsic, lens, twists, imu, truth, columns, measured)
-    _convert(euroc.read(folder, asked), target, twist_timing, fix)
+    _convert(euroc.read(folder, asked), asked, target)
 
 
-def kitti_(
+def _kitti(
+    asked: Asked,
     folder: Path = typer.Argument(
         ..., metavar="FOLDER", help="DATE_drive_NNNN_sync, or sequences/NN of the benchmark."
     ),
-    target: Path = TARGET,
-    calibration: list[Path] = CALIBRATION,
-    extrinsic: Path | None = EXTRINSIC,
-    lens: LensModel | None = LENS,
-    twists: Path | None = TWISTS,
-    imu: Path | None = IMU,
-    truth: Path | None = TRUTH,
-    columns: list[str] = COLUMNS,
-    measured: str = MEASURED,
+    target: Path = own.TARGET,
     velocity_sigma: float = typer.Option(
         0.5, metavar="M/S", help="Noise of the twists that are made from the benchmark's poses."
     ),
     gyro_sigma: float = typer.Option(0.05, metavar="RAD/S", help="Likewise."),
     seed: int = typer.Option(1, help="Of that noise."),
-    twist_timing: Timing | None = typer.Option(
-        None, help="When a twist reading holds; else end for a raw drive, start for the others."
-    ),
-    fix: Fix = FIX,
 ) -> None:
     """A raw drive of KITTI with its OXTS, or a sequence of its odometry benchmark."""
-    asked = _asked(calibration, extrinsic, lens, twists, imu, truth, columns, measured)
-    usual = Timing.END if kitti.is_raw(folder) and asked.motion is None else Timing.START
     found = kitti.read(folder, asked, kitti.Made(velocity_sigma, gyro_sigma, seed))
-    _convert(found, target, twist_timing or usual, fix)
+    oxts = kitti.is_raw(folder) and asked.motion is None
+    _convert(found, asked, target, TwistTiming.END if oxts else TwistTiming.START)
 
 
-def ros_(
+def _ros(
+    asked: Asked,
     source: Path = typer.Argument(
         ..., metavar="BAG", help="ROS 1 (.bag), ROS 2 (a folder with metadata.yaml), .mcap or .db3."
     ),
-    target: Path = TARGET,
-    calibration: list[Path] = CALIBRATION,
-    extrinsic: Path | None = EXTRINSIC,
-    lens: LensModel | None = LENS,
+    target: Path = own.TARGET,
     left_topic: str = typer.Option("", help="Pictures; else of the calibration, or called left."),
     right_topic: str = typer.Option("", help="Likewise, of the right camera."),
     pair_within: float = typer.Option(
@@ -134,6 +162,9 @@ def ros_(
     twist_topic: str = typer.Option(
         "", help="Odometry, TwistStamped or TwistWithCovarianceStamped; else the only one."
     ),
+    gyro_topic: str = typer.Option(
+        "", help="Imu whose gyro, in body axes, takes the place of the twists' rotation."
+    ),
     imu_topic: str = typer.Option("", help="Or: the raw readings of an IMU move the body."),
     joint_topic: str = typer.Option("", help="Or: JointState with the speeds of wheels, rad/s."),
     joints: list[str] = typer.Option([], "--joint", help="A wheel's joint, left ones first."),
@@ -145,26 +176,18 @@ def ros_(
         "", help="Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped."
     ),
     stamps: Stamps = typer.Option(Stamps.HEADER, help="Times of the headers, or of the arrival."),
-    twists: Path | None = TWISTS,
-    imu: Path | None = IMU,
-    truth: Path | None = TRUTH,
-    columns: list[str] = COLUMNS,
-    measured: str = MEASURED,
-    twist_timing: Timing = TIMING,
-    fix: Fix = FIX,
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
-    asked = _asked(calibration, extrinsic, lens, twists, imu, truth, columns, measured)
     topics = ros.Topics(
         Cameras(left_topic, right_topic, tracks_topic, round(pair_within * 1e6)),
         twist_topic,
+        gyro_topic,
         imu_topic,
         truth_topic,
         _wheels(joint_topic, joints, wheel_radius, track_width),
-        csv.measured_of(measured),
     )
     with Bag(source, stamps.value) as opened:
-        _convert(ros.read(opened, topics, asked), target, twist_timing, fix)
+        _convert(ros.read(opened, topics, asked), asked, target)
 
 
 def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> ros.Wheels | None:
@@ -177,29 +200,13 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> r
     return ros.Wheels(topic, tuple(joints), radius_m, track_m)
 
 
-def _asked(
-    calibration: list[Path],
-    extrinsic: Path | None,
-    lens: LensModel | None,
-    twists: Path | None,
-    imu: Path | None,
-    truth: Path | None,
-    columns: list[str],
-    measured: str,
-) -> Asked:
-    named = Columns.of(columns)
-    has = csv.measured_of(measured)
-    motion = csv.motion_of(twists, imu, has, named) if twists or imu else None
-    poses = csv.truth_of(truth, named) if truth else None
-    named.require_used()
-    return Asked(tuple(calibration), extrinsic, lens, motion, poses)
-
-
-def _convert(found: Streams, target: Path, twist_timing: Timing, fix: Fix) -> None:
+def _convert(
+    found: Streams, asked: Asked, target: Path, usual: TwistTiming = TwistTiming.START
+) -> None:
     for remark in found.remarks:
         out.print(escape(remark))
-    recording = streams.recording(found).with_header(twist_timing=twist_timing.value_in_header)
-    if fix is Fix.NONE:
+    recording = streams.recording(found).with_header(twist_timing=asked.timing or usual)
+    if not asked.fix:
         write(recording, [], target)
         return
     whole = isinstance(found.motion, Twists) and found.motion.is_whole

@@ -26,6 +26,11 @@ TWISTS = typer.Option(
     help="Columns t_s (or t_ms, t_us, t_ns), vx_mps, vy_mps, vz_mps, wx_radps, wy_radps, "
     "wz_radps, in body axes; some of them alone: --measured.",
 )
+GYRO = typer.Option(
+    None,
+    help="Beside --twists: columns t_s, wx_radps, wy_radps, wz_radps of a gyro in body axes, in "
+    "place of the twists' own; its mean between two twists is taken.",
+)
 IMU = typer.Option(
     None,
     help="In place of twists, an IMU's raw readings: columns t_s, ax_mps2, ay_mps2, az_mps2 (9.81 "
@@ -47,6 +52,9 @@ MEASURED = typer.Option(
     metavar="NAMES",
     help="Which velocities the twists' file has: vx for a wheel speed alone, vx,wz for wheels that "
     "tell a turn. The others are taken as 0 and little believed.",
+)
+TIMING = typer.Option(
+    None, help="When a twist reading holds; else the calibration says it, else start."
 )
 EXTRINSIC = typer.Option(
     None,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pelorus.converters.streams import Readings, Twists
+from pelorus.frames import TwistTiming
 from pelorus.rig.lens import LensModel
 from pelorus.trajectory import Trajectory
 
@@ -20,3 +21,6 @@ class Asked:
     lens: LensModel | None = None
     motion: Twists | Readings | None = None
     truth: Trajectory | None = None
+    measured: frozenset[str] = Twists.measured  # of the source's own twists
+    timing: TwistTiming | None = None
+    fix: bool = True

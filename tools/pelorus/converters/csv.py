@@ -44,25 +44,34 @@ VELOCITIES = {
     for kind, unit in (("v", "mps"), ("w", "radps"))
     for axis in "xyz"
 }
+RATES = {short: name for short, name in VELOCITIES.items() if short[0] == "w"}
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 NAMES_ITS_COLUMNS = 0.5  # of the first row's cells: letters, where others have numbers
 
 
 @dataclass(frozen=True)
-class Sources:
-    """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them.
+class MotionFiles:
+    """Twists, with a gyro beside them or without, or an IMU: one of them is due.
 
-    Twists or an IMU: one of them. `measured` are the velocities that the twists' file has.
+    `measured` are the velocities that the twists' file has.
     """
 
-    twists: Path | None
+    twists: Path | None = None
+    gyro: Path | None = None
+    imu: Path | None = None
+    measured: frozenset[str] = frozenset(VELOCITIES)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them."""
+
+    motion: MotionFiles
     stereo: Path
     calibration: tuple[Path, ...]
     truth: Path | None = None
     extrinsic: Path | None = None
     lens: LensModel | None = None
-    imu: Path | None = None
-    measured: frozenset[str] = frozenset(VELOCITIES)
     columns: Columns = field(default_factory=Columns)
 
 
@@ -76,7 +85,7 @@ def convert(
 
     `readings` are the files of small sensors, by name.
     """
-    found = read(sources, readings or {})
+    found = read(sources, readings or {}, twist_timing)
     recording = streams.recording(found)
     if twist_timing is not None:
         recording = recording.with_header(twist_timing=twist_timing)
@@ -86,13 +95,18 @@ def convert(
     return streams.examined(recording, whole)
 
 
-def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Streams:
+def read(
+    sources: Sources,
+    readings: Mapping[str, list[Path]],
+    twist_timing: TwistTiming | None = None,
+) -> Streams:
     """The files as they are."""
     columns = sources.columns
     calibrated = rig_files.read(
         sources.calibration, sources.stereo.stem, sources.extrinsic, sources.lens
     )
-    motion = motion_of(sources.twists, sources.imu, sources.measured, columns)
+    timing = calibrated.header.twist_timing if twist_timing is None else twist_timing
+    motion = motion_of(sources.motion, columns, timing)
     frame_t_ns, tracks = _stereo(columns.read(sources.stereo, "stereo"))
     found = Streams(
         calibrated,
@@ -108,15 +122,19 @@ def read(sources: Sources, readings: Mapping[str, list[Path]]) -> Streams:
 # --- motion ---------------------------------------------------------------------------------------
 
 
-def motion_of(
-    twists: Path | None, imu: Path | None, measured: frozenset[str], columns: Columns
-) -> Twists | Readings:
-    """Of the file that there is."""
+def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twists | Readings:
+    """Of the files that there are."""
+    twists, imu = files.twists, files.imu
     if twists is not None and imu is None:
-        return _twists(twists, measured, columns)
+        if files.gyro is None:
+            return _twists(twists, files.measured, columns)
+        speeds = _twists(twists, files.measured - RATES.keys(), columns)
+        table = columns.read(files.gyro, "gyro")
+        rates = table.numbers(*RATES.values())
+        return streams.with_gyro(speeds, files.gyro, table.ascending_times(), rates, timing)
     if imu is not None and twists is None:
         table = columns.read(imu, "imu")
-        a, w = table.numbers(*FORCES), table.numbers(*list(VELOCITIES.values())[3:])
+        a, w = table.numbers(*FORCES), table.numbers(*RATES.values())
         return Readings(imu, Inertial(table.ascending_times(), a, w))
     raise PelorusError(
         f"{'--twists and --imu' if imu else 'neither --twists nor --imu'} given; one is due: "

@@ -11,13 +11,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus.console import progress
-from pelorus.converters import ros_frames
+from pelorus.converters import ros_frames, streams
 from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
 from pelorus.converters.streams import Readings, Streams, Twists
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
+from pelorus.frames import TwistTiming
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.motion import Times
@@ -61,16 +62,16 @@ class Topics:
 
     cameras: Cameras
     twist: str = ""
+    gyro: str = ""
     imu: str = ""
     truth: str = ""
     wheels: Wheels | None = None
-    measured: frozenset[str] = Twists.measured
 
 
 def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     """What of the bag becomes a recording; its pictures are read later, so it must stay open."""
     remarks: list[str] = []
-    motion = asked.motion or _motion(bag, topics, remarks)
+    motion = asked.motion or _motion(bag, topics, asked, remarks)
     calibrated, cameras = _calibrated(bag, topics.cameras, asked)
     frames = ros_frames.read(bag, cameras, calibrated, remarks)
     truth = asked.truth or (_truth(bag, topics.truth) if topics.truth else None)
@@ -97,7 +98,18 @@ def _calibrated(bag: Bag, cameras: Cameras, asked: Asked) -> tuple[Calibrated, C
 # --- motion ---------------------------------------------------------------------------------------
 
 
-def _motion(bag: Bag, topics: Topics, remarks: list[str]) -> Twists | Readings:
+def _motion(bag: Bag, topics: Topics, asked: Asked, remarks: list[str]) -> Twists | Readings:
+    found = _without_gyro(bag, topics, asked, remarks)
+    if not topics.gyro:
+        return found
+    if isinstance(found, Readings):
+        raise PelorusError("--gyro-topic: it goes with twists or wheels, an IMU has its own")
+    own = _imu(bag, bag.require(topics.gyro, IMU))
+    timing = asked.timing or TwistTiming.START
+    return streams.with_gyro(found, own.where, own.inertial.t_ns, own.inertial.w_B_radps, timing)
+
+
+def _without_gyro(bag: Bag, topics: Topics, asked: Asked, remarks: list[str]) -> Twists | Readings:
     named = [topic for topic in (topics.twist, topics.imu) if topic]
     if len(named) + (topics.wheels is not None) > 1:
         raise PelorusError(
@@ -114,7 +126,10 @@ def _motion(bag: Bag, topics: Topics, remarks: list[str]) -> Twists | Readings:
             f"{bag.path}: what moves the body? {len(twists)} topics hold twists, {len(imus)} hold "
             f"{IMU}; --twist-topic, --imu-topic or --joint-topic is due; {bag.listing()}"
         )
-    return _twists(bag, bag.require(topics.twist or twists[0], *TWISTS), topics.measured, remarks)
+    unused = [topic for topic in imus if topic != topics.gyro]
+    if unused:
+        remarks.append(f"{', '.join(unused)}: not used; --imu-topic or --gyro-topic would use it")
+    return _twists(bag, bag.require(topics.twist or twists[0], *TWISTS), asked.measured, remarks)
 
 
 def _twists(bag: Bag, topic: str, measured: frozenset[str], remarks: list[str]) -> Twists:

@@ -22,7 +22,7 @@ from pelorus.faults import stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import mend
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Noise, Process, Reading, Text
+from pelorus.frames import Header, Noise, Process, Reading, Text, TwistTiming
 from pelorus.inertial import NO_READINGS, Inertial
 from pelorus.layout import Floats
 from pelorus.motion import Times
@@ -37,6 +37,7 @@ from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory
 
 TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up for a frame
+FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
@@ -142,6 +143,7 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
         inertial, first_ns = NO_READINGS, int(motion.t_ns[0])
     else:
         told = {name: s for name, s in vars(streams.calibrated.imu).items() if s >= 0}
+        _require_gravity(motion)
         header = replace(header, process=Process.IMU, noise=replace(header.noise, **told))
         moved = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
         inertial = motion.inertial
@@ -153,6 +155,18 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
     )
 
 
+def _require_gravity(readings: Readings) -> None:
+    """An IMU that is at rest for some of the time, or level on average, feels 9.81 m/s^2."""
+    usual = float(np.median(np.linalg.norm(readings.inertial.a_B_mps2, axis=1)))
+    if not FORCES_MPS2[0] <= usual <= FORCES_MPS2[1]:
+        raise ForeignFileError(
+            readings.where,
+            f"the specific force is {usual:.3g} m/s^2 in the median",
+            due="about 9.81 is due: is it in g (--columns ax=COLUMN:g and so on), or has gravity "
+            "been taken away? Raw readings are due",
+        )
+
+
 def _with_blind_axes(noise: Noise, measured: frozenset[str]) -> Noise:
     """Sigmas for what nobody measured, unless the calibration tells some."""
     given = {
@@ -161,6 +175,46 @@ def _with_blind_axes(noise: Noise, measured: frozenset[str]) -> Noise:
     }
     told = vars(noise)
     return replace(noise, **{name: s for name, s in given.items() if told[name] <= 0})
+
+
+def with_gyro(
+    twists: Twists, where: Path, gyro_t_ns: Times, w_B_radps: Floats, timing: TwistTiming
+) -> Twists:
+    """The twists with a gyro's rates: each has the mean over the time for which it holds.
+
+    So the rotation between two twists is the gyro's, however fast it is read. Twists that the
+    gyro does not cover are left out.
+    """
+    t = twists.t_ns
+    inside = (t >= gyro_t_ns[0]) & (t <= gyro_t_ns[-1])
+    if inside.sum() < 2:
+        raise ForeignFileError(
+            where,
+            f"spans {gyro_t_ns[0]} to {gyro_t_ns[-1]} ns, {twists.where} {t[0]} to {t[-1]} ns: "
+            "they do not overlap",
+        )
+    t = t[inside]
+    cuts = _held_between(t, timing)
+    steps = np.diff(gyro_t_ns) * 1e-9
+    turned = np.cumsum(0.5 * (w_B_radps[1:] + w_B_radps[:-1]) * steps[:, None], axis=0)
+    angle = np.concatenate((np.zeros((1, 3)), turned))
+    seconds, own = (cuts - gyro_t_ns[0]) * 1e-9, (gyro_t_ns - gyro_t_ns[0]) * 1e-9
+    at = np.stack([np.interp(seconds, own, x) for x in angle.T], axis=-1)
+    w = np.diff(at, axis=0) / np.diff(seconds)[:, None]
+    if timing is TwistTiming.START:
+        w = np.concatenate((w, w[-1:]))
+    elif timing is TwistTiming.END:
+        w = np.concatenate((w[:1], w))
+    measured = twists.measured | {"wx", "wy", "wz"}
+    return Twists(twists.where, t, twists.v_B_mps[inside], w, measured)
+
+
+def _held_between(t_ns: Times, timing: TwistTiming) -> Times:
+    """The readings' own times; or, where each is in the middle, those half way between them."""
+    if timing is not TwistTiming.MID:
+        return t_ns
+    half_way = t_ns[:-1] + np.diff(t_ns) // 2
+    return np.concatenate((t_ns[:1], half_way, t_ns[-1:]))
 
 
 def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Readings) -> None:
