@@ -12,6 +12,7 @@ import pytest
 from converted import Run, messages_of
 from drives import clean
 from pelorus import evaluation, road, se3
+from pelorus.consistency import rms
 from pelorus.evaluation import Accuracy, assess
 from pelorus.frames import Header, Truth
 from pelorus.layout import Floats
@@ -117,10 +118,10 @@ def test_the_rigid_fit_is_the_least_squares_one_and_never_a_mirror() -> None:
     target = source @ by.R.T + by.p + CHANCE.normal(0, 0.1, (50, 3))
     fit = evaluation.rigid_fit(source, target)
     assert np.linalg.det(fit.R) == pytest.approx(1.0)
-    best = evaluation.rms(se3.apply(fit, source) - target)
+    best = rms(se3.apply(fit, source) - target)
     for _ in range(200):
         step = se3.exp(CHANCE.normal(0, 0.01, 3), CHANCE.normal(0, 0.01, 3))
-        assert evaluation.rms(se3.apply(se3.compose(step, fit), source) - target) >= best
+        assert rms(se3.apply(se3.compose(step, fit), source) - target) >= best
     mirrored = source * [1, 1, -1]
     assert np.linalg.det(evaluation.rigid_fit(source, mirrored).R) == pytest.approx(1.0)
 

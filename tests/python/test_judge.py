@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from pelorus import se3
-from pelorus.evaluation import judge, rigid_fit, rms
+from pelorus.consistency import rms
+from pelorus.evaluation import judge, rigid_fit
 from pelorus.frames import UNKNOWN_VARIANCE, Header, Message, Pose, Stereo, Truth
 from pelorus.layout import pack_symmetric
 from pelorus.se3 import Poses

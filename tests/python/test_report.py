@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from converted import Run as Command
 from pelorus import se3
+from pelorus.consistency import nees_per_dof
 from pelorus.errors import PelorusError
-from pelorus.evaluation import assess, made_in, map_figures, nees_per_dof
+from pelorus.evaluation import assess, made_in, map_figures
 from pelorus.frame_table import frame_table, write_csv
 from pelorus.frames import Kind, Landmark, Pose, Report, Role, Stereo, Truth
 from pelorus.layout import pack_symmetric, unpack_symmetric

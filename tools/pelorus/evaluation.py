@@ -9,6 +9,11 @@ rot_deg       RMS angle of R^_k^T R(A T_k)
 nees_per_dof  mean of e^T P^-1 e / 6, e = Log(T^_k^-1 A T_k), the first frame left out: 1 is due
 map_*         of e = m^ - A m over the landmarks of equal id; NEES e^T P^-1 e / 3
 
+With an IMU gravity shows the vertical, so A turns about it alone, and is taken at the frame at
+which the world was laid for good: where the filter's position is known as it was set, at the start,
+or some seconds after a start in motion (docs/MATH.md, the anchor). Frames before it do not count.
+What the filter knows besides is judged too, each state by its NEES (inertial_evaluation.py).
+
 A figure that cannot be had is None: without truth or covariance, and the poses' own where they
 were given (mode mapping).
 """
@@ -22,7 +27,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3
+from pelorus import inertial_evaluation, se3
+from pelorus.consistency import Figures, mean, nees_per_dof, rms
 from pelorus.frames import Landmark, Message, Role
 from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
@@ -30,13 +36,12 @@ from pelorus.se3 import Poses
 from pelorus.settings import in_force, mode_in_force
 from pelorus.trajectory import Trajectory, estimate_in, truth_in
 
-Figures = dict[str, float | int | None]
-
 MEANING = {
     "err0_m": "RMS position error, first poses aligned",
     "ate_m": "RMS position error after the best rigid fit",
     "rot_deg": "RMS rotation error, first poses aligned",
     "nees_per_dof": "mean NEES of the pose, a degree of freedom: 1 is due",
+    **inertial_evaluation.MEANING,
     "truth_frames": "poses compared",
     "nees_left_out": "of them with a covariance that has no inverse, left out of NEES",
     "path_m": "length of the trajectory",
@@ -57,8 +62,8 @@ MEANING = {
 class Accuracy:
     """At the n frames with truth, the truth brought to the estimate's start.
 
-    error (n, 6) is Log(T^-1 A T_true), (rho, theta), m and rad; sigma (n, 6); nees = e^T P^-1 e / 6
-    (n,), NaN at the first frame and where P is not positive.
+    error (n, 6) is Log(T^-1 A T_true), (rho, theta), m and rad; P (n, 6, 6) its covariance, sigma
+    (n, 6); nees = e^T P^-1 e / 6 (n,), NaN at the first frame and where P is not positive.
     """
 
     t_ns: Times
@@ -66,6 +71,7 @@ class Accuracy:
     truth: Poses  # A T_true
     A: Poses
     error: Floats
+    P: Floats
     sigma: Floats
     nees: Floats
 
@@ -84,7 +90,7 @@ class Accuracy:
 
     @property
     def nees_per_dof(self) -> float | None:
-        return _mean(self.nees)
+        return mean(self.nees)
 
     @property
     def figures(self) -> Figures:
@@ -99,22 +105,57 @@ class Accuracy:
 
 
 def assess(
-    estimate: Trajectory, truth: Trajectory, covariance: Floats | None = None, tolerance_ns: int = 0
+    estimate: Trajectory,
+    truth: Trajectory,
+    covariance: Floats | None = None,
+    tolerance_ns: int = 0,
+    upright: bool = False,
 ) -> Accuracy | None:
-    """None if no pose has a truth of equal time. `covariance` (n, 6, 6), NaN where unknown."""
+    """None if no pose has a truth of equal time. `covariance` (n, 6, 6), NaN where unknown.
+
+    `upright`: the filter knows the vertical, as with an IMU.
+    """
     mine, theirs = match(estimate, truth, tolerance_ns)
     if not len(mine):
         return None
     unknown = np.full((len(estimate.t_ns), 6, 6), np.nan)
     P = (unknown if covariance is None else covariance)[mine]
+    if upright:
+        laid = slice(world_laid(P), None)
+        mine, theirs, P = mine[laid], theirs[laid], P[laid]
     T, T_true = estimate.poses.at(mine), truth.poses.at(theirs)
-    A = se3.compose(T.at(0), se3.inverse(T_true.at(0)))
+    A = about_vertical(T.at(0), T_true.at(0)) if upright else _onto(T.at(0), T_true.at(0))
     aligned = se3.compose(A, T_true)
     error = se3.log(se3.compose(se3.inverse(T), aligned))
     sigma = np.sqrt(np.clip(np.diagonal(P, axis1=1, axis2=2), 0, None))
     nees = nees_per_dof(error, P)
     nees[0] = np.nan  # its error is zero by the alignment: it says nothing
-    return Accuracy(estimate.t_ns[mine], T, aligned, A, error, sigma, nees)
+    return Accuracy(estimate.t_ns[mine], T, aligned, A, error, P, sigma, nees)
+
+
+def _onto(T: Poses, T_true: Poses) -> Poses:
+    """A with T = A T_true."""
+    return se3.compose(T, se3.inverse(T_true))
+
+
+def about_vertical(T: Poses, T_true: Poses) -> Poses:
+    """A that turns about the vertical alone, brings p_true to p, and R_true as near R as it can."""
+    between = T.R @ T_true.R.T
+    x, y = between[0, 0] + between[1, 1], between[1, 0] - between[0, 1]
+    cosine, sine = np.array([x, y]) / np.hypot(x, y)
+    R = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return Poses(R, T.p - R @ T_true.p)
+
+
+def world_laid(P: Floats) -> int:
+    """The last frame whose position is known as it was set: alike along all axes, and by itself.
+
+    The first one if there is none such: then the world was laid before it.
+    """
+    rho, cross = P[:, :3, :3], P[:, :3, 3:]
+    alike = (rho == rho[:, :1, :1] * np.eye(3)).all(axis=(1, 2))
+    as_set = np.nonzero(alike & (cross == 0).all(axis=(1, 2)))[0]
+    return int(as_set[-1]) if len(as_set) else 0
 
 
 def match(
@@ -129,16 +170,6 @@ def match(
     good = np.nonzero(np.abs(truth.t_ns[nearest] - estimate.t_ns) <= tolerance_ns)[0]
     _, first = np.unique(nearest[good], return_index=True)
     return good[first], nearest[good[first]]
-
-
-def nees_per_dof(error: Floats, P: Floats) -> Floats:
-    """e^T P^-1 e / d of (n, d) and (n, d, d); NaN where P is not positive."""
-    out = np.full(len(error), np.nan)
-    finite = np.nonzero(np.isfinite(P).all(axis=(1, 2)))[0]
-    sound = finite[np.linalg.eigvalsh(P[finite])[:, 0] > 0]
-    weighted = np.linalg.solve(P[sound], error[sound, :, None])[..., 0]
-    out[sound] = np.sum(error[sound] * weighted, axis=1) / error.shape[1]
-    return out
 
 
 def rigid_fit(source: Floats, target: Floats) -> Poses:
@@ -161,15 +192,6 @@ def step_change(poses: Poses) -> float:
 def path_m(poses: Poses) -> float:
     """Length of the way."""
     return float(np.linalg.norm(np.diff(poses.p, axis=0), axis=1).sum())
-
-
-def rms(errors: Floats) -> float:
-    """Root of the mean squared norm of the rows."""
-    return float(np.sqrt(np.mean(np.sum(errors**2, axis=-1))))
-
-
-def _mean(values: Floats) -> float | None:
-    return float(np.nanmean(values)) if np.isfinite(values).any() else None
 
 
 # --- maps -----------------------------------------------------------------------------------------
@@ -209,7 +231,7 @@ def map_figures(made: Sequence[Landmark], known: Sequence[Landmark], A: Poses = 
         "map_landmarks": len(mine),
         "map_rms_m": rms(error),
         "map_median_m": float(np.median(np.linalg.norm(error, axis=1))),
-        "map_nees_per_dof": _mean(nees),
+        "map_nees_per_dof": mean(nees),
         "map_nees_left_out": int(np.isnan(nees).sum()),
         "map_sigma_least_m": float(sigma.min()),
         "map_sigma_largest_m": float(sigma.max()),
@@ -226,6 +248,11 @@ def is_mapping(messages: Sequence[Message]) -> bool:
     return mode_in_force(messages) == "mapping"
 
 
+def by_imu(messages: Sequence[Message]) -> bool:
+    """Whether an IMU moved the filter that left this result."""
+    return bool(in_force(messages, "process"))
+
+
 def _found_by_itself(messages: Sequence[Message]) -> list[Landmark]:
     """What the filter made; without the known ones that it was located by."""
     made = made_in(messages)
@@ -240,17 +267,25 @@ def judge(
     truth: Trajectory | None = None,
     known: Sequence[Landmark] = (),
     tolerance_ns: int = 0,
+    truths: Sequence[Message] = (),
 ) -> Figures:
-    """A result against truth and known landmarks, by default its own."""
+    """A result against truth and known landmarks, by default its own.
+
+    `truths` are the messages that may say more of the truth than its poses.
+    """
     truth = truth_in(messages) if truth is None else truth
     found = estimate_in(messages)
     accuracy = None
     if found is not None and truth is not None:
-        accuracy = assess(found[0], truth, found[1], tolerance_ns)
+        accuracy = assess(found[0], truth, found[1], tolerance_ns, by_imu(messages))
     figures: Figures = dict.fromkeys(OF_POSES) | {"truth_frames": 0}
     if accuracy is not None:
         figures = accuracy.figures
     if is_mapping(messages):
         figures |= dict.fromkeys(OF_POSES)
+    elif accuracy is not None and by_imu(messages):
+        figures |= inertial_evaluation.figures(
+            messages, truths or messages, accuracy.t_ns, accuracy.error, accuracy.P
+        )
     A = accuracy.A if accuracy else UNMOVED
     return figures | map_figures(_found_by_itself(messages), known or known_in(messages), A)

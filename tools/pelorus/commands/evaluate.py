@@ -12,9 +12,10 @@ from rich.table import Table
 
 from pelorus import evaluation, road
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
+from pelorus.consistency import Figures
 from pelorus.console import out
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Figures, assess, judge, known_in
+from pelorus.evaluation import assess, judge, known_in
 from pelorus.frames import Message
 from pelorus.replay import result_of
 from pelorus.trajectory import Trajectory, estimate_in, is_recording, read_truth, read_tum, truth_of
@@ -61,6 +62,9 @@ def evaluate(
         None, metavar="TIMES.txt", help="For KITTI poses of the body: a time in s a row."
     ),
     skip: float = typer.Option(45.0, metavar="M", help="With --road: leave out the first metres."),
+    first: float = typer.Option(
+        0.0, metavar="S", min=0, help="Look at the first so many seconds alone; 0: at all."
+    ),
     tolerance: float = typer.Option(
         1e-6, metavar="S", help="Times that differ by no more are equal."
     ),
@@ -91,10 +95,11 @@ def evaluate(
         found |= asdict(road.compare(estimate.poses.p, road.read_road(road_file), skip))
     else:
         reference = truth_of(source) if truth is None else read_truth(truth, times, recording)
-        known = known_in(messages_of(truth)) if truth is not None and is_recording(truth) else []
+        theirs = messages_of(truth) if truth is not None and is_recording(truth) else []
+        reference = _until(reference, estimate, first)
         tolerance_ns = round(tolerance * 1e9)
         if messages:
-            found |= judge(messages, reference, known, tolerance_ns)
+            found |= judge(messages, reference, known_in(theirs), tolerance_ns, theirs)
         else:
             accuracy = assess(estimate, reference, tolerance_ns=tolerance_ns)
             found |= accuracy.figures if accuracy else {"truth_frames": 0}
@@ -105,6 +110,14 @@ def evaluate(
         typer.echo(json.dumps(found))
     else:
         _show(found)
+
+
+def _until(reference: Trajectory, estimate: Trajectory, first_s: float) -> Trajectory:
+    """The reference of that time alone."""
+    if not first_s:
+        return reference
+    early = reference.t_ns - estimate.t_ns[0] <= round(first_s * 1e9)
+    return Trajectory(reference.t_ns[early], reference.poses.at(early))
 
 
 def _require_something(

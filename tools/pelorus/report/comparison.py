@@ -25,7 +25,7 @@ import numpy as np
 
 from pelorus import style
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Accuracy, assess
+from pelorus.evaluation import Accuracy, assess, by_imu
 from pelorus.frames import Kind, Landmark, Message, Report, Role, Stereo
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
@@ -94,7 +94,10 @@ class Comparison:
         truth = self.subject.truth
         if truth is None:
             return {}
-        found = {run.name: assess(run.trajectory, truth, run.covariance) for run in self.runs}
+        found = {
+            run.name: assess(run.trajectory, truth, run.covariance, upright=by_imu(run.messages))
+            for run in self.runs
+        }
         return {name: accuracy for name, accuracy in found.items() if accuracy is not None}
 
     @cached_property

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Settings for IMUs by name: what the files say is what they set, and more than a data sheet."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from converted import Run
+from imu_drives import noisy
+from pelorus.replay import run_program
+from replay_drive import BIN
+
+CONFIG = ROOT / "tools" / "config"
+NAMES = ["imu", *sorted(path.stem for path in CONFIG.glob("imu-*.conf"))]
+OF_A_DATA_SHEET = re.compile(
+    r"(\d+) times: gyro (\S+) dps/sqrt\(Hz\),\n# accelerometer (\S+) ug/sqrt\(Hz\)"
+)
+OFFSETS = re.compile(r"its offsets, (\S+) dps and (\S+) mg")
+
+
+def settings(name: str, recording: Path) -> dict[str, str]:
+    """What is in force with a config file."""
+    options = ["--config", str(CONFIG / f"{name}.conf"), "--print-config"]
+    said, _ = run_program(BIN / "pelorus-replay", recording, options)
+    lines = (line.partition("#")[0].partition("=") for line in said.splitlines())
+    return {name.strip(): value.strip() for name, _, value in lines}
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    path = tmp_path / "imu.plr"
+    noisy().recording.write(path)
+    return path
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_file_is_taken_and_asks_for_an_IMU(name: str, recording: Path) -> None:
+    assert settings(name, recording)["process"] == "imu"
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("imu", "imu-adis16448")])
+def test_noises_are_those_of_the_data_sheet_so_many_times(name: str, recording: Path) -> None:
+    words = (CONFIG / f"{name}.conf").read_text(encoding="utf-8")
+    sheet, offsets = OF_A_DATA_SHEET.search(words), OFFSETS.search(words)
+    assert sheet is not None
+    assert offsets is not None
+    found = settings(name, recording)
+    times = float(sheet[1])
+    degrees, ug = times * float(sheet[2]), times * float(sheet[3])
+    assert float(found["gyro-noise"]) == pytest.approx(np.radians(degrees), rel=0.05)
+    assert float(found["accel-noise"]) == pytest.approx(ug * 9.81e-6, rel=0.05)
+    assert float(found["bias-gyro-sigma"]) == pytest.approx(np.radians(float(offsets[1])), rel=0.05)
+    assert float(found["bias-accel-sigma"]) == pytest.approx(float(offsets[2]) * 9.81e-3, rel=0.05)
+    assert times > 1
+
+
+def test_imu_conf_leaves_the_noises_to_the_recording(recording: Path) -> None:
+    found, told = settings("imu", recording), noisy().recording.header.noise
+    assert float(found["gyro-noise"]) == told.gyro_noise
+    assert float(found["accel-walk"]) == told.accel_walk
+    assert float(found["pixel-sigma"]) == told.pixel_sigma_px
+
+
+# --- the real recordings, in the first part of each, so that it takes seconds ---------------------
+
+
+def figures(
+    pelorus: Run, source: Path, target: Path, *options: object, seed: int | None = None
+) -> dict[str, float]:
+    drawn = () if seed is None else ("--seed", seed)
+    assert pelorus("convert", "imu-npz", source, target, *drawn).status == 0
+    said = pelorus("evaluate", target, "--bin", BIN, "--json", *options)
+    assert said.status == 0, said.err
+    found: dict[str, float] = json.loads(said.out)
+    return found
+
+
+NEES = ("position", "rotation", "velocity", "bias_accel", "bias_gyro")
+
+
+@pytest.mark.parametrize(("slots", "metres", "degrees"), [(60, 0.06, 0.15), (16, 0.12, 0.4)])
+def test_a_walk_through_a_corridor_drifts_by_centimetres(
+    real: Callable[[str], Path],
+    pelorus: Run,
+    tmp_path: Path,
+    slots: int,
+    metres: float,
+    degrees: float,
+) -> None:
+    """Of five draws the median is half of these limits; this is one of them."""
+    source = real("imu/tum_corridor1-60-seed0.npz")
+    options = ("--config", CONFIG / "imu.conf", "--set", f"slots={slots}", "--first", 120)
+    found = figures(pelorus, source, tmp_path / "corridor.plr", *options, seed=1)
+    assert found["err0_m"] < metres
+    assert found["rot_deg"] < degrees
+    assert found["truth_frames"] == 1201
+    for name in NEES:
+        assert 0.3 < found[f"nees_{name}"] < 2, name
+
+
+def test_real_readings_need_the_noises_of_a_real_IMU(
+    real: Callable[[str], Path], pelorus: Run, tmp_path: Path
+) -> None:
+    source, target = real("imu/euroc-V102-real-imu.npz"), tmp_path / "euroc.plr"
+    options = ("--set", "slots=60", "--config")
+    honest = figures(pelorus, source, target, *options, CONFIG / "imu-adis16448.conf")
+    told = figures(pelorus, source, target, *options, CONFIG / "imu.conf")
+    assert honest["err0_m"] < 0.005 * honest["path_m"]
+    assert 0.5 < honest["nees_per_dof"] < 2
+    assert told["nees_velocity"] > 10, "the data sheet's noise is not that of the real readings"
+    assert told["err0_m"] > honest["err0_m"]
