@@ -217,6 +217,7 @@ def imu_npz(
 
 @app.command(
     "map",
+    rich_help_panel="A map",
     epilog="Example:  pelorus convert map landmarks.csv map.plr --like drive.plr",
 )
 def map_(
