@@ -222,6 +222,15 @@ typedef struct plr_config {
      * START or END only for an IMU that sends means over an interval instead of samples. */
     uint8_t imu_timing;
 
+    /* Setting imu-turn [rad]: -3.2 to 3.2, default 0.
+     * Three numbers: the rotation vector that turns the IMU's axes into the body's. 3.1416,0,0 for
+     * an IMU that is mounted upside down. Calibration, poses and velocities are the body's. */
+    double imu_turn_rad[3];
+
+    /* Setting imu-arm [m]: -100 to 100, default 0.
+     * Three numbers: where the IMU is on the body, in the body's axes. */
+    double imu_arm_m[3];
+
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
      * Take several times the data sheet's figure: vibration, scale and timing errors come on top,

@@ -210,7 +210,8 @@ typedef struct plr_parameters {
     plr_real landmark_variance;
     plr_real min_inverse_range;
     plr_time_ns max_gap_ns;
-    plr_real gravity;                                            /* m/s^2 */
+    plr_real R_BI[9], imu_arm[3]; /* the IMU on the body; the camera above is seen from the arm */
+    plr_real gravity;             /* m/s^2 */
     plr_real accel_density, gyro_density, accel_walk, gyro_walk; /* squared, of an IMU */
     plr_real start_velocity_variance;
 } plr_parameters;

@@ -11,7 +11,7 @@
 
 enum {
     COLUMN = 34, /* where the meaning of an option begins */
-    NAMES = 12
+    NAMES = 16
 };
 
 /* The settings in the order in which a newcomer meets them. Those that stand in no group come
@@ -26,7 +26,7 @@ static const struct {
       "bias-gyro-sigma", "bias-velocity-walk", "bias-gyro-walk", "standstill-sigma"}},
     {"IMU",
      {"gyro-noise", "accel-noise", "gyro-walk", "accel-walk", "bias-accel-sigma", "gravity",
-      "imu-start", "start-velocity-sigma", "gyro-range", "accel-range", "imu-timing"}},
+      "imu-turn", "imu-arm", "imu-start", "start-velocity-sigma", "gyro-range", "accel-range", "imu-timing"}},
     {"Vision",
      {"pixel-sigma", "gate-d2", "gate-residual", "min-depth", "min-disparity", "max-depth",
       "max-row-gap", "max-range", "landmark-sigma", "landmark-prior"}},

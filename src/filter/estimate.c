@@ -5,6 +5,7 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/mount.h"
 #include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -38,6 +39,7 @@ plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
         return sound;
     to_double(T_WB->R, f->R_WB, 9);
     memcpy(T_WB->p, f->p_WB, sizeof T_WB->p);
+    plr_mount_pose_out(f, T_WB);
     return PLR_OK;
 }
 
@@ -51,6 +53,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
         return PLR_E_DIVERGED;
     plr_real P[PLR_POSE_SQUARE];
     pose_covariance(f, P);
+    plr_mount_covariance_out(f, P);
     to_double(P_xi, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
@@ -63,6 +66,7 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
         return sound;
     plr_real u[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
     plr_process_of(f)->now(f, u, P_u);
+    plr_mount_twist_out(f, u, NULL);
     to_double(velocity->v_B_mps, u, 3);
     to_double(velocity->w_B_radps, u + 3, 3);
     return PLR_OK;
@@ -78,6 +82,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
         return PLR_E_DIVERGED;
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
     plr_process_of(f)->now(f, u, P);
+    plr_mount_twist_out(f, u, P);
     to_double(P_u, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }

@@ -7,6 +7,7 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/mount.h"
 #include "filter/predict.h"
 #include "math/se3.h"
 #include "math/small.h"
@@ -59,6 +60,7 @@ static plr_real squared(double x) {
 static void set_parameters(plr_parameters *par, const plr_calibration *calibration,
                            const plr_config *c) {
     set_camera(&par->camera, calibration);
+    plr_mount_set(par, c);
     plr_se3_adjoint(par->Ad_CB, par->camera.R_CB, par->camera.t_CB);
     par->pixel_variance = squared(c->pixel_sigma_px);
     for (int i = 0; i < 3; i++) {
@@ -264,14 +266,18 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     if (P_xi && !plr_is_covariance(P_xi, PLR_POSE_DIM))
         return plr_filter_refuse(f, PLR_E_ARGUMENT);
 
+    plr_pose at = *T_WB;
     double P_start[PLR_POSE_SQUARE];
     start_covariance(f, P_start);
+    if (P_xi)
+        memcpy(P_start, P_xi, sizeof P_start);
+    plr_mount_pose_in(f, &at, P_start);
     plr_predict_drop(f);
     if (f->clock_started)
         f->totals.resets++;
     f->count = 0;
-    plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi ? P_xi : P_start);
-    store_pose(f, t_ns, T_WB);
+    plr_covariance_begin(f, PLR_BLOCK_POSE, P_start);
+    store_pose(f, t_ns, &at);
     f->inertial.pose_given = 1;
     plr_consistency_clear(f);
     plr_filter_store_for_recovery(f);
@@ -325,14 +331,16 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
         return plr_filter_refuse(f, status);
     if (f->clock_started && t_ns <= f->t_ns)
         return plr_filter_refuse(f, PLR_E_TIME);
+    plr_pose at = *T_WB;
+    plr_mount_pose_in(f, &at, NULL);
     if (!f->clock_started) {
-        store_pose(f, t_ns, T_WB);
+        store_pose(f, t_ns, &at);
         plr_guard_seal(f);
         return PLR_OK;
     }
     plr_real R[9];
-    get_rotation(R, T_WB);
-    plr_motion_jump(f, t_ns, R, T_WB->p);
+    get_rotation(R, &at);
+    plr_motion_jump(f, t_ns, R, at.p);
     plr_guard_seal(f);
     return PLR_OK;
 }

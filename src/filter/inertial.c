@@ -7,6 +7,7 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/mount.h"
 #include "filter/predict.h"
 #include "math/small.h"
 #include "process/alignment.h"
@@ -111,6 +112,7 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
         reading[i] = (plr_real)imu->a_B_mps2[i];
         reading[3 + i] = (plr_real)imu->w_B_radps[i];
     }
+    plr_mount_reading_in(f, reading);
     if (!plr_all_finite(imu->a_B_mps2, 3) || !plr_all_finite(imu->w_B_radps, 3))
         return refuse(f, PLR_E_NOT_FINITE, PLR_IMU_FAULT_NOT_FINITE);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)

@@ -10,6 +10,7 @@
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
+#include "filter/mount.h"
 #include "filter/predict.h"
 #include "math/dense.h"
 #include "math/small.h"
@@ -219,9 +220,11 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
         status = check_time(f, reading);
     if (status != PLR_OK)
         return refuse(f, status, got);
+    plr_reading seen_from_imu = *reading;
+    plr_mount_place_in(f, seen_from_imu.at_B_m);
     plr_predict_to(f, reading->t_ns);
     uint16_t *rejected = &f->readings_rejected[reading->sensor - 1];
-    const bool used = measure(f, reading, got);
+    const bool used = measure(f, &seen_from_imu, got);
     *rejected = used ? 0 : (uint16_t)(*rejected + (*rejected < UINT16_MAX));
     plr_guard_seal_whole(f);
     return PLR_OK;

@@ -4,6 +4,7 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/mount.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 
@@ -42,11 +43,15 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
         plr_guard_seal(f);
         return PLR_OK;
     }
+    plr_pose anywhere = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+    double P[PLR_POSE_SQUARE];
+    memcpy(P, P_moved, sizeof P);
+    plr_mount_pose_in(f, &anywhere, P);
     /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j < PLR_POSE_DIM; j++)
             f->motion.Q[PLR_POSE_DIM * i + j] +=
-                (plr_real)(0.5 * (P_moved[PLR_POSE_DIM * i + j] + P_moved[PLR_POSE_DIM * j + i]));
+                (plr_real)(0.5 * (P[PLR_POSE_DIM * i + j] + P[PLR_POSE_DIM * j + i]));
     f->motion.pending = f->motion.noisy = 1;
     plr_guard_seal(f);
     return PLR_OK;

@@ -369,12 +369,14 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
     }
 }
 
-/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g with w_m the mean
- * reading of the last half second, whose noise adds to the measurement's. */
+/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise adds
+ * to the measurement's. A row of v and w together (a wheel) takes the last reading, for both change;
+ * a row of w alone (a standstill) the mean reading since the last such row, which has less noise. */
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = (plr_real)((double)(f->t_ns - f->inertial.still_ns) * 1e-9);
     const plr_real mean_of = since > 0 && since < PLR_R(0.5) ? since : PLR_R(0.5);
+    const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : mean_of;
     memset(H, 0, sizeof *H);
     H->terms = 2;
     H->term[0].row = plr_row_of(f, PLR_BLOCK_VELOCITY);
@@ -383,10 +385,13 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
     H->term[1].columns = PLR_BIAS_DIM;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
+        const bool moves = plr_dot3(M, M) > 0;
+        const plr_real *w_m = moves ? f->reading + 3 : f->inertial.slow + 3;
+        const plr_real noise = f->par.gyro_density / (moves ? usual : mean_of);
         r[i] = rows->z[i];
-        R[i] = PLR_FMA(f->par.gyro_density / mean_of, plr_dot3(M + 3, M + 3), rows->R[i]);
+        R[i] = PLR_FMA(noise, plr_dot3(M + 3, M + 3), rows->R[i]);
         for (unsigned c = 0; c < 3; c++) {
-            const plr_real w = f->inertial.slow[3 + c] - f->bias[3 + c];
+            const plr_real w = w_m[c] - f->bias[3 + c];
             r[i] = PLR_FMA(-M[c], f->inertial.velocity[c], r[i]);
             r[i] = PLR_FMA(-M[3 + c], w, r[i]);
             H->term[0].H[PLR_VELOCITY_DIM * i + c] = M[c];

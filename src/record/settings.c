@@ -76,6 +76,12 @@ static const plr_row rows[] = {
     {{42, "accel-range", "m/s^2", "the same of the accelerometer", PLR_SETTING_NUMBER, NULL, 0, 1e4, 0}, AT(accel_range_mps2), STORE_DOUBLE},
     {{43, "camera-offset", "s", "added to the time of every frame", PLR_SETTING_NUMBER, NULL, -1, 1, 0}, AT(camera_offset_s), STORE_DOUBLE},
     {{44, "imu-timing", "", "which interval an IMU reading stands for", PLR_SETTING_CHOICE, timing_words, 0, 2, PLR_TWIST_MID}, AT(imu_timing), STORE_U8},
+    {{45, "imu-turn", "rad", "rotation vector from the IMU's axes to the body's: x, y, z", PLR_SETTING_NUMBER, NULL, -3.2, 3.2, 0}, AT(imu_turn_rad), STORE_AXES},
+    {{46, "imu-turn-y", "rad", "of the y axis alone", PLR_SETTING_NUMBER, NULL, -3.2, 3.2, 0}, AT(imu_turn_rad[1]), STORE_DOUBLE},
+    {{47, "imu-turn-z", "rad", "of the z axis alone", PLR_SETTING_NUMBER, NULL, -3.2, 3.2, 0}, AT(imu_turn_rad[2]), STORE_DOUBLE},
+    {{48, "imu-arm", "m", "where the IMU is on the body: x, y, z", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m), STORE_AXES},
+    {{49, "imu-arm-y", "m", "along the y axis alone", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m[1]), STORE_DOUBLE},
+    {{50, "imu-arm-z", "m", "along the z axis alone", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m[2]), STORE_DOUBLE},
 };
 /* clang-format on */
 

@@ -14,7 +14,7 @@ enum {
     /* Where fields stand (docs/STATE-FORMAT.md). */
     FINGERPRINT_AT = 8,
     SETTINGS_AT = 13,
-    CAMERA_AT = SETTINGS_AT + 9 * 44,
+    CAMERA_AT = SETTINGS_AT + 9 * 50,
     COUNT_AT = CAMERA_AT + 17 * REAL,
     INTERVAL_AT = COUNT_AT + 4 + 16,
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
