@@ -10,15 +10,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import wire
+from pelorus import inertial_survey, wire
 from pelorus.errors import PelorusError
-from pelorus.frames import Config, End, Header, Kind, Landmark, Message, Reading, Stereo, Text
+from pelorus.frames import (
+    Config,
+    End,
+    Header,
+    Imu,
+    Kind,
+    Landmark,
+    Message,
+    Reading,
+    Stereo,
+    Text,
+)
 from pelorus.health import TimeLine, time_line
+from pelorus.inertial import GRAVITY_MPS2
+from pelorus.inertial_survey import ImuSurvey
 from pelorus.small_sensors import name_of
 from pelorus.wire import Counts, Received
 
+SAME_MOST = 10  # successive readings of the same numbers, as the filter allows
+GRAVITY_OFF_MPS2 = 1.0
 GAP_RATIO = 1.5  # an interval is a gap if it exceeds the median one so much
-DATA = (Kind.TWIST, Kind.STEREO, Kind.TRUTH, Kind.POSE)
+DATA = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.POSE)
 
 
 class Gap(NamedTuple):
@@ -72,6 +87,7 @@ class Survey:
     texts: list[Text]
     streams: dict[Kind, Stream]
     sensors: dict[str, SmallSensor]
+    imu: ImuSurvey | None
     tracks: Tracks | None
     end: End | None
     health: TimeLine | None = None  # of a result
@@ -97,10 +113,11 @@ def survey(path: Path) -> Survey:
     header = next((m for m in messages if isinstance(m, Header)), None)
     end = next((m for m in reversed(messages) if isinstance(m, End)), None)
     streams = {
-        kind: _stream([m for m in messages if m.kind == kind])
+        kind: _stream(_times([m for m in messages if m.kind == kind]))
         for kind in DATA
         if counts.frames[kind]
     }
+    imus = [m for m in messages if isinstance(m, Imu)]
     stereos = [m for m in messages if isinstance(m, Stereo)]
     roles = [m.role.name.lower() for m in messages if isinstance(m, Landmark)]
     found = Survey(
@@ -112,6 +129,7 @@ def survey(path: Path) -> Survey:
         texts=[m for m in messages if isinstance(m, Text)],
         streams=streams,
         sensors=_sensors([m for m in messages if isinstance(m, Reading)]),
+        imu=inertial_survey.survey(inertial_survey.readings_of(imus)) if imus else None,
         tracks=_tracks(stereos) if stereos else None,
         end=end,
         health=time_line(messages),
@@ -128,16 +146,24 @@ def _sensors(readings: list[Reading]) -> dict[str, SmallSensor]:
         has = np.array([[m.axes >> k & 1 for k in range(3)] for m in own], bool)
         sigma = np.array([m.sigma for m in own])
         found[name_of(number)] = SmallSensor(
-            _stream(own, ties=True),
+            _stream(_times(own), ties=True),
             int(np.bitwise_or.reduce([m.axes for m in own])),
             tuple(float(np.median(sigma[has[:, k], k])) for k in range(3) if has[:, k].any()),
         )
     return found
 
 
-def _stream(messages: Sequence[Message], ties: bool = False) -> Stream:
+def _times(messages: Sequence[Message]) -> list[int]:
+    """Of each message, or of each reading of an IMU."""
+    return [
+        int(t)
+        for m in messages
+        for t in (m.times_ns if isinstance(m, Imu) else [m.t_ns])  # type: ignore[attr-defined]
+    ]
+
+
+def _stream(exact: Sequence[int], ties: bool = False) -> Stream:
     """`ties`: at one time there may be several."""
-    exact = [int(m.t_ns) for m in messages]  # type: ignore[attr-defined]
     steps = np.diff(np.array(exact, np.float64))
     ahead = steps[steps > 0]
     usual = float(np.median(ahead)) if len(ahead) else 0.0
@@ -147,7 +173,7 @@ def _stream(messages: Sequence[Message], ties: bool = False) -> Stream:
         first_ns=exact[0],
         last_ns=exact[-1],
         rate_hz=1e9 / usual if usual else 0.0,
-        gaps=[Gap(exact[k], exact[k + 1] - exact[k]) for k in late],
+        gaps=[Gap(exact[k], exact[k + 1] - exact[k]) for k in late.tolist()],
         steps_back=int(np.sum(steps < 0 if ties else steps <= 0)),
     )
 
@@ -176,7 +202,9 @@ def _remarks(found: Survey, received: list[Received]) -> list[str]:
     elif not isinstance(received[0].message, Header):
         said.append("HEADER is not the first frame")
     if found.header is not None and not found.useful:
-        said.append("there are no data: neither TWIST nor STEREO nor TRUTH nor READING nor POSE")
+        said.append(
+            "there are no data: neither TWIST nor IMU nor STEREO nor TRUTH nor READING nor POSE"
+        )
     if found.end is None:
         said.append("there is no END: the recording was cut short")
     else:
@@ -184,9 +212,25 @@ def _remarks(found: Survey, received: list[Received]) -> list[str]:
     for kind, stream in found.streams.items():
         if stream.steps_back:
             said.append(f"{kind.name}: time does not ascend {stream.steps_back} times")
+    if found.imu is not None:
+        said.extend(_imu_remarks(found.imu))
     for name, sensor in found.sensors.items():
         if sensor.stream.steps_back:
             said.append(f"READING {name}: time does not ascend {sensor.stream.steps_back} times")
+    return said
+
+
+def _imu_remarks(imu: ImuSurvey) -> list[str]:
+    said = []
+    if imu.not_finite:
+        said.append(f"IMU: {imu.not_finite} readings are not finite")
+    if imu.longest_same >= SAME_MOST:
+        said.append(f"IMU: {imu.longest_same} successive readings have the same numbers: frozen?")
+    if imu.still is not None and abs(imu.still.force_mps2 - GRAVITY_MPS2) > GRAVITY_OFF_MPS2:
+        said.append(
+            f"IMU: at rest it feels {imu.still.force_mps2:.3g} m/s^2, where gravity's "
+            f"{GRAVITY_MPS2:g} are due"
+        )
     return said
 
 

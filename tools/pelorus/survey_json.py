@@ -10,6 +10,7 @@ import numpy as np
 
 from pelorus.frames import Header
 from pelorus.health import TimeLine
+from pelorus.inertial_survey import ImuSurvey
 from pelorus.schema import HEALTHS
 from pelorus.settings import describe
 from pelorus.survey import Stream, Survey
@@ -37,6 +38,7 @@ def of(found: Survey) -> dict[str, Any]:
             name: _stream(sensor.stream, origin) | {"axes": sensor.axes, "sigma": sensor.sigma}
             for name, sensor in found.sensors.items()
         },
+        "imu": None if found.imu is None else _imu(found.imu, origin),
         "tracks": None if found.tracks is None else asdict(found.tracks),
         "health": None if found.health is None else _health(found.health, origin),
         "texts": [{"severity": text.severity, "text": text.text} for text in found.texts],
@@ -57,6 +59,7 @@ def _header(header: Header) -> dict[str, Any]:
         "version": [header.version_major, header.version_minor],
         "name": header.name,
         "body_axes": header.body_axes.name.lower().replace("_", "-"),
+        "process": header.process.name.lower(),
         "twist_timing": header.twist_timing.name.lower(),
         "image_px": [header.image_width_px, header.image_height_px],
         **{name: _number(value) for name, value in vars(header.camera).items()},
@@ -78,6 +81,15 @@ def _stream(stream: Stream, origin_ns: int) -> dict[str, Any]:
             for gap in stream.gaps
         ],
     }
+
+
+def _imu(imu: ImuSurvey, origin_ns: int) -> dict[str, Any]:
+    found = asdict(imu)
+    if imu.still is not None:
+        still = found["still"]
+        still["from_s"] = _seconds(still.pop("from_ns") - origin_ns)
+        still["to_s"] = _seconds(still.pop("to_ns") - origin_ns)
+    return found
 
 
 def _health(health: TimeLine, origin_ns: int) -> dict[str, Any]:

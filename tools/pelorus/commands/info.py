@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import typer
@@ -12,7 +13,8 @@ from rich.table import Table
 
 from pelorus import survey_json
 from pelorus.console import out
-from pelorus.frames import Config, Header, Kind
+from pelorus.frames import Config, Header, Kind, Process
+from pelorus.inertial_survey import ImuSurvey
 from pelorus.settings import describe
 from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.survey import Survey, Tracks, require_useful, survey
@@ -50,6 +52,8 @@ def info(
     _show_counts(found)
     _show_streams(found)
     _show_sensors(found)
+    if found.imu is not None:
+        _show_imu(found.imu, found.origin_ns)
     if found.tracks is not None:
         _show_tracks(found.tracks)
     for text in found.texts:
@@ -65,7 +69,10 @@ def _show_header(header: Header) -> None:
     camera = header.camera
     table.add_row("name", escape(header.name))
     table.add_row("body axes", header.body_axes.name.lower().replace("_", "-"))
-    table.add_row("twist timing", header.twist_timing.name.lower())
+    by_imu = header.process is Process.IMU
+    table.add_row("moved by", "an IMU" if by_imu else "twists")
+    if not by_imu:
+        table.add_row("twist timing", header.twist_timing.name.lower())
     size = f"{header.image_width_px} x {header.image_height_px} px"
     table.add_row("image", size if header.image_width_px else "size unknown")
     table.add_row("focal lengths", f"{camera.fx_px:g}, {camera.fy_px:g} px")
@@ -141,6 +148,28 @@ def _show_sensors(found: Survey) -> None:
         out.print(
             f"{sensor.stream.count} readings of a {name}, axes {axes}, sigma {sigma} (median)"
         )
+
+
+def _show_imu(imu: ImuSurvey, origin_ns: int) -> None:
+    out.print(
+        f"{imu.readings} readings of an IMU: accelerometer {_ranges(imu.accel_range)} m/s^2, gyro "
+        f"{_ranges(imu.gyro_range)} rad/s (x, y, z)"
+    )
+    still = imu.still
+    if still is None:
+        out.print("at no time does the IMU rest for 2 s")
+        return
+    rate = ", ".join(f"{x:.2g}" for x in still.rate_radps)
+    out.print(
+        f"the IMU rests from {_seconds(still.from_ns - origin_ns)} to "
+        f"{_seconds(still.to_ns - origin_ns)} s: specific force {still.force_mps2:.3f} m/s^2, gyro "
+        f"{rate} rad/s, noise {still.gyro_noise:.2g} rad/s/sqrt(Hz) and {still.accel_noise:.2g} "
+        "m/s^2/sqrt(Hz)"
+    )
+
+
+def _ranges(axes: Sequence[tuple[float, float]]) -> str:
+    return ", ".join(f"{least:.3g} to {most:.3g}" for least, most in axes) or "nothing"
 
 
 def _show_tracks(tracks: Tracks) -> None:
