@@ -29,6 +29,8 @@ enum {
 #define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW)
 /* Reasons that do not apply in dead reckoning. */
 #define OBSERVATION_REASONS (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)
+/* Reasons that hold now or not at all, whatever the last frame said. */
+#define IMU_REASONS (PLR_REASON_NOT_STARTED | PLR_REASON_IMU_FAULT)
 /* Reasons by which the pose is lost. */
 #define LOST                                                                                       \
     (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES |                  \
@@ -69,6 +71,15 @@ static bool lacks_twists(plr_filter *f) {
         return false;
     const double held = seconds_since(f->reading_ns, f->t_ns);
     return refused || !f->reading_valid || held > HELD_INTERVALS * (double)f->interval_s + HELD_S;
+}
+
+/* The same, and a fault of an IMU has passed if readings come again. */
+static uint32_t judge_readings(plr_filter *f) {
+    if (lacks_twists(f))
+        return PLR_REASON_NO_TWISTS;
+    if (f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
+        f->inertial.fault = PLR_IMU_FAULT_NONE;
+    return 0;
 }
 
 static uint32_t rejected_readings(const plr_filter *f) {
@@ -124,11 +135,7 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_BUDGET;
     if (events->recovered)
         reasons |= PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
-    reasons |= rejected_readings(f);
-    if (lacks_twists(f))
-        reasons |= PLR_REASON_NO_TWISTS;
-    else if (f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
-        f->inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
+    reasons |= rejected_readings(f) | judge_readings(f);
     return reasons | imu_reasons(f);
 }
 
@@ -163,10 +170,14 @@ void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report 
     f->reasons = report->reasons;
 }
 
+void plr_health_dead_reckons(plr_filter *f) {
+    f->reasons = (f->reasons & OBSERVATION_REASONS) | judge_readings(f);
+    f->health = (uint8_t)health_of(f->reasons & ~(uint32_t)OBSERVATION_REASONS, LOST);
+}
+
 void plr_health_waits(plr_filter *f, plr_report *report) {
-    report->reasons = imu_reasons(f);
-    if (lacks_twists(f))
-        report->reasons |= PLR_REASON_NO_TWISTS;
+    report->reasons = judge_readings(f);
+    report->reasons |= imu_reasons(f);
     report->health = PLR_HEALTH_LOST;
     f->last_frame_ns = f->t_ns;
     f->health = (uint8_t)report->health;
@@ -201,7 +212,8 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
     }
     const plr_time_ns now = t_ns > f->t_ns ? t_ns : f->t_ns;
     const bool looks = f->config.mode != PLR_MODE_DEAD_RECKONING;
-    health->reasons = looks ? f->reasons : f->reasons & ~(uint32_t)OBSERVATION_REASONS;
+    health->reasons =
+        f->reasons & ~(uint32_t)(looks ? IMU_REASONS : OBSERVATION_REASONS | IMU_REASONS);
     health->seconds_without_frame = seconds_if(f->last_frame_ns != 0, f->last_frame_ns, now);
     health->seconds_without_use = seconds_if(f->last_use_ns != 0, f->last_use_ns, now);
     health->seconds_without_twist = seconds_if(f->reading_valid, f->reading_ns, now);

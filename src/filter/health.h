@@ -30,6 +30,9 @@ void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report 
 /* Fills health of a frame that came before an IMU's start. */
 void plr_health_waits(plr_filter *f, plr_report *report);
 
+/* A frame of dead reckoning came: NO_TWISTS says whether readings were refused since the last one. */
+void plr_health_dead_reckons(plr_filter *f);
+
 /* Fills health of a frame that was refused. */
 void plr_health_after_refusal(const plr_filter *f, plr_report *report);
 

@@ -271,6 +271,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         process(f, frame, r);
     } else {
         dead_reckon(f);
+        plr_health_dead_reckons(f);
     }
     r->active = (uint16_t)f->count;
     plr_health_count(f, r);

@@ -110,6 +110,22 @@ static void test_a_refused_reading_is_told_at_once(void) {
 
 /* Frames of another clock say nothing of this one: not that they have just come, nor for how long none
  * has. */
+/* In dead reckoning too a frame asks whether readings were refused since the last one. */
+static void test_in_dead_reckoning_a_refused_reading_is_forgotten_as_readings_come_again(void) {
+    const plr_twist broken = {{NAN, 0, 0}, {0}};
+    rig.config.mode = PLR_MODE_DEAD_RECKONING;
+    rig_begin();
+    rig_drive(2);
+    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE,
+                          plr_filter_predict(&rig.filter, rig.world.t_ns, &broken));
+    rig_drive(1);
+    ask(rig.world.t_ns);
+    TEST_ASSERT_EQUAL_HEX32(PLR_REASON_NO_TWISTS, state.reasons);
+    rig_drive(1);
+    ask(rig.world.t_ns);
+    TEST_ASSERT_EQUAL_HEX32(0, state.reasons);
+}
+
 static void test_on_another_clock_no_frame_has_come_yet(void) {
     static const plr_pose origin = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
     const plr_time_ns clocks[] = {1000, UINT64_C(86400000000000)};
@@ -172,6 +188,7 @@ int main(void) {
     RUN_TEST(test_a_camera_that_sees_nothing_is_told_too);
     RUN_TEST(test_an_odometry_that_falls_silent_is_told);
     RUN_TEST(test_a_refused_reading_is_told_at_once);
+    RUN_TEST(test_in_dead_reckoning_a_refused_reading_is_forgotten_as_readings_come_again);
     RUN_TEST(test_on_another_clock_no_frame_has_come_yet);
     RUN_TEST(test_on_the_same_clock_a_pose_from_outside_forgets_no_frame);
     RUN_TEST(test_what_a_mode_does_without_is_not_missed);

@@ -1,0 +1,485 @@
+// SPDX-License-Identifier: MIT
+/* The start with an IMU (process/alignment.h): what is taken for rest, what is refused and why, and
+ * what the filter then knows. */
+#include <math.h>
+#include <stdlib.h>
+#include <unity.h>
+
+#include "support/imu_rig.h"
+#include "support/rigid.h"
+#include "support/specimens.h"
+
+enum { SECOND = 400 }; /* readings */
+
+static const double g = 9.81;
+static plr_filter *const f = &imu_rig.filter;
+static rng chance;
+
+void setUp(void) {
+    imu_rig_set_up();
+    chance = rng_seeded(401);
+}
+
+void tearDown(void) {
+}
+
+/* A new filter whose clock has not begun. */
+static void make_filter(void) {
+    plr_calibration calibration;
+    imu_flight_start(&imu_rig.flight, &imu_rig.options);
+    calibration = imu_rig.flight.calibration;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(f, &calibration, &imu_rig.config, NULL));
+}
+
+/* A filter in a pose with this roll, which is given. */
+static void make_filter_at(double roll) {
+    plr_pose pose = {{1, 0, 0, 0, cos(roll), -sin(roll), 0, sin(roll), cos(roll)}, {1, 2, 3}};
+    make_filter();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 1000000000, &pose, NULL));
+}
+
+/* Readings at 400 Hz that a body at rest gives, with noise: of this specific force and rate. */
+static plr_status feed(unsigned count, const double a[3], const double w[3]) {
+    const double root = sqrt(SECOND);
+    plr_time_ns t_ns = plr_filter_time(f) ? plr_filter_time(f) : 1000000000;
+    plr_status status = PLR_OK;
+    for (unsigned k = 0; k < count && status == PLR_OK; k++) {
+        plr_imu imu;
+        for (int i = 0; i < 3; i++) {
+            imu.a_B_mps2[i] = a[i] + imu_rig.options.accel_noise * root * rng_normal(&chance);
+            imu.w_B_radps[i] = w[i] + imu_rig.options.gyro_noise * root * rng_normal(&chance);
+        }
+        t_ns += 2500000;
+        status = plr_filter_inertial(f, t_ns, &imu);
+    }
+    return status;
+}
+
+static void feed_up(unsigned count, double x, double y, double z) {
+    static const double none[3] = {0};
+    const double a[3] = {x, y, z};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(count, a, none));
+}
+
+static uint32_t reasons(void) {
+    plr_health_state health;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_health(f, plr_filter_time(f), &health));
+    return health.reasons;
+}
+
+static void demand_waiting(plr_imu_fault fault) {
+    plr_health_state health;
+    TEST_ASSERT_EQUAL_UINT8(0, f->inertial.started);
+    TEST_ASSERT_EQUAL_INT(fault, plr_filter_imu_fault(f));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_health(f, plr_filter_time(f), &health));
+    TEST_ASSERT_TRUE(health.reasons & PLR_REASON_NOT_STARTED);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST, health.health);
+    const bool says = fault != PLR_IMU_FAULT_NONE && fault != PLR_IMU_FAULT_MOVES;
+    TEST_ASSERT_EQUAL_INT(says, (health.reasons & PLR_REASON_IMU_FAULT) != 0);
+}
+
+static void demand_started(void) {
+    TEST_ASSERT_EQUAL_UINT8(1, f->inertial.started);
+    TEST_ASSERT_FALSE(reasons() & PLR_REASON_NOT_STARTED);
+}
+
+/* ---------------------------------------------------------------- at rest */
+
+static void test_a_body_that_stands_for_a_second_starts(void) {
+    make_filter();
+    feed_up(SECOND - 1, 0, 0, g);
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    feed_up(2, 0, 0, g);
+    demand_started();
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
+}
+
+static void test_until_the_start_the_pose_stays(void) {
+    plr_pose pose;
+    make_filter_at(0);
+    feed_up(SECOND / 2, 0.5, 0, g);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    TEST_ASSERT_EQUAL_DOUBLE(1, pose.p[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(1, pose.R[0]);
+}
+
+/* Roll and pitch as gravity shows them; the rate is the gyro's bias. */
+static void test_at_rest_tilt_and_gyro_bias_are_measured(void) {
+    const double roll = 0.3, pitch = -0.2;
+    const double a[3] = {-g * sin(pitch), g * cos(pitch) * sin(roll), g * cos(pitch) * cos(roll)};
+    const double w[3] = {0.004, -0.003, 0.006};
+    double b[6];
+    plr_pose pose;
+    make_filter();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(SECOND + 1, a, w));
+    demand_started();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    for (int i = 0; i < 3; i++) /* noise of a second: 1 mm/s^2 in 9.8 m/s^2, 0.06 deg/s */
+        TEST_ASSERT_DOUBLE_WITHIN(5e-3, a[i] / g, pose.R[6 + i]);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(f, b, NULL));
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(5e-3, w[i], b[3 + i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, b[i]);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, pose.R[1],
+                              pose.R[3]); /* the smallest turn: about a level axis */
+}
+
+/* The tilt is wrong by the accelerometer's bias: theta = [u]x db_a / g, and P says so. */
+static void test_the_tilts_covariance_is_that_of_the_accelerometers_bias(void) {
+    const double sigma = 0.2, s2 = sigma * sigma;
+    const double roll = 0.4;
+    imu_rig.config.bias_accel_sigma_mps2 = sigma;
+    make_filter();
+    feed_up(SECOND + 1, 0, g * sin(roll), g * cos(roll));
+    demand_started();
+    const double u[3] = {(double)f->R_WB[6], (double)f->R_WB[7], (double)f->R_WB[8]};
+    const double L[9] = {0, -u[2] / g, u[1] / g, u[2] / g, 0, -u[0] / g, -u[1] / g, u[0] / g, 0};
+    double *P = specimen_covariance(f);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double LL = 0;
+            for (int k = 0; k < 3; k++)
+                LL += L[3 * i + k] * L[3 * j + k];
+            /* beside it the noise of a second, and the start's own 1e-4 rad */
+            TEST_ASSERT_DOUBLE_WITHIN(3e-6, LL * s2, P[PLR_CORE_DIM * (3 + i) + 3 + j]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-5, L[3 * i + j] * s2, P[PLR_CORE_DIM * (3 + i) + 9 + j]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-4 * s2, i == j ? s2 : 0,
+                                      P[PLR_CORE_DIM * (9 + i) + 9 + j]);
+        }
+    free(P);
+}
+
+/* Errors of tilt and velocity over many starts, in units of P. */
+static void test_starts_at_rest_are_as_wrong_as_they_believe(void) {
+    enum { STARTS = 60 };
+    double orientation = 0, gyro = 0;
+    for (uint64_t seed = 1; seed <= STARTS; seed++) {
+        imu_rig_begin(IMU_RIG_AT_REST, seed);
+        imu_rig_readings(SECOND + 4);
+        demand_started();
+        imu_rig_adopt_world();
+        const imu_rig_errors e = imu_rig_errors_now();
+        orientation += e.orientation / STARTS; /* yaw is as adopted: two degrees of freedom */
+        gyro += e.gyro_bias / STARTS;
+    }
+    TEST_ASSERT_TRUE(orientation > 1.2 && orientation < 2.9);
+    TEST_ASSERT_TRUE(gyro > 2 && gyro < 4.2);
+}
+
+/* ---------------------------------------------------------------- what is no rest */
+
+static void shake(double amplitude, double turn, unsigned seconds) {
+    const plr_time_ns begin = plr_filter_time(f) ? plr_filter_time(f) : 1000000000;
+    for (unsigned k = 1; k <= seconds * SECOND; k++) {
+        const double s = 2 * 3.14159265 * 1.3 * k / SECOND;
+        const plr_imu imu = {{amplitude * sin(s), amplitude * cos(1.3 * s), g},
+                             {turn * sin(s), 0, turn * cos(s) + 1e-6 * k}};
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_inertial(f, begin + UINT64_C(2500000) * k, &imu));
+    }
+}
+
+static void test_a_body_that_is_shaken_does_not_start_at_rest(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    make_filter();
+    shake(2, 0.3, 5);
+    demand_waiting(PLR_IMU_FAULT_MOVES);
+    feed_up(2 * SECOND + 2, 0, 0, g); /* and then it stands */
+    demand_started();
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
+}
+
+static void test_auto_starts_in_motion_where_the_body_never_stands(void) {
+    make_filter();
+    shake(2, 0.3, 2);
+    demand_waiting(PLR_IMU_FAULT_MOVES);
+    shake(2, 0.3, 3);
+    demand_started();
+    double P_u[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(f, P_u));
+    TEST_ASSERT_TRUE(P_u[0] >= 9);
+}
+
+static void test_a_gyro_in_degrees_turns_while_the_body_stands(void) {
+    static const double up[3] = {0, 0, 9.81};
+    static const double turn[3] = {0.8, -0.2, 0.3};
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    make_filter();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(3 * SECOND, up, turn));
+    demand_waiting(PLR_IMU_FAULT_TURNS);
+}
+
+static void test_an_accelerometer_in_g_is_told(void) {
+    make_filter();
+    feed_up(2 * SECOND, 0, 0, 1);
+    demand_waiting(PLR_IMU_FAULT_IN_G);
+    feed_up(4 * SECOND, 0, 0, 1); /* nor does it start as in motion */
+    demand_waiting(PLR_IMU_FAULT_IN_G);
+}
+
+static void test_a_force_at_rest_that_is_not_gravity_is_told(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    make_filter();
+    feed_up(2 * SECOND, 0, 0, g + 2);
+    demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
+    feed_up(SECOND, 0, 0, g - 2);
+    demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
+    feed_up(2 * SECOND, 0, 0, g + 0.5);
+    demand_started();
+}
+
+static void test_no_force_at_all_does_not_start_at_rest(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    make_filter();
+    feed_up(3 * SECOND, 0, 0, 0);
+    demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
+}
+
+static void test_gravity_that_points_down_in_the_given_pose_is_told(void) {
+    make_filter_at(0);
+    feed_up(2 * SECOND, 0, 0, -g);
+    demand_waiting(PLR_IMU_FAULT_UPSIDE_DOWN);
+    feed_up(4 * SECOND, 0, 0, -g);
+    demand_waiting(PLR_IMU_FAULT_UPSIDE_DOWN);
+}
+
+/* Without a pose any tilt is believed, an IMU upside down too. */
+static void test_without_a_pose_upside_down_is_a_tilt(void) {
+    plr_pose pose;
+    make_filter();
+    feed_up(SECOND + 1, 0, 0, -g);
+    demand_started();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, -1, pose.R[8]);
+    double RtR[9] = {0};
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < 3; k++)
+            RtR[i] += pose.R[3 * k + i / 3] * pose.R[3 * k + i % 3];
+    for (int i = 0; i < 9; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, i % 4 == 0, RtR[i]);
+}
+
+static void test_another_tilt_than_the_given_poses_is_told_and_taken(void) {
+    plr_pose pose;
+    make_filter_at(0);
+    feed_up(SECOND + 1, 0, g * sin(0.6), g * cos(0.6));
+    demand_started();
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_TILT, plr_filter_imu_fault(f));
+    TEST_ASSERT_TRUE(reasons() & PLR_REASON_IMU_FAULT);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, sin(0.6), pose.R[7]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1, pose.p[0]);
+}
+
+static void test_a_given_pose_keeps_its_place_and_heading(void) {
+    double P[36];
+    plr_pose pose;
+    make_filter_at(0.1);
+    feed_up(SECOND + 1, 0, g * sin(0.12), g * cos(0.12));
+    demand_started();
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, pose.R[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, sin(0.12), pose.R[7]);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1e-8, P[0]);
+}
+
+/* ---------------------------------------------------------------- in motion, and given */
+
+static void test_a_start_in_motion_takes_a_tenth_of_a_second(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_MOTION;
+    make_filter();
+    feed_up(SECOND / 10 - 1, 0, 0, g);
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    feed_up(3, 0, 0, g);
+    demand_started();
+}
+
+/* Until the anchor what the first second did to the pose is believed; then position and yaw are where
+ * they are. */
+static void test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start_in_motion(void) {
+    double P[36];
+    plr_pose pose;
+    imu_rig_begin(IMU_RIG_IN_MOTION, 3);
+    imu_rig_fly(18);
+    TEST_ASSERT_EQUAL_UINT8(0, f->inertial.anchored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
+    TEST_ASSERT_TRUE(P[0] + P[7] + P[14] > 1e-5);
+    imu_rig_fly(6);
+    TEST_ASSERT_EQUAL_UINT8(1, f->inertial.anchored);
+    imu_rig_begin(IMU_RIG_IN_MOTION, 3);
+    while (!f->inertial.anchored) {
+        imu_rig_readings(IMU_RIG_EVERY);
+        imu_rig_frame();
+    }
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
+    double along = 0;
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-10, 1e-8, P[7 * i]);
+        for (int j = 0; j < 3; j++)
+            along += pose.R[6 + i] * P[6 * (3 + i) + 3 + j] * pose.R[6 + j];
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-8, along);
+    TEST_ASSERT_TRUE(P[21] + P[28] + P[35] > 1e-6); /* the tilt is as well known as it is */
+}
+
+static void test_a_given_start_waits_for_nothing_but_its_pose(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_GIVEN;
+    make_filter();
+    feed_up(2 * SECOND, 0, 0, g);
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    make_filter_at(0);
+    feed_up(1, 0, 0, g);
+    demand_started();
+    double P_u[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(f, P_u));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 9, P_u[0]);
+}
+
+/* ---------------------------------------------------------------- pictures before the start */
+
+static plr_observation points[5];
+
+static plr_report look(double shift_px) {
+    plr_report report;
+    for (unsigned i = 0; i < 5; i++) {
+        const float u = (float)(100 + 90 * i + shift_px);
+        points[i] = (plr_observation){i + 1, u, 200, u - 12, 200};
+    }
+    const plr_frame frame = {plr_filter_time(f), PLR_NO_BUDGET, 5, points};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &frame, &report));
+    return report;
+}
+
+static void test_frames_before_the_start_are_taken_and_make_no_landmarks(void) {
+    make_filter();
+    for (unsigned k = 0; k < 3; k++) {
+        feed_up(SECOND / 4, 0, 0, g);
+        const plr_report report = look(0);
+        TEST_ASSERT_EQUAL_UINT16(0, report.active);
+        TEST_ASSERT_EQUAL_UINT16(0, report.used);
+        TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST, report.health);
+        TEST_ASSERT_TRUE(report.reasons & PLR_REASON_NOT_STARTED);
+    }
+    feed_up(SECOND / 4 + 2, 0, 0, g);
+    demand_started();
+    const plr_report report = look(0);
+    TEST_ASSERT_EQUAL_UINT16(5, report.created);
+    TEST_ASSERT_FALSE(report.reasons & PLR_REASON_NOT_STARTED);
+    feed_up(10, 0, 0, g);
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, look(0).health);
+}
+
+static void test_in_dead_reckoning_too_the_start_ends_the_waiting(void) {
+    imu_rig.config.mode = PLR_MODE_DEAD_RECKONING;
+    make_filter();
+    feed_up(SECOND / 2, 0, 0, g);
+    (void)look(0);
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    feed_up(SECOND / 2 + 2, 0, 0, g);
+    demand_started();
+    (void)look(0);
+    feed_up(SECOND / 10, 0, 0, g);
+    TEST_ASSERT_EQUAL_HEX32(0, reasons());
+}
+
+/* A steady flight feels like rest: the pictures know better. */
+static void test_pictures_that_move_keep_the_filter_from_a_start_at_rest(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    make_filter();
+    for (unsigned k = 0; k < 16; k++) {
+        feed_up(SECOND / 4, 0, 0, g);
+        (void)look(30.0 * k);
+    }
+    demand_waiting(PLR_IMU_FAULT_MOVES);
+    for (unsigned k = 0; k < 6; k++) {
+        feed_up(SECOND / 4, 0, 0, g);
+        (void)look(450);
+    }
+    demand_started();
+}
+
+/* ---------------------------------------------------------------- set_velocity */
+
+static void test_a_velocity_is_refused_where_it_makes_no_sense(void) {
+    static const double v[3] = {1, 2, 3}, good[3] = {0.1, 0.1, 0.1};
+    const double nan_v[3] = {1, NAN, 0}, fast[3] = {0, 0, 2e4}, negative[3] = {1, -1e-9, 1};
+    const double infinite[3] = {1, 1, INFINITY}, huge[3] = {1, 2e12, 1};
+    const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(NULL, v, good));
+    make_filter();
+    imu_rig_remember();
+    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good)); /* no pose yet */
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 1000000000, &identity, NULL));
+    imu_rig_remember();
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(f, NULL, good));
+    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(f, v, NULL));
+    imu_rig_demand_refusal(PLR_E_NOT_FINITE, plr_filter_set_velocity(f, nan_v, good));
+    imu_rig_demand_refusal(PLR_E_NOT_FINITE, plr_filter_set_velocity(f, v, infinite));
+    imu_rig_demand_refusal(PLR_E_RANGE, plr_filter_set_velocity(f, fast, good));
+    imu_rig_demand_refusal(PLR_E_RANGE, plr_filter_set_velocity(f, v, huge));
+    imu_rig_demand_refusal(PLR_E_ARGUMENT, plr_filter_set_velocity(f, v, negative));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, v, good));
+    demand_started();
+    feed_up(1, 0, 0, g);
+    imu_rig_remember();
+    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good)); /* it moves */
+}
+
+static void test_a_velocity_is_refused_where_there_are_landmarks_or_twists(void) {
+    static const double v[3] = {1, 2, 3}, good[3] = {0.1, 0.1, 0.1};
+    imu_rig_begin(IMU_RIG_GIVEN, 1);
+    imu_rig_fly(2);
+    TEST_ASSERT_TRUE(f->count > 0);
+    imu_rig_remember();
+    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good));
+    imu_rig.config.process = PLR_PROCESS_TWIST;
+    make_filter_at(0);
+    imu_rig_remember();
+    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good));
+}
+
+static void test_a_given_velocity_and_its_covariance_are_the_estimate(void) {
+    static const double v[3] = {1, -2, 3}, variance[3] = {0.01, 0.02, 0.03};
+    double P_u[36];
+    plr_twist got;
+    make_filter_at(0.2);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, v, variance));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity(f, &got));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(f, P_u));
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL_DOUBLE(v[i], got.v_B_mps[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, variance[i], P_u[7 * i]);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_body_that_stands_for_a_second_starts);
+    RUN_TEST(test_until_the_start_the_pose_stays);
+    RUN_TEST(test_at_rest_tilt_and_gyro_bias_are_measured);
+    RUN_TEST(test_the_tilts_covariance_is_that_of_the_accelerometers_bias);
+    RUN_TEST(test_starts_at_rest_are_as_wrong_as_they_believe);
+    RUN_TEST(test_a_body_that_is_shaken_does_not_start_at_rest);
+    RUN_TEST(test_auto_starts_in_motion_where_the_body_never_stands);
+    RUN_TEST(test_a_gyro_in_degrees_turns_while_the_body_stands);
+    RUN_TEST(test_an_accelerometer_in_g_is_told);
+    RUN_TEST(test_a_force_at_rest_that_is_not_gravity_is_told);
+    RUN_TEST(test_no_force_at_all_does_not_start_at_rest);
+    RUN_TEST(test_gravity_that_points_down_in_the_given_pose_is_told);
+    RUN_TEST(test_without_a_pose_upside_down_is_a_tilt);
+    RUN_TEST(test_another_tilt_than_the_given_poses_is_told_and_taken);
+    RUN_TEST(test_a_given_pose_keeps_its_place_and_heading);
+    RUN_TEST(test_a_start_in_motion_takes_a_tenth_of_a_second);
+    RUN_TEST(test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start_in_motion);
+    RUN_TEST(test_a_given_start_waits_for_nothing_but_its_pose);
+    RUN_TEST(test_frames_before_the_start_are_taken_and_make_no_landmarks);
+    RUN_TEST(test_in_dead_reckoning_too_the_start_ends_the_waiting);
+    RUN_TEST(test_pictures_that_move_keep_the_filter_from_a_start_at_rest);
+    RUN_TEST(test_a_velocity_is_refused_where_it_makes_no_sense);
+    RUN_TEST(test_a_velocity_is_refused_where_there_are_landmarks_or_twists);
+    RUN_TEST(test_a_given_velocity_and_its_covariance_are_the_estimate);
+    return UNITY_END();
+}
