@@ -30,14 +30,14 @@ static const plr_field header_fields[] = {
 enum { STORE_VERSION = 1, OWN_CRC = PLR_STORE_HEADER - 4 /* where the last field begins */ };
 
 /* Moves the next bytes of a header that is written or read. */
-static bool write_bytes(void *context, uint8_t *bytes, unsigned n) {
+static bool to_header(void *context, uint8_t *bytes, unsigned n) {
     uint8_t **at = context;
     memcpy(*at, bytes, n);
     *at += n;
     return true;
 }
 
-static bool take_bytes(void *context, uint8_t *bytes, unsigned n) {
+static bool from_header(void *context, uint8_t *bytes, unsigned n) {
     const uint8_t **at = context;
     memcpy(bytes, *at, n);
     *at += n;
@@ -53,7 +53,7 @@ static void write_header(uint8_t bytes[PLR_STORE_HEADER], slot_header header) {
     for (unsigned pass = 0; pass < 2;
          pass++) { /* the second with the CRC of what the first wrote */
         uint8_t *at = bytes;
-        plr_codec codec = {.direction = PLR_CODEC_WRITE, .move = write_bytes, .context = &at};
+        plr_codec codec = {.direction = PLR_CODEC_WRITE, .move = to_header, .context = &at};
         pass_header(&codec, &header);
         header.own_crc = plr_crc32(0, bytes, OWN_CRC);
     }
@@ -64,7 +64,7 @@ static void write_header(uint8_t bytes[PLR_STORE_HEADER], slot_header header) {
 static plr_status read_header(const uint8_t bytes[PLR_STORE_HEADER], slot_header *header) {
     const uint8_t *at = bytes;
     plr_codec codec = {
-        .direction = PLR_CODEC_READ, .move = take_bytes, .context = &at, .left = PLR_STORE_HEADER};
+        .direction = PLR_CODEC_READ, .move = from_header, .context = &at, .left = PLR_STORE_HEADER};
     memset(header, 0, sizeof *header);
     pass_header(&codec, header);
     if (header->magic != SLOT_MAGIC)

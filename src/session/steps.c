@@ -19,7 +19,7 @@ static plr_kind kind_of_steps(const plr_session *s) {
 
 /* --- refusing --- */
 
-static void refuse(plr_session *s, plr_time_ns t_ns, plr_status status) {
+static void refuse_step(plr_session *s, plr_time_ns t_ns, plr_status status) {
     if (!is_inertial(s)) {
         plr_send_refusal(s, PLR_KIND_TWIST, t_ns, status, NULL);
         return;
@@ -74,7 +74,7 @@ static void apply_readings_before(plr_session *s, plr_time_ns t_ns) {
         apply_reading(s, &reading);
 }
 
-static plr_status move(plr_session *s, const plr_held_step *step) {
+static plr_status predict(plr_session *s, const plr_held_step *step) {
     const uint64_t begin = plr_clock_now_ns(s);
     const plr_status status = is_inertial(s)
                                   ? plr_filter_inertial(&s->filter, step->t_ns, &step->by.imu)
@@ -84,17 +84,17 @@ static plr_status move(plr_session *s, const plr_held_step *step) {
 }
 
 /* A step, after the readings that wait and are older than it. */
-static void apply(plr_session *s, const plr_held_step *step) {
+static void apply_step(plr_session *s, const plr_held_step *step) {
     apply_readings_before(s, step->t_ns);
     plr_start_apply_until(s, step->t_ns);
-    plr_status status = move(s, step);
+    plr_status status = predict(s, step);
     /* of a batch the first speaks for the sender's clock: the others have their times from it */
     if ((step->leads || status == PLR_OK) && plr_reanchor_follow(s, step->t_ns, status))
-        status = move(s, step);
+        status = predict(s, step);
     if (is_inertial(s))
         report_fault(s);
     if (status != PLR_OK) {
-        refuse(s, step->t_ns, status);
+        refuse_step(s, step->t_ns, status);
         return;
     }
     s->imu_status = PLR_OK;
@@ -105,7 +105,7 @@ static void apply(plr_session *s, const plr_held_step *step) {
 void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
     plr_held_step step;
     while (plr_held_pop_until(&s->held, until_ns, &step))
-        apply(s, &step);
+        apply_step(s, &step);
     apply_readings_before(s, until_ns);
 }
 
@@ -115,31 +115,31 @@ static plr_time_ns delay_ns(const plr_session *s) {
     return (plr_time_ns)(plr_filter_config(&s->filter)->twist_delay_s * 1e9 + 0.5);
 }
 
-static void delay(plr_session *s, const plr_held_step *step) {
+static void delay_step(plr_session *s, const plr_held_step *step) {
     plr_held_step due;
     if (plr_held_contradicts(&s->held, step->t_ns))
         plr_steps_apply_held(s, UINT64_MAX);
     if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
         s->totals.held_short++;
-        apply(s, &due);
+        apply_step(s, &due);
     }
     plr_held_push(&s->held, step);
     while (plr_held_pop_due(&s->held, delay_ns(s), &due))
-        apply(s, &due);
+        apply_step(s, &due);
 }
 
-static void use(plr_session *s, const plr_held_step *step) {
+static void use_step(plr_session *s, const plr_held_step *step) {
     if (delay_ns(s) > 0)
-        delay(s, step);
+        delay_step(s, step);
     else
-        apply(s, step);
+        apply_step(s, step);
 }
 
 void plr_steps_use_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
     const plr_held_step step = {.t_ns = twist->t_ns, .by.twist = twist->twist, .leads = true};
     if (kind_of_steps(s) == PLR_KIND_TWIST)
-        use(s, &step);
+        use_step(s, &step);
     else
         refuse_other(s, PLR_KIND_TWIST, twist->t_ns);
 }
@@ -155,11 +155,11 @@ void plr_steps_use_imu(plr_session *s) {
                                     .by.imu = imu->readings[i],
                                     .leads = i == 0};
         if (step.t_ns < imu->t_ns) /* beyond the clock's end */
-            refuse(s, imu->t_ns, PLR_E_TIME);
+            refuse_step(s, imu->t_ns, PLR_E_TIME);
         else if (!plr_plausible(PLR_GROUP_IMU, &step.by.imu))
-            refuse(s, step.t_ns, PLR_E_RANGE);
+            refuse_step(s, step.t_ns, PLR_E_RANGE);
         else
-            use(s, &step);
+            use_step(s, &step);
     }
 }
 

@@ -4,7 +4,8 @@
 gcc's -fcallgraph-info=su gives the functions of each source with their frames and calls (.ci files,
 in VCG form). Functions of the C library come without; their frames are read from the machine code.
 What a call through a pointer may reach cannot be seen by a machine: INDIRECT says it, by hand, and
-a call that it does not cover is an error. So are recursion and frames without a bound.
+a call that it does not cover is an error. So are recursion and frames without a bound. A pattern
+with a colon names the source too: twist.c:step.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pelorus.errors import PelorusError
 # Who calls through a pointer, and what it may reach: patterns of function names. Of the session's
 # observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
+PROCESS = r"(twist|imu)\.c:(lay_out|check|step|mean|rest|walk|now|bias_covariance|measure)"
 MAP = ("send_evicted", "find_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
 TELEMETRY = "send_odometry"
@@ -28,10 +30,13 @@ STORE = (
     r"plr_state_store_\w+|look_\w+|read_(bytes|crc|slot|state)|write_slot|erase_blocks|program\w*"
     r"|flush|append_state"
 )
-SESSION = r"plr_session_step|feed_reader|apply_twist|predict|update|use_frame|answer|plr_data_\w+"
+SESSION = (
+    r"plr_session_step|feed_reader|(apply|use|delay)_step|predict|update|use_frame|answer"
+    r"|plr_(data|steps)_\w+"
+)
 HANDLERS = (
     r"plr_start_(begin|change_settings|add_landmark)",
-    r"plr_data_use_\w+",
+    r"plr_(data|steps)_use_\w+",
     r"plr_saving_restore",
     r"save|compare_counts",
 )
@@ -43,16 +48,16 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"\w+_before",)),
     (r"to_frame|send_frame|plr_writer_put", ("write_to_port", "send")),
     (STORE, (DEVICE,)),
-    (r"move|pass_\w+|plr_codec_\w+", ("from_payload", "to_frame", "from_source", "to_sink")),
+    (r"move|pass_\w+|plr_codec_\w+", (r"(from|to)_(payload|frame|source|sink|header)",)),
     (r"from_source|to_sink|plr_filter_save", ("append_state", "read_state")),
     (r"write_to_port", PORT),
     (SESSION, (*PORT, TELEMETRY)),
     (r"plr_input_handle", HANDLERS),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
     (r"plr_correct", (*MODEL, "measure", "given")),
-    (r"hold|apply", (*MODEL, "measure")),
+    (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
-    (FILTER, MODEL + MAP),
+    (FILTER, (*MODEL, *MAP, PROCESS)),
 )
 
 NODE = re.compile(r'node: \{ title: "([^"]+)" label: "([^"]*)"')
@@ -90,6 +95,12 @@ class Bound:
 def short(title: str) -> str:
     """A static function's title is file:name."""
     return title.rpartition(":")[2]
+
+
+def _where(title: str) -> str:
+    """Of a static function: file.c:name, without what gcc appends to its clones."""
+    file, _, name = title.rpartition(":")
+    return f"{Path(file).name}:{name.partition('.')[0]}"
 
 
 def read_call_graphs(folders: Iterable[Path]) -> dict[str, Function]:
@@ -208,8 +219,8 @@ class Analysis:
         titles = {
             title
             for name, titles in self._by_name.items()
-            if re.fullmatch(pattern, name.partition(".")[0])
             for title in titles
+            if re.fullmatch(pattern, _where(title) if ":" in pattern else name.partition(".")[0])
             if self._functions[title].from_compiler
         }
         if not titles and pattern != TELEMETRY:
