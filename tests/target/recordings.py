@@ -30,6 +30,11 @@ LIGHT: dict[str, tuple[str, ...]] = {
         *("--observations", "5", "--landmarks", "200"),
     ),
 }
+# By an IMU that finds its tilt while the body stands, and then drives off.
+INERTIAL: tuple[str, ...] = (
+    *("simulate", "{out}", "--seed", "7", "--duration", "6", "--observations", "20"),
+    *("--imu-rate", "200", "--rest", "2", "--start", "pose"),
+)
 REAL: dict[str, tuple[tuple[str, ...], str, int]] = {
     "starry-night": (
         ("convert", "starry-night", "{in}", "{out}"),
@@ -69,7 +74,7 @@ def main() -> None:
     folder = Path(sys.argv[1])
     (folder / "whole").mkdir(parents=True, exist_ok=True)
     (folder / "light").mkdir(exist_ok=True)
-    made: dict[Path, tuple[str, ...]] = {folder / "simulated.plr": SIMULATION}
+    made = {folder / "simulated.plr": SIMULATION, folder / "imu.plr": INERTIAL}
     made.update({folder / "light" / f"{name}.plr": words for name, words in LIGHT.items()})
     for simulated, words in made.items():
         if not simulated.exists():
