@@ -33,7 +33,7 @@ LIGHT: dict[str, tuple[str, ...]] = {
 # By an IMU that finds its tilt while the body stands, and then drives off.
 INERTIAL: tuple[str, ...] = (
     *("simulate", "{out}", "--seed", "7", "--duration", "6", "--observations", "20"),
-    *("--imu-rate", "200", "--rest", "2", "--start", "pose"),
+    *("--imu-rate", "200", "--rest", "2", "--start", "pose", "--outliers", "0"),
 )
 REAL: dict[str, tuple[tuple[str, ...], str, int]] = {
     "starry-night": (
