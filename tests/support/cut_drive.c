@@ -15,8 +15,10 @@ plr_session_options cut_options;
 faulty_port first_port, second_port;
 faulty_flash cut_flash;
 plr_state_store cut_store;
+bool cut_by_imu;
 
 void cut_clear(void) {
+    cut_by_imu = false;
     faulty_port_init(&first_port, 1);
     faulty_port_init(&second_port, 2);
     faulty_flash_init(&cut_flash, 3, FAULTY_FLASH_BYTES, ERASE, PROGRAM);
@@ -47,7 +49,9 @@ plr_time_ns cut_frame_time(unsigned i) {
 void cut_begin(plr_session *s, faulty_port *port) {
     const plr_port functions = faulty_port_functions(port);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(s, &functions, &cut_options));
-    cut_send(port, drive_header());
+    plr_message header = drive_header();
+    header.as.header.process = cut_by_imu ? PLR_PROCESS_IMU : PLR_PROCESS_TWIST;
+    cut_send(port, header);
     cut_send(port, drive_config("slots", SLOTS));
 }
 
@@ -56,11 +60,12 @@ void cut_run(plr_session *s) {
         continue;
 }
 
-/* From frame to frame, ten a second, four twists before each. */
 void cut_drive(faulty_port *port, unsigned from, unsigned to) {
     for (unsigned i = from; i < to; i++) {
-        for (unsigned k = 0; k < 4; k++)
-            cut_send(port, drive_twist(0.1 * i + 0.025 * k));
+        for (unsigned k = 0; k < 4; k++) {
+            const double t_s = 0.1 * i + 0.025 * k;
+            cut_send(port, cut_by_imu ? drive_imu(t_s, 1, 0) : drive_twist(t_s));
+        }
         cut_send(port, drive_stereo(0.1 * i + 0.09));
     }
 }

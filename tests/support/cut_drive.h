@@ -20,6 +20,7 @@ extern plr_session_options cut_options; /* of the next session; with the store *
 extern faulty_port first_port, second_port;
 extern faulty_flash cut_flash;
 extern plr_state_store cut_store;
+extern bool cut_by_imu; /* readings of an IMU come, and the HEADER says so; else twists */
 
 /* Empty ports, a new flash, default options: for setUp. */
 void cut_clear(void);
@@ -34,7 +35,7 @@ plr_message cut_ask(plr_state_action action, plr_time_ns t_ns);
 
 plr_time_ns cut_frame_time(unsigned i);
 
-/* From frame to frame, ten a second, four twists before each. */
+/* From frame to frame, ten a second, four twists, or readings, before each. */
 void cut_drive(faulty_port *port, unsigned from, unsigned to);
 
 /* Steps until the port has nothing more. */

@@ -16,7 +16,7 @@ void tearDown(void) {
 
 /* --- restore --- */
 
-static void test_with_nothing_between_the_poses_are_those_of_a_drive_without_a_cut(void) {
+static void assert_a_cut_changes_nothing(void) {
     cut_drive_and_save();
     cut_drive(&first_port, CUT, LAST);
     cut_run(&before_cut);
@@ -27,6 +27,17 @@ static void test_with_nothing_between_the_poses_are_those_of_a_drive_without_a_c
     cut_run(&after_restart);
     TEST_ASSERT_EQUAL_UINT32(0, after_restart.totals.refused);
     cut_assert_same_poses();
+}
+
+static void test_with_nothing_between_the_poses_are_those_of_a_drive_without_a_cut(void) {
+    assert_a_cut_changes_nothing();
+}
+
+/* Velocity, biases of the IMU and the motion since the last frame are in the state. */
+static void test_the_same_holds_of_a_drive_by_an_imu(void) {
+    cut_by_imu = true;
+    assert_a_cut_changes_nothing();
+    TEST_ASSERT_EQUAL_UINT8(PLR_PROCESS_IMU, plr_filter_config(&after_restart.filter)->process);
 }
 
 static void test_the_settings_in_force_are_told_before_the_answer(void) {
@@ -306,6 +317,7 @@ static void test_of_two_states_the_damaged_one_is_told(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_with_nothing_between_the_poses_are_those_of_a_drive_without_a_cut);
+    RUN_TEST(test_the_same_holds_of_a_drive_by_an_imu);
     RUN_TEST(test_the_settings_in_force_are_told_before_the_answer);
     RUN_TEST(test_on_another_clock_the_body_stands_where_it_stood);
     RUN_TEST(test_what_may_have_moved_widens_the_covariance);
