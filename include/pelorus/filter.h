@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * The filter: twists and stereo observations in, pose and landmarks with covariance out.
+ * The filter: twists or readings of an IMU, and stereo observations in; pose and landmarks with
+ * covariance out.
  *
  *     static plr_filter filter;                      // all of its memory; no heap anywhere
  *     plr_config config;
@@ -10,18 +11,28 @@
  *     plr_filter_update(&filter, &frame, &report);   // at every stereo pair
  *     plr_filter_pose(&filter, &pose);
  *
- * Time is an argument: the filter has no clock. Every call runs a bounded number of steps, whatever
- * its data; the bounds are in docs/SIZES.md. A program may have several filters. One filter is not
- * thread-safe: calls on it must not overlap.
+ * With an IMU in place of twists, and body axes that are the IMU's:
+ *
+ *     config.process = PLR_PROCESS_IMU;              // and its noises: gyro_noise, accel_noise ...
+ *     plr_filter_inertial(&filter, t_ns, &reading);  // at every reading, in place of predict
+ *
+ * The body stands for a second first, or see the setting imu_start. "Reading" means below what
+ * moves the state, a twist or a reading of the IMU, or a reading of a small sensor where it says
+ * so.
+ *
+ * Time is an argument: the filter has no clock. Every call runs a bounded number of steps,
+ * whatever its data; the bounds are in docs/SIZES.md. A program may have several filters. One
+ * filter is not thread-safe: calls on it must not overlap.
  *
  * A refused call (status < 0) changes nothing but the counts of refused calls. A function that
  * takes a const filter changes nothing at all: whether you call it or not, later results have the
  * same bits. Every call first checks that the filter's memory is as the previous call left it; if
  * not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
  *
- * The error of a pose is defined on its right side: with T the true pose and T^ the estimate,
- * T = T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias
- * is db = b - b^. Covariances are those of xi and db. Source of the equations: docs/MATH.md.
+ * The error of a pose is defined on its right side: with T the true pose and T^ the estimate, T =
+ * T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias is
+ * db = b - b^, that of a velocity dv = v - v^. Covariances are those of xi, db and dv. Source of
+ * the equations: docs/MATH.md.
  */
 #ifndef PELORUS_FILTER_H
 #define PELORUS_FILTER_H
@@ -42,8 +53,9 @@ plr_status plr_filter_init_sized(plr_filter *f, const plr_calibration *calibrati
                                  const plr_sizes *caller);
 
 /* Prepares a filter: pose identity with covariance start_sigma^2 I, bias 0 with its prior, no
- * landmarks, time not set (the first twist or frame sets it). `map` may be NULL: no sink, no
- * source. All three are copied, so they need not outlive the call.
+ * landmarks, time not set (the first reading or frame sets it). With an IMU the filter has not
+ * started: see plr_filter_inertial. `map` may be NULL: no sink, no source. All three are copied, so
+ * they need not outlive the call.
  * PLR_E_ARGUMENT null pointer; PLR_E_CONFIG, see plr_config_check; PLR_E_CALIBRATION focal length
  * or baseline not positive, or T_CB not a rigid motion, or one of these numbers beyond 1e6;
  * PLR_E_MODE localization without a source; PLR_E_CPU the processor flushes subnormals to zero;
@@ -60,17 +72,17 @@ plr_status plr_filter_reset(plr_filter *f);
 
 /* Sets the pose and the time, at the start or later. P_xi[36] is the covariance of (rho, theta),
  * 6x6; NULL: start_sigma^2 I. All landmarks are dropped and not handed to the sink, because their
- * positions belong to the old pose. Bias and its covariance stay. t_ns may be earlier or later than
- * the filter's time. Counted in plr_filter_totals().resets, except where it is the first to set the
- * time.
+ * positions belong to the old pose. Biases and velocity and their covariance stay. With an IMU
+ * that has not started, position and heading are kept, and tilt is measured (not with imu_start =
+ * given). t_ns may be earlier or later than the filter's time. Counted in
+ * plr_filter_totals().resets, except where it is the first to set the time.
  * PLR_E_NOT_FINITE; PLR_E_ARGUMENT if R is not a rotation or P_xi not symmetric and positive;
  * PLR_E_RANGE beyond 1e9 m or a variance of 1e12; PLR_E_MODE in mapping. */
 plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB,
                                const double *P_xi);
 
 /* Sets mean and variances of the bias prior, 6 each: (b_v, b_w), m/s and rad/s; with an IMU
- * (b_a, b_g), m/s^2 and rad/s. Only before the
- * first twist and the first frame.
+ * (b_a, b_g), m/s^2 and rad/s. Only before the first reading and the first frame.
  * PLR_E_MODE if bias is off, in mapping, or after those; PLR_E_NOT_FINITE; PLR_E_ARGUMENT a
  * negative variance; PLR_E_RANGE a bias beyond 1e4 or a variance beyond 1e12. */
 plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *variance);
@@ -82,16 +94,17 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
  * is checked but not used.
  * PLR_E_TIME not later than the last reading, or earlier than the last frame; PLR_E_GAP more than
  * max_gap_s ahead; PLR_E_NOT_FINITE; PLR_E_RANGE the step to t_ns, or a next step of the same
- * length with this reading, would be more than pi rad or 1 km. */
+ * length with this reading, would be more than pi rad or 1 km; PLR_E_MODE the process is another.
+ */
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist);
 
-/* With the setting process = imu, in place of plr_filter_predict: a reading of accelerometer and gyro
- * taken at t_ns. Until tilt and velocity are known (setting imu-start) readings are averaged, the
- * pose stays, and health says NOT_STARTED. Takes the same time for any number of landmarks.
+/* With the setting process = imu, in place of plr_filter_predict: a reading of accelerometer and
+ * gyro taken at t_ns. Until tilt and velocity are known (setting imu-start) readings are averaged,
+ * the pose stays, and health says NOT_STARTED. Takes the same time for any number of landmarks.
  * Refused readings count in plr_filter_totals().twists_refused; where the sensor is to blame,
  * plr_filter_imu_fault says how, and health says IMU_FAULT.
- * Statuses as of plr_filter_predict, and: PLR_E_RANGE at the limit of gyro_range or accel_range, or
- * a spike; PLR_E_ARGUMENT the same numbers ten times; PLR_E_MODE the process is another. */
+ * Statuses as of plr_filter_predict, and: PLR_E_RANGE at the limit of gyro_range or accel_range,
+ * or a spike; PLR_E_ARGUMENT the same numbers ten times; PLR_E_MODE the process is another. */
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
 
 /* With an IMU: sets the velocity of the body in its own axes, m/s, and its variances. It starts the
@@ -111,10 +124,11 @@ plr_imu_fault plr_filter_imu_fault(const plr_filter *f);
  * 1e9 m). */
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB);
 
-/* A stereo frame: predicts the pose at its time with the last twist, matches observations to
+/* A stereo frame: predicts the pose at its time with the last reading, matches observations to
  * landmarks by id, gates them, corrects the state, and makes landmarks of new ids, evicting others
- * where no slot is free. The order of the observations does not change the result. Malformed
- * observations are left out and counted. `report` (may be NULL) is filled in any case.
+ * where no slot is free. Before an IMU has started a frame only shows whether the body stands. The
+ * order of the observations does not change the result. Malformed observations are left out and
+ * counted. `report` (may be NULL) is filled in any case.
  * PLR_E_LATE earlier than the filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_RANGE the
  * prediction would be more than pi rad or 1 km; PLR_E_ARGUMENT more than PLR_MAX_OBSERVATIONS;
  * PLR_E_MODE in mapping, when plr_filter_move_to has not been called for this time.
@@ -123,43 +137,47 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
  * RECOVERED. */
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report);
 
-/* A reading of a small sensor (plr_sensor) at reading->t_ns. It predicts the pose to that time with
- * the last twist. A position corrects the whole state at once. A velocity (wheel, standstill) holds
- * from its sensor's second reading until the next one, at most for two intervals, and not at all
- * where readings are more than half a second apart: in each step of the motion it is weighed
- * against the twist, and their difference corrects the twists' biases with the next frame.
- * Of a twist and a reading of the same time give the twist first; of a frame and a position the
- * frame.
+/* A reading of a small sensor (plr_sensor) at reading->t_ns. It predicts the pose to that time
+ * with the last twist or IMU reading. A position corrects the whole state at once, and with an IMU
+ * a velocity (wheel, standstill) does too: there velocity is estimated, and the rate is that of
+ * the gyro less its bias. With twists a velocity holds from its sensor's second reading until the
+ * next one, at most for two intervals, and not at all where readings are more than half a second
+ * apart: in each step of the motion it is weighed against the twist, and their difference corrects
+ * the twists' biases with the next frame.
+ * Of a twist, or IMU reading, and a reading of the same time give the former first; of a frame and
+ * a position the frame.
  * A reading beyond the setting gate-d2, and a position more than 900 m off, is rejected: PLR_OK,
  * and result->used is false. `result` may be NULL.
  * PLR_E_ARGUMENT no such sensor, axes that it cannot measure, or a sigma that is not positive;
- * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4, a position beyond 1e9, an arm beyond 1 km, a
- * sigma beyond 1e6, or a prediction of more than pi rad or 1 km; PLR_E_TIME before the first twist;
- * PLR_E_LATE earlier than the filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in
- * mapping. */
+ * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4, a position beyond 1e9, an arm beyond 1 km,
+ * a sigma beyond 1e6, or a prediction of more than pi rad or 1 km; PLR_E_TIME before the first
+ * twist or IMU reading; PLR_E_NOT_READY before an IMU has started; PLR_E_LATE earlier than the
+ * filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in mapping. */
 plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
                               plr_reading_result *result);
 
 /* --- estimate at the time plr_filter_time() --- */
 
-/* Time of the estimate: that of the last accepted twist, frame or reading. */
+/* Time of the estimate: that of the last accepted twist, IMU reading, frame or reading. */
 plr_time_ns plr_filter_time(const plr_filter *f);
 
 /* The pose of the body in the world, T_WB. */
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB);
 
-/* Covariance of the pose's error (rho, theta), 6x6, m and rad. While vision contradicts the twists
- * it is enlarged so that it covers the pose by vision and the pose by twists (docs/MATH.md 17). */
+/* Covariance of the pose's error (rho, theta), 6x6, m and rad. While vision contradicts the twists,
+ * or the IMU, it is enlarged so that it covers the pose by vision and theirs (docs/MATH.md 17). */
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi);
 
-/* Velocity of the body: the last twist reading minus the estimated bias. */
+/* Velocity of the body in its own axes: the last twist minus the estimated bias. With an IMU the
+ * estimated velocity, zero before the start, and the last rate of the gyro minus its bias. */
 plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity);
 
-/* Covariance of that velocity, 6x6, in the order (v, w): the reading's plus the bias's. */
+/* Covariance of that velocity, 6x6, in the order (v, w): the reading's plus the bias's; with an IMU
+ * that of the estimated velocity, and for the rate the gyro's plus its bias's. */
 plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u);
 
-/* The bias (b_v, b_w) of the twists, 6 numbers, m/s and rad/s, and its covariance, 6x6. Zeros while
- * the setting bias is off. `P_b` may be NULL. */
+/* The bias, 6 numbers, and its covariance, 6x6: (b_v, b_w) of the twists, m/s and rad/s, or (b_a,
+ * b_g) of the IMU, m/s^2 and rad/s. Zeros while the setting bias is off. `P_b` may be NULL. */
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b);
 
 /* Trace of the covariance of the whole state. It adds different units, so only its trend means
@@ -225,11 +243,12 @@ uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks);
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,
                               void *context);
 
-/* Continues after an interruption without twists, for example after a restore. The filter's time
+/* Continues after an interruption without readings, for example after a restore. The filter's time
  * becomes t_ns, of any clock. The pose stays where it is, and its covariance grows by P_moved[36],
  * 6x6, of (rho, theta), m^2 and rad^2: how far the body may have moved meanwhile. NULL: it has not
- * moved. Landmarks stay, with their correlation with the pose.
- * PLR_E_MODE P_moved in mapping, or no twist, frame or pose was ever accepted; PLR_E_NOT_FINITE;
+ * moved. Landmarks stay, with their correlation with the pose. With an IMU velocity is then zero,
+ * and known to start_velocity_sigma.
+ * PLR_E_MODE P_moved in mapping, or no reading, frame or pose was ever accepted; PLR_E_NOT_FINITE;
  * PLR_E_RANGE; PLR_E_ARGUMENT P_moved not symmetric and positive. */
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved);
 
@@ -237,8 +256,9 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
 
 /* The filter's health at t_ns, which need not be the time of a frame: call it whenever you use the
  * pose. To the reasons of the last frame it adds NO_FRAMES and NO_OBSERVATIONS when there was none
- * for a second, and NO_TWISTS when readings were refused or the last one is older than three
- * intervals between readings plus 50 ms. A t_ns before plr_filter_time() counts as that time.
+ * for a second, and NO_TWISTS when twists or IMU readings were refused or the last one is older
+ * than three intervals between them plus 50 ms. A t_ns before plr_filter_time() counts as that
+ * time.
  * PLR_E_DAMAGED, PLR_E_NOT_READY: `health` is filled too and says DIVERGED. */
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
 

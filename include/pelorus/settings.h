@@ -25,7 +25,7 @@ typedef enum plr_mode {
     PLR_MODE_SLAM = 0,          /* pose and landmarks are estimated together */
     PLR_MODE_MAPPING = 1,       /* every frame's pose is given as exact; landmarks are estimated */
     PLR_MODE_LOCALIZATION = 2,  /* all landmarks come from the map source; the pose is estimated */
-    PLR_MODE_DEAD_RECKONING = 3 /* the pose follows the twists; observations are not used */
+    PLR_MODE_DEAD_RECKONING = 3 /* the pose follows twists or IMU; observations are not used */
 } plr_mode;
 
 /* The interval for which the twist reading taken at t_j is valid. */
@@ -93,7 +93,7 @@ typedef struct plr_config {
 
     /* Setting bias: 0 or 1, default 1.
      * 1: constant errors of the twists (6 numbers) are estimated as well. 0 saves time and memory;
-     * choose it only where the twists have no such errors. */
+     * choose it only where the twists have no such errors. An IMU needs 1. */
     uint8_t bias;
 
     /* Setting known-map: 0 or 1, default 0.
@@ -193,21 +193,21 @@ typedef struct plr_config {
 
     /* Setting max-gap [s]: 1e-3 to 60, default 2.
      * A reading or frame further ahead than this is refused with PLR_E_GAP. Choose the longest
-     * pause over which the last twist may still be taken as valid. */
+     * pause over which the last twist or IMU reading may still be taken as valid. */
     double max_gap_s;
 
     /* Setting twist-delay [s]: 0 to 10, default 0.
-     * Used by plr_session alone: it holds each twist or IMU reading for this long, so that a frame which arrives
-     * later than newer twists is still processed in order of time. Choose the camera's delay from
-     * shutter to message. At most PLR_SESSION_HELD_TWISTS are held. */
+     * Used by plr_session alone: it holds each twist or IMU reading for this long, so that a frame
+     * which arrives later than newer ones is still processed in order of time. Choose the camera's
+     * delay from shutter to message. At most PLR_SESSION_HELD_TWISTS are held. */
     double twist_delay_s;
 
     /* Setting standstill-sigma [m/s]: 0 to 1, default 0.
-     * How still a robot is that stands, m/s, and rad/s for its turning; 0: standing is not detected.
-     * Above 0 the filter takes the body for standing where for a second no pixel moved by more than its
-     * noise and the twists do not say otherwise, and measures a velocity of zero with this sigma. The
-     * pixels cannot tell a slower motion from none: choose about pixel-sigma times the usual depth over
-     * the focal length, per second (2 px, 5 m, 500 px: 0.02 m/s). */
+     * How still a robot is that stands, m/s, and rad/s for its turning; 0: standing is not
+     * detected. Above 0 the filter takes the body for standing where for a second no pixel moved by
+     * more than its noise and twists or IMU do not say otherwise, and measures a velocity of zero
+     * with this sigma. The pixels cannot tell a slower motion from none: choose about pixel-sigma
+     * times the usual depth over the focal length, per second (2 px, 5 m, 500 px: 0.02 m/s). */
     double standstill_sigma_mps;
 
     /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
@@ -234,7 +234,7 @@ typedef struct plr_config {
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
      * Take several times the data sheet's figure: vibration, scale and timing errors come on top,
-     * and with too small a figure the gate rejects what the camera sees (docs/NUMERICS.md). */
+     * and with too small a figure the gate rejects what the camera sees (docs/NUMERICS.md 13). */
     double gyro_noise;
 
     /* Setting accel-noise [m/s^2/sqrt(Hz)]: 0 to 100, default 1e-2.
@@ -272,8 +272,8 @@ typedef struct plr_config {
     double accel_range_mps2;
 
     /* Setting camera-offset [s]: -1 to 1, default 0.
-     * Used by plr_session alone: added to the time of every frame, so that it is the clock of IMU or
-     * twists (Kalibr's timeshift_cam_imu). If it is negative, twist-delay must cover it. */
+     * Used by plr_session alone: added to the time of every frame, so that it is the clock of IMU
+     * or twists (Kalibr's timeshift_cam_imu). If it is negative, twist-delay must cover it. */
     double camera_offset_s;
 } plr_config;
 

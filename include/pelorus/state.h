@@ -30,7 +30,7 @@ typedef struct plr_map {
 
 /* Counts since init or reset. */
 typedef struct plr_totals {
-    uint32_t twists;        /* accepted */
+    uint32_t twists;        /* accepted; with an IMU its readings, as in twists_refused */
     uint32_t frames;        /* accepted */
     uint32_t late;          /* frames and readings refused with PLR_E_LATE */
     uint32_t refused;       /* other calls refused because of their data */
@@ -40,7 +40,7 @@ typedef struct plr_totals {
     uint32_t blocks_failed; /* as in plr_report */
     uint32_t widened;       /* times the pose's covariance was enlarged: the pose may have jumped */
     uint32_t recoveries;    /* times the landmarks were dropped after a divergence */
-    uint32_t contradictions; /* times the filter followed vision against the twists */
+    uint32_t contradictions; /* times the filter followed vision against twists or IMU */
     uint32_t twists_refused, frames_refused;             /* for any reason */
     uint32_t readings, readings_gated, readings_refused; /* of small sensors */
     uint32_t damaged;                                    /* frames refused with PLR_E_DAMAGED */
@@ -95,14 +95,14 @@ typedef struct plr_motion {
     plr_real E[9], p[3];         /* 3x3 and m */
     plr_real Q[PLR_POSE_SQUARE]; /* 6x6 */
     plr_real B[PLR_MOTION_BY];   /* 6 x drivers, leading dimension PLR_DRIVERS */
-    plr_real seconds;            /* duration, for the bias walk */
+    plr_real seconds;            /* duration, for the bias walk of twists */
     uint8_t pending;             /* 1 if any motion is accumulated */
     uint8_t noisy;               /* 0 if it is exact (mapping): Q and B are zero */
 } plr_motion;
 
-/* The rest of the core in the same motion, with an IMU (docs/MATH.md 19): its velocity becomes V x_d
- * plus noise, its biases only gain noise. Q_nc and Q_cc are the covariances of the noise of velocity
- * and biases with that of n, and with itself. */
+/* The rest of the core in the same motion, with an IMU (docs/MATH.md 19): its velocity becomes V
+ * x_d plus noise, its biases only gain noise. Q_nc and Q_cc are the covariances of the noise of
+ * velocity and biases with that of n, and with itself. */
 typedef struct plr_core_motion {
     plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS];
     plr_real Q_nc[PLR_POSE_DIM * PLR_REST_DIM];
@@ -168,7 +168,8 @@ typedef struct plr_velocities {
 } plr_velocities;
 
 /* Sums over frames, in which older ones count less: of nu, the difference between the motion by
- * vision and by twists in units of the twists' sigmas, and of the covariance expected of it. */
+ * vision and by twists, or the IMU, in units of their sigmas, and of the covariance expected of
+ * it. */
 typedef struct plr_consistency_window {
     plr_real sum[PLR_POSE_DIM];
     plr_real variance[PLR_POSE_TRIANGLE]; /* 6x6, packed upper triangle */
@@ -176,7 +177,7 @@ typedef struct plr_consistency_window {
 
 enum { PLR_CONSISTENCY_WINDOWS = 3 };
 
-/* Whether twists and pictures agree: src/filter/consistency.h. */
+/* Whether twists (or IMU) and pictures agree: src/filter/consistency.h. */
 typedef struct plr_consistency {
     plr_consistency_window windows[PLR_CONSISTENCY_WINDOWS];
     plr_real difference
@@ -263,8 +264,8 @@ typedef struct plr_filter {
     plr_layout layout;
 
     plr_time_ns t_ns;       /* of the estimate */
-    plr_time_ns reading_ns; /* of the last twist */
-    plr_real interval_s;    /* between the last two twists */
+    plr_time_ns reading_ns; /* of the last twist or IMU reading */
+    plr_real interval_s;    /* between the last two of them */
     uint8_t clock_started, reading_valid;
     uint8_t velocities_known; /* 0: no small sensor has measured one, and `velocities` is zero */
     uint8_t diverged;
@@ -276,14 +277,14 @@ typedef struct plr_filter {
     plr_real recovery_P
         [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
                                 since; packed lower triangle */
-    plr_real reading[PLR_POSE_DIM]; /* last twist */
+    plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_motion motion;
     uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];
-    plr_real P[PLR_PACKED_SIZE + PLR_KERNEL_MARGIN]; /* packed lower triangle: pose, bias,
-                                                        landmarks */
+    plr_real P[PLR_PACKED_SIZE + PLR_KERNEL_MARGIN]; /* packed lower triangle: the blocks of
+                                                        plr_layout, landmarks */
     plr_workspace work;
 
     plr_consistency consistency;
@@ -296,7 +297,7 @@ typedef struct plr_filter {
     uint32_t reasons;
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */
-    uint32_t refused_before;                /* twists refused until the last frame */
+    uint32_t refused_before;                /* readings refused until the last frame */
     uint16_t frames_without_use, frames_mostly_gated;
     uint32_t matches_since_gated;
     plr_totals totals;

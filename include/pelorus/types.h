@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
- * The types that filter, wire format and session share: status, pose, twist, observation, landmark,
- * report. Numbers are double here, whatever the filter computes in: every float32 fits exactly.
+ * The types that filter, wire format and session share: status, pose, twist, IMU reading,
+ * observation, landmark, report. Numbers are double here, whatever the filter computes in: every
+ * float32 fits exactly.
  *
  * Frames: W world, B body, C left camera (x right, y down, z forward). T_WB = (R_WB, p_WB) brings
  * body coordinates to the world: x_W = R_WB x_B + p_WB. Matrices are row by row.
@@ -51,8 +52,9 @@ typedef enum plr_status {
 typedef enum plr_health {
     PLR_HEALTH_GOOD = 0,     /* nothing to report */
     PLR_HEALTH_DEGRADED = 1, /* works, with less than it should have: see the reasons */
-    PLR_HEALTH_LOST = 2, /* the pose is predicted from twists alone (no observation and no position
-                                was used for a second or two), or vision contradicts it */
+    PLR_HEALTH_LOST = 2,    /* the pose is predicted from twists or IMU alone (no observation and no
+                                position was used for a second or two), vision contradicts it, or
+                                the IMU has not started */
     PLR_HEALTH_DIVERGED = 3 /* something else wrote to the filter's memory: init again */
 } plr_health;
 
@@ -62,8 +64,8 @@ typedef enum plr_reason {
     /* Fewer than 3 observations used in this frame: a bare wall, darkness, a covered camera, or the
      * gate rejects what is seen. Usually passes; if it stays, check the tracker. */
     PLR_REASON_FEW_OBSERVATIONS = 1 << 0,
-    /* None used in the last 10 frames, or for a second: the pose is predicted from twists alone and
-     * drifts. Causes as above. */
+    /* None used in the last 10 frames, or for a second: the pose is predicted from twists or IMU
+     * alone and drifts, with an IMU within seconds. Causes as above. */
     PLR_REASON_NO_OBSERVATIONS = 1 << 1,
     /* Most matches rejected in 10 successive frames; the landmarks were dropped. The camera was
      * moved, ids changed their meaning, or a sigma is far too small. */
@@ -80,8 +82,8 @@ typedef enum plr_reason {
     PLR_REASON_NO_ROOM = 1 << 6,
     /* Observations were malformed or ids were doubled: a fault of the tracker or of the link. */
     PLR_REASON_REFUSED_INPUT = 1 << 7,
-    /* Innovations are larger than the noise explains: pixel-sigma, or a twist's sigma, is too
-     * small, or the calibration is off. */
+    /* Innovations are larger than the noise explains: pixel-sigma, a twist's sigma or an IMU's
+     * noise is too small, or the calibration is off. */
     PLR_REASON_NIS_HIGH = 1 << 8,
     /* An update would have turned a landmark's bearing by more than 1 rad, or put it nearer than
      * 1 cm, and was limited to that: a point beside the camera, or a wrong match that the gate
@@ -92,25 +94,27 @@ typedef enum plr_reason {
     PLR_REASON_NOT_POSITIVE = 1 << 10,
     /* Observations were left out for want of time. A longer deadline, or fewer features. */
     PLR_REASON_BUDGET = 1 << 11,
-    /* Vision contradicts the twists, and the filter followed vision: slipping wheels, a dead
-     * encoder, a push. If it comes again, check the wheels; if it never goes, the odometry's
-     * scale. */
+    /* Vision contradicts the twists, or the IMU, and the filter followed vision: slipping wheels, a
+     * dead encoder, a push. If it comes again, check the wheels; if it never goes, the odometry's
+     * scale. With an IMU: its noises are set too small (settings gyro-noise, accel-noise), or the
+     * clocks of camera and IMU differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
-     * says, until twists and vision agree again. Drive with care, or set the pose to end it. */
+     * says, until they agree with vision again. Drive with care, or set the pose to end it. */
     PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,
-    /* A bias estimate is beyond 3 sigma of its prior. Stereo and odometry disagree in scale
-     * (baseline, focal length, wheel radius; which of them cannot be known), or bias-*-sigma is too
-     * small. */
+    /* A bias estimate is beyond 3 sigma of its prior. With twists: stereo and odometry disagree in
+     * scale (baseline, focal length, wheel radius; which of them cannot be known), or bias-*-sigma
+     * is too small. With an IMU: bias-accel-sigma or bias-gyro-sigma is too small, a START told
+     * biases that are not true, or the camera's place on the body is wrong. */
     PLR_REASON_BIAS_OFF_PRIOR = 1 << 14,
     /* Innovations are far smaller than the noise says, over many frames: pixel-sigma is too large,
      * or the tracker smooths what it sees. The pose is better than its covariance says. */
     PLR_REASON_NIS_LOW = 1 << 15,
-    /* The same pixels in successive frames while the twists report motion: a camera or tracker that
-     * sends the same image again. Restart it. */
+    /* The same pixels in successive frames while twists or IMU report motion: a camera or tracker
+     * that sends the same image again. Restart it. */
     PLR_REASON_FROZEN_IMAGE = 1 << 16,
     /* The matched points do not agree on one motion: more than 30 % are rejected. Much of the scene
-     * moves, or tracks are stale. The pose leans on the twists until they agree. */
+     * moves, or tracks are stale. The pose leans on twists or IMU until they agree. */
     PLR_REASON_SCENE_DISAGREES = 1 << 17,
     /* After a divergence the landmarks were dropped and the pose's covariance was enlarged, so that
      * the filter can continue. Reported once; the reset counter of POSE and ODOMETRY counts it. */
@@ -122,8 +126,8 @@ typedef enum plr_reason {
      * grew into it. Call plr_filter_init; if it comes again, search for the code that writes
      * there. */
     PLR_REASON_STATE_DAMAGED = 1 << 20,
-    /* Twists are missing or refused, or the last one is too old. Check the odometry and its
-     * link. */
+    /* Twists, or IMU readings, are missing or refused, or the last one is too old. Check the
+     * odometry, or the IMU, and its link; plr_filter_imu_fault says what is wrong with an IMU. */
     PLR_REASON_NO_TWISTS = 1 << 21,
     /* Ten successive readings of a small sensor (plr_sensor) were rejected. The sensor or the
      * estimate is wrong: check the sensor's frame, lever arm, units and sigma. */
@@ -131,8 +135,8 @@ typedef enum plr_reason {
     /* With an IMU: the filter has not started, because tilt and velocity are not known yet. Let the
      * body stand for a second, or see the setting imu-start. */
     PLR_REASON_NOT_STARTED = 1 << 23,
-    /* IMU readings are refused (saturated, repeated without end, spikes) or do not fit gravity: check
-     * units (m/s^2, rad/s), signs, axes and range of the sensor. */
+    /* IMU readings are refused (saturated, repeated without end, spikes) or do not fit gravity:
+     * check units (m/s^2, rad/s), signs, axes and range of the sensor. */
     PLR_REASON_IMU_FAULT = 1 << 24
 } plr_reason;
 
@@ -280,7 +284,7 @@ typedef struct plr_health_state {
     uint32_t reasons;             /* bits of plr_reason */
     double seconds_without_frame; /* since the last accepted frame */
     double seconds_without_use;   /* since the last observation that was used */
-    double seconds_without_twist; /* since the last accepted twist */
+    double seconds_without_twist; /* since the last accepted twist or IMU reading */
     uint32_t resets; /* times the pose may have jumped: it was set by a call, or its covariance was
                         enlarged; the reset counter of a POSE */
 } plr_health_state;

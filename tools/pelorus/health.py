@@ -32,7 +32,7 @@ SHORT = {
     "RANGE_LIMITED": "a landmark's correction was limited",
     "NOT_POSITIVE": "a variance ceased to be positive",
     "BUDGET": "no time for all observations",
-    "TWIST_CONTRADICTED": "vision contradicts the twists",
+    "TWIST_CONTRADICTED": "vision contradicts twists or IMU",
     "POSE_MAY_BE_WRONG": "the pose may be wrong",
     "BIAS_OFF_PRIOR": "a bias is far from its prior",
     "FROZEN_IMAGE": "identical pixels",
@@ -40,7 +40,7 @@ SHORT = {
     "RECOVERED": "landmarks dropped and covariance widened",
     "NO_FRAMES": NO_FRAMES,
     "STATE_DAMAGED": "the filter's memory was changed",
-    "NO_TWISTS": "twists missing, refused or too old",
+    "NO_TWISTS": "twists or IMU readings missing, refused or too old",
     "READINGS_REJECTED": "readings of a small sensor rejected",
 }
 # What follows from a cause; where the cause is known too, it is told first.
