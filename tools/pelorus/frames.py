@@ -203,7 +203,7 @@ class Twist(Message, kind=Kind.TWIST):
 
 @dataclass(frozen=True, eq=False)
 class Imu(Message, kind=Kind.IMU):
-    """One to IMU_READINGS_MAX readings of an IMU, (n, 3) each, in body axes; kept as float32.
+    """One to IMU_READINGS_MAX readings of an IMU, (n, 3) each, in its axes; kept as float32.
 
     Reading k is of `t_ns` + k `period_ns`. `a_B_mps2` is specific force: at rest 9.81 upwards.
     """
