@@ -5,14 +5,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from pelorus.frames import BodyAxes, Header, Message, Pose
+from pelorus.frames import BodyAxes, Header, Kind, Message, Pose
 from pelorus.robot.emulator import Emulator
 from pelorus.robot.stream import Streamer
+from pelorus.wire import read_file
 from recordings import first_frames
 from scipy.spatial.transform import Rotation
 
@@ -21,6 +23,7 @@ common = pytest.importorskip("pymavlink.dialects.v20.common", reason="pymavlink 
 Matrix = npt.NDArray[np.float64]
 
 FRAMES = 30
+AWAY = 32  # frames of the drive by an IMU: it rests for 2 s, and sets off
 HANG_S = 1800.0
 TURNS = {
     BodyAxes.FORWARD_LEFT_UP: np.diag([1.0, -1.0, -1.0]),
@@ -94,7 +97,29 @@ def test_odometry_is_the_pose_in_forward_right_down_axes(
     emulator: Emulator, drive: list[Message], axes: BodyAxes
 ) -> None:
     poses, odometries = fly(emulator, first_frames(drive, FRAMES), axes)
-    assert len(poses) == len(odometries) == FRAMES
+    assert len(poses) == FRAMES
+    assert_told(poses, odometries, axes)
+
+
+def test_with_an_imu_velocity_is_the_estimated_one_with_its_covariance(
+    emulator: Emulator, robot: Path
+) -> None:
+    recording = read_file(robot / "recordings" / "imu.plr")[0]
+    messages = [frame.message for frame in recording if frame.message.kind != Kind.TRUTH]
+    axes = BodyAxes.FORWARD_LEFT_UP
+    poses, odometries = fly(emulator, first_frames(messages, AWAY), axes)
+    assert len(poses) == AWAY
+    assert_told(poses, odometries, axes)
+    told = odometries[-1]
+    assert np.hypot(told.vx, told.vy) > 0.5, "it has set off"
+    assert all(0 < told.velocity_covariance[k] < 0.1 for k in (0, 6, 11))
+    assert odometries[0].quality == 1, "it has not found its tilt yet"
+    assert told.quality == 100
+
+
+def assert_told(poses: list[Pose], odometries: list[Any], axes: BodyAxes) -> None:
+    """Each ODOMETRY is its POSE in the autopilot's axes."""
+    assert len(poses) == len(odometries)
     M = TURNS[axes]
     both = np.kron(np.eye(2), M)
     for number, (pose, odometry) in enumerate(zip(poses, odometries, strict=True)):
