@@ -15,6 +15,8 @@
 #define MOVING_NS UINT64_C(3000000000)
 /* A start in motion takes gravity from this much. */
 #define GLANCE_NS UINT64_C(100000000)
+/* After a longer pause between readings the average begins anew: few readings are no mean. */
+#define PAUSE_NS UINT64_C(100000000)
 /* At rest the readings spread by no more than this about their mean, besides their noise, and the
  * means of both halves agree to a part of it: a running engine is allowed, a walking hand is not. */
 #define SPREAD_ACCEL PLR_R(0.5)  /* m/s^2 */
@@ -44,6 +46,14 @@ void plr_alignment_restart(plr_filter *f) {
     const plr_time_ns first = f->inertial.alignment.first_ns;
     memset(&f->inertial.alignment, 0, sizeof f->inertial.alignment);
     f->inertial.alignment.first_ns = first;
+}
+
+/* What is being averaged ends at a pause, and altogether where the clock became another. */
+static void end_stretch(plr_filter *f, plr_time_ns t_ns) {
+    if (!f->reading_valid)
+        memset(&f->inertial.alignment, 0, sizeof f->inertial.alignment);
+    else if (t_ns - f->reading_ns > PAUSE_NS)
+        plr_alignment_restart(f);
 }
 
 /* Mean and spread of the readings so far (Welford). */
@@ -263,6 +273,7 @@ bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
         begin(f, t_ns, 0);
         return true;
     }
+    end_stretch(f, t_ns);
     average(at, t_ns, reading);
     const plr_time_ns stretch = t_ns - at->begin_ns;
     const bool may_move = kind == PLR_IMU_START_MOTION ||

@@ -6,7 +6,6 @@
 #include <unity.h>
 
 #include "support/imu_rig.h"
-#include "support/rigid.h"
 #include "support/specimens.h"
 
 enum { SECOND = 400 }; /* readings */
@@ -165,6 +164,32 @@ static void test_starts_at_rest_are_as_wrong_as_they_believe(void) {
     }
     TEST_ASSERT_TRUE(orientation > 1.2 && orientation < 2.9);
     TEST_ASSERT_TRUE(gyro > 2 && gyro < 4.2);
+}
+
+/* Few readings are no mean, however much time lies between them. */
+static void test_a_pause_between_readings_begins_the_second_anew(void) {
+    make_filter();
+    feed_up(10, 0, 0, g);
+    const plr_imu imu = {{0, 0, g}, {0, 0, 1e-4}};
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_filter_inertial(f, plr_filter_time(f) + UINT64_C(1500000000), &imu));
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    feed_up(SECOND - 1, 0, 0, g);
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    feed_up(2, 0, 0, g);
+    demand_started();
+}
+
+/* A pose that is set on another clock: what was averaged belongs to the old one. */
+static void test_on_another_clock_the_start_begins_anew(void) {
+    const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    make_filter();
+    feed_up(SECOND / 2, 0, 0, g);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 500000000, &identity, NULL));
+    feed_up(SECOND - 1, 0, 0, g);
+    demand_waiting(PLR_IMU_FAULT_NONE);
+    feed_up(3, 0, 0, g);
+    demand_started();
 }
 
 /* ---------------------------------------------------------------- what is no rest */
@@ -401,60 +426,6 @@ static void test_pictures_that_move_keep_the_filter_from_a_start_at_rest(void) {
     demand_started();
 }
 
-/* ---------------------------------------------------------------- set_velocity */
-
-static void test_a_velocity_is_refused_where_it_makes_no_sense(void) {
-    static const double v[3] = {1, 2, 3}, good[3] = {0.1, 0.1, 0.1};
-    const double nan_v[3] = {1, NAN, 0}, fast[3] = {0, 0, 2e4}, negative[3] = {1, -1e-9, 1};
-    const double infinite[3] = {1, 1, INFINITY}, huge[3] = {1, 2e12, 1};
-    const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
-    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(NULL, v, good));
-    make_filter();
-    imu_rig_remember();
-    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good)); /* no pose yet */
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 1000000000, &identity, NULL));
-    imu_rig_remember();
-    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(f, NULL, good));
-    TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(f, v, NULL));
-    imu_rig_demand_refusal(PLR_E_NOT_FINITE, plr_filter_set_velocity(f, nan_v, good));
-    imu_rig_demand_refusal(PLR_E_NOT_FINITE, plr_filter_set_velocity(f, v, infinite));
-    imu_rig_demand_refusal(PLR_E_RANGE, plr_filter_set_velocity(f, fast, good));
-    imu_rig_demand_refusal(PLR_E_RANGE, plr_filter_set_velocity(f, v, huge));
-    imu_rig_demand_refusal(PLR_E_ARGUMENT, plr_filter_set_velocity(f, v, negative));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, v, good));
-    demand_started();
-    feed_up(1, 0, 0, g);
-    imu_rig_remember();
-    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good)); /* it moves */
-}
-
-static void test_a_velocity_is_refused_where_there_are_landmarks_or_twists(void) {
-    static const double v[3] = {1, 2, 3}, good[3] = {0.1, 0.1, 0.1};
-    imu_rig_begin(IMU_RIG_GIVEN, 1);
-    imu_rig_fly(2);
-    TEST_ASSERT_TRUE(f->count > 0);
-    imu_rig_remember();
-    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good));
-    imu_rig.config.process = PLR_PROCESS_TWIST;
-    make_filter_at(0);
-    imu_rig_remember();
-    imu_rig_demand_refusal(PLR_E_MODE, plr_filter_set_velocity(f, v, good));
-}
-
-static void test_a_given_velocity_and_its_covariance_are_the_estimate(void) {
-    static const double v[3] = {1, -2, 3}, variance[3] = {0.01, 0.02, 0.03};
-    double P_u[36];
-    plr_twist got;
-    make_filter_at(0.2);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, v, variance));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity(f, &got));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(f, P_u));
-    for (int i = 0; i < 3; i++) {
-        TEST_ASSERT_EQUAL_DOUBLE(v[i], got.v_B_mps[i]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-8, variance[i], P_u[7 * i]);
-    }
-}
-
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_body_that_stands_for_a_second_starts);
@@ -462,6 +433,8 @@ int main(void) {
     RUN_TEST(test_at_rest_tilt_and_gyro_bias_are_measured);
     RUN_TEST(test_the_tilts_covariance_is_that_of_the_accelerometers_bias);
     RUN_TEST(test_starts_at_rest_are_as_wrong_as_they_believe);
+    RUN_TEST(test_a_pause_between_readings_begins_the_second_anew);
+    RUN_TEST(test_on_another_clock_the_start_begins_anew);
     RUN_TEST(test_a_body_that_is_shaken_does_not_start_at_rest);
     RUN_TEST(test_auto_starts_in_motion_where_the_body_never_stands);
     RUN_TEST(test_a_gyro_in_degrees_turns_while_the_body_stands);
@@ -478,8 +451,5 @@ int main(void) {
     RUN_TEST(test_frames_before_the_start_are_taken_and_make_no_landmarks);
     RUN_TEST(test_in_dead_reckoning_too_the_start_ends_the_waiting);
     RUN_TEST(test_pictures_that_move_keep_the_filter_from_a_start_at_rest);
-    RUN_TEST(test_a_velocity_is_refused_where_it_makes_no_sense);
-    RUN_TEST(test_a_velocity_is_refused_where_there_are_landmarks_or_twists);
-    RUN_TEST(test_a_given_velocity_and_its_covariance_are_the_estimate);
     return UNITY_END();
 }
