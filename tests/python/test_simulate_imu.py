@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from pelorus.simulation.imu import ImuFaults, StartGiven
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Simulation, simulate
+from replay_drive import BIN
 
 
 def drive(faults: ImuFaults | None = None, imu: Any = EXACT, **changes: Any) -> Simulation:
@@ -234,10 +236,30 @@ def test_late_readings_stand_behind_newer_frames(tmp_path: Path, pelorus: Run) -
 
 
 def test_frames_of_another_clock_are_stamped_too_early() -> None:
-    plain, other = drive(), drive(ImuFaults(camera_offset_s=0.03))
-    early = plain.recording.frame_t_ns - other.recording.frame_t_ns
-    assert set(early.tolist()) == {30_000_000}
-    assert np.array_equal(plain.recording.tracks.pixels, other.recording.tracks.pixels)
+    plain = drive().recording
+    for offset_s in (0.03, -0.02):
+        other = drive(ImuFaults(camera_offset_s=offset_s)).recording
+        ahead = (other.inertial.t_ns[0] - plain.inertial.t_ns[0]) - (
+            other.frame_t_ns[0] - plain.frame_t_ns[0]
+        )
+        assert ahead == round(offset_s * 1e9)
+        assert other.start is not None
+        assert other.start.t_ns == other.truth_t_ns[0] == other.inertial.t_ns[0]
+        assert np.array_equal(plain.tracks.pixels, other.tracks.pixels)
+
+
+def test_a_filter_that_is_told_of_the_other_clock_finds_its_truth(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    target = tmp_path / "offset.plr"
+    options = ("--imu-rate", 200, "--duration", 8, "--camera-offset", 0.04)
+    assert pelorus("simulate", target, *options).status == 0
+    evaluate = ("evaluate", target, "--bin", BIN, "--json", "--set")
+    found = json.loads(pelorus(*evaluate, "camera-offset=0.04").out)
+    assert found["truth_frames"] > 70
+    assert found["err0_m"] < 0.1
+    assert found["nees_per_dof"] < 3
+    assert "0 of its" in pelorus(*evaluate, "camera-offset=0").err, "poses of other times"
 
 
 @pytest.mark.parametrize(

@@ -114,16 +114,18 @@ def truth_of(path: Path) -> Trajectory:
     found = truth_in(messages)
     if found is not None:
         return found
-    count = sum(isinstance(m, Truth) for m in messages)
-    if not count:
-        raise PelorusError(f"{path}: holds no TRUTH frame")
-    raise PelorusError(f"{path}: none of its {count} TRUTH frames has a STEREO's time")
+    raise PelorusError(f"{path}: holds no TRUTH frame that is finite")
 
 
 def truth_in(messages: Sequence[Message]) -> Trajectory | None:
-    """TRUTH at the times of STEREO; of two at one time the later, and none that is not finite."""
+    """TRUTH at the times of STEREO; of two at one time the later, and none that is not finite.
+
+    All of it where none has such a time: then the camera has a clock of its own, and the filter's
+    poses have the other one (setting camera-offset).
+    """
     frames = _frame_times(messages)
-    used = {m.t_ns: m for m in messages if isinstance(m, Truth) and m.t_ns in frames}
+    whole = {m.t_ns: m for m in messages if isinstance(m, Truth)}
+    used = {t: m for t, m in whole.items() if t in frames} or whole
     sound = [m for m in used.values() if np.isfinite(m.R_WB).all() and np.isfinite(m.p_WB_m).all()]
     return _ordered(sound) if sound else None
 

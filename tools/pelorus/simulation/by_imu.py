@@ -58,17 +58,20 @@ def driven(
 ) -> Recording:
     """The recording with an IMU's readings in place of twists."""
     none: Floats = np.empty((0, 3))
-    early_ns = round(given.faults.camera_offset_s * 1e9)
+    ahead_ns = round(given.faults.camera_offset_s * 1e9)
+    late_ns = max(ahead_ns, 0)  # of all but the frames: no time is negative
     recording = replace(
         recording,
         twist_t_ns=np.empty(0, np.int64),
         v_B_mps=none,
         w_B_radps=none,
-        frame_t_ns=recording.frame_t_ns - early_ns,
-        inertial=sensed.readings,
+        frame_t_ns=recording.frame_t_ns + late_ns - ahead_ns,
+        truth_t_ns=recording.truth_t_ns + late_ns,
+        readings=[replace(m, t_ns=m.t_ns + late_ns) for m in recording.readings],
+        inertial=sensed.readings._replace(t_ns=sensed.readings.t_ns + late_ns),
         imu_batch=given.imu.imu_batch,
         twist_delay_ns=round(given.faults.imu_delay_s * 1e9),
-        start=_start(recording, given, chance),
+        start=_later(_start(recording, given, chance), late_ns),
         truth_velocity=given.way.velocities(smooth.seconds(recording.truth_t_ns))[0],
         truth_bias=_biases(sensed, recording.truth_t_ns),
     )
@@ -128,6 +131,10 @@ def _start(recording: Recording, given: ImuDrive, chance: np.random.Generator) -
         return start
     variance = np.full(3, imu.start_velocity_sigma_mps**2)
     return replace(start, velocity=faulty, velocity_variance=variance)
+
+
+def _later(start: Start | None, by_ns: int) -> Start | None:
+    return None if start is None else replace(start, t_ns=start.t_ns + by_ns)
 
 
 def _turned(small: Floats) -> Floats:
