@@ -28,7 +28,7 @@ FRAME_STEPS = (
     ("apply the motion; its noise stays in W", "predict.c, model_body.c"),
     ("correct x, W and P, batch by batch", "correction.c"),
     ("add W to P; retract; transport P", "covariance_motion.c, model_body.c"),
-    ("compare with the twists", "consistency.c"),
+    ("compare with twists or IMU", "consistency.c"),
     ("evict, initialise; judge health", "births.c, health.c"),
 )
 
@@ -74,18 +74,18 @@ def draw_inputs(axes: Axes) -> None:
     """What comes in, and what the process makes of it."""
     title(axes, 1.15, "what comes in", "any order, any rate")
     for y, text, small in (
-        (5.75, "twist (v, w)", "odometry and gyro, 50 to 200 Hz"),
-        (4.65, "wheel, standstill", "rows over the twist"),
-        (2.15, "position", "rows over the pose, gated alone"),
+        (5.75, "twist (v, w), or IMU (a, w)", "50 to 400 Hz; one of the two"),
+        (4.65, "wheel, standstill", "rows over the twist, beside twists"),
+        (2.15, "position", "over the state; with an IMU wheels too"),
         (0.55, "stereo frame", "ids and pixels, 10 Hz"),
     ):
         box(axes, 0.1, y, 2.1, 0.7, INPUT)
         say(axes, 1.15, y + 0.35, text, small)
-    title(axes, 4.05, "between frames", "six numbers wide, < 1 us")
+    title(axes, 4.05, "between frames", "costs the same for any N")
     box(axes, 2.95, 4.65, 2.2, 1.8, PROCESS)
-    say(axes, 4.05, 6.15, "a step of the motion", "process/twist.c, velocity.c")
+    say(axes, 4.05, 6.15, "a step of the motion", "process/twist.c, velocity.c, or imu.c")
     axes.text(
-        4.05, 5.33, "the pose moves at once;\nD = D D$_k$,  Q,  B accumulate;\nvelocities inform\n"
+        4.05, 5.33, "pose (and velocity) move at once;\nD = D D$_k$,  Q,  B accumulate;\nwheels inform\n"
         "about the biases", ha="center", va="center", fontsize=8, color=INK, linespacing=1.35,
     )  # fmt: skip
     box(axes, 2.95, 2.75, 2.2, 1.05, PROCESS)
@@ -115,7 +115,7 @@ def draw_state(axes: Axes) -> None:
     """The state, and P as a triangle of blocks with W beside it."""
     title(axes, 10.75, "the state", "one struct, static")
     left, top, unit = 9.72, 6.3, 0.34
-    names = ("pose", "bias", "1", "2", "...", "N")
+    names = ("pose", "v, b", "1", "2", "...", "N")
     rows = len(names)
     for i in range(rows):
         for j in range(i + 1):
@@ -135,7 +135,7 @@ def draw_state(axes: Axes) -> None:
     axes.text(left + 0.75 * unit * rows, top - 0.22 * unit * rows, "P", fontsize=15, color=INK)
     axes.text(left + unit * rows + 0.42, top + 0.1, "W", fontsize=12, ha="center", color=INK)
     axes.text(
-        10.9, 3.92, "P: errors of pose, biases and landmarks.\nW: the effect of the motion's\n"
+        10.9, 3.92, "P: errors of pose, velocity (with an IMU),\nbiases and landmarks. W: the motion's\n"
         "noise on each, during a frame alone", ha="center", va="center", fontsize=7.5, color=INK,
         linespacing=1.35,
     )  # fmt: skip
@@ -145,7 +145,7 @@ def draw_state(axes: Axes) -> None:
         axes,
         10.9,
         3.125,
-        "T$_{WB}$, biases, N landmarks",
+        "T$_{WB}$, v, biases, N landmarks",
         "q in the camera: bearing, 1 / range",
         8.5,
     )

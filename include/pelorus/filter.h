@@ -11,7 +11,7 @@
  *     plr_filter_update(&filter, &frame, &report);   // at every stereo pair
  *     plr_filter_pose(&filter, &pose);
  *
- * With an IMU in place of twists, and body axes that are the IMU's:
+ * With an IMU in place of twists (where it is on the body: settings imu_turn and imu_arm):
  *
  *     config.process = PLR_PROCESS_IMU;              // and its noises: gyro_noise, accel_noise ...
  *     plr_filter_inertial(&filter, t_ns, &reading);  // at every reading, in place of predict

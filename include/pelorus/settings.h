@@ -211,8 +211,8 @@ typedef struct plr_config {
     double standstill_sigma_mps;
 
     /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
-     * What moves the state. With IMU the body's axes are those of the IMU, velocity is estimated,
-     * and the biases are those of accelerometer and gyro. */
+     * What moves the state. With IMU velocity is estimated, and the biases are those of
+     * accelerometer and gyro; imu-turn and imu-arm say where it is on the body. */
     uint8_t process;
 
     /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO. */

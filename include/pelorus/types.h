@@ -171,7 +171,7 @@ typedef struct plr_twist {
     double w_B_radps[3];
 } plr_twist;
 
-/* One reading of an IMU, in the body's axes, which are those of the IMU. */
+/* One reading of an IMU. Its axes are the body's, unless the setting imu_turn says otherwise. */
 typedef struct plr_imu {
     double a_B_mps2[3];  /* specific force: at rest 9.81 upwards */
     double w_B_radps[3]; /* angular rate */
