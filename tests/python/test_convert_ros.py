@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,11 @@ from bags import NS, Recorder
 from converted import SHORT, Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
-from pelorus.converters import ros_frames
+from pelorus.converters import ros, ros_frames
+from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag
+from pelorus.converters.streams import Pictures
+from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist
 from pelorus.recording import Recording
@@ -28,6 +32,7 @@ from test_convert_csv import csv_files
 from test_convert_euroc import assert_on_surfaces
 
 RIGHT_LATE_NS = 1_000_000
+DAMAGES = 60
 FORMS = ["ros1", "sqlite3", "mcap", "lone mcap"]
 
 
@@ -360,6 +365,35 @@ def test_what_is_no_bag_is_told_and_a_cut_one_too(
     outcome = pelorus("convert", "ros", tmp_path / "folder", tmp_path / "out.plr")
     assert "is a folder without metadata.yaml; a ROS 1 bag (.bag)" in outcome.err
     assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.parametrize("form", ["ros1", "sqlite3", "lone mcap"])
+def test_damage_anywhere_in_a_bag_is_refused_or_read_and_never_something_else(
+    form: str, kalibr: Path, tmp_path: Path
+) -> None:
+    recorder = Recorder(1 if form == "ros1" else 2)
+    for k in range(6):
+        recorder.twist_stamped("/twist", (k + 1) * NS, (1, 0, 0), (0, 0, 0))
+        for topic in ("/cam0/image_raw", "/cam1/image_raw"):
+            recorder.image(topic, (k + 1) * NS, np.zeros((64, 80), np.uint8))
+    path = written(recorder, tmp_path, form)
+    path = next(path.glob("*.db3")) if path.is_dir() else path
+    content, chance, refused = path.read_bytes(), random.Random(1), 0
+    damaged = tmp_path / f"damaged{path.suffix}"
+    for _ in range(DAMAGES):
+        harmed = bytearray(content)
+        for _ in range(3):
+            harmed[chance.randrange(len(harmed))] = chance.randrange(256)
+        harmed[chance.randrange(3000) - 3000] ^= 255
+        damaged.write_bytes(harmed[: chance.randrange(1, 4 * len(harmed))])
+        try:
+            with Bag(damaged) as bag:
+                found = ros.read(bag, ros.Topics(ros_frames.Cameras()), Asked((kalibr,)))
+                assert isinstance(found.frames, Pictures)
+                list(found.frames.read())
+        except PelorusError:
+            refused += 1
+    assert refused > DAMAGES // 8
 
 
 def test_a_bag_is_closed_again(tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ known cameras must come back as what a rectified pair sees of them.
 from __future__ import annotations
 
 import json
+import random
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -38,6 +39,7 @@ from rigs import (
 )
 
 FISHEYE_SIZE = (512, 512)
+DAMAGES = 150
 
 
 def assert_rectifies(rig: Rig, cameras: Cameras) -> None:
@@ -307,6 +309,36 @@ def test_what_is_no_calibration_is_told(tmp_path: Path, text: str, said: str) ->
     with pytest.raises(ForeignFileError) as caught:
         rig_files.read([path], "x")
     assert said in str(caught.value)
+
+
+WRONG: list[Any] = [
+    *(0, -1, 1e300, 1e-300, float("nan"), float("inf"), 10**30, "x", "", None, True, [], {}, [[]]),
+    *([1, [2]], {"rows": -1, "cols": -16, "data": [1] * 16}, {"rows": 1e30, "cols": 0}),
+]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("cameras", [Cameras(), fisheye()], ids=["radtan", "fisheye"])
+def test_a_wrong_value_anywhere_is_refused_or_read_and_never_something_else(
+    tmp_path: Path, cameras: Cameras
+) -> None:
+    chance, refused = random.Random(1), 0
+    for _ in range(DAMAGES):
+        content: Any = camchain(cameras, FISHEYE_SIZE)
+        place, key = content, cast(Any, "cam0")
+        while isinstance(place[key], (dict, list)) and (place is content or chance.random() < 0.8):
+            place = place[key]
+            keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+            key = chance.choice(keys)
+        place[key] = chance.choice(WRONG)
+        path = write_yaml(tmp_path / "c.yaml", content)
+        try:
+            rig = rig_files.of_rig(rig_files.read_rig([path]), "x").rig
+            assert rig is not None
+            rig.rectification().pixels(cameras.see(points(5)))
+        except PelorusError:
+            refused += 1
+    assert DAMAGES // 2 < refused < DAMAGES
 
 
 def test_metres_are_due_and_cameras_side_by_side(tmp_path: Path) -> None:

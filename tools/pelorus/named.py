@@ -12,6 +12,7 @@ from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 
 SHOWN_MAX = 60  # characters of a bad value
+NUMBER_MAX = 1e9  # beyond, no calibration's number
 
 
 class Named:
@@ -40,7 +41,7 @@ class Named:
         """Finite numbers of this shape; a lone one without a shape."""
         value = self.get(name)
         array = as_numbers(value)
-        if array is None or array.shape != shape or not np.isfinite(array).all():
+        if array is None or array.shape != shape or not sane(array):
             due = f"an array of shape {shape} of finite numbers" if shape else "a finite number"
             raise self.error(name, value, f"{due} is due")
         return array
@@ -66,9 +67,16 @@ class Named:
         """Width and height, px."""
         value = self.get(name)
         sizes = as_numbers(value)
-        if sizes is None or sizes.shape != (2,) or not ((sizes % 1 == 0) & (sizes > 0)).all():
+        if sizes is None or sizes.shape != (2,) or not sane(sizes):
+            raise self.error(name, value, "[width, height] in px is due")
+        if not ((sizes % 1 == 0) & (sizes > 0)).all():
             raise self.error(name, value, "[width, height] in px is due")
         return int(sizes[0]), int(sizes[1])
+
+
+def sane(array: Floats) -> bool:
+    """Whether these can be numbers of a calibration."""
+    return bool((np.abs(array) <= NUMBER_MAX).all())  # NaN is not
 
 
 def as_numbers(value: Any) -> Floats | None:

@@ -27,6 +27,12 @@ class Stamped(NamedTuple):
     message: Any
 
 
+def require_messages(bag: Bag, topic: str, count: int) -> None:
+    """Refuse a topic of which nothing can be read, whatever the bag's index says."""
+    if not count:
+        raise ForeignFileError(bag.path, "no message can be read", at=topic)
+
+
 class Bag(AbstractContextManager["Bag"]):
     """`stamps`: whether a message's time is that of its header or of its arrival in the bag."""
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pelorus.console import progress
 from pelorus.converters import ros_frames, streams
 from pelorus.converters.asked import Asked
-from pelorus.converters.bag import Bag
+from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
 from pelorus.converters.streams import Readings, Streams, Twists
 from pelorus.errors import PelorusError
@@ -195,6 +195,7 @@ def _rows(
     """Times and numbers of a topic in the order of time; of two at one time the first."""
     found = progress(bag.messages([topic]), f"reading {topic}", bag.count([topic]))
     stamped = [(t_ns, row(message)) for _, t_ns, message in found]
+    require_messages(bag, topic, len(stamped))
     t_ns = np.array([t for t, _ in stamped], np.int64)
     numbers = np.array([values for _, values in stamped])
     require_stamps(bag, topic, t_ns)

@@ -17,7 +17,7 @@ import numpy as np
 
 from pelorus import se3
 from pelorus.console import progress
-from pelorus.converters.bag import Bag
+from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.streams import Pictures, Seen
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
@@ -109,6 +109,8 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     stamps: dict[str, list[int]] = {topic: [] for topic in topics}
     for topic, t_ns, _ in progress(bag.messages(topics), "finding pictures", bag.count(topics)):
         stamps[topic].append(t_ns)
+    for topic, found in stamps.items():
+        require_messages(bag, topic, len(found))
     left, right = (np.unique(np.array(stamps[topic], np.int64)) for topic in topics)
     pairs = _paired(bag, cameras, left, right)
     alone = len(left) + len(right) - 2 * len(pairs)

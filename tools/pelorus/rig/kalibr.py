@@ -18,7 +18,7 @@ import numpy as np
 from pelorus import se3
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
-from pelorus.named import Named, as_numbers
+from pelorus.named import Named, as_numbers, sane
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import ImuNoise, Rig, rigid
 from pelorus.se3 import Poses
@@ -33,6 +33,7 @@ LENSES = {
 }
 TO_CAMERA, FROM_CAMERA = ("T_cam_imu",), ("T_imu_cam", "T_BS")
 STEP = "T_cn_cnm1"
+FOCAL_MIN_PX = 1.0  # less is in another unit
 AGREE = 1e-3  # m and rad: two ways to the same camera
 NOISE = {
     "gyro_noise": "gyroscope_noise_density",
@@ -101,10 +102,11 @@ def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:
     if isinstance(value, dict):
         inner = content.object(name)
         value = as_numbers(inner.get("data"))
-        size = int(inner.number("rows")), int(inner.number("cols"))
-        value = value.reshape(size) if value is not None and value.size == size[0] * size[1] else 0
+        size = [inner.number("rows"), inner.number("cols")]
+        if size == [rows, columns] and value is not None and value.shape == (rows * columns,):
+            value = value.reshape(rows, columns)
     found = as_numbers(value)
-    if found is None or found.shape != (rows, columns) or not np.isfinite(found).all():
+    if found is None or found.shape != (rows, columns) or not sane(found):
         raise content.error(name, content.get(name), f"{rows} x {columns} finite numbers are due")
     return found
 
@@ -137,7 +139,7 @@ def _lens(camera: Named) -> Lens:
     if "camera_model" in camera:
         camera.word("camera_model", ("pinhole",))
     numbers = camera.array("intrinsics", 4).tolist()
-    if min(numbers[:2]) <= 0:
+    if min(numbers[:2]) < FOCAL_MIN_PX:
         raise camera.error("intrinsics", numbers, "[fx, fy, cx, cy] in px is due")
     model = LENSES[camera.word("distortion_model", tuple(LENSES))]
     if "resolution" not in camera:

@@ -75,20 +75,22 @@ class Lens:
         rays = np.asarray(
             find(np.ascontiguousarray(pixels[:, None], np.float64), self.K, self._D), np.float64
         ).reshape(-1, 2)
-        for _ in range(NEWTON_STEPS):
-            J = np.stack(
-                [
-                    (self.distort(rays + step) - self.distort(rays - step)) / (2 * DIFFERENCE)
-                    for step in DIFFERENCE * np.eye(2)
-                ],
-                axis=-1,
-            )
-            sound = np.abs(np.linalg.det(J)) > 1  # px^2: else the lens folds there
-            miss = pixels - self.distort(rays)
-            rays[sound] += np.linalg.solve(J[sound], miss[sound, :, None])[..., 0]
-        off = np.linalg.norm(pixels - self.distort(rays), axis=1)
-        rays[~(off < MISS_MAX_PX)] = np.nan
+        with np.errstate(all="ignore"):
+            for _ in range(NEWTON_STEPS):
+                J = self._slope(rays)
+                det = np.abs(np.linalg.det(J))
+                sound = (det > 1) & np.isfinite(det)  # px^2: else the lens folds there
+                miss = pixels - self.distort(rays)
+                rays[sound] += np.linalg.solve(J[sound], miss[sound, :, None])[..., 0]
+            off = np.linalg.norm(pixels - self.distort(rays), axis=1)
+            rays[~(off < MISS_MAX_PX)] = np.nan
         return rays
+
+    def _slope(self, rays: Floats) -> Floats:
+        """(n, 2, 2) d px / d ray."""
+        steps = DIFFERENCE * np.eye(2)
+        sides = [self.distort(rays + step) - self.distort(rays - step) for step in steps]
+        return np.stack(sides, axis=-1) / (2 * DIFFERENCE)
 
     @property
     def _is_fisheye(self) -> bool:

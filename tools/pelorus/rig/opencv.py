@@ -89,7 +89,7 @@ def _numbers(content: Named, name: str) -> tuple[float, ...]:
         value = np.ravel(value).tolist()
         return tuple(Named(content.path, {name: value}).array(name, len(value)).tolist())
     inner = content.object(name)
-    count = round(inner.number("rows") * inner.number("cols"))
+    count = int(inner.number("rows") * inner.number("cols"))
     return tuple(inner.array("data", count).tolist())
 
 

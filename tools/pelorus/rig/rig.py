@@ -74,9 +74,7 @@ class Rig:
         try:
             return Rectification.of(self.left, self.right, self.T_RL)
         except ValueError as error:
-            raise ForeignFileError(
-                self.path, str(error), due="cameras side by side are due"
-            ) from None
+            raise ForeignFileError(self.path, str(error)) from None
 
     def header(self, rectification: Rectification, name: str) -> Header:
         """Of the rectified camera."""
