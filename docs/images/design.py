@@ -85,8 +85,9 @@ def draw_inputs(axes: Axes) -> None:
     box(axes, 2.95, 4.65, 2.2, 1.8, PROCESS)
     say(axes, 4.05, 6.15, "a step of the motion", "process/twist.c, velocity.c, or imu.c")
     axes.text(
-        4.05, 5.33, "pose (and velocity) move at once;\nD = D D$_k$,  Q,  B accumulate;\nwheels inform\n"
-        "about the biases", ha="center", va="center", fontsize=8, color=INK, linespacing=1.35,
+        4.05, 5.33, "pose (and velocity) move at once;\nD = D D$_k$,  Q,  B accumulate;\n"
+        "wheels inform\nabout the biases", ha="center", va="center", fontsize=8, color=INK,
+        linespacing=1.35,
     )  # fmt: skip
     box(axes, 2.95, 2.75, 2.2, 1.05, PROCESS)
     say(axes, 4.05, 3.42, "motion since landmarks")
@@ -135,9 +136,9 @@ def draw_state(axes: Axes) -> None:
     axes.text(left + 0.75 * unit * rows, top - 0.22 * unit * rows, "P", fontsize=15, color=INK)
     axes.text(left + unit * rows + 0.42, top + 0.1, "W", fontsize=12, ha="center", color=INK)
     axes.text(
-        10.9, 3.92, "P: errors of pose, velocity (with an IMU),\nbiases and landmarks. W: the motion's\n"
-        "noise on each, during a frame alone", ha="center", va="center", fontsize=7.5, color=INK,
-        linespacing=1.35,
+        10.9, 3.92, "P: errors of pose, velocity (with an IMU),\nbiases and landmarks. "
+        "W: the motion's\nnoise on each, during a frame alone", ha="center", va="center",
+        fontsize=7.5, color=INK, linespacing=1.35,
     )  # fmt: skip
     arrow(axes, (8.95, 2.3), (9.3, 2.3), (9.3, 3.15), (9.55, 3.15))
     box(axes, 9.55, 2.75, 2.7, 0.75, STATE)
