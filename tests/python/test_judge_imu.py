@@ -121,6 +121,17 @@ def test_a_start_before_the_first_frame_counts_from_the_first_frame() -> None:
     assert found["truth_frames"] == 500
 
 
+def test_a_filter_that_never_started_is_judged_by_the_pose_that_it_kept() -> None:
+    """An accelerometer that reads in g: the pose stays where it was set."""
+    messages: list[Message] = [BY_IMU]
+    for k in range(11):
+        truth = Poses(TURNED.R, TURNED.p + [0.3 * k, 0.0, 0.0])
+        messages += frame(k, TURNED, truth, SET)
+    found = judge(messages)
+    assert found["truth_frames"] == 11
+    assert found["err0_m"] == pytest.approx(0.3 * np.sqrt(35))
+
+
 def test_what_truth_does_not_tell_is_left_open() -> None:
     messages: list[Message] = [BY_IMU]
     for k in range(5):

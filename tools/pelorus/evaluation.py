@@ -150,12 +150,13 @@ def about_vertical(T: Poses, T_true: Poses) -> Poses:
 def world_laid(P: Floats) -> int:
     """The last frame whose position is known as it was set: alike along all axes, and by itself.
 
-    The first one if there is none such: then the world was laid before it.
+    The first one if there is none such: then the world was laid before it. And if the last frame of
+    all is such a one: then the filter has never started.
     """
     rho, cross = P[:, :3, :3], P[:, :3, 3:]
     alike = (rho == rho[:, :1, :1] * np.eye(3)).all(axis=(1, 2))
     as_set = np.nonzero(alike & (cross == 0).all(axis=(1, 2)))[0]
-    return int(as_set[-1]) if len(as_set) else 0
+    return int(as_set[-1]) if len(as_set) and as_set[-1] < len(P) - 1 else 0
 
 
 def match(
