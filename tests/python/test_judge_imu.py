@@ -125,7 +125,7 @@ def test_a_filter_that_never_started_is_judged_by_the_pose_that_it_kept() -> Non
     """An accelerometer that reads in g: the pose stays where it was set."""
     messages: list[Message] = [BY_IMU]
     for k in range(11):
-        truth = Poses(TURNED.R, TURNED.p + [0.3 * k, 0.0, 0.0])
+        truth = Poses(TURNED.R, TURNED.p + np.array([0.3 * k, 0.0, 0.0]))
         messages += frame(k, TURNED, truth, SET)
     found = judge(messages)
     assert found["truth_frames"] == 11
