@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
  * Counts what the filter costs: replays a recording that is part of the image, and writes a line of
- * text for each size, and for each predict and update the core clocks that it took. Under QEMU's
+ * text for each size, and for each predict, reading of an IMU and update the core clocks that it took. Under QEMU's
  * `-icount shift=0` an instruction takes a nanosecond, so clocks are instructions divided by a known
  * number, and repeat to the clock: nothing comes in over the link, and no interrupt is on.
  */
@@ -45,8 +45,40 @@ static void begin(const plr_header *header) {
     config.bias = 1;
     config.slots = PLR_MAX_LANDMARKS;
     config.twist_timing = header->twist_timing;
+    config.process = header->process;
+    if (header->process == PLR_PROCESS_IMU) {
+        config.gyro_noise = header->gyro_noise;
+        config.accel_noise = header->accel_noise;
+        config.gyro_walk = header->gyro_walk;
+        config.accel_walk = header->accel_walk;
+        config.gravity_mps2 = header->gravity_mps2;
+    }
+    add_field("process", header->process);
+    put_line();
     if (plr_filter_init(&filter, &header->calibration, &config, NULL) != PLR_OK) {
         text_add(&line, "error: the filter refuses the recording's HEADER");
+        put_line();
+    }
+}
+
+/* An IMU starts from the pose and the velocity that are given: no frame is lost to the alignment. */
+static void start(const plr_start *given) {
+    double P_xi[36];
+    plr_status status = PLR_OK;
+    if (plr_filter_config(&filter)->process != PLR_PROCESS_IMU) {
+        return;
+    }
+    for (unsigned i = 0, k = 0; i < 6; i++) {
+        for (unsigned j = 0; j <= i; j++, k++) {
+            P_xi[6 * i + j] = P_xi[6 * j + i] = given->P_xi[k];
+        }
+    }
+    status = plr_filter_set_pose(&filter, given->t_ns, &given->T_WB, P_xi);
+    if (status == PLR_OK) {
+        status = plr_filter_set_velocity(&filter, given->velocity, given->velocity_variance);
+    }
+    if (status != PLR_OK) {
+        text_add(&line, "error: the filter refuses the recording's START");
         put_line();
     }
 }
@@ -63,6 +95,19 @@ static void time_predict(const plr_twist_message *twist) {
     if (status == PLR_OK) {
         add_field("predict", clocks);
         put_line();
+    }
+}
+
+static void time_readings(const plr_imu_message *imu) {
+    for (unsigned i = 0; i < imu->count; i++) {
+        const plr_time_ns t_ns = imu->t_ns + (plr_time_ns)i * imu->period_ns;
+        const uint32_t start = SYST_CVR;
+        const plr_status status = plr_filter_inertial(&filter, t_ns, &imu->readings[i]);
+        const uint32_t clocks = clocks_since(start);
+        if (status == PLR_OK) {
+            add_field("reading", clocks);
+            put_line();
+        }
     }
 }
 
@@ -87,8 +132,14 @@ static void take(void) {
     case PLR_KIND_HEADER:
         begin(&message.as.header);
         break;
+    case PLR_KIND_START:
+        start(&message.as.start);
+        break;
     case PLR_KIND_TWIST:
         time_predict(&message.as.twist);
+        break;
+    case PLR_KIND_IMU:
+        time_readings(&message.as.imu);
         break;
     case PLR_KIND_STEREO:
         time_update(&message.as.stereo);

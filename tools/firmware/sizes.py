@@ -11,10 +11,11 @@ calls them in order.
 
 from __future__ import annotations
 
+import itertools
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
@@ -40,19 +41,39 @@ EMULATED_HZ = {"stm32f405": 168_000_000}
 INSTRUCTIONS_PER_SECOND = 1_000_000_000  # -icount shift=0: one a nanosecond
 
 
+@dataclass(frozen=True)
+class Process:
+    """What moves the body between frames."""
+
+    name: str
+    options: tuple[str, ...]  # of `pelorus simulate`
+    step: str  # what the bench image calls a reading of it
+    core: int  # rows of the state before the landmarks
+
+
+# By their number in a HEADER.
+PROCESSES = {
+    0: Process("twist", (), "predict", 12),
+    1: Process("imu", ("--imu-rate", "200"), "reading", 15),
+}
+
+
 # --- the recording -------------------------------------------------------------------------------
 
 
 def write_recording(target: Path) -> None:
-    """Two drives one after the other: every frame of 20 observations, then the busiest possible.
+    """Two drives of each process: every frame of 20 observations, then the busiest possible.
 
     A file that holds them already is left alone: images are made of it.
     """
     parts = []
-    for observations in (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS):
-        part = target.with_suffix(f".{observations}.plr")
+    for process, observations in itertools.product(
+        PROCESSES.values(), (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS)
+    ):
+        part = target.with_suffix(f".{process.name}.{observations}.plr")
         command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--seed", SEED]
         command += ["--duration", DURATION_S, "--observations", str(2 * BUSY_OBSERVATIONS)]
+        command += process.options
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         messages = [frame.message for frame in read_file(part)[0]]
         with part.open("wb") as stream:
@@ -101,6 +122,28 @@ class Update:
 
 
 @dataclass(frozen=True)
+class Run:
+    """What the drives of one process took."""
+
+    steps: list[float] = field(default_factory=list)
+    updates: list[Update] = field(default_factory=list)
+
+    @property
+    def full(self) -> list[float]:
+        """The frames of 20 observations."""
+        return [u.instructions for u in self.updates if u.observations == FRAME_OBSERVATIONS]
+
+    @property
+    def spread(self) -> float:
+        """Worst over median, among frames of which everything counted is the same."""
+        groups: dict[tuple[int, ...], list[float]] = {}
+        for update in self.updates:
+            key = (update.observations, update.matched, update.used, update.created, update.active)
+            groups.setdefault(key, []).append(update.instructions)
+        return max((max(group) / median(group) for group in groups.values()), default=1.0)
+
+
+@dataclass(frozen=True)
 class Bench:
     """What a bench image told."""
 
@@ -108,8 +151,7 @@ class Bench:
     workspace_bytes: int
     session_bytes: int
     stack_bytes: int
-    predicts: list[float]
-    updates: list[Update]
+    runs: dict[str, Run]
 
 
 def fields(line: str) -> dict[str, int]:
@@ -134,17 +176,20 @@ def run_bench(board: str, image: Path) -> Bench:
     first, *lines, last = text.decode().splitlines()
     sizes = fields(first.removeprefix("size "))
     per_clock = INSTRUCTIONS_PER_SECOND / EMULATED_HZ.get(board, sizes["hz"])
-    predicts, updates = [], []
+    runs = {process.name: Run() for process in PROCESSES.values()}
+    process = PROCESSES[0]
     for line in lines:
         found = fields(line)
-        if "predict" in found:
-            predicts.append(found["predict"] * per_clock)
+        if "process" in found:
+            process = PROCESSES[found["process"]]
+        elif process.step in found:
+            runs[process.name].steps.append(found[process.step] * per_clock)
         else:
             instructions = found.pop("update") * per_clock
             found.pop("evicted")
-            updates.append(Update(instructions, **found))
+            runs[process.name].updates.append(Update(instructions, **found))
     stack = fields(last.removeprefix("done "))["stack"]
-    return Bench(sizes["filter"], sizes["workspace"], sizes["session"], stack, predicts, updates)
+    return Bench(sizes["filter"], sizes["workspace"], sizes["session"], stack, runs)
 
 
 @dataclass(frozen=True)
@@ -159,13 +204,7 @@ class Cost:
     session: int
     stack_bound: int
     stack_seen: int
-    predict: float
-    predict_worst: float
-    frame: float
-    frame_worst: float
-    spread: float  # worst over median of frames with the same counts
-    busiest: float
-    bench: Bench
+    runs: dict[str, Run]
 
 
 def section_sizes(image: Path) -> tuple[int, int]:
@@ -177,15 +216,6 @@ def section_sizes(image: Path) -> tuple[int, int]:
     return text + data, data + bss
 
 
-def spread_of(updates: list[Update]) -> float:
-    """Worst over median, among frames of which everything counted is the same."""
-    groups: dict[tuple[int, ...], list[float]] = {}
-    for update in updates:
-        key = (update.observations, update.matched, update.used, update.created, update.active)
-        groups.setdefault(key, []).append(update.instructions)
-    return max((max(group) / median(group) for group in groups.values()), default=1.0)
-
-
 def measure(build: Path, board: str, capacity: int) -> Cost:
     """Everything about one board and capacity."""
     firmware = build / "images" / f"pelorus-{board}-n{capacity}.elf"
@@ -193,7 +223,6 @@ def measure(build: Path, board: str, capacity: int) -> Cost:
     library = f"pelorus-{PROCESSORS[board]}-n{capacity}-f32.dir"
     folders = [build / "CMakeFiles" / library, build / "CMakeFiles" / f"{firmware.stem}.dir"]
     bench = run_bench(board, build / "images" / f"bench-{board}-n{capacity}.elf")
-    full = [u.instructions for u in bench.updates if u.observations == FRAME_OBSERVATIONS]
     return Cost(
         board=board,
         capacity=capacity,
@@ -203,13 +232,7 @@ def measure(build: Path, board: str, capacity: int) -> Cost:
         session=bench.session_bytes - bench.filter_bytes,
         stack_bound=image_bound(firmware, folders).stack_bytes,
         stack_seen=bench.stack_bytes,
-        predict=median(bench.predicts),
-        predict_worst=max(bench.predicts),
-        frame=median(full),
-        frame_worst=max(full),
-        spread=spread_of(bench.updates),
-        busiest=max(u.instructions for u in bench.updates),
-        bench=bench,
+        runs=bench.runs,
     )
 
 
@@ -218,21 +241,21 @@ def measure(build: Path, board: str, capacity: int) -> Cost:
 TERMS = ("1", "m", "m n", "n^2", "b n", "b n^2")
 
 
-def terms(capacity: int, observations: int) -> list[float]:
+def terms(process: Process, capacity: int, observations: int) -> list[float]:
     """n is the state's dimension, b the number of blocks."""
-    n = 12 + 3 * capacity
+    n = process.core + 3 * capacity
     blocks = -(-min(observations, capacity) // 8)
     return [1.0, observations, observations * n, n * n, blocks * n, blocks * n * n]
 
 
-def fit_bound(costs: list[Cost]) -> list[float]:
+def fit_bound(process: Process, costs: list[Cost]) -> list[float]:
     """Coefficients as large as the worst frame of any board asks for, and little larger."""
     worst: dict[tuple[int, int], float] = {}
     for cost in costs:
-        for update in cost.bench.updates:
+        for update in cost.runs[process.name].updates:
             key = (cost.capacity, update.observations)
             worst[key] = max(worst.get(key, 0.0), update.instructions)
-    rows = np.array([terms(*key) for key in worst])
+    rows = np.array([terms(process, *key) for key in worst])
     values = np.array(list(worst.values()))
     coefficients, _ = nnls(rows / values[:, None], np.ones(len(values)))
     short_by = max(values / (rows @ coefficients))
@@ -241,45 +264,53 @@ def fit_bound(costs: list[Cost]) -> list[float]:
 
 # --- the document --------------------------------------------------------------------------------
 
-TITLES = (
-    "board | N | flash | RAM | filter | session | stack, bound | stack, seen",
-    "board | N | predict, median | worst | frame of 20, median | worst | worst / median at the "
-    "same counts | busiest frame | its bound",
+MEMORY_TITLE = "board | N | flash | RAM | filter | session | stack, bound | stack, seen"
+TIME_TITLE = (
+    "board | N | {step}, median | worst | frame of 20, median | worst | worst / median at the "
+    "same counts | busiest frame | its bound"
 )
 
 
 def document(costs: list[Cost]) -> str:
     """docs/SIZES.md."""
-    bound = fit_bound(costs)
+    memory = [
+        f"| {cost.board} | {cost.capacity} | {cost.flash} | {cost.ram} | {cost.filter} | "
+        f"{cost.session} | {cost.stack_bound} | {cost.stack_seen} |"
+        for cost in costs
+    ]
+    parts = {
+        f"{process.name}_{part}": text
+        for process in PROCESSES.values()
+        for part, text in zip(("time", "formula"), time_of(process, costs), strict=True)
+    }
+    return TEMPLATE.format(
+        memory="\n".join((_title(MEMORY_TITLE), *memory)),
+        tolerance=f"{TOLERANCE:.0%}",
+        busy=BUSY_OBSERVATIONS,
+        spread_limit=SPREAD_LIMIT,
+        **parts,
+    )
+
+
+def time_of(process: Process, costs: list[Cost]) -> tuple[str, str]:
+    """The table of a process, and the bound of its frames."""
+    bound = fit_bound(process, costs)
+    lines = [_title(TIME_TITLE.format(step=process.step))]
+    for cost in costs:
+        run = cost.runs[process.name]
+        busiest = max(update.instructions for update in run.updates)
+        limit = float(np.dot(bound, terms(process, cost.capacity, BUSY_OBSERVATIONS)))
+        lines.append(
+            f"| {cost.board} | {cost.capacity} | {median(run.steps):.0f} | {max(run.steps):.0f} | "
+            f"{median(run.full):.0f} | {max(run.full):.0f} | {run.spread:.3f} | {busiest:.0f} | "
+            f"{limit:.0f} |"
+        )
     formula = " + ".join(
         f"{c:g} {name}" if name != "1" else f"{c:g}"
         for c, name in zip(bound, TERMS, strict=True)
         if c
     )
-    memory, time = [], []
-    for cost in costs:
-        limit = sum(
-            c * t for c, t in zip(bound, terms(cost.capacity, BUSY_OBSERVATIONS), strict=True)
-        )
-        memory.append(
-            f"| {cost.board} | {cost.capacity} | {cost.flash} | {cost.ram} | {cost.filter} | "
-            f"{cost.session} | {cost.stack_bound} | {cost.stack_seen} |"
-        )
-        time.append(
-            f"| {cost.board} | {cost.capacity} | {cost.predict:.0f} | {cost.predict_worst:.0f} | "
-            f"{cost.frame:.0f} | {cost.frame_worst:.0f} | {cost.spread:.3f} | {cost.busiest:.0f} | "
-            f"{limit:.0f} |"
-        )
-    return TEMPLATE.format(
-        memory_title=_title(TITLES[0]),
-        memory="\n".join(memory),
-        time_title=_title(TITLES[1]),
-        time="\n".join(time),
-        formula=formula,
-        tolerance=f"{TOLERANCE:.0%}",
-        busy=BUSY_OBSERVATIONS,
-        spread_limit=SPREAD_LIMIT,
-    )
+    return "\n".join(lines), formula
 
 
 def _title(names: str) -> str:
@@ -310,7 +341,6 @@ resolved by the table in `tools/firmware/stack.py`; no recursion, no frame witho
 bound) with one interrupt on top. *Stack, seen* is what the bench image used,
 without interrupts and session.
 
-{memory_title}
 {memory}
 
 There is no heap and no stdio: the linker refuses `malloc`, `printf` and their like, and the library
@@ -320,46 +350,71 @@ has no writable globals (`tests/layering`).
 
 Instructions, **not cycles**: QEMU counts them (`-icount shift=0`) and knows neither caches nor wait
 states nor dual issue. They repeat exactly; the resolution is one tick of SysTick, 40 instructions
-on MPS2. A recording is part of the image: a simulated drive with a twist every 10 ms and a frame
-every 100 ms, first with exactly 20 observations in each frame, then with up to {busy}.
+on MPS2. A recording is part of the image: simulated drives with a frame every 100 ms, first with
+exactly 20 observations in each frame, then with up to {busy}; one pair of them with a twist every
+10 ms, one with a reading of an IMU every 5 ms.
 
-{time_title}
-{time}
+A frame costs at most what stands below its table, in instructions, with m observations in the
+frame, n rows of the state (12 + 3 N with twists, 15 + 3 N with an IMU), and b = min(m, N) / 8
+blocks, rounded up. The coefficients are fitted to the worst frames of all boards and scaled until
+none is above; *its bound* is the formula at m = {busy}, beside the busiest frame that was met.
+Every loop has a count that N and m bound, and a library function that is not of constant time for
+such a count does not exist in it; so the worst case is no other than that of these counts.
+
+### With twists
+
+{twist_time}
 
 A predict costs the same for every N. A frame costs at most
 
-    {formula}
+    {twist_formula}
 
-instructions, with m observations in the frame, n = 12 + 3 N, and b = min(m, N) / 8 blocks, rounded
-up. The coefficients are fitted to the worst frames of all boards and scaled until none is above;
-*its bound* is the formula at m = {busy}, beside the busiest frame that was met. Every loop has a
-count that N and m bound, and a library function that is not of constant time for such a count does
-not exist in it; so the worst case is no other than that of these counts.
+### With an IMU
+
+{imu_time}
+
+A reading costs the same for every N. A frame costs at most
+
+    {imu_formula}
 """
 
 
-def numbers(text: str) -> dict[tuple[str, str], list[float]]:
-    """(board, capacity, which table) -> the numbers of a row."""
-    rows: dict[tuple[str, str], list[float]] = {}
+Numbers = dict[tuple[str, str], dict[str, float]]
+
+
+def numbers(text: str) -> Numbers:
+    """(board and capacity, which table) -> the numbers of a row by the titles of their columns."""
+    rows: Numbers = {}
+    titles: list[str] = []
     for line in text.splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if len(cells) > 2 and cells[0] in MACHINES:
-            rows[f"{cells[0]} N={cells[1]}", f"{len(cells)}"] = [float(cell) for cell in cells[2:]]
+        if cells[0] == "board":
+            titles = cells
+        elif cells[0] in MACHINES:
+            values = map(float, cells[2:])
+            names = [f"{k}: {name}" for k, name in enumerate(titles[2:])]
+            rows[f"{cells[0]} N={cells[1]}", titles[2]] = dict(zip(names, values, strict=True))
     return rows
 
 
 def differences(old: str, new: str) -> list[str]:
     """What moved by more than the tolerance, or is no longer there."""
     before, now = numbers(old), numbers(new)
-    found = [f"{row}: in the document, and not measured" for row, _ in before.keys() - now.keys()]
-    found += [f"{row}: measured, and not in the document" for row, _ in now.keys() - before.keys()]
-    for key in before.keys() & now.keys():
-        titles = next(title for title in TITLES if str(title.count("|") + 1) == key[1])
-        names = [name.strip() for name in titles.split("|")][2:]
-        for name, was, is_now in zip(names, before[key], now[key], strict=True):
-            allowed = {"stack, seen": 64.0}.get(name, TOLERANCE * was)
+    found = [
+        f"{row}, {table}: in the document, and not measured"
+        for row, table in before.keys() - now.keys()
+    ]
+    found += [
+        f"{row}, {table}: measured, and not in the document"
+        for row, table in now.keys() - before.keys()
+    ]
+    for row, table in before.keys() & now.keys():
+        for name, is_now in now[row, table].items():
+            was = before[row, table].get(name, 0.0)
+            title = name.partition(": ")[2]
+            allowed = 64.0 if title == "stack, seen" else TOLERANCE * was
             if abs(is_now - was) > allowed:
-                found.append(f"{key[0]}: {name}: {was:g} in the document, {is_now:g} now")
+                found.append(f"{row}, {table}: {title}: {was:g} in the document, {is_now:g} now")
     return sorted(found)
 
 
@@ -387,10 +442,11 @@ def main(arguments: list[str]) -> int:
             costs = measure_all(Path(build))
             wrong = differences(Path(path).read_text(), document(costs))
             wrong += [
-                f"{cost.board} N={cost.capacity}: worst / median {cost.spread:.3f} is above"
-                f" {SPREAD_LIMIT}"
+                f"{cost.board} N={cost.capacity}, {process}: worst / median {run.spread:.3f} is"
+                f" above {SPREAD_LIMIT}"
                 for cost in costs
-                if cost.spread > SPREAD_LIMIT
+                for process, run in cost.runs.items()
+                if run.spread > SPREAD_LIMIT
             ]
             for line in wrong:
                 err.print(line)
