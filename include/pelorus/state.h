@@ -135,7 +135,6 @@ typedef struct plr_inertial {
     plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */
     plr_real change2[2]; /* mean square of the difference between successive readings */
     plr_real usual_s;    /* usual interval between readings */
-    plr_alignment alignment;
     plr_time_ns started_ns;
     plr_time_ns still_ns; /* of the last standstill that was measured */
     uint16_t repeated;    /* successive readings of the same numbers */
@@ -288,7 +287,12 @@ typedef struct plr_filter {
     plr_workspace work;
 
     plr_consistency consistency;
-    plr_velocities velocities; /* part of the "small" checksum while any is known */
+    /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
+     * twists, while any is known; alignment with an IMU, until it has started. */
+    union {
+        plr_velocities velocities;
+        plr_alignment alignment;
+    } either;
     plr_core_motion
         core_motion; /* with an IMU, and then part of the "small" checksum, as the next */
     plr_inertial inertial;

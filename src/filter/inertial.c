@@ -159,7 +159,7 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     unsigned seen = 0;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
-        plr_watched_point *point = watched(&f->inertial.alignment, o->id);
+        plr_watched_point *point = watched(&f->either.alignment, o->id);
         if (!point)
             continue;
         if (!point->used) {

@@ -40,18 +40,20 @@ enum { ANCHOR_FRAMES = 10 };
 
 void plr_alignment_clear(plr_filter *f) {
     memset(&f->inertial, 0, sizeof f->inertial);
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        memset(&f->either.alignment, 0, sizeof f->either.alignment);
 }
 
 void plr_alignment_restart(plr_filter *f) {
-    const plr_time_ns first = f->inertial.alignment.first_ns;
-    memset(&f->inertial.alignment, 0, sizeof f->inertial.alignment);
-    f->inertial.alignment.first_ns = first;
+    const plr_time_ns first = f->either.alignment.first_ns;
+    memset(&f->either.alignment, 0, sizeof f->either.alignment);
+    f->either.alignment.first_ns = first;
 }
 
 /* What is being averaged ends at a pause, and altogether where the clock became another. */
 static void end_stretch(plr_filter *f, plr_time_ns t_ns) {
     if (!f->reading_valid)
-        memset(&f->inertial.alignment, 0, sizeof f->inertial.alignment);
+        memset(&f->either.alignment, 0, sizeof f->either.alignment);
     else if (t_ns - f->reading_ns > PAUSE_NS)
         plr_alignment_restart(f);
 }
@@ -156,13 +158,13 @@ static void begin(plr_filter *f, plr_time_ns t_ns, plr_real interval) {
     s->started = 1;
     s->started_ns = s->still_ns = t_ns;
     s->usual_s = interval;
-    memcpy(s->slow, s->alignment.mean, sizeof s->slow);
+    memcpy(s->slow, f->either.alignment.mean, sizeof s->slow);
 }
 
 /* The unit vector of the mean specific force less its bias; returns its length, m/s^2. */
 static plr_real measured_up(const plr_filter *f, plr_real u[3]) {
     for (unsigned i = 0; i < 3; i++)
-        u[i] = f->inertial.alignment.mean[i] - f->bias[i];
+        u[i] = f->either.alignment.mean[i] - f->bias[i];
     const plr_real length = PLR_SQRT(plr_dot3(u, u));
     for (unsigned i = 0; i < 3 && length > 0; i++)
         u[i] /= length;
@@ -189,7 +191,7 @@ static plr_imu_fault find_fault(const plr_filter *f, const plr_real u[3], plr_re
  * accelerometer's bias: theta = [u]x db_a / g. */
 static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, const plr_real u[3]) {
     enum { A = 0, G = 3 };
-    const plr_alignment *at = &f->inertial.alignment;
+    const plr_alignment *at = &f->either.alignment;
     const plr_real seconds = interval * (plr_real)at->count;
     const plr_real measured = f->par.gyro_density / seconds;
     const plr_real flicker = f->par.accel_density / (seconds * f->par.gravity * f->par.gravity);
@@ -243,7 +245,7 @@ void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
 
 /* Starts if the stretch that was averaged is good for it. */
 static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
-    plr_alignment *at = &f->inertial.alignment;
+    plr_alignment *at = &f->either.alignment;
     plr_real u[3];
     const plr_real interval =
         (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
@@ -265,7 +267,7 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
 
 bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
     const plr_imu_start kind = (plr_imu_start)f->config.imu_start;
-    plr_alignment *at = &f->inertial.alignment;
+    plr_alignment *at = &f->either.alignment;
     if (kind == PLR_IMU_START_GIVEN) {
         if (!f->inertial.pose_given)
             return false;

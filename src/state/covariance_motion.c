@@ -118,18 +118,17 @@ void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned row
 }
 
 /* X, rows x drivers with leading dimension PLR_DRIVERS, is a derivative by the drivers before a
- * motion (I + E, p). Y becomes the same by the drivers after the pose's transport: theta is turned
+ * motion (I + E, p). It becomes the same by the drivers after the pose's transport: theta is turned
  * by it, all others stay. */
 static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsigned rows,
-                                 const plr_real *X, plr_real *Y) {
-    memcpy(Y, X, rows * PLR_DRIVERS * sizeof *Y);
+                                 plr_real *X) {
     if (f->layout.driver >= PLR_POSE_DIM)
         return;
-    for (unsigned r = 0; r < rows; r++) {
+    for (unsigned r = 0; r < rows; r++, X += PLR_DRIVERS) {
         plr_real turned[3];
-        plr_mat3_tvec(turned, E, X + PLR_DRIVERS * r);
+        plr_mat3_tvec(turned, E, X);
         for (unsigned c = 0; c < 3; c++)
-            Y[PLR_DRIVERS * r + c] += turned[c];
+            X[c] += turned[c];
     }
 }
 
@@ -171,7 +170,8 @@ void plr_covariance_carry_core(plr_filter *f) {
 static void carry_core(plr_filter *f, const plr_applied_motion *motion, plr_real *Vt, size_t ld) {
     const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
     plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], X[PLR_POSE_DIM * PLR_REST_DIM];
-    drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, f->core_motion.V, V);
+    memcpy(V, f->core_motion.V, sizeof V);
+    drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, V);
     carry_core_covariance(f, V);
     memcpy(X, f->core_motion.Q_nc, sizeof X);
     plr_motion_solve(motion->L, PLR_REST_DIM, X, PLR_REST_DIM);
@@ -199,7 +199,8 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY];
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         memset(Vt + k * ld + n, 0, (ld - n) * sizeof *Vt);
-    drivers_after_motion(f, motion->E, PLR_POSE_DIM, motion->K, K);
+    plr_motion_by_drivers(f, motion->L, K);
+    drivers_after_motion(f, motion->E, PLR_POSE_DIM, K);
     for (unsigned i = 0; i < n; i++) {
         plr_real v[PLR_POSE_DIM];
         plr_covariance_motion_share(f, i, 1, K, v);

@@ -60,6 +60,12 @@ void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_r
     }
 }
 
+void plr_motion_by_drivers(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE],
+                           plr_real K[PLR_MOTION_BY]) {
+    memcpy(K, f->motion.B, sizeof f->motion.B);
+    plr_motion_solve(L, f->layout.drivers, K, PLR_DRIVERS);
+}
+
 static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
                        plr_real turn2) {
     plr_real BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];
@@ -75,8 +81,6 @@ static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scal
     for (int i = 0; i < PLR_POSE_DIM; i++)
         M[(PLR_POSE_DIM + 1) * i] += i < 3 ? way2 : turn2;
     plr_factor6(applied->L, M);
-    memcpy(applied->K, f->motion.B, sizeof applied->K);
-    plr_motion_solve(applied->L, f->layout.drivers, applied->K, PLR_DRIVERS);
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
 

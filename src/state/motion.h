@@ -19,8 +19,6 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9], co
 typedef struct plr_applied_motion {
     plr_real E[9], p[3];          /* D' = D Exp(L z) = (I + E, p) */
     plr_real L[PLR_POSE_SQUARE];  /* lower triangle: L L^T = B P_dd B^T + Q; columns may be zero */
-    plr_real K[PLR_MOTION_BY];    /* L^-1 B, 6 x drivers: derivative of nu by the drivers; zero rows
-                                     where L has zero columns */
     plr_real JL[PLR_POSE_SQUARE]; /* Jr(L z) L: D Exp(L nu) = D' Exp(JL (nu - z)) to first order */
     plr_real z[PLR_POSE_DIM];
 } plr_applied_motion;
@@ -32,6 +30,11 @@ void plr_motion_covariance_by_state(const plr_filter *f, plr_real BPB[PLR_POSE_S
  * plr_applied_motion. */
 void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_real *X,
                       unsigned ld);
+
+/* K = L^-1 B, 6 x drivers with leading dimension PLR_DRIVERS, for L of an applied motion: the
+ * derivative of nu by the drivers. Zero rows where L has zero columns. */
+void plr_motion_by_drivers(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE],
+                           plr_real K[PLR_MOTION_BY]);
 
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);

@@ -333,7 +333,7 @@ The images are float32, bias on, blocks of 8, at most 128 observations a frame (
 ## Memory
 
 In bytes. *Flash*: code, constants and initial values. *RAM*: everything static, with the stack of
-10 KB, its guard, both rings of the link (4 KB each), telemetry (MAVLink) and 64 known landmarks.
+8 KB, its guard, both rings of the link (4 KB each), telemetry (MAVLink) and 64 known landmarks.
 *Filter* is `sizeof(plr_filter)`, the state with its workspace; *session* is what the loop adds to
 it: wire buffers, messages, held twists. *Stack, bound* is the deepest chain of calls that there can
 be, from the compiler's own account (`-fstack-usage`, call graph; calls through pointers are

@@ -24,8 +24,8 @@ list(TRANSFORM FORBIDDEN PREPEND "-Wl,--wrap=")
 
 # By the bits of a number, which fill most of a frame. tests/target holds it against what the deepest
 # chain of calls takes.
-set(stack_bytes_32 10240)
-set(stack_bytes_64 20480)
+set(stack_bytes_32 8192)
+set(stack_bytes_64 16384)
 
 # -fstack-usage and -fcallgraph-info are what docs/SIZES.md's bound of the stack is made from.
 set(flags_c -O2 -ffp-contract=off -fno-math-errno -fsigned-char
