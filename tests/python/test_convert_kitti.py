@@ -163,6 +163,9 @@ def test_a_raw_drive_arrives_with_its_oxts_as_twists_and_truth(
     assert np.allclose(way, velocity_B() * (FRAMES - 2) / RATE_HZ, atol=1e-5)
     assert np.allclose(first.R_WB, Rotation.from_euler("ZYX", [YAW, PITCH, ROLL]).as_matrix())
     assert_points_are_right(target)
+    words = ("--fix", "none", "--twist-timing", "start")
+    assert pelorus("convert", "kitti", drive, target, *words).status == 0
+    assert messages_of(target, Header)[0].twist_timing is TwistTiming.START
 
 
 def test_a_sequence_of_the_benchmark_gets_twists_from_its_poses_and_says_so(

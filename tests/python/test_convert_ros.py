@@ -37,6 +37,7 @@ FORMS = ["ros1", "sqlite3", "mcap", "lone mcap"]
 
 
 def written(recorder: Recorder, folder: Path, form: str) -> Path:
+    folder.mkdir(exist_ok=True)
     if form == "ros1":
         return recorder.write(folder / "drive.bag")
     path = recorder.write(folder / "drive", mcap="mcap" in form)
@@ -319,6 +320,20 @@ def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
         assert said in outcome.err, outcome.err
         if "there are:" in said:
             assert "/cam0/image_raw  sensor_msgs/msg/Image  6 messages, 9.98 Hz" in outcome.err
+        assert not list(tmp_path.glob("out*"))
+
+
+def test_pictures_of_another_size_in_mid_bag_are_told(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    for side, where in ((0, "cam0"), (1, "cam1")):
+        changed = [list(pair) for pair in pairs]
+        changed[3][side] = changed[3][side][:200].copy()
+        recorder = with_odometry(with_pictures(Recorder(), changed))
+        bag = written(recorder, tmp_path / f"{side}", "sqlite3")
+        outcome = pelorus("convert", "ros", bag, tmp_path / "out.plr", "--calibration", kalibr)
+        assert outcome.status == 1
+        assert f"{where}/image_raw: has {WIDTH} x 200 pixels; {WIDTH} x {HEIGHT}" in outcome.err
         assert not list(tmp_path.glob("out*"))
 
 

@@ -95,11 +95,12 @@ def _asked(
     fix: Fix,
 ) -> Asked:
     named = Columns.of(columns)
-    timing = twist_timing.value_in_header if twist_timing else None
+    timing = None if twist_timing is None else twist_timing.value_in_header
     files = csv.MotionFiles(twists, gyro, imu, csv.measured_of(measured))
     motion = None
     if twists or imu:
-        motion = csv.motion_of(files, named, timing or TwistTiming.START)
+        held = TwistTiming.START if timing is None else timing
+        motion = csv.motion_of(files, named, held)
     elif gyro:
         raise PelorusError("--gyro: it goes with --twists FILE, whose velocities lack a gyro")
     poses = csv.truth_of(truth, named) if truth else None
@@ -140,7 +141,7 @@ def _kitti(
     """A raw drive of KITTI with its OXTS, or a sequence of its odometry benchmark."""
     found = kitti.read(folder, asked, kitti.Made(velocity_sigma, gyro_sigma, seed))
     oxts = kitti.is_raw(folder) and asked.motion is None
-    _convert(found, asked, target, TwistTiming.END if oxts else TwistTiming.START)
+    _convert(found, asked, target, TwistTiming.END if oxts else None)
 
 
 def _ros(
@@ -200,12 +201,13 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> r
     return ros.Wheels(topic, tuple(joints), radius_m, track_m)
 
 
-def _convert(
-    found: Streams, asked: Asked, target: Path, usual: TwistTiming = TwistTiming.START
-) -> None:
+def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
     for remark in found.remarks:
         out.print(escape(remark))
-    recording = streams.recording(found).with_header(twist_timing=asked.timing or usual)
+    recording = streams.recording(found)
+    timing = usual if asked.timing is None else asked.timing
+    if timing is not None:
+        recording = recording.with_header(twist_timing=timing)
     if not asked.fix:
         write(recording, [], target)
         return

@@ -105,7 +105,7 @@ def _motion(bag: Bag, topics: Topics, asked: Asked, remarks: list[str]) -> Twist
     if isinstance(found, Readings):
         raise PelorusError("--gyro-topic: it goes with twists or wheels, an IMU has its own")
     own = _imu(bag, bag.require(topics.gyro, IMU))
-    timing = asked.timing or TwistTiming.START
+    timing = TwistTiming.START if asked.timing is None else asked.timing
     return streams.with_gyro(found, own.where, own.inertial.t_ns, own.inertial.w_B_radps, timing)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
 from pelorus.se3 import Poses
-from pelorus.tracking.images import require_size
+from pelorus.tracking import images
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
 from pelorus.tracks import Tracks
@@ -253,7 +254,7 @@ def _tracked(
     height, width = first[0].shape
     header, rig = calibrated.header, calibrated.rig
     known = (rig.left.width_px, rig.left.height_px) if rig else _size(header)
-    require_size(pictures.where[0], first[0].shape, known)
+    images.require_size(pictures.where[0], first[0].shape, known)
     show = None
     if rig is not None:
         whole = replace(
@@ -264,8 +265,9 @@ def _tracked(
     header = replace(header, image_width_px=width, image_height_px=height)
 
     def shown() -> Iterator[tuple[Gray, Gray]]:
-        yield first if show is None else show(*first)
-        for pair in pairs:
+        for pair in chain((first,), pairs):
+            for where, picture in zip(pictures.where, pair, strict=True):
+                images.require_alike(where, picture, first[0])
             yield pair if show is None else show(*pair)
 
     return header, track(

@@ -148,9 +148,10 @@ def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> N
         )
 
 
-def require_same_size(path: Path, image: Gray, other: Gray) -> None:
-    """Both pictures of a pair are equally large."""
-    _require_shape(path, image, other.shape, "the left ones have")
+def require_alike(path: Path, image: Gray, first: Gray) -> None:
+    """All pictures are as large as the first left one, and large enough."""
+    _require_shape(path, image, first.shape, "the first picture has")
+    _require_side(path, image.shape)
 
 
 def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> None:
@@ -160,6 +161,15 @@ def require_size(path: Path, shape: tuple[int, ...], known: tuple[int, int]) -> 
             path,
             f"the pictures have {_size(shape)} pixels",
             due=f"{known[0]} x {known[1]} are due, for which the calibration was made",
+        )
+
+
+def _require_side(path: Path, shape: tuple[int, ...]) -> None:
+    if min(shape) < SIDE_MIN_PX:
+        raise ForeignFileError(
+            path,
+            f"has {_size(shape)} pixels",
+            due=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are due",
         )
 
 
@@ -184,10 +194,5 @@ def decoded(path: Path, packed: bytes) -> Gray:
         raise ForeignFileError(
             path, f"cannot be read as a picture: {error}", due="a whole PNG, JPEG or PGM is due"
         ) from error
-    if min(pixels.shape) < SIDE_MIN_PX:
-        raise ForeignFileError(
-            path,
-            f"has {_size(pixels.shape)} pixels",
-            due=f"at least {SIDE_MIN_PX} x {SIDE_MIN_PX} are due",
-        )
+    _require_side(path, pixels.shape)
     return np.ascontiguousarray(np.clip(pixels, 0, 255), np.uint8)
