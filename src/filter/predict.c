@@ -59,7 +59,7 @@ void plr_predict_apply_prior(plr_filter *f) {
     (void)plr_model_of(f)->retract(f, f->work.dx); /* restores plr_slot.beyond */
 }
 
-/* The argument `interval` of plr_twist_step, which adds the variance sigma^2 interval (h1 - h0),
+/* The argument `interval` of a process's step; that of twists adds the variance sigma^2 interval (h1 - h0),
  * when the last reading is used from h0 to h1 seconds after its time. The error of one reading is
  * constant, so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau
  * between readings by the usual sigma^2 tau h, and later, if twists fail to come, to sigma^2
