@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -31,10 +32,12 @@ def recorded(folder: Path, messages: list[Message]) -> Path:
     return path
 
 
-def compared(path: Path, programs: Programs, *settings: str) -> Comparison:
+def compared(
+    path: Path, programs: Programs, *settings: str, also: Sequence[str] = ("course", "world")
+) -> Comparison:
     """Carry out the runs of a report."""
     folder = path.parent / "runs"
     folder.mkdir()
-    plans = plan_runs(programs, path, settings or SETTINGS, ("course", "world"))
+    plans = plan_runs(programs, path, settings or SETTINGS, also)
     subject = read_subject(path)
     return Comparison(subject, [carry_out(plan, subject, folder) for plan in plans])

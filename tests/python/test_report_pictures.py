@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imu_drives import noisy
 from pelorus import style
+from pelorus.frame_table import write_csv
 from pelorus.frames import BodyAxes
 from pelorus.grid import plane
 from pelorus.replay import Programs
@@ -117,3 +119,23 @@ def test_a_logarithmic_axis_ignores_the_few_smallest_values() -> None:
     axes.plot(np.concatenate(([1e-30], np.full(200, 5.0))))
     style.limit_decades(axes)
     assert axes.get_ylim()[0] == pytest.approx(2.5)
+
+
+def test_the_biases_of_an_imu_have_its_names_and_their_truth(
+    tmp_path: Path, programs: Programs
+) -> None:
+    recording = tmp_path / "imu.plr"
+    noisy().recording.write(recording)
+    found = compared(recording, programs, also=())
+    figure = pictures.biases(found)
+    panels = figure.axes
+    assert [axes.get_title() for axes in panels[::3]] == ["$b_{ax}$", "$b_{gx}$"]
+    assert panels[0].get_ylabel() == "accelerometer bias (m/s²)"
+    truth = noisy().recording.truth_bias
+    assert truth is not None
+    drawn = {line.get_label(): line.get_ydata() for line in panels[4].get_lines()}
+    assert np.allclose(np.asarray(drawn["truth"]), truth[:, 4])
+    write_csv(tmp_path / "frames.csv", found.main.frames)
+    titles = (tmp_path / "frames.csv").read_text().partition("\n")[0].split(",")
+    assert {"bias_ax", "var_bias_az", "bias_wx", "new"} <= set(titles)
+    assert "bias_vx" not in titles

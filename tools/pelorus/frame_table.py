@@ -16,6 +16,7 @@ from pelorus.frames import Kind, Message, Pose, Report, Stereo
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.schema import HEALTHS
+from pelorus.settings import in_force
 
 HEALTH = tuple(HEALTHS.values())
 RHO_THETA = tuple(f"var_{part}_{axis}" for part in ("rho", "theta") for axis in "xyz")
@@ -40,6 +41,7 @@ class FrameTable:
 
     t_ns: Times
     columns: dict[str, Floats]
+    by_imu: bool = False  # bias_v* are then the accelerometer's, and called bias_a* in a file
 
     def __getitem__(self, name: str) -> Floats:
         return self.columns[name]
@@ -63,7 +65,8 @@ def frame_table(messages: Sequence[Message]) -> FrameTable:
     columns = dict(zip(ESTIMATE, estimate.T, strict=True))
     for name in REPORT:
         columns[name] = np.array([getattr(report, name) for _, report in rows], np.float64)
-    return FrameTable(np.array([report.t_ns for _, report in rows], np.int64), columns)
+    t_ns = np.array([report.t_ns for _, report in rows], np.int64)
+    return FrameTable(t_ns, columns, bool(in_force(messages, "process")))
 
 
 def _answers(messages: Sequence[Message]) -> Iterator[tuple[Pose | None, Report]]:
@@ -100,6 +103,9 @@ def _estimate(pose: Pose | None) -> Floats:
 def write_csv(path: Path, table: FrameTable) -> None:
     """Times to the nanosecond; what is not known is empty."""
     names = {"created": "new"}  # of columns, where another word is the usual one
+    if table.by_imu:
+        names |= {name: name.replace("bias_v", "bias_a") for name in table.columns}
+        names["created"] = "new"
     titles = ",".join(("t_s", *(names.get(name, name) for name in table.columns)))
     rows = np.stack(list(table.columns.values()), axis=-1)
     health = list(table.columns).index("health")

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -13,9 +13,11 @@ from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 from pelorus.frame_table import BIASES
+from pelorus.frames import Message, Truth, TruthKnows
 from pelorus.grid import picture
 from pelorus.grid.files import heights
 from pelorus.layout import Floats
+from pelorus.motion import Times
 from pelorus.report import top_view
 from pelorus.report.comparison import COURSE, MAIN, Comparison
 from pelorus.report.results import Run
@@ -82,7 +84,8 @@ def pictures(compared: Comparison) -> list[Picture]:
         words = f"{COVARIANCE} {WHOLE_MAP.format(ids=compared.whole_map.ids)}"
     add("covariance", "Trace of the covariance", words, covariance)
     if compared.main.summary["bias"] == "on":
-        add("bias", "Biases", "The biases of the twist as your run estimates them.", biases)
+        whose = "IMU" if compared.main.frames.by_imu else "twist"
+        add("bias", "Biases", f"The biases of the {whose} as your run estimates them.", biases)
     add("observations", "Observations", OBSERVATIONS, observations)
     add("time", "Time a frame", TIMES, times)
     if judged and not compared.main.poses_given:
@@ -264,24 +267,36 @@ def nees(compared: Comparison) -> Figure:
 
 
 def biases(compared: Comparison) -> Figure:
-    """The estimate with its 3-sigma band; what the truth is, no recording says."""
+    """The estimate with its 3-sigma band, and the truth where TRUTH tells it."""
     frames = compared.main.frames
+    true_t_ns, true = true_biases(compared.main.messages)
+    letters = {"v": "a", "w": "g"} if frames.by_imu else {"v": "v", "w": "w"}
     t = compared.seconds(frames.t_ns)
     figure = new_figure(WIDTH_IN, 5.5)
     panels = figure.subplots(2, 3, sharex=True, sharey="row")
-    for name, axes in zip(BIASES, panels.flat, strict=True):
+    for k, (name, axes) in enumerate(zip(BIASES, panels.flat, strict=True)):
         value, three_sigma = frames[name], 3 * np.sqrt(np.clip(frames[f"var_{name}"], 0, None))
         axes.fill_between(t, value - three_sigma, value + three_sigma, color=SKY, alpha=0.35,
                           linewidth=0, label=f"± 3 {SIGMA}")  # fmt: skip
         axes.plot(t, value, color=BLUE, label="estimate")
         axes.axhline(0, color=GREY, linewidth=1)
-        axes.set_title(f"$b_{{{name[-2]}{name[-1]}}}$")
-    panels[0, 0].set_ylabel("velocity bias (m/s)")
+        if len(true):
+            axes.plot(compared.seconds(true_t_ns), true[:, k], color=BLACK, label="truth")
+        axes.set_title(f"$b_{{{letters[name[-2]]}{name[-1]}}}$")
+    of_v = "accelerometer bias (m/s²)" if frames.by_imu else "velocity bias (m/s)"
+    panels[0, 0].set_ylabel(of_v)
     panels[1, 0].set_ylabel("gyro bias (rad/s)")
     for axes in panels[1]:
         axes.set_xlabel(TIME)
     legend_above(figure, panels[0, 0])
     return figure
+
+
+def true_biases(messages: Sequence[Message]) -> tuple[Times, Floats]:
+    """Times (n,) and (n, 6), of the TRUTH that tells them."""
+    known = [m for m in messages if isinstance(m, Truth) and m.knows & TruthKnows.BIAS]
+    t_ns = np.array([m.t_ns for m in known], np.int64)
+    return t_ns, np.array([m.bias for m in known]).reshape(-1, 6)
 
 
 def observations(compared: Comparison) -> Figure:
