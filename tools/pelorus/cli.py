@@ -22,6 +22,7 @@ COMMANDS = (
     "convert",
     "track",
     "info",
+    "check",
     "evaluate",
     "export",
     "simulate",

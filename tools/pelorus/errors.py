@@ -40,3 +40,13 @@ def made(folder: Path) -> Path:
     except OSError as error:
         raise PelorusError(f"{folder}: cannot be made: {error.strerror}") from error
     return folder
+
+
+def read_text(path: Path) -> str:
+    """A text file as it is; PelorusError where it is none."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise PelorusError(f"{path}: is no text in UTF-8") from error

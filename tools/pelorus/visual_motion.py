@@ -28,6 +28,7 @@ WIDE_ITERATIONS = 6  # the first ones accept larger residuals
 WIDE_PX, NARROW_PX = 10.0, 2.0
 RIDGE = 1e-3  # keeps frames without observations solvable
 STEP_MAX = 1.0  # m and rad an iteration
+CHI2_4_MEDIAN = 3.3567  # of chi-square with four degrees of freedom
 
 
 @dataclass(frozen=True)
@@ -151,3 +152,24 @@ def _sum_by_frame(seen: SeenPairs, values: Floats) -> Floats:
         starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
         out[filled] = np.add.reduceat(values, starts[filled], axis=0)
     return out
+
+
+def pixel_sigma(seen: SeenPairs, camera: Camera, motion: Poses) -> float:
+    """The pixels' noise as the two views of the points tell it, px; NaN with too few pairs.
+
+    A pair's residual weighted by its covariance for unit noise is chi-square with four degrees of
+    freedom; the median makes it robust. Only frames count whose motion has pairs enough.
+    """
+    enough = (seen.counts() >= 2 * PAIRS_MIN)[seen.frame]
+    q = np.einsum("nij,nj->ni", motion.R[seen.frame], seen.q_C) + motion.p[seen.frame]
+    good = enough & (q[:, 2] > DEPTH_MIN_M)
+    if good.sum() < PAIRS_MIN:
+        return float("nan")
+    q, R = q[good], motion.R[seen.frame[good]]
+    residual = seen.pixels[good] - project(camera, q)
+    D = point_jacobian(camera, q)
+    J = triangulation_jacobian(camera, seen.first_pixels[good], seen.q_C[good])
+    from_first = D @ R @ J
+    W = np.linalg.inv(np.eye(4) + from_first @ np.swapaxes(from_first, 1, 2))
+    squared = np.einsum("na,nab,nb->n", residual, W, residual)
+    return float(np.sqrt(np.median(squared) / CHI2_4_MEDIAN))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -269,6 +269,23 @@ def messages_of(path: Path) -> list[Message]:
     received, _ = read_file(path)
     header_of(received, path)
     return [frame.message for frame in received]
+
+
+def header_of_messages(messages: Iterable[Message]) -> Header:
+    """The HEADER of what `messages_of` gave."""
+    return next(m for m in messages if isinstance(m, Header))
+
+
+def only(path: Path, kinds: Collection[Kind]) -> Iterator[Message]:
+    """The messages of these kinds of a sound file that a program of ours has just written: the
+    others are passed over unread, which takes a tenth of the time.
+    """
+    wanted = {int(kind) for kind in kinds}
+    for stuffed in path.read_bytes().split(DELIMITER):
+        if len(stuffed) > 1 and stuffed[1] in wanted:  # stuffed[0] is COBS's: no kind is zero
+            body = cobs.decode(stuffed)
+            if body is not None and body[0] in wanted:
+                yield KINDS[body[0]].unpack(body[BODY_BYTES_MIN - 4 : -4])
 
 
 def header_of(received: list[Received], path: Path) -> Header:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import typer
 
+from pelorus.errors import PelorusError, read_text
 from pelorus.frames import TwistTiming
 
 CONFIG = typer.Option(
@@ -62,3 +63,19 @@ def replay_options(config: Path | None, settings: list[str], hint: str = "--set"
             raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint=hint)
         options += [f"--{name}", value]
     return options
+
+
+def settings_given(config: Path | None, settings: list[str]) -> dict[str, str]:
+    """A config file and NAME=VALUE as one: what is said later holds."""
+    given = {}
+    if config is not None:
+        for number, line in enumerate(read_text(config).splitlines(), 1):
+            words = line.partition("#")[0].strip()
+            name, equals, value = (part.strip() for part in words.partition("="))
+            if words and not (name and equals and value):
+                raise PelorusError(f"{config}: line {number}: {words!r} is not name = value")
+            if words:
+                given[name] = value
+    options = replay_options(None, settings)
+    pairs = zip(options[::2], options[1::2], strict=True)
+    return given | {name.removeprefix("--"): value for name, value in pairs}

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""Everyday faults put into a recording, each at three strengths; as a program it measures how many
+are named rightly, and how often a clean piece of a drive is called faulty:
+
+    python tests/python/injected.py DRIVE.plr...
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from pelorus import se3, wire
+from pelorus.check.contents import recording_of
+from pelorus.check.named import Fault, faults_of
+from pelorus.frames import Message, Stereo, Twist
+from pelorus.recording import Recording
+
+PIECE = 300  # frames of a clean piece
+
+
+def turned(recording: Recording, F: np.ndarray) -> Recording:
+    """Twists in axes that the extrinsic does not mean."""
+    return replace(recording, v_B_mps=recording.v_B_mps @ F.T, w_B_radps=recording.w_B_radps @ F.T)
+
+
+def mirrored(recording: Recording, axis: int) -> Recording:
+    """One axis the other way round. Of a car that neither climbs nor rolls the images cannot tell
+    that of z, so that of x stands for it.
+    """
+    flip = np.ones(3)
+    flip[axis % 2] = -1
+    return replace(
+        recording, v_B_mps=recording.v_B_mps * flip, w_B_radps=-recording.w_B_radps * flip
+    )
+
+
+def inverted(recording: Recording, _: int) -> Recording:
+    """The extrinsic's inverse in its place."""
+    T = se3.inverse(recording.T_CB)
+    return recording.with_extrinsic(T)
+
+
+def axes(recording: Recording, k: int) -> Recording:
+    """Twists in other axes than the extrinsic's."""
+    order = [[[0, 1, 0], [-1, 0, 0], [0, 0, 1]], [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+             [[0, 0, 1], [1, 0, 0], [0, 1, 0]]][k]  # fmt: skip
+    return turned(recording, np.array(order, np.float64))
+
+
+def pitched(recording: Recording, k: int) -> Recording:
+    """A pitch of the camera that the extrinsic does not know."""
+    angle = np.radians((15, 20, 30)[k])
+    tilt = se3.exp(np.zeros(3), np.array([angle, 0, 0]))
+    return recording.with_extrinsic(recording.T_CB._replace(R=tilt.R @ recording.T_CB.R))
+
+
+def pixels(recording: Recording, new: np.ndarray) -> Recording:
+    """Other pixels on the same tracks."""
+    return replace(recording, tracks=replace(recording.tracks, pixels=new))
+
+
+def unrectified(recording: Recording, k: int) -> Recording:
+    """Rows of the right picture that lie lower, and slanted."""
+    new = recording.tracks.pixels.copy()
+    new[:, 3] += (3.0, 6.0, 12.0)[k] + 0.01 * (k + 1) * (new[:, 2] - new[:, 2].mean())
+    return pixels(recording, new)
+
+
+def scaled(recording: Recording, k: int) -> Recording:
+    """A baseline that is wrong by 20 percent and more."""
+    camera = recording.header.camera
+    wrong = replace(camera, baseline_m=camera.baseline_m * (1.2, 1.35, 0.75)[k])
+    return recording.with_header(camera=wrong)
+
+
+def row_ids(recording: Recording, k: int) -> Recording:
+    """Row numbers for ids."""
+    tracks = recording.tracks
+    own = np.arange(len(tracks)) - tracks.bounds()[tracks.frame]
+    return replace(recording, tracks=replace(tracks, id=own + k))
+
+
+def slot_ids(recording: Recording, k: int) -> Recording:
+    """A live track has a slot; one that ends gives it to the next."""
+    tracks = recording.tracks
+    last = {int(i): int(f) for i, f in zip(tracks.id, tracks.frame, strict=True)}
+    free: list[int] = []
+    out = np.empty_like(tracks.id)
+    held: dict[int, int] = {}
+    for frame in range(tracks.frame_count):
+        a, b = tracks.bounds()[frame : frame + 2]
+        for row in range(a, b):
+            id = int(tracks.id[row])
+            if id not in held:
+                held[id] = free.pop() if free else len(held) + len(free) + k
+            out[row] = held[id]
+        for id in [i for i in held if last[i] <= frame]:
+            free.append(held.pop(id))
+    return replace(recording, tracks=type(tracks).from_rows(
+        tracks.frame_count, tracks.frame, out, tracks.pixels))  # fmt: skip
+
+
+def frozen(recording: Recording, k: int) -> Recording:
+    """From a frame in the middle of fast motion on."""
+    tracks = recording.tracks
+    speed = np.linalg.norm(recording.body_motion(1).p, axis=1)
+    run = (4, 8, 16)[k]
+    at = int(np.argmax(np.convolve(speed, np.ones(run), "valid"))) if len(speed) > run else 0
+    bounds, keep = tracks.bounds(), np.ones(len(tracks), bool)
+    keep[bounds[at + 1] : bounds[at + run + 1]] = False
+    rows = np.arange(bounds[at], bounds[at + 1])
+    parts = [(tracks.frame[keep], tracks.id[keep], tracks.pixels[keep])]
+    parts += [
+        (np.full(len(rows), f), tracks.id[rows], tracks.pixels[rows])
+        for f in range(at + 1, at + run + 1)
+    ]
+    frame, id, px = (np.concatenate([part[j] for part in parts]) for j in range(3))
+    return replace(recording, tracks=type(tracks).from_rows(tracks.frame_count, frame, id, px))
+
+
+Change = Callable[[Recording, int], Recording]
+OF_RECORDINGS: dict[str, tuple[Change, tuple[str, ...]]] = {
+    "inverted": (inverted, ("inverted", "axes", "extrinsic")),
+    "axes": (axes, ("axes",)),
+    "mirrored": (mirrored, ("axes",)),
+    "pitch": (pitched, ("pitch",)),
+    "degrees": (lambda r, _: replace(r, w_B_radps=np.degrees(r.w_B_radps)), ("unit-degrees",)),
+    "km/h": (lambda r, _: replace(r, v_B_mps=3.6 * r.v_B_mps), ("unit-km/h",)),
+    "mm/s": (lambda r, _: replace(r, v_B_mps=1e3 * r.v_B_mps), ("unit-mm/s",)),
+    "scale": (scaled, ("scale",)),
+    "left-right": (lambda r, _: pixels(r, r.tracks.pixels[:, [2, 3, 0, 1]]), ("left-right",)),
+    "u-v": (lambda r, _: pixels(r, r.tracks.pixels[:, [1, 0, 3, 2]]), ("u-v",)),
+    "unrectified": (unrectified, ("unrectified",)),
+    "ids-rows": (row_ids, ("ids-rows",)),
+    "ids-slots": (slot_ids, ("ids-slots", "scene")),
+    "frozen": (frozen, ("frozen",)),
+}
+
+
+def of_times(messages: list[Message], k: int, name: str) -> list[Message]:
+    """Faults of the clocks as a robot's own recorder would write them."""
+    out: list[Message] = []
+    last: dict[type[Message], int] = {}
+    for count, message in enumerate(messages):
+        if not isinstance(message, Twist | Stereo):
+            out.append(message)
+            continue
+        t = message.t_ns
+        if name == "time-unit":
+            t *= (1000, 1000, 1_000_000)[k]
+        elif name == "time-order" and count % 7 == 0:
+            t = max(last.get(type(message), t) - (0, 10**6, 10**9)[k], 0)
+        elif name == "time-gap" and count > len(messages) // 2:
+            t += (2, 5, 30)[k] * 10**9
+        last[type(message)] = t
+        out.append(replace(message, t_ns=t))
+    return out
+
+
+def found_in(recording: Recording) -> list[Fault]:
+    """What is named, of tracks and twists alone."""
+    return faults_of([recording.header], recording)
+
+
+def injections(recording: Recording) -> Iterator[tuple[str, int, list[Fault], tuple[str, ...]]]:
+    """Fault, strength, what was named, what is due."""
+    for name, (change, due) in OF_RECORDINGS.items():
+        for k in range(3):
+            yield name, k, found_in(change(recording, k)), due
+
+
+def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
+    """Some of the frames."""
+    tracks = recording.tracks
+    rows = (tracks.frame >= first) & (tracks.frame < first + most)
+    t = recording.frame_t_ns[first : first + most]
+    count = len(t)
+    return replace(recording, frame_t_ns=t, tracks=type(tracks)(
+        count, tracks.frame[rows] - first, tracks.id[rows], tracks.pixels[rows]))  # fmt: skip
+
+
+def main(paths: list[str]) -> None:
+    """Print what was named wrongly, and the two shares."""
+    right, asked, false, clean = 0, 0, 0, 0
+    for path in paths:
+        whole = recording_of(wire.messages_of(Path(path)))
+        for first in range(0, max(whole.tracks.frame_count - PIECE // 2, 1), PIECE):
+            said = found_in(piece(whole, first))
+            clean += 1
+            false += bool(said)
+            if said:
+                print(path, "clean", first, [f"{f.name}: {f.words}" for f in said], flush=True)
+        for name, k, said, due in injections(piece(whole, 0)):
+            good = bool(said) and said[0].name in due
+            right, asked = right + good, asked + 1
+            if not good:
+                print(path, name, k, [f"{f.name}: {f.words}" for f in said], flush=True)
+    print(f"{right} of {asked} named rightly; {false} of {clean} clean pieces called faulty")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

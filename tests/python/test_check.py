@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus check`: the sigmas, timing and clock that a recording was made with are found, and what
+is not there is not claimed.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from converted import Run
+from pelorus import wire
+from pelorus.check import outcome, search, tracks_noise, tuning
+from pelorus.check.contents import first_frames, half, recording_of, shifted, write
+from pelorus.check.outcome import Bench, Outcome
+from pelorus.errors import PelorusError
+from pelorus.frames import Header, Kind, Message, Report, Start, Stereo, Twist
+from pelorus.tracks import Tracks
+from replay_drive import BIN, CAMERA, drive, header
+from report_runs import built_programs
+
+MS = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Half a minute at 20 readings a second, whose noise is not what the HEADER suggests."""
+    built_programs()
+    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+
+    path = tmp_path_factory.mktemp("check") / "drive.plr"
+    noise = ("--pixel-sigma", "1.5", "--velocity-sigma", "0.3", "--gyro-sigma", "0.03")
+    rates = ("--duration", "30", "--lap", "10", "--twist-rate", "20", "--observations", "30")
+    assert main(["simulate", str(path), "--seed", "3", *noise, *rates]) == 0
+    return path
+
+
+WRONG = {"pixel-sigma": "0.8", "velocity-sigma": "0.08", "gyro-sigma": "0.1"}
+
+
+def said_wrong() -> list[str]:
+    return [word for name, value in WRONG.items() for word in ("--set", f"{name}={value}")]
+
+
+def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
+    simulated: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    conf = tmp_path / "tuned.conf"
+    said = pelorus("check", simulated, "--out", conf, "--bin", BIN, "--json", *said_wrong())
+    assert said.status == 0, said.err
+    found = json.loads(said.out)
+    settings = found["settings"]
+    assert float(settings["pixel-sigma"]) == pytest.approx(1.5, rel=0.2)
+    assert float(settings["velocity-sigma"]) == pytest.approx(0.3, rel=0.2)
+    assert float(settings["gyro-sigma"]) == pytest.approx(0.03, rel=0.2)
+    assert settings["twist-timing"] == "start"
+    assert found["camera_offset_s"] == 0
+    assert found["grade"] == "good", found["remarks"]
+    figures = found["figures"]
+    assert float(figures["innovations over their noise"]["after"]) == pytest.approx(1, abs=0.1)
+    cost = figures["-2 ln likelihood an observation"]
+    assert float(cost["after"]) < float(cost["before"])
+    text = conf.read_text(encoding="utf-8")
+    assert "# pixel-sigma 0.8 should be 1." in text
+    again = pelorus("evaluate", simulated, "--config", conf, "--bin", BIN)
+    assert again.status in (0, 1)  # it is a settings file that the replay takes
+    assert "unknown" not in again.err
+
+
+def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) -> None:
+    messages = wire.messages_of(simulated)
+    late = tmp_path / "late.plr"
+    write(late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS))
+    bench = Bench(built_programs().float32, late, tmp_path)
+    true = {"pixel-sigma": "1.5", "velocity-sigma": "0.3", "gyro-sigma": "0.03"}
+    offset_s, likeliest = tuning.offset_of(bench, true, bench.run(true))
+    assert offset_s == pytest.approx(-0.05, abs=0.02)
+    assert likeliest.gain_over(bench.run(true)) > tuning.PAYS
+
+
+def test_the_timing_of_the_readings_is_found(simulated: Path, tmp_path: Path) -> None:
+    bench = Bench(built_programs().float32, simulated, tmp_path)
+    values = {"pixel": 1.5, "velocity": 0.3, "gyro": 0.03}
+    fixed, _, words = tuning.clock(bench, {"twist-timing": "end"}, values)
+    assert fixed["twist-timing"] == "start" or "early" in words
+    assert "agree" not in words
+
+
+# --- what the likelihood is made of ---------------------------------------------------------------
+
+
+def report(t: int, **counts: float) -> Report:
+    return Report(t, Kind.STEREO, **counts)  # type: ignore[arg-type]
+
+
+def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
+    from pelorus.frames import Pose  # noqa: PLC0415 - only here
+
+    good = report(1, matched=10, used=10, innovation_rows=30, innovation_d2=30.0)
+    pose = Pose(1, after_stereo=True)
+    base = outcome.outcome_of([good, pose], 40.0)
+    assert base.nis == 1.0
+    worse = outcome.outcome_of([replace(good, gated=1), pose], 40.0)
+    assert worse.cost - base.cost == pytest.approx(4.0)
+    assert outcome.outcome_of([pose], 40.0) is outcome.NOTHING
+    refused = replace(good, status=-6)
+    assert outcome.outcome_of([good, refused, pose], 40.0).matched == 10
+
+
+def test_an_outlier_may_lie_anywhere_in_the_picture() -> None:
+    frames = drive()
+    sized = header(image_width_px=640, image_height_px=480)
+    cost = outcome.outlier_cost(sized, frames)
+    assert cost == pytest.approx(2 * np.log(640 * 480 * outcome.DISPARITY_SPAN_PX))
+    spread = outcome.outlier_cost(header(), frames)  # then as far as the pixels lie apart
+    assert spread == pytest.approx(cost, abs=1)
+
+
+# --- the search -----------------------------------------------------------------------------------
+
+
+class Bowl:
+    """A bench whose cost is known: a bowl about (3, 0.2) in the logarithms."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def run(self, settings: dict[str, str]) -> Outcome:
+        return self.run_all([settings])[0]
+
+    def run_all(self, many: list[dict[str, str]], what: str = "") -> list[Outcome]:
+        self.asked += len(many) + 0 * len(what)
+        return [self._outcome(settings) for settings in many]
+
+    def _outcome(self, settings: dict[str, str]) -> Outcome:
+        a, b = np.log(float(settings["a"]) / 3), np.log(float(settings["b"]) / 0.2)
+        return replace(outcome.NOTHING, cost=float(a * a + 0.3 * a * b + b * b), matched=1000)
+
+
+def test_the_search_finds_the_foot_of_a_bowl_from_far_away() -> None:
+    bowl = Bowl()
+    found = search.search(
+        bowl,  # type: ignore[arg-type]
+        {"a": 0.1, "b": 7.0},
+        {"a": (1e-3, 1e3), "b": (1e-3, 1e3)},
+        lambda values: {name: repr(value) for name, value in values.items()},
+        (2.0, 2.0, 1.5, 1.25),
+    )
+    assert found.values["a"] == pytest.approx(3, rel=0.05)
+    assert found.values["b"] == pytest.approx(0.2, rel=0.05)
+    assert bowl.asked < 120
+
+
+def test_the_foot_of_three_points_is_that_of_their_parabola() -> None:
+    assert search.foot(1.0, 0.0, 1.0) == 0
+    assert search.foot(2.25, 0.25, 0.25) == pytest.approx(0.5)
+    assert search.foot(0.0, 1.0, 2.0) == -1  # a slope without a foot: a step downhill
+    assert search.foot(1.0, 1.0, 1.0) == 0
+    assert search.foot(np.inf, 1.0, 2.0) == 0
+
+
+# --- biases, tracks, parts ------------------------------------------------------------------------
+
+
+def test_a_bias_must_be_told_by_both_halves_alike() -> None:
+    bias, variance = np.array([0.010, -0.012, 0.009]), np.full(3, 1e-6)
+    assert tuning.common_bias(bias, variance, 1.1 * bias, variance) == pytest.approx(0.011, rel=0.1)
+    assert tuning.common_bias(bias, variance, -bias, variance) == 0
+    assert tuning.common_bias(bias, variance, np.roll(bias, 1) * [1, -1, 1], variance) == 0
+    assert tuning.common_bias(bias, 1e4 * variance, bias, 1e4 * variance) == 0  # may be chance
+    assert tuning.common_bias(bias, -np.ones(3), bias, variance) == 0  # not known
+
+
+def moving_tracks(drift_px: float) -> list[Message]:
+    """A circle's drive whose pixels are off by a random walk, or by noise that is new each time."""
+    chance = np.random.default_rng(2)
+    messages = drive(120, sigma_px=0.0)
+    off: dict[int, np.ndarray] = {}
+    out: list[Message] = []
+    for message in messages:
+        if isinstance(message, Stereo):
+            shifts = []
+            for id in message.ids.tolist():
+                new = chance.normal(0, 0.3, 4)
+                off[id] = off.get(id, np.zeros(4)) + drift_px * chance.normal(size=4)
+                shifts.append(new + off[id])
+            pixels = message.pixels + np.array(shifts).reshape(-1, 4)
+            message = replace(message, pixels=pixels.astype(np.float32))  # noqa: PLW2901
+        out.append(message)
+    return out
+
+
+def test_tracks_that_drift_are_told_from_white_noise() -> None:
+    white = tracks_noise.track_noise(recording_of(moving_tracks(0.0)))
+    assert not white.drifts
+    assert white.by_lag[1] == pytest.approx(0.3, rel=0.2)
+    drifting = tracks_noise.track_noise(recording_of(moving_tracks(0.3)))
+    assert drifting.drifts
+    assert drifting.stands_for_px > 2 * drifting.by_lag[1]
+
+
+def test_too_few_points_seen_twice_tell_nothing_of_drift() -> None:
+    few = recording_of(drive(3))
+    tracks = Tracks.from_rows(3, few.tracks.frame[:9], few.tracks.id[:9], few.tracks.pixels[:9])
+    found = tracks_noise.track_noise(replace(few, tracks=tracks))
+    assert np.isnan(found.growth)
+    assert not found.drifts
+
+
+def test_parts_of_a_recording_keep_its_header_and_its_order() -> None:
+    messages = [header(), Start(0), *drive(40)[1:]]
+    first, second = half(messages, 0), half(messages, 1)
+    assert isinstance(first[0], Header)
+    assert isinstance(second[0], Header)
+    assert not any(isinstance(m, Start) for m in second)
+    count = [sum(isinstance(m, Stereo) for m in part) for part in (first, second)]
+    assert count == [20, 20]
+    assert sum(isinstance(m, Stereo) for m in first_frames(messages, 7)) == 7
+    late = shifted(first_frames(messages), 30 * MS)
+    times = [m.t_ns for m in late if isinstance(m, Stereo | Twist)]
+    assert times == sorted(times)
+    early = shifted([header(), Stereo(5, np.zeros(0, np.uint32), np.zeros((0, 4), np.float32))], -9)
+    assert len(early) == 1  # before time zero
+
+
+def test_what_no_filter_takes_is_left_out_of_what_is_examined() -> None:
+    messages = drive(10)
+    bad = Stereo(1, np.zeros(1, np.uint32), np.zeros((1, 4), np.float32))  # time goes back
+    frames = [m for m in messages if isinstance(m, Stereo)]
+    frames[3] = replace(frames[3], pixels=np.full_like(frames[3].pixels, np.nan))
+    twists = [m for m in messages if isinstance(m, Twist)]
+    found = recording_of([header(), *twists, *frames, bad])
+    assert found.tracks.frame_count == 10
+    assert np.isfinite(found.tracks.pixels).all()
+    assert found.header.camera == CAMERA
+
+
+@pytest.mark.parametrize("kind", [Twist, Stereo])
+def test_a_recording_with_nothing_to_check_says_what_it_lacks(
+    tmp_path: Path, pelorus: Run, kind: type[Message]
+) -> None:
+    path = tmp_path / "x.plr"
+    write(path, [m for m in drive(5) if not isinstance(m, kind)])
+    said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN)
+    assert said.status == 1
+    assert ("no twists" if kind is Twist else "no stereo frames") in said.err
+    assert not (tmp_path / "t.conf").exists()
+
+
+def test_a_settings_file_that_is_none_is_refused_by_line(tmp_path: Path, pelorus: Run) -> None:
+    path, conf = tmp_path / "x.plr", tmp_path / "bad.conf"
+    write(path, drive(5))
+    conf.write_text("# mine\npixel-sigma 2\n", encoding="utf-8")
+    said = pelorus("check", path, "--config", conf, "--out", tmp_path / "t.conf", "--bin", BIN)
+    assert said.status == 1
+    assert "bad.conf: line 2: 'pixel-sigma 2' is not name = value" in said.err
+    with pytest.raises(PelorusError, match="no stereo frames"):
+        recording_of([header(), Twist(0)])

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Everyday faults are named, and clean recordings are not called faulty."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from converted import Converted, Run
+from injected import OF_RECORDINGS, found_in, of_times, piece
+from pelorus import wire
+from pelorus.check.contents import recording_of, write
+from pelorus.check.named import faults_of
+from pelorus.frames import Header, Kind, Stereo, Twist
+from pelorus.recording import Recording
+from replay_drive import BIN, drive
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+
+    path = tmp_path_factory.mktemp("named") / "drive.plr"
+    assert main(["simulate", str(path), "--seed", "4", "--duration", "25"]) == 0
+    return recording_of(wire.messages_of(path))
+
+
+def test_a_clean_recording_has_no_faults(simulated: Recording) -> None:
+    assert found_in(simulated) == []
+
+
+@pytest.mark.parametrize("strength", range(3))
+@pytest.mark.parametrize("name", OF_RECORDINGS)
+def test_a_fault_is_named(simulated: Recording, name: str, strength: int) -> None:
+    change, due = OF_RECORDINGS[name]
+    said = found_in(change(simulated, strength))
+    assert said, "nothing was named"
+    assert said[0].name in due, said
+
+
+@pytest.mark.parametrize("name", ["axes", "pitch", "degrees", "km/h", "u-v", "ids-slots"])
+def test_a_fault_in_a_real_recording_is_named(of_03: Converted, name: str) -> None:
+    clean = piece(of_03.recording, 300)
+    assert found_in(clean) == []
+    change, due = OF_RECORDINGS[name]
+    assert found_in(change(clean, 1))[0].name in due
+
+
+@pytest.mark.parametrize("strength", range(3))
+@pytest.mark.parametrize("name", ["time-unit", "time-order", "time-gap"])
+def test_a_fault_of_the_clock_is_named(name: str, strength: int) -> None:
+    messages = of_times(drive(60), strength, name)
+    found = faults_of(messages, recording_of(messages))
+    assert name in [fault.name for fault in found], found
+    assert faults_of(drive(60), recording_of(drive(60))) == []
+
+
+def test_what_no_known_fault_explains_is_not_guessed_at(simulated: Recording) -> None:
+    chance = np.random.default_rng(1)
+    noise = replace(simulated, v_B_mps=chance.normal(0, 3, simulated.v_B_mps.shape))
+    said = found_in(noise)
+    assert said
+    assert not {"axes", "inverted"} & {fault.name for fault in said} or said[0].name == "no-fit"
+
+
+def test_check_names_the_fault_and_writes_no_settings(tmp_path: Path, pelorus: Run) -> None:
+    path, conf = tmp_path / "x.plr", tmp_path / "t.conf"
+    swapped = [
+        replace(m, pixels=m.pixels[:, [2, 3, 0, 1]]) if isinstance(m, Stereo) else m
+        for m in drive(60)
+    ]
+    write(path, swapped)
+    said = pelorus("check", path, "--out", conf, "--bin", BIN)
+    assert said.status == 0, said.err
+    assert said.out.startswith("do not trust this")
+    assert "left and right are swapped" in said.out
+    assert not conf.exists()
+
+
+def test_messages_without_ids_in_common_say_so() -> None:
+    messages = [m for m in drive(30) if isinstance(m, Header | Twist | Stereo)]
+    anew = [
+        replace(m, ids=(m.ids + 1000 * k).astype(np.uint32)) if isinstance(m, Stereo) else m
+        for k, m in enumerate(messages)
+    ]
+    found = faults_of(anew, recording_of(anew))
+    assert [fault.name for fault in found] == ["ids-new"]
+    assert Kind.STEREO in {m.kind for m in anew}

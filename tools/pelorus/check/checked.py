@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""The whole of `pelorus check`: tuning, a run before and one after, and what they say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pelorus import wire
+from pelorus.check import verdict
+from pelorus.check.named import LOCAL, faults_of
+from pelorus.check.outcome import Bench, Settings, options_of
+from pelorus.check.tuning import Tuned, tune
+from pelorus.check.verdict import Grade, Remark, Run
+from pelorus.console import progress
+from pelorus.evaluation import judge
+from pelorus.replay import Outputs, replay
+from pelorus.trajectory import Trajectory, truth_in
+
+SPELLS_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Checked:
+    """`rows`: title, before, after."""
+
+    grade: Grade
+    remarks: list[Remark]
+    spells: list[str]
+    changes: list[str]
+    rows: list[tuple[str, str, str]]
+    tuned: Tuned | None  # None where a fault must be mended first
+
+    @property
+    def verdict(self) -> str:
+        return verdict.VERDICTS[self.grade]
+
+
+def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
+    """Tune in the folder, then replay the whole recording with both settings."""
+    bench = Bench(program, recording, folder)
+    messages = wire.messages_of(recording)
+    named = faults_of(messages, bench.examined)
+    faults = [Remark(Grade.BAD, fault.words) for fault in named]
+    if any(fault.name not in LOCAL for fault in named):
+        return Checked(Grade.BAD, faults, [], [], [], None)
+    tuned = tune(bench, given)
+    runs, figures = [], []
+    truth = truth_in(messages)
+    for name, settings in progress((("before", given), ("after", tuned.settings)), "whole drive"):
+        outputs = Outputs.named(folder, name)
+        replay(program, recording, options_of(settings), outputs)
+        messages = wire.messages_of(outputs.log)
+        runs.append(Run.of(messages))
+        figures.append(_figures(runs[-1], truth))
+    origin = int(runs[1].frames.t_ns[0])
+    remarks = [*faults, *verdict.remarks(runs[1], tuned, origin)]
+    rows = [(title, figures[0][title], figures[1][title]) for title in figures[0]]
+    cost = (
+        "-2 ln likelihood an observation",
+        f"{tuned.before.cost:.2f}",
+        f"{tuned.after.cost:.2f}",
+    )
+    spells = [spell.words(origin) for spell in runs[1].health.spells]
+    if len(spells) > SPELLS_SHOWN:
+        spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
+    changed = verdict.changes(given, bench.header, tuned)
+    return Checked(verdict.overall(remarks), remarks, spells, changed, [cost, *rows], tuned)
+
+
+def _figures(run: Run, truth: Trajectory | None) -> dict[str, str]:
+    found = {
+        "innovations over their noise": f"{run.nis:.2f}",
+        "matches rejected": f"{run.gated_share:.1%}",
+        "frames good": f"{run.good_share:.1%}",
+    }
+    if truth is None:
+        return found
+    against = judge(run.messages, truth, [])
+    for title, key in (("ATE m (truth, to compare)", "ate_m"), ("NEES/6", "nees_per_dof")):
+        value = against[key]
+        found[title] = "-" if value is None else f"{value:.3f}"
+    return found
+
+
+def config_text(found: Checked, recording: Path) -> str:
+    """A settings file, with what was found as its remarks."""
+    assert found.tuned is not None
+    lines = [f"# pelorus check {recording.name}: {found.verdict}"]
+    lines += [f"#   {remark.text}" for remark in found.remarks if remark.grade > Grade.GOOD]
+    lines += [f"# {change}" for change in found.changes]
+    lines += [f"{name} = {value}" for name, value in found.tuned.settings.items()]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""What the images alone say of the camera's motion, beside what the twists say of the body's.
+
+Rates of turn and velocities, one of each for every pair of frames:
+
+    w_C = a R w_B,    v_C = b R (v_B + w_B x r)          r: the camera's place in the body
+
+With R, a, b free and robust weights, R beside the given R_CB, a and b beside 1 say what is wrong
+with the extrinsic, with units, with the calibration's scale. Nothing is assumed of the axes: cars
+turn about one and drive along another, and two directions settle a rotation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3, visual_motion
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+from pelorus.visual_motion import PAIRS_MIN, seen_pairs
+
+FRAMES_MOST = 500
+ROUNDS = 10
+MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
+FRAMES_ENOUGH = 40
+FITS_PX = 3.0  # a pair of one rigid scene fits its frame's motion so well
+SAME_WAY = 0.5  # rad
+
+
+@dataclass(frozen=True)
+class HandEye:
+    """`R`, `turn_scale`, `way_scale` and their one-sigma; `fit`: the share of point pairs that one
+    motion a frame explains; `excited`: whether there is way and turn to tell by.
+    """
+
+    frames: int
+    fit: float
+    R: Floats
+    turn_scale: float
+    turn_sigma: float
+    way_scale: float
+    way_sigma: float
+    turn_left: float  # of the turns what the fit does not explain, as a share
+    way_left: float
+    late_s: float  # the twists are later than the images by so much
+    late_sigma_s: float
+
+    @property
+    def told(self) -> bool:
+        return self.frames >= FRAMES_ENOUGH
+
+
+def first_part(recording: Recording, most: int = FRAMES_MOST) -> Recording:
+    """The beginning, that has frames enough."""
+    if recording.tracks.frame_count <= most:
+        return recording
+    tracks = recording.tracks
+    rows = tracks.frame < most
+    short = type(tracks)(most, tracks.frame[rows], tracks.id[rows], tracks.pixels[rows])
+    return replace(recording, tracks=short, frame_t_ns=recording.frame_t_ns[:most])
+
+
+def hand_eye(recording: Recording) -> HandEye:
+    """Fit both motions to one another."""
+    recording = first_part(recording)
+    camera = recording.header.camera
+    seen = seen_pairs(recording.tracks, camera, 1)
+    usable = seen.counts() >= PAIRS_MIN
+    motion = visual_motion.estimate(seen, camera)
+    errors = seen.reproject(camera, motion)
+    fit = float(np.mean(errors < FITS_PX)) if len(errors) else 0.0
+    tau = np.diff(recording.frame_t_ns) * 1e-9
+    # motion maps camera k to k + 1: the body's own motion is its inverse
+    of_camera = se3.log(se3.inverse(motion)) / tau[:, None]
+    of_body = se3.log(se3.inverse(recording.body_motion(1))) / tau[:, None]
+    return _fit(recording, of_camera, of_body, usable, fit)
+
+
+def _fit(
+    recording: Recording, of_camera: Floats, of_body: Floats, usable: NDArray[np.bool_], fit: float
+) -> HandEye:
+    usable = usable & np.isfinite(of_camera).all(axis=1) & np.isfinite(of_body).all(axis=1)
+    v_C, w_C = of_camera[usable, :3], of_camera[usable, 3:]
+    v_B, w_B = of_body[usable, :3], of_body[usable, 3:]
+    if len(v_C) < FRAMES_ENOUGH:
+        nan = float("nan")
+        return HandEye(len(v_C), fit, np.eye(3), *[nan] * 8)
+    w_B = w_B - np.median(w_B - np.median(w_B, axis=0), axis=0)
+    lever = -recording.T_CB.R.T @ recording.T_CB.p
+    driven = v_B + np.cross(w_B, lever)
+    R = _rotation(w_B, w_C, driven, v_C)
+    turn_scale, turn_sigma, turn_left = _scale(w_C, w_B @ R.T)
+    way_scale, way_sigma, way_left = _scale(v_C, driven @ R.T)
+    late_s, late_sigma_s = _late(recording, w_C, w_B @ R.T * turn_scale, usable)
+    return HandEye(
+        len(v_C), fit, R, turn_scale, turn_sigma, way_scale, way_sigma, turn_left, way_left,
+        late_s, late_sigma_s,
+    )  # fmt: skip
+
+
+def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> Floats:
+    """Kabsch on both kinds of vectors, each in units of its own size, with robust weights."""
+    pairs = []
+    for b, c, least in ((w_B, w_C, TURNS_RADPS), (v_B, v_C, MOVES_MPS)):
+        size_b, size_c = (np.median(np.linalg.norm(x, axis=1)) for x in (b, c))
+        if size_c > least and size_b > 0:
+            pairs.append((b / size_b, c / size_c))
+    if not pairs:
+        return np.eye(3)
+    b, c = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+    share = np.concatenate([np.full(len(p[0]), 1 / np.mean(p[0] ** 2)) for p in pairs])
+    R, weight = np.eye(3), np.ones(len(b))
+    for _ in range(ROUNDS):
+        U, _, Vt = np.linalg.svd((c * (weight * share)[:, None]).T @ b)
+        R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+        left = np.sum((c - b @ R.T) ** 2, axis=1)
+        weight = 1 / (1 + left / (np.median(left) + 1e-12)) ** 2
+    return np.asarray(R)
+
+
+def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
+    """c = s b, robust, along b and free of b's noise by instruments: b of the frames beside."""
+    instrument = 0.5 * (np.roll(b, 1, axis=0) + np.roll(b, -1, axis=0))
+    instrument[[0, -1]] = 0
+    offset_c, offset_b = np.zeros(3), np.zeros(3)
+    weight, s = np.ones(len(b)), 1.0
+    for _ in range(ROUNDS):
+        along = np.sum(instrument * (b - offset_b), axis=1)
+        s = float(np.sum(weight * np.sum(instrument * (c - offset_c), axis=1)))
+        s /= float(np.sum(weight * along)) or 1e-12
+        left = c - s * b
+        squared = np.sum(left**2, axis=1)
+        weight = 1 / (1 + squared / (4 * np.median(squared) + 1e-12)) ** 2
+    score = weight * np.sum(instrument * left, axis=1)
+    sigma = float(np.sqrt(np.sum(score**2)) / abs(np.sum(weight * along)))
+    return s, sigma, float(np.sqrt(np.median(squared) / (np.median(np.sum(c**2, axis=1)) + 1e-12)))
+
+
+def _late(
+    recording: Recording, w_C: Floats, w: Floats, usable: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """w_C(t) = w(t) + late w'(t): w' from the frames beside, whose noise is not that of w(t)."""
+    t = (recording.frame_t_ns[:-1] * 1e-9)[usable]
+    gap = np.roll(t, -1) - np.roll(t, 1)
+    usual = 2 * np.median(np.diff(recording.frame_t_ns)) * 1e-9
+    inner = (gap > 0.5 * usual) & (gap < 1.5 * usual)
+    slope = (np.roll(w_C, -1, axis=0) - np.roll(w_C, 1, axis=0)) / usual
+    left = w_C - w
+    left = left - np.median(left, axis=0)
+    weight = inner / (1 + np.sum(left**2, axis=1) / (4 * np.median(left**2) + 1e-12)) ** 2
+    along = float(np.sum(weight * np.sum(slope**2, axis=1))) or 1e-12
+    late = float(np.sum(weight * np.sum(slope * left, axis=1))) / along
+    score = weight * np.sum(slope * (left - late * slope), axis=1)
+    return late, float(np.sqrt(np.sum(score**2)) / along)
+
+
+def angle_between(A: Floats, B: Floats) -> float:
+    """Of two rotations, degrees."""
+    cosine = (np.trace(A.T @ B) - 1) / 2
+    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))

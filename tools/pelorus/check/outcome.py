@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""One replay, and how likely its observations were: what settings are compared by.
+
+Each REPORT tells d2 = y^T S^-1 y and ln det S of all innovations that the frame used, as the filter
+believed them to be distributed before it saw them. Summed over a drive that is -2 ln of the
+likelihood of what was seen, given the settings; smaller is better. An observation that the gate
+rejected counts as one that could have been anywhere in the picture: else the best settings would
+be those that reject everything.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pelorus import wire
+from pelorus.check.contents import first_frames, half, not_before, recording_of, shifted, write
+from pelorus.console import progress
+from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo
+from pelorus.layout import Floats
+from pelorus.replay import run_program
+
+# While settings are compared the gate stands where an observation begins to be more likely an
+# outlier than a rare one; the usual gate cuts 1 % of the sound ones, and so would favour sigmas
+# that are too large.
+GATE_D2 = "25"
+DISPARITY_SPAN_PX = 100.0
+BEGIN_NS = 1_000_000_000  # a recording may begin at zero, and its frames be too late
+OFFSET, PART, LENGTH = "@offset", "@part", "@frames"
+
+Settings = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """`cost`: -2 ln of the likelihood of a matched observation, on average."""
+
+    cost: float
+    matched: int
+    used: int
+    gated: int
+    frames: int
+    nis: float  # a degree of freedom: 1 is due
+    bias: Floats  # at the end, (b_v, b_w)
+    bias_variance: Floats
+
+    def gain_over(self, other: Outcome) -> float:
+        """How much likelier this run makes what was seen: -2 ln of the ratio, over the drive."""
+        return (other.cost - self.cost) * min(self.matched, other.matched)
+
+
+NOTHING = Outcome(math.inf, 0, 0, 0, 0, math.nan, np.zeros(6), np.zeros(6))
+
+
+class Bench:
+    """Replays a recording with many settings, on all processors, each set once.
+
+    Settings may hold OFFSET (the frames' times are later by so many s), PART (0 or 1: the first or
+    the second half of the drive) and LENGTH (so many frames), which are not the filter's.
+    """
+
+    def __init__(self, program: Path, recording: Path, folder: Path) -> None:
+        messages = wire.messages_of(recording)
+        self.header = wire.header_of_messages(messages)
+        self.examined = recording_of(messages)
+        self._messages = not_before(first_frames(messages), BEGIN_NS)
+        self._folder = folder
+        self._program = program
+        self._outlier_cost = outlier_cost(self.header, messages)
+        self._known: dict[tuple[tuple[str, str], ...], Outcome] = {}
+        self._written: dict[tuple[str, str, str], Path] = {}
+
+    @property
+    def replays(self) -> int:
+        return len(self._known)
+
+    def run(self, settings: Settings) -> Outcome:
+        return self.run_all([settings])[0]
+
+    def run_all(self, many: Sequence[Settings], what: str = "replaying") -> list[Outcome]:
+        """In their order."""
+        keys = [tuple(sorted(settings.items())) for settings in many]
+        new = [key for key in dict.fromkeys(keys) if key not in self._known]
+        for key in new:
+            self._recording(dict(key))
+        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+            done = pool.map(self._replay, new)
+            self._known.update(zip(new, progress(done, what, len(new)), strict=True))
+        return [self._known[key] for key in keys]
+
+    def _recording(self, settings: Settings) -> Path:
+        """What is replayed, written when it is first wanted."""
+        key = settings.get(OFFSET, "0"), settings.get(PART, ""), settings.get(LENGTH, "")
+        if key not in self._written:
+            path = self._folder / f"tuning-{len(self._written)}.plr"
+            messages = half(self._messages, int(key[1])) if key[1] else self._messages
+            messages = first_frames(messages, int(key[2])) if key[2] else messages
+            write(path, shifted(messages, round(float(key[0]) * 1e9)))
+            self._written[key] = path
+        return self._written[key]
+
+    def _replay(self, key: tuple[tuple[str, str], ...]) -> Outcome:
+        settings = dict(key)
+        recording = self._recording(settings)
+        wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
+        with tempfile.TemporaryDirectory(dir=self._folder) as folder:
+            answers = Path(folder) / "answers.plr"
+            options = ["--quiet", *options_of({"gate-d2": GATE_D2} | wanted)]
+            run_program(self._program, recording, [*options, "--out", str(answers)])
+            return outcome_of(wire.only(answers, (Kind.REPORT, Kind.POSE)), self._outlier_cost)
+
+
+def options_of(settings: Settings) -> list[str]:
+    """As pelorus-replay takes them."""
+    return [word for name, value in settings.items() for word in (f"--{name}", value)]
+
+
+def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
+    """From a filter's REPORTs and POSEs."""
+    total, rows, d2, matched, used, gated, frames = 0.0, 0, 0.0, 0, 0, 0, 0
+    last: Pose | None = None
+    for message in answers:
+        if isinstance(message, Pose) and message.after_stereo:
+            last = message
+        if not isinstance(message, Report) or message.subject != Kind.STEREO or message.status:
+            continue
+        frames += 1
+        matched, used = matched + message.matched, used + message.used
+        gated += message.gated
+        d2, rows = d2 + message.innovation_d2, rows + message.innovation_rows
+        total += message.innovation_log_det
+    if not matched or not rows or last is None:
+        return NOTHING
+    cost = total + d2 + rows * math.log(2 * math.pi) + gated * cost_of_outlier
+    variance = np.asarray(last.bias_variance, np.float64)
+    return Outcome(
+        cost / matched if math.isfinite(cost) else math.inf,
+        matched,
+        used,
+        gated,
+        frames,
+        d2 / rows,
+        np.asarray(last.bias, np.float64),
+        variance,
+    )
+
+
+def outlier_cost(header: Header, messages: Sequence[Message]) -> float:
+    """-2 ln of the density of an observation that may be anywhere: uL, v and disparity."""
+    width, height = float(header.image_width_px), float(header.image_height_px)
+    if not (width and height):
+        seen = [m.pixels for m in messages if isinstance(m, Stereo) and len(m.pixels)]
+        pixels = np.concatenate(seen) if seen else np.zeros((1, 4), np.float32)
+        sound = pixels[np.isfinite(pixels).all(axis=1)]
+        width, height = (float(np.ptp(sound[:, k])) + 1.0 for k in (0, 1))
+    return 2 * math.log(width * height * DISPARITY_SPAN_PX)

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""The settings that make what was seen most likely: a search in the logarithms of the sigmas.
+
+In each round every parameter is tried a step up and a step down, all at once on all processors.
+Three points give a parabola, and all parameters move to the feet of theirs together; the best of
+everything tried stays. Then the step shrinks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from pelorus.check.outcome import Bench, Outcome, Settings
+
+FARTHEST = 2.0  # steps that a parabola may lead away
+WORTH_ANOTHER = 0.01  # an observation: so much from a wide step asks for one more
+LEAST_COST = 2e-5  # an observation: less is no improvement
+
+Build = Callable[[Mapping[str, float]], Settings]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The best that was tried."""
+
+    values: dict[str, float]
+    outcome: Outcome
+
+
+def search(
+    bench: Bench,
+    start: Mapping[str, float],
+    limits: Mapping[str, tuple[float, float]],
+    build: Build,
+    steps: Sequence[float],
+    what: str = "noise",
+) -> Found:
+    """From `start`, by rounds; `build` makes settings of the values."""
+    best = Found(dict(start), bench.run(build(start)))
+    for round_, step in enumerate(steps):
+        said = f"{what}, round {round_ + 1} of {len(steps)}"
+        better = _round(bench, best, limits, build, step, said)
+        while step > 1.9 and better.outcome.cost < best.outcome.cost - WORTH_ANOTHER:
+            best, better = better, _round(bench, better, limits, build, step, said)
+        best = better
+    return best
+
+
+def _round(
+    bench: Bench,
+    best: Found,
+    limits: Mapping[str, tuple[float, float]],
+    build: Build,
+    step: float,
+    what: str,
+) -> Found:
+    tried: list[dict[str, float]] = []
+    for name in best.values:
+        for factor in (step, 1 / step):
+            tried.append(best.values | {name: _within(limits[name], best.values[name] * factor)})
+    outcomes = bench.run_all([build(values) for values in tried], what)
+    moved = dict(best.values)
+    for k, name in enumerate(best.values):
+        up, down = outcomes[2 * k].cost, outcomes[2 * k + 1].cost
+        steps = foot(down, best.outcome.cost, up)
+        moved[name] = _within(limits[name], best.values[name] * step**steps)
+    together = Found(moved, bench.run(build(moved)))
+    singly = (Found(v, o) for v, o in zip(tried, outcomes, strict=True))
+    return min((best, together, *singly), key=lambda found: found.outcome.cost)
+
+
+def foot(down: float, middle: float, up: float) -> float:
+    """Where the parabola through (-1, down), (0, middle), (1, up) is lowest, within reason."""
+    if not all(map(math.isfinite, (down, middle, up))):
+        return 0.0
+    bend = down - 2 * middle + up
+    if bend <= LEAST_COST:  # no foot: a step downhill, if there is a slope
+        return 0.0 if abs(up - down) <= LEAST_COST else math.copysign(1.0, down - up)
+    return max(-FARTHEST, min(FARTHEST, 0.5 * (down - up) / bend))
+
+
+def _within(limits: tuple[float, float], value: float) -> float:
+    return min(max(value, limits[0]), limits[1])

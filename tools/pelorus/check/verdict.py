@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""What a run says about itself, without truth: can it be trusted, and what is wrong?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from pelorus.check.tuning import NAMES, Tuned, starting_sigmas
+from pelorus.frame_table import BIASES, FrameTable, frame_table
+from pelorus.frames import Header, Message
+from pelorus.health import TimeLine, time_line
+from pelorus.schema import HEALTHS
+from pelorus.settings import in_force
+
+GOOD = HEALTHS[0]
+GOOD_MOST, LOST_MANY = 0.95, 0.1  # of the frames
+GATED_MANY, GATED_MOST = 0.1, 0.3  # of the matches
+WINDOW_S = 5.0
+WORSE = 3.0  # times the usual share of a window that is worth naming
+NIS_LOW, NIS_HIGH = 0.6, 1.6
+BIAS_SIGMAS = 3.0
+OTHER_SIGMA = 1.2  # a setting that differs by more is told
+FEW_USED = 8.0  # a frame
+
+
+class Grade(IntEnum):
+    """From good to bad."""
+
+    GOOD = 0
+    CARE = 1
+    BAD = 2
+
+
+VERDICTS = {
+    Grade.GOOD: "this can be trusted",
+    Grade.CARE: "this can be trusted with care",
+    Grade.BAD: "do not trust this",
+}
+
+
+@dataclass(frozen=True)
+class Remark:
+    """One thing that was looked at."""
+
+    grade: Grade
+    text: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """A whole replay with one set of settings."""
+
+    messages: Sequence[Message]
+    frames: FrameTable
+    health: TimeLine
+
+    @classmethod
+    def of(cls, messages: Sequence[Message]) -> Run:
+        return cls(messages, frame_table(messages), time_line(messages) or TimeLine(0, {}, ()))
+
+    @property
+    def good_share(self) -> float:
+        return self.health.by_health.get(GOOD, 0) / max(self.health.frames, 1)
+
+    @property
+    def gated_share(self) -> float:
+        return float(self.frames["gated"].sum() / max(self.frames["matched"].sum(), 1))
+
+    @property
+    def nis(self) -> float:
+        """Of all innovations of a frame together, a degree of freedom: 1 is due."""
+        rows = self.frames["innovation_rows"].sum()
+        return float(self.frames["innovation_d2"].sum() / rows) if rows else float("nan")
+
+
+def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
+    """Of the run with the tuned settings, and of what tuning has found."""
+    return [
+        *_health(run),
+        *_gate(run, origin_ns),
+        *_used(run),
+        *_nis(run, tuned),
+        *_biases(run),
+        *_tracks(tuned),
+        *(Remark(Grade.GOOD, words) for words in tuned.said),
+    ]
+
+
+def overall(found: Sequence[Remark]) -> Grade:
+    """As the worst of them."""
+    return max((remark.grade for remark in found), default=Grade.GOOD)
+
+
+def _health(run: Run) -> Iterator[Remark]:
+    lost = 1 - sum(run.health.by_health.get(HEALTHS[k], 0) for k in (0, 1)) / run.health.frames
+    grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
+    grade = Grade.BAD if lost > LOST_MANY else grade
+    yield Remark(grade, f"health {run.health.summary()}")
+
+
+def _gate(run: Run, origin_ns: int) -> Iterator[Remark]:
+    """The share, and where in the drive it is far above the usual."""
+    share = run.gated_share
+    grade = Grade.BAD if share > GATED_MOST else Grade.CARE if share > GATED_MANY else Grade.GOOD
+    words = f"the gate rejects {share:.1%} of the matches"
+    worst = _worst_window(run, origin_ns)
+    if worst is not None and worst[2] > max(WORSE * share, GATED_MANY):
+        words += f", {worst[2]:.0%} of them from {worst[0]:.0f} to {worst[1]:.0f} s"
+    yield Remark(grade, words)
+
+
+def _worst_window(run: Run, origin_ns: int) -> tuple[float, float, float] | None:
+    t = (run.frames.t_ns - origin_ns) * 1e-9
+    if not len(t):
+        return None
+    number = ((t - t[0]) // WINDOW_S).astype(np.int64)
+    matched, gated = (np.bincount(number, run.frames[name]) for name in ("matched", "gated"))
+    enough = matched >= 50
+    if not enough.any():
+        return None
+    shares = np.where(enough, gated / np.maximum(matched, 1), 0)
+    k = int(np.argmax(shares))
+    return float(t[0] + k * WINDOW_S), float(t[0] + (k + 1) * WINDOW_S), float(shares[k])
+
+
+def _used(run: Run) -> Iterator[Remark]:
+    used = float(np.median(run.frames["used"]))
+    if used < FEW_USED:
+        yield Remark(Grade.CARE, f"only {used:.0f} observations of a frame are used (median)")
+
+
+def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
+    words = f"innovations are {run.nis:.2f} times what the noise says, 1 is due"
+    if tuned.noise.drifts:
+        yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for drift as well")
+    elif NIS_LOW <= run.nis <= NIS_HIGH:
+        yield Remark(Grade.GOOD, words)
+    else:
+        yield Remark(Grade.CARE, f"{words}: the noise is not what these settings describe")
+
+
+def _biases(run: Run) -> Iterator[Remark]:
+    """Against their priors: beyond 3 sigma stereo and odometry disagree in something else."""
+    if not in_force(run.messages, "bias"):
+        return
+    for name, axis in zip(BIASES, (*"xyz", *"xyz"), strict=True):
+        kind = "velocity" if name.startswith("bias_v") else "gyro"
+        prior = in_force(run.messages, f"bias-{kind}-sigma") or 0.0
+        value = float(run.frames[name][-1])
+        if prior > 0 and abs(value) > BIAS_SIGMAS * prior:
+            yield Remark(
+                Grade.CARE,
+                f"the {kind} bias of {axis} is {value:.3g}, {abs(value) / prior:.1f} sigma of its "
+                "prior: do stereo and odometry disagree in scale?",
+            )
+
+
+def _tracks(tuned: Tuned) -> Iterator[Remark]:
+    noise = tuned.noise
+    if not noise.drifts:
+        return
+    known = {lag: sigma for lag, sigma in noise.by_lag.items() if np.isfinite(sigma)}
+    first, last = min(known), max(known)
+    yield Remark(
+        Grade.CARE,
+        f"the tracks drift: points are off by {known[first]:.2f} px after {first} frame and by "
+        f"{known[last]:.2f} px after {last}; pixel-sigma {noise.stands_for_px:.2g} stands for "
+        "that. Timing, clocks and the noise of single axes cannot be told by the likelihood of "
+        "single steps then, and stay as given",
+    )
+
+
+def changes(given: Mapping[str, str], header: Header, tuned: Tuned) -> list[str]:
+    """`pixel-sigma 2 should be 1`: what differs by more than a fifth, or in words."""
+    before = starting_sigmas(header, given)
+    said = []
+    for name, setting in NAMES.items():
+        after = [float(part) for part in tuned.settings.get(setting, "").split(",") if part]
+        ratios = [max(x / before[name], before[name] / x) for x in after if x > 0]
+        if ratios and max(ratios) > OTHER_SIGMA:
+            said.append(f"{setting} {before[name]:.3g} should be {tuned.settings[setting]}")
+    for setting in ("twist-timing", "bias", "camera-offset"):
+        value = tuned.settings.get(setting)
+        if value is not None and value != given.get(setting, _usual(setting, header)):
+            said.append(f"{setting} should be {value}")
+    return said
+
+
+def _usual(setting: str, header: Header) -> str:
+    return {"twist-timing": header.twist_timing.name.lower(), "bias": "on"}.get(setting, "0")

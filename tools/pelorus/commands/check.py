@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus check RECORDING`."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from pelorus.commands.choices import PROGRAMS, SETTINGS, settings_given
+from pelorus.console import out
+from pelorus.errors import write_text
+from pelorus.replay import find_programs
+
+if TYPE_CHECKING:
+    from pelorus.check.checked import Checked
+
+COLOURS = ("green", "yellow", "red")
+MARKS = ("good", "care", "bad")
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `check` to the command line."""
+    parent.command(epilog="Example:  pelorus check drive.plr --out tuned.conf")(check)
+
+
+def check(
+    recording: Path = typer.Argument(
+        ..., metavar="RECORDING", help="A .plr file; no truth needed."
+    ),
+    tuned: Path = typer.Option(
+        Path("tuned.conf"), "--out", metavar="FILE", help="The settings to write."
+    ),
+    config: Path | None = typer.Option(
+        None, metavar="FILE", help="Your settings, which the search begins with."
+    ),
+    settings: list[str] = SETTINGS,
+    as_json: bool = typer.Option(False, "--json", help="The verdict as one JSON object."),
+    programs: Path | None = PROGRAMS,
+) -> None:
+    """Can a recording be trusted, what is wrong with it, and which settings suit it?
+
+    Replays it some hundred times: noise, twist timing, the camera's clock and the biases are those
+    that make what was seen likeliest. Truth is not looked at. Writes the settings, and shows what
+    the filter says of itself before and after.
+    """
+    from pelorus.check import checked  # noqa: PLC0415 - scipy loads slowly
+
+    given = settings_given(config, settings)
+    program = find_programs(programs).float32
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        found = checked.check(program, recording, given, Path(folder))
+    if found.tuned is not None:
+        write_text(tuned, checked.config_text(found, recording))
+    if as_json:
+        out.print(json.dumps(_json(found, tuned), indent=2), markup=False)
+    else:
+        _tell(found, tuned)
+
+
+def _tell(found: Checked, tuned: Path) -> None:
+    out.print(f"[bold {COLOURS[found.grade]}]{found.verdict}[/]")
+    for remark in found.remarks:
+        out.print(f"  [{COLOURS[remark.grade]}]{MARKS[remark.grade]}[/]  {escape(remark.text)}")
+    if found.tuned is None:
+        out.print("mend this first: nothing was tuned, and no settings were written")
+        return
+    for spell in found.spells:
+        out.print(f"        {escape(spell)}")
+    for change in found.changes:
+        out.print(f"[bold]{escape(change)}[/]")
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "before", "after"):
+        table.add_column(title, justify="right" if title else "left", no_wrap=True)
+    for row in found.rows:
+        table.add_row(*row)
+    out.print(table)
+    out.print(f"settings: {escape(str(tuned))}")
+
+
+def _json(found: Checked, tuned: Path) -> dict[str, Any]:
+    return {
+        "verdict": found.verdict,
+        "grade": MARKS[found.grade],
+        "remarks": [{"grade": MARKS[r.grade], "text": r.text} for r in found.remarks],
+        "health": found.spells,
+        "changes": found.changes,
+        "figures": {title: {"before": a, "after": b} for title, a, b in found.rows},
+        "settings": found.tuned.settings if found.tuned else None,
+        "camera_offset_s": found.tuned.offset_s if found.tuned else None,
+        "file": str(tuned) if found.tuned else None,
+    }
