@@ -57,8 +57,8 @@ extern "C" {
 #define PLR_PORTABLE 0
 #endif
 
-/* Columns of the tile that the update's kernel keeps in registers: 1 to 16, default 16 with AVX,
- * else 4. It changes the speed, and no bit of a result. */
+/* Columns of the tile that the update's kernel keeps in registers: a divisor of 16 or 6, default 16
+ * with AVX, else 4. It changes the speed, and no bit of a result. */
 #ifndef PLR_TILE_COLUMNS
 #if defined(__AVX__)
 #define PLR_TILE_COLUMNS 16
@@ -73,8 +73,8 @@ extern "C" {
 #if !defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ != 0
 #error "Pelorus needs FLT_EVAL_METHOD 0 (on 32-bit x86: -msse2 -mfpmath=sse)."
 #endif
-#if PLR_TILE_COLUMNS < 1 || PLR_TILE_COLUMNS > 16
-#error "PLR_TILE_COLUMNS must be 1 to 16."
+#if PLR_TILE_COLUMNS < 1 || (16 % PLR_TILE_COLUMNS != 0 && 6 % PLR_TILE_COLUMNS != 0)
+#error "PLR_TILE_COLUMNS must divide 16 or 6."
 #endif
 #if PLR_MAX_LANDMARKS < 1 || PLR_MAX_LANDMARKS > 1024
 #error "PLR_MAX_LANDMARKS must be 1 to 1024."
@@ -129,7 +129,11 @@ enum {
     PLR_BLOCK_ROWS = PLR_ROWS * PLR_BLOCK_OBSERVATIONS,
     PLR_WORK_ROWS = PLR_BLOCK_ROWS > 24 ? PLR_BLOCK_ROWS : 24, /* a predict needs 4 x 6 */
     PLR_MAX_STATE = PLR_CORE_DIM + PLR_LANDMARK_DIM * PLR_MAX_LANDMARKS,
-    PLR_MAX_LD = (PLR_MAX_STATE + 15) / 16 * 16, /* a multiple of every tile width */
+    /* The leading dimension is a multiple of the tile's width, which the library alone knows: it is
+     * at most this, for every width that divides 16 or 6. */
+    PLR_LD_OF_16 = (PLR_MAX_STATE + 15) / 16 * 16,
+    PLR_LD_OF_6 = (PLR_MAX_STATE + 5) / 6 * 6,
+    PLR_MAX_LD = PLR_LD_OF_16 > PLR_LD_OF_6 ? PLR_LD_OF_16 : PLR_LD_OF_6,
     PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond the end of a matrix */
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "state/covariance.h"
 
+#include "pelorus/assertions.h"
+
 #include "math/dense.h"
 #include "math/small.h"
 #include "state/blocks.h"
@@ -15,7 +17,10 @@ unsigned plr_covariance_dim(const plr_filter *f) {
 }
 
 unsigned plr_covariance_ld(const plr_filter *f) {
-    return (plr_covariance_dim(f) + PLR_TILE_COLUMNS - 1) / PLR_TILE_COLUMNS * PLR_TILE_COLUMNS;
+    const unsigned n = plr_covariance_dim(f);
+    const unsigned ld = (n + PLR_TILE_COLUMNS - 1) / PLR_TILE_COLUMNS * PLR_TILE_COLUMNS;
+    PLR_ASSERT(ld <= PLR_MAX_LD);
+    return ld;
 }
 
 /* ---------------------------------------------------------------- blocks */
