@@ -130,7 +130,7 @@ static void put(plr_real *F, const plr_real block[9]) {
 static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
     plr_real block[9], skew[9], forward[9], tau = s->tau;
     plr_real *rho = F, *theta = F + THETA * DIM, *vel = F + VEL * DIM;
-    memset(F, 0, MOVED * DIM * sizeof *F);
+    memset(theta, 0, 3 * DIM * sizeof *F); /* the columns of rho in the rows of v are not read */
     put(rho, s->Et);
     put(theta + THETA, s->Et);
     put(vel + VEL, s->Et);
@@ -195,52 +195,63 @@ static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
 /* The covariance of the motion's noise: of n, velocity and biases together, 15 x 15. */
 static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
     const plr_core_motion *m = &f->core_motion;
-    for (unsigned i = 0; i < DIM; i++)
-        for (unsigned j = 0; j <= i; j++) {
-            plr_real q;
-            if (i < VEL)
-                q = f->motion.Q[PLR_POSE_DIM * i + j];
-            else if (j < VEL)
-                q = m->Q_nc[PLR_REST_DIM * j + i - VEL];
-            else
-                q = m->Q_cc[PLR_REST_DIM * (i - VEL) + j - VEL];
-            Q[DIM * i + j] = Q[DIM * j + i] = q;
-        }
-}
-
-static void set_noise(plr_filter *f, const plr_real Q[DIM * DIM]) {
-    plr_core_motion *m = &f->core_motion;
     for (unsigned i = 0; i < VEL; i++) {
-        memcpy(f->motion.Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
-        memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
+        memcpy(Q + DIM * i, f->motion.Q + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *Q);
+        memcpy(Q + DIM * i + VEL, m->Q_nc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
     }
-    for (unsigned i = 0; i < PLR_REST_DIM; i++)
-        memcpy(m->Q_cc + PLR_REST_DIM * i, Q + DIM * (VEL + i) + VEL, PLR_REST_DIM * sizeof *Q);
+    for (unsigned i = 0; i < PLR_REST_DIM; i++) {
+        plr_real *row = Q + DIM * (VEL + i);
+        memcpy(row + VEL, m->Q_cc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
+        for (unsigned j = 0; j < VEL; j++)
+            row[j] = m->Q_nc[PLR_REST_DIM * j + i];
+    }
 }
 
-static void gemm(unsigned m, unsigned n, unsigned k, const plr_real *A, const plr_real *B,
-                 plr_real *C) {
-    plr_gemm_nn(m, n, k, A, DIM, B, DIM, C, DIM);
+/* Stores an element of that covariance and its mirror image. */
+static inline void set_noise(plr_filter *f, unsigned r, unsigned c, plr_real q) {
+    plr_core_motion *m = &f->core_motion;
+    if (r >= VEL && c >= VEL)
+        m->Q_cc[PLR_REST_DIM * (r - VEL) + c - VEL] = m->Q_cc[PLR_REST_DIM * (c - VEL) + r - VEL] =
+            q;
+    else if (r >= VEL)
+        m->Q_nc[PLR_REST_DIM * c + r - VEL] = q;
+    else if (c >= VEL)
+        m->Q_nc[PLR_REST_DIM * r + c - VEL] = q;
+    else
+        f->motion.Q[PLR_POSE_DIM * r + c] = f->motion.Q[PLR_POSE_DIM * c + r] = q;
 }
 
-/* Q <- F Q F^T, where the rows of the biases do not change and those of theta depend on theta and
- * gyro bias alone. */
-static void transport_noise(const plr_real F[MOVED * DIM], plr_real Q[DIM * DIM]) {
-    plr_real X[MOVED * DIM] = {0};
-    gemm(3, DIM, DIM, F, Q, X);
-    gemm(3, DIM, 3, F + THETA * DIM + THETA, Q + THETA * DIM, X + THETA * DIM);
-    gemm(3, DIM, 3, F + THETA * DIM + GYRO, Q + GYRO * DIM, X + THETA * DIM);
-    gemm(3, DIM, DIM - THETA, F + VEL * DIM + THETA, Q + THETA * DIM, X + VEL * DIM);
-    for (unsigned i = 0; i < MOVED; i++) {
-        for (unsigned j = 0; j <= i; j++) {
-            const unsigned from = j < THETA ? 0 : THETA;
-            plr_real sum = 0;
-            for (unsigned l = from; l < DIM; l++)
-                sum = PLR_FMA(X[DIM * i + l], F[DIM * j + l], sum);
-            Q[DIM * i + j] = Q[DIM * j + i] = sum;
+enum { STRIP = 5 }; /* columns that are computed side by side */
+
+/* The rows of rho, theta and v of F are zero but for these columns. */
+typedef struct plr_imu_rows {
+    uint8_t row, from, to, more; /* from .. to - 1, and from `more` to the end */
+} plr_imu_rows;
+
+static const plr_imu_rows of_rho = {0, 0, DIM, DIM};
+static const plr_imu_rows of_theta = {THETA, THETA, VEL, GYRO};
+static const plr_imu_rows of_v = {VEL, THETA, DIM, DIM};
+
+static inline unsigned next_column(const plr_imu_rows *rows, unsigned column) {
+    return column + 1 == rows->to ? rows->more : column + 1;
+}
+
+/* Three rows of X = F Q: a strip of the result stays in registers. */
+static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
+                           const plr_real *restrict Q, plr_real *restrict X) {
+    F += DIM * rows->row;
+    X += DIM * rows->row;
+    for (unsigned j = 0; j < DIM; j += STRIP) {
+        plr_real sum[3 * STRIP] = {0};
+        for (unsigned l = rows->from; l < DIM; l = next_column(rows, l)) {
+            const plr_real *q = Q + DIM * l + j;
+            for (unsigned i = 0; i < 3; i++)
+                for (unsigned c = 0; c < STRIP; c++)
+                    sum[STRIP * i + c] = PLR_FMA(F[DIM * i + l], q[c], sum[STRIP * i + c]);
         }
-        for (unsigned j = MOVED; j < DIM; j++)
-            Q[DIM * i + j] = Q[DIM * j + i] = X[DIM * i + j];
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned c = 0; c < STRIP; c++)
+                X[DIM * i + j + c] = sum[STRIP * i + c];
     }
 }
 
@@ -256,36 +267,68 @@ static void densities(const plr_filter *f, plr_real interval, plr_real density[2
         density[i] = PLR_FMA(at->change2[i] * (interval / at->usual_s), interval, density[i]);
 }
 
-/* The noise of the readings enters as the biases do, and the biases walk. */
-static void add_noise(const plr_filter *f, const plr_real F[MOVED * DIM], plr_real tau,
-                      plr_real interval, plr_real Q[DIM * DIM]) {
-    plr_real density[2];
-    densities(f, interval, density);
-    const plr_real accel = density[0] / tau, gyro = density[1] / tau;
+/* The 3x3 block of X F^T between three rows of X and three of F. */
+static void set_block(plr_filter *f, const plr_real *X, const plr_real *F, const plr_imu_rows *left,
+                      const plr_imu_rows *right) {
+    plr_real block[9] = {0};
+    X += DIM * left->row;
+    F += DIM * right->row;
+    for (unsigned l = right->from; l < DIM; l = next_column(right, l))
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned j = 0; j < 3; j++)
+                block[3 * i + j] = PLR_FMA(X[DIM * i + l], F[DIM * j + l], block[3 * i + j]);
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < (left == right ? i + 1 : 3); j++)
+            set_noise(f, left->row + i, right->row + j, block[3 * i + j]);
+}
+
+/* Q <- F Q F^T + noise. The rows of the biases do not change. The noise of the readings, of variances
+ * `reading` (accelerometer, gyro), enters as an error of the biases does that lasts for this step
+ * alone. */
+static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
+                            const plr_real reading[2]) {
+    plr_real Q[DIM * DIM], X[MOVED * DIM];
+    get_noise(f, Q);
+    transport_rows(&of_rho, F, Q, X);
+    transport_rows(&of_theta, F, Q, X);
+    transport_rows(&of_v, F, Q, X);
     for (unsigned i = 0; i < MOVED; i++)
-        for (unsigned j = 0; j <= i; j++) {
-            const plr_real *a = F + DIM * i + ACCEL, *b = F + DIM * j + ACCEL;
-            const plr_real q = PLR_FMA(gyro, plr_dot3(a + 3, b + 3), accel * plr_dot3(a, b));
-            Q[DIM * i + j] += q;
-            Q[DIM * j + i] = Q[DIM * i + j];
+        for (unsigned c = ACCEL; c < DIM; c++) {
+            plr_real *x = &X[DIM * i + c];
+            set_noise(f, i, c, *x);
+            *x = PLR_FMA(F[DIM * i + c], reading[c >= GYRO], *x);
         }
-    for (unsigned i = ACCEL; i < DIM; i++)
-        Q[(DIM + 1) * i] =
-            PLR_FMA(i < GYRO ? f->par.accel_walk : f->par.gyro_walk, tau, Q[(DIM + 1) * i]);
+    /* of two, the one that is zero in more columns stands on the right */
+    set_block(f, X, F, &of_rho, &of_rho);
+    set_block(f, X, F, &of_rho, &of_theta);
+    set_block(f, X, F, &of_rho, &of_v);
+    set_block(f, X, F, &of_theta, &of_theta);
+    set_block(f, X, F, &of_v, &of_theta);
+    set_block(f, X, F, &of_v, &of_v);
+}
+
+static void move_noise(plr_filter *f, const plr_real F[MOVED * DIM], plr_real tau,
+                       plr_real interval) {
+    plr_real reading[2];
+    densities(f, interval, reading);
+    reading[0] /= tau;
+    reading[1] /= tau;
+    transport_noise(f, F, reading);
+    for (unsigned i = ACCEL - VEL; i < PLR_REST_DIM; i++) {
+        plr_real *q = &f->core_motion.Q_cc[(PLR_REST_DIM + 1) * i];
+        *q = PLR_FMA(i < GYRO - VEL ? f->par.accel_walk : f->par.gyro_walk, tau, *q);
+    }
 }
 
 static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real seconds, plr_real interval) {
     plr_imu_step s;
-    plr_real F[MOVED * DIM], Q[DIM * DIM];
+    plr_real F[MOVED * DIM];
     plr_motion *m = &f->motion;
     integrate(f, reading, seconds, &s);
     transition(&s, F);
     accumulate_derivatives(f, &s, F);
-    get_noise(f, Q);
-    transport_noise(F, Q);
-    add_noise(f, F, seconds, interval, Q);
-    set_noise(f, Q);
+    move_noise(f, F, seconds, interval);
     plr_pose_move(f, s.E, s.d);
     memcpy(f->inertial.velocity, s.v, sizeof s.v);
     plr_se3_append(m->E, m->p, s.E, s.d);

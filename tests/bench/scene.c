@@ -39,6 +39,25 @@ void scene_twist(const scene *s, unsigned k, plr_twist *twist) {
     twist->v_B_mps[0] = (place(s, k + 1) - place(s, k)) * s->frames_per_second;
 }
 
+/* Since frame 0. */
+static double phase(plr_time_ns t_ns) {
+    return sway_radps * ((double)t_ns * 1e-9 - 1);
+}
+
+void scene_imu(scene *s, plr_time_ns t_ns, plr_imu *imu) {
+    double noise[6];
+    rng_normals(&s->noise, 1e-3, noise, 6);
+    *imu = (plr_imu){.a_B_mps2 = {noise[0] - sway_m * sway_radps * sway_radps * sin(phase(t_ns)),
+                                  noise[1], noise[2] + 9.81},
+                     .w_B_radps = {noise[3], noise[4], noise[5]}};
+}
+
+void scene_velocity(const scene *s, plr_time_ns t_ns, double v_B_mps[3]) {
+    (void)s;
+    v_B_mps[0] = sway_m * sway_radps * cos(phase(t_ns));
+    v_B_mps[1] = v_B_mps[2] = 0;
+}
+
 void scene_frame(scene *s, unsigned k, plr_frame *frame) {
     const plr_calibration *c = &s->calibration;
     for (unsigned i = 0; i < s->count; i++) {

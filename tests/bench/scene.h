@@ -23,6 +23,10 @@ void scene_init(scene *s, unsigned count);
 /* The twist that holds from frame k to k + 1. */
 void scene_twist(const scene *s, unsigned k, plr_twist *twist);
 
+/* An IMU's reading at t_ns, and the velocity that it moves with. */
+void scene_imu(scene *s, plr_time_ns t_ns, plr_imu *imu);
+void scene_velocity(const scene *s, plr_time_ns t_ns, double v_B_mps[3]);
+
 /* Frame k: every point, with a pixel's noise. */
 void scene_frame(scene *s, unsigned k, plr_frame *frame);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * The committed recording drive.plr through the filter, against the committed results: the same bits
- * from every compiler, level of optimisation and processor. docs/TESTING.md says how they are
+ * The committed recordings through the filter, against the committed results: the same bits from
+ * every compiler, level of optimisation and processor. docs/TESTING.md says how they are
  * renewed when a change is meant.
  *
  * A line of the results is a frame: counts and position in full, everything else as a CRC-32 of its
@@ -26,16 +26,23 @@ typedef struct scenario {
     bool bias;
     unsigned slots;
     double max_depth_m;
-    bool slips; /* the wheels slip: from 3 to 6 s twists are half of what they were */
+    bool slips;          /* the wheels slip: from 3 to 6 s twists are half of what they were */
+    plr_imu_start start; /* of the recording of an IMU; AUTO: that of twists */
 } scenario;
 
 static const scenario scenarios[] = {
-    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false},
-    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20, false},
-    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0, false},
-    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0, false},
-    {"slip", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, true},
+    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_AUTO},
+    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20, false, PLR_IMU_START_AUTO},
+    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0, false, PLR_IMU_START_AUTO},
+    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0, false, PLR_IMU_START_AUTO},
+    {"slip", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, true, PLR_IMU_START_AUTO},
+    {"imu-rest", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_REST},
+    {"imu-motion", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_MOTION},
 };
+
+static bool is_by_imu(const scenario *s) {
+    return s->start != PLR_IMU_START_AUTO;
+}
 
 static plr_filter filter;
 static plr_landmark known[MOST_KNOWN];
@@ -71,6 +78,19 @@ static uint32_t crc_of_landmarks(void) {
     return sum;
 }
 
+/* Of the biases; with an IMU of velocity and rate too, and of their covariance. */
+static uint32_t crc_of_bias(void) {
+    plr_twist now;
+    double P_u[36];
+    const uint32_t sum = crc(filter.bias, sizeof filter.bias);
+    if (plr_filter_config(&filter)->process != PLR_PROCESS_IMU)
+        return sum;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity(&filter, &now));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(&filter, P_u));
+    return plr_crc32(plr_crc32(sum, (const uint8_t *)&now, sizeof now), (const uint8_t *)P_u,
+                     sizeof P_u);
+}
+
 static void describe(char line[LINE], const plr_report *r) {
     plr_real P_xi[36];
     const unsigned n = plr_covariance_dim(&filter);
@@ -79,10 +99,9 @@ static void describe(char line[LINE], const plr_report *r) {
              "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x "
              "used %u gated %u new %u evicted %u active %u status %d",
              (double)r->t_ns * 1e-9, filter.p_WB[0], filter.p_WB[1], filter.p_WB[2],
-             crc(filter.R_WB, sizeof filter.R_WB), crc(P_xi, sizeof P_xi),
-             crc(filter.bias, sizeof filter.bias), crc_of_landmarks(),
-             crc(filter.P, n * (n + 1) / 2 * sizeof *filter.P), r->used, r->gated, r->created,
-             r->evicted, r->active, r->status);
+             crc(filter.R_WB, sizeof filter.R_WB), crc(P_xi, sizeof P_xi), crc_of_bias(),
+             crc_of_landmarks(), crc(filter.P, n * (n + 1) / 2 * sizeof *filter.P), r->used,
+             r->gated, r->created, r->evicted, r->active, r->status);
 }
 
 /* Says which words of two lines differ, each behind the name that stands before it. */
@@ -133,6 +152,27 @@ static bool source(void *context, uint32_t id, plr_landmark *landmark) {
     return false;
 }
 
+static void suggest_for_twists(plr_config *config, const plr_header *header) {
+    each_axis(config->velocity_sigma, header->velocity_sigma_mps);
+    each_axis(config->gyro_sigma, header->gyro_sigma_radps);
+    config->bias_velocity_sigma_mps = header->bias_velocity_sigma_mps;
+    config->bias_gyro_sigma_radps = header->bias_gyro_sigma_radps;
+    config->bias_velocity_walk = header->bias_velocity_walk;
+    config->bias_gyro_walk = header->bias_gyro_walk;
+}
+
+static void suggest_for_imu(plr_config *config, const scenario *s, const plr_header *header) {
+    config->process = PLR_PROCESS_IMU;
+    config->imu_start = (uint8_t)s->start;
+    config->gyro_noise = header->gyro_noise;
+    config->accel_noise = header->accel_noise;
+    config->gyro_walk = header->gyro_walk;
+    config->accel_walk = header->accel_walk;
+    config->bias_accel_sigma_mps2 = header->bias_accel_sigma_mps2;
+    config->bias_gyro_sigma_radps = header->bias_gyro_sigma_radps;
+    config->gravity_mps2 = header->gravity_mps2;
+}
+
 static void begin(const scenario *s, const plr_header *header) {
     const plr_map map = {.source = source};
     plr_config config;
@@ -144,12 +184,10 @@ static void begin(const scenario *s, const plr_header *header) {
     config.max_depth_m = s->max_depth_m;
     config.twist_timing = header->twist_timing;
     config.pixel_sigma_px = header->pixel_sigma_px;
-    each_axis(config.velocity_sigma, header->velocity_sigma_mps);
-    each_axis(config.gyro_sigma, header->gyro_sigma_radps);
-    config.bias_velocity_sigma_mps = header->bias_velocity_sigma_mps;
-    config.bias_gyro_sigma_radps = header->bias_gyro_sigma_radps;
-    config.bias_velocity_walk = header->bias_velocity_walk;
-    config.bias_gyro_walk = header->bias_gyro_walk;
+    if (is_by_imu(s))
+        suggest_for_imu(&config, s, header);
+    else
+        suggest_for_twists(&config, header);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &header->calibration, &config, &map));
 }
 
@@ -171,6 +209,21 @@ static void take_twist(const scenario *s, const plr_twist_message *message) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, message->t_ns, &twist));
 }
 
+static void take_start(const plr_start *start) {
+    double P[36];
+    for (unsigned i = 0, k = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++, k++)
+            P[6 * i + j] = P[6 * j + i] = start->P_xi[k];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, start->t_ns, &start->T_WB, P));
+}
+
+static void take_imu(const plr_imu_message *imu) {
+    for (unsigned i = 0; i < imu->count; i++)
+        TEST_ASSERT_EQUAL_INT(
+            PLR_OK, plr_filter_inertial(&filter, imu->t_ns + i * (plr_time_ns)imu->period_ns,
+                                        &imu->readings[i]));
+}
+
 static void take(const scenario *s, const plr_message *message) {
     char line[LINE];
     plr_report report;
@@ -183,7 +236,19 @@ static void take(const scenario *s, const plr_message *message) {
         known[known_count++] = message->as.landmark.landmark;
         break;
     case PLR_KIND_TRUTH:
-        take_truth(s, &message->as.truth);
+        if (!is_by_imu(s))
+            take_truth(s, &message->as.truth);
+        break;
+    case PLR_KIND_START:
+        if (is_by_imu(s))
+            take_start(&message->as.start);
+        break;
+    case PLR_KIND_IMU:
+        take_imu(&message->as.imu);
+        break;
+    case PLR_KIND_READING:
+        (void)plr_filter_measure(&filter, &message->as.reading,
+                                 NULL); /* refused before the start */
         break;
     case PLR_KIND_TWIST:
         take_twist(s, &message->as.twist);
@@ -204,8 +269,10 @@ static void replay(const scenario *s) {
     plr_reader reader;
     uint8_t bytes[512];
     size_t n;
-    FILE *recording = fopen(PELORUS_SOURCE_DIR "/tests/golden/drive.plr", "rb");
-    TEST_ASSERT_NOT_NULL_MESSAGE(recording, "tests/golden/drive.plr is missing");
+    const char *path = is_by_imu(s) ? PELORUS_SOURCE_DIR "/tests/golden/imu.plr"
+                                    : PELORUS_SOURCE_DIR "/tests/golden/drive.plr";
+    FILE *recording = fopen(path, "rb");
+    TEST_ASSERT_NOT_NULL_MESSAGE(recording, path);
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_reader_init(&reader, buffer, sizeof buffer, observations, 256));
     while ((n = fread(bytes, 1, sizeof bytes, recording)) > 0)
@@ -301,6 +368,18 @@ static void test_slipping_wheels_compute_the_committed_bits(void) {
     TEST_ASSERT_GREATER_THAN_UINT32(0, filter.totals.contradictions);
 }
 
+static void test_an_imu_that_starts_at_rest_computes_the_committed_bits(void) {
+    check(&scenarios[5]);
+    TEST_ASSERT_TRUE(filter.inertial.started);
+    TEST_ASSERT_GREATER_THAN_UINT32(20, filter.totals.readings); /* wheel and standstill */
+}
+
+/* And fixes position and heading anew two seconds later. */
+static void test_an_imu_that_starts_in_motion_computes_the_committed_bits(void) {
+    check(&scenarios[6]);
+    TEST_ASSERT_TRUE(filter.inertial.anchored);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_body_computes_the_committed_bits);
@@ -308,5 +387,7 @@ int main(void) {
     RUN_TEST(test_localization_computes_the_committed_bits);
     RUN_TEST(test_mapping_computes_the_committed_bits);
     RUN_TEST(test_slipping_wheels_compute_the_committed_bits);
+    RUN_TEST(test_an_imu_that_starts_at_rest_computes_the_committed_bits);
+    RUN_TEST(test_an_imu_that_starts_in_motion_computes_the_committed_bits);
     return UNITY_END();
 }
