@@ -284,8 +284,10 @@ OPENS = re.compile(
     r"\.open\(|(?<![\w.])open\(|\.read_(text|bytes)\(|np\.(load|loadtxt|genfromtxt|fromfile)\b|"
     r"loadmat|json\.load|csv\.(reader|DictReader)|zipfile"
 )
-# What they open is the project's own: recordings, results of its replay, its build, its devices.
+# What they open is the project's own: recordings, settings, results of its replay, its build, its
+# devices.
 OWN = (
+    *("check/contents.py", "errors.py", "wire.py"),
     *("packed_file.py", "report/page.py", "replay.py", "schema.py"),
     *("robot/emulator.py", "robot/serial.py"),
 )
