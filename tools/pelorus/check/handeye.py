@@ -27,7 +27,6 @@ ROUNDS = 10
 MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
 FRAMES_ENOUGH = 40
 FITS_PX = 3.0  # a pair of one rigid scene fits its frame's motion so well
-SAME_WAY = 0.5  # rad
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,8 @@ class HandEye:
     way_sigma: float
     turn_left: float  # of the turns what the fit does not explain, as a share
     way_left: float
-    late_s: float  # the twists are later than the images by so much
-    late_sigma_s: float
+    R_covariance: Floats  # rad^2, of a small turn on the left of R
+    heading_B: Floats  # unit vector: where the body mostly drives
 
     @property
     def told(self) -> bool:
@@ -87,29 +86,32 @@ def _fit(
     v_B, w_B = of_body[usable, :3], of_body[usable, 3:]
     if len(v_C) < FRAMES_ENOUGH:
         nan = float("nan")
-        return HandEye(len(v_C), fit, np.eye(3), *[nan] * 8)
+        return HandEye(
+            len(v_C), fit, np.eye(3), nan, nan, nan, nan, nan, nan, np.eye(3), np.eye(3)[0]
+        )
     w_B = w_B - np.median(w_B - np.median(w_B, axis=0), axis=0)
     lever = -recording.T_CB.R.T @ recording.T_CB.p
     driven = v_B + np.cross(w_B, lever)
-    R = _rotation(w_B, w_C, driven, v_C)
+    R, covariance = _rotation(w_B, w_C, driven, v_C)
     turn_scale, turn_sigma, turn_left = _scale(w_C, w_B @ R.T)
     way_scale, way_sigma, way_left = _scale(v_C, driven @ R.T)
-    late_s, late_sigma_s = _late(recording, w_C, w_B @ R.T * turn_scale, usable)
-    return HandEye(
-        len(v_C), fit, R, turn_scale, turn_sigma, way_scale, way_sigma, turn_left, way_left,
-        late_s, late_sigma_s,
-    )  # fmt: skip
+    turn, way = (turn_scale, turn_sigma), (way_scale, way_sigma)
+    mean = np.median(driven, axis=0)
+    heading = mean / (np.linalg.norm(mean) + 1e-12)
+    return HandEye(len(v_C), fit, R, *turn, *way, turn_left, way_left, covariance, heading)
 
 
-def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> Floats:
-    """Kabsch on both kinds of vectors, each in units of its own size, with robust weights."""
+def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> tuple[Floats, Floats]:
+    """Kabsch on both kinds of vectors, each in units of its own size, with robust weights; and the
+    covariance of a small turn, from what is left.
+    """
     pairs = []
     for b, c, least in ((w_B, w_C, TURNS_RADPS), (v_B, v_C, MOVES_MPS)):
         size_b, size_c = (np.median(np.linalg.norm(x, axis=1)) for x in (b, c))
         if size_c > least and size_b > 0:
             pairs.append((b / size_b, c / size_c))
     if not pairs:
-        return np.eye(3)
+        return np.eye(3), np.eye(3)
     b, c = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
     share = np.concatenate([np.full(len(p[0]), 1 / np.mean(p[0] ** 2)) for p in pairs])
     R, weight = np.eye(3), np.ones(len(b))
@@ -118,7 +120,12 @@ def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> Floats:
         R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
         left = np.sum((c - b @ R.T) ** 2, axis=1)
         weight = 1 / (1 + left / (np.median(left) + 1e-12)) ** 2
-    return np.asarray(R)
+    J = -se3.skew(b @ R.T)
+    trust = weight * share
+    H = np.einsum("nai,naj,n->ij", J, J, trust) + 1e-9 * np.eye(3)
+    score = np.einsum("nai,na,n->ni", J, c - b @ R.T, trust)
+    half = np.linalg.solve(H, score.T)
+    return np.asarray(R), np.asarray(half @ half.T)
 
 
 def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
@@ -137,24 +144,6 @@ def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
     score = weight * np.sum(instrument * left, axis=1)
     sigma = float(np.sqrt(np.sum(score**2)) / abs(np.sum(weight * along)))
     return s, sigma, float(np.sqrt(np.median(squared) / (np.median(np.sum(c**2, axis=1)) + 1e-12)))
-
-
-def _late(
-    recording: Recording, w_C: Floats, w: Floats, usable: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """w_C(t) = w(t) + late w'(t): w' from the frames beside, whose noise is not that of w(t)."""
-    t = (recording.frame_t_ns[:-1] * 1e-9)[usable]
-    gap = np.roll(t, -1) - np.roll(t, 1)
-    usual = 2 * np.median(np.diff(recording.frame_t_ns)) * 1e-9
-    inner = (gap > 0.5 * usual) & (gap < 1.5 * usual)
-    slope = (np.roll(w_C, -1, axis=0) - np.roll(w_C, 1, axis=0)) / usual
-    left = w_C - w
-    left = left - np.median(left, axis=0)
-    weight = inner / (1 + np.sum(left**2, axis=1) / (4 * np.median(left**2) + 1e-12)) ** 2
-    along = float(np.sum(weight * np.sum(slope**2, axis=1))) or 1e-12
-    late = float(np.sum(weight * np.sum(slope * left, axis=1))) / along
-    score = weight * np.sum(slope * (left - late * slope), axis=1)
-    return late, float(np.sqrt(np.sum(score**2)) / along)
 
 
 def angle_between(A: Floats, B: Floats) -> float:

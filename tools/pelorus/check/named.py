@@ -24,10 +24,13 @@ SWAPPED_SHARE = 0.5
 ROW_GAP_PX, ROW_GAP_FAR_PX = 2.0, 20.0  # of a rectified pair the median is below one
 FIT_LEAST = 0.6  # of the point pairs that one motion explains
 LEFT_MOST = 0.7  # of a motion's size that the twists leave unexplained
-TURNED_DEG, NEAR_DEG = 12.0, 20.0
-SCALE_OFF = 0.08
+TURNED_DEG, ROLLED_DEG, NEAR_DEG, AXES_DEG = 12.0, 50.0, 20.0, 40.0
+PITCH_MOST_DEG = 60.0
+SURE_SIGMAS = 4.0
+SCALE_LEAST, SCALE_MOST = 0.88, 1.07  # noise makes far points, and so every way, seem smaller
 UNIT_NEAR = 0.15
 FROZEN_FRAMES = 3
+JUMPS_SHARE = 0.003
 GAP_TIMES = 10.0
 
 
@@ -128,7 +131,7 @@ def _ids(recording: Recording) -> Iterator[Fault]:
     wide = np.ptp(tracks.pixels[:, 0]) * 0.25
     few = len(np.unique(tracks.id)) < 3 * float(np.median(filled))
     share = float(np.mean(jump > wide))
-    if share > 0.02 and few:
+    if share > JUMPS_SHARE and few:
         yield Fault(
             "ids-slots",
             f"{share:.0%} of the ids jump across the picture from one frame to the next, and there "
@@ -181,7 +184,11 @@ def _geometry(recording: Recording, found: HandEye) -> Iterator[Fault]:
     yield from units
     given = recording.T_CB.R
     off = angle_between(found.R, given)
-    if off > TURNED_DEG:
+    cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
+    headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    # the way tells where the camera looks; the roll about it only the turns do, which may be noise
+    sure = off > SURE_SIGMAS * _sigma_deg(found, given)
+    if sure and (headed > TURNED_DEG or off > ROLLED_DEG):
         yield _extrinsic(given, found.R, off)
     elif found.way_left > LEFT_MOST and not units:
         yield Fault(
@@ -211,16 +218,24 @@ def _extrinsic(given: Floats, found: Floats, off: float) -> Fault:
             f"the extrinsic is off by {off:.0f} degrees, and fits inverted: R_CB is body to camera",
         )
     turned = min(turns(), key=lambda F: angle_between(found, given @ F))
-    if not np.allclose(turned, np.eye(3)) and angle_between(found, given @ turned) < NEAR_DEG:
+    if not np.allclose(turned, np.eye(3)) and angle_between(found, given @ turned) < AXES_DEG:
         words = ", ".join(f"{'xyz'[k]} for {_axis_name(turned[k])}" for k in range(3))
         return Fault("axes", f"the body's axes are turned or mirrored: the twists have {words}")
     axis = _axis_of(found @ given.T)
-    if abs(axis[0]) > 0.85:
+    if abs(axis[0]) > 0.85 and off < PITCH_MOST_DEG:
         return Fault(
             "pitch",
             f"the camera is pitched by {off:.0f} degrees beside the extrinsic: forgotten?",
         )
     return Fault("extrinsic", f"the extrinsic's rotation is off by {off:.0f} degrees")
+
+
+def _sigma_deg(found: HandEye, given: Floats) -> float:
+    """How well the turn between the two rotations is known. Of a drive straight ahead nothing tells
+    the roll.
+    """
+    axis = _axis_of(found.R @ given.T)
+    return float(np.degrees(np.sqrt(axis @ found.R_covariance @ axis)))
 
 
 def _axis_name(row: Floats) -> str:
@@ -233,7 +248,8 @@ def _axis_of(R: Floats) -> Floats:
 
 
 def _scales(found: HandEye) -> Iterator[Fault]:
-    if abs(found.way_scale - 1) > max(SCALE_OFF, 4 * found.way_sigma):
+    low, high = SCALE_LEAST - 4 * found.way_sigma, SCALE_MOST + 4 * found.way_sigma
+    if not low < found.way_scale < high:
         yield Fault(
             "scale",
             "stereo and odometry disagree in scale: the images show "
