@@ -223,7 +223,8 @@ typedef int (*plr_state_source)(void *context, uint32_t offset, uint8_t *bytes, 
 
 /* Writes the whole state to a sink, as little-endian bytes that do not depend on the compiler:
  * docs/STATE-FORMAT.md. A filter that is restored from them computes the same bits as one that was
- * never interrupted. The bytes contain no checksum; plr_state_store_save adds one. `sink` NULL:
+ * never interrupted. (With an IMU that has not started yet, what was averaged until then is not
+ * saved: the average begins anew.) The bytes contain no checksum; plr_state_store_save adds one. `sink` NULL:
  * only checks whether the state can be saved.
  * PLR_E_DIVERGED, PLR_E_NOT_FINITE the state is not usable; PLR_E_IO the sink failed. After an
  * error discard what the sink has received. */

@@ -23,7 +23,7 @@ static plr_status check_moved(const plr_filter *f, const double *P_moved) {
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved) {
     if (!f)
         return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
     const plr_status status = check_moved(f, P_moved);
@@ -40,7 +40,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     for (unsigned slot = 0; slot < f->count; slot++)
         f->slots[slot].anchored = 0;
     if (!P_moved) {
-        plr_guard_seal(f);
+        plr_guard_seal_whole(f);
         return PLR_OK;
     }
     plr_pose anywhere = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
@@ -53,6 +53,6 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
             f->motion.Q[PLR_POSE_DIM * i + j] +=
                 (plr_real)(0.5 * (P[PLR_POSE_DIM * i + j] + P[PLR_POSE_DIM * j + i]));
     f->motion.pending = f->motion.noisy = 1;
-    plr_guard_seal(f);
+    plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -159,6 +159,7 @@ static void begin(plr_filter *f, plr_time_ns t_ns, plr_real interval) {
     s->started_ns = s->still_ns = t_ns;
     s->usual_s = interval;
     memcpy(s->slow, f->either.alignment.mean, sizeof s->slow);
+    memset(&f->either.alignment, 0, sizeof f->either.alignment); /* as after a restore */
 }
 
 /* The unit vector of the mean specific force less its bias; returns its length, m/s^2. */

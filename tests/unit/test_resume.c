@@ -5,6 +5,7 @@
 #include <unity.h>
 
 #include "support/axes.h"
+#include "support/reseal.h"
 #include "support/scene.h"
 #include "support/specimens.h"
 
@@ -133,6 +134,17 @@ static void test_the_pose_gains_what_was_allowed_and_nothing_else_changes(void) 
     TEST_ASSERT_EQUAL_MEMORY(&before.totals, &filter.totals, sizeof filter.totals);
 }
 
+/* A resume forgets where the landmarks were when the body began to stand. */
+static void test_a_body_that_stood_before_goes_on_undamaged(void) {
+    rng chance = rng_seeded(23);
+    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, 4);
+    filter.slots[2].anchored = 1;
+    reseal(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 77, NULL));
+    TEST_ASSERT_EQUAL_UINT8(0, filter.slots[2].anchored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_save(&filter, NULL, NULL));
+}
+
 static void test_allowances_add_up_and_outlast_their_application(void) {
     double P[36], more[36], P_moved[36];
     rng chance = rng_seeded(22);
@@ -247,6 +259,7 @@ int main(void) {
     RUN_TEST(test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks);
     RUN_TEST(test_without_an_allowance_landmarks_that_agree_are_believed_and_it_is_said);
     RUN_TEST(test_the_pose_gains_what_was_allowed_and_nothing_else_changes);
+    RUN_TEST(test_a_body_that_stood_before_goes_on_undamaged);
     RUN_TEST(test_allowances_add_up_and_outlast_their_application);
     RUN_TEST(test_a_body_that_was_moved_leaves_the_map_as_it_was);
     RUN_TEST(test_a_reading_of_before_says_nothing_afterwards);
