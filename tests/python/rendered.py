@@ -21,7 +21,7 @@ WIDTH, HEIGHT = 376, 240
 FRAMES, RATE_HZ, SPEED_MPS = 6, 10.0, 2.0
 WALL_M, BOARD_M, BOARD_HALF_M = 8.0, 4.0, 0.8
 BEGIN_NS = 1403636579763555584
-INVERSIONS = 40
+INVERSIONS = 200
 
 SMALL = Cameras(
     left=(229.3, 228.6, 183.6, 124.2),
@@ -34,7 +34,7 @@ class Scene:
     """The left camera at (0, 0, k SPEED / RATE) of the world, which looks along z."""
 
     cameras: Cameras = SMALL
-    shades: list[NDArray[np.float32]] = field(default_factory=lambda: [_texture(1), _texture(2)])
+    shades: list[NDArray[np.float32]] = field(default_factory=lambda: [texture(1), texture(2)])
 
     @property
     def t_ns(self) -> list[int]:
@@ -58,7 +58,7 @@ class Scene:
 
     def _seen(self, T_WC: Poses, intrinsics: tuple[float, ...]) -> Gray:
         cameras = self.cameras
-        rays = _rays(cameras.model, intrinsics, cameras.coefficients) @ T_WC.R.T
+        rays = rays_of(cameras.model, intrinsics, cameras.coefficients) @ T_WC.R.T
         picture = np.zeros((HEIGHT, WIDTH), np.float32)
         for shade, depth_m, dots_per_m in zip(
             self.shades, (WALL_M, BOARD_M), (30, 60), strict=True
@@ -73,7 +73,7 @@ class Scene:
 
 
 @cache
-def _rays(model: str, intrinsics: tuple[float, ...], D: tuple[float, ...]) -> Floats:
+def rays_of(model: str, intrinsics: tuple[float, ...], D: tuple[float, ...]) -> Floats:
     """Of every pixel: the formula of the lens, inverted by trial and error."""
     u, v = np.meshgrid(np.arange(WIDTH, dtype=float), np.arange(HEIGHT, dtype=float))
     wanted = np.stack((u.ravel(), v.ravel()), axis=-1)
@@ -84,7 +84,7 @@ def _rays(model: str, intrinsics: tuple[float, ...], D: tuple[float, ...]) -> Fl
     return np.column_stack((rays, np.ones(len(rays))))
 
 
-def _texture(seed: int) -> NDArray[np.float32]:
+def texture(seed: int) -> NDArray[np.float32]:
     """Soft blobs, which a point can be followed on."""
     noise = np.random.default_rng(seed).uniform(0, 255, (1024, 1024)).astype(np.float32)
     soft = cv2.GaussianBlur(noise, (0, 0), 2.5)

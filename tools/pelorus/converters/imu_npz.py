@@ -49,13 +49,16 @@ SAME_TIME_NS = 1000  # a start is at the reading that is so near
 
 
 class StartSigmas(NamedTuple):
-    """How well the state of `init` is known: a simulator's is exact, and written to many digits."""
+    """How well the state of `init` is known: a simulator's is exact, and written to many digits.
+
+    The biases walk: a prior narrower than they stray in a minute would soon be told to be wrong.
+    """
 
     position_m: float = 1e-4
     rotation_rad: float = 1e-4
     velocity_mps: float = 1e-3
-    bias_accel_mps2: float = 1e-3
-    bias_gyro_radps: float = 1e-4
+    bias_accel_mps2: float = 2e-2
+    bias_gyro_radps: float = 1e-3
 
 
 START_SIGMAS = StartSigmas()
