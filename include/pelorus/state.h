@@ -133,6 +133,7 @@ typedef struct plr_alignment {
 typedef struct plr_inertial {
     plr_real velocity[PLR_VELOCITY_DIM]; /* of the body in its own axes, m/s */
     plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */
+    plr_real spread2[2]; /* mean square difference of readings from `slow`, linear and angular */
     plr_real change2[2]; /* mean square of the difference between successive readings */
     plr_real usual_s;    /* usual interval between readings */
     plr_time_ns started_ns;

@@ -95,8 +95,15 @@ static void learn(plr_filter *f, const plr_real reading[PLR_POSE_DIM], plr_real 
     for (unsigned i = 0; i < 2; i++)
         s->change2[i] = PLR_FMA(CHANGE_SHARE, change2[i] / PLR_R(3) - s->change2[i], s->change2[i]);
     const plr_real share = interval < SLOW_S ? interval / SLOW_S : PLR_R(1);
-    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
-        s->slow[i] = PLR_FMA(share, reading[i] - s->slow[i], s->slow[i]);
+    plr_real off2[2] = {0};
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
+        const plr_real off = reading[i] - s->slow[i];
+        off2[i / 3] = PLR_FMA(off, off, off2[i / 3]);
+        s->slow[i] = PLR_FMA(share, off, s->slow[i]);
+    }
+    for (unsigned i = 0; i < 2; i++) /* a slower mean */
+        s->spread2[i] =
+            PLR_FMA(PLR_R(0.25) * share, off2[i] / PLR_R(3) - s->spread2[i], s->spread2[i]);
 }
 
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
@@ -139,8 +146,9 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
 
 /* ---------------------------------------------------------------- frames and the start */
 
-/* A point that has moved by more than this many sigmas of its pixel, in the mean. */
-#define MOVED_SIGMAS PLR_R(4)
+/* A point has moved if the square of its way in the picture, in units of that of two still pixels in
+ * two directions, exceeds this: of still ones it is one in a thousand. */
+#define MOVED_ABOVE PLR_R(7)
 
 /* The watched point of this id, or a free place for it; NULL if there is none. */
 static plr_watched_point *watched(plr_alignment *at, uint32_t id) {
@@ -155,8 +163,8 @@ static plr_watched_point *watched(plr_alignment *at, uint32_t id) {
 }
 
 void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
-    plr_real moved2 = 0;
-    unsigned seen = 0;
+    const plr_real still2 = PLR_R(4) * f->par.pixel_variance;
+    unsigned seen = 0, moved = 0;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_watched_point *point = watched(&f->either.alignment, o->id);
@@ -171,11 +179,10 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
         }
         const plr_real du = (plr_real)(o->uL_px - point->u_px);
         const plr_real dv = (plr_real)(o->vL_px - point->v_px);
-        moved2 += du * du + dv * dv;
+        moved += du * du + dv * dv > MOVED_ABOVE * still2;
         seen++;
     }
-    const plr_real still2 = PLR_R(4) * f->par.pixel_variance; /* of two differences of two pixels */
-    if (seen < 3 || moved2 <= MOVED_SIGMAS * still2 * (plr_real)seen)
+    if (seen < 3 || 2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
     plr_alignment_restart(f);
     f->inertial.fault = PLR_IMU_FAULT_MOVES;

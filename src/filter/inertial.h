@@ -5,8 +5,8 @@
 
 #include "pelorus/filter.h"
 
-/* A frame of before the start, with n valid observations in work.order: if its points have moved
- * since the readings began to be averaged, the body does not stand, and they begin anew. */
+/* A frame of before the start, with n valid observations in work.order: if most of its points have
+ * moved since the readings began to be averaged, the body does not stand, and they begin anew. */
 void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n);
 
 /* After a frame: fixes position and yaw anew some time after a start in motion. */

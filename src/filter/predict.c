@@ -76,7 +76,9 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
         const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
         const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
         const plr_real interval = noise_interval(f, h0, h1);
-        plr_process_of(f)->step(f, t_ns, f->reading, plr_seconds(t_ns - f->t_ns), interval);
+        plr_real held[PLR_POSE_DIM];
+        plr_process_of(f)->hold(f, h0, held);
+        plr_process_of(f)->step(f, t_ns, held, plr_seconds(t_ns - f->t_ns), interval);
     }
     f->t_ns = t_ns;
     f->clock_started = 1;

@@ -23,6 +23,10 @@
 #define MAX_WAY  PLR_R(1000)
 /* A reading that is held for more of the usual intervals than this is no mean any more. */
 #define LONG_INTERVALS PLR_R(2.5)
+/* The error of a reading that is held lasts about so long before it becomes another, s. */
+#define LASTING_S PLR_R(0.5)
+/* A reading older than this says nothing of the present: the body keeps its velocity instead, s. */
+#define STALE_S PLR_R(0.25)
 
 /* Rows in the core, and columns among the drivers (theta, v, b_a, b_g). */
 enum { THETA = 3, VEL = 6, ACCEL = 9, GYRO = 12, DIM = PLR_CORE_DIM, D = PLR_DRIVERS };
@@ -256,15 +260,20 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
 }
 
 /* The densities of the readings' noise, squared. A reading that is held for longer than usual, since
- * others were lost, is wrong by what changes meanwhile. */
+ * others were lost, is wrong by what changes meanwhile: at first as much as successive readings
+ * differ, and later as readings scatter at all. */
 static void densities(const plr_filter *f, plr_real interval, plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     density[0] = f->par.accel_density;
     density[1] = f->par.gyro_density;
     if (!(at->usual_s > 0) || interval <= LONG_INTERVALS * at->usual_s)
         return;
-    for (int i = 0; i < 2; i++)
-        density[i] = PLR_FMA(at->change2[i] * (interval / at->usual_s), interval, density[i]);
+    const plr_real lasting = interval < LASTING_S ? interval : LASTING_S;
+    for (int i = 0; i < 2; i++) {
+        const plr_real changed = at->change2[i] * (interval / at->usual_s);
+        const plr_real most = at->spread2[i] + at->change2[i];
+        density[i] = PLR_FMA(changed < most ? changed : most, lasting, density[i]);
+    }
 }
 
 /* The 3x3 block of X F^T between three rows of X and three of F. */
@@ -343,7 +352,8 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
 
 /* Between two samples of a signal that changes smoothly its mean is that of both ends. Where a frame
  * came in between, the first part of the interval was bridged by the older one: the second makes up
- * for it, so that the integral is right. */
+ * for it, so that the integral is right. Not so after lost readings: meanwhile frames have corrected
+ * what the older one did. */
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
     const uint8_t timing = f->reading_valid ? f->config.imu_timing : PLR_TWIST_END;
@@ -351,12 +361,13 @@ static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
                               ? (plr_real)((double)(f->t_ns - f->reading_ns) * 1e-9)
                               : PLR_R(0);
+    const bool bridged = whole <= LONG_INTERVALS * f->inertial.usual_s;
     for (int i = 0; i < PLR_READING_DIM; i++) {
         const plr_real target = timing == PLR_TWIST_END ? reading[i]
                                 : timing == PLR_TWIST_START
                                     ? f->reading[i]
                                     : PLR_R(0.5) * (f->reading[i] + reading[i]);
-        held[i] = done > 0 && whole > done
+        held[i] = bridged && done > 0 && whole > done
                       ? PLR_FMA(done / (whole - done), target - f->reading[i], target)
                       : target;
     }
@@ -375,6 +386,13 @@ static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
         reading[i] = f->bias[i] - gamma[i];
         reading[3 + i] = f->bias[3 + i];
     }
+}
+
+static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
+    if (age > STALE_S)
+        rest(f, held);
+    else
+        memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
 }
 
 /* ---------------------------------------------------------------- the estimate */
@@ -448,6 +466,7 @@ const plr_process plr_process_imu = {
     .check = check,
     .step = step,
     .mean = mean,
+    .hold = hold,
     .rest = rest,
     .walk = walk,
     .now = now,

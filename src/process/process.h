@@ -32,6 +32,9 @@ typedef struct plr_process {
     void (*mean)(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real mean[PLR_READING_DIM]);
 
+    /* The last reading, `age` seconds after its time, or what is assumed in its place. */
+    void (*hold)(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]);
+
     /* The reading of a body that keeps its velocity: assumed while there is none. */
     void (*rest)(const plr_filter *f, plr_real reading[PLR_READING_DIM]);
 

@@ -99,6 +99,11 @@ static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
                                               : PLR_R(0.5) * (f->reading[i] + reading[i]);
 }
 
+static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
+    (void)age;
+    memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
+}
+
 static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
     memcpy(reading, f->bias, PLR_READING_DIM * sizeof *reading);
 }
@@ -162,6 +167,7 @@ const plr_process plr_process_twist = {
     .check = check,
     .step = step,
     .mean = mean,
+    .hold = hold,
     .rest = rest,
     .walk = walk,
     .now = now,

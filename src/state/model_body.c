@@ -258,27 +258,54 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     return covariance_in_chart(landmark->P, J_W, known->P_W_m2);
 }
 
-/* The rigid motion eta of the body that the corrections of the landmarks have in common. It differs
+/* A rigid motion that the corrections of some landmarks have in common. */
+typedef struct plr_common_motion {
+    plr_real eta[PLR_POSE_DIM]; /* of the body */
+    plr_real E[9], R[9], p[3];  /* of the camera: Exp(eta_C), R = I + E */
+} plr_common_motion;
+
+/* With an IMU, landmarks out of sight share another motion than those in sight: the frame that finds
+ * the velocity after a stretch without pictures corrects the position by metres, and with it the old
+ * landmarks, but not those that it sees. */
+enum { IN_SIGHT, OUT_OF_SIGHT, SIGHTS };
+
+static unsigned sight_of(const plr_filter *f, unsigned slot) {
+    const bool parted = plr_has_block(f, PLR_BLOCK_VELOCITY);
+    return parted && f->slots[slot].last_frame != f->frame_number ? OUT_OF_SIGHT : IN_SIGHT;
+}
+
+/* The rigid motions eta of the body that the corrections of the landmarks have in common. They differ
  * from the pose's correction xi, which may mostly concern the way travelled before, in which no
  * visible landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity
  * that it causes. Known landmarks are left out: they are fixed in the world, so the pose moves them
  * in the camera, and the common part of a map's errors is not a motion. J becomes
  * chart_by_body_twist of every slot. */
-static void common_motion(const plr_filter *f, const plr_real *dx, plr_real *J,
-                          plr_real eta[PLR_POSE_DIM]) {
+static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_real *J,
+                                plr_common_motion common[SIGHTS]) {
+    static const plr_real none[PLR_POSE_DIM] = {0};
+    const bool parted = plr_has_block(f, PLR_BLOCK_VELOCITY);
     const plr_real baseline = f->par.camera.baseline;
     const plr_real W[3] = {1, 1, baseline * baseline};
     const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
-    plr_rigid_fit fit;
-    plr_rigid_fit_clear(&fit);
+    plr_rigid_fit fit[SIGHTS];
+    plr_rigid_fit_clear(&fit[IN_SIGHT]);
+    plr_rigid_fit_clear(&fit[OUT_OF_SIGHT]);
     for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_polar chart;
         plr_polar_at(&chart, f->slots[slot].x);
         chart_by_body_twist(f, &chart, J);
         if (!f->slots[slot].known)
-            plr_rigid_fit_add(&fit, J, dx + plr_covariance_row(f, slot), W);
+            plr_rigid_fit_add(&fit[sight_of(f, slot)], J, dx + plr_covariance_row(f, slot), W);
     }
-    plr_rigid_fit_solve(&fit, dx, f->work.noise.motion_variance, angle2, eta);
+    for (unsigned sight = 0; sight < (parted ? SIGHTS : 1); sight++) {
+        plr_common_motion *m = &common[sight];
+        plr_real eta_C[PLR_POSE_DIM];
+        plr_rigid_fit_solve(&fit[sight], parted && sight == IN_SIGHT ? none : dx,
+                            f->work.noise.motion_variance, angle2, m->eta);
+        plr_mat6_vec(eta_C, f->par.Ad_CB, m->eta);
+        plr_se3_expm1(m->E, m->p, eta_C);
+        plr_se3_rotation(m->R, m->E);
+    }
 }
 
 /* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common
@@ -299,18 +326,16 @@ static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
  * eta_C, and the pose's rows by Ad(Exp(-xi)).
  */
 static unsigned body_retract(plr_filter *f, const plr_real *dx) {
-    plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE], eta[PLR_POSE_DIM], eta_C[PLR_POSE_DIM], E_C[9],
-        R_C[9], p_C[3];
+    plr_real R_xi[9], p_xi[3], A[PLR_POSE_SQUARE];
+    plr_common_motion both[SIGHTS];
     plr_se3_exp(R_xi, p_xi, dx);
     plr_se3_adjoint_inverse(A, R_xi, p_xi);
     plr_real *F = f->work.Vt, *J = F + 9 * f->count; /* 27 numbers a slot; Vt has at least 72 */
-    common_motion(f, dx, J, eta);
-    plr_mat6_vec(eta_C, f->par.Ad_CB, eta);
-    plr_se3_expm1(E_C, p_C, eta_C);
-    plr_se3_rotation(R_C, E_C);
+    find_common_motions(f, dx, J, both);
 
     unsigned cut = 0;
     for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
+        const plr_common_motion *common = &both[sight_of(f, slot)];
         plr_slot *s = &f->slots[slot];
         plr_polar from, there, to;
         plr_real M[4], w[3], rigid[9];
@@ -318,11 +343,11 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         memcpy(w, dx + plr_covariance_row(f, slot), sizeof w);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < PLR_POSE_DIM; k++)
-                w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], eta[k], w[i]);
+                w[i] = PLR_FMA(-J[PLR_POSE_DIM * i + k], common->eta[k], w[i]);
         w[2] += s->beyond;
-        plr_se3_move_back(s->x, E_C, p_C);
+        plr_se3_move_back(s->x, common->E, common->p);
         plr_polar_at(&there, s->x);
-        chart_jacobian(rigid, &there, R_C, p_C, &from);
+        chart_jacobian(rigid, &there, common->R, common->p, &from);
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, f->par.min_inverse_range, s->x, &s->beyond);
         plr_real *own = F + 9 * slot;

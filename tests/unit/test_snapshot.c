@@ -187,6 +187,7 @@ static void test_every_field_is_carried(void) {
     fill_reals(&chance, driven.inertial.velocity, PLR_VELOCITY_DIM);
     fill_reals(&chance, driven.inertial.slow, PLR_POSE_DIM);
     fill_reals(&chance, driven.inertial.change2, 2);
+    fill_reals(&chance, driven.inertial.spread2, 2);
     fill_reals(&chance, &driven.inertial.usual_s, 1);
     driven.inertial.started_ns = rng_bits(&chance);
     driven.inertial.still_ns = rng_bits(&chance);
@@ -277,7 +278,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 50 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 143 * real;
-    const uint32_t health_at = frames_at + 4 + 16 + 10 + 6 + 4 + 327 * real;
+    const uint32_t health_at = frames_at + 4 + 16 + 10 + 6 + 4 + 329 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
     const uint32_t slots_at = totals_at + 68 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
@@ -300,7 +301,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(708 + 487 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(708 + 489 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
                              state.length);
 }

@@ -19,7 +19,7 @@ enum {
     INTERVAL_AT = COUNT_AT + 4 + 16,
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
     FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 143 * REAL,
-    HEALTH_AT = FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 327 * REAL, /* doubtful stands before it */
+    HEALTH_AT = FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 329 * REAL, /* doubtful stands before it */
     SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
     SLOT_SIZE = 8 * REAL + 35,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,
