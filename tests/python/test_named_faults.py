@@ -12,7 +12,7 @@ from converted import Converted, Run
 from injected import OF_RECORDINGS, found_in, of_times, piece
 from pelorus import wire
 from pelorus.check.contents import recording_of, write
-from pelorus.check.named import faults_of
+from pelorus.check.named import UNTOLD, faults_of
 from pelorus.frames import Header, Kind, Stereo, Twist
 from pelorus.recording import Recording
 from replay_drive import BIN, drive
@@ -88,3 +88,12 @@ def test_messages_without_ids_in_common_say_so() -> None:
     found = faults_of(anew, recording_of(anew))
     assert [fault.name for fault in found] == ["ids-new"]
     assert Kind.STEREO in {m.kind for m in anew}
+
+
+def test_too_few_points_are_no_fault_and_not_called_good(simulated: Recording) -> None:
+    tracks = simulated.tracks
+    few = tracks.id % 20 == 0
+    thin = type(tracks)(tracks.frame_count, tracks.frame[few], tracks.id[few], tracks.pixels[few])
+    said = found_in(replace(simulated, tracks=thin))
+    assert [fault.name for fault in said] == [UNTOLD]
+    assert "cannot be judged" in said[0].words

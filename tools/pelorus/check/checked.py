@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pelorus import wire
 from pelorus.check import verdict
-from pelorus.check.named import LOCAL, faults_of
+from pelorus.check.named import LOCAL, UNTOLD, faults_of
 from pelorus.check.outcome import Bench, Settings, options_of
 from pelorus.check.tuning import Tuned, tune
 from pelorus.check.verdict import Grade, Remark, Run
@@ -41,7 +41,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     bench = Bench(program, recording, folder)
     messages = wire.messages_of(recording)
     named = faults_of(messages, bench.examined)
-    faults = [Remark(Grade.BAD, fault.words) for fault in named]
+    grades = [Grade.CARE if fault.name == UNTOLD else Grade.BAD for fault in named]
+    faults = [Remark(grade, fault.words) for grade, fault in zip(grades, named, strict=True)]
     if any(fault.name not in LOCAL for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
     tuned = tune(bench, given)

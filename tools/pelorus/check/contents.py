@@ -52,17 +52,18 @@ def _ascending(messages: list[Timed]) -> list[Timed]:
     return out
 
 
-FRAMES_MOST = 1000  # so many tell the sigmas to a percent or two
+FRAMES_MOST, SEEN_MOST = 4000, 60_000  # so many tell the sigmas to a percent or two
 AHEAD = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK)  # what belongs to each part of a recording
 
 
 def first_frames(messages: Sequence[Message], most: int = FRAMES_MOST) -> list[Message]:
     """The recording's beginning, without truth, which is not to be looked at, and without END."""
     out: list[Message] = []
-    frames = 0
+    frames = seen = 0
     for message in messages:
-        frames += isinstance(message, Stereo)
-        if frames > most:
+        if isinstance(message, Stereo):
+            frames, seen = frames + 1, seen + len(message.ids)
+        if frames > most or seen > SEEN_MOST:
             break
         if message.kind not in (Kind.END, Kind.TRUTH, Kind.TEXT, Kind.STATE):
             out.append(message)

@@ -25,7 +25,7 @@ from pelorus.visual_motion import PAIRS_MIN, seen_pairs
 FRAMES_MOST = 500
 ROUNDS = 10
 MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
-FRAMES_ENOUGH = 40
+FRAMES_ENOUGH = 50
 FITS_PX = 3.0  # a pair of one rigid scene fits its frame's motion so well
 
 
@@ -46,6 +46,7 @@ class HandEye:
     way_left: float
     R_covariance: Floats  # rad^2, of a small turn on the left of R
     heading_B: Floats  # unit vector: where the body mostly drives
+    speed_mps: float  # of the camera, as the images have it
 
     @property
     def told(self) -> bool:
@@ -85,10 +86,8 @@ def _fit(
     v_C, w_C = of_camera[usable, :3], of_camera[usable, 3:]
     v_B, w_B = of_body[usable, :3], of_body[usable, 3:]
     if len(v_C) < FRAMES_ENOUGH:
-        nan = float("nan")
-        return HandEye(
-            len(v_C), fit, np.eye(3), nan, nan, nan, nan, nan, nan, np.eye(3), np.eye(3)[0]
-        )
+        x, axes = float("nan"), np.eye(3)
+        return HandEye(len(v_C), fit, axes, x, x, x, x, x, x, axes, axes[0], 0.0)
     w_B = w_B - np.median(w_B - np.median(w_B, axis=0), axis=0)
     lever = -recording.T_CB.R.T @ recording.T_CB.p
     driven = v_B + np.cross(w_B, lever)
@@ -98,7 +97,8 @@ def _fit(
     turn, way = (turn_scale, turn_sigma), (way_scale, way_sigma)
     mean = np.median(driven, axis=0)
     heading = mean / (np.linalg.norm(mean) + 1e-12)
-    return HandEye(len(v_C), fit, R, *turn, *way, turn_left, way_left, covariance, heading)
+    speed = float(np.median(np.linalg.norm(v_C, axis=1)))
+    return HandEye(len(v_C), fit, R, *turn, *way, turn_left, way_left, covariance, heading, speed)
 
 
 def _rotation(w_B: Floats, w_C: Floats, v_B: Floats, v_C: Floats) -> tuple[Floats, Floats]:

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pelorus.check.handeye import HandEye, angle_between, hand_eye
+from pelorus.check.handeye import FRAMES_ENOUGH, HandEye, angle_between, hand_eye
 from pelorus.faults.axes import turns
 from pelorus.frames import Message, Stereo, Twist
 from pelorus.layout import Floats
@@ -30,11 +30,13 @@ SURE_SIGMAS = 4.0
 SCALE_LEAST, SCALE_MOST = 0.88, 1.07  # noise makes far points, and so every way, seem smaller
 UNIT_NEAR = 0.15
 FROZEN_FRAMES = 3
+MOVES_MPS = 1.0  # a camera that hardly moves need not agree with the twists' noise
 JUMPS_SHARE = 0.003
 GAP_TIMES = 10.0
 
 
-LOCAL = ("frozen", "time-gap", "time-order")  # the rest of the drive may be sound
+UNTOLD = "untold"  # no fault, but not called good either
+LOCAL = ("frozen", "time-gap", "time-order", UNTOLD)  # the rest of the drive may be sound
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,11 @@ def _longest_run(flags: np.ndarray) -> int:
 
 def _geometry(recording: Recording, found: HandEye) -> Iterator[Fault]:
     if not found.told:
+        yield Fault(
+            UNTOLD,
+            f"only {found.frames} frames share points enough with the one before ({FRAMES_ENOUGH} "
+            "are due): axes, units and scale cannot be judged",
+        )
         return
     if found.fit < FIT_LEAST:
         yield Fault(
@@ -188,14 +195,16 @@ def _geometry(recording: Recording, found: HandEye) -> Iterator[Fault]:
     headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
     # the way tells where the camera looks; the roll about it only the turns do, which may be noise
     sure = off > SURE_SIGMAS * _sigma_deg(found, given)
+    if found.way_left > LEFT_MOST and not units:
+        if found.speed_mps > MOVES_MPS:
+            yield Fault(
+                "no-fit",
+                f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is "
+                "left unexplained), and no known fault explains why",
+            )
+        return
     if sure and (headed > TURNED_DEG or off > ROLLED_DEG):
         yield _extrinsic(given, found.R, off)
-    elif found.way_left > LEFT_MOST and not units:
-        yield Fault(
-            "no-fit",
-            f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is left "
-            "unexplained), and no known fault explains why",
-        )
     if not units:
         yield from _scales(found)
 
