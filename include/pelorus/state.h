@@ -66,7 +66,7 @@ typedef struct plr_layout {
                                 twists; with an IMU theta, velocity and biases */
 } plr_layout;
 
-/* One landmark slot. */
+/* One landmark slot. The times stand where no processor needs padding before them. */
 typedef struct plr_slot {
     plr_real x[PLR_LANDMARK_DIM]; /* body: q in the current left camera; world: m; metres */
     plr_real beyond; /* body: added to 1 / |x| it gives the inverse range, 1/m; negative where noise
@@ -74,19 +74,19 @@ typedef struct plr_slot {
     uint32_t id;
     uint32_t times_seen;
     uint32_t times_gated;
-    uint32_t last_frame; /* number of the frame that saw it last */
-    uint32_t pixel_hash; /* checksum of its pixels when it was last seen */
+    uint32_t last_frame;          /* number of the frame that saw it last */
+    uint32_t pixel_hash;          /* checksum of its pixels when it was last seen */
+    plr_real innovation_variance; /* of innovation_sum if the innovations are white noise */
     plr_time_ns last_seen_ns;
-    plr_real innovation_sum[3];   /* sum of its whitened innovations, older ones weighted less */
-    plr_real innovation_variance; /* the variance of innovation_sum if they are white noise */
-    plr_real anchor[PLR_ROWS];    /* its pixels (uL, uR, v) when the body last began to stand */
-    plr_time_ns anchor_ns;        /* when that was */
-    uint8_t anchored;             /* 1: anchor is filled */
-    uint8_t known;                /* 1: given by a map source or plr_filter_insert_known */
-    uint8_t moving;               /* 1: the innovations are not white: the point moves */
-    uint8_t restarts;             /* times it was initialised again after repeated rejection */
-    uint16_t accepted;            /* frames that used it since it was last initialised */
-    uint16_t rejected;            /* successive frames in which the gate rejected it */
+    plr_real innovation_sum[3]; /* sum of its whitened innovations, older ones weighted less */
+    plr_real anchor[PLR_ROWS];  /* its pixels (uL, uR, v) when the body last began to stand */
+    plr_time_ns anchor_ns;      /* when that was */
+    uint8_t anchored;           /* 1: anchor is filled */
+    uint8_t known;              /* 1: given by a map source or plr_filter_insert_known */
+    uint8_t moving;             /* 1: the innovations are not white: the point moves */
+    uint8_t restarts;           /* times it was initialised again after repeated rejection */
+    uint16_t accepted;          /* frames that used it since it was last initialised */
+    uint16_t rejected;          /* successive frames in which the gate rejected it */
 } plr_slot;
 
 /* Motion that is already in the pose but not yet in the covariance: D = (I + E, p) with
