@@ -26,11 +26,11 @@ static plr_real huber(plr_real d2) {
 }
 
 /* V and P of one sighting, which do not change during the search. */
-static void prepare(plr_search *s, unsigned i, const plr_real K[PLR_MOTION_BY]) {
+static void prepare(plr_search *s, unsigned i, const plr_real Kt[PLR_MOTION_BY]) {
     plr_filter *f = s->f;
     plr_sighting *at = &s->sightings[i];
     const unsigned slot = f->work.slot_of[f->work.used[i]];
-    plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, K, at->V);
+    plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, Kt, at->V);
     plr_covariance_landmark(f, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)
@@ -142,10 +142,11 @@ void plr_search_add(plr_search *s, plr_real active) {
 }
 
 void plr_search_prepare(plr_search *s) {
-    plr_real K[PLR_MOTION_BY];
+    plr_real K[PLR_MOTION_BY], Kt[PLR_MOTION_BY];
     plr_motion_by_drivers(s->f, s->prior.L, K);
+    plr_motion_transpose(K, Kt);
     for (unsigned i = 0; i < s->count; i++)
-        prepare(s, i, K);
+        prepare(s, i, Kt);
 }
 
 /* Evaluates all observations at nu = z. Returns by how much the cost of the observations is larger

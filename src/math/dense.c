@@ -17,8 +17,9 @@ void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
     }
 }
 
-void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real B[PLR_MOTION_BY],
-                          const plr_real *P) {
+/* Inlined for each m: a constant size is faster. */
+static inline void sandwich(plr_real S[PLR_POSE_SQUARE], unsigned m,
+                            const plr_real B[PLR_MOTION_BY], const plr_real *P) {
     plr_real BP[PLR_MOTION_BY] = {0};
     plr_gemm_nn(PLR_POSE_DIM, m, m, B, PLR_DRIVERS, P, m, BP, PLR_DRIVERS);
     memset(S, 0, PLR_POSE_SQUARE * sizeof *S);
@@ -28,6 +29,16 @@ void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_rea
         for (unsigned j = 0; j < i; j++)
             S[PLR_POSE_DIM * j + i] = S[PLR_POSE_DIM * i + j];
     }
+}
+
+void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real B[PLR_MOTION_BY],
+                          const plr_real *P) {
+    if (m == PLR_BIAS_DIM)
+        sandwich(S, PLR_BIAS_DIM, B, P);
+    else if (m == PLR_DRIVERS)
+        sandwich(S, PLR_DRIVERS, B, P);
+    else
+        sandwich(S, m, B, P);
 }
 
 enum { STRIP = PLR_TILE_COLUMNS };

@@ -98,9 +98,8 @@ void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], 
 }
 
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real K[PLR_MOTION_BY], plr_real *V) {
+                                 const plr_real Kt[PLR_MOTION_BY], plr_real *V) {
     const unsigned first = f->layout.driver, drivers = f->layout.drivers;
-    memset(V, 0, PLR_POSE_DIM * rows * sizeof *V);
     for (unsigned i = row; i < row + rows; i++) {
         plr_real before[PLR_DRIVERS];
         const plr_real *P_id = f->P + plr_packed_row(i) + first;
@@ -108,12 +107,11 @@ void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned row
             plr_covariance_with_drivers(f, i, 1, before);
             P_id = before;
         }
-        if (drivers == PLR_BIAS_DIM) /* a constant size is faster */
-            plr_gemm_nt(1, PLR_POSE_DIM, PLR_BIAS_DIM, P_id, PLR_BIAS_DIM, K, PLR_DRIVERS,
-                        V + PLR_POSE_DIM * (i - row), PLR_POSE_DIM);
-        else
-            plr_gemm_nt(1, PLR_POSE_DIM, drivers, P_id, PLR_DRIVERS, K, PLR_DRIVERS,
-                        V + PLR_POSE_DIM * (i - row), PLR_POSE_DIM);
+        plr_real sum[PLR_POSE_DIM] = {0}; /* in registers */
+        for (unsigned d = 0; d < drivers; d++)
+            for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+                sum[k] = PLR_FMA(P_id[d], Kt[PLR_POSE_DIM * d + k], sum[k]);
+        memcpy(V + PLR_POSE_DIM * (i - row), sum, sizeof sum);
     }
 }
 
@@ -196,14 +194,15 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     noise->open = 1;
     if (f->layout.drivers == 0)
         return;
-    plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY];
+    plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY], Kt[PLR_MOTION_BY];
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         memset(Vt + k * ld + n, 0, (ld - n) * sizeof *Vt);
     plr_motion_by_drivers(f, motion->L, K);
     drivers_after_motion(f, motion->E, PLR_POSE_DIM, K);
+    plr_motion_transpose(K, Kt);
     for (unsigned i = 0; i < n; i++) {
         plr_real v[PLR_POSE_DIM];
-        plr_covariance_motion_share(f, i, 1, K, v);
+        plr_covariance_motion_share(f, i, 1, Kt, v);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             Vt[k * ld + i] = v[k];
     }

@@ -66,6 +66,12 @@ void plr_motion_by_drivers(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE
     plr_motion_solve(L, f->layout.drivers, K, PLR_DRIVERS);
 }
 
+void plr_motion_transpose(const plr_real K[PLR_MOTION_BY], plr_real Kt[PLR_MOTION_BY]) {
+    for (unsigned d = 0; d < PLR_DRIVERS; d++)
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            Kt[PLR_POSE_DIM * d + k] = K[PLR_DRIVERS * k + d];
+}
+
 static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scale, plr_real way2,
                        plr_real turn2) {
     plr_real BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];

@@ -36,6 +36,9 @@ void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_r
 void plr_motion_by_drivers(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE],
                            plr_real K[PLR_MOTION_BY]);
 
+/* Kt = K^T, drivers x 6. */
+void plr_motion_transpose(const plr_real K[PLR_MOTION_BY], plr_real Kt[PLR_MOTION_BY]);
+
 /* The motion at nu = 0: D' = D. */
 void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
 
