@@ -26,16 +26,24 @@ static inline uint32_t turned(uint32_t sum) {
 static void add(plr_sum *sum, const void *memory, size_t bytes) {
     const unsigned char *at = memory;
     plr_sum now = *sum;
-    uint32_t word[LANES] = {0};
-    for (; bytes >= sizeof word; bytes -= sizeof word, at += sizeof word)
+    uint32_t word = 0;
+    for (; bytes >= LANES * sizeof word; bytes -= LANES * sizeof word, at += LANES * sizeof word)
         for (unsigned lane = 0; lane < LANES; lane++) {
-            memcpy(word, at + lane * sizeof *word, sizeof *word);
-            now.lane[lane] = turned(now.lane[lane]) + word[0];
+            memcpy(&word, at + lane * sizeof word, sizeof word);
+            now.lane[lane] = turned(now.lane[lane]) + word;
         }
-    memset(word, 0, sizeof word);
-    memcpy(word, at, bytes);
-    for (unsigned lane = 0; lane < LANES; lane++)
-        sum->lane[lane] = turned(now.lane[lane]) + word[lane];
+    *sum = now;
+    for (unsigned lane = 0; lane < LANES && bytes > 0; lane++) {
+        const size_t part = bytes < sizeof word ? bytes : sizeof word;
+        word = 0;
+        if (part == sizeof word) /* always, as members go: a constant size is faster */
+            memcpy(&word, at, sizeof word);
+        else
+            memcpy(&word, at, part);
+        sum->lane[lane] = turned(sum->lane[lane]) + word;
+        at += part;
+        bytes -= part;
+    }
 }
 
 /* The members from one offset to another. */
