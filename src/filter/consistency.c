@@ -6,6 +6,7 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
+#include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
@@ -366,7 +367,9 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
 
 static bool bias_is_off(const plr_filter *f) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real limit = BIAS_SIGMAS * f->bias_prior_sigma[k];
+        const plr_real walked = plr_process_of(f)->walked(f, k), sigma = f->bias_prior_sigma[k];
+        const plr_real limit =
+            BIAS_SIGMAS * (walked > 0 ? PLR_SQRT(sigma * sigma + walked) : sigma);
         if (limit > 0 && plr_abs(f->bias[k] - f->bias_prior[k]) > limit)
             return true;
     }

@@ -284,7 +284,9 @@ bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     bool started = false;
     if (stretch >= REST_NS && kind != PLR_IMU_START_MOTION)
         started = try_to_start(f, t_ns, true);
-    if (!started && may_move && stretch >= GLANCE_NS && at->count > 1)
+    const bool doubtful =
+        f->inertial.fault == PLR_IMU_FAULT_TURNS; /* the gyro is wrong, or soon rests */
+    if (!started && may_move && !doubtful && stretch >= GLANCE_NS && at->count > 1)
         started = try_to_start(f, t_ns, false);
     if (!started && stretch >= REST_NS)
         plr_alignment_restart(f);

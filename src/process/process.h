@@ -42,6 +42,9 @@ typedef struct plr_process {
      * besides plr_covariance_carry_core. */
     void (*walk)(plr_filter *f, plr_real seconds);
 
+    /* The variance by which bias k may have walked away from its prior since the start. */
+    plr_real (*walked)(const plr_filter *f, unsigned k);
+
     /* The body's present twist (v, w) with its covariance, 6x6. */
     void (*now)(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
 

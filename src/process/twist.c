@@ -99,6 +99,13 @@ static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
                                               : PLR_R(0.5) * (f->reading[i] + reading[i]);
 }
 
+/* The walk of twists stands for slow changes and is not counted. */
+static plr_real walked(const plr_filter *f, unsigned k) {
+    (void)f;
+    (void)k;
+    return 0;
+}
+
 static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
     (void)age;
     memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
@@ -170,6 +177,7 @@ const plr_process plr_process_twist = {
     .hold = hold,
     .rest = rest,
     .walk = walk,
+    .walked = walked,
     .now = now,
     .bias_covariance = bias_covariance,
 };
