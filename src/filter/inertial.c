@@ -26,7 +26,7 @@ enum {
 /* What an average keeps of a new interval, and of a new difference. */
 #define INTERVAL_SHARE PLR_R(0.0625)
 #define CHANGE_SHARE   PLR_R(0.015625)
-/* The mean reading covers about this much, s. */
+/* The mean reading covers about this much at most, and no more than since the last standstill, s. */
 #define SLOW_S PLR_R(0.5)
 /* The largest velocity that can be set, m/s. */
 #define MAX_VELOCITY 1e4
@@ -83,10 +83,14 @@ static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
 }
 
 /* Averages over the readings: their interval, how much they change, and their mean. */
-static void learn(plr_filter *f, const plr_real reading[PLR_POSE_DIM], plr_real interval,
-                  const plr_real change2[2]) {
+static void learn(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                  plr_real interval, const plr_real change2[2]) {
     plr_inertial *s = &f->inertial;
-    if (!(interval > 0))
+    if (!f->reading_valid) {
+        memcpy(s->slow, reading, sizeof s->slow);
+        s->still_ns = f->t_ns;
+    }
+    if (!f->reading_valid || !(interval > 0))
         return;
     if (!(s->usual_s > 0) || interval < PLR_R(0.5) * s->usual_s)
         s->usual_s = interval;
@@ -94,16 +98,17 @@ static void learn(plr_filter *f, const plr_real reading[PLR_POSE_DIM], plr_real 
         s->usual_s = PLR_FMA(INTERVAL_SHARE, interval - s->usual_s, s->usual_s);
     for (unsigned i = 0; i < 2; i++)
         s->change2[i] = PLR_FMA(CHANGE_SHARE, change2[i] / PLR_R(3) - s->change2[i], s->change2[i]);
-    const plr_real share = interval < SLOW_S ? interval / SLOW_S : PLR_R(1);
+    const plr_real since = plr_seconds(t_ns - s->still_ns), span = since < SLOW_S ? since : SLOW_S;
+    const plr_real share = interval < span ? interval / span : PLR_R(1);
+    const plr_real slower = PLR_R(0.25) * (interval < SLOW_S ? interval / SLOW_S : PLR_R(1));
     plr_real off2[2] = {0};
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
         const plr_real off = reading[i] - s->slow[i];
         off2[i / 3] = PLR_FMA(off, off, off2[i / 3]);
         s->slow[i] = PLR_FMA(share, off, s->slow[i]);
     }
-    for (unsigned i = 0; i < 2; i++) /* a slower mean */
-        s->spread2[i] =
-            PLR_FMA(PLR_R(0.25) * share, off2[i] / PLR_R(3) - s->spread2[i], s->spread2[i]);
+    for (unsigned i = 0; i < 2; i++)
+        s->spread2[i] = PLR_FMA(slower, off2[i] / PLR_R(3) - s->spread2[i], s->spread2[i]);
 }
 
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
@@ -134,8 +139,7 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    if (f->reading_valid)
-        learn(f, reading, interval, change2);
+    learn(f, t_ns, reading, interval, change2);
     if (f->inertial.started)
         return plr_predict_accept(f, t_ns, reading, PLR_OK);
     (void)plr_alignment_add(f, t_ns, reading);

@@ -144,7 +144,8 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
         result->d2 += (double)verdict.d2;
         accepted = accepted && verdict.accepted;
     }
-    f->inertial.still_ns = f->t_ns;
+    if (reading->sensor == PLR_SENSOR_STANDSTILL)
+        f->inertial.still_ns = f->t_ns;
     return correct(f, m, accepted ? parts : 0) && accepted;
 }
 

@@ -435,9 +435,13 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
     }
 }
 
+/* The noise of the rate at a standstill is in theta too, where v = 0 finds it again: as if it were
+ * independent, the gyro's bias would be believed too much. */
+#define USED_TWICE PLR_R(2)
+
 /* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise adds
  * to the measurement's. A row of v and w together (a wheel) takes the last reading, for both change;
- * a row of w alone (a standstill) the mean reading since the last such row, which has less noise. */
+ * a row of w alone (a standstill) the mean reading since the last one, which has less noise. */
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = (plr_real)((double)(f->t_ns - f->inertial.still_ns) * 1e-9);
@@ -453,7 +457,8 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
         const bool moves = plr_dot3(M, M) > 0;
         const plr_real *w_m = moves ? f->reading + 3 : f->inertial.slow + 3;
-        const plr_real noise = f->par.gyro_density / (moves ? usual : mean_of);
+        const plr_real noise =
+            moves ? f->par.gyro_density / usual : USED_TWICE * f->par.gyro_density / mean_of;
         r[i] = rows->z[i];
         R[i] = PLR_FMA(noise, plr_dot3(M + 3, M + 3), rows->R[i]);
         for (unsigned c = 0; c < 3; c++) {
