@@ -222,6 +222,39 @@ static void test_a_standstill_holds_velocity_and_measures_the_gyros_bias(void) {
     TEST_ASSERT_TRUE(sums[1].rad < 0.1 * sums[0].rad);
 }
 
+/* A body that has turned until just now: what the gyro showed before is not taken for its bias. */
+static void test_a_turn_that_ends_in_a_standstill_leaves_the_gyros_bias_alone(void) {
+    static const plr_pose level = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    static const double none[3] = {0}, exact[3] = {1e-6, 1e-6, 1e-6};
+    rng chance = rng_seeded(77);
+    for (int speed = 0; speed < 4; speed++) {
+        const double turn = 0.01 * pow(10, 0.7 * speed), root = 20;
+        double b[6], P[36];
+        imu_rig_begin(IMU_RIG_AT_REST, 1);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 1000000000, &level, NULL));
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, none, exact));
+        for (unsigned k = 1; k <= 1600; k++) {
+            plr_imu imu = {{0, 0, 9.81}, {0, 0, k <= 800 ? turn : 0}};
+            for (int i = 0; i < 3; i++) {
+                imu.a_B_mps2[i] += imu_rig.options.accel_noise * root * rng_normal(&chance);
+                imu.w_B_radps[i] += imu_rig.options.gyro_noise * root * rng_normal(&chance);
+            }
+            const plr_time_ns t_ns = 1000000000 + UINT64_C(2500000) * k;
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_inertial(f, t_ns, &imu));
+            const plr_reading still = {
+                .t_ns = t_ns, .sensor = PLR_SENSOR_STANDSTILL, .axes = 3, .sigma = {1e-3, 1e-4, 0}};
+            if (k > 800 && k % 40 == 0) {
+                TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_measure(f, &still, NULL));
+            }
+        }
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(f, b, P));
+        for (int i = 3; i < 6; i++) {
+            TEST_ASSERT_TRUE(sqrt(P[7 * i]) < 1.5e-3);
+            TEST_ASSERT_DOUBLE_WITHIN(4 * sqrt(P[7 * i]), 0, b[i]);
+        }
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_ten_seconds_of_darkness_are_within_the_covariance_and_so_is_what_follows);
@@ -229,5 +262,6 @@ int main(void) {
     RUN_TEST(test_a_wheel_makes_velocity_and_place_better_and_is_believed_as_it_should);
     RUN_TEST(test_wheels_hold_the_velocity_in_the_dark);
     RUN_TEST(test_a_standstill_holds_velocity_and_measures_the_gyros_bias);
+    RUN_TEST(test_a_turn_that_ends_in_a_standstill_leaves_the_gyros_bias_alone);
     return UNITY_END();
 }
