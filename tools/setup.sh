@@ -147,8 +147,8 @@ build_robot() {
     local options=()
     mkdir -p "$ROBOT"
     case " $* " in *' bench '*)
-        PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes recording "$ROBOT/bench.plr" || return 1
-        options=('-DPELORUS_CAPACITIES=8;16;32;64' -DPELORUS_BENCH_RECORDING="$ROBOT/bench.plr")
+        PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes recordings "$ROBOT" || return 1
+        options=('-DPELORUS_CAPACITIES=8;16;32;64' "-DPELORUS_BENCH_RECORDINGS=$ROBOT/twist.plr;$ROBOT/imu.plr")
         ;;
     esac
     cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: MIT
 """What the filter costs on each board: docs/SIZES.md, made and compared.
 
-usage: PYTHONPATH=tools python -m firmware.sizes recording OUT.plr
+usage: PYTHONPATH=tools python -m firmware.sizes recordings FOLDER
        PYTHONPATH=tools python -m firmware.sizes write|check BUILD_FOLDER DOCUMENT
 
-`recording` makes what the bench images carry. `write` measures all images of a build folder and
-writes the document; `check` measures, and compares with the document's numbers. tools/sizes.sh
-calls them in order.
+`recordings` makes what the bench images carry, twist.plr and imu.plr. `write` measures all images
+of a build folder and writes the document; `check` measures, and compares with the document's
+numbers. tools/sizes.sh calls them in order.
 """
 
 from __future__ import annotations
 
-import itertools
 import re
 import subprocess
 import sys
@@ -32,7 +31,6 @@ from firmware.stack import image_bound
 FRAME_OBSERVATIONS = 20
 BUSY_OBSERVATIONS = 60
 SEED = "31"
-DURATION_S = "12"
 BENCH_S = 1800.0  # against hangs
 TOLERANCE = 0.03
 PROCESSORS = {"mps2_an386": "m4f", "mps2_an500": "m7", "mps3_an547": "m55", "stm32f405": "m4f"}
@@ -51,29 +49,26 @@ class Process:
     core: int  # rows of the state before the landmarks
 
 
-# By their number in a HEADER.
+# By their number in a HEADER. The drives fit into the flash of a board, beside the filter.
 PROCESSES = {
-    0: Process("twist", (), "predict", 12),
-    1: Process("imu", ("--imu-rate", "200"), "reading", 15),
+    0: Process("twist", ("--duration", "12"), "predict", 12),
+    1: Process("imu", ("--duration", "12", "--imu-rate", "200"), "reading", 15),
 }
 
 
 # --- the recording -------------------------------------------------------------------------------
 
 
-def write_recording(target: Path) -> None:
-    """Two drives of each process: every frame of 20 observations, then the busiest possible.
+def write_recording(process: Process, target: Path) -> None:
+    """Two drives one after the other: every frame of 20 observations, then the busiest possible.
 
     A file that holds them already is left alone: images are made of it.
     """
     parts = []
-    for process, observations in itertools.product(
-        PROCESSES.values(), (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS)
-    ):
-        part = target.with_suffix(f".{process.name}.{observations}.plr")
+    for observations in (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS):
+        part = target.with_suffix(f".{observations}.plr")
         command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--seed", SEED]
-        command += ["--duration", DURATION_S, "--observations", str(2 * BUSY_OBSERVATIONS)]
-        command += process.options
+        command += ["--observations", str(2 * BUSY_OBSERVATIONS), *process.options]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         messages = [frame.message for frame in read_file(part)[0]]
         with part.open("wb") as stream:
@@ -151,7 +146,7 @@ class Bench:
     workspace_bytes: int
     session_bytes: int
     stack_bytes: int
-    runs: dict[str, Run]
+    run: Run
 
 
 def fields(line: str) -> dict[str, int]:
@@ -176,20 +171,20 @@ def run_bench(board: str, image: Path) -> Bench:
     first, *lines, last = text.decode().splitlines()
     sizes = fields(first.removeprefix("size "))
     per_clock = INSTRUCTIONS_PER_SECOND / EMULATED_HZ.get(board, sizes["hz"])
-    runs = {process.name: Run() for process in PROCESSES.values()}
+    run = Run()
     process = PROCESSES[0]
     for line in lines:
         found = fields(line)
         if "process" in found:
             process = PROCESSES[found["process"]]
         elif process.step in found:
-            runs[process.name].steps.append(found[process.step] * per_clock)
+            run.steps.append(found[process.step] * per_clock)
         else:
             instructions = found.pop("update") * per_clock
             found.pop("evicted")
-            runs[process.name].updates.append(Update(instructions, **found))
+            run.updates.append(Update(instructions, **found))
     stack = fields(last.removeprefix("done "))["stack"]
-    return Bench(sizes["filter"], sizes["workspace"], sizes["session"], stack, runs)
+    return Bench(sizes["filter"], sizes["workspace"], sizes["session"], stack, run)
 
 
 @dataclass(frozen=True)
@@ -222,7 +217,13 @@ def measure(build: Path, board: str, capacity: int) -> Cost:
     flash, ram = section_sizes(firmware)
     library = f"pelorus-{PROCESSORS[board]}-n{capacity}-f32.dir"
     folders = [build / "CMakeFiles" / library, build / "CMakeFiles" / f"{firmware.stem}.dir"]
-    bench = run_bench(board, build / "images" / f"bench-{board}-n{capacity}.elf")
+    benches = {
+        process.name: run_bench(
+            board, build / "images" / f"bench-{process.name}-{board}-n{capacity}.elf"
+        )
+        for process in PROCESSES.values()
+    }
+    bench = next(iter(benches.values()))
     return Cost(
         board=board,
         capacity=capacity,
@@ -231,8 +232,8 @@ def measure(build: Path, board: str, capacity: int) -> Cost:
         filter=bench.filter_bytes,
         session=bench.session_bytes - bench.filter_bytes,
         stack_bound=image_bound(firmware, folders).stack_bytes,
-        stack_seen=bench.stack_bytes,
-        runs=bench.runs,
+        stack_seen=max(each.stack_bytes for each in benches.values()),
+        runs={name: each.run for name, each in benches.items()},
     )
 
 
@@ -350,9 +351,9 @@ has no writable globals (`tests/layering`).
 
 Instructions, **not cycles**: QEMU counts them (`-icount shift=0`) and knows neither caches nor wait
 states nor dual issue. They repeat exactly; the resolution is one tick of SysTick, 40 instructions
-on MPS2. A recording is part of the image: simulated drives with a frame every 100 ms, first with
-exactly 20 observations in each frame, then with up to {busy}; one pair of them with a twist every
-10 ms, one with a reading of an IMU every 5 ms.
+on MPS2. A recording is part of each image: simulated drives with a frame every 100 ms, first with
+exactly 20 observations in each frame, then with up to {busy}; in one image with a twist every
+10 ms, in the other with a reading of an IMU every 5 ms.
 
 A frame costs at most what stands below its table, in instructions, with m observations in the
 frame, n rows of the state (12 + 3 N with twists, 15 + 3 N with an IMU), and b = min(m, N) / 8
@@ -421,8 +422,8 @@ def differences(old: str, new: str) -> list[str]:
 def measure_all(build: Path) -> list[Cost]:
     """Every firmware image that has its bench beside it."""
     found = []
-    for path in (build / "images").glob("bench-*-n*.elf"):
-        _, board, capacity = path.stem.split("-")
+    for path in (build / "images").glob(f"bench-{PROCESSES[0].name}-*-n*.elf"):
+        _, _, board, capacity = path.stem.split("-")
         found.append((list(MACHINES).index(board), int(capacity[1:]), board))
     if not found:
         raise PelorusError(f"{build}/images: no bench images; tools/sizes.sh builds them")
@@ -432,8 +433,9 @@ def measure_all(build: Path) -> list[Cost]:
 def main(arguments: list[str]) -> int:
     """See the module's text."""
     match arguments:
-        case ["recording", target]:
-            write_recording(Path(target))
+        case ["recordings", folder]:
+            for process in PROCESSES.values():
+                write_recording(process, Path(folder) / f"{process.name}.plr")
         case ["write", build, path]:
             Path(path).write_text(document(measure_all(Path(build))))
         case ["check", build, path]:

@@ -129,13 +129,14 @@ function(cortexm_firmware board capacity bits)
   add_dependencies(boards pelorus-${suffix})
 endfunction()
 
-# What the filter costs, with a recording inside.
-function(cortexm_bench board capacity)
+# What the filter costs, with a recording inside: one image a recording, for the flash does not hold all.
+function(cortexm_bench board capacity recording)
   cortexm_library(library ${board_${board}_cpu} ${capacity} 32)
-  set(name bench-${board}-n${capacity})
+  get_filename_component(stem "${recording}" NAME_WE)
+  set(name bench-${stem}-${board}-n${capacity})
   cortexm_image(${name} ${board} ${library} 32 "${PORT}/main_bench.c" "${PORT}/bench_recording.S")
   set_source_files_properties("${PORT}/bench_recording.S" PROPERTIES
-    OBJECT_DEPENDS "${PELORUS_BENCH_RECORDING}"
-    COMPILE_DEFINITIONS "BENCH_RECORDING=\"${PELORUS_BENCH_RECORDING}\"")
+    OBJECT_DEPENDS "${PELORUS_BENCH_RECORDINGS}")
+  target_compile_definitions(${name} PRIVATE "BENCH_RECORDING=\"${recording}\"")
   add_dependencies(bench ${name})
 endfunction()
