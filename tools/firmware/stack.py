@@ -21,7 +21,9 @@ from pelorus.errors import PelorusError
 # Who calls through a pointer, and what it may reach: patterns of function names. Of the session's
 # observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
-PROCESS = r"(twist|imu)\.c:(lay_out|check|step|mean|rest|walk|now|bias_covariance|measure)"
+PROCESS = (
+    r"(twist|imu)\.c:(lay_out|check|step|mean|hold|rest|walk|walked|now|bias_covariance|measure)"
+)
 MAP = ("send_evicted", "find_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
 TELEMETRY = "send_odometry"
@@ -41,7 +43,7 @@ HANDLERS = (
     r"save|compare_counts",
 )
 FILTER = (
-    r"plr_(filter|predict|correct|gate|motion|slots|births|match|landmarks|stereo)\w*|process"
+    r"plr_(filter|predict|correct|consistency|gate|motion|slots|births|match|landmarks)\w*|process"
     r"|gate_each|initialise_new|append_new|adopt_known"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
