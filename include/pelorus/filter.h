@@ -107,8 +107,9 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
  * or a spike; PLR_E_ARGUMENT the same numbers ten times; PLR_E_MODE the process is another. */
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
 
-/* With an IMU: sets the velocity of the body in its own axes, m/s, and its variances. It starts the
- * filter with the pose that was set before it by plr_filter_set_pose.
+/* With an IMU: sets the velocity of the IMU (with the setting imu-arm not that of the body's origin),
+ * in the body's axes, m/s, and its variances. It starts the filter with the pose that was set before
+ * it by plr_filter_set_pose.
  * PLR_E_MODE another process, no pose was set, or there are landmarks or readings since;
  * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e4 m/s or a variance of 1e12; PLR_E_ARGUMENT a negative
  * variance. */
