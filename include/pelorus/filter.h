@@ -200,8 +200,9 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
 /* Puts a landmark of known world position and covariance into the state. Its error is assumed to be
  * independent of the state's. That is wrong for a landmark which this filter has evicted before:
  * its information is then counted twice (docs/MATH.md).
- * PLR_E_EXISTS; PLR_E_FULL; PLR_E_ARGUMENT covariance not positive; PLR_E_NOT_FINITE; PLR_E_RANGE
- * beyond 1e9 m or a variance of 1e12, or (`body`) it lies on the camera or beyond max_range. */
+ * PLR_E_NOT_READY before an IMU has started, whose start turns the pose; PLR_E_EXISTS; PLR_E_FULL;
+ * PLR_E_ARGUMENT covariance not positive; PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e9 m or a variance
+ * of 1e12, or (`body`) it lies on the camera or beyond max_range. */
 plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark);
 
 /* Hands every landmark to the map sink and drops it; those that the sink refuses stay.

@@ -143,7 +143,8 @@ typedef struct plr_inertial {
     uint16_t frames;      /* that used observations since the start, up to the anchor */
     uint8_t started;      /* 1: tilt and velocity are known */
     uint8_t pose_given;   /* 1: plr_filter_set_pose was called */
-    uint8_t anchored;     /* 1: position and yaw have been fixed after a start in motion */
+    uint8_t anchored;     /* 1: position and yaw are fixed: by the start, the anchor after it, a
+                             measured position or a map */
     uint8_t fault;        /* plr_imu_fault, found at the start or since */
 } plr_inertial;
 

@@ -273,6 +273,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
         memcpy(P_start, P_xi, sizeof P_start);
     plr_mount_pose_in(f, &at, P_start);
     plr_predict_drop(f);
+    plr_alignment_follow_clock(f, t_ns);
     if (f->clock_started)
         f->totals.resets++;
     f->count = 0;

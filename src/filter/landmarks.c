@@ -2,6 +2,8 @@
 /* Landmarks as the caller sees them: in the world, in and out. */
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "process/alignment.h"
+#include "process/process.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/slots.h"
@@ -39,6 +41,8 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
         return PLR_E_ARGUMENT;
     if (f->diverged)
         return PLR_E_DIVERGED;
+    if (!plr_process_has_started(f)) /* the start turns the pose, by which it comes in */
+        return PLR_E_NOT_READY;
     if (plr_slots_find(f, landmark->id) != PLR_NO_SLOT)
         return PLR_E_EXISTS;
     if (f->count >= f->config.slots)
@@ -47,6 +51,7 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
     if (!plr_model_of(f)->adopt(f, landmark, &entering))
         return PLR_E_RANGE;
     plr_slots_append(f, landmark->id, true, &entering);
+    plr_alignment_keep_world(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -3,6 +3,7 @@
 
 #include "filter/filter_internal.h"
 #include "math/order.h"
+#include "process/alignment.h"
 #include "state/model.h"
 #include "state/slots.h"
 
@@ -98,6 +99,8 @@ void plr_match_known(plr_filter *f, const plr_observation *seen, unsigned n,
         report->created++;
         moved = true;
     }
-    if (moved)
-        plr_match_slots(f, seen, n);
+    if (!moved)
+        return;
+    plr_alignment_keep_world(f);
+    plr_match_slots(f, seen, n);
 }

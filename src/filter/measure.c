@@ -15,6 +15,7 @@
 #include "math/dense.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
+#include "process/alignment.h"
 #include "process/process.h"
 #include "process/velocity.h"
 #include "sensor/sensor.h"
@@ -195,6 +196,8 @@ static bool measure(plr_filter *f, const plr_reading *reading, plr_reading_resul
     result->used = apply(f, kind, reading, result);
     count(f, result);
     const uint8_t bounding = kind->bounds_position;
+    if (result->used)
+        plr_alignment_keep_world(f);
     if (result->used && bounding != 0 && (reading->axes & bounding) == bounding)
         f->last_position_ns = f->t_ns;
     return result->used;

@@ -5,6 +5,7 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "filter/mount.h"
+#include "process/alignment.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 
@@ -29,6 +30,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     const plr_status status = check_moved(f, P_moved);
     if (status != PLR_OK)
         return plr_filter_refuse(f, status);
+    plr_alignment_follow_clock(f, t_ns);
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
     f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;

@@ -301,6 +301,18 @@ bool plr_alignment_wants_anchor(const plr_filter *f) {
            f->t_ns - s->started_ns >= ANCHOR_NS && !f->motion.pending;
 }
 
+void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns) {
+    if (!f->inertial.started)
+        return;
+    f->inertial.started_ns += t_ns - f->t_ns; /* unsigned: a time before zero wraps, and back */
+    f->inertial.still_ns += t_ns - f->t_ns;
+}
+
+void plr_alignment_keep_world(plr_filter *f) {
+    if (f->config.process == PLR_PROCESS_IMU)
+        f->inertial.anchored = 1;
+}
+
 void plr_alignment_anchor(plr_filter *f) {
     const plr_real variance = (plr_real)(f->config.start_sigma * f->config.start_sigma);
     const plr_real *u = f->R_WB + 6;

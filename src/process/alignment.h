@@ -27,6 +27,13 @@ void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
 /* True if position and yaw are to be fixed anew, some time after a start in motion. */
 bool plr_alignment_wants_anchor(const plr_filter *f);
 
+/* A position was measured, or a landmark of a map came in: position and yaw are not free any more,
+ * and an anchor that is still to come would lose what is known of them. */
+void plr_alignment_keep_world(plr_filter *f);
+
+/* The clock is about to be set from f->t_ns to t_ns: the time since the start stays what it is. */
+void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns);
+
 /* Lays the world anew so that the present position and yaw are exact, or known to start_sigma: both
  * are free. What tilt and velocity had added to their errors is gone. No motion may be pending. */
 void plr_alignment_anchor(plr_filter *f);

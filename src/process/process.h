@@ -62,9 +62,11 @@ typedef struct plr_process {
 extern const plr_process plr_process_twist;
 extern const plr_process plr_process_imu;
 
-/* False until an IMU has been aligned with gravity: the state does not move before. */
+/* False until an IMU has been aligned with gravity: the state does not move before. In mapping poses
+ * are given, and nothing has to start. */
 static inline bool plr_process_has_started(const plr_filter *f) {
-    return f->config.process != PLR_PROCESS_IMU || f->inertial.started != 0;
+    return f->config.process != PLR_PROCESS_IMU || f->inertial.started != 0 ||
+           f->config.mode == PLR_MODE_MAPPING;
 }
 
 static inline const plr_process *plr_process_of(const plr_filter *f) {
