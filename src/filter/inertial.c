@@ -189,7 +189,7 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     if (seen < 3 || 2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
     plr_alignment_restart(f);
-    f->inertial.fault = PLR_IMU_FAULT_MOVES;
+    plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);
 }
 
 void plr_filter_anchor(plr_filter *f, const plr_report *report) {

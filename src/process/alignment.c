@@ -244,6 +244,11 @@ void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
     f->inertial.anchored = 1;
 }
 
+void plr_alignment_does_not_stand(plr_filter *f, plr_imu_fault how) {
+    if (f->inertial.fault != PLR_IMU_FAULT_TURNS)
+        f->inertial.fault = (uint8_t)how;
+}
+
 /* Starts if the stretch that was averaged is good for it. */
 static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
     plr_alignment *at = &f->either.alignment;
@@ -253,7 +258,7 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
     const plr_real length = measured_up(f, u);
     if (at_rest && !is_at_rest(f, at, interval)) {
         const bool turns = is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval);
-        f->inertial.fault = turns ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES;
+        plr_alignment_does_not_stand(f, turns ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES);
         return false;
     }
     f->inertial.fault = (uint8_t)find_fault(f, u, length, at_rest);

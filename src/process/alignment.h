@@ -20,6 +20,10 @@ bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
 /* The stretch that is averaged begins anew: the pictures show that the body moves. */
 void plr_alignment_restart(plr_filter *f);
 
+/* Notes that the body moves or turns. A gyro that turned while the accelerometer stood still is the
+ * sensor's fault until a rest has shown otherwise, whatever moves after that. */
+void plr_alignment_does_not_stand(plr_filter *f, plr_imu_fault how);
+
 /* Starts with velocity v and the pose as they were set. */
 void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
                          const plr_real variance[PLR_VELOCITY_DIM]);
