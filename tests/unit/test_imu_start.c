@@ -234,6 +234,18 @@ static void test_a_gyro_in_degrees_turns_while_the_body_stands(void) {
     demand_waiting(PLR_IMU_FAULT_TURNS);
 }
 
+static void test_after_a_turn_at_rest_moving_does_not_start_and_resting_does(void) {
+    static const double up[3] = {0, 0, 9.81};
+    static const double turn[3] = {0.8, -0.2, 0.3};
+    make_filter();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(3 * SECOND / 2, up, turn));
+    demand_waiting(PLR_IMU_FAULT_TURNS);
+    shake(2, 0.3, 5);
+    demand_waiting(PLR_IMU_FAULT_TURNS);
+    feed_up(5 * SECOND / 2, 0, 0, 9.81);
+    demand_started();
+}
+
 static void test_an_accelerometer_in_g_is_told(void) {
     make_filter();
     feed_up(2 * SECOND, 0, 0, 1);
@@ -438,6 +450,7 @@ int main(void) {
     RUN_TEST(test_a_body_that_is_shaken_does_not_start_at_rest);
     RUN_TEST(test_auto_starts_in_motion_where_the_body_never_stands);
     RUN_TEST(test_a_gyro_in_degrees_turns_while_the_body_stands);
+    RUN_TEST(test_after_a_turn_at_rest_moving_does_not_start_and_resting_does);
     RUN_TEST(test_an_accelerometer_in_g_is_told);
     RUN_TEST(test_a_force_at_rest_that_is_not_gravity_is_told);
     RUN_TEST(test_no_force_at_all_does_not_start_at_rest);
