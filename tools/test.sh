@@ -205,7 +205,7 @@ fi
 beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
 beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tools/firmware tests/python tests/layering tests/golden tests/fuzz
+    tools/pelorus tools/firmware tools/example_robot.py tests/python tests/layering tests/golden tests/fuzz
 beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
 joined
