@@ -215,7 +215,10 @@ typedef struct plr_config {
      * accelerometer and gyro; imu-turn and imu-arm say where it is on the body. */
     uint8_t process;
 
-    /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO. */
+    /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO.
+     * After a start in motion position and yaw are laid anew two seconds later, where the estimate
+     * then stands, and their covariance with them; the world that plr_filter_set_pose gave is left by
+     * what the first seconds were off. Not so where a position or a map has been used. */
     uint8_t imu_start;
 
     /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.

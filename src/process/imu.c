@@ -25,6 +25,8 @@
 #define LONG_INTERVALS PLR_R(2.5)
 /* The error of a reading that is held lasts about so long before it becomes another, s. */
 #define LASTING_S PLR_R(0.5)
+/* What a frame has bridged by the older reading is made up for if it is no longer than this, s. */
+#define BRIDGED_S PLR_R(0.1)
 /* A reading older than this says nothing of the present: the body keeps its velocity instead, s. */
 #define STALE_S PLR_R(0.25)
 
@@ -268,9 +270,10 @@ static void densities(const plr_filter *f, plr_real interval, plr_real density[2
     density[1] = f->par.gyro_density;
     if (!(at->usual_s > 0) || interval <= LONG_INTERVALS * at->usual_s)
         return;
+    const plr_real intervals = interval / at->usual_s;
     const plr_real lasting = interval < LASTING_S ? interval : LASTING_S;
     for (int i = 0; i < 2; i++) {
-        const plr_real changed = at->change2[i] * (interval / at->usual_s);
+        const plr_real changed = at->change2[i] * intervals * intervals;
         const plr_real most = at->spread2[i] + at->change2[i];
         density[i] = PLR_FMA(changed < most ? changed : most, lasting, density[i]);
     }
@@ -352,8 +355,8 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
 
 /* Between two samples of a signal that changes smoothly its mean is that of both ends. Where a frame
  * came in between, the first part of the interval was bridged by the older one: the second makes up
- * for it, so that the integral is right. Not so after lost readings: meanwhile frames have corrected
- * what the older one did. */
+ * for it, so that the integral is right. Not so after many lost readings: meanwhile frames have
+ * corrected what the older one did. */
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
     const uint8_t timing = f->reading_valid ? f->config.imu_timing : PLR_TWIST_END;
@@ -361,7 +364,7 @@ static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
                               ? (plr_real)((double)(f->t_ns - f->reading_ns) * 1e-9)
                               : PLR_R(0);
-    const bool bridged = whole <= LONG_INTERVALS * f->inertial.usual_s;
+    const bool bridged = whole <= BRIDGED_S;
     for (int i = 0; i < PLR_READING_DIM; i++) {
         const plr_real target = timing == PLR_TWIST_END ? reading[i]
                                 : timing == PLR_TWIST_START
@@ -445,8 +448,10 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = (plr_real)((double)(f->t_ns - f->inertial.still_ns) * 1e-9);
-    const plr_real mean_of = since > 0 && since < PLR_R(0.5) ? since : PLR_R(0.5);
-    const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : mean_of;
+    const plr_real most = since < PLR_R(0.5) ? since : PLR_R(0.5);
+    const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : PLR_R(1e-3);
+    /* at the time of the last such row the mean is used up: one reading's worth is granted */
+    const plr_real mean_of = most > 0 ? most : usual;
     memset(H, 0, sizeof *H);
     H->terms = 2;
     H->term[0].row = plr_row_of(f, PLR_BLOCK_VELOCITY);
