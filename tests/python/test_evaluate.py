@@ -18,6 +18,7 @@ from pelorus.frames import Header, Truth
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory, read_truth, read_tum
+from replay_drive import BIN
 from scipy.spatial.transform import Rotation
 
 COUNT = 200
@@ -325,3 +326,16 @@ def test_a_step_that_changes_is_told_in_the_body_s_own_axes() -> None:
     shaken = Poses(np.tile(np.eye(3), (50, 1, 1)), np.zeros((50, 3)))
     shaken.p[::2, 0] = 0.5
     assert evaluation.step_change(shaken) == pytest.approx(1.0)
+
+
+def test_truth_is_found_between_the_frames_where_the_camera_has_another_clock(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    target = tmp_path / "late.plr"
+    assert pelorus("simulate", target, "--duration", 12, "--seed", 4).status == 0
+    plain = pelorus("evaluate", target, "--bin", BIN, "--json")
+    options = ("--set", "camera-offset=-0.012", "--set", "twist-delay=0.05")
+    moved = pelorus("evaluate", target, "--bin", BIN, "--json", *options)
+    assert plain.status == moved.status == 0, moved.err
+    frames = json.loads(plain.out)["truth_frames"]
+    assert json.loads(moved.out)["truth_frames"] >= frames - 2  # the first lies before all truth

@@ -34,7 +34,7 @@ from pelorus.layout import Floats, unpack_symmetric
 from pelorus.motion import Times
 from pelorus.se3 import Poses
 from pelorus.settings import in_force, mode_in_force
-from pelorus.trajectory import Trajectory, estimate_in, truth_in
+from pelorus.trajectory import Trajectory, estimate_in, filled, truth_in
 
 MEANING = {
     "err0_m": "RMS position error, first poses aligned",
@@ -263,6 +263,13 @@ def _found_by_itself(messages: Sequence[Message]) -> list[Landmark]:
     return made
 
 
+def on_its_clock(
+    messages: Sequence[Message], truth: Trajectory, estimate: Trajectory
+) -> Trajectory:
+    """With a camera-offset the result's poses lie between those of the truth."""
+    return filled(truth, estimate.t_ns) if in_force(messages, "camera-offset") else truth
+
+
 def judge(
     messages: Sequence[Message],
     truth: Trajectory | None = None,
@@ -276,6 +283,8 @@ def judge(
     """
     truth = truth_in(messages) if truth is None else truth
     found = estimate_in(messages)
+    if truth is not None and found is not None:
+        truth = on_its_clock(messages, truth, found[0])
     accuracy = None
     if found is not None and truth is not None:
         accuracy = assess(found[0], truth, found[1], tolerance_ns, by_imu(messages))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from pelorus import foreign, packed_file, se3, wire
 from pelorus.errors import PelorusError
@@ -25,6 +25,7 @@ KITTI_COLUMNS = 12
 EUROC_COLUMNS = (8, 17)  # t x y z qw qx qy qz, and velocity and biases behind them
 NS_DIGITS = (16, 19)  # of today's time in ns; seconds have 10 before the point
 QUATERNION_NORM_TOLERANCE = 1e-2
+TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up
 CELL_SHOWN = 40  # characters of a bad one
 
 
@@ -33,6 +34,26 @@ class Trajectory(NamedTuple):
 
     t_ns: Times
     poses: Poses
+
+
+def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
+    """The same, and one at each wanted time between poses that are near enough in time."""
+    t_ns = whole.t_ns
+    lacking = np.setdiff1d(wanted_t_ns, t_ns)
+    lacking = lacking[(lacking > t_ns[0]) & (lacking < t_ns[-1])]
+    after = np.searchsorted(t_ns, lacking)
+    near = t_ns[after] - t_ns[after - 1] <= TRUTH_GAP_NS
+    lacking, after = lacking[near], after[near]
+    if not len(lacking):
+        return whole
+    first = t_ns[0]
+    seconds, own = (lacking - first) * 1e-9, (t_ns - first) * 1e-9
+    R = Slerp(own, Rotation.from_matrix(whole.poses.R))(seconds).as_matrix()
+    p = np.stack([np.interp(seconds, own, x) for x in whole.poses.p.T], axis=-1)
+    together = np.concatenate((t_ns, lacking))
+    order = np.argsort(together)
+    poses = Poses(np.concatenate((whole.poses.R, R)), np.concatenate((whole.poses.p, p)))
+    return Trajectory(together[order], poses.at(order))
 
 
 def read_tum(path: Path) -> Trajectory:

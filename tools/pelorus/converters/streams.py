@@ -14,7 +14,6 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from pelorus.console import progress
 from pelorus.converters import twist_noise
@@ -30,14 +29,12 @@ from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
-from pelorus.se3 import Poses
 from pelorus.tracking import images
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
 from pelorus.tracks import Tracks
-from pelorus.trajectory import Trajectory
+from pelorus.trajectory import Trajectory, filled
 
-TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up for a frame
 FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
@@ -282,7 +279,7 @@ def _size(header: Header) -> tuple[int, int]:
 # --- truth ----------------------------------------------------------------------------------------
 
 
-def _at_frames(truth: Trajectory, frame_t_ns: Times) -> tuple[Times, Poses]:
+def _at_frames(truth: Trajectory, frame_t_ns: Times) -> Trajectory:
     """The truth, and between its poses one at each frame without one: there it is compared."""
     t_ns = truth.t_ns
     if frame_t_ns[-1] < t_ns[0] or t_ns[-1] < frame_t_ns[0]:
@@ -290,18 +287,4 @@ def _at_frames(truth: Trajectory, frame_t_ns: Times) -> tuple[Times, Poses]:
             f"the truth spans {t_ns[0]} to {t_ns[-1]} ns, the frames {frame_t_ns[0]} to "
             f"{frame_t_ns[-1]} ns: they do not overlap; times on the twists' clock are due"
         )
-    lacking = np.setdiff1d(frame_t_ns, t_ns)
-    lacking = lacking[(lacking > t_ns[0]) & (lacking < t_ns[-1])]
-    after = np.searchsorted(t_ns, lacking)
-    near = t_ns[after] - t_ns[after - 1] <= TRUTH_GAP_NS
-    lacking, after = lacking[near], after[near]
-    if not len(lacking):
-        return t_ns, truth.poses
-    first = t_ns[0]
-    seconds, own = (lacking - first) * 1e-9, (t_ns - first) * 1e-9
-    R = Slerp(own, Rotation.from_matrix(truth.poses.R))(seconds).as_matrix()
-    p = np.stack([np.interp(seconds, own, x) for x in truth.poses.p.T], axis=-1)
-    together = np.concatenate((t_ns, lacking))
-    order = np.argsort(together)
-    poses = Poses(np.concatenate((truth.poses.R, R)), np.concatenate((truth.poses.p, p)))
-    return together[order], poses.at(order)
+    return filled(truth, frame_t_ns)

@@ -25,7 +25,7 @@ import numpy as np
 
 from pelorus import style
 from pelorus.errors import PelorusError
-from pelorus.evaluation import Accuracy, assess, by_imu
+from pelorus.evaluation import Accuracy, assess, by_imu, on_its_clock
 from pelorus.frames import Kind, Landmark, Message, Report, Role, Stereo
 from pelorus.grid.occupancy import Grid, Wish, occupancy
 from pelorus.grid.sightings import sightings
@@ -95,7 +95,12 @@ class Comparison:
         if truth is None:
             return {}
         found = {
-            run.name: assess(run.trajectory, truth, run.covariance, upright=by_imu(run.messages))
+            run.name: assess(
+                run.trajectory,
+                on_its_clock(run.messages, truth, run.trajectory),
+                run.covariance,
+                upright=by_imu(run.messages),
+            )
             for run in self.runs
         }
         return {name: accuracy for name, accuracy in found.items() if accuracy is not None}
