@@ -112,7 +112,7 @@ static void test_a_refused_reading_is_told_at_once(void) {
  * has. */
 /* In dead reckoning too a frame asks whether readings were refused since the last one. */
 static void test_in_dead_reckoning_a_refused_reading_is_forgotten_as_readings_come_again(void) {
-    const plr_twist broken = {{NAN, 0, 0}, {0}};
+    const plr_twist broken = {{(double)NAN, 0, 0}, {0}};
     rig.config.mode = PLR_MODE_DEAD_RECKONING;
     rig_begin();
     rig_drive(2);

@@ -255,11 +255,10 @@ static void test_derivatives_by_tilt_velocity_and_biases_are_those_of_the_motion
     static const char *const columns[4] = {"theta", "v", "b_a", "b_g"};
     double expected[ERROR * DRIVER], got[ERROR * DRIVER], column[ERROR];
     for (int c = 0; c < DRIVER; c++) {
-        double *number = c < 6 ? &real.v[c - 3] : &real.bias[c - 6];
         if (c < 3)
             derivative_by_turn(c, 1e-4, column);
         else
-            derivative(number, 1e-4, column);
+            derivative(c < 6 ? &real.v[c - 3] : &real.bias[c - 6], 1e-4, column);
         for (int r = 0; r < ERROR; r++)
             expected[DRIVER * r + c] = column[r];
     }

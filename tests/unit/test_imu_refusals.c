@@ -87,7 +87,7 @@ static void test_numbers_that_are_none(void) {
     for (int i = 0; i < 6; i++) {
         plr_imu imu = in_flight();
         double *number = i < 3 ? &imu.a_B_mps2[i] : &imu.w_B_radps[i - 3];
-        *number = i % 2 ? NAN : -INFINITY;
+        *number = i % 2 ? (double)NAN : -(double)INFINITY;
         demand_fault(PLR_E_NOT_FINITE, &imu, PLR_IMU_FAULT_NOT_FINITE);
     }
     demand_recovery();
@@ -188,7 +188,7 @@ static void test_a_reading_before_the_last_frame_is_too_late(void) {
 
 static void test_a_refused_reading_changes_nothing_that_follows(void) {
     static plr_filter spoilt;
-    const plr_imu broken = {{NAN, 0, 0}, {0}};
+    const plr_imu broken = {{(double)NAN, 0, 0}, {0}};
     (void)in_flight();
     spoilt = *f;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE,
@@ -242,8 +242,8 @@ static void make_filter(bool pose_given) {
 
 static void test_a_velocity_is_refused_where_it_makes_no_sense(void) {
     static const double v[3] = {1, 2, 3}, good[3] = {0.1, 0.1, 0.1};
-    const double nan_v[3] = {1, NAN, 0}, fast[3] = {0, 0, 2e4}, negative[3] = {1, -1e-9, 1};
-    const double infinite[3] = {1, 1, INFINITY}, huge[3] = {1, 2e12, 1};
+    const double nan_v[3] = {1, (double)NAN, 0}, fast[3] = {0, 0, 2e4}, negative[3] = {1, -1e-9, 1};
+    const double infinite[3] = {1, 1, (double)INFINITY}, huge[3] = {1, 2e12, 1};
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_velocity(NULL, v, good));
     make_filter(false);
     imu_rig_remember();

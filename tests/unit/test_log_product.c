@@ -43,7 +43,7 @@ static void test_a_product_beyond_every_exponent_is_kept(void) {
 }
 
 static void test_what_is_no_positive_number_changes_nothing(void) {
-    const double with[] = {2, 0, -3, NAN, INFINITY, 5}, without[] = {2, 5};
+    const double with[] = {2, 0, -3, (double)NAN, (double)INFINITY, 5}, without[] = {2, 5};
     TEST_ASSERT_EQUAL_DOUBLE(value_of(without, 2), value_of(with, 6));
 }
 
