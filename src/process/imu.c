@@ -216,15 +216,14 @@ static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
 /* Stores an element of that covariance and its mirror image. */
 static inline void set_noise(plr_filter *f, unsigned r, unsigned c, plr_real q) {
     plr_core_motion *m = &f->core_motion;
-    if (r >= VEL && c >= VEL)
-        m->Q_cc[PLR_REST_DIM * (r - VEL) + c - VEL] = m->Q_cc[PLR_REST_DIM * (c - VEL) + r - VEL] =
-            q;
-    else if (r >= VEL)
-        m->Q_nc[PLR_REST_DIM * c + r - VEL] = q;
-    else if (c >= VEL)
-        m->Q_nc[PLR_REST_DIM * r + c - VEL] = q;
+    const unsigned low = r < c ? r : c, high = r < c ? c : r;
+    if (high < VEL)
+        f->motion.Q[PLR_POSE_DIM * low + high] = f->motion.Q[PLR_POSE_DIM * high + low] = q;
+    else if (low < VEL)
+        m->Q_nc[PLR_REST_DIM * low + high - VEL] = q;
     else
-        f->motion.Q[PLR_POSE_DIM * r + c] = f->motion.Q[PLR_POSE_DIM * c + r] = q;
+        m->Q_cc[PLR_REST_DIM * (low - VEL) + high - VEL] =
+            m->Q_cc[PLR_REST_DIM * (high - VEL) + low - VEL] = q;
 }
 
 enum { STRIP = 5 }; /* columns that are computed side by side */
