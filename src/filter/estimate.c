@@ -64,8 +64,8 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     const plr_status sound = plr_guard_check(f);
     if (sound != PLR_OK)
         return sound;
-    plr_real u[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
-    plr_process_of(f)->now(f, u, P_u);
+    plr_real u[PLR_POSE_DIM];
+    plr_process_of(f)->now(f, u, NULL);
     plr_mount_twist_out(f, u, NULL);
     to_double(velocity->v_B_mps, u, 3);
     to_double(velocity->w_B_radps, u + 3, 3);

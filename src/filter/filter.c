@@ -131,6 +131,13 @@ void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]) {
     plr_covariance_begin_diagonal(f, PLR_BLOCK_BIAS, variance);
 }
 
+void plr_filter_begin_velocity(plr_filter *f) {
+    const double v = (double)f->par.start_velocity_variance;
+    const double variance[PLR_VELOCITY_DIM] = {v, v, v};
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, variance);
+}
+
 static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
                            const double variance[PLR_POSE_DIM]) {
     for (int i = 0; i < PLR_POSE_DIM; i++) {
@@ -197,11 +204,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     start_covariance(f, P_xi);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_filter_store_for_recovery(f);
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY)) {
-        const double v = (double)f->par.start_velocity_variance;
-        const double P_v[PLR_VELOCITY_DIM] = {v, v, v};
-        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, P_v);
-    }
+    plr_filter_begin_velocity(f);
     if (plr_has_block(f, PLR_BLOCK_BIAS))
         start_bias(f);
     plr_guard_seal_whole(f);
@@ -271,7 +274,8 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     start_covariance(f, P_start);
     if (P_xi)
         memcpy(P_start, P_xi, sizeof P_start);
-    plr_mount_pose_in(f, &at, P_start);
+    plr_mount_pose_in(f, &at);
+    plr_mount_covariance_in(f, P_start);
     plr_predict_drop(f);
     plr_alignment_follow_clock(f, t_ns);
     if (f->clock_started)
@@ -333,7 +337,7 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     if (f->clock_started && t_ns <= f->t_ns)
         return plr_filter_refuse(f, PLR_E_TIME);
     plr_pose at = *T_WB;
-    plr_mount_pose_in(f, &at, NULL);
+    plr_mount_pose_in(f, &at);
     if (!f->clock_started) {
         store_pose(f, t_ns, &at);
         plr_guard_seal(f);

@@ -27,6 +27,9 @@ void plr_filter_forget_reading(plr_filter *f);
 /* The biases' covariance becomes a diagonal, uncorrelated with the rest. Only without landmarks. */
 void plr_filter_begin_bias(plr_filter *f, const double variance[PLR_BIAS_DIM]);
 
+/* With an IMU: the velocity's covariance becomes that of an unknown one, likewise. */
+void plr_filter_begin_velocity(plr_filter *f);
+
 /* Counts a refused call in the totals, and returns its status. */
 plr_status plr_filter_refuse(plr_filter *f, plr_status status);
 

@@ -131,19 +131,18 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
         if (!plr_is_finite(reading[i]))
             return refuse(f, PLR_E_RANGE, PLR_IMU_FAULT_NONE);
 
-    plr_real interval = 0;
-    plr_status status = plr_predict_check(f, t_ns, reading, &interval);
-    if (status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
-        return plr_predict_accept(f, t_ns, reading, status);
+    const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
+    if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
+        return plr_predict_accept(f, t_ns, reading, &planned);
     const plr_real change2[2] = {change2_of(f, reading, 0), change2_of(f, reading, 3)};
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    learn(f, t_ns, reading, interval, change2);
+    learn(f, t_ns, reading, planned.interval, change2);
     if (f->inertial.started)
-        return plr_predict_accept(f, t_ns, reading, PLR_OK);
+        return plr_predict_accept(f, t_ns, reading, &planned);
     (void)plr_alignment_add(f, t_ns, reading);
-    status = plr_predict_accept(f, t_ns, reading, PLR_OK);
+    const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
     plr_guard_seal_whole(f); /* the start sets P */
     return status;
 }

@@ -46,16 +46,19 @@ static void move(const plr_filter *f, double sign, plr_pose *T) {
             T->p[i] += sign * T->R[3 * i + j] * (double)f->par.imu_arm[j];
 }
 
-void plr_mount_pose_in(const plr_filter *f, plr_pose *T, double *P) {
+void plr_mount_pose_in(const plr_filter *f, plr_pose *T) {
+    if (has_arm(f))
+        move(f, 1, T);
+}
+
+void plr_mount_covariance_in(const plr_filter *f, double P[PLR_POSE_SQUARE]) {
     plr_real in_real[PLR_POSE_SQUARE];
     if (!has_arm(f))
         return;
-    move(f, 1, T);
-    for (int i = 0; P && i < PLR_POSE_SQUARE; i++)
+    for (int i = 0; i < PLR_POSE_SQUARE; i++)
         in_real[i] = (plr_real)P[i];
-    if (P)
-        shift(f->par.imu_arm, -1, in_real);
-    for (int i = 0; P && i < PLR_POSE_SQUARE; i++)
+    shift(f->par.imu_arm, -1, in_real);
+    for (int i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = (double)in_real[i];
 }
 

@@ -13,8 +13,9 @@
 void plr_mount_set(plr_parameters *par, const plr_config *config);
 
 /* p <- p + R r: from the caller's origin to the IMU. Of a covariance of (rho, theta), 6x6:
- * rho <- rho - r x theta. P may be NULL. */
-void plr_mount_pose_in(const plr_filter *f, plr_pose *T, double *P);
+ * rho <- rho - r x theta. */
+void plr_mount_pose_in(const plr_filter *f, plr_pose *T);
+void plr_mount_covariance_in(const plr_filter *f, double P[PLR_POSE_SQUARE]);
 
 /* The reverse. */
 void plr_mount_pose_out(const plr_filter *f, plr_pose *T);

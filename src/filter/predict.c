@@ -59,11 +59,11 @@ void plr_predict_apply_prior(plr_filter *f) {
     (void)plr_model_of(f)->retract(f, f->work.dx); /* restores plr_slot.beyond */
 }
 
-/* The argument `interval` of a process's step; that of twists adds the variance sigma^2 interval (h1 - h0),
- * when the last reading is used from h0 to h1 seconds after its time. The error of one reading is
- * constant, so its variance grows to sigma^2 max(tau, h) h in h seconds: within the interval tau
- * between readings by the usual sigma^2 tau h, and later, if twists fail to come, to sigma^2
- * h^2. */
+/* The argument `interval` of a process's step. That of twists adds the variance
+ * sigma^2 interval (h1 - h0), when the last reading is used from h0 to h1 seconds after its time.
+ * The error of one reading is constant, so its variance grows to sigma^2 max(tau, h) h in h
+ * seconds: within the interval tau between readings by the usual sigma^2 tau h, and later, if
+ * twists fail to come, to sigma^2 h^2. */
 static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     const plr_real tau = f->interval_s;
     if (!f->reading_valid || f->config.noise == PLR_NOISE_STEP || h1 <= tau)
@@ -120,42 +120,37 @@ static plr_status refuse_twist(plr_filter *f, plr_status status) {
     return plr_filter_refuse(f, status);
 }
 
-plr_status plr_predict_check(const plr_filter *f, plr_time_ns t_ns,
-                             const plr_real reading[PLR_POSE_DIM], plr_real *interval) {
-    plr_real held[PLR_POSE_DIM];
-    *interval = 0;
+plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
+                                  const plr_real reading[PLR_POSE_DIM]) {
+    plr_planned_step planned = {.status = PLR_OK};
     if (f->config.mode == PLR_MODE_MAPPING)
-        return PLR_OK;
-    const plr_status in_time = check_time(f, t_ns);
-    if (in_time != PLR_OK)
-        return in_time;
-    plr_process_of(f)->mean(f, t_ns, reading, held);
-    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    *interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
-    return plr_process_of(f)->check(f, held, seconds) == PLR_OK &&
-                   check_reading(f, reading, *interval) == PLR_OK
-               ? PLR_OK
-               : PLR_E_RANGE;
+        return planned;
+    planned.status = check_time(f, t_ns);
+    if (planned.status != PLR_OK)
+        return planned;
+    plr_process_of(f)->mean(f, t_ns, reading, planned.mean);
+    planned.seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
+    planned.interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : planned.seconds;
+    if (plr_process_of(f)->check(f, planned.mean, planned.seconds) != PLR_OK ||
+        check_reading(f, reading, planned.interval) != PLR_OK)
+        planned.status = PLR_E_RANGE;
+    return planned;
 }
 
 plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                              plr_status status) {
-    if (status != PLR_OK)
-        return refuse_twist(f, status);
+                              const plr_planned_step *planned) {
+    if (planned->status != PLR_OK)
+        return refuse_twist(f, planned->status);
     if (f->config.mode == PLR_MODE_MAPPING) {
         f->totals.twists++;
         plr_guard_seal(f);
         return PLR_OK;
     }
-    plr_real held[PLR_POSE_DIM];
-    plr_process_of(f)->mean(f, t_ns, reading, held);
-    const plr_real seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    const plr_real interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : seconds;
-    if (seconds > 0 && plr_process_has_started(f))
-        plr_process_of(f)->step(f, t_ns, held, seconds, interval);
+    if (planned->seconds > 0 && plr_process_has_started(f))
+        plr_process_of(f)->step(f, t_ns, planned->mean, planned->seconds, planned->interval);
     f->t_ns = t_ns;
     f->clock_started = 1;
-    store_reading(f, t_ns, reading, interval);
+    store_reading(f, t_ns, reading, planned->interval);
     plr_guard_seal(f);
     return PLR_OK;
 }
@@ -171,12 +166,13 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     if (!plr_all_finite(twist->v_B_mps, 3) || !plr_all_finite(twist->w_B_radps, 3))
         return refuse_twist(f, PLR_E_NOT_FINITE);
 
-    plr_real reading[PLR_POSE_DIM], interval;
+    plr_real reading[PLR_POSE_DIM];
     for (int i = 0; i < 3; i++) {
         reading[i] = (plr_real)twist->v_B_mps[i];
         reading[3 + i] = (plr_real)twist->w_B_radps[i];
         if (!plr_is_finite(reading[i]) || !plr_is_finite(reading[3 + i]))
             return refuse_twist(f, PLR_E_RANGE);
     }
-    return plr_predict_accept(f, t_ns, reading, plr_predict_check(f, t_ns, reading, &interval));
+    const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
+    return plr_predict_accept(f, t_ns, reading, &planned);
 }

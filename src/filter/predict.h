@@ -9,14 +9,21 @@
 /* Carries the pose to t_ns by the last reading. */
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
 
-/* Whether a reading of the process (process/process.h) can be accepted at t_ns. *interval receives
- * the seconds since the reading before it, or since the pose was set. */
-plr_status plr_predict_check(const plr_filter *f, plr_time_ns t_ns,
-                             const plr_real reading[PLR_POSE_DIM], plr_real *interval);
+/* The step that ends with a reading of the process (process/process.h). */
+typedef struct plr_planned_step {
+    plr_status status;           /* PLR_OK, or why the reading is refused */
+    plr_real mean[PLR_POSE_DIM]; /* of the readings over the step */
+    plr_real seconds;            /* since the filter's time */
+    plr_real interval;           /* since the last reading, or since the pose was set */
+} plr_planned_step;
 
-/* Moves the state by a reading with that status, or counts a refused one. */
+/* Plans the step of a reading at t_ns; changes nothing. In mapping there is none. */
+plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
+                                  const plr_real reading[PLR_POSE_DIM]);
+
+/* Moves the state by a reading as planned, or counts a refused one. */
 plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                              plr_status status);
+                              const plr_planned_step *planned);
 
 /* Applies D' to landmarks and covariance, and moves the pose from D to D'. In `body` the motion's
  * noise is kept in work.noise, not in P, until plr_covariance_close_noise. Sets f->diverged if a

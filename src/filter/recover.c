@@ -84,11 +84,7 @@ void plr_filter_recover(plr_filter *f) {
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_consistency_clear(f);
     f->consistency.doubtful = 1;
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY)) {
-        const double v = (double)f->par.start_velocity_variance;
-        const double P_v[PLR_VELOCITY_DIM] = {v, v, v};
-        plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, P_v);
-    }
+    plr_filter_begin_velocity(f);
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {

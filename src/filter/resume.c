@@ -45,10 +45,9 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
         plr_guard_seal_whole(f);
         return PLR_OK;
     }
-    plr_pose anywhere = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
     double P[PLR_POSE_SQUARE];
     memcpy(P, P_moved, sizeof P);
-    plr_mount_pose_in(f, &anywhere, P);
+    plr_mount_covariance_in(f, P);
     /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j < PLR_POSE_DIM; j++)

@@ -139,12 +139,12 @@ static void set_tilt_covariance(plr_filter *f, const plr_real u[3], const plr_re
 }
 
 static void set_velocity(plr_filter *f, const plr_real v[3], const plr_real variance[3]) {
-    double P_v[PLR_VELOCITY_DIM * PLR_VELOCITY_DIM] = {0};
+    double P_v[PLR_VELOCITY_DIM];
     for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++) {
         f->inertial.velocity[i] = v[i];
-        P_v[(PLR_VELOCITY_DIM + 1) * i] = (double)variance[i];
+        P_v[i] = (double)variance[i];
     }
-    plr_covariance_begin(f, PLR_BLOCK_VELOCITY, P_v);
+    plr_covariance_begin_diagonal(f, PLR_BLOCK_VELOCITY, P_v);
 }
 
 static void set_unknown_velocity(plr_filter *f, plr_real variance) {

@@ -13,7 +13,6 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
-#include "process/imu.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
@@ -46,7 +45,8 @@ static void lay_out(plr_filter *f) {
     f->layout.drivers = D;
 }
 
-void plr_imu_gravity(const plr_filter *f, plr_real gamma[3]) {
+/* gamma = R_WB^T (0, 0, -g): gravity's acceleration in body axes, m/s^2. */
+static void gravity(const plr_filter *f, plr_real gamma[3]) {
     for (int i = 0; i < 3; i++)
         gamma[i] = -f->par.gravity * f->R_WB[6 + i];
 }
@@ -80,7 +80,7 @@ static void integrate(const plr_filter *f, const plr_real reading[PLR_READING_DI
         s->a[i] = reading[i] - f->bias[i];
         phi[i] = tau * (reading[3 + i] - f->bias[3 + i]);
     }
-    plr_imu_gravity(f, s->gamma);
+    gravity(f, s->gamma);
     plr_so3_series_at(&c, plr_dot3(phi, phi));
     plr_skew(W, phi);
     plr_mat3_mul(WW, W, W);
@@ -388,7 +388,7 @@ static plr_real walked(const plr_filter *f, unsigned k) {
 
 static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
     plr_real gamma[3];
-    plr_imu_gravity(f, gamma);
+    gravity(f, gamma);
     for (int i = 0; i < 3; i++) {
         reading[i] = f->bias[i] - gamma[i];
         reading[3 + i] = f->bias[3 + i];
@@ -418,15 +418,19 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
     enum { V = PLR_VELOCITY_DIM };
     const plr_core_motion *m = &f->core_motion;
     plr_real P_dd[D * D], VP[V * D] = {0}, P_vv[V * V] = {0}, P_b[PLR_POSE_SQUARE];
+    for (unsigned i = 0; i < V; i++) {
+        u[i] = f->inertial.velocity[i];
+        u[V + i] = f->reading[V + i] - f->bias[V + i];
+    }
+    if (!P_u)
+        return;
     plr_covariance_with_drivers(f, f->layout.driver, D, P_dd);
     plr_gemm_nn(V, D, D, m->V, D, P_dd, D, VP, D);
     plr_gemm_nt(V, V, D, VP, D, m->V, D, P_vv, V);
     bias_covariance(f, P_b);
     const plr_real per_reading =
         f->inertial.usual_s > 0 ? f->par.gyro_density / f->inertial.usual_s : f->par.gyro_density;
-    for (unsigned i = 0; i < V; i++) {
-        u[i] = f->inertial.velocity[i];
-        u[V + i] = f->reading[V + i] - f->bias[V + i];
+    for (unsigned i = 0; i < V; i++)
         for (unsigned j = 0; j < V; j++) {
             P_u[PLR_POSE_DIM * i + j] = P_vv[V * i + j] + m->Q_cc[PLR_REST_DIM * i + j];
             P_u[PLR_POSE_DIM * i + V + j] = P_u[PLR_POSE_DIM * (V + j) + i] =
@@ -434,7 +438,6 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
             P_u[PLR_POSE_DIM * (V + i) + V + j] =
                 P_b[PLR_POSE_DIM * (V + i) + V + j] + (i == j ? per_reading : PLR_R(0));
         }
-    }
 }
 
 /* The noise of the rate at a standstill is in theta too, where v = 0 finds it again: as if it were

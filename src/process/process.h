@@ -45,7 +45,7 @@ typedef struct plr_process {
     /* The variance by which bias k may have walked away from its prior since the start. */
     plr_real (*walked)(const plr_filter *f, unsigned k);
 
-    /* The body's present twist (v, w) with its covariance, 6x6. */
+    /* The body's present twist (v, w) with its covariance, 6x6, which may be NULL. */
     void (*now)(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
 
     /* The covariance of the biases at the time of the estimate, 6x6; zeros if they are not

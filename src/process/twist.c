@@ -44,6 +44,10 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) 
 }
 
 static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
+    for (int i = 0; i < PLR_POSE_DIM; i++)
+        u[i] = f->reading[i] - f->bias[i];
+    if (!P_u)
+        return;
     /* with noise = step the sigmas are those of a displacement: divide by the step */
     const plr_real scale = f->config.noise == PLR_NOISE_STEP && f->interval_s > 0
                                ? PLR_R(1) / (f->interval_s * f->interval_s)
@@ -53,8 +57,6 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
         P_u[(PLR_POSE_DIM + 1) * i] += scale * f->par.velocity_variance[i];
         P_u[(PLR_POSE_DIM + 1) * (3 + i)] += scale * f->par.gyro_variance[i];
     }
-    for (int i = 0; i < PLR_POSE_DIM; i++)
-        u[i] = f->reading[i] - f->bias[i];
 }
 
 /* xi = seconds (reading - b) */

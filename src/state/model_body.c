@@ -132,7 +132,7 @@ static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
     return s->beyond - (ratio - PLR_R(1)) / range;
 }
 
-/* Stores the variances of the motion, the prior of the common motion in common_motion. */
+/* Stores the variances of the motion, the prior of the common motions. */
 static void store_motion_variance(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         f->work.noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
