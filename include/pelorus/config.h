@@ -67,6 +67,15 @@ extern "C" {
 #endif
 #endif
 
+/* The kernel's inner loop: in a Cortex-M's own instructions if the tile has 6 columns, else in C. It
+ * changes no bit either. */
+#if defined(__thumb2__) && defined(__ARM_FEATURE_FMA) && PLR_REAL == 32 &&                         \
+    PLR_TILE_COLUMNS == 6 && !PLR_PORTABLE
+#define PLR_TILE_FILE "math/tile_cortex_m.h"
+#else
+#define PLR_TILE_FILE "math/tile_in_c.h"
+#endif
+
 #if defined(__FAST_MATH__)
 #error "Pelorus needs IEEE arithmetic: build without -ffast-math."
 #endif

@@ -82,9 +82,8 @@ bool plr_cholesky_upper(unsigned n, plr_real *S) {
                     return false;
                 inverse = PLR_R(1) / PLR_SQRT(x[0]);
             }
-            for (int c = 0; c < STRIP; c++)
-                x[c] *= inverse;
-            memcpy(row + (j - i), x, (n - j < STRIP ? n - j : STRIP) * sizeof *x);
+            for (unsigned c = 0; c < STRIP && j + c < n; c++)
+                row[j - i + c] = x[c] * inverse;
         }
     }
     return true;
@@ -98,7 +97,8 @@ static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, pl
     if (i > 0) {
         const plr_tile_factors above = {
             .U = U + i, .W = X, .to_next_U = k - 1, .to_next_W = ldx, .shrink = 1};
-        plr_tile_subtract(i, above, row, row);
+        plr_real *tile[PLR_TILE_ROWS] = {row[0], row[1], row[2], row[3]};
+        plr_tile_subtract(i, above, tile);
     }
     const plr_real *u0 = U + plr_upper_row(k, i), *u1 = u0 + (k - i);
     const plr_real *u2 = u1 + (k - i - 1), *u3 = u2 + (k - i - 2);
@@ -107,7 +107,8 @@ static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, pl
     plr_tile_add(x1, -u0[1], x0, row[1]);
     plr_tile_add(x2, -u0[2], x0, row[2]);
     plr_tile_add(x3, -u0[3], x0, row[3]);
-    memcpy(row[0], x0, sizeof x0);
+    for (int c = 0; c < STRIP; c++)
+        row[0][c] = x0[c];
     plr_tile_scale(row[1], PLR_R(1) / u1[0], x1);
     plr_tile_accumulate(x2, -u1[1], row[1]);
     plr_tile_accumulate(x3, -u1[2], row[1]);
@@ -116,12 +117,14 @@ static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, pl
     plr_tile_scale(row[3], PLR_R(1) / u3[0], x3);
 }
 
+/* The rows that are beyond a multiple of four are the first ones: they have the fewest above. A
+ * tile has two rows above it or more. */
 static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
+    enum { ROWS = PLR_TILE_ROWS };
+    const unsigned alone = k % ROWS == 1 && k > 1 ? ROWS + 1 : k % ROWS;
     plr_real x[STRIP];
     unsigned i = 0;
-    for (; i + PLR_TILE_ROWS <= k; i += PLR_TILE_ROWS)
-        solve_four_rows(k, U, i, X, ldx);
-    for (; i < k; i++) {
+    for (; i < alone; i++) {
         plr_real *row = X + i * ldx;
         if (i > 0)
             reduce_strip(k, U, i, X, ldx, row, x);
@@ -129,6 +132,8 @@ static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) 
             memcpy(x, row, sizeof x);
         plr_tile_scale(row, PLR_R(1) / U[plr_upper_row(k, i)], x);
     }
+    for (; i < k; i += ROWS)
+        solve_four_rows(k, U, i, X, ldx);
 }
 
 /* The same for a single column. */
@@ -188,11 +193,10 @@ void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_
                             const plr_real *V, size_t ldv, plr_real *const X[4]) {
     PLR_ASSERT(depth >= 2 && n % PLR_TILE_COLUMNS == 0);
     PLR_ASSERT(lda >= 4 && ldv >= n);
-    plr_tile_factors factors = {.U = A, .W = V, .to_next_U = lda, .to_next_W = ldv};
+    plr_real *row[PLR_TILE_ROWS] = {X[0], X[1], X[2], X[3]};
     for (unsigned j = 0; j < n; j += STRIP) {
-        plr_real *const at[PLR_TILE_ROWS] = {X[0] + j, X[1] + j, X[2] + j, X[3] + j};
-        plr_tile_subtract(depth, factors, at, at);
-        factors.W += STRIP;
+        const plr_tile_factors factors = {A, V + j, lda, ldv, 0};
+        plr_tile_subtract(depth, factors, row);
     }
 }
 

@@ -8,27 +8,23 @@
 
 enum { ROWS = PLR_TILE_ROWS, COLUMNS = PLR_TILE_COLUMNS };
 
-/* Where the tile's rows begin, at column j of P; those after the last one are `beyond`. */
-static void find_rows(unsigned n, unsigned i, unsigned j, plr_real *P, plr_real *beyond,
-                      plr_real *row[ROWS]) {
+/* A tile that the diagonal cuts: only what lies inside is written; what is read outside does not
+ * matter. */
+static void subtract_cut_tile(unsigned i, unsigned j, unsigned depth, plr_tile_factors factors,
+                              plr_real *row[ROWS]) {
+    plr_tile_row tile[ROWS];
+    plr_real *at[ROWS] = {tile[0], tile[1], tile[2], tile[3]};
     for (unsigned r = 0; r < ROWS; r++)
-        row[r] = i + r < n ? P + plr_packed_row(i + r) + j : beyond;
-}
-
-/* A tile that the diagonal or the last row cuts: only what lies inside is written; what is read
- * outside does not matter. */
-static void subtract_cut_tile(unsigned n, unsigned i, unsigned j, unsigned depth,
-                              plr_tile_factors factors, plr_real *P) {
-    plr_tile_row beyond = {0}, result[ROWS];
-    plr_real *const to[ROWS] = {result[0], result[1], result[2], result[3]};
-    plr_real *row[ROWS];
-    find_rows(n, i, j, P, beyond, row);
-    plr_tile_subtract(depth, factors, row, to);
-    for (unsigned r = 0; r < ROWS && i + r < n; r++)
+        memcpy(tile[r], row[r], sizeof tile[r]);
+    plr_tile_subtract(depth, factors, at);
+    for (unsigned r = 0; r < ROWS; r++) {
         for (unsigned c = 0; c < COLUMNS && j + c <= i + r; c++)
-            row[r][c] = result[r][c];
+            row[r][c] = tile[r][c];
+        row[r] += COLUMNS;
+    }
 }
 
+/* The rows that are beyond a multiple of ROWS are the first ones: they are the shortest. */
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P) {
     PLR_ASSERT(ld >= n);
@@ -36,20 +32,19 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
         plr_packed_subtract_plain(n, depth, Ut, Wt, ld, P);
         return;
     }
-    for (unsigned i = 0; i < n; i += ROWS) {
-        plr_tile_factors factors = {.U = Ut + i, .W = Wt, .to_next_U = ld, .to_next_W = ld};
-        const unsigned whole = i + ROWS <= n ? (i + 1) / COLUMNS * COLUMNS : 0;
+    plr_packed_subtract_plain(n % ROWS, depth, Ut, Wt, ld, P);
+    for (unsigned i = n % ROWS; i < n; i += ROWS) {
         plr_real *row[ROWS];
-        find_rows(n, i, 0, P, NULL, row);
+        for (unsigned r = 0; r < ROWS; r++)
+            row[r] = P + plr_packed_row(i + r);
         unsigned j = 0;
-        for (; j < whole; j += COLUMNS) {
-            plr_real *const at[ROWS] = {row[0] + j, row[1] + j, row[2] + j, row[3] + j};
-            plr_tile_subtract(depth, factors, at, at);
-            factors.W += COLUMNS;
+        for (; j + COLUMNS <= i + 1; j += COLUMNS) {
+            const plr_tile_factors factors = {Ut + i, Wt + j, ld, ld, 0};
+            plr_tile_subtract(depth, factors, row);
         }
-        for (; j < n && j < i + ROWS; j += COLUMNS) {
-            subtract_cut_tile(n, i, j, depth, factors, P);
-            factors.W += COLUMNS;
+        for (; j < i + ROWS; j += COLUMNS) {
+            const plr_tile_factors factors = {Ut + i, Wt + j, ld, ld, 0};
+            subtract_cut_tile(i, j, depth, factors, row);
         }
     }
 }
@@ -68,7 +63,8 @@ void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *
                 sum[c] = PLR_FMA(-row[c], row[c], sum[c]);
             row += ld;
         }
-        memcpy(d + j, sum, width * sizeof *d);
+        for (unsigned c = 0; c < width; c++)
+            d[j + c] = sum[c];
     }
 }
 

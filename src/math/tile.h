@@ -53,30 +53,12 @@ static inline void plr_tile_next(plr_tile_factors *at) {
     at->to_next_U -= at->shrink;
 }
 
-/* to[r][c] = from[r][c] - sum_k U(k, r) W(k, c), k = 0 .. depth-1, depth >= 2; to[r] may be
- * from[r]. The first step reads `from` and the last one writes `to`: separate copies would take the
- * time of a few steps. */
+/* row[r][c] -= sum_k U(k, r) W(k, c), k = 0 .. depth-1, depth >= 2. The rows move on to the next
+ * tile. The first step reads them and the last one writes them: separate copies would take the time
+ * of a few steps. */
 static inline void plr_tile_subtract(unsigned depth, plr_tile_factors at,
-                                     plr_real *const from[PLR_TILE_ROWS],
-                                     plr_real *const to[PLR_TILE_ROWS]) {
-    PLR_ASSERT(depth >= 2);
-    plr_tile_row a0, a1, a2, a3;
-    plr_tile_add(a0, -at.U[0], at.W, from[0]);
-    plr_tile_add(a1, -at.U[1], at.W, from[1]);
-    plr_tile_add(a2, -at.U[2], at.W, from[2]);
-    plr_tile_add(a3, -at.U[3], at.W, from[3]);
-    for (unsigned steps = depth - 2; steps > 0; steps--) {
-        plr_tile_next(&at);
-        plr_tile_accumulate(a0, -at.U[0], at.W);
-        plr_tile_accumulate(a1, -at.U[1], at.W);
-        plr_tile_accumulate(a2, -at.U[2], at.W);
-        plr_tile_accumulate(a3, -at.U[3], at.W);
-    }
-    plr_tile_next(&at);
-    plr_tile_add(to[0], -at.U[0], at.W, a0);
-    plr_tile_add(to[1], -at.U[1], at.W, a1);
-    plr_tile_add(to[2], -at.U[2], at.W, a2);
-    plr_tile_add(to[3], -at.U[3], at.W, a3);
-}
+                                     plr_real *row[PLR_TILE_ROWS]);
+
+#include PLR_TILE_FILE
 
 #endif

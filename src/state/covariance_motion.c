@@ -39,14 +39,16 @@ static inline void transport_block(const plr_real *restrict F, const plr_real *r
     plr_mat3_vec(r2, g, FX);
 }
 
-/* X <- F X, 3xn, in three rows of P. */
+/* X <- F X, 3xn, in three rows of P. F is copied to locals, because the compiler would otherwise
+ * load it for each column. */
 static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *restrict r0,
                              plr_real *restrict r1, plr_real *restrict r2) {
+    const plr_real g[9] = {F[0], F[1], F[2], F[3], F[4], F[5], F[6], F[7], F[8]};
     for (unsigned j = 0; j < n; j++) {
         const plr_real x[3] = {r0[j], r1[j], r2[j]};
-        r0[j] = plr_dot3(F, x);
-        r1[j] = plr_dot3(F + 3, x);
-        r2[j] = plr_dot3(F + 6, x);
+        r0[j] = plr_dot3(g, x);
+        r1[j] = plr_dot3(g + 3, x);
+        r2[j] = plr_dot3(g + 6, x);
     }
 }
 

@@ -26,7 +26,7 @@ build_firmware() {
         targets=(boards bringup bench)
     else
         for board in "${BOARDS[@]}"; do
-            targets+=("pelorus-$board-n32" "bringup-$board")
+            targets+=("pelorus-$board-n32" "bringup-$board" "kernels-$board")
             [ "$board" != mps2_an500 ] || targets+=("pelorus-$board-n32-f64")
         done
     fi

@@ -115,6 +115,15 @@ function(cortexm_bringup board)
   add_dependencies(bringup bringup-${board})
 endfunction()
 
+# The kernels against their plain twins: tests/target/test_kernels.py runs it.
+function(cortexm_kernels board)
+  cortexm_library(library ${board_${board}_cpu} 8 32)
+  cortexm_image(kernels-${board} ${board} ${library} 32
+    "${PELORUS_ROOT}/tests/target/main_kernels.c")
+  target_include_directories(kernels-${board} PRIVATE "${PORT}" "${PELORUS_ROOT}/src")
+  add_dependencies(bringup kernels-${board})
+endfunction()
+
 function(cortexm_firmware board capacity bits)
   cortexm_library(library ${board_${board}_cpu} ${capacity} ${bits})
   set(suffix ${board}-n${capacity})
