@@ -175,6 +175,7 @@ typedef struct plr_session {
     uint32_t start_resets;
     plr_held_steps held;
     plr_held_readings held_readings;
+    plr_waiting_frame waiting;
     plr_known_map known;
     plr_clock_watch watch;
     plr_budget budget;

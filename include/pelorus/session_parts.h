@@ -56,6 +56,16 @@ typedef struct plr_held_readings {
     plr_reading readings[PLR_SESSION_HELD_READINGS];
 } plr_held_readings;
 
+/* A frame whose time, moved by the setting camera-offset, lies beyond the last step: it waits until
+ * the steps have come there. */
+typedef struct plr_waiting_frame {
+    bool waits;
+    plr_frame frame;        /* as it came; its observations are those below */
+    plr_time_ns moved_ns;   /* its time by the clock of the steps */
+    plr_time_ns stepped_ns; /* that of the last step */
+    plr_observation observations[PLR_MAX_OBSERVATIONS];
+} plr_waiting_frame;
+
 /* Landmarks of known position, ascending by id. */
 typedef struct plr_known_map {
     plr_landmark *landmarks;

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
+
 #include "session/budget.h"
 #include "session/clock.h"
 #include "session/line.h"
@@ -22,8 +24,7 @@ static plr_status update(plr_session *s, const plr_frame *frame, plr_report *rep
     return status;
 }
 
-void plr_data_refuse_frame(plr_session *s, plr_status status) {
-    const plr_frame *frame = &s->in.as.stereo;
+void plr_data_refuse_frame(plr_session *s, const plr_frame *frame, plr_status status) {
     plr_report report;
     memset(&report, 0, sizeof report);
     report.t_ns = frame->t_ns;
@@ -81,7 +82,7 @@ static void use_frame(plr_session *s, const plr_frame *frame, const plr_frame *m
     if (status != PLR_OK && status != PLR_E_DIVERGED) {
         if (status == PLR_E_MODE)
             s->totals.without_truth++;
-        plr_data_refuse_frame(s, status);
+        plr_data_refuse_frame(s, frame, status);
         return;
     }
     if (status != PLR_OK)
@@ -102,33 +103,64 @@ void plr_data_limit_frame(plr_session *s) {
 
 /* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there are
  * none: a frame has the time of its TRUTH.) False if there is no such time. */
-static bool move_frame(const plr_session *s, plr_frame *frame) {
+static bool move(const plr_session *s, plr_time_ns t_ns, plr_time_ns *moved_ns) {
     const plr_config *config = plr_filter_config(&s->filter);
     const double offset_ns = config->mode == PLR_MODE_MAPPING ? 0 : config->camera_offset_s * 1e9;
     const bool back = offset_ns < 0;
     const plr_time_ns by_ns = (plr_time_ns)((back ? -offset_ns : offset_ns) + 0.5);
-    if (back ? frame->t_ns < by_ns : frame->t_ns > UINT64_MAX - by_ns)
+    if (back ? t_ns < by_ns : t_ns > UINT64_MAX - by_ns)
         return false;
-    frame->t_ns = back ? frame->t_ns - by_ns : frame->t_ns + by_ns;
+    *moved_ns = back ? t_ns - by_ns : t_ns + by_ns;
     return true;
+}
+
+/* The frame after the steps up to its time. */
+static void use_in_order(plr_session *s, const plr_frame *frame, plr_time_ns moved_ns) {
+    plr_frame moved = *frame;
+    moved.t_ns = moved_ns;
+    plr_steps_apply_held(s, moved_ns);
+    if (s->phase == PLR_PHASE_STARTING) /* a START of the frame's own time counts, too */
+        plr_start_choose(s, moved_ns > frame->t_ns ? moved_ns : frame->t_ns);
+    if (s->phase == PLR_PHASE_STARTING)
+        plr_data_refuse_frame(s, frame, PLR_E_NOT_READY);
+    else if (is_repeated(s, frame))
+        plr_data_refuse_frame(s, frame, PLR_E_TIME);
+    else
+        use_frame(s, frame, &moved);
+}
+
+static void wait(plr_waiting_frame *waiting, const plr_frame *frame, plr_time_ns moved_ns) {
+    PLR_ASSERT(!waiting->waits && frame->count <= PLR_MAX_OBSERVATIONS);
+    waiting->waits = true;
+    waiting->frame = *frame;
+    waiting->moved_ns = moved_ns;
+    memcpy(waiting->observations, frame->observations, frame->count * sizeof *frame->observations);
+    waiting->frame.observations = waiting->observations;
+}
+
+void plr_data_use_waiting(plr_session *s) {
+    if (!s->waiting.waits)
+        return;
+    s->waiting.waits = false;
+    use_in_order(s, &s->waiting.frame, s->waiting.moved_ns);
+    plr_steps_apply_due(s);
+}
+
+void plr_data_use_waiting_in_time(plr_session *s) {
+    if (s->waiting.stepped_ns >= s->waiting.moved_ns)
+        plr_data_use_waiting(s);
 }
 
 void plr_data_use_stereo(plr_session *s) {
     const plr_frame *frame = &s->in.as.stereo;
-    plr_frame moved = *frame;
-    if (!move_frame(s, &moved)) {
-        plr_data_refuse_frame(s, PLR_E_TIME);
-        return;
-    }
-    plr_steps_apply_held(s, moved.t_ns);
-    if (s->phase == PLR_PHASE_STARTING) /* a START of the frame's own time counts, too */
-        plr_start_choose(s, moved.t_ns > frame->t_ns ? moved.t_ns : frame->t_ns);
-    if (s->phase == PLR_PHASE_STARTING)
-        plr_data_refuse_frame(s, PLR_E_NOT_READY);
-    else if (is_repeated(s, frame))
-        plr_data_refuse_frame(s, PLR_E_TIME);
+    plr_time_ns moved_ns;
+    plr_data_use_waiting(s);
+    if (!move(s, frame->t_ns, &moved_ns))
+        plr_data_refuse_frame(s, frame, PLR_E_TIME);
+    else if (moved_ns > frame->t_ns && moved_ns > s->waiting.stepped_ns)
+        wait(&s->waiting, frame, moved_ns);
     else
-        use_frame(s, frame, &moved);
+        use_in_order(s, frame, moved_ns);
 }
 
 /* --- TRUTH --- */
@@ -165,6 +197,7 @@ void plr_data_use_truth(plr_session *s) {
 
 void plr_data_use_start(plr_session *s) {
     s->start = s->in.as.start;
+    plr_data_use_waiting(s);
     plr_steps_apply_held(s, UINT64_MAX);
     plr_start_apply(s);
 }

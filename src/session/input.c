@@ -157,7 +157,7 @@ static plr_status check(const plr_session *s, unsigned row, plr_rule rule) {
 static void refuse(plr_session *s, plr_status status) {
     const plr_message *in = &s->in;
     if (in->kind == PLR_KIND_STEREO)
-        plr_data_refuse_frame(s, status);
+        plr_data_refuse_frame(s, &in->as.stereo, status);
     else if (in->kind == PLR_KIND_STATE)
         plr_saving_refuse(s, (plr_state_action)in->as.state.action, time_of(in), status);
     else
@@ -201,4 +201,5 @@ void plr_input_handle(plr_session *s) {
         table[row].use(s);
     else if (rule == KEEP)
         plr_start_keep(s);
+    plr_data_use_waiting_in_time(s);
 }

@@ -115,6 +115,16 @@ static plr_time_ns delay_ns(const plr_session *s) {
     return (plr_time_ns)(plr_filter_config(&s->filter)->twist_delay_s * 1e9 + 0.5);
 }
 
+static bool steps_wait(const plr_session *s) {
+    return delay_ns(s) > 0 || s->waiting.waits;
+}
+
+void plr_steps_apply_due(plr_session *s) {
+    plr_held_step due;
+    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
+        apply_step(s, &due);
+}
+
 static void delay_step(plr_session *s, const plr_held_step *step) {
     plr_held_step due;
     if (plr_held_contradicts(&s->held, step->t_ns))
@@ -124,12 +134,13 @@ static void delay_step(plr_session *s, const plr_held_step *step) {
         apply_step(s, &due);
     }
     plr_held_push(&s->held, step);
-    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
-        apply_step(s, &due);
+    if (!s->waiting.waits)
+        plr_steps_apply_due(s);
 }
 
 static void use_step(plr_session *s, const plr_held_step *step) {
-    if (delay_ns(s) > 0)
+    s->waiting.stepped_ns = step->t_ns;
+    if (steps_wait(s))
         delay_step(s, step);
     else
         apply_step(s, step);
@@ -166,7 +177,7 @@ void plr_steps_use_imu(plr_session *s) {
 void plr_steps_use_reading(plr_session *s) {
     const plr_reading *reading = &s->in.as.reading;
     plr_reading oldest;
-    if (delay_ns(s) == 0) {
+    if (!steps_wait(s)) {
         apply_reading(s, reading);
         return;
     }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * What moves the body: TWIST or IMU, as the setting `process` says, and the READINGs of small sensors
- * among them. With the setting twist-delay all of them wait. The message is in s->in.
+ * among them. With the setting twist-delay all of them wait, and while a frame waits for them (data.h).
+ * The message is in s->in.
  *
  * A TWIST with process = imu, or an IMU with process = twist, is refused once in a drive, with a TEXT
  * that says what would be right; the others are only counted (totals.other_process). IMU readings that
@@ -20,5 +21,8 @@ void plr_steps_use_reading(plr_session *s);
 
 /* Applies those of the delayed ones whose time is at most until_ns. */
 void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns);
+
+/* Applies those that have waited for twist-delay. */
+void plr_steps_apply_due(plr_session *s);
 
 #endif
