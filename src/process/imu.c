@@ -213,17 +213,14 @@ static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
     }
 }
 
-/* Stores an element of that covariance and its mirror image. */
-static inline void set_noise(plr_filter *f, unsigned r, unsigned c, plr_real q) {
+static void put_noise(plr_filter *f, const plr_real Q[DIM * DIM]) {
     plr_core_motion *m = &f->core_motion;
-    const unsigned low = r < c ? r : c, high = r < c ? c : r;
-    if (high < VEL)
-        f->motion.Q[PLR_POSE_DIM * low + high] = f->motion.Q[PLR_POSE_DIM * high + low] = q;
-    else if (low < VEL)
-        m->Q_nc[PLR_REST_DIM * low + high - VEL] = q;
-    else
-        m->Q_cc[PLR_REST_DIM * (low - VEL) + high - VEL] =
-            m->Q_cc[PLR_REST_DIM * (high - VEL) + low - VEL] = q;
+    for (unsigned i = 0; i < VEL; i++) {
+        memcpy(f->motion.Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
+        memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
+    }
+    for (unsigned i = 0; i < PLR_REST_DIM; i++)
+        memcpy(m->Q_cc + PLR_REST_DIM * i, Q + DIM * (VEL + i) + VEL, PLR_REST_DIM * sizeof *Q);
 }
 
 enum { STRIP = 5 }; /* columns that are computed side by side */
@@ -278,9 +275,9 @@ static void densities(const plr_filter *f, plr_real interval, plr_real density[2
     }
 }
 
-/* The 3x3 block of X F^T between three rows of X and three of F. */
-static void set_block(plr_filter *f, const plr_real *X, const plr_real *F, const plr_imu_rows *left,
-                      const plr_imu_rows *right) {
+/* The 3x3 block of Q = X F^T between three rows of X and three of F, and its mirror image. */
+static inline void set_block(plr_real Q[DIM * DIM], const plr_real *X, const plr_real *F,
+                             const plr_imu_rows *left, const plr_imu_rows *right) {
     plr_real block[9] = {0};
     X += DIM * left->row;
     F += DIM * right->row;
@@ -290,7 +287,8 @@ static void set_block(plr_filter *f, const plr_real *X, const plr_real *F, const
                 block[3 * i + j] = PLR_FMA(X[DIM * i + l], F[DIM * j + l], block[3 * i + j]);
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = 0; j < (left == right ? i + 1 : 3); j++)
-            set_noise(f, left->row + i, right->row + j, block[3 * i + j]);
+            Q[DIM * (left->row + i) + right->row + j] = Q[DIM * (right->row + j) + left->row + i] =
+                block[3 * i + j];
 }
 
 /* Q <- F Q F^T + noise. The rows of the biases do not change. The noise of the readings, of variances
@@ -306,16 +304,17 @@ static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
     for (unsigned i = 0; i < MOVED; i++)
         for (unsigned c = ACCEL; c < DIM; c++) {
             plr_real *x = &X[DIM * i + c];
-            set_noise(f, i, c, *x);
+            Q[DIM * i + c] = Q[DIM * c + i] = *x;
             *x = PLR_FMA(F[DIM * i + c], reading[c >= GYRO], *x);
         }
     /* of two, the one that is zero in more columns stands on the right */
-    set_block(f, X, F, &of_rho, &of_rho);
-    set_block(f, X, F, &of_rho, &of_theta);
-    set_block(f, X, F, &of_rho, &of_v);
-    set_block(f, X, F, &of_theta, &of_theta);
-    set_block(f, X, F, &of_v, &of_theta);
-    set_block(f, X, F, &of_v, &of_v);
+    set_block(Q, X, F, &of_rho, &of_rho);
+    set_block(Q, X, F, &of_rho, &of_theta);
+    set_block(Q, X, F, &of_rho, &of_v);
+    set_block(Q, X, F, &of_theta, &of_theta);
+    set_block(Q, X, F, &of_v, &of_theta);
+    set_block(Q, X, F, &of_v, &of_v);
+    put_noise(f, Q);
 }
 
 static void move_noise(plr_filter *f, const plr_real F[MOVED * DIM], plr_real tau,
