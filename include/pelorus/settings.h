@@ -276,9 +276,9 @@ typedef struct plr_config {
 
     /* Setting camera-offset [s]: -1 to 1, default 0.
      * Used by plr_session alone: added to the time of every frame, so that it is the clock of IMU
-     * or twists (Kalibr's timeshift_cam_imu). If it is negative, twist-delay must cover it. If it is
-     * positive and a frame comes before the steps up to its time, as in a recording in order of
-     * stamps, it waits for them, until the next frame at the most. */
+     * or twists (Kalibr's timeshift_cam_imu). If it is negative, twists and readings wait that much
+     * longer than twist-delay. If it is positive and a frame comes before the steps up to its time,
+     * as in a recording in order of stamps, it waits for them, until the next frame at the most. */
     double camera_offset_s;
 } plr_config;
 

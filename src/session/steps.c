@@ -111,8 +111,11 @@ void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
 
 /* --- now, or later --- */
 
+/* A frame that camera-offset moves back is late by so much more. */
 static plr_time_ns delay_ns(const plr_session *s) {
-    return (plr_time_ns)(plr_filter_config(&s->filter)->twist_delay_s * 1e9 + 0.5);
+    const plr_config *config = plr_filter_config(&s->filter);
+    const double back_s = config->camera_offset_s < 0 ? -config->camera_offset_s : 0;
+    return (plr_time_ns)((config->twist_delay_s + back_s) * 1e9 + 0.5);
 }
 
 static bool steps_wait(const plr_session *s) {

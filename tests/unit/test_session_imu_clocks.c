@@ -66,43 +66,48 @@ static void test_a_frame_is_used_at_the_time_that_camera_offset_gives_it(void) {
                              found.pose.t_ns);
 }
 
-enum { BEHIND = 3 }; /* readings by which the camera's clock is behind */
-
-/* Each message in the order of its own stamps: a frame before the readings of its moved time. */
-static void send_in_order_of_stamps(unsigned batch, int frames) {
-    const inertial_manner behind = {.batch = batch, .camera_ahead_s = -BEHIND * INERTIAL_READING_S};
+/* Each message in the order of its own stamps. Of a camera whose clock is `behind` readings behind
+ * that of the IMU, a frame comes before the readings of its moved time. */
+static void send_in_order_of_stamps(unsigned batch, int behind) {
+    const inertial_manner how = {.batch = batch, .camera_ahead_s = -behind * INERTIAL_READING_S};
+    const int end = INERTIAL_PER_FRAME * (INERTIAL_FRAMES - 1) + 1;
     int sent = 0;
     desk_begin();
     desk_send(inertial_header());
     desk_send(drive_start(0));
-    for (int k = 0; k < frames; k++) {
-        const int until = INERTIAL_PER_FRAME * k - BEHIND + 1;
+    for (int k = 0; k < INERTIAL_FRAMES; k++) {
+        const int stamped = INERTIAL_PER_FRAME * k - behind + 1;
+        const int until = stamped < end ? stamped : end;
         if (until > sent) {
-            inertial_send_readings(&behind, sent, until);
+            inertial_send_readings(&how, sent, until);
             sent = until;
         }
-        inertial_send_frame(&behind, k);
+        inertial_send_frame(&how, k);
     }
-    inertial_send_readings(&behind, sent, INERTIAL_PER_FRAME * (frames - 1) + 1);
+    inertial_send_readings(&how, sent, end);
     desk_run();
 }
 
-static void test_a_frame_before_the_readings_of_its_moved_time_waits_for_them(void) {
+static void test_in_the_order_of_stamps_camera_offset_costs_no_reading(void) {
+    static const struct {
+        int behind;
+        double delay_s;
+    } tried[] = {{3, 0}, {3, 0.25}, {-3, 0}, {-3, 0.25}};
     static const unsigned batches[] = {1, 4, INERTIAL_PER_FRAME};
     const inertial_result expected = inertial_result_of(&inertial_plain);
-    for (unsigned i = 0; i < 6; i++) {
-        desk_clear(1);
-        desk_use_setting("camera-offset", BEHIND * INERTIAL_READING_S);
-        if (i >= 3)
-            desk_use_setting("twist-delay", 0.25);
-        send_in_order_of_stamps(batches[i % 3], INERTIAL_FRAMES);
-        plr_session_finish(&session);
-        desk_assert_nothing_refused();
-        faulty_port_answers_again(&port);
-        const inertial_result found = inertial_read();
-        inertial_assert_same(&expected, &found);
-        TEST_ASSERT_EQUAL_UINT32(0, session.totals.imu_refused);
-    }
+    for (unsigned i = 0; i < 4; i++)
+        for (unsigned b = 0; b < 3; b++) {
+            desk_clear(1);
+            desk_use_setting("camera-offset", tried[i].behind * INERTIAL_READING_S);
+            desk_use_setting("twist-delay", tried[i].delay_s);
+            send_in_order_of_stamps(batches[b], tried[i].behind);
+            plr_session_finish(&session);
+            desk_assert_nothing_refused();
+            faulty_port_answers_again(&port);
+            const inertial_result found = inertial_read();
+            inertial_assert_same(&expected, &found);
+            TEST_ASSERT_EQUAL_UINT32(0, session.totals.imu_refused);
+        }
 }
 
 static void test_without_steps_a_frame_waits_until_the_next_one_or_the_end(void) {
@@ -231,7 +236,7 @@ int main(void) {
     RUN_TEST(test_readings_wait_for_a_late_camera_as_twists_do);
     RUN_TEST(test_what_does_not_fit_the_delay_is_used_early_and_counted);
     RUN_TEST(test_a_frame_is_used_at_the_time_that_camera_offset_gives_it);
-    RUN_TEST(test_a_frame_before_the_readings_of_its_moved_time_waits_for_them);
+    RUN_TEST(test_in_the_order_of_stamps_camera_offset_costs_no_reading);
     RUN_TEST(test_without_steps_a_frame_waits_until_the_next_one_or_the_end);
     RUN_TEST(test_a_report_has_the_time_that_the_frame_was_sent_with);
     RUN_TEST(test_a_frame_whose_moved_time_no_clock_has_is_refused);
