@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from pelorus.console import out, progress
 from pelorus.errors import PelorusError
+from pelorus.row_gaps import TOLD_ABOVE_PX, row_gaps
 from pelorus.tracking import images, output, sheet
 from pelorus.tracking.images import Gray, Pair
 from pelorus.tracking.settings import Settings
@@ -75,8 +76,9 @@ def track(
 ) -> None:
     """Follow points through rectified stereo pictures (PNG, JPEG, PGM, BMP, TIFF).
 
-    Corners are spread over the picture, followed there and back, matched along the row and kept
-    where RANSAC agrees; a track is written if it lived for three frames at least.
+    Corners are spread over the picture, followed there and back, kept where RANSAC agrees, found
+    anew by the patch of their birth, and matched along the row; a track is written if it lived for
+    three frames at least.
     """
     settings = Settings(corners, spacing, window, round_trip, row_gap, epipolar, disparity_max)
     settings.check()
@@ -129,4 +131,12 @@ def _say(target: Path, tracks: Tracks) -> None:
         out.print(
             f"    -> frames without any track: {len(empty)}, the first is frame {empty[0]} "
             "(counted from 0); they are not in the file"
+        )
+    gaps = row_gaps(tracks)
+    if gaps is not None and gaps.smooth_px > TOLD_ABOVE_PX:
+        out.print(
+            f"    -> rectification: the rows of left and right differ by {gaps.smooth_px:.2f} px "
+            f"RMS, smoothly over the picture and up to {gaps.largest_px:.1f} px, beside "
+            f"{gaps.rest_px:.2f} px from match to match: the calibration is off by that, and a "
+            f"pixel-sigma of {gaps.stands_for_px(float(np.median(counts))):.2g} stands for it"
         )

@@ -13,14 +13,17 @@ from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
 from pelorus.layout import Floats
-from pelorus.tracking import matching
+from pelorus.tracking import matching, patches
 from pelorus.tracking.images import PAIRS_MIN, Gray
 from pelorus.tracking.matching import Mask, Points
+from pelorus.tracking.patches import Patches
 from pelorus.tracking.settings import Settings
 from pelorus.tracks import Tracks
 
 ADMITTED_AFTER = PAIRS_MIN  # frames
 LOOP_PX = 1.0  # flow in the right picture and the match from the left one must meet
+MOVED_PX = 1.5  # by the patch of its birth a point may be so far from where the flow led
+LIKENESS_MIN = 0.8  # to the patch of its birth
 MATCHED_MIN = 0.1  # of the new corners, over the drive
 
 
@@ -31,7 +34,7 @@ class Live(NamedTuple):
     left: Points
     right: Points
 
-    def where(self, good: Mask) -> Live:
+    def where(self, good: Mask | NDArray[np.intp]) -> Live:
         return Live(self.id[good], self.left[good], self.right[good])
 
 
@@ -49,28 +52,47 @@ class Tracker:
     matched: int = 0  # of them found on the right
     _before: tuple[Gray, Gray] | None = None
     _next_id: int = 0
+    _births: Patches | None = None  # of the last frame's tracks
 
     def add(self, left: Gray, right: Gray) -> None:
         """The next frame."""
-        live = _nothing()
+        live, soft = _nothing(), patches.smooth(left)
         if self._before is not None:
-            live = self._followed(*self._before, left, right)
-        self.frames.append(self._filled(live, left, right))
+            live = self._followed(*self._before, left, right, soft)
+        filled = self._filled(live, left, right)
+        fresh = patches.cut(soft, filled.left[len(live.id) :], self.settings.window_px)
+        self._births = fresh if self._births is None else patches.joined(self._births, fresh)
+        self.frames.append(filled)
         self._before = left, right
 
-    def _followed(self, left0: Gray, right0: Gray, left: Gray, right: Gray) -> Live:
+    def _followed(self, left0: Gray, right0: Gray, left: Gray, right: Gray, soft: Floats) -> Live:
         """What of the last frame's tracks is seen again, in both pictures and without a doubt."""
         live, s = self.frames[-1], self.settings
         there, good = matching.flow(left0, left, live.left, s)
-        before, now = live.where(good), there[good]
-        agree = matching.agreeing(before.left, now, s)
-        before, now = before.where(agree), now[agree]
-        on_right, good = matching.flow(right0, right, before.right, s)
-        before, now, on_right = before.where(good), now[good], on_right[good]
-        matched, good = matching.match(left, right, now, s, on_right)
+        rows, there = np.nonzero(good)[0], there[good]
+        agree = matching.agreeing(live.left[rows], there, s)
+        rows, there = rows[agree], there[agree]
+        now, births = self._as_at_birth(soft, rows, there)
+        on_right, found = matching.flow(right0, right, now.right, s)
+        matched, good = matching.match(left, right, now.left, s, on_right)
         meets = np.linalg.norm(matched - on_right, axis=1) <= LOOP_PX
-        apart = _apart(now, s.spacing_px / 2)
-        return Live(before.id, now, matched).where(good & meets & apart)
+        sure = found & good & meets
+        sure[sure] = _apart(now.left[sure], s.spacing_px / 2)
+        kept = Live(now.id, now.left, matched).where(sure)
+        self._births = patches.renewed(births.where(sure), soft, kept.left, s.window_px)
+        return kept
+
+    def _as_at_birth(
+        self, soft: Floats, rows: NDArray[np.intp], there: Points
+    ) -> tuple[Live, Patches]:
+        """Where the points are by the patches of their births; gone are those that look unlike."""
+        assert self._births is not None
+        before = self.frames[-1].where(rows)
+        found = patches.find(soft, self._births.where(rows), there, self.settings.window_px)
+        moved = np.linalg.norm(found.points - there, axis=1)
+        same = (found.likeness >= LIKENESS_MIN) & (moved <= MOVED_PX)
+        now = Live(before.id, found.points.astype(np.float32), before.right)
+        return now.where(same), found.patches.where(same)
 
     def _filled(self, live: Live, left: Gray, right: Gray) -> Live:
         fresh = matching.new_corners(left, live.left, self.settings)
