@@ -52,16 +52,12 @@ static inline void reduce_strip(unsigned k, const plr_real *restrict U, unsigned
                                 const plr_real *restrict from, plr_real *restrict x) {
     PLR_ASSERT(i > 0 && i < k);
     const plr_real *u = U + i; /* (0, i), then down the column */
-    const plr_real first = -*u;
     plr_real sum[STRIP];
-    for (int c = 0; c < STRIP; c++)
-        sum[c] = PLR_FMA(first, y[c], from[c]);
+    plr_tile_less(sum, *u, y, from);
     for (size_t step = k - 1; step > k - i; step--) {
         u += step;
         y += down ? down : step;
-        const plr_real a = -*u;
-        for (int c = 0; c < STRIP; c++)
-            sum[c] = PLR_FMA(a, y[c], sum[c]);
+        plr_tile_reduce(sum, *u, y);
     }
     for (int c = 0; c < STRIP; c++)
         x[c] = sum[c];
@@ -104,16 +100,16 @@ static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, pl
     const plr_real *u2 = u1 + (k - i - 1), *u3 = u2 + (k - i - 2);
     plr_real x0[STRIP], x1[STRIP], x2[STRIP], x3[STRIP];
     plr_tile_scale(x0, PLR_R(1) / u0[0], row[0]);
-    plr_tile_add(x1, -u0[1], x0, row[1]);
-    plr_tile_add(x2, -u0[2], x0, row[2]);
-    plr_tile_add(x3, -u0[3], x0, row[3]);
+    plr_tile_less(x1, u0[1], x0, row[1]);
+    plr_tile_less(x2, u0[2], x0, row[2]);
+    plr_tile_less(x3, u0[3], x0, row[3]);
     for (int c = 0; c < STRIP; c++)
         row[0][c] = x0[c];
     plr_tile_scale(row[1], PLR_R(1) / u1[0], x1);
-    plr_tile_accumulate(x2, -u1[1], row[1]);
-    plr_tile_accumulate(x3, -u1[2], row[1]);
+    plr_tile_reduce(x2, u1[1], row[1]);
+    plr_tile_reduce(x3, u1[2], row[1]);
     plr_tile_scale(row[2], PLR_R(1) / u2[0], x2);
-    plr_tile_accumulate(x3, -u2[1], row[2]);
+    plr_tile_reduce(x3, u2[1], row[2]);
     plr_tile_scale(row[3], PLR_R(1) / u3[0], x3);
 }
 

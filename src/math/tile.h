@@ -2,9 +2,10 @@
 /*
  * The innermost loops of an update. A tile of the result, PLR_TILE_ROWS x PLR_TILE_COLUMNS, stays
  * in the processor's registers while the rows of the two factors are read one after another.
- * Inlined where it is used. plr_tile_add and plr_tile_accumulate differ only in what the compiler
- * may assume about overlap; they take the factor with its sign, because gcc vectorises a loop
- * without the negation better.
+ * Inlined where it is used. plr_tile_add and plr_tile_accumulate, plr_tile_less and plr_tile_reduce
+ * differ only in what the compiler may assume about overlap. Where u w is subtracted, the sign
+ * stands at w: gcc then makes one fused instruction of it, and would otherwise negate u by itself
+ * before it fills a vector with it.
  */
 #ifndef PLR_MATH_TILE_H
 #define PLR_MATH_TILE_H
@@ -31,6 +32,19 @@ static inline void plr_tile_accumulate(plr_real *restrict to, plr_real u,
                                        const plr_real *restrict w) {
     for (int c = 0; c < PLR_TILE_COLUMNS; c++)
         to[c] = PLR_FMA(u, w[c], to[c]);
+}
+
+/* to[c] = from[c] - u w[c] */
+static inline void plr_tile_less(plr_real *restrict to, plr_real u, const plr_real *restrict w,
+                                 const plr_real *restrict from) {
+    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
+        to[c] = PLR_FMA(u, -w[c], from[c]);
+}
+
+/* to[c] -= u w[c] */
+static inline void plr_tile_reduce(plr_real *restrict to, plr_real u, const plr_real *restrict w) {
+    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
+        to[c] = PLR_FMA(u, -w[c], to[c]);
 }
 
 /* to[c] = u w[c] */
