@@ -34,7 +34,7 @@ STORE = (
 )
 SESSION = (
     r"plr_session_step|feed_reader|(apply|use|delay)_step|predict|update|use_frame|answer"
-    r"|plr_(data|steps)_\w+"
+    r"|use_in_order|plr_(data|steps)_\w+"
 )
 HANDLERS = (
     r"plr_start_(begin|change_settings|add_landmark)",
