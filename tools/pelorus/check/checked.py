@@ -10,14 +10,17 @@ from pelorus import wire
 from pelorus.check import verdict
 from pelorus.check.named import LOCAL, UNTOLD, faults_of
 from pelorus.check.outcome import Bench, Settings, options_of
-from pelorus.check.tuning import Tuned, tune
+from pelorus.check.parameters import Tuned
+from pelorus.check.tuning import tune
 from pelorus.check.verdict import Grade, Remark, Run
 from pelorus.console import progress
+from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
 SPELLS_SHOWN = 12
+NOTHING_USED = "no frame could be used"  # words of pelorus-replay
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class Checked:
 
 def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
     """Tune in the folder, then replay the whole recording with both settings."""
-    bench = Bench(program, recording, folder)
+    bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
     named = faults_of(messages, bench.examined)
     grades = [Grade.CARE if fault.name == UNTOLD else Grade.BAD for fault in named]
@@ -46,27 +49,39 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if any(fault.name not in LOCAL for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
     tuned = tune(bench, given)
-    runs, figures = [], []
     truth = truth_in(messages)
-    for name, settings in progress((("before", given), ("after", tuned.settings)), "whole drive"):
-        outputs = Outputs.named(folder, name)
-        replay(program, recording, options_of(settings), outputs)
-        messages = wire.messages_of(outputs.log)
-        runs.append(Run.of(messages))
-        figures.append(_figures(runs[-1], truth))
-    origin = int(runs[1].frames.t_ns[0])
-    remarks = [*faults, *verdict.remarks(runs[1], tuned, origin)]
-    rows = [(title, figures[0][title], figures[1][title]) for title in figures[0]]
+    both = progress((("before", given), ("after", tuned.settings)), "whole drive")
+    before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)
+    if run is None:
+        raise PelorusError(f"{recording}: {NOTHING_USED}")
+    figures = {} if before is None else _figures(before, truth)
+    origin = int(run.frames.t_ns[0])
+    remarks = [*faults, *verdict.remarks(run, tuned, origin)]
+    rows = [(title, figures.get(title, "-"), now) for title, now in _figures(run, truth).items()]
     cost = (
         "-2 ln likelihood an observation",
         f"{tuned.before.cost:.2f}",
         f"{tuned.after.cost:.2f}",
     )
-    spells = [spell.words(origin) for spell in runs[1].health.spells]
+    spells = [spell.words(origin) for spell in run.health.spells]
     if len(spells) > SPELLS_SHOWN:
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
-    changed = verdict.changes(given, bench.header, tuned)
+    changed = verdict.changes(given, bench.header, tuned, bench.by_imu)
     return Checked(verdict.overall(remarks), remarks, spells, changed, [cost, *rows], tuned)
+
+
+def _whole(
+    program: Path, recording: Path, settings: Settings, folder: Path, name: str
+) -> Run | None:
+    """None if not one frame could be used, as with a clock that is off."""
+    outputs = Outputs.named(folder, name)
+    try:
+        replay(program, recording, options_of(settings), outputs)
+    except PelorusError as error:
+        if NOTHING_USED in str(error):
+            return None
+        raise
+    return Run.of(wire.messages_of(outputs.log))
 
 
 def _figures(run: Run, truth: Trajectory | None) -> dict[str, str]:

@@ -11,34 +11,49 @@ from typing import TypeVar
 
 import numpy as np
 
+from pelorus import inertial
 from pelorus.errors import PelorusError
-from pelorus.frames import Kind, Message, Reading, Start, Stereo, Twist
+from pelorus.frames import Imu, Kind, Message, Process, Reading, Start, Stereo, Twist
+from pelorus.inertial import Inertial
+from pelorus.inertial_survey import readings_of
 from pelorus.recording import Recording
 from pelorus.tracks import Tracks
 from pelorus.wire import Writer, header_of_messages
 
 
-def recording_of(messages: Sequence[Message]) -> Recording:
-    """Header, twists and tracks. What a filter would refuse, pixels that are not finite and times
-    that do not ascend, is left out.
+def recording_of(messages: Sequence[Message], process: Process | None = None) -> Recording:
+    """Header, twists or readings of an IMU, and tracks. What a filter would refuse, pixels that are
+    not finite and times that do not ascend, is left out. `process` is the HEADER's if not given.
     """
-    twists = _ascending([m for m in messages if isinstance(m, Twist)])
+    header = header_of_messages(messages)
+    by_imu = (process or header.process) is Process.IMU
+    twists = [] if by_imu else _ascending([m for m in messages if isinstance(m, Twist)])
+    readings = [m for m in messages if isinstance(m, Imu)] if by_imu else []
     frames = _ascending([m for m in messages if isinstance(m, Stereo)])
-    if not twists or not frames:
-        lacks = "twists" if not twists else "stereo frames"
+    if not (twists or readings) or not frames:
+        lacks = "stereo frames" if twists or readings else "readings of an IMU"
+        lacks = lacks if frames or by_imu else "twists"
         raise PelorusError(f"the recording holds no {lacks}: there is nothing to check")
     frame = np.repeat(np.arange(len(frames)), [len(m.ids) for m in frames])
     ids = np.concatenate([m.ids for m in frames]).astype(np.int64)
     pixels = np.concatenate([m.pixels for m in frames]).astype(np.float64).reshape(-1, 4)
     good = np.isfinite(pixels).all(axis=1)
     return Recording(
-        header_of_messages(messages),
+        header,
         np.array([m.t_ns for m in twists], np.int64),
-        np.array([m.v_B_mps for m in twists], np.float64),
-        np.array([m.w_B_radps for m in twists], np.float64),
+        np.array([m.v_B_mps for m in twists], np.float64).reshape(-1, 3),
+        np.array([m.w_B_radps for m in twists], np.float64).reshape(-1, 3),
         np.array([m.t_ns for m in frames], np.int64),
         Tracks.from_rows(len(frames), frame[good], ids[good], pixels[good]),
+        inertial=_in_order(readings) if by_imu else inertial.NO_READINGS,
     )
+
+
+def _in_order(messages: Sequence[Imu]) -> Inertial:
+    """Readings of ascending times."""
+    readings = readings_of(messages)
+    newest = np.maximum.accumulate(readings.t_ns)
+    return readings.at(np.concatenate(([True], readings.t_ns[1:] > newest[:-1])))
 
 
 Timed = TypeVar("Timed", Twist, Stereo)
@@ -81,9 +96,7 @@ def half(messages: Sequence[Message], which: int) -> list[Message]:
 
 
 def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
-    """With the frames later by so much, in the order of time."""
-    if offset_ns == 0:
-        return list(messages)
+    """With the frames later by so much, in the order of time: each finds all readings before it."""
     ahead = [m for m in messages if m.kind in AHEAD or isinstance(m, Start)]
     data: list[tuple[int, int, Message]] = []
     for message in messages:
@@ -93,15 +106,38 @@ def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
                 data.append((moved, 1, replace(message, t_ns=moved)))
         elif isinstance(message, Twist | Reading):
             data.append((message.t_ns, 0, message))
+    readings = [m for m in messages if isinstance(m, Imu)]
+    if readings:  # a batch may not reach over a frame
+        cuts = np.array([t for t, kind, _ in data if kind == 1], np.int64)
+        data += [(t, 0, m) for t, m in inertial.messages(_in_order(readings), cuts)]
     return [*ahead, *(m for _, _, m in sorted(data, key=lambda row: row[:2]))]
 
 
 def not_before(messages: Sequence[Message], t_ns: int) -> list[Message]:
     """All later by so much, where they begin before: then every offset moves the same frames."""
-    timed = (Stereo, Twist, Reading, Start)
+    timed = (Stereo, Twist, Imu, Reading, Start)
     least = min((m.t_ns for m in messages if isinstance(m, timed)), default=t_ns)
     later = max(t_ns - least, 0)
     return [replace(m, t_ns=m.t_ns + later) if isinstance(m, timed) else m for m in messages]
+
+
+def within(messages: Sequence[Message], margin_ns: int) -> list[Message]:
+    """Without the frames that are not between two readings wherever an offset up to the margin
+    moves them: so all offsets are judged by the same frames. As they are if that leaves few.
+    """
+    times = [t for m in messages for t in _reading_times(m)]
+    if not times:
+        return list(messages)
+    first, last = min(times) + margin_ns, max(times) - margin_ns
+    kept = [m for m in messages if not isinstance(m, Stereo) or first < m.t_ns < last]
+    frames = [sum(isinstance(m, Stereo) for m in some) for some in (kept, messages)]
+    return kept if 2 * frames[0] > frames[1] else list(messages)
+
+
+def _reading_times(message: Message) -> list[int]:
+    if isinstance(message, Twist):
+        return [message.t_ns]
+    return message.times_ns if isinstance(message, Imu) else []
 
 
 def write(path: Path, messages: Sequence[Message]) -> None:

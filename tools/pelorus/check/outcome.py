@@ -21,9 +21,17 @@ from pathlib import Path
 import numpy as np
 
 from pelorus import wire
-from pelorus.check.contents import first_frames, half, not_before, recording_of, shifted, write
+from pelorus.check.contents import (
+    first_frames,
+    half,
+    not_before,
+    recording_of,
+    shifted,
+    within,
+    write,
+)
 from pelorus.console import progress
-from pelorus.frames import Header, Kind, Message, Pose, Report, Stereo
+from pelorus.frames import Header, Kind, Message, Pose, Process, Report, Stereo
 from pelorus.layout import Floats
 from pelorus.replay import run_program
 
@@ -33,7 +41,9 @@ from pelorus.replay import run_program
 GATE_D2 = "25"
 DISPARITY_SPAN_PX = 100.0
 BEGIN_NS = 1_000_000_000  # a recording may begin at zero, and its frames be too late
+OFFSET_MOST_S = 0.1
 OFFSET, PART, LENGTH = "@offset", "@part", "@frames"
+CAMERA_OFFSET = "camera-offset"
 
 Settings = Mapping[str, str]
 
@@ -66,16 +76,22 @@ class Bench:
     the second half of the drive) and LENGTH (so many frames), which are not the filter's.
     """
 
-    def __init__(self, program: Path, recording: Path, folder: Path) -> None:
+    def __init__(self, program: Path, recording: Path, folder: Path, process: str = "") -> None:
         messages = wire.messages_of(recording)
         self.header = wire.header_of_messages(messages)
-        self.examined = recording_of(messages)
-        self._messages = not_before(first_frames(messages), BEGIN_NS)
+        asked = Process[process.upper()] if process else None
+        self.examined = recording_of(messages, asked)
+        part = within(first_frames(messages), round(OFFSET_MOST_S * 1e9))
+        self._messages = not_before(part, BEGIN_NS)
         self._folder = folder
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
         self._known: dict[tuple[tuple[str, str], ...], Outcome] = {}
         self._written: dict[tuple[str, str, str], Path] = {}
+
+    @property
+    def by_imu(self) -> bool:
+        return len(self.examined.inertial.t_ns) > 0
 
     @property
     def replays(self) -> int:
@@ -86,7 +102,7 @@ class Bench:
 
     def run_all(self, many: Sequence[Settings], what: str = "replaying") -> list[Outcome]:
         """In their order."""
-        keys = [tuple(sorted(settings.items())) for settings in many]
+        keys = [tuple(sorted(_by_offset(settings).items())) for settings in many]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         for key in new:
             self._recording(dict(key))
@@ -115,6 +131,15 @@ class Bench:
             options = ["--quiet", *options_of({"gate-d2": GATE_D2} | wanted)]
             run_program(self._program, recording, [*options, "--out", str(answers)])
             return outcome_of(wire.only(answers, (Kind.REPORT, Kind.POSE)), self._outlier_cost)
+
+
+def _by_offset(settings: Settings) -> Settings:
+    """With camera-offset as OFFSET: a replay cannot hold a frame back until its time comes."""
+    if CAMERA_OFFSET not in settings:
+        return settings
+    moved = float(settings[CAMERA_OFFSET]) + float(settings.get(OFFSET, "0"))
+    kept = {k: v for k, v in settings.items() if k != CAMERA_OFFSET}
+    return {**kept, OFFSET: f"{moved:.6f}"}
 
 
 def options_of(settings: Settings) -> list[str]:

@@ -5,132 +5,114 @@ likeliest.
 A parameter more must pay: what was seen must become so much likelier that chance would not do it.
 Where the tracks drift, the likelihood of a single step is blind to what matters (tracks_noise.py):
 then pixel-sigma is the one that stands for the drift, and the twists' sigmas are as given, but no
-larger than what the images allow.
+larger than what the images allow. What comes out must be likelier than what was given in both
+halves of the drive, else the latter stays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from pelorus.check.outcome import LENGTH, OFFSET, PART, Bench, Outcome, Settings
-from pelorus.check.search import Found, foot, search
+from pelorus.check import clock, tuning_imu
+from pelorus.check.outcome import LENGTH, OFFSET, PART, Bench, Settings
+from pelorus.check.parameters import (
+    AXES,
+    PAYS,
+    TWIST,
+    Tuned,
+    fewer_slots,
+    limits,
+    merged,
+    offset_settings,
+    pooled,
+    starting,
+    written,
+)
+from pelorus.check.search import Found, search
 from pelorus.check.tracks_noise import TrackNoise, track_noise
 from pelorus.converters.twist_noise import difference_of_a_reading
-from pelorus.frames import Header
 from pelorus.layout import Floats
-from pelorus.motion import Times
 
-AXES = "xyz"
-LIMITS = {"pixel": (0.02, 100.0), "velocity": (1e-4, 30.0), "gyro": (1e-5, 3.0)}
-NAMES = {"pixel": "pixel-sigma", "velocity": "velocity-sigma", "gyro": "gyro-sigma"}
-DEFAULTS = {"pixel": 2.0, "velocity": 0.1, "gyro": 0.01}
-PAYS = 20.0  # -2 ln of the likelihood ratio that one parameter more, or another timing, must bring
 WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
+PRIORS = {
+    "bias-gyro-sigma": (0.001, 0.003, 0.01, 0.03, 0.1),
+    "bias-velocity-sigma": (0.003, 0.01, 0.03, 0.1, 0.3),
+}
+UNITS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
 SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
 ALIKE = 0.7  # cosine of the angle between them
-OFFSET_MOST_S = 0.1
-OFFSET_STEP_S = 0.01  # at least, in whole readings
-COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0, 2.0), "300"
+COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
 FINE = (1.3, 1.15)
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """Settings to write, and why; `offset_s` is added to the frames' times."""
-
-    settings: dict[str, str]
-    before: Outcome
-    after: Outcome
-    noise: TrackNoise
-    said: list[str] = field(default_factory=list)
-    offset_s: float = 0.0
+OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
+CLOCK = ("camera-offset", "twist-delay", "twist-timing", "imu-timing")
+MIDDLES = {"start": 0.5, "mid": 0.0, "end": -0.5}  # of what a reading stands for, in readings
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
     """`given` are the settings as they are: they hold wherever nothing better is found."""
+    found = tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given)
+    return _held_against(bench, given, found)
+
+
+def _held_against(bench: Bench, given: Settings, found: Tuned) -> Tuned:
+    """What fits one half of the drive alone fits no drive to come."""
+    if found.noise.drifts:  # no likelihood was asked
+        return found
+    # the clock was judged by a parabola: a single cost depends on how frames cut the readings, too
+    clocked = {k: v for k, v in found.settings.items() if k in CLOCK}
+    settings = {k: v for k, v in given.items() if k not in CLOCK} | clocked
+    halves = [{**some, PART: part} for part in "01" for some in (settings, found.settings)]
+    ran = bench.run_all(halves, "both halves")
+    if all(new.gain_over(old) >= 0 for old, new in (ran[:2], ran[2:])):
+        return found
+    words = "no noises are likelier than yours in both halves of the drive: yours stay"
+    outcome = bench.run(settings)
+    return Tuned(
+        settings, found.before, outcome, found.noise, [words, *found.of_clock], found.offset_s
+    )
+
+
+def _tune(bench: Bench, given: Settings) -> Tuned:
     before = bench.run(given)
     noise = track_noise(bench.examined)
-    start = starting_sigmas(bench.header, given)
-    fixed = {k: v for k, v in given.items() if k not in NAMES.values()}
-    said = []
+    start = starting(bench.header, given, TWIST)
+    names = tuple(parameter.setting for parameter in TWIST.values())
+    fixed = {k: v for k, v in given.items() if not k.startswith(names)}
+    fixed[OFFSET] = fixed.pop("camera-offset", "0")
     if noise.drifts:
         found = _of_drifting_tracks(bench, fixed, start, noise)
-        fixed, words = _bias(bench, fixed, found.values, drifts=True)
-        said.append(words)
-        settings = fixed | _written(found.values)
-        return Tuned(_merged(settings), before, bench.run(settings), noise, said)
-
-    def noise_of(side: Settings, values: Mapping[str, float], steps: Sequence[float]) -> Found:
-        build = lambda v: {**side, **_written(v)}  # noqa: E731 - named where it is used
-        return search(bench, values, _limits(values), build, steps)
-
-    coarse = noise_of(fixed | WIDE | {LENGTH: COARSE_FRAMES}, start, COARSE).values
-    without, with_ = (
-        noise_of(side, coarse, (1.5, 1.25)) for side in ({**fixed, "bias": "off"}, fixed | WIDE)
-    )
-    found = min((without, with_), key=lambda f: f.outcome.cost)
-    fixed, words = _bias(bench, fixed, found.values, drifts=False)
-    said.append(words)
-    fixed, found, words = clock(bench, fixed, found.values)
-    said.append(words)
-    found, words = _axes(bench, fixed, found)
-    said.append(words)
-    offset_s = float(fixed.pop(OFFSET, "0"))
-    settings = _merged(fixed | _written(found.values))
-    return Tuned(
-        settings | _offset_settings(offset_s), before, found.outcome, noise, said, offset_s
-    )
+        fixed, words = _bias_of_halves(bench, fixed, found.values)
+        offset_s = float(fixed.pop(OFFSET))
+        settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
+        return Tuned(settings, before, bench.run(settings), noise, [words])
+    rough = fixed | WIDE | fewer_slots(given)
+    values = _search(bench, rough | {LENGTH: COARSE_FRAMES}, start, COARSE).values
+    offset = clock.of_twists(bench, rough | written(values, TWIST))
+    if offset.gain > PAYS:  # what a wrong clock does is no noise
+        rough[OFFSET] = f"{offset.best_s:.6f}"
+        values = _search(bench, rough | {LENGTH: COARSE_FRAMES}, values, COARSE).values
+    moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
+    values = _search(bench, moved, values, (1.5, 1.25)).values
+    fixed, of_bias = _bias(bench, moved, values)
+    fixed, found, of_clock = _clock(bench, fixed, values, given)
+    found, of_axes = _axes(bench, fixed, found)
+    offset_s = float(fixed.pop(OFFSET))
+    settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)
+    said = [of_bias, of_clock, of_axes]
+    return Tuned(settings, before, found.outcome, noise, said, offset_s, [of_clock])
 
 
-def starting_sigmas(header: Header, given: Settings) -> dict[str, float]:
-    """What is set, else what the recording suggests, else the defaults."""
-    noise = header.noise
-    suggested = {
-        "pixel": noise.pixel_sigma_px,
-        "velocity": noise.velocity_sigma_mps,
-        "gyro": noise.gyro_sigma_radps,
-    }
-    out = {}
-    for name, setting in NAMES.items():
-        value = suggested[name] if suggested[name] > 0 else DEFAULTS[name]
-        if setting in given:
-            value = float(np.mean([float(part) for part in given[setting].split(",")]))
-        out[name] = min(max(value, LIMITS[name][0]), LIMITS[name][1])
-    return out
-
-
-def _limits(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    return {name: LIMITS[name.partition("-")[0]] for name in values}
-
-
-def _written(values: Mapping[str, float]) -> dict[str, str]:
-    """As settings: of velocity, or of velocity-x, -y, -z."""
-    out = {}
-    for name, setting in NAMES.items():
-        if name in values:
-            out[setting] = f"{values[name]:.4g}"
-        else:
-            out[setting] = ",".join(f"{values[f'{name}-{axis}']:.4g}" for axis in AXES)
-    return out
-
-
-def _merged(settings: Settings) -> dict[str, str]:
-    return {k: v for k, v in settings.items() if not k.startswith("@")}
-
-
-def _offset_settings(offset_s: float) -> dict[str, str]:
-    """A frame that is moved to an earlier time must find the twists held back."""
-    if offset_s == 0:
-        return {}
-    out = {"camera-offset": f"{offset_s:.4g}"}
-    return out if offset_s > 0 else out | {"twist-delay": f"{-offset_s:.4g}"}
-
-
-def _again(bench: Bench, fixed: Settings, values: Mapping[str, float], what: str) -> Found:
-    return search(bench, values, _limits(values), lambda v: {**fixed, **_written(v)}, FINE, what)
+def _search(
+    bench: Bench,
+    side: Settings,
+    values: Mapping[str, float],
+    steps: Sequence[float],
+    what: str = "noise",
+) -> Found:
+    build = lambda v: {**side, **written(v, TWIST)}  # noqa: E731 - named where it is used
+    return search(bench, values, limits(values, TWIST), build, steps, what)
 
 
 # --- tracks that drift ----------------------------------------------------------------------------
@@ -144,34 +126,57 @@ def _of_drifting_tracks(
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     most = difference_of_a_reading(bench.examined)
     if most is not None:
-        values["velocity"] = min(values["velocity"], most.velocity_mps)
-        values["gyro"] = min(values["gyro"], most.gyro_radps)
-    return Found(values, bench.run({**fixed, **_written(values)}))
+        for name, value in start.items():
+            if name.startswith("velocity"):
+                values[name] = min(value, most.velocity_mps)
+            elif name.startswith("gyro"):
+                values[name] = min(value, most.gyro_radps)
+    return Found(values, bench.run({**fixed, **written(values, TWIST)}))
 
 
 # --- biases ---------------------------------------------------------------------------------------
 
 
-def _bias(
-    bench: Bench, fixed: Settings, values: Mapping[str, float], drifts: bool
-) -> tuple[dict[str, str], str]:
-    """Both halves of the drive must tell the same bias.
+def _bias(bench: Bench, fixed: Settings, values: Mapping[str, float]) -> tuple[dict[str, str], str]:
+    """Of each kind the prior under which the drive is likeliest; none, unless one pays.
 
-    What else looks like a bias for a while does not stay the same. Tracks that drift look like a
-    bias of the velocity all along, so with them there is none to be told.
+    A prior that is wider than the bias costs likelihood, so the data themselves say how wide.
     """
-    wide = {**fixed, **WIDE, **_written(values)}
+    side = {**fixed, **WIDE, **written(values, TWIST)}
+    said = []
+    for name, sizes in PRIORS.items():
+        tried = [{**side, name: "0"}, *({**side, name: f"{size:g}"} for size in sizes)]
+        ran = bench.run_all(tried, "biases")
+        best = min(range(1, len(ran)), key=lambda k: ran[k].cost)
+        pays = ran[best].gain_over(ran[0]) > PAYS
+        side[name] = f"{sizes[best - 1]:g}" if pays else "0"
+        if pays:
+            kind = name.split("-")[1]
+            said.append(f"of the {kind} readings of about {side[name]} {UNITS[name]}")
+    kept = {k: side[k] for k in PRIORS}
+    if not said:
+        without = {k: v for k, v in fixed.items() if k not in WIDE}
+        return {**without, "bias": "off"}, "no bias that would make the drive likelier"
+    return {**fixed, "bias": "on", **kept}, f"biases {' and '.join(said)}"
+
+
+def _bias_of_halves(
+    bench: Bench, fixed: Settings, values: Mapping[str, float]
+) -> tuple[dict[str, str], str]:
+    """Both halves of the drive must tell the same gyro bias.
+
+    Tracks that drift look like a bias of the velocity all along, so with them there is none of it
+    to be told, and likelihood would find one.
+    """
+    wide = {**fixed, **WIDE, **written(values, TWIST)}
     halves = bench.run_all([wide | {PART: part} for part in "01"], "biases of both halves")
-    prior, found = {}, []
-    for name, unit, axes in (("velocity", "m/s", slice(0, 3)), ("gyro", "rad/s", slice(3, 6))):
-        told = [(half.bias[axes], half.bias_variance[axes]) for half in halves]
-        size = 0.0 if drifts and name == "velocity" else common_bias(*told[0], *told[1])
-        prior[f"bias-{name}-sigma"] = f"{size:.2g}"
-        if size > 0:
-            found.append(f"of the {name} readings of about {size:.2g} {unit}")
-    if not found:
+    told = [(half.bias[3:], half.bias_variance[3:]) for half in halves]
+    size = common_bias(*told[0], *told[1])
+    if not size > 0:
         return {**fixed, "bias": "off"}, "no bias that both halves of the drive agree on"
-    return {**fixed, "bias": "on", **prior}, f"biases {' and '.join(found)}, in both halves alike"
+    prior = {"bias-velocity-sigma": "0", "bias-gyro-sigma": f"{size:.2g}"}
+    words = f"biases of the gyro readings of about {size:.2g} rad/s, in both halves alike"
+    return {**fixed, "bias": "on", **prior}, words
 
 
 def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> float:
@@ -192,70 +197,54 @@ def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> float:
 # --- clocks ---------------------------------------------------------------------------------------
 
 
-def clock(
-    bench: Bench, fixed: Settings, values: Mapping[str, float]
+def _clock(
+    bench: Bench, fixed: Settings, values: Mapping[str, float], given: Settings
 ) -> tuple[dict[str, str], Found, str]:
-    """Timing start or end, and the offset of the camera's clock.
+    """Timing and the offset of the camera's clock; the noises again where they change.
 
-    `mid` competes only if it is given: it is the mean of two readings, and would win for its
-    smaller noise alone. So would an offset by parts of a reading: those tried are whole readings,
-    and a parabola through the best three gives the rest.
+    With several readings a frame the offset tells both: another timing is one of a whole reading.
+    With a single one the timings are tried; `mid` competes only if it is given, for it is the mean
+    of two readings, and would win for its smaller noise alone.
     """
-    given = fixed.get("twist-timing", bench.header.twist_timing.name.lower())
-    timings = tuple(dict.fromkeys((given, "start", "end")))
-    tried = {timing: {**fixed, "twist-timing": timing, **_written(values)} for timing in timings}
-    by_timing = dict(zip(timings, bench.run_all(list(tried.values()), "timing"), strict=True))
-    timing = min(by_timing, key=lambda name: by_timing[name].cost)
-    offset_s, outcome = offset_of(bench, tried[given], by_timing[given])
-    gains = by_timing[timing].gain_over(by_timing[given]), outcome.gain_over(by_timing[given])
-    # one reading later or earlier is the other timing; an offset must say more than that
-    if gains[1] > max(gains[0], 0.0) + PAYS:
-        timing = given
-    elif gains[0] > PAYS:
-        offset_s = 0.0
+    was_s = float(given.get("camera-offset", "0"))
+    timing = fixed.get("twist-timing", bench.header.twist_timing.name.lower())
+    side = {**fixed, **written(values, TWIST), "twist-timing": timing}
+    offset = clock.of_twists(bench, side)
+    settings = {**fixed, "twist-timing": timing, OFFSET: f"{was_s:.6f}"}
+    words = f"twist-timing {timing}, and the clocks agree"
+    if np.isfinite(offset.sigma_s):
+        words += f" (known to {2e3 * offset.sigma_s:.2g} ms)"
+        if ((offset.best_s - was_s) / offset.sigma_s) ** 2 > PAYS:
+            settings, words = _moved(bench, settings, offset, timing)
     else:
-        timing, offset_s = given, 0.0
-    settings = {**fixed, "twist-timing": timing}
-    if offset_s:
-        settings[OFFSET] = f"{offset_s:.4g}"
-    return (
-        settings,
-        _again(bench, settings, values, "noise"),
-        _clock_words(given, timing, offset_s, gains[1] if offset_s else gains[0]),
+        others = [name for name in ("start", "end") if name != timing]
+        ran = bench.run_all([side, *({**side, "twist-timing": name} for name in others)], "timing")
+        best = min(range(len(ran)), key=lambda k: ran[k].cost)
+        if ran[best].gain_over(ran[0]) > PAYS:
+            settings["twist-timing"] = others[best - 1]
+            gain = ran[best].gain_over(ran[0])
+            words = f"twist-timing is {others[best - 1]}, not {timing} (likelihood {gain:+.0f})"
+    return settings, _search(bench, settings, values, FINE), words
+
+
+def _moved(
+    bench: Bench, settings: Settings, offset: clock.Offset, timing: str
+) -> tuple[dict[str, str], str]:
+    """By the offset, or by the timing that moves the readings as far."""
+    period_s = clock.seconds(bench.examined.twist_t_ns)
+    near_s = max(3 * offset.sigma_s, 0.25 * period_s)
+    for name in ("start", "end"):
+        as_far_s = (MIDDLES[timing] - MIDDLES[name]) * period_s
+        if name != timing and abs(offset.best_s - as_far_s) < near_s:
+            words = f"twist-timing is {name}, not {timing} (likelihood {offset.gain:+.0f}), or the "
+            words += f"camera's clock is {abs(as_far_s) * 1e3:.0f} ms off: one is like the other"
+            return {**settings, "twist-timing": name, OFFSET: "0"}, words
+    late = "late" if offset.best_s < 0 else "early"
+    words = (
+        f"the camera's clock is {abs(offset.best_s) * 1e3:.0f} ms {late} beside that of the "
+        f"twists, known to {2e3 * offset.sigma_s:.2g} ms (likelihood {offset.gain:+.0f})"
     )
-
-
-def offset_of(bench: Bench, settings: Settings, usual: Outcome) -> tuple[float, Outcome]:
-    """The likeliest offset, s; 0 where there is a single reading a frame."""
-    period_s = _seconds(bench.examined.twist_t_ns)
-    if _seconds(bench.examined.frame_t_ns) < 2 * period_s or not period_s > 0:
-        return 0.0, usual
-    step_s = period_s * max(round(OFFSET_STEP_S / period_s), 1)
-    most = int(OFFSET_MOST_S / step_s)
-    steps = [k for k in range(-most, most + 1) if k]
-    if not steps:
-        return 0.0, usual
-    shifted = [{**settings, OFFSET: f"{k * step_s:.6g}"} for k in steps]
-    costs = dict(zip(steps, bench.run_all(shifted, "clock"), strict=True)) | {0: usual}
-    best = min(costs, key=lambda k: costs[k].cost)
-    beside = [costs[k].cost if k in costs else np.inf for k in (best - 1, best, best + 1)]
-    return (best + foot(*beside)) * step_s, costs[best]
-
-
-def _seconds(t_ns: Times) -> float:
-    return float(np.median(np.diff(t_ns))) * 1e-9 if len(t_ns) > 2 else 0.0
-
-
-def _clock_words(given: str, timing: str, offset_s: float, gain: float) -> str:
-    if offset_s:
-        late = "late" if offset_s < 0 else "early"
-        return (
-            f"the camera's clock is {abs(offset_s) * 1e3:.0f} ms {late} beside that of the twists"
-            f" (likelihood {gain:+.0f})"
-        )
-    if timing != given:
-        return f"twist-timing is {timing}, not {given} (likelihood {gain:+.0f})"
-    return f"twist-timing {timing}, and the clocks agree"
+    return {**settings, OFFSET: f"{offset.best_s:.6f}"}, words
 
 
 # --- axes -----------------------------------------------------------------------------------------
@@ -263,19 +252,25 @@ def _clock_words(given: str, timing: str, offset_s: float, gain: float) -> str:
 
 def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
     """A sigma for each axis where that pays: two parameters more for each of the two."""
-    split = {"pixel": found.values["pixel"]} | {
-        f"{name}-{axis}": found.values[name] for name in ("velocity", "gyro") for axis in AXES
-    }
-    result = _again(bench, fixed, split, "noise by axis")
+    split = {"pixel": found.values["pixel"]}
+    for name in ("velocity", "gyro"):
+        for axis in AXES:
+            key = f"{name}-{axis}"
+            split[key] = found.values[key] if key in found.values else found.values[name]
+    rough = _search(bench, {**fixed, **fewer_slots(fixed)}, split, OF_AXES, "noise by axis")
+    result = _search(bench, fixed, rough.values, FINE[1:], "noise by axis")
     said = []
     for name in ("velocity", "gyro"):
-        of_axes = [result.values[f"{name}-{axis}"] for axis in AXES]
-        pooled = {k: v for k, v in result.values.items() if not k.startswith(name)}
-        pooled[name] = float(np.exp(np.mean(np.log(of_axes))))
-        one = Found(pooled, bench.run({**fixed, **_written(pooled)}))
+        alike = {k: v for k, v in result.values.items() if not k.startswith(name)}
+        alike |= {name: pooled(result.values, name)}
+        one = Found(alike, bench.run({**fixed, **written(alike, TWIST)}))
+        if name in found.values:  # the best for all axes that is known
+            best = {**alike, name: found.values[name]}
+            other = Found(best, bench.run({**fixed, **written(best, TWIST)}))
+            one = min(one, other, key=lambda some: some.outcome.cost)
         gain = result.outcome.gain_over(one.outcome)
         if gain > 2 * PAYS:
-            said.append(f"{NAMES[name]} by axis (likelihood {gain:+.0f})")
+            said.append(f"{TWIST[name].setting} by axis (likelihood {gain:+.0f})")
         else:
             result = one
     better = result if result.outcome.cost < found.outcome.cost else found

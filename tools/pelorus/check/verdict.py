@@ -9,7 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from pelorus.check.tuning import NAMES, Tuned, starting_sigmas
+from pelorus.check.parameters import Tuned, of_process, starting
 from pelorus.frame_table import BIASES, FrameTable, frame_table
 from pelorus.frames import Header, Message
 from pelorus.health import TimeLine, time_line
@@ -145,17 +145,21 @@ def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
 
 def _biases(run: Run) -> Iterator[Remark]:
     """Against their priors: beyond 3 sigma stereo and odometry disagree in something else."""
-    if not in_force(run.messages, "bias"):
+    by_imu = run.frames.by_imu
+    if not (by_imu or in_force(run.messages, "bias")):
         return
+    why = "do stereo and odometry disagree in scale?"
+    if by_imu:
+        why = "is it so large (give the prior), or are scale, axes or gravity wrong?"
     for name, axis in zip(BIASES, (*"xyz", *"xyz"), strict=True):
-        kind = "velocity" if name.startswith("bias_v") else "gyro"
+        kind = "gyro" if name.startswith("bias_w") else "accel" if by_imu else "velocity"
         prior = in_force(run.messages, f"bias-{kind}-sigma") or 0.0
         value = float(run.frames[name][-1])
         if prior > 0 and abs(value) > BIAS_SIGMAS * prior:
             yield Remark(
                 Grade.CARE,
                 f"the {kind} bias of {axis} is {value:.3g}, {abs(value) / prior:.1f} sigma of its "
-                "prior: do stereo and odometry disagree in scale?",
+                f"prior: {why}",
             )
 
 
@@ -174,16 +178,22 @@ def _tracks(tuned: Tuned) -> Iterator[Remark]:
     )
 
 
-def changes(given: Mapping[str, str], header: Header, tuned: Tuned) -> list[str]:
+def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
     """`pixel-sigma 2 should be 1`: what differs by more than a fifth, or in words."""
-    before = starting_sigmas(header, given)
+    parameters = of_process(by_imu)
+    before = starting(header, given, parameters)
     said = []
-    for name, setting in NAMES.items():
-        after = [float(part) for part in tuned.settings.get(setting, "").split(",") if part]
-        ratios = [max(x / before[name], before[name] / x) for x in after if x > 0]
+    for name, parameter in parameters.items():
+        written = tuned.settings.get(parameter.setting, "")
+        after = [float(part) for part in written.split(",") if part]
+        was = [before[name]] if name in before else [before[f"{name}-{axis}"] for axis in "xyz"]
+        count = max(len(was), len(after))
+        pairs = zip(was * (count // len(was)), after * (count // max(len(after), 1)), strict=False)
+        ratios = [max(x / y, y / x) for x, y in pairs if x > 0]
         if ratios and max(ratios) > OTHER_SIGMA:
-            said.append(f"{setting} {before[name]:.3g} should be {tuned.settings[setting]}")
-    for setting in ("twist-timing", "bias", "camera-offset"):
+            words = ",".join(f"{x:.3g}" for x in was)
+            said.append(f"{parameter.setting} {words} should be {written}")
+    for setting in ("twist-timing", "imu-timing", "bias", "camera-offset"):
         value = tuned.settings.get(setting)
         if value is not None and value != given.get(setting, _usual(setting, header)):
             said.append(f"{setting} should be {value}")
@@ -191,4 +201,5 @@ def changes(given: Mapping[str, str], header: Header, tuned: Tuned) -> list[str]
 
 
 def _usual(setting: str, header: Header) -> str:
-    return {"twist-timing": header.twist_timing.name.lower(), "bias": "on"}.get(setting, "0")
+    usual = {"twist-timing": header.twist_timing.name.lower(), "bias": "on", "imu-timing": "mid"}
+    return usual.get(setting, "0")

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""By how much the camera's clock is off: the offset that makes what was seen likeliest.
+
+About its least, the cost of an offset is a parabola: cost = least + (offset - best)^2 / sigma^2. So
+its foot is the offset, and its bend says how well the recording tells it. A single cost jumps
+by chance, since each offset brings other readings' noise together in a frame; so the parabola is
+laid through many offsets, and not through the best three.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pelorus.check.outcome import OFFSET, OFFSET_MOST_S, Bench, Settings
+from pelorus.layout import Floats
+from pelorus.motion import Times
+
+FEWEST = 5  # points of a parabola
+COARSE_S = 0.01  # from one offset tried to the next, at least
+NEAR_S = 0.04  # to either side of the best of them: farther off it is no parabola
+SHRINK = 3.0
+FINEST_S = 2e-5
+STEP_SIGMAS = 2.0  # steps of so many sigmas tell the foot best
+SURE_OF_PARTS = 0.04  # of a reading: with such a sigma the least is not made by its parts
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Seconds to be added to the frames' times; `sigma_s` is infinite if nothing tells it."""
+
+    best_s: float
+    sigma_s: float
+
+    @property
+    def gain(self) -> float:
+        """By how much it is likelier than none, -2 ln of the ratio."""
+        return (self.best_s / self.sigma_s) ** 2 if self.sigma_s > 0 else 0.0
+
+
+UNTOLD = Offset(0.0, float("inf"))
+
+
+def of_twists(bench: Bench, settings: Settings) -> Offset:
+    """Moved by whole readings only; untold where there is a single reading a frame.
+
+    An offset by a part of a reading would have each frame average one reading more, and win for the
+    smaller noise alone.
+    """
+    period_s = seconds(bench.examined.twist_t_ns)
+    if seconds(bench.examined.frame_t_ns) < 2 * period_s or not period_s > 0:
+        return UNTOLD
+    step_s = period_s * max(round(COARSE_S / period_s), 1)
+    most = int(OFFSET_MOST_S / step_s + 1e-6)
+    costs = _costs(bench, settings, 0.0, step_s, most)
+    offsets = np.array(list(costs))
+    best_s = min(costs, key=lambda offset: costs[offset])
+    beside = np.sort(np.abs(offsets - best_s))[: FEWEST + 1].max(initial=0.0)
+    near = np.abs(offsets - best_s) <= max(NEAR_S, beside) * (1 + 1e-9)
+    return foot(offsets[near], np.array(list(costs.values()))[near])
+
+
+def of_imu(bench: Bench, settings: Settings, about_s: float = 0.0) -> Offset:
+    """Steps that find the valley first, then finer ones that find its foot.
+
+    They are whole readings as long as that is fine enough: where camera and IMU keep one grid, an
+    offset by parts of a reading changes how many readings a frame averages, too.
+    """
+    period_s = seconds(bench.examined.inertial.t_ns)
+    if not period_s > 0:
+        return UNTOLD
+    step_s = period_s * max(round(COARSE_S / period_s), 1)
+    most = int(OFFSET_MOST_S / step_s + 1e-6)
+    costs = _costs(bench, settings, about_s, step_s, most)
+    while True:
+        found, costs = _valley(bench, settings, costs, step_s)
+        if np.isfinite(found.sigma_s) and step_s <= STEP_SIGMAS * SHRINK * found.sigma_s:
+            return found
+        whole = step_s > 1.5 * period_s
+        unsure = not whole and found.sigma_s > SURE_OF_PARTS * period_s
+        if unsure or step_s <= FINEST_S:
+            return found
+        finer_s = step_s / SHRINK
+        step_s = period_s * max(round(finer_s / period_s), 1) if whole else max(finer_s, FINEST_S)
+
+
+def _valley(
+    bench: Bench, settings: Settings, costs: dict[float, float], step_s: float
+) -> tuple[Offset, dict[float, float]]:
+    """Two steps to either side of the best that is known; there may be a better one among them."""
+    tried = -1
+    while tried < len(costs):
+        tried = len(costs)
+        best_s = min(costs, key=lambda offset: costs[offset])
+        costs = costs | _costs(bench, settings, best_s, step_s, 2)
+    near = [offset for offset in costs if abs(offset - best_s) < 2.5 * step_s]
+    return foot(np.array(near), np.array([costs[offset] for offset in near])), costs
+
+
+def _costs(
+    bench: Bench, settings: Settings, about_s: float, step_s: float, most: int
+) -> dict[float, float]:
+    """-2 ln of the likelihood of the whole drive, by offset."""
+    offsets = (about_s + k * step_s for k in range(-most, most + 1))
+    tried = [float(f"{at:.6f}") for at in offsets if abs(at) <= OFFSET_MOST_S * 1.001]
+    ran = bench.run_all([{**settings, OFFSET: f"{at:.6f}"} for at in tried], "clock")
+    most = max((outcome.matched for outcome in ran), default=0)
+    return {at: outcome.cost * most for at, outcome in zip(tried, ran, strict=True)}
+
+
+def foot(offsets: Floats, costs: Floats) -> Offset:
+    """Of the parabola through all of them, as far as they are finite and lie about it."""
+    good = np.isfinite(costs)
+    x, y = offsets[good], costs[good]
+    if len(x) < FEWEST - 2:
+        return UNTOLD
+    middle, scale = float(x[np.argmin(y)]), float(np.ptp(x)) / 2 or 1.0
+    bend, slope, _ = np.polyfit((x - middle) / scale, y - y.min(), 2)
+    if not bend > 0:
+        return UNTOLD
+    best = float(np.clip(-slope / (2 * bend), -1.0, 1.0))
+    return Offset(middle + best * scale, scale / float(np.sqrt(bend)))
+
+
+def seconds(t_ns: Times) -> float:
+    """From one to the next, usually."""
+    return float(np.median(np.diff(t_ns))) * 1e-9 if len(t_ns) > 2 else 0.0

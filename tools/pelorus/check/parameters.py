@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""The noises that are looked for: their settings, limits, and what the search begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from pelorus.check.outcome import Outcome, Settings
+from pelorus.check.tracks_noise import TrackNoise
+from pelorus.frames import Header
+
+AXES = "xyz"
+PAYS = 20.0  # -2 ln of the likelihood ratio that one parameter more, or another timing, must bring
+FEWER_SLOTS = 30  # landmarks while a rough answer is looked for: a third of the time
+
+
+class Parameter(NamedTuple):
+    """A setting, what it is where nothing is given, its limits and the HEADER's suggestion."""
+
+    setting: str
+    default: float
+    least: float
+    most: float
+    suggestion: str
+
+
+PIXEL = {"pixel": Parameter("pixel-sigma", 2.0, 0.02, 100.0, "pixel_sigma_px")}
+TWIST = PIXEL | {
+    "velocity": Parameter("velocity-sigma", 0.1, 1e-4, 30.0, "velocity_sigma_mps"),
+    "gyro": Parameter("gyro-sigma", 0.01, 1e-5, 3.0, "gyro_sigma_radps"),
+}
+IMU = PIXEL | {
+    "gyro": Parameter("gyro-noise", 1e-3, 1e-6, 1.0, "gyro_noise"),
+    "accel": Parameter("accel-noise", 1e-2, 1e-5, 10.0, "accel_noise"),
+}
+WALKS = {
+    "gyro-walk": Parameter("gyro-walk", 1e-4, 1e-7, 0.1, "gyro_walk"),
+    "accel-walk": Parameter("accel-walk", 1e-3, 1e-6, 1.0, "accel_walk"),
+}
+AXIS_SUGGESTIONS = {
+    "velocity": tuple(f"velocity_sigma_{axis}_mps" for axis in AXES),
+    "gyro": tuple(f"gyro_sigma_{axis}_radps" for axis in AXES),
+}
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """Settings to write, and why; `offset_s` is added to the frames' times."""
+
+    settings: dict[str, str]
+    before: Outcome
+    after: Outcome
+    noise: TrackNoise
+    said: list[str] = field(default_factory=list)
+    offset_s: float = 0.0
+    of_clock: list[str] = field(default_factory=list)  # of what was said
+
+
+def of_process(by_imu: bool) -> dict[str, Parameter]:
+    """All whose changes are told."""
+    return IMU | WALKS if by_imu else TWIST
+
+
+def starting(
+    header: Header, given: Settings, parameters: Mapping[str, Parameter]
+) -> dict[str, float]:
+    """What is set, else what the recording suggests, else the defaults; name-x, -y, -z where axes
+    differ.
+    """
+    out = {}
+    for name, parameter in parameters.items():
+        axes = [_within(parameter, value) for value in _axes(header, given, name, parameter)]
+        if len(set(axes)) == 1:
+            out[name] = axes[0]
+        else:
+            out |= {f"{name}-{axis}": value for axis, value in zip(AXES, axes, strict=True)}
+    return out
+
+
+def _axes(header: Header, given: Settings, name: str, parameter: Parameter) -> list[float]:
+    if parameter.setting in given:
+        values = [float(part) for part in given[parameter.setting].split(",")]
+        values = values * len(AXES) if len(values) == 1 else values
+        keys = (f"{parameter.setting}-{axis}" for axis in AXES)  # y and z have settings, too
+        return [float(given.get(key, v)) for key, v in zip(keys, values, strict=False)]
+    suggested = vars(header.noise)
+    value = suggested[parameter.suggestion]
+    usual = value if value > 0 else parameter.default
+    if parameter not in (TWIST.get(name),):
+        return [usual]
+    of_axes = [suggested[key] for key in AXIS_SUGGESTIONS.get(name, ())]
+    return [value if value > 0 else usual for value in of_axes] or [usual]
+
+
+def _within(parameter: Parameter, value: float) -> float:
+    return min(max(value, parameter.least), parameter.most)
+
+
+def limits(
+    values: Mapping[str, float], parameters: Mapping[str, Parameter]
+) -> dict[str, tuple[float, float]]:
+    """Of each value that is looked for."""
+    found = {}
+    for name in values:
+        parameter = parameters.get(name) or parameters[name.rpartition("-")[0]]
+        found[name] = (parameter.least, parameter.most)
+    return found
+
+
+def written(values: Mapping[str, float], parameters: Mapping[str, Parameter]) -> dict[str, str]:
+    """As settings: of velocity, or of velocity-x, -y, -z."""
+    out = {}
+    for name, parameter in parameters.items():
+        if name in values:
+            out[parameter.setting] = f"{values[name]:.4g}"
+        elif f"{name}-x" in values:
+            out[parameter.setting] = ",".join(f"{values[f'{name}-{axis}']:.4g}" for axis in AXES)
+    return out
+
+
+def pooled(values: Mapping[str, float], name: str) -> float:
+    """One value for all axes."""
+    if name in values:
+        return values[name]
+    return float(np.exp(np.mean([np.log(values[f"{name}-{axis}"]) for axis in AXES])))
+
+
+def fewer_slots(given: Settings) -> dict[str, str]:
+    """For a rough answer."""
+    return {"slots": str(min(int(float(given.get("slots", "100"))), FEWER_SLOTS))}
+
+
+def merged(settings: Settings) -> dict[str, str]:
+    """Without what is not the filter's."""
+    return {k: v for k, v in settings.items() if not k.startswith("@")}
+
+
+def offset_settings(offset_s: float) -> dict[str, str]:
+    """A frame that is moved to an earlier time must find the readings held back."""
+    if offset_s == 0:
+        return {}
+    out = {"camera-offset": f"{offset_s:.4g}"}
+    return out if offset_s > 0 else out | {"twist-delay": f"{-offset_s:.4g}"}

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""Noises, walks, timing and clock of a recording with an IMU, by what makes its frames likeliest.
+
+A wrong clock looks like noise, and small noise hides the valley in which the clock's offset lies: a
+filter that is sure of its IMU takes frames of another time for a contradiction, and widens what it
+believes. So the noises come first, as large as the wrong clock makes them, then the clock, and then
+both again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pelorus.check import clock
+from pelorus.check.outcome import LENGTH, OFFSET, Bench, Outcome, Settings
+from pelorus.check.parameters import (
+    IMU,
+    PAYS,
+    PIXEL,
+    WALKS,
+    Parameter,
+    Tuned,
+    fewer_slots,
+    limits,
+    merged,
+    offset_settings,
+    starting,
+    written,
+)
+from pelorus.check.search import Found, search
+from pelorus.check.tracks_noise import TrackNoise, track_noise
+
+COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
+FINE = (1.5, 1.2)
+WALK_STEPS = (4.0, 2.0)
+TOLD = 9.0  # 3 sigma, to either side
+TOLD_FACTOR = 3.0
+TIMINGS = {"start": 0.5, "mid": 0.0, "end": -0.5}  # the middle of what a reading stands for
+
+
+def tune(bench: Bench, given: Settings) -> Tuned:
+    """`given` are the settings as they are: they hold wherever nothing better is found."""
+    before = bench.run(given)
+    noise = track_noise(bench.examined)
+    values = starting(bench.header, given, IMU | WALKS)
+    side = {k: v for k, v in given.items() if k not in _settings()}
+    side[OFFSET] = side.pop("camera-offset", "0")
+    said: list[str] = []
+    if noise.drifts:
+        return _of_drifting_tracks(bench, side, values, before, noise)
+    walks = {name: values.pop(name) for name in WALKS}
+    side |= written(walks, WALKS)
+    values, offset = _roughly(bench, side, values)
+    side[OFFSET] = f"{offset.best_s:.6f}"
+    values = _search(bench, side | fewer_slots(given), values, FINE[:1]).values
+    offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s)
+    side, words = _clock(side | written(values, IMU), offset, given)
+    said.append(words)
+    side, words = _walks(bench, side, walks)
+    found = _search(bench, side, values, FINE)
+    said.append(words)
+    side, outcome, words = _timing(bench, side | written(found.values, IMU), found.outcome, offset)
+    said.append(words)
+    offset_s = float(side.pop(OFFSET))
+    settings = merged(side) | offset_settings(offset_s)
+    return Tuned(settings, before, outcome, noise, said, offset_s, [said[0], words])
+
+
+def _settings() -> set[str]:
+    return {parameter.setting for parameter in (*IMU.values(), *WALKS.values())}
+
+
+def _search(
+    bench: Bench,
+    side: Settings,
+    values: Mapping[str, float],
+    steps: Sequence[float],
+    parameters: Mapping[str, Parameter] = IMU,
+) -> Found:
+    build = lambda v: {**side, **written(v, parameters)}  # noqa: E731 - named where it is used
+    return search(bench, values, limits(values, parameters), build, steps)
+
+
+# --- clock ----------------------------------------------------------------------------------------
+
+
+def _roughly(
+    bench: Bench, side: Settings, values: Mapping[str, float]
+) -> tuple[dict[str, float], clock.Offset]:
+    """Noises and clock, in turn, with few landmarks and the drive's beginning for the noises."""
+    short = {**side, **fewer_slots(side), LENGTH: COARSE_FRAMES}
+    coarse = _search(bench, short, values, COARSE).values
+    rough = {**side, **fewer_slots(side), **written(coarse, IMU)}
+    offset = clock.of_imu(bench, rough, float(side[OFFSET]))
+    if offset.gain > PAYS:
+        short[OFFSET] = f"{offset.best_s:.6f}"
+        coarse = _search(bench, short, coarse, COARSE).values
+    else:
+        offset = replace(offset, best_s=float(side[OFFSET]))
+    return coarse, offset
+
+
+def _clock(side: Settings, offset: clock.Offset, given: Settings) -> tuple[dict[str, str], str]:
+    """The offset that was found, if it is clearly likelier than the one that is set."""
+    was_s = float(given.get("camera-offset", "0"))
+    known = f"known to {2e3 * offset.sigma_s:.2g} ms" if np.isfinite(offset.sigma_s) else "untold"
+    # by the parabola, for a single cost depends on how many readings a frame averages, too
+    gain = ((offset.best_s - was_s) / offset.sigma_s) ** 2
+    if gain < PAYS:
+        here = {**side, OFFSET: f"{was_s:.6f}"}
+        return here, f"the clocks of camera and IMU agree as they are set ({known})"
+    late = "late" if offset.best_s < 0 else "early"
+    return {**side, OFFSET: f"{offset.best_s:.6f}"}, (
+        f"the camera's clock is {abs(offset.best_s) * 1e3:.3g} ms {late} beside that of the IMU, "
+        f"{known} (likelihood {gain:+.0f})"
+    )
+
+
+def _timing(
+    bench: Bench, settings: Settings, usual: Outcome, offset: clock.Offset
+) -> tuple[dict[str, str], Outcome, str]:
+    """Another moment of a reading is the same as another offset; what is left of it is whether the
+    mean of two readings fits better than one. That is little: only a clock that is known to a small
+    part of a reading tells it.
+    """
+    period_s = clock.seconds(bench.examined.inertial.t_ns)
+    given = settings.get("imu-timing", "mid")
+    if offset.sigma_s > clock.SURE_OF_PARTS * period_s:
+        words = f"imu-timing {given}: this drive cannot tell it from an offset by half a reading"
+        return dict(settings), usual, words
+    tried = {
+        name: {
+            **settings,
+            "imu-timing": name,
+            OFFSET: f"{float(settings[OFFSET]) + (middle - TIMINGS[given]) * period_s:.6f}",
+        }
+        for name, middle in TIMINGS.items()
+        if name != given
+    }
+    ran = dict(zip(tried, bench.run_all(list(tried.values()), "timing"), strict=True))
+    best = min(ran, key=lambda name: ran[name].cost)
+    gain = ran[best].gain_over(usual)
+    if gain < PAYS:
+        return dict(settings), usual, f"imu-timing {given} is the likeliest"
+    words = f"imu-timing is {best}, not {given} (likelihood {gain:+.0f})"
+    return tried[best], ran[best], words
+
+
+# --- walks ----------------------------------------------------------------------------------------
+
+
+def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[dict[str, str], str]:
+    """How fast the biases wander, where the drive is long enough to tell."""
+    quick = {**side, **fewer_slots(side)}
+    found = _search(bench, quick, given, WALK_STEPS, WALKS)
+    kept = dict(given)
+    words = []
+    for name in WALKS:
+        sides = [
+            {**found.values, name: found.values[name] * factor}
+            for factor in (TOLD_FACTOR, 1 / TOLD_FACTOR)
+        ]
+        ran = bench.run_all([{**quick, **written(v, WALKS)} for v in sides], "walks")
+        told = all(found.outcome.gain_over(other) > TOLD for other in ran)
+        alone = bench.run({**quick, **written({**found.values, name: given[name]}, WALKS)})
+        if found.outcome.gain_over(alone) > PAYS:
+            kept[name] = found.values[name]
+        if not told:
+            words.append(name)
+    said = "gyro-walk and accel-walk are told by the drive"
+    if words:
+        said = (
+            f"{' and '.join(words)} cannot be told within {TOLD_FACTOR:g} times by this drive: "
+            "hours at rest would (Allan deviation)"
+        )
+    return {**side, **written(kept, WALKS)}, said
+
+
+# --- tracks that drift ----------------------------------------------------------------------------
+
+
+def _of_drifting_tracks(
+    bench: Bench,
+    side: Settings,
+    values: Mapping[str, float],
+    before: Outcome,
+    noise: TrackNoise,
+) -> Tuned:
+    """The IMU's noises stay as given, and the pixels' stands for the drift."""
+    values = dict(values)
+    if np.isfinite(noise.stands_for_px):
+        values["pixel"] = float(f"{noise.stands_for_px:.3g}")
+    settings = {**side, **written(values, PIXEL | IMU | WALKS)}
+    offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))
+    settings, words = _clock(settings, offset, {"camera-offset": side[OFFSET]})
+    outcome = bench.run(settings)
+    offset_s = float(settings.pop(OFFSET))
+    said = [words]
+    return Tuned(
+        merged(settings) | offset_settings(offset_s), before, outcome, noise, said, offset_s
+    )
