@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 from converted import Run
 from pelorus import wire
-from pelorus.check import outcome, search, tracks_noise, tuning
+from pelorus.check import clock, outcome, parameters, search, tracks_noise, tuning
 from pelorus.check.contents import first_frames, half, recording_of, shifted, write
 from pelorus.check.outcome import Bench, Outcome
+from pelorus.check.parameters import PAYS
 from pelorus.errors import PelorusError
-from pelorus.frames import Header, Kind, Message, Report, Start, Stereo, Twist
+from pelorus.frames import Header, Imu, Kind, Message, Noise, Report, Start, Stereo, Twist
 from pelorus.tracks import Tracks
 from replay_drive import BIN, CAMERA, drive, header
 from report_runs import built_programs
@@ -76,17 +77,90 @@ def test_a_camera_whose_clock_is_late_is_found(simulated: Path, tmp_path: Path) 
     write(late, shifted([m for m in messages if m.kind not in (Kind.END, Kind.TRUTH)], 50 * MS))
     bench = Bench(built_programs().float32, late, tmp_path)
     true = {"pixel-sigma": "1.5", "velocity-sigma": "0.3", "gyro-sigma": "0.03"}
-    offset_s, likeliest = tuning.offset_of(bench, true, bench.run(true))
-    assert offset_s == pytest.approx(-0.05, abs=0.02)
-    assert likeliest.gain_over(bench.run(true)) > tuning.PAYS
+    offset = clock.of_twists(bench, true)
+    assert offset.best_s == pytest.approx(-0.05, abs=max(0.01, 3 * offset.sigma_s))
+    assert offset.sigma_s < 0.01
+    assert offset.gain > PAYS
 
 
 def test_the_timing_of_the_readings_is_found(simulated: Path, tmp_path: Path) -> None:
     bench = Bench(built_programs().float32, simulated, tmp_path)
     values = {"pixel": 1.5, "velocity": 0.3, "gyro": 0.03}
-    fixed, _, words = tuning.clock(bench, {"twist-timing": "end"}, values)
-    assert fixed["twist-timing"] == "start" or "early" in words
-    assert "agree" not in words
+    fixed, _, words = tuning.clocked(bench, {"twist-timing": "end"}, values, {})
+    assert fixed["twist-timing"] == "start", words
+
+
+# --- an IMU ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Half a minute by an IMU of 100 readings a second, that turns and accelerates."""
+    built_programs()
+    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+
+    path = tmp_path_factory.mktemp("check") / "flight.plr"
+    noise = ("--gyro-noise", "0.002", "--accel-noise", "0.03", "--pixel-sigma", "0.8")
+    rates = ("--duration", "40", "--lap", "6", "--imu-rate", "100", "--observations", "40")
+    assert main(["simulate", str(path), "--seed", "7", *noise, *rates]) == 0
+    return path
+
+
+def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
+    flown: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    early = tmp_path / "early.plr"
+    messages = [m for m in wire.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
+    write(early, shifted(messages, -20 * MS))
+    wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.1"}
+    sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
+    conf = tmp_path / "tuned.conf"
+    said = pelorus("check", early, "--out", conf, "--bin", BIN, "--json", *sets)
+    assert said.status == 0, said.err
+    found = json.loads(said.out)
+    settings = found["settings"]
+    assert float(settings["pixel-sigma"]) == pytest.approx(0.8, rel=0.2)
+    assert float(settings["gyro-noise"]) == pytest.approx(0.002, rel=0.2)
+    assert float(settings["accel-noise"]) == pytest.approx(0.03, rel=0.2)
+    assert found["camera_offset_s"] == pytest.approx(0.02, rel=0.1)
+    assert settings["camera-offset"] == f"{found['camera_offset_s']:.4g}"
+    assert any("cannot be told" in remark["text"] for remark in found["remarks"]), "the walks"
+    assert "# gyro-noise 0.0005 should be" in conf.read_text(encoding="utf-8")
+
+
+def test_every_offset_of_an_imu_is_judged_by_the_same_frames(flown: Path, tmp_path: Path) -> None:
+    bench = Bench(built_programs().float32, flown, tmp_path)
+    assert bench.by_imu
+    quick = {outcome.LENGTH: "60", "slots": "15"}
+    ran = bench.run_all([{**quick, outcome.OFFSET: f"{at:g}"} for at in (-0.1, 0.0, 0.1)])
+    assert len({run.frames for run in ran}) == 1
+    assert bench.run({**quick, "camera-offset": "0.1"}).cost == ran[2].cost
+
+
+def test_a_batch_of_readings_does_not_reach_over_a_frame_that_was_moved(flown: Path) -> None:
+    messages = shifted(first_frames(wire.messages_of(flown), 30), 33 * MS)
+    newest = 0
+    for message in messages:
+        if isinstance(message, Imu):
+            assert message.t_ns > newest or message.t_ns == 0
+            newest = message.times_ns[-1]
+        elif isinstance(message, Stereo):
+            assert newest <= message.t_ns
+    given = [t for m in wire.messages_of(flown) if isinstance(m, Imu) for t in m.times_ns]
+    kept = [t for m in messages if isinstance(m, Imu) for t in m.times_ns]
+    assert kept == given[: len(kept)]
+
+
+def test_the_foot_of_a_parabola_and_how_sure_it_is() -> None:
+    at = np.linspace(-0.03, 0.03, 7)
+    offset = clock.foot(at, 7.0 + ((at - 0.004) / 0.002) ** 2)
+    assert offset.best_s == pytest.approx(0.004)
+    assert offset.sigma_s == pytest.approx(0.002)
+    assert offset.gain == pytest.approx(4.0)
+    jumping = clock.foot(at, ((at - 0.004) / 0.002) ** 2 + 40 * np.array([0, 1, 0, 1, 0, 1, 0]))
+    assert jumping.sigma_s > offset.sigma_s  # a parabola that does not fit is not believed
+    assert clock.foot(at, -(at**2)).sigma_s == np.inf
+    assert clock.foot(at[:2], at[:2]).gain == 0
 
 
 # --- what the likelihood is made of ---------------------------------------------------------------
@@ -160,6 +234,56 @@ def test_the_foot_of_three_points_is_that_of_their_parabola() -> None:
     assert search.foot(0.0, 1.0, 2.0) == -1  # a slope without a foot: a step downhill
     assert search.foot(1.0, 1.0, 1.0) == 0
     assert search.foot(np.inf, 1.0, 2.0) == 0
+
+
+# --- noises as settings ---------------------------------------------------------------------------
+
+
+def test_the_search_begins_with_each_axis_own_sigma_where_they_differ() -> None:
+    blind = header(noise=Noise(velocity_sigma_mps=0.1, velocity_sigma_y_mps=0.2))
+    values = parameters.starting(blind, {"gyro-sigma": "0.01,0.02,0.03"}, parameters.TWIST)
+    assert values["pixel"] == 2.0
+    assert [values[f"velocity-{axis}"] for axis in "xyz"] == [0.1, 0.2, 0.1]
+    assert [values[f"gyro-{axis}"] for axis in "xyz"] == [0.01, 0.02, 0.03]
+    settings = parameters.written(values, parameters.TWIST)
+    assert settings["velocity-sigma"] == "0.1,0.2,0.1"
+    assert parameters.starting(blind, settings, parameters.TWIST) == values
+    assert parameters.pooled(values, "velocity") == pytest.approx(0.1 * 2 ** (1 / 3))
+
+
+class Halves:
+    """A bench on which settings cost what is said, by half."""
+
+    def __init__(self, costs: dict[str, tuple[float, float]]) -> None:
+        self.costs = costs
+
+    def run(self, settings: dict[str, str]) -> Outcome:
+        return self.run_all([settings])[0]
+
+    def run_all(self, many: list[dict[str, str]], what: str = "") -> list[Outcome]:
+        assert what in ("", "both halves")
+        return [self._outcome(settings) for settings in many]
+
+    def _outcome(self, settings: dict[str, str]) -> Outcome:
+        halves = self.costs[settings.get("pixel-sigma", "given")]
+        cost = halves[int(settings.get(outcome.PART, "0"))]
+        return replace(outcome.NOTHING, cost=cost, matched=1000)
+
+
+@pytest.mark.parametrize(("second_half", "kept"), [(9.0, "1"), (11.0, None)])
+def test_noises_that_suit_one_half_of_the_drive_alone_are_not_written(
+    second_half: float, kept: str | None
+) -> None:
+    bench = Halves({"given": (10.0, 10.0), "1": (5.0, second_half)})
+    white = tracks_noise.TrackNoise({1: 1.0, 5: 1.0}, 1.0)
+    nothing = outcome.NOTHING
+    settings = {"pixel-sigma": "1", "camera-offset": "0.01"}
+    found = parameters.Tuned(settings, nothing, nothing, white, ["a", "clock"], 0.01, ["clock"])
+    held = tuning.held_against(bench, {}, found)  # type: ignore[arg-type]
+    assert held.settings.get("pixel-sigma") == kept
+    assert held.settings["camera-offset"] == "0.01"  # of which a parabola has judged
+    assert "clock" in held.said
+    assert kept or "yours stay" in held.said[0]
 
 
 # --- biases, tracks, parts ------------------------------------------------------------------------

@@ -56,7 +56,7 @@ def of_twists(bench: Bench, settings: Settings) -> Offset:
     costs = _costs(bench, settings, 0.0, step_s, most)
     offsets = np.array(list(costs))
     best_s = min(costs, key=lambda offset: costs[offset])
-    beside = np.sort(np.abs(offsets - best_s))[: FEWEST + 1].max(initial=0.0)
+    beside = np.sort(np.abs(offsets - best_s))[:FEWEST].max(initial=0.0)
     near = np.abs(offsets - best_s) <= max(NEAR_S, beside) * (1 + 1e-9)
     return foot(offsets[near], np.array(list(costs.values()))[near])
 
@@ -116,11 +116,15 @@ def foot(offsets: Floats, costs: Floats) -> Offset:
     if len(x) < FEWEST - 2:
         return UNTOLD
     middle, scale = float(x[np.argmin(y)]), float(np.ptp(x)) / 2 or 1.0
-    bend, slope, _ = np.polyfit((x - middle) / scale, y - y.min(), 2)
+    across, up = (x - middle) / scale, y - y.min()
+    bend, slope, least = np.polyfit(across, up, 2)
     if not bend > 0:
         return UNTOLD
     best = float(np.clip(-slope / (2 * bend), -1.0, 1.0))
-    return Offset(middle + best * scale, scale / float(np.sqrt(bend)))
+    # the foot is as sure as the bend says, but no surer than the points lie on a parabola
+    off = float(np.sum((up - np.polyval((bend, slope, least), across)) ** 2)) / max(len(x) - 3, 1)
+    variance = 1 / bend + off / float(np.sum(across**2)) / (2 * bend) ** 2
+    return Offset(middle + best * scale, scale * float(np.sqrt(variance)))
 
 
 def seconds(t_ns: Times) -> float:

@@ -31,8 +31,8 @@ def recording_of(messages: Sequence[Message], process: Process | None = None) ->
     readings = [m for m in messages if isinstance(m, Imu)] if by_imu else []
     frames = _ascending([m for m in messages if isinstance(m, Stereo)])
     if not (twists or readings) or not frames:
-        lacks = "stereo frames" if twists or readings else "readings of an IMU"
-        lacks = lacks if frames or by_imu else "twists"
+        moved = "readings of an IMU" if by_imu else "twists"
+        lacks = "stereo frames" if twists or readings else moved
         raise PelorusError(f"the recording holds no {lacks}: there is nothing to check")
     frame = np.repeat(np.arange(len(frames)), [len(m.ids) for m in frames])
     ids = np.concatenate([m.ids for m in frames]).astype(np.int64)

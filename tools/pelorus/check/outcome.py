@@ -128,7 +128,7 @@ class Bench:
         wanted = {k: v for k, v in settings.items() if not k.startswith("@")}
         with tempfile.TemporaryDirectory(dir=self._folder) as folder:
             answers = Path(folder) / "answers.plr"
-            options = ["--quiet", *options_of({"gate-d2": GATE_D2} | wanted)]
+            options = ["--quiet", *options_of(wanted | {"gate-d2": GATE_D2})]
             run_program(self._program, recording, [*options, "--out", str(answers)])
             return outcome_of(wire.only(answers, (Kind.REPORT, Kind.POSE)), self._outlier_cost)
 

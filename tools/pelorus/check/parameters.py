@@ -140,8 +140,5 @@ def merged(settings: Settings) -> dict[str, str]:
 
 
 def offset_settings(offset_s: float) -> dict[str, str]:
-    """A frame that is moved to an earlier time must find the readings held back."""
-    if offset_s == 0:
-        return {}
-    out = {"camera-offset": f"{offset_s:.4g}"}
-    return out if offset_s > 0 else out | {"twist-delay": f"{-offset_s:.4g}"}
+    """What a robot is told of it."""
+    return {"camera-offset": f"{offset_s:.4g}"} if offset_s else {}

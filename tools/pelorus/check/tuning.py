@@ -46,17 +46,17 @@ ALIKE = 0.7  # cosine of the angle between them
 COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
 FINE = (1.3, 1.15)
 OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
-CLOCK = ("camera-offset", "twist-delay", "twist-timing", "imu-timing")
+CLOCK = ("camera-offset", "twist-timing", "imu-timing")
 MIDDLES = {"start": 0.5, "mid": 0.0, "end": -0.5}  # of what a reading stands for, in readings
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
     """`given` are the settings as they are: they hold wherever nothing better is found."""
     found = tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given)
-    return _held_against(bench, given, found)
+    return held_against(bench, given, found)
 
 
-def _held_against(bench: Bench, given: Settings, found: Tuned) -> Tuned:
+def held_against(bench: Bench, given: Settings, found: Tuned) -> Tuned:
     """What fits one half of the drive alone fits no drive to come."""
     if found.noise.drifts:  # no likelihood was asked
         return found
@@ -96,7 +96,7 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = _search(bench, moved, values, (1.5, 1.25)).values
     fixed, of_bias = _bias(bench, moved, values)
-    fixed, found, of_clock = _clock(bench, fixed, values, given)
+    fixed, found, of_clock = clocked(bench, fixed, values, given)
     found, of_axes = _axes(bench, fixed, found)
     offset_s = float(fixed.pop(OFFSET))
     settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)
@@ -138,26 +138,48 @@ def _of_drifting_tracks(
 
 
 def _bias(bench: Bench, fixed: Settings, values: Mapping[str, float]) -> tuple[dict[str, str], str]:
-    """Of each kind the prior under which the drive is likeliest; none, unless one pays.
+    """Of each kind that both halves tell alike the prior under which the drive is likeliest; none,
+    unless one pays.
 
     A prior that is wider than the bias costs likelihood, so the data themselves say how wide.
     """
     side = {**fixed, **WIDE, **written(values, TWIST)}
+    halves = _halves(bench, side)
     said = []
     for name, sizes in PRIORS.items():
         tried = [{**side, name: "0"}, *({**side, name: f"{size:g}"} for size in sizes)]
         ran = bench.run_all(tried, "biases")
         best = min(range(1, len(ran)), key=lambda k: ran[k].cost)
-        pays = ran[best].gain_over(ran[0]) > PAYS
+        pays = ran[best].gain_over(ran[0]) > PAYS and halves[name] > 0
         side[name] = f"{sizes[best - 1]:g}" if pays else "0"
         if pays:
             kind = name.split("-")[1]
-            said.append(f"of the {kind} readings of about {side[name]} {UNITS[name]}")
+            said.append(f"of the {kind} readings of about {halves[name]:.2g} {UNITS[name]}")
     kept = {k: side[k] for k in PRIORS}
     if not said:
         without = {k: v for k, v in fixed.items() if k not in WIDE}
-        return {**without, "bias": "off"}, "no bias that would make the drive likelier"
-    return {**fixed, "bias": "on", **kept}, f"biases {' and '.join(said)}"
+        return {**without, "bias": "off"}, "no bias that both halves of the drive agree on"
+    words = f"biases {' and '.join(said)}, in both halves alike"
+    return {**fixed, "bias": "on", **kept}, words
+
+
+def _halves(bench: Bench, settings: Settings) -> dict[str, float]:
+    """The size of the bias that both halves of the drive tell alike, by the name of its prior.
+
+    What else looks like a bias for a while does not stay the same. An axis that nothing measures
+    has none.
+    """
+    ran = bench.run_all([{**settings, PART: part} for part in "01"], "biases of both halves")
+    twists = bench.examined
+    found = {}
+    for name, axes, readings in (
+        ("bias-gyro-sigma", slice(3, 6), twists.w_B_radps),
+        ("bias-velocity-sigma", slice(0, 3), twists.v_B_mps),
+    ):
+        there = np.any(readings != 0, axis=0)
+        told = [(half.bias[axes][there], half.bias_variance[axes][there]) for half in ran]
+        found[name] = common_bias(*told[0], *told[1]) if there.any() else 0.0
+    return found
 
 
 def _bias_of_halves(
@@ -168,10 +190,7 @@ def _bias_of_halves(
     Tracks that drift look like a bias of the velocity all along, so with them there is none of it
     to be told, and likelihood would find one.
     """
-    wide = {**fixed, **WIDE, **written(values, TWIST)}
-    halves = bench.run_all([wide | {PART: part} for part in "01"], "biases of both halves")
-    told = [(half.bias[3:], half.bias_variance[3:]) for half in halves]
-    size = common_bias(*told[0], *told[1])
+    size = _halves(bench, {**fixed, **WIDE, **written(values, TWIST)})["bias-gyro-sigma"]
     if not size > 0:
         return {**fixed, "bias": "off"}, "no bias that both halves of the drive agree on"
     prior = {"bias-velocity-sigma": "0", "bias-gyro-sigma": f"{size:.2g}"}
@@ -197,7 +216,7 @@ def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> float:
 # --- clocks ---------------------------------------------------------------------------------------
 
 
-def _clock(
+def clocked(
     bench: Bench, fixed: Settings, values: Mapping[str, float], given: Settings
 ) -> tuple[dict[str, str], Found, str]:
     """Timing and the offset of the camera's clock; the noises again where they change.
