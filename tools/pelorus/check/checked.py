@@ -11,6 +11,7 @@ from pelorus.check import verdict
 from pelorus.check.named import LOCAL, UNTOLD, faults_of
 from pelorus.check.outcome import Bench, Settings, options_of
 from pelorus.check.parameters import Tuned
+from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
 from pelorus.check.verdict import Grade, Remark, Run
 from pelorus.console import progress
@@ -48,7 +49,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     faults = [Remark(grade, fault.words) for grade, fault in zip(grades, named, strict=True)]
     if any(fault.name not in LOCAL for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
-    tuned = tune(bench, given)
+    tuned = with_shared_rows(bench, tune(bench, given))
     truth = truth_in(messages)
     both = progress((("before", given), ("after", tuned.settings)), "whole drive")
     before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)

@@ -18,6 +18,7 @@ from pelorus import visual_motion
 from pelorus.console import progress
 from pelorus.layout import Floats
 from pelorus.recording import Recording
+from pelorus.row_gaps import TOLD_ABOVE_PX, RowGaps, row_gaps
 from pelorus.visual_motion import seen_pairs
 
 LAGS = (1, 2, 3, 5)
@@ -32,6 +33,20 @@ class TrackNoise:
 
     by_lag: dict[int, float]
     stands_for_px: float
+    rows: RowGaps | None = None
+    points: float = 0.0  # of a frame, in the median
+
+    @property
+    def rows_px(self) -> float:
+        """The least sigma that the rectification leaves, 0 where that is good or untold.
+
+        All points of a region are off alike, in every frame, so that motion and map bend to fit,
+        and no likelihood can see it. The filter believes the mean of n points to be known to
+        sigma / sqrt(n): not better than the error that they share.
+        """
+        if self.rows is None or self.rows.smooth_px <= TOLD_ABOVE_PX:
+            return 0.0
+        return self.rows.stands_for_px(self.points)
 
     @property
     def growth(self) -> float:
@@ -52,7 +67,9 @@ def track_noise(recording: Recording) -> TrackNoise:
         seen = seen_pairs(recording.tracks, camera, lag)
         motion = visual_motion.estimate(seen, camera)
         by_lag[lag] = visual_motion.pixel_sigma(seen, camera, motion)
-    return TrackNoise(by_lag, _stands_for(by_lag))
+    tracks = recording.tracks
+    points = float(np.median(tracks.counts())) if tracks.frame_count else 0.0
+    return TrackNoise(by_lag, _stands_for(by_lag), row_gaps(tracks), points)
 
 
 def _stands_for(by_lag: dict[int, float]) -> float:

@@ -137,6 +137,8 @@ def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
     words = f"innovations are {run.nis:.2f} times what the noise says, 1 is due"
     if tuned.noise.drifts:
         yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for drift as well")
+    elif run.nis < NIS_LOW and tuned.noise.rows_px > 0:
+        yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for the rectification")
     elif NIS_LOW <= run.nis <= NIS_HIGH:
         yield Remark(Grade.GOOD, words)
     else:
@@ -165,6 +167,14 @@ def _biases(run: Run) -> Iterator[Remark]:
 
 def _tracks(tuned: Tuned) -> Iterator[Remark]:
     noise = tuned.noise
+    if noise.rows is not None and noise.rows_px > 0:
+        yield Remark(
+            Grade.CARE,
+            f"the rectification is off: the rows of left and right differ by "
+            f"{noise.rows.smooth_px:.2f} px RMS, smoothly over the picture and up to "
+            f"{noise.rows.largest_px:.1f} px, which all points share: pixel-sigma is at least "
+            f"{noise.rows_px:.2g} for that. A better calibration is due",
+        )
     if not noise.drifts:
         return
     known = {lag: sigma for lag, sigma in noise.by_lag.items() if np.isfinite(sigma)}
