@@ -3,8 +3,14 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 from numpy.typing import NDArray
+from pelorus.check.outcome import NOTHING
+from pelorus.check.parameters import Tuned
+from pelorus.check.shared_rows import with_shared_rows
+from pelorus.check.tracks_noise import TrackNoise
 from pelorus.row_gaps import row_gaps
 from pelorus.tracks import Tracks
 
@@ -56,3 +62,21 @@ def test_few_tracks_tell_nothing() -> None:
     assert row_gaps(tracks(np.zeros(4), points=10)) is None
     none = np.zeros(0, np.int64)
     assert row_gaps(Tracks(0, none, none, np.zeros((0, 4)))) is None
+
+
+class AnyBench:
+    """Where a run is wanted, not its outcome."""
+
+    def run(self, _: object) -> object:
+        return NOTHING
+
+
+def test_check_takes_no_pixel_sigma_below_what_the_rectification_leaves() -> None:
+    def sigma(bend: list[float], given: str) -> float:
+        noise = TrackNoise({}, float("nan"), row_gaps(tracks(np.array(bend))), 49)
+        tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, noise)
+        return float(with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"])
+
+    assert abs(sigma([0.4, 0, 0, 0], "0.3") - 7 * 0.4 / np.sqrt(2)) < 0.05
+    assert sigma([0.4, 0, 0, 0], "5") == 5
+    assert sigma([0.1, 0, 0, 0], "0.3") == 0.3  # as good as pairs are
