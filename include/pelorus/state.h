@@ -146,6 +146,7 @@ typedef struct plr_inertial {
     uint8_t anchored;     /* 1: position and yaw are fixed: by the start, the anchor after it, a
                              measured position or a map */
     uint8_t fault;        /* plr_imu_fault, found at the start or since */
+    uint8_t doubts;       /* successive frames at which the mean reading did not fit gravity */
 } plr_inertial;
 
 /* A velocity that a small sensor measured: z = M (v, w) + noise. It holds until its next reading;

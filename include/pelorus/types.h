@@ -141,17 +141,18 @@ typedef enum plr_reason {
 } plr_reason;
 
 /* What is wrong with an IMU: plr_filter_imu_fault. While it has not started the filter waits for
- * better readings; of the last five readings are refused. */
+ * better readings. After a start from a given state faults 2 to 6 are found within ten seconds, in
+ * the readings' mean; the filter goes on. Readings of the last four are refused. */
 typedef enum plr_imu_fault {
     PLR_IMU_FAULT_NONE = 0,
     PLR_IMU_FAULT_MOVES = 1,       /* at the start: the body does not stand still */
-    PLR_IMU_FAULT_TURNS = 2,       /* the accelerometer stands still and the gyro turns: degrees
+    PLR_IMU_FAULT_TURNS = 2,       /* the gyro turns and the accelerometer does not: degrees
                                       instead of rad, or a bias beyond bias-gyro-sigma */
-    PLR_IMU_FAULT_IN_G = 3,        /* the specific force at rest is about 1: g instead of m/s^2 */
+    PLR_IMU_FAULT_IN_G = 3,        /* the mean specific force is about 1: g instead of m/s^2 */
     PLR_IMU_FAULT_NOT_GRAVITY = 4, /* it is far from the setting gravity: scale, or a broken axis */
     PLR_IMU_FAULT_UPSIDE_DOWN = 5, /* it points down in the pose that was set: a wrong sign */
     PLR_IMU_FAULT_TILT = 6,        /* it points elsewhere than the pose that was set: axes swapped,
-                                      or a wrong pose. The filter starts with the measured tilt */
+                                      or a wrong pose. A start at rest uses the measured tilt */
     PLR_IMU_FAULT_SATURATED = 7,   /* at the setting gyro-range or accel-range */
     PLR_IMU_FAULT_FROZEN = 8,      /* the same numbers again and again */
     PLR_IMU_FAULT_SPIKE = 9,       /* a single reading far from its neighbours */

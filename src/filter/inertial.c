@@ -191,13 +191,14 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);
 }
 
-void plr_filter_anchor(plr_filter *f, const plr_report *report) {
+void plr_filter_follow_start(plr_filter *f, const plr_report *report) {
     if (f->config.process != PLR_PROCESS_IMU)
         return;
     f->inertial.frames =
         (uint16_t)(f->inertial.frames + (report->used > 0 && f->inertial.frames < UINT16_MAX));
     if (plr_alignment_wants_anchor(f))
         plr_alignment_anchor(f);
+    plr_alignment_watch_gravity(f);
 }
 
 plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],

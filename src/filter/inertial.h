@@ -10,6 +10,6 @@
 void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n);
 
 /* After a frame: fixes position and yaw anew some time after a start in motion. */
-void plr_filter_anchor(plr_filter *f, const plr_report *report);
+void plr_filter_follow_start(plr_filter *f, const plr_report *report);
 
 #endif

@@ -200,7 +200,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     } else if (stands && is_state) {
         (void)plr_measure_twist(f, &still, &unused);
     }
-    plr_filter_anchor(f, report);
+    plr_filter_follow_start(f, report);
     plr_health_judge(f, &events, report);
 }
 

@@ -34,6 +34,11 @@
 #define NOT_GRAVITY PLR_R(1.5)
 /* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
 #define OTHER_TILT PLR_R(0.06)
+/* So long after the start, and for so many frames in a row, the mean reading is held against
+ * gravity. A body that spins faster, rad/s, would be thrown about. */
+#define WATCH_NS UINT64_C(10000000000)
+#define SPINS    PLR_R(10)
+enum { WATCH_FRAMES = 10 };
 /* The anchor comes this much after a start in motion, if this many frames were used. */
 #define ANCHOR_NS UINT64_C(2000000000)
 enum { ANCHOR_FRAMES = 10 };
@@ -296,6 +301,38 @@ bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
     if (!started && stretch >= REST_NS)
         plr_alignment_restart(f);
     return started;
+}
+
+/* What speaks against the readings' mean of half a second, whatever the body does meanwhile. */
+static plr_imu_fault find_doubt(const plr_filter *f) {
+    const plr_real g = f->par.gravity, *rate = f->inertial.slow + 3;
+    plr_real force[3];
+    for (unsigned i = 0; i < 3; i++)
+        force[i] = f->inertial.slow[i] - f->bias[i];
+    const plr_real length = PLR_SQRT(plr_dot3(force, force));
+    const plr_real up = plr_dot3(force, f->R_WB + 6);
+    const bool carried = length > PLR_R(0.7) * g && length < PLR_R(1.3) * g;
+    if (carried && plr_dot3(rate, rate) > SPINS * SPINS)
+        return PLR_IMU_FAULT_TURNS;
+    if (length <= PLR_R(0.05) * g) /* falls */
+        return PLR_IMU_FAULT_NONE;
+    if (length < PLR_R(0.3) * g)
+        return PLR_IMU_FAULT_IN_G;
+    if (length < PLR_R(0.6) * g || length > PLR_R(2.5) * g)
+        return PLR_IMU_FAULT_NOT_GRAVITY;
+    if (up < PLR_R(-0.7) * length)
+        return PLR_IMU_FAULT_UPSIDE_DOWN;
+    return carried && up < PLR_R(0.5) * length ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
+}
+
+void plr_alignment_watch_gravity(plr_filter *f) {
+    plr_inertial *s = &f->inertial;
+    if (!s->started || s->fault != PLR_IMU_FAULT_NONE || f->t_ns - s->started_ns > WATCH_NS)
+        return;
+    const plr_imu_fault doubt = find_doubt(f);
+    s->doubts = doubt == PLR_IMU_FAULT_NONE ? 0 : (uint8_t)(s->doubts + 1);
+    if (s->doubts >= WATCH_FRAMES)
+        s->fault = (uint8_t)doubt;
 }
 
 /* ---------------------------------------------------------------- the anchor */

@@ -28,6 +28,10 @@ void plr_alignment_does_not_stand(plr_filter *f, plr_imu_fault how);
 void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
                          const plr_real variance[PLR_VELOCITY_DIM]);
 
+/* After each frame of the first seconds: notes that the readings' mean does not fit gravity in the
+ * pose, as a start that was given may have it: units, signs, axes. */
+void plr_alignment_watch_gravity(plr_filter *f);
+
 /* True if position and yaw are to be fixed anew, some time after a start in motion. */
 bool plr_alignment_wants_anchor(const plr_filter *f);
 

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+/* After a start from a state that is given nobody has averaged readings at rest: what does not fit
+ * gravity is found in their mean (process/alignment.h). */
+#include <unity.h>
+
+#include "support/imu_rig.h"
+
+enum { PER_FRAME = 40, FRAME_MS = 100 };
+
+static plr_filter *const f = &imu_rig.filter;
+
+void setUp(void) {
+    imu_rig_set_up();
+}
+
+void tearDown(void) {
+}
+
+static void start(void) {
+    static const plr_pose pose = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 2, 3}};
+    static const double still[3] = {0}, variance[3] = {0.01, 0.01, 0.01};
+    imu_flight_start(&imu_rig.flight, &imu_rig.options);
+    const plr_calibration calibration = imu_rig.flight.calibration;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(f, &calibration, &imu_rig.config, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 1000000000, &pose, NULL));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, still, variance));
+}
+
+/* Readings about these means at 400 Hz, and a frame without observations after each PER_FRAME. */
+static uint32_t reasons_after(unsigned frames, const double a[3], const double w[3]) {
+    rng chance = rng_seeded(411);
+    plr_report report = {0};
+    for (unsigned n = 1; n <= frames * PER_FRAME; n++) {
+        const plr_time_ns t_ns = 1000000000 + n * UINT64_C(2500000);
+        plr_imu imu;
+        for (int i = 0; i < 3; i++) {
+            imu.a_B_mps2[i] = a[i] + 0.02 * rng_normal(&chance);
+            imu.w_B_radps[i] = w[i] + 0.002 * rng_normal(&chance);
+        }
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_inertial(f, t_ns, &imu));
+        const plr_frame frame = {.t_ns = t_ns, .budget = PLR_NO_BUDGET};
+        if (n % PER_FRAME == 0)
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &frame, &report));
+    }
+    return report.reasons;
+}
+
+static void demand(plr_imu_fault fault, const double a[3], const double w[3]) {
+    start();
+    (void)reasons_after(9, a, w);
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
+    start();
+    const uint32_t reasons = reasons_after(20, a, w);
+    TEST_ASSERT_EQUAL_INT(fault, plr_filter_imu_fault(f));
+    TEST_ASSERT_EQUAL_INT(fault != PLR_IMU_FAULT_NONE, (reasons & PLR_REASON_IMU_FAULT) != 0);
+}
+
+static const double slow[3] = {0.1, 0, 0};
+
+static void test_an_accelerometer_in_g_is_told(void) {
+    demand(PLR_IMU_FAULT_IN_G, (const double[]){0.1, 0, 1}, slow);
+}
+
+static void test_a_force_that_is_not_gravity_is_told(void) {
+    demand(PLR_IMU_FAULT_NOT_GRAVITY, (const double[]){0, 0, 0.5 * 9.81}, slow);
+    demand(PLR_IMU_FAULT_NOT_GRAVITY, (const double[]){0, 0, 3 * 9.81}, slow);
+}
+
+static void test_a_wrong_sign_is_told(void) {
+    demand(PLR_IMU_FAULT_UPSIDE_DOWN, (const double[]){0.5, 0, -9.81}, slow);
+}
+
+static void test_swapped_axes_are_told(void) {
+    demand(PLR_IMU_FAULT_TILT, (const double[]){9.81, 0, 0.3}, slow);
+}
+
+static void test_a_gyro_in_degrees_is_told(void) {
+    demand(PLR_IMU_FAULT_TURNS, (const double[]){0.5, 0.2, 9.81}, (const double[]){6, 3, 12});
+}
+
+static void test_thrust_and_a_fall_and_a_spin_are_no_faults(void) {
+    demand(PLR_IMU_FAULT_NONE, (const double[]){3, 2, 9.81}, slow);
+    demand(PLR_IMU_FAULT_NONE, (const double[]){0, 0, 0.1}, slow);
+    demand(PLR_IMU_FAULT_NONE, (const double[]){0, 0, 9.81}, (const double[]){0, 0, 5});
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_an_accelerometer_in_g_is_told);
+    RUN_TEST(test_a_force_that_is_not_gravity_is_told);
+    RUN_TEST(test_a_wrong_sign_is_told);
+    RUN_TEST(test_swapped_axes_are_told);
+    RUN_TEST(test_a_gyro_in_degrees_is_told);
+    RUN_TEST(test_thrust_and_a_fall_and_a_spin_are_no_faults);
+    return UNITY_END();
+}
