@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from pelorus import se3, wire
 from pelorus.check.contents import recording_of
-from pelorus.check.named import Fault, faults_of
+from pelorus.faults.fault import Fault
+from pelorus.faults.named import faults_of
 from pelorus.frames import Message, Stereo, Twist
 from pelorus.recording import Recording
 

@@ -12,7 +12,8 @@ from converted import Converted, Run
 from injected import OF_RECORDINGS, found_in, of_times, piece
 from pelorus import wire
 from pelorus.check.contents import recording_of, write
-from pelorus.check.named import UNTOLD, faults_of
+from pelorus.faults.fault import UNTOLD
+from pelorus.faults.named import faults_of
 from pelorus.frames import Header, Kind, Stereo, Twist
 from pelorus.recording import Recording
 from replay_drive import BIN, drive

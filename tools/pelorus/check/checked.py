@@ -8,7 +8,6 @@ from pathlib import Path
 
 from pelorus import wire
 from pelorus.check import verdict
-from pelorus.check.named import LOCAL, UNTOLD, faults_of
 from pelorus.check.outcome import Bench, Settings, options_of
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
@@ -17,6 +16,7 @@ from pelorus.check.verdict import Grade, Remark, Run
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
+from pelorus.faults.named import faults_of
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
@@ -45,9 +45,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
     named = faults_of(messages, bench.examined)
-    grades = [Grade.CARE if fault.name == UNTOLD else Grade.BAD for fault in named]
-    faults = [Remark(grade, fault.words) for grade, fault in zip(grades, named, strict=True)]
-    if any(fault.name not in LOCAL for fault in named):
+    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.words) for f in named]
+    if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
     tuned = with_shared_rows(bench, tune(bench, given))
     truth = truth_in(messages)

@@ -16,7 +16,7 @@ from pelorus.console import out, progress
 from pelorus.errors import made
 from pelorus.replay import find_programs
 from pelorus.report import words
-from pelorus.report.results import carry_out, plan_runs, read_subject
+from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
 
 if TYPE_CHECKING:
     from pelorus.report.comparison import Comparison
@@ -58,6 +58,7 @@ def report(
     textbook's, both in float64. Without a depth limit in the settings, world gets one of 60 m.
     """
     subject = read_subject(recording)
+    require_twists(subject, also)
     options = replay_options(config, settings)
     plans = plan_runs(find_programs(programs), recording, options, also)
     runs_folder = made(folder / "runs")

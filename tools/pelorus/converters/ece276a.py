@@ -19,7 +19,7 @@ from pelorus.arrays import Arrays
 from pelorus.converters import twist_noise
 from pelorus.faults import axes, stale, timing
 from pelorus.faults.finding import Finding
-from pelorus.faults.mend import mend
+from pelorus.faults.mend import held_to_fit, mend
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Header, TwistTiming, header_name
 from pelorus.recording import Recording
@@ -38,7 +38,7 @@ def convert(
 
     `twist_timing` None: let the data decide. `keep_ids`: what else is mended, stale tracks are not.
     """
-    recording = read(source)
+    given = recording = read(source)
     tracks = recording.tracks
     findings: list[Finding] = []
     if fix:
@@ -50,7 +50,7 @@ def convert(
         recording = recording.with_header(twist_timing=twist_timing)
     if fix:
         recording, finding = twist_noise.suggest(recording)
-        findings.append(finding)
+        recording, findings = held_to_fit(given, recording, [*findings, finding])
     if keep_ids:
         recording = replace(recording, tracks=tracks)
         findings = [_left_alone(finding) for finding in findings]

@@ -20,7 +20,7 @@ from pelorus.converters import twist_noise
 from pelorus.errors import PelorusError
 from pelorus.faults import stale
 from pelorus.faults.finding import Finding
-from pelorus.faults.mend import mend
+from pelorus.faults.mend import held_to_fit, mend
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Header, Noise, Process, Reading, Text, TwistTiming
 from pelorus.inertial import NO_READINGS, Inertial
@@ -124,9 +124,10 @@ def examined(made: Recording, whole_twists: bool = True) -> tuple[Recording, lis
     if not whole_twists:
         made, finding = stale.mend(made)
         return made, [finding]
+    given = made
     made, findings = mend(made)
     made, finding = twist_noise.suggest(made)
-    return made, [*findings, finding]
+    return held_to_fit(given, made, [*findings, finding])
 
 
 # --- motion ---------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.visual_motion import SeenPairs, seen_pairs
 
+SUBJECT = "body axes"
 LAG = 5
 RATIO_MAX = 0.6  # the error must fall below this share of the given one
 SHARE_MIN = 0.75  # in at least so many frames
@@ -50,18 +51,17 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     scores = [np.median(e[np.isfinite(e)]) if np.isfinite(e).any() else np.inf for e in errors]
     best = int(np.argmin(scores))
     result = duel(errors[0], errors[best], LAG)
-    subject = "body axes"
     if not result.frames:
-        return recording, Finding(subject, False, TOO_FEW, "left as given", told=False)
+        return recording, Finding(SUBJECT, False, TOO_FEW, "left as given", told=False)
     if best == 0 or not result.clearly_won(RATIO_MAX, SHARE_MIN, Z_MIN):
-        return recording, Finding(subject, False, _quiet(scores), "nothing to mend")
+        return recording, Finding(SUBJECT, False, _quiet(scores), "nothing to mend")
     mended = _turned(recording.T_CB, candidates[best])
     evidence = (
         f"lag-{LAG} reprojection falls from {result.given:.1f} to {result.challenger:.1f} px with "
         f"the axes turned, in {100 * result.share:.0f} % of {result.frames} frames"
     )
     action = f"T_CB turned by {_text(candidates[best])}: body axes are now {name(mended.R)}"
-    return recording.with_extrinsic(mended), Finding(subject, True, evidence, action)
+    return recording.with_extrinsic(mended), Finding(SUBJECT, True, evidence, action)
 
 
 def _turned(T_CB: Poses, F: Floats) -> Poses:

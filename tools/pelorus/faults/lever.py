@@ -25,6 +25,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.visual_motion import PAIRS_MIN, SeenPairs, seen_pairs
 
+SUBJECT = "lever of the extrinsic"
 LAG = 3
 SIGMAS_MIN = 3.0  # s must exceed one half by so many of its own standard deviations
 MARGIN_MIN = 0.08  # and by so much: cars' velocities are not quite those of the point they name
@@ -35,7 +36,6 @@ RIDGE = 1e-9  # keeps a column that the drive does not excite solvable
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:
     """Replace t by -R t if the turns say so."""
-    subject = "lever of the extrinsic"
     camera = recording.header.camera
     given = recording.T_CB
     other = Poses(given.R, -given.R @ given.p)
@@ -47,7 +47,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
     turning = usable & (distance > SEPARATED_MIN_M)
     if turning.sum() < PAIRS_MIN:
         evidence = f"{int(turning.sum())} frames with a turn that would tell, {PAIRS_MIN} are due"
-        return recording, Finding(subject, False, evidence, "left as given", told=False)
+        return recording, Finding(SUBJECT, False, evidence, "left as given", told=False)
     way = _way(recording, seen_motion.R, given)
     columns = _columns(recording, seen_motion.R, way, apart)
     s, sigma = _regress(seen_motion.p[usable] - way[usable], columns[usable])
@@ -61,9 +61,9 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"{errors[1]:.1f} px"
     )
     if s - 0.5 < max(SIGMAS_MIN * sigma, MARGIN_MIN):
-        return recording, Finding(subject, False, evidence, "nothing to mend")
+        return recording, Finding(SUBJECT, False, evidence, "nothing to mend")
     action = f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"
-    return recording.with_extrinsic(other), Finding(subject, True, evidence, action)
+    return recording.with_extrinsic(other), Finding(SUBJECT, True, evidence, action)
 
 
 def _way(recording: Recording, R_C: Floats, T_CB: Poses) -> Floats:

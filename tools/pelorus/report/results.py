@@ -15,7 +15,7 @@ from pelorus import wire
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge, known_in, made_in, sigmas_m
 from pelorus.frame_table import FrameTable, frame_table
-from pelorus.frames import Header, Landmark, Message
+from pelorus.frames import Header, Landmark, Message, Process
 from pelorus.health import TimeLine, time_line
 from pelorus.layout import Floats
 from pelorus.replay import Outputs, Programs, depth_limit_m, replay
@@ -46,6 +46,17 @@ def read_subject(path: Path) -> Subject:
     messages = wire.messages_of(path)
     header = next(m for m in messages if isinstance(m, Header))
     return Subject(path, header, truth_in(messages), known_in(messages))
+
+
+def require_twists(subject: Subject, also: Sequence[str]) -> None:
+    """The filters that stand beside the user's own take twists alone."""
+    if also and subject.header.process is Process.IMU:
+        asked = " ".join(f"--also {name}" for name in also)
+        raise PelorusError(
+            f"{subject.path}: holds an IMU's readings, and {asked} asks for a filter that takes "
+            "twists alone (velocities and rates of turn): leave it out. Your own run and dead "
+            "reckoning are compared without it"
+        )
 
 
 OWN = "yours"  # the run with the settings that were given, and what the report is about

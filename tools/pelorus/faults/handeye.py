@@ -17,16 +17,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import se3, visual_motion
+from pelorus import se3
+from pelorus.faults.two_views import TwoViews
 from pelorus.layout import Floats
 from pelorus.recording import Recording
-from pelorus.visual_motion import PAIRS_MIN, seen_pairs
 
-FRAMES_MOST = 500
+FRAMES_MOST = 1000
+POINTS_MIN = 6  # of a pair of frames
 ROUNDS = 10
 MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
 FRAMES_ENOUGH = 50
-FITS_PX = 3.0  # a pair of one rigid scene fits its frame's motion so well
+FITS_D2, FITS_PX = 25.0, 3.0  # a pair of one rigid scene fits its frame's motion so well
 
 
 @dataclass(frozen=True)
@@ -63,20 +64,15 @@ def first_part(recording: Recording, most: int = FRAMES_MOST) -> Recording:
     return replace(recording, tracks=short, frame_t_ns=recording.frame_t_ns[:most])
 
 
-def hand_eye(recording: Recording) -> HandEye:
-    """Fit both motions to one another."""
-    recording = first_part(recording)
-    camera = recording.header.camera
-    seen = seen_pairs(recording.tracks, camera, 1)
-    usable = seen.counts() >= PAIRS_MIN
-    motion = visual_motion.estimate(seen, camera)
-    errors = seen.reproject(camera, motion)
-    fit = float(np.mean(errors < FITS_PX)) if len(errors) else 0.0
+def hand_eye(recording: Recording, views: TwoViews) -> HandEye:
+    """Fit both motions to one another; `views` are of neighbouring frames."""
+    fits = views.d2 < np.maximum(FITS_D2, (FITS_PX / views.sigma_px) ** 2)
+    fit = float(np.mean(fits)) if len(fits) else 0.0
     tau = np.diff(recording.frame_t_ns) * 1e-9
     # motion maps camera k to k + 1: the body's own motion is its inverse
-    of_camera = se3.log(se3.inverse(motion)) / tau[:, None]
+    of_camera = se3.log(se3.inverse(views.motion)) / tau[:, None]
     of_body = se3.log(se3.inverse(recording.body_motion(1))) / tau[:, None]
-    return _fit(recording, of_camera, of_body, usable, fit)
+    return _fit(recording, of_camera, of_body, views.counts >= POINTS_MIN, fit)
 
 
 def _fit(

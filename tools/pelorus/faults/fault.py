@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: MIT
+"""A fault of a recording, by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+UNTOLD = "untold"  # no fault, but not called good either
+
+
+@dataclass(frozen=True)
+class Fault:
+    """`name` is for programs, `words` for people; nothing was mended."""
+
+    name: str
+    words: str
+    stops: bool = True  # settings tuned in spite of it would be worth nothing
+    grave: bool = True  # it spoils the result; else the filter can live with it

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: MIT
+"""Faults of what lies between camera and body: units, axes, extrinsic, lever, scale and clocks.
+
+Each is told by how far it is from what is due, in its own standard errors, and by whether that
+matters. What the data cannot tell apart is not guessed at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pelorus.faults import mounting
+from pelorus.faults.agreement import Agreement, Body, Seen, agreement
+from pelorus.faults.axes import turns
+from pelorus.faults.fault import UNTOLD, Fault
+from pelorus.faults.handeye import FRAMES_ENOUGH, HandEye, angle_between, hand_eye
+from pelorus.faults.moving import moving
+from pelorus.faults.two_views import TwoViews, two_views
+from pelorus.frames import TwistTiming
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+
+FIT_LEAST = 0.6  # of the point pairs that one motion explains
+LEFT_MOST = 0.7  # of a motion's size that the twists leave unexplained
+MOVES_MPS = 1.0  # a camera that hardly moves need not agree with the twists' noise
+TURNED_DEG, ROLLED_DEG, NEAR_DEG, AXES_DEG = 6.0, 50.0, 20.0, 40.0
+PITCH_MOST_DEG = 60.0
+SURE_SIGMAS = 4.0
+UNIT_NEAR = 0.15
+FAR_LAG = 5
+MOVING_SHARE = 0.12  # of what is seen on roads 4 to 9 % drives
+SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 3.0, 0.015, 0.15
+CLOCK_SIGMAS, CLOCK_OFF_S = 3.0, 0.015
+LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
+LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
+
+
+def geometry(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+    """`views` of neighbouring frames. Nothing where all is well."""
+    found = hand_eye(recording, views)
+    if not found.told:
+        yield Fault(
+            UNTOLD,
+            f"only {found.frames} frames share points enough with the one before ({FRAMES_ENOUGH} "
+            "are due): axes, units and scale cannot be judged",
+            stops=False,
+            grave=False,
+        )
+        return
+    if found.fit < FIT_LEAST:
+        yield Fault(
+            "scene",
+            f"only {found.fit:.0%} of the points of two frames agree on one motion: wrong ids, a "
+            "wrong calibration, or much of the scene moves",
+        )
+        return
+    turned = [*_units(found)] or [*_extrinsic(recording, found, views)]
+    if turned:
+        yield from turned
+        return
+    if found.way_left > LEFT_MOST and found.speed_mps > MOVES_MPS:
+        yield Fault(
+            "no-fit",
+            f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is "
+            "left unexplained), and no known fault explains why",
+        )
+        return
+    agreed = agreement(recording, views)
+    if agreed.told:
+        yield from _lever(recording, agreed)
+        yield from _scale(agreed, recording.header.noise.bias_velocity_sigma_mps)
+        yield from _clock(recording, agreed)
+    yield from _moving(recording)
+
+
+# --- units ----------------------------------------------------------------------------------------
+
+
+def _units(found: HandEye) -> Iterator[Fault]:
+    """c = s b: with degrees b is 57 times too large, so s is 1/57."""
+    for name, scale, unit, words in (
+        ("degrees", found.turn_scale, np.pi / 180, "rates: they are in degrees"),
+        ("degrees", found.turn_scale, 180 / np.pi, "rates: degrees were made of radians twice"),
+        ("km/h", found.way_scale, 1 / 3.6, "velocities: they are in km/h"),
+        ("cm/s", found.way_scale, 1e-2, "velocities: they are in cm/s"),
+        ("mm/s", found.way_scale, 1e-3, "velocities: they are in mm/s"),
+    ):
+        near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
+        if scale > 0 and abs(np.log(scale / unit)) < near:
+            yield Fault(f"unit-{name}", f"the images show {scale:.3g} times the {words}")
+
+
+# --- axes and extrinsic ---------------------------------------------------------------------------
+
+
+def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterator[Fault]:
+    """The rotation, and whether each of the twists' axes is the one that is meant."""
+    given = recording.T_CB.R
+    off = angle_between(found.R, given)
+    sure = off > SURE_SIGMAS * _sigma_deg(found, given)
+    axes = list(_axes(recording, views))
+    cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
+    headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    if axes and sure and angle_between(found.R, given.T) < NEAR_DEG:
+        yield _inverted(off)
+    elif axes:
+        yield from axes
+    # the way tells where the camera looks; the roll about it only the turns do, which may be noise
+    elif sure and found.way_left < LEFT_MOST and (headed > TURNED_DEG or off > ROLLED_DEG):
+        yield _turned(given, found.R, off)
+
+
+def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+    seen = Seen.of(recording, views)
+    rates = Body(recording).rates(recording.frame_t_ns, 1, 0.0)
+    arm = -recording.T_CB.R.T @ recording.T_CB.p
+    own = np.where(seen.usable[:, None], seen.rates, np.nan)
+    of_turn = mounting.best_axes(own[:, 3:], rates[:, 3:])
+    turn = own[:, 3:]
+    of_way = mounting.best_axes(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn)
+    both = of_turn.won and of_way.won and np.array_equal(of_turn.F, of_way.F)
+    if both or (of_turn.won and not of_way.won):
+        whose = "the twists have" if both else "the rates of turn have"
+        yield Fault("axes", f"the body's axes are turned or mirrored: {whose} {_words(of_turn.F)}")
+    elif of_way.won:
+        words = f"the velocities have {_words(of_way.F)}"
+        if of_turn.won:
+            words += f", the rates of turn {_words(of_turn.F)}"
+        yield Fault("axes", f"the body's axes are turned or mirrored: {words}")
+
+
+def _words(F: Floats) -> str:
+    """y for x, -z for z: y = F b, so what stands as b's k-th is that axis of what is due."""
+    parts = [f"{_axis_name(column)} for {'xyz'[k]}" for k, column in enumerate(F.T)]
+    return ", ".join(part for k, part in enumerate(parts) if not part.startswith("xyz"[k]))
+
+
+def _inverted(off: float) -> Fault:
+    return Fault(
+        "inverted",
+        f"the extrinsic is off by {off:.0f} degrees, and fits inverted: R_CB is body to camera",
+    )
+
+
+def _turned(given: Floats, found: Floats, off: float) -> Fault:
+    if angle_between(found, given.T) < NEAR_DEG:
+        return _inverted(off)
+    turned = min(turns(), key=lambda F: angle_between(found, given @ F))
+    if not np.allclose(turned, np.eye(3)) and angle_between(found, given @ turned) < AXES_DEG:
+        words = _words(turned)
+        return Fault("axes", f"the body's axes are turned or mirrored: the twists have {words}")
+    axis = _axis_of(found @ given.T)
+    if abs(axis[0]) > 0.85 and off < PITCH_MOST_DEG:
+        return Fault(
+            "pitch",
+            f"the camera is pitched by {off:.0f} degrees beside the extrinsic: forgotten?",
+        )
+    return Fault("extrinsic", f"the extrinsic's rotation is off by {off:.0f} degrees")
+
+
+def _sigma_deg(found: HandEye, given: Floats) -> float:
+    """How well the turn between the two rotations is known. Of a drive straight ahead nothing tells
+    the roll.
+    """
+    axis = _axis_of(found.R @ given.T)
+    return float(np.degrees(np.sqrt(axis @ found.R_covariance @ axis)))
+
+
+def _axis_name(row: Floats) -> str:
+    return ("-" if row.sum() < 0 else "") + "xyz"[int(np.argmax(np.abs(row)))]
+
+
+def _axis_of(R: Floats) -> Floats:
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return np.asarray(axis / (np.linalg.norm(axis) + 1e-12))
+
+
+# --- lever, scale and clock -----------------------------------------------------------------------
+
+
+def _lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """Is the camera rather where a translation that was mistaken for another one puts it?"""
+    T = recording.T_CB
+    arm = -T.R.T @ T.p
+    doubt = LEVER_SHARE * float(np.linalg.norm(arm)) + 0.01
+    known = np.linalg.inv(agreed.lever_covariance + doubt**2 * np.eye(3))
+    as_given = float(agreed.lever_m @ known @ agreed.lever_m)
+    for place, words in (
+        (T.p, "[R | p] with the camera's position p in the body in place of -R p"),
+        (-arm, "the translation with the wrong sign"),
+    ):
+        apart = place - arm
+        left = agreed.lever_m - apart
+        far = float(np.sqrt(apart @ known @ apart))
+        gain = as_given - float(left @ known @ left)
+        if far > LEVER_APART and gain > LEVER_SURE:
+            yield Fault(
+                "lever",
+                f"turns put the camera {_metres(arm + agreed.lever_m)} in the body, the extrinsic "
+                f"puts it {_metres(arm)}: it looks like {words}",
+            )
+            return
+
+
+def _metres(p: Floats) -> str:
+    return "at (" + ", ".join(f"{x:.2f}" for x in p) + ") m"
+
+
+def _scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
+    """`bias_sigma` as the HEADER tells it: such a bias is nothing new. Negative: it tells none."""
+    off, sigma = agreed.scale - 1, agreed.scale_sigma
+    turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
+    through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
+    if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
+        yield Fault(
+            "scale",
+            f"stereo and odometry disagree in scale: the images show {agreed.scale:.3f} +- "
+            f"{sigma:.3f} times the twists' way. Baseline, focal length or the wheels' radius: "
+            "which of them cannot be known",
+            stops=abs(off) > SCALE_WILD,
+            grave=abs(off) > SCALE_WILD,
+        )
+        return
+    if abs(turn) > max(SCALE_SIGMAS * turn_sigma, SCALE_OFF):
+        yield Fault(
+            "scale",
+            f"stereo and odometry disagree in scale: the images show {agreed.turn_scale:.3f} +- "
+            f"{turn_sigma:.3f} times the twists' turns. Focal length or the gyro's scale",
+            stops=abs(turn) > SCALE_WILD,
+            grave=abs(turn) > SCALE_WILD,
+        )
+        return
+    bias = abs(through) * agreed.speed_mps
+    told = bias > SCALE_SIGMAS * bias_sigma and abs(through) > SCALE_OFF
+    either = abs(through - off) < 2 * sigma and abs(through) < SCALE_SIGMAS * sigma
+    if told and either and abs(through) > SCALE_SIGMAS * its_sigma:
+        wild = abs(through) > SCALE_WILD
+        yield Fault(
+            "scale",
+            f"stereo and odometry disagree: the images show {agreed.through_zero:.3f} +- "
+            f"{its_sigma:.3f} times the twists' way. The speed varies too little to tell a scale "
+            f"that is off from a bias of {bias:.2g} m/s",
+            stops=wild,
+            grave=wild,
+        )
+
+
+def _clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """One reading later or earlier is another timing: what of it a timing explains is said."""
+    offset, sigma = agreed.offset_s, agreed.offset_sigma_s
+    if abs(offset) < max(CLOCK_SIGMAS * sigma, CLOCK_OFF_S):
+        return
+    words = (
+        f"camera and twists agree best with the frames {abs(offset) * 1e3:.0f} +- "
+        f"{sigma * 1e3:.0f} ms {'later' if offset > 0 else 'earlier'} (camera-offset)"
+    )
+    period = float(np.median(np.diff(recording.twist_t_ns))) * 1e-9
+    given = recording.header.twist_timing
+    lates = {TwistTiming.START: 0.0, TwistTiming.MID: 0.5 * period, TwistTiming.END: period}
+    timing = min(lates, key=lambda t: abs(offset - (lates[t] - lates[given])))
+    if timing is not given:
+        part = (lates[timing] - lates[given]) * 1e3
+        words += f"; twist-timing {timing.name.lower()} would make up for {part:.0f} ms of it"
+    yield Fault("clock", words, stops=False, grave=False)
+
+
+def _moving(recording: Recording) -> Iterator[Fault]:
+    far = two_views(recording.tracks, recording.header.camera, FAR_LAG)
+    found = moving(recording.tracks, far)
+    if found.share > MOVING_SHARE:
+        yield Fault(
+            "moving",
+            f"{found.share:.0%} of what is seen moves beside the rest ({found.tracks} tracks of "
+            "some length)",
+            stops=False,
+            grave=False,
+        )

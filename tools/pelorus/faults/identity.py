@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""Does an id stay with its point? Slots are given to one point after another, row numbers to any.
+
+A track that ends leaves its slot to the next point: from one frame to the next the id jumps, and
+before and behind the jump it follows a point well. A bad match looks otherwise: the track comes
+back. So does a point that was out of sight, and is seen again where it must be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.faults.two_views import TwoViews, measured, predicted
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from pelorus.tracks import Tracks
+
+Flags = NDArray[np.bool_]
+ROWS_LEAST = 4
+ROWS_SHARE, WRONG_TOGETHER = 0.9, 0.15
+JUMP_PX, SOUND_D2 = 12.0, 16.0
+JUMPS_LEAST, JUMPS_SHARE = 5, 0.2  # of the tracks that end
+GAPS_LEAST, ELSEWHERE_SHARE = 10, 0.6  # of the points that are seen again
+GAP_MOST = 5  # frames over which the twists tell where a point must be
+ELSEWHERE = 0.08  # of the picture's width
+
+
+def follow(tracks: Tracks, views: TwoViews) -> bool:
+    """Whether ids stay with their points but for single ones: one row less, and all those behind it
+    are other points.
+    """
+    bad = _wrong(tracks, views)
+    pairs = np.bincount(views.frame)
+    wrong = np.bincount(views.frame, bad, minlength=len(pairs))
+    some = wrong > 0
+    return not some.any() or float(np.mean(wrong[some] / pairs[some])) < WRONG_TOGETHER
+
+
+def _wrong(tracks: Tracks, views: TwoViews) -> Flags:
+    """Pairs that cannot be of one point of the world, whatever the noise is taken for."""
+    step = tracks.pixels[views.second] - tracks.pixels[views.first]
+    moved = np.linalg.norm(step[:, :2], axis=1)
+    off_px = np.sqrt(views.d2) * views.sigma_px
+    return np.asarray((off_px > JUMP_PX) & (moved > JUMP_PX))
+
+
+def are_rows(tracks: Tracks) -> bool:
+    """0, 1, 2, ... in nearly every frame: of a full table of slots, too."""
+    first, rows = [], []
+    for a, b in pairwise(tracks.bounds().tolist()):
+        if b - a > ROWS_LEAST:
+            first.append(int(tracks.id[a]))
+            rows.append(np.array_equal(tracks.id[a:b] - tracks.id[a], np.arange(b - a)))
+    return bool(rows) and float(np.mean(rows)) > ROWS_SHARE and len(set(first)) <= 2
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Tracks that go on elsewhere, beside those that end."""
+
+    jumps: int
+    ends: int
+    again: int  # points seen again after a few frames
+    elsewhere: int  # of these far from where they must be
+
+    @property
+    def are_slots(self) -> bool:
+        goes_on = self.jumps + self.elsewhere
+        if self.again >= GAPS_LEAST and self.elsewhere > ELSEWHERE_SHARE * self.again:
+            return True
+        return self.jumps >= JUMPS_LEAST and goes_on > JUMPS_SHARE * (self.jumps + self.ends)
+
+
+def jumps(recording: Recording, views: TwoViews) -> Jumps:
+    """`views` of neighbouring frames."""
+    tracks = recording.tracks
+    px = tracks.pixels
+    same = (px[views.first] == px[views.second]).all(axis=1)
+    bad = _wrong(tracks, views) & ~same
+    sound = views.d2 < SOUND_D2
+    begins, ends = np.zeros(len(tracks), bool), np.zeros(len(tracks), bool)
+    begins[views.first[sound]] = True  # a sound pair begins with this row
+    ends[views.second[sound]] = True
+    jumped = bad & ends[views.first] & begins[views.second]
+    seen_next = np.zeros(len(tracks), bool)
+    seen_next[views.first] = True
+    last = np.nonzero(ends & ~seen_next & (tracks.frame < tracks.frame_count - 1))[0]
+    return Jumps(int(jumped.sum()), len(last), *_again(recording))
+
+
+def _again(recording: Recording) -> tuple[int, int]:
+    """Points that come back within a few frames, and those that come back elsewhere."""
+    tracks, camera = recording.tracks, recording.header.camera
+    order = np.lexsort((tracks.frame, tracks.id))
+    one, two = order[:-1], order[1:]
+    gap = tracks.frame[two] - tracks.frame[one]
+    known = (tracks.id[one] == tracks.id[two]) & (gap > 1) & (gap <= GAP_MOST)
+    one, two = one[known], two[known]
+    if not len(one):
+        return 0, 0
+    body = recording.dead_reckoning()
+    T_CW = se3.compose(recording.T_CB, se3.inverse(body))
+    motion = se3.compose(T_CW.at(tracks.frame[two]), se3.inverse(T_CW.at(tracks.frame[one])))
+    x = measured(camera, tracks.pixels[one])
+    h, _, _ = predicted(camera, x, *Poses(motion.R, motion.p))
+    off = np.linalg.norm((h - measured(camera, tracks.pixels[two]))[:, :2], axis=1)
+    width = float(np.ptp(tracks.pixels[:, 0]))
+    return len(one), int(np.sum(off > ELSEWHERE * width))

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""How much of what is seen moves by itself?
+
+Most points tell one motion of the camera. Seen again some frames later, a point of the world is
+where that motion puts it, or a bad match was anywhere, once; a point that moves is off, in most of
+its views, and the farther the longer it is watched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pelorus.faults.two_views import TwoViews
+from pelorus.tracks import Tracks
+
+OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 sound pairs
+VIEWS_LEAST = 4  # pairs of a track that tell
+MOST_OF_THEM = 0.7
+TRACKS_LEAST = 20
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Of so many tracks that were long enough this share moves."""
+
+    tracks: int
+    share: float
+
+
+def moving(tracks: Tracks, far: TwoViews) -> Moving:
+    """`far` are views some frames apart."""
+    _, number = np.unique(tracks.id, return_inverse=True)
+    count = int(number.max()) + 1 if len(number) else 0
+    whose = number[far.first]
+    views = np.bincount(whose, minlength=count)
+    off = np.bincount(whose, far.d2 > OFF_D2, minlength=count)
+    long = views >= VIEWS_LEAST
+    if long.sum() < TRACKS_LEAST:
+        return Moving(int(long.sum()), 0.0)
+    # by views, so that what is seen for long weighs as much as it does in a filter
+    moves = long & (off > MOST_OF_THEM * views)
+    return Moving(int(long.sum()), float(views[moves].sum() / views[long].sum()))

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""Everyday faults, by name: what is most likely wrong with a recording, and how to put it right.
+
+An absolute test comes first: one rigid scene must explain the points of two frames, and one
+rotation and scale the motions of camera and body. Where that fails nothing is called good, and
+where no known fault explains it, that is said instead of a guess. Nothing is changed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from pelorus.faults import identity
+from pelorus.faults.fault import Fault
+from pelorus.faults.geometry import geometry
+from pelorus.faults.handeye import first_part
+from pelorus.faults.two_views import TwoViews, two_views
+from pelorus.frames import Message, Stereo, Twist
+from pelorus.motion import Times
+from pelorus.recording import Recording
+
+SWAPPED_SHARE = 0.5
+ROW_GAP_PX = 2.0  # of a rectified pair the median is below one
+ROW_BIN, ROW_BINS = 50, 4  # observations and parts of the picture by which rows are compared
+ROW_OFF_PX = 1.0
+FROZEN_FRAMES = 3
+GAP_TIMES = 10.0
+TWISTS, FRAMES = "twists", "frames"
+USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, FRAMES: 5e5}
+
+
+def faults_of(messages: Sequence[Message], recording: Recording) -> list[Fault]:
+    """Of a file's messages, times as they stand, and of what a filter would take of them."""
+    times = {
+        name: np.array([m.t_ns for m in messages if isinstance(m, kind)], np.int64)
+        for kind, name in ((Twist, TWISTS), (Stereo, FRAMES))
+    }
+    return _faults(times, recording)
+
+
+def faults_in(recording: Recording) -> list[Fault]:
+    """Of a recording that is not written yet."""
+    return _faults({TWISTS: recording.twist_t_ns, FRAMES: recording.frame_t_ns}, recording)
+
+
+def _faults(times_ns: Mapping[str, Times], recording: Recording) -> list[Fault]:
+    """The likeliest first; empty if nothing is wrong that this knows of."""
+    times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
+    short = first_part(recording)
+    pixels = list(_pixels(short))
+    if pixels or any(fault.name == "time-unit" for fault in times):
+        return [*pixels, *times]  # what follows would be built on sand
+    views = two_views(short.tracks, short.header.camera, 1)
+    ids = list(_ids(short, views))
+    if ids:
+        return [*ids, *times]
+    return [*geometry(short, views), *_frozen(recording), *times]
+
+
+# --- time -----------------------------------------------------------------------------------------
+
+
+def _times(name: str, t_ns: Times) -> Iterator[Fault]:
+    steps = np.diff(t_ns)
+    back, same = int(np.sum(steps < 0)), int(np.sum(steps == 0))
+    if back or same:
+        words = f"the times of {name} go back {back} times and repeat {same}"
+        yield Fault("time-order", words, stops=False)
+    ahead = steps[steps > 0]
+    usual = float(np.median(ahead)) if len(ahead) else 0.0
+    gaps = int(np.sum(ahead > max(GAP_TIMES * usual, 1e9)))
+    if gaps and usual < 1e9:
+        longest = float(ahead.max()) * 1e-9
+        words = f"{gaps} gaps in the {name}, the longest of {longest:.1f} s"
+        yield Fault("time-gap", words, stops=False)
+    if usual > USUAL_MOST_NS or 0 < usual < USUAL_LEAST_NS[name]:
+        yield Fault(
+            "time-unit",
+            f"{usual * 1e-9:.3g} s from one of the {name} to the next: is the time in other "
+            "units (ms, us)?",
+        )
+
+
+# --- pixels and ids -------------------------------------------------------------------------------
+
+
+def _pixels(recording: Recording) -> Iterator[Fault]:
+    u_l, v_l, u_r, v_r = recording.tracks.pixels.T
+    disparity, rows = u_l - u_r, v_l - v_r
+    gap = float(np.median(np.abs(rows)))
+    if np.mean(disparity < 0) > SWAPPED_SHARE and gap < ROW_GAP_PX:
+        yield Fault(
+            "left-right",
+            f"{np.mean(disparity < 0):.0%} of the disparities are negative: left and right are "
+            "swapped",
+        )
+        return
+    if gap > ROW_GAP_PX and np.median(np.abs(disparity)) < ROW_GAP_PX:
+        yield Fault("u-v", f"rows differ by {gap:.0f} px where columns should: u and v are swapped")
+        return
+    off = _row_offset(recording)
+    if gap > ROW_GAP_PX or off > ROW_OFF_PX:
+        yield Fault(
+            "unrectified",
+            f"a point's rows differ by {gap:.1f} px, by {off:.1f} px in whole parts of the "
+            "picture: the pair is not rectified, or left and right are of different moments",
+        )
+
+
+def _row_offset(recording: Recording) -> float:
+    """RMS over parts of the picture of the rows' median difference, px."""
+    px = recording.tracks.pixels
+    rows = px[:, 1] - px[:, 3]
+    parts = np.zeros(len(px), np.int64)
+    for axis in (0, 1):
+        edges = np.quantile(px[:, axis], np.arange(1, ROW_BINS) / ROW_BINS)
+        parts = parts * ROW_BINS + np.searchsorted(edges, px[:, axis])
+    own = [rows[parts == k] for k in range(ROW_BINS * ROW_BINS)]
+    medians = [float(np.median(values)) for values in own if len(values) >= ROW_BIN]
+    return float(np.sqrt(np.mean(np.square(medians)))) if medians else 0.0
+
+
+def _ids(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+    """Ids that are a frame's row numbers, or slots, or never seen again."""
+    tracks = recording.tracks
+    if not len(tracks.pairs(1).first):
+        yield Fault("ids-new", "no id is seen in two frames in a row: ids must follow a point")
+        return
+    if identity.are_rows(tracks) and not identity.follow(tracks, views):
+        yield Fault("ids-rows", "the ids are 0, 1, 2, ... in every frame: they are row numbers")
+        return
+    found = identity.jumps(recording, views)
+    if found.are_slots:
+        yield Fault(
+            "ids-slots",
+            f"{found.jumps} tracks go on with another point from one frame to the next, "
+            f"{found.elsewhere} of {found.again} come back elsewhere, {found.ends} end: the ids "
+            f"({len(np.unique(tracks.id))}) are slots, not points",
+        )
+
+
+def _frozen(recording: Recording) -> Iterator[Fault]:
+    """The same picture several times in a row, though the twists say that the body moves."""
+    pairs = recording.tracks.pairs(1)
+    same = (recording.tracks.pixels[pairs.first] == recording.tracks.pixels[pairs.second]).all(1)
+    count = np.bincount(pairs.frame, minlength=recording.tracks.frame_count)
+    repeated = np.bincount(pairs.frame, same, minlength=recording.tracks.frame_count)
+    frozen = (count >= 3) & (repeated == count)
+    moved = np.linalg.norm(recording.body_motion(1).p, axis=1)
+    frozen[: len(moved)] &= moved > 0.005
+    longest = _longest_run(frozen)
+    if longest >= FROZEN_FRAMES:
+        t = (recording.frame_t_ns - recording.frame_t_ns[0]) * 1e-9
+        at = t[np.nonzero(frozen)[0]]
+        yield Fault(
+            "frozen",
+            f"{int(frozen.sum())} frames repeat the picture before them while the body moves, the "
+            f"first at {at[0]:.1f} s: the camera or the tracker is frozen there",
+            stops=False,
+        )
+
+
+def _longest_run(flags: np.ndarray) -> int:
+    run = best = 0
+    for flag in flags.tolist():
+        run = run + 1 if flag else 0
+        best = max(best, run)
+    return best

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""The camera's motion between two frames, and how well it is known, from their common tracks.
+
+Both views of a point are measured with the same noise, and the point itself is unknown: motion and
+points are those that make all four pictures likeliest. A point is its left pixel and its disparity,
+so that far points, whose disparity noise may take below zero, need not be left out; and every step
+linearises where both views together have the point. To take points from the first view alone, as
+pelorus.visual_motion does, makes every way about 1 % too short: that is what is measured here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.console import progress
+from pelorus.frames import Camera
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
+from pelorus.tracks import Indices, Tracks
+
+ROW_GAP_MAX_PX = 4.0  # a rectified pair shows a point in one row; more is a bad match
+ITERATIONS, WIDE_ITERATIONS = 10, 4
+WIDE, NARROW = 10.0, 3.0  # sigmas that the weights of Geman and McClure accept
+SIGMA_LEAST_PX = 0.02
+RIDGE = 1e-3  # keeps frames without observations solvable
+STEP_MAX = 1.0  # m and rad an iteration
+CHI2_3_MEDIAN = 2.366
+FAR_OFF = 50.0  # d^2 beyond which a point stays where the first view has it
+# Of (uL, v, disparity) with v the mean of both rows, for pixels of unit noise.
+NOISE = np.array([[1.0, 0.0, 1.0], [0.0, 0.5, 0.0], [1.0, 0.0, 2.0]])
+
+
+@dataclass(frozen=True)
+class TwoViews:
+    """For each k the motion that brings coordinates in camera k to camera k + lag, with the
+    covariance of a small step on its left; and for each pair of observations its d^2 in that
+    motion, of three degrees of freedom and in units of sigma_px.
+    """
+
+    lag: int
+    motion: Poses
+    covariance: Floats  # (k, 6, 6): metres, radians
+    counts: NDArray[np.int64]
+    sigma_px: float
+    frame: Indices
+    first: Indices  # row of the tracks
+    second: Indices
+    d2: Floats
+
+
+def two_views(tracks: Tracks, camera: Camera, lag: int) -> TwoViews:
+    """Gauss-Newton with robust weights, all frames at once."""
+    pairs = tracks.pairs(lag)
+    rows = np.abs(tracks.pixels[:, 1] - tracks.pixels[:, 3]) < ROW_GAP_MAX_PX
+    good = rows[pairs.first] & rows[pairs.second]
+    frame, first, second = pairs.frame[good], pairs.first[good], pairs.second[good]
+    count = max(tracks.frame_count - lag, 0)
+    solver = _Solver(camera, frame, count, tracks.pixels[first], tracks.pixels[second])
+    for k in progress(range(ITERATIONS), "camera motion", ITERATIONS):
+        solver.step(WIDE if k < WIDE_ITERATIONS else NARROW)
+    return TwoViews(
+        lag,
+        Poses(se3.nearest_rotation(solver.R), solver.p),
+        np.asarray(np.linalg.inv(solver.H) * solver.sigma**2, np.float64),
+        np.bincount(frame, minlength=count),
+        solver.sigma,
+        frame,
+        first,
+        second,
+        solver.d2 / solver.sigma**2,
+    )
+
+
+def measured(camera: Camera, pixels: Floats) -> Floats:
+    """(uL, v, disparity) beside the principal point, px."""
+    u, v = pixels[:, 0] - camera.cx_px, 0.5 * (pixels[:, 1] + pixels[:, 3]) - camera.cy_px
+    return np.stack((u, v, pixels[:, 0] - pixels[:, 2]), axis=-1)
+
+
+def predicted(camera: Camera, x: Floats, R: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
+    """Where points x of the first view stand in the second, h (n, 3); dh/dx (n, 3, 3); and
+    dh/d motion (n, 3, 6), NaN-free even behind the camera.
+    """
+    focal = np.array([camera.fx_px, camera.fy_px, camera.fx_px * camera.baseline_m])
+    ray = np.stack((x[:, 0] / focal[0], x[:, 1] / focal[1], np.ones(len(x))), axis=-1)
+    inverse_depth = x[:, 2] / focal[2]
+    q = np.einsum("nij,nj->ni", R, ray) + inverse_depth[:, None] * p
+    z = np.where(np.abs(q[:, 2]) < 1e-3, 1e-3, q[:, 2])
+    h = focal * np.stack((q[:, 0], q[:, 1], inverse_depth), axis=-1) / z[:, None]
+    D = np.zeros((len(x), 3, 3))  # dh/dq
+    D[:, 0, 0], D[:, 1, 1] = focal[0] / z, focal[1] / z
+    D[:, :, 2] = -h / z[:, None]
+    to_x = np.concatenate((R[:, :, :2] / focal[:2], p[:, :, None] / focal[2]), axis=2)
+    Jx = D @ to_x
+    Jx[:, 2, 2] += 1 / z
+    J_motion = np.concatenate((D * inverse_depth[:, None, None], -D @ se3.skew(q)), axis=-1)
+    return h, Jx, J_motion
+
+
+class _Solver:
+    """The state of the iteration."""
+
+    def __init__(
+        self, camera: Camera, frame: Indices, count: int, first: Floats, second: Floats
+    ) -> None:
+        self._camera, self._frame, self._count = camera, frame, count
+        self._first, self._second = measured(camera, first), measured(camera, second)
+        self._x = self._first.copy()
+        self.R, self.p = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+        self.H = np.tile(np.eye(6), (count, 1, 1))
+        self.sigma = 1.0
+        self.d2 = np.zeros(len(frame))
+
+    def step(self, accepts: float) -> None:
+        """All motions by one step, then the points."""
+        frame = self._frame
+        h, Jx, J = predicted(self._camera, self._x, self.R[frame], self.p[frame])
+        Jt = np.swapaxes(Jx, 1, 2)
+        e = self._second - h - np.einsum("nij,nj->ni", Jx, self._first - self._x)
+        W = np.linalg.inv(Jx @ NOISE @ Jt + NOISE)
+        d2 = np.einsum("ni,nij,nj->n", e, W, e)
+        weight = 1 / (1 + d2 / (3 * (accepts * self.sigma) ** 2)) ** 2
+        JW = np.swapaxes(J, 1, 2) @ (W * weight[:, None, None])
+        self.H = self._by_frame(JW @ J) + RIDGE * np.eye(6)
+        g = self._by_frame(np.einsum("nij,nj->ni", JW, e))
+        step = np.clip(np.linalg.solve(self.H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
+        moved = se3.compose(se3.exp(step[:, :3], step[:, 3:]), Poses(self.R, self.p))
+        self.R, self.p = moved
+        left = e - np.einsum("nij,nj->ni", J, step[frame])
+        better = self._first + np.einsum("nij,nj->ni", NOISE @ Jt @ W, left)
+        near = d2 < FAR_OFF * self.sigma**2
+        self._x = np.where(near[:, None], better, self._first)
+        self.d2 = d2
+        if len(d2):
+            self.sigma = max(float(np.sqrt(np.median(d2) / CHI2_3_MEDIAN)), SIGMA_LEAST_PX)
+
+    def _by_frame(self, values: Floats) -> Floats:
+        counts = np.bincount(self._frame, minlength=self._count)
+        out = np.zeros((self._count, *values.shape[1:]))
+        filled = counts > 0
+        starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
+        if len(values):
+            out[filled] = np.add.reduceat(values, starts[filled], axis=0)
+        return out
