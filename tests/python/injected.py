@@ -19,6 +19,7 @@ from pelorus.faults.fault import Fault
 from pelorus.faults.named import faults_of
 from pelorus.frames import Message, Stereo, Twist
 from pelorus.recording import Recording
+from pelorus.tracks import project, triangulate
 
 PIECE = 300  # frames of a clean piece
 
@@ -29,11 +30,9 @@ def turned(recording: Recording, F: np.ndarray) -> Recording:
 
 
 def mirrored(recording: Recording, axis: int) -> Recording:
-    """One axis the other way round. Of a car that neither climbs nor rolls the images cannot tell
-    that of z, so that of x stands for it.
-    """
+    """One axis the other way round."""
     flip = np.ones(3)
-    flip[axis % 2] = -1
+    flip[axis] = -1
     return replace(
         recording, v_B_mps=recording.v_B_mps * flip, w_B_radps=-recording.w_B_radps * flip
     )
@@ -72,10 +71,45 @@ def unrectified(recording: Recording, k: int) -> Recording:
 
 
 def scaled(recording: Recording, k: int) -> Recording:
-    """A baseline that is wrong by 20 percent and more."""
+    """A baseline, a focal length or an odometry that is wrong by some percent."""
     camera = recording.header.camera
-    wrong = replace(camera, baseline_m=camera.baseline_m * (1.2, 1.35, 0.75)[k])
-    return recording.with_header(camera=wrong)
+    if k == 0:
+        return recording.with_header(camera=replace(camera, baseline_m=1.05 * camera.baseline_m))
+    if k == 1:
+        long = replace(camera, fx_px=1.06 * camera.fx_px, fy_px=1.06 * camera.fy_px)
+        return recording.with_header(camera=long)
+    return replace(recording, v_B_mps=0.9 * recording.v_B_mps)
+
+
+def swapped_lever(recording: Recording, k: int) -> Recording:
+    """The camera's position in the body in place of the translation, or that with a wrong sign."""
+    T = recording.T_CB
+    return recording.with_extrinsic(T._replace(p=-T.p if k == 1 else -T.R.T @ T.p))
+
+
+def late(recording: Recording, k: int) -> Recording:
+    """Frames with a clock of their own."""
+    by_ns = (20, 50, -90)[k] * 10**6
+    return replace(recording, frame_t_ns=recording.frame_t_ns + by_ns)
+
+
+def wandering(recording: Recording, k: int) -> Recording:
+    """Some of the points swing to and fro, each its own way, by 2.5 m."""
+    tracks, camera = recording.tracks, recording.header.camera
+    t_s = (recording.frame_t_ns[tracks.frame] - recording.frame_t_ns[0]) * 1e-9
+    rows = np.nonzero((tracks.id * 7919) % 100 < (22, 30, 40)[k])[0]
+    own = tracks.id[rows]
+    swing = 2.5 * np.sin(2 * np.pi * t_s[rows] / 4 + own * 2.4)
+    way_W = np.stack((swing * np.cos(1.7 * own), swing * np.sin(1.7 * own), 0 * swing), axis=-1)
+    path = recording.dead_reckoning()
+    R_CW = recording.T_CB.R @ np.swapaxes(path.R, 1, 2)
+    px = tracks.pixels.copy()
+    px[rows, 2] = np.minimum(px[rows, 2], px[rows, 0] - 1)
+    q = triangulate(camera, px[rows])
+    q += np.einsum("nij,nj->ni", R_CW[tracks.frame[rows]], way_W)
+    q[:, 2] = np.maximum(q[:, 2], 0.5)
+    px[rows] = project(camera, q)
+    return pixels(recording, px)
 
 
 def row_ids(recording: Recording, k: int) -> Recording:
@@ -124,6 +158,7 @@ def frozen(recording: Recording, k: int) -> Recording:
 
 
 Change = Callable[[Recording, int], Recording]
+ALIKE = ("inverted", "degrees", "km/h", "mm/s", "left-right", "u-v")  # at any strength
 OF_RECORDINGS: dict[str, tuple[Change, tuple[str, ...]]] = {
     "inverted": (inverted, ("inverted", "axes", "extrinsic")),
     "axes": (axes, ("axes",)),
@@ -137,7 +172,10 @@ OF_RECORDINGS: dict[str, tuple[Change, tuple[str, ...]]] = {
     "u-v": (lambda r, _: pixels(r, r.tracks.pixels[:, [1, 0, 3, 2]]), ("u-v",)),
     "unrectified": (unrectified, ("unrectified",)),
     "ids-rows": (row_ids, ("ids-rows",)),
-    "ids-slots": (slot_ids, ("ids-slots", "scene")),
+    "ids-slots": (slot_ids, ("ids-slots",)),
+    "lever": (swapped_lever, ("lever",)),
+    "clock": (late, ("clock",)),
+    "moving": (wandering, ("moving",)),
     "frozen": (frozen, ("frozen",)),
 }
 
@@ -170,7 +208,7 @@ def found_in(recording: Recording) -> list[Fault]:
 def injections(recording: Recording) -> Iterator[tuple[str, int, list[Fault], tuple[str, ...]]]:
     """Fault, strength, what was named, what is due."""
     for name, (change, due) in OF_RECORDINGS.items():
-        for k in range(3):
+        for k in range(1 if name in ALIKE else 3):
             yield name, k, found_in(change(recording, k)), due
 
 

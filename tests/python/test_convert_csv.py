@@ -112,8 +112,8 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
     csv_files(tmp_path, clean(3, velocity_sigma_mps=0.5, gyro_sigma_radps=0.05))
     sources = sources_in(tmp_path)
     recording, findings = csv_converter.convert(sources)
-    assert findings[-1].subject == "twist noise"
-    assert findings[-1].found
+    noise = next(finding for finding in findings if finding.subject == "twist noise")
+    assert noise.found
     assert recording.header.noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
     assert recording.header.noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
     assert recording.header.noise.pixel_sigma_px == 0.5, "as the calibration says"
@@ -127,11 +127,24 @@ def test_faults_of_a_users_own_data_are_found_too(tmp_path: Path) -> None:
     csv_files(tmp_path, with_turned_axes(drive))
     sources = sources_in(tmp_path)
     mended, findings = csv_converter.convert(sources)
-    assert [finding.found for finding in findings] == [False, True, False, False]
+    assert [f.subject for f in findings if f.found] == ["body axes", "clock"], (
+        "the calibration says end where the drive was made with start"
+    )
+    assert "twist-timing start" in findings[-1].evidence
     assert np.allclose(mended.T_CB.R, drive.T_CB.R)
     left, findings = csv_converter.convert(sources, fix=False)
     assert findings == []
     assert np.allclose(left.T_CB.R, with_turned_axes(drive).T_CB.R)
+
+
+def test_no_extrinsic_is_changed_for_one_that_does_not_fit_either(tmp_path: Path) -> None:
+    turned = with_turned_axes(clean(3))
+    csv_files(tmp_path, replace(turned, v_B_mps=3.6 * turned.v_B_mps))
+    left, findings = csv_converter.convert(sources_in(tmp_path))
+    assert np.allclose(left.T_CB.R, turned.T_CB.R)
+    told = {finding.subject: finding for finding in findings}
+    assert told["body axes"].action.startswith("left as given")
+    assert told["unit-km/h"].found
 
 
 def edited(name: str, old: str, new: str) -> tuple[str, str, str]:

@@ -429,3 +429,18 @@ def test_evaluate_compares_the_map_of_a_result(pelorus: Command, tmp_path: Path)
     said = pelorus("evaluate", log, "--truth", bare)
     assert said.status == 1
     assert "there is nothing to compare" in said.err
+
+
+# --- what cannot be compared ----------------------------------------------------------------------
+
+
+def test_comparisons_that_take_twists_alone_are_refused_for_an_imu(
+    tmp_path: Path, pelorus: Command, programs: Programs
+) -> None:
+    path = tmp_path / "imu.plr"
+    assert pelorus("simulate", path, "--imu-rate", "200", "--duration", "2").status == 0
+    also = ("--also", "world", "--bin", programs.float32.parent)
+    said = pelorus("report", path, "--out", tmp_path / "out", *also)
+    assert said.status == 1
+    assert "holds an IMU's readings, and --also world asks for a filter that takes" in said.err
+    assert not (tmp_path / "out").exists()

@@ -32,6 +32,7 @@ FRAMES_MIN = 50
 NO_BIAS_MPS = 1e-4
 BIAS_MPS = 0.1  # sigma of the velocity's bias, as the filter's setting
 ROUNDS = 8
+CHANCE = 2.0  # standard errors that near and far may differ by
 BLOCKS_MOST, BLOCK_FRAMES = 40, 10
 OFFSETS_S = np.arange(-20, 21) * 0.02  # where the clock's offset is looked for at first
 CLOCK_ROUNDS, CLOCK_STEP_S, CLOCK_FOUND_S = 10, 0.05, 2e-4
@@ -197,7 +198,7 @@ def _doubt_by_depth(recording: Recording, views: TwoViews, body: Body, offset: f
         fit = _Fit(part, body, seen, offset, NO_BIAS_MPS)
         halves.append((fit.x[SCALE], fit.image_sigma[SCALE]))
     (near, near_sigma), (far, far_sigma) = halves
-    excess = (near - far) ** 2 - near_sigma**2 - far_sigma**2
+    excess = (near - far) ** 2 - CHANCE**2 * (near_sigma**2 + far_sigma**2)
     return float(np.sqrt(max(excess, 0.0)) / 2)
 
 

@@ -17,8 +17,9 @@ from pelorus.tracks import Tracks
 
 OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 sound pairs
 VIEWS_LEAST = 4  # pairs of a track that tell
-MOST_OF_THEM = 0.7
+MOST_OF_THEM = 0.5
 TRACKS_LEAST = 20
+MAD_TO_SIGMA, NOISE_LEAST, DRIFTS_ABOVE = 1.4826, 0.5, 1.5
 
 
 @dataclass(frozen=True)
@@ -29,16 +30,27 @@ class Moving:
     share: float
 
 
-def moving(tracks: Tracks, far: TwoViews) -> Moving:
-    """`far` are views some frames apart."""
+def moving(tracks: Tracks, near: TwoViews, far: TwoViews) -> Moving:
+    """`near` of neighbouring frames, `far` of some frames apart."""
     _, number = np.unique(tracks.id, return_inverse=True)
     count = int(number.max()) + 1 if len(number) else 0
     whose = number[far.first]
     views = np.bincount(whose, minlength=count)
-    off = np.bincount(whose, far.d2 > OFF_D2, minlength=count)
+    off = np.bincount(whose, far.d2 > OFF_D2 * _noise(tracks, near, far) ** 2, minlength=count)
     long = views >= VIEWS_LEAST
     if long.sum() < TRACKS_LEAST:
         return Moving(int(long.sum()), 0.0)
     # by views, so that what is seen for long weighs as much as it does in a filter
     moves = long & (off > MOST_OF_THEM * views)
     return Moving(int(long.sum()), float(views[moves].sum() / views[long].sum()))
+
+
+def _noise(tracks: Tracks, near: TwoViews, far: TwoViews) -> float:
+    """Of the pixels, in units of the far views' own, which what moves has widened: rows of the left
+    and the right picture tell it at one moment. Not where all tracks drift, which rows do not tell.
+    """
+    if far.sigma_px > DRIFTS_ABOVE * near.sigma_px:
+        return 1.0
+    rows = tracks.pixels[:, 1] - tracks.pixels[:, 3]
+    sigma = MAD_TO_SIGMA * float(np.median(np.abs(rows - np.median(rows)))) / np.sqrt(2)
+    return float(np.clip(sigma / far.sigma_px, NOISE_LEAST, 1.0))

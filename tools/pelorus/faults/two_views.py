@@ -23,7 +23,7 @@ from pelorus.se3 import Poses
 from pelorus.tracks import Indices, Tracks
 
 ROW_GAP_MAX_PX = 4.0  # a rectified pair shows a point in one row; more is a bad match
-ITERATIONS, WIDE_ITERATIONS = 10, 4
+ITERATIONS, WIDE_ITERATIONS = 8, 3
 WIDE, NARROW = 10.0, 3.0  # sigmas that the weights of Geman and McClure accept
 SIGMA_LEAST_PX = 0.02
 RIDGE = 1e-3  # keeps frames without observations solvable

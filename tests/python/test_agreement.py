@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""How far camera and twists disagree, and how well that is known: against what was put in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from pelorus import se3
+from pelorus.faults.agreement import Agreement, agreement
+from pelorus.faults.fault import Fault
+from pelorus.faults.named import faults_in
+from pelorus.faults.two_views import two_views
+from pelorus.recording import Recording
+from pelorus.simulation.simulate import Options, simulate
+
+DRIVE = Options(
+    duration_s=30.0, twist_rate_hz=50.0, bias_velocity_sigma_mps=0.0, loss=0.03, baseline_m=0.4
+)
+
+
+@cache
+def driven(seed: int = 11) -> Recording:
+    """No bias of the velocity, and none that the HEADER tells of."""
+    return simulate(replace(DRIVE, seed=seed)).recording
+
+
+def agreed(recording: Recording) -> Agreement:
+    return agreement(recording, two_views(recording.tracks, recording.header.camera, 1))
+
+
+def scale_in(recording: Recording) -> list[Fault]:
+    return [fault for fault in faults_in(recording) if fault.name == "scale"]
+
+
+def test_ways_have_the_length_that_they_have() -> None:
+    recording = driven()
+    views = two_views(recording.tracks, recording.header.camera, 1)
+    seen = np.isin(recording.truth_t_ns, recording.frame_t_ns)
+    T_WC = se3.compose(recording.truth.at(seen), se3.inverse(recording.T_CB))
+    true = se3.compose(se3.inverse(T_WC.at(slice(1, None))), T_WC.at(slice(None, -1)))
+    good = views.counts > 20
+    along = np.sum(views.motion.p[good] * true.p[good]) / np.sum(true.p[good] ** 2)
+    assert along == pytest.approx(1, abs=0.003), "points from one view alone: 1 % too short"
+    off = se3.log(se3.compose(views.motion, se3.inverse(true)))[good]
+    nees = np.einsum("ni,nij,nj->n", off, np.linalg.inv(views.covariance[good]), off) / 6
+    assert 0.5 < np.median(nees) < 1.4
+    assert views.sigma_px == pytest.approx(1, rel=0.1)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.03, 0.94])
+def test_a_scale_is_found_within_its_standard_errors(factor: float) -> None:
+    recording = driven()
+    found = agreed(replace(recording, v_B_mps=recording.v_B_mps / factor))
+    assert abs(found.through_zero - factor) < 3 * found.through_zero_sigma + 0.003
+    assert abs(found.scale - factor) < 3 * found.scale_sigma
+    assert found.through_zero_sigma < 0.01
+
+
+def test_two_percent_of_scale_are_named_and_none_is_not() -> None:
+    recording = driven()
+    assert scale_in(recording) == []
+    camera = recording.header.camera
+    wrong = recording.with_header(camera=replace(camera, baseline_m=1.025 * camera.baseline_m))
+    assert len(scale_in(wrong)) == 1
+    assert not scale_in(wrong)[0].stops, "the filter can live with it"
+
+
+def test_a_bias_that_the_header_tells_of_is_no_scale() -> None:
+    recording = driven()
+    shifted = replace(recording, v_B_mps=recording.v_B_mps + np.array([0.1, 0, 0]))
+    noise = replace(recording.header.noise, bias_velocity_sigma_mps=0.1)
+    assert scale_in(shifted.with_header(noise=noise)) == []
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.03, -0.12])
+def test_a_clock_is_found_to_some_milliseconds(late_s: float) -> None:
+    recording = driven()
+    moved = replace(recording, frame_t_ns=recording.frame_t_ns + round(late_s * 1e9))
+    found = agreed(moved)
+    assert found.offset_s == pytest.approx(-late_s, abs=0.008)
+    assert found.offset_sigma_s < 0.008
+
+
+def test_the_cameras_place_is_found_from_turns() -> None:
+    recording = driven()
+    T = recording.T_CB
+    found = agreed(recording.with_extrinsic(T._replace(p=T.p - T.R @ np.array([0.3, -0.2, 0.0]))))
+    sigma = np.sqrt(np.diag(found.lever_covariance))
+    assert (np.abs(found.lever_m - np.array([-0.3, 0.2, 0.0])) < 4 * sigma + 0.03).all()
+    assert (sigma[:2] < 0.1).all()
