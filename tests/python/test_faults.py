@@ -16,7 +16,7 @@ from drives import (
     with_turned_axes,
 )
 from pelorus.faults import axes, lever, stale, timing
-from pelorus.faults.mend import mend
+from pelorus.faults.mend import held_to_fit, mend
 from pelorus.frames import BodyAxes, TwistTiming
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -56,6 +56,19 @@ def test_a_camera_at_rest_may_repeat_its_pixels() -> None:
     mended, findings = mend(recording)
     assert not any(finding.found for finding in findings), findings
     assert mended is recording
+
+
+def test_pictures_that_stand_still_are_no_stale_tracks() -> None:
+    resting = at_rest()
+    frozen = replace(resting, v_B_mps=resting.v_B_mps + np.array([1.0, 0, 0]))
+    split, findings = mend(frozen)
+    assert split.tracks is not frozen.tracks
+    mended, findings = held_to_fit(frozen, split, findings)
+    assert mended.tracks is frozen.tracks
+    told = {finding.subject: finding for finding in findings}
+    assert told["stale tracks"].action.startswith("left as given")
+    assert "frozen" in told
+    assert told["frozen"].found
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -67,12 +67,14 @@ def geometry(recording: Recording, views: TwoViews) -> Iterator[Fault]:
             "left unexplained), and no known fault explains why",
         )
         return
+    moves = list(_moving(recording, views))
+    yield from moves
     agreed = agreement(recording, views)
     if agreed.told:
         yield from _lever(recording, agreed)
-        yield from _scale(agreed, recording.header.noise.bias_velocity_sigma_mps)
+        if not moves:  # what moves looks like another scale
+            yield from _scale(agreed, recording.header.noise.bias_velocity_sigma_mps)
         yield from _clock(recording, agreed)
-    yield from _moving(recording, views)
 
 
 # --- units ----------------------------------------------------------------------------------------

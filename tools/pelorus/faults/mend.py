@@ -12,6 +12,8 @@ from pelorus.faults.finding import Finding
 from pelorus.faults.named import faults_in
 from pelorus.recording import Recording
 
+NOTHING_LASTS = "ids-new"
+
 
 def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
     """Find and mend what the recording's own data give away.
@@ -33,18 +35,24 @@ def held_to_fit(
     is wrong besides is told by name.
     """
     named = faults_in(mended)
+    if mended.tracks is not given.tracks and any(fault.name == NOTHING_LASTS for fault in named):
+        mended = replace(
+            mended, tracks=given.tracks
+        )  # pictures that stand still, not single tracks
+        findings = [_taken_back(finding, named[0], stale.SUBJECT) for finding in findings]
+        named = faults_in(mended)
     changed = mended.header.R_CB is not given.header.R_CB
     changed |= mended.header.t_CB_m is not given.header.t_CB_m
     wrong = [fault for fault in named if fault.stops]
     if changed and wrong:
-        findings = [_taken_back(finding, wrong[0]) for finding in findings]
+        findings = [_taken_back(f, wrong[0], axes.SUBJECT, lever.SUBJECT) for f in findings]
         mended = mended.with_extrinsic(given.T_CB)
         named = faults_in(mended)
     return mended, [*findings, *(_told(fault) for fault in named if fault.name != UNTOLD)]
 
 
-def _taken_back(finding: Finding, because: Fault) -> Finding:
-    if finding.subject not in (axes.SUBJECT, lever.SUBJECT) or not finding.found:
+def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
+    if finding.subject not in subjects or not finding.found:
         return finding
     action = f"left as given: even then it would not fit ({because.words})"
     return replace(finding, told=False, found=False, action=action)
