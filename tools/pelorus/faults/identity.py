@@ -101,7 +101,7 @@ def _again(recording: Recording) -> tuple[int, int]:
     gap = tracks.frame[two] - tracks.frame[one]
     known = (tracks.id[one] == tracks.id[two]) & (gap > 1) & (gap <= GAP_MOST)
     one, two = one[known], two[known]
-    if not len(one):
+    if not len(one) or not len(recording.twist_t_ns):
         return 0, 0
     body = recording.dead_reckoning()
     T_CW = se3.compose(recording.T_CB, se3.inverse(body))

@@ -56,6 +56,8 @@ def _faults(times_ns: Mapping[str, Times], recording: Recording) -> list[Fault]:
     ids = list(_ids(short, views))
     if ids:
         return [*ids, *times]
+    if not len(recording.twist_t_ns):
+        return times  # an IMU: how the body moved is not known before the filter says it
     return [*geometry(short, views), *_frozen(recording), *times]
 
 
