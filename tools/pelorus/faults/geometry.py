@@ -90,6 +90,8 @@ def _units(found: HandEye) -> Iterator[Fault]:
         ("mm/s", found.way_scale, 1e-3, "velocities: they are in mm/s"),
     ):
         near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
+        if name == "degrees" and not found.turns_told:
+            continue
         if scale > 0 and abs(np.log(scale / unit)) < near:
             yield Fault(f"unit-{name}", f"the images show {scale:.3g} times the {words}")
 
@@ -102,6 +104,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
     given = recording.T_CB.R
     off = angle_between(found.R, given)
     sure = off > SURE_SIGMAS * _sigma_deg(found, given)
+    rolled = off > ROLLED_DEG and found.turns_told
     axes = list(_axes(recording, views))
     cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
     headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
@@ -110,7 +113,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
     elif axes:
         yield from axes
     # the way tells where the camera looks; the roll about it only the turns do, which may be noise
-    elif sure and found.way_left < LEFT_MOST and (headed > TURNED_DEG or off > ROLLED_DEG):
+    elif sure and found.way_left < LEFT_MOST and (headed > TURNED_DEG or rolled):
         yield _turned(given, found.R, off)
 
 

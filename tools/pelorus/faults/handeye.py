@@ -27,6 +27,7 @@ POINTS_MIN = 6  # of a pair of frames
 ROUNDS = 10
 MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
 FRAMES_ENOUGH = 50
+TURNS_SIGMAS = 4.0
 FITS_D2, FITS_PX = 25.0, 3.0  # a pair of one rigid scene fits its frame's motion so well
 
 
@@ -48,6 +49,13 @@ class HandEye:
     R_covariance: Floats  # rad^2, of a small turn on the left of R
     heading_B: Floats  # unit vector: where the body mostly drives
     speed_mps: float  # of the camera, as the images have it
+
+    @property
+    def turns_told(self) -> bool:
+        """Whether the rates of turn are the camera's at any scale; on a straight way they may be
+        noise, and what fits noise best is no fault.
+        """
+        return abs(self.turn_scale) > TURNS_SIGMAS * self.turn_sigma
 
     @property
     def told(self) -> bool:
