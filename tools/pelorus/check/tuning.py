@@ -36,11 +36,7 @@ from pelorus.converters.twist_noise import difference_of_a_reading
 from pelorus.layout import Floats
 
 WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
-PRIORS = {
-    "bias-gyro-sigma": (0.001, 0.003, 0.01, 0.03, 0.1),
-    "bias-velocity-sigma": (0.003, 0.01, 0.03, 0.1, 0.3),
-}
-UNITS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
+PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
 SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
 ALIKE = 0.7  # cosine of the angle between them
 COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
@@ -138,23 +134,21 @@ def _of_drifting_tracks(
 
 
 def _bias(bench: Bench, fixed: Settings, values: Mapping[str, float]) -> tuple[dict[str, str], str]:
-    """Of each kind that both halves tell alike the prior under which the drive is likeliest; none,
-    unless one pays.
+    """Of each kind that both halves of the drive tell alike, if the drive is likelier with it.
 
-    A prior that is wider than the bias costs likelihood, so the data themselves say how wide.
+    As wide as what they tell: of priors the likeliest may be narrower than the bias of the one axis
+    that has one, for the three axes share it.
     """
     side = {**fixed, **WIDE, **written(values, TWIST)}
     halves = _halves(bench, side)
     said = []
-    for name, sizes in PRIORS.items():
-        tried = [{**side, name: "0"}, *({**side, name: f"{size:g}"} for size in sizes)]
-        ran = bench.run_all(tried, "biases")
-        best = min(range(1, len(ran)), key=lambda k: ran[k].cost)
-        pays = ran[best].gain_over(ran[0]) > PAYS and halves[name] > 0
-        side[name] = f"{sizes[best - 1]:g}" if pays else "0"
+    for name, unit in PRIORS.items():
+        tried = [{**side, name: "0"}, {**side, name: f"{halves[name]:.2g}"}]
+        none, some = bench.run_all(tried, "biases")
+        pays = halves[name] > 0 and some.gain_over(none) > PAYS
+        side[name] = f"{halves[name]:.2g}" if pays else "0"
         if pays:
-            kind = name.split("-")[1]
-            said.append(f"of the {kind} readings of about {halves[name]:.2g} {UNITS[name]}")
+            said.append(f"of the {name.split('-')[1]} readings of about {side[name]} {unit}")
     kept = {k: side[k] for k in PRIORS}
     if not said:
         without = {k: v for k, v in fixed.items() if k not in WIDE}

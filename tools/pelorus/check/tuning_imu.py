@@ -34,6 +34,7 @@ from pelorus.check.search import Found, search
 from pelorus.check.tracks_noise import TrackNoise, track_noise
 
 COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
+LOOSE = 10.0  # times the noises, while the clock is far off
 FINE = (1.5, 1.2)
 WALK_STEPS = (4.0, 2.0)
 TOLD = 9.0  # 3 sigma, to either side
@@ -90,10 +91,13 @@ def _search(
 def _roughly(
     bench: Bench, side: Settings, values: Mapping[str, float]
 ) -> tuple[dict[str, float], clock.Offset]:
-    """Noises and clock, in turn, with few landmarks and the drive's beginning for the noises."""
+    """Noises and clock, in turn, with few landmarks and the drive's beginning for the noises. The
+    clock with an IMU that is believed less: else nothing is a valley but its very foot.
+    """
     short = {**side, **fewer_slots(side), LENGTH: COARSE_FRAMES}
     coarse = _search(bench, short, values, COARSE).values
-    rough = {**side, **fewer_slots(side), **written(coarse, IMU)}
+    loose = coarse | {name: LOOSE * coarse[name] for name in ("gyro", "accel")}
+    rough = {**side, **fewer_slots(side), **written(loose, IMU)}
     offset = clock.of_imu(bench, rough, float(side[OFFSET]))
     if offset.gain > PAYS:
         short[OFFSET] = f"{offset.best_s:.6f}"
