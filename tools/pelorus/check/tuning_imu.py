@@ -35,6 +35,7 @@ from pelorus.check.tracks_noise import TrackNoise, track_noise
 
 COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
 LOOSE = 10.0  # times the noises, while the clock is far off
+MIDDLE = (2.0, 2.0, 1.5)  # the whole drive with few landmarks, once the clock is about right
 FINE = (1.5, 1.2)
 WALK_STEPS = (4.0, 2.0)
 TOLD = 9.0  # 3 sigma, to either side
@@ -56,7 +57,7 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     side |= written(walks, WALKS)
     values, offset = _roughly(bench, side, values)
     side[OFFSET] = f"{offset.best_s:.6f}"
-    values = _search(bench, side | fewer_slots(given), values, FINE[:1]).values
+    values = _search(bench, side | fewer_slots(given), values, MIDDLE).values
     offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s)
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
