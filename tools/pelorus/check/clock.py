@@ -19,6 +19,7 @@ from pelorus.motion import Times
 
 FEWEST = 5  # points of a parabola
 COARSE_S = 0.01  # from one offset tried to the next, at least
+NEAR_STEPS = 2  # of these, where the offset is roughly known
 NEAR_S = 0.04  # to either side of the best of them: farther off it is no parabola
 SHRINK = 3.0
 FINEST_S = 2e-5
@@ -32,6 +33,7 @@ class Offset:
 
     best_s: float
     sigma_s: float
+    bend_s: float = float("inf")  # sigma by the bend alone: finer steps may lie on a parabola
 
     @property
     def gain(self) -> float:
@@ -61,8 +63,10 @@ def of_twists(bench: Bench, settings: Settings) -> Offset:
     return foot(offsets[near], np.array(list(costs.values()))[near])
 
 
-def of_imu(bench: Bench, settings: Settings, about_s: float = 0.0) -> Offset:
-    """Steps that find the valley first, then finer ones that find its foot.
+def of_imu(
+    bench: Bench, settings: Settings, about_s: float = 0.0, reach: int | None = None
+) -> Offset:
+    """Steps that find the valley first, so many to either side, then finer ones that find its foot.
 
     They are whole readings as long as that is fine enough: where camera and IMU keep one grid, an
     offset by parts of a reading changes how many readings a frame averages, too.
@@ -71,14 +75,14 @@ def of_imu(bench: Bench, settings: Settings, about_s: float = 0.0) -> Offset:
     if not period_s > 0:
         return UNTOLD
     step_s = period_s * max(round(COARSE_S / period_s), 1)
-    most = int(OFFSET_MOST_S / step_s + 1e-6)
+    most = int(OFFSET_MOST_S / step_s + 1e-6) if reach is None else reach
     costs = _costs(bench, settings, about_s, step_s, most)
     while True:
         found, costs = _valley(bench, settings, costs, step_s)
-        if np.isfinite(found.sigma_s) and step_s <= STEP_SIGMAS * SHRINK * found.sigma_s:
+        if np.isfinite(found.bend_s) and step_s <= STEP_SIGMAS * SHRINK * found.bend_s:
             return found
         whole = step_s > 1.5 * period_s
-        unsure = not whole and found.sigma_s > SURE_OF_PARTS * period_s
+        unsure = not whole and found.bend_s > SURE_OF_PARTS * period_s
         if unsure or step_s <= FINEST_S:
             return found
         finer_s = step_s / SHRINK
@@ -124,7 +128,8 @@ def foot(offsets: Floats, costs: Floats) -> Offset:
     # the foot is as sure as the bend says, but no surer than the points lie on a parabola
     off = float(np.sum((up - np.polyval((bend, slope, least), across)) ** 2)) / max(len(x) - 3, 1)
     variance = 1 / bend + off / float(np.sum(across**2)) / (2 * bend) ** 2
-    return Offset(middle + best * scale, scale * float(np.sqrt(variance)))
+    bend_s = scale / float(np.sqrt(bend))
+    return Offset(middle + best * scale, scale * float(np.sqrt(variance)), bend_s)
 
 
 def seconds(t_ns: Times) -> float:

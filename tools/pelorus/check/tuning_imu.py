@@ -58,7 +58,7 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     values, offset = _roughly(bench, side, values)
     side[OFFSET] = f"{offset.best_s:.6f}"
     values = _search(bench, side | fewer_slots(given), values, MIDDLE).values
-    offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s)
+    offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
     side, words = _walks(bench, side, walks)
@@ -97,7 +97,8 @@ def _roughly(
     """
     short = {**side, **fewer_slots(side), LENGTH: COARSE_FRAMES}
     coarse = _search(bench, short, values, COARSE).values
-    loose = coarse | {name: LOOSE * coarse[name] for name in ("gyro", "accel")}
+    loose = {name: LOOSE * max(coarse[name], values[name]) for name in ("gyro", "accel")}
+    loose["pixel"] = coarse["pixel"]
     rough = {**side, **fewer_slots(side), **written(loose, IMU)}
     offset = clock.of_imu(bench, rough, float(side[OFFSET]))
     if offset.gain > PAYS:
