@@ -3,6 +3,7 @@
 #ifndef PELORUS_SESSION_PARTS_H
 #define PELORUS_SESSION_PARTS_H
 
+#include "pelorus/config.h"
 #include "pelorus/wire.h"
 
 #ifdef __cplusplus
