@@ -67,10 +67,10 @@ extern "C" {
 #endif
 #endif
 
-/* The kernel's inner loop: in a Cortex-M's own instructions if the tile has 6 columns, else in C. It
- * changes no bit either. */
-#if defined(__thumb2__) && defined(__ARM_FEATURE_FMA) && PLR_REAL == 32 &&                         \
-    PLR_TILE_COLUMNS == 6 && !PLR_PORTABLE
+/* The kernel's inner loop: in a Cortex-M's own instructions if the tile has 6 columns and the
+ * compiler optimises, else in C. It changes no bit either. */
+#if defined(__thumb2__) && defined(__ARM_FEATURE_FMA) && defined(__OPTIMIZE__) &&                  \
+    PLR_REAL == 32 && PLR_TILE_COLUMNS == 6 && !PLR_PORTABLE
 #define PLR_TILE_FILE "math/tile_cortex_m.h"
 #else
 #define PLR_TILE_FILE "math/tile_in_c.h"
