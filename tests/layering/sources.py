@@ -74,7 +74,7 @@ SIBLINGS: dict[str, set[str]] = {
     "pelorus.h": FILTER_HEADERS - {"pelorus.h"},
     "wire.h": {"types.h"},
     "port.h": {"types.h"},
-    "session_parts.h": {"wire.h"},
+    "session_parts.h": {"config.h", "wire.h"},
     "session.h": FILTER_HEADERS | {"wire.h", "port.h", "session_parts.h", "state_store.h"},
     "state_store.h": {"filter.h", "port.h"},
 }
