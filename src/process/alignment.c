@@ -167,30 +167,36 @@ static void begin(plr_filter *f, plr_time_ns t_ns, plr_real interval) {
     memset(&f->either.alignment, 0, sizeof f->either.alignment); /* as after a restore */
 }
 
-/* The unit vector of the mean specific force less its bias; returns its length, m/s^2. */
-static plr_real measured_up(const plr_filter *f, plr_real u[3]) {
+/* The unit vector of a mean specific force less its bias; returns its length, m/s^2. */
+static plr_real measured_up(const plr_filter *f, const plr_real mean[3], plr_real u[3]) {
     for (unsigned i = 0; i < 3; i++)
-        u[i] = f->either.alignment.mean[i] - f->bias[i];
+        u[i] = mean[i] - f->bias[i];
     const plr_real length = PLR_SQRT(plr_dot3(u, u));
     for (unsigned i = 0; i < 3 && length > 0; i++)
         u[i] /= length;
     return length;
 }
 
-/* What speaks against a start by this mean specific force, if anything. */
+/* Within these a mean specific force is taken for gravity's. */
+typedef struct gravity_limits {
+    plr_real least, most; /* its length, m/s^2 */
+    plr_real least_up;    /* the cosine of its angle to the pose's up; ANY_TILT: no limit */
+} gravity_limits;
+
+#define ANY_LENGTH PLR_R(1e9)
+#define ANY_TILT   PLR_R(-2)
+
+/* What speaks against this mean specific force, if anything; in_pose: its direction tells. */
 static plr_imu_fault find_fault(const plr_filter *f, const plr_real u[3], plr_real length,
-                                bool at_rest) {
-    const plr_real g = f->par.gravity;
+                                const gravity_limits *due, bool in_pose) {
+    const plr_real g = f->par.gravity, up = plr_dot3(u, f->R_WB + 6);
     if (length < PLR_R(0.3) * g && length > PLR_R(0.05) * g)
         return PLR_IMU_FAULT_IN_G;
-    if (at_rest && plr_abs(length - g) > NOT_GRAVITY)
+    if (length < due->least || length > due->most)
         return PLR_IMU_FAULT_NOT_GRAVITY;
-    if (!f->inertial.pose_given)
-        return PLR_IMU_FAULT_NONE;
-    const plr_real cosine = plr_dot3(u, f->R_WB + 6);
-    if (cosine < PLR_R(-0.7))
+    if (in_pose && up < PLR_R(-0.7))
         return PLR_IMU_FAULT_UPSIDE_DOWN;
-    return at_rest && PLR_R(1) - cosine > OTHER_TILT ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
+    return in_pose && up < due->least_up ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
 }
 
 /* At rest: the mean rate is the gyro's bias, and the mean specific force points up, but for the
@@ -260,13 +266,17 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
     plr_real u[3];
     const plr_real interval =
         (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
-    const plr_real length = measured_up(f, u);
+    const plr_real length = measured_up(f, at->mean, u);
     if (at_rest && !is_at_rest(f, at, interval)) {
         const bool turns = is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval);
         plr_alignment_does_not_stand(f, turns ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES);
         return false;
     }
-    f->inertial.fault = (uint8_t)find_fault(f, u, length, at_rest);
+    const plr_real g = f->par.gravity;
+    const gravity_limits resting = {g - NOT_GRAVITY, g + NOT_GRAVITY, PLR_R(1) - OTHER_TILT};
+    const gravity_limits moving = {0, ANY_LENGTH, ANY_TILT};
+    f->inertial.fault =
+        (uint8_t)find_fault(f, u, length, at_rest ? &resting : &moving, f->inertial.pose_given);
     if (f->inertial.fault != PLR_IMU_FAULT_NONE && f->inertial.fault != PLR_IMU_FAULT_TILT)
         return false;
     if (at_rest)
@@ -306,23 +316,15 @@ bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
 /* What speaks against the readings' mean of half a second, whatever the body does meanwhile. */
 static plr_imu_fault find_doubt(const plr_filter *f) {
     const plr_real g = f->par.gravity, *rate = f->inertial.slow + 3;
-    plr_real force[3];
-    for (unsigned i = 0; i < 3; i++)
-        force[i] = f->inertial.slow[i] - f->bias[i];
-    const plr_real length = PLR_SQRT(plr_dot3(force, force));
-    const plr_real up = plr_dot3(force, f->R_WB + 6);
+    plr_real u[3];
+    const plr_real length = measured_up(f, f->inertial.slow, u);
     const bool carried = length > PLR_R(0.7) * g && length < PLR_R(1.3) * g;
     if (carried && plr_dot3(rate, rate) > SPINS * SPINS)
         return PLR_IMU_FAULT_TURNS;
     if (length <= PLR_R(0.05) * g) /* falls */
         return PLR_IMU_FAULT_NONE;
-    if (length < PLR_R(0.3) * g)
-        return PLR_IMU_FAULT_IN_G;
-    if (length < PLR_R(0.6) * g || length > PLR_R(2.5) * g)
-        return PLR_IMU_FAULT_NOT_GRAVITY;
-    if (up < PLR_R(-0.7) * length)
-        return PLR_IMU_FAULT_UPSIDE_DOWN;
-    return carried && up < PLR_R(0.5) * length ? PLR_IMU_FAULT_TILT : PLR_IMU_FAULT_NONE;
+    const gravity_limits due = {PLR_R(0.6) * g, PLR_R(2.5) * g, carried ? PLR_R(0.5) : ANY_TILT};
+    return find_fault(f, u, length, &due, true);
 }
 
 void plr_alignment_watch_gravity(plr_filter *f) {

@@ -196,8 +196,8 @@ void plr_data_use_truth(plr_session *s) {
 /* --- START among the data --- */
 
 void plr_data_use_start(plr_session *s) {
-    s->start = s->in.as.start;
     plr_data_use_waiting(s);
+    s->start = s->in.as.start;
     plr_steps_apply_held(s, UINT64_MAX);
     plr_start_apply(s);
 }

@@ -14,6 +14,14 @@ void setUp(void) {
 void tearDown(void) {
 }
 
+/* Nothing was refused, and the last POSE is that of `expected`. */
+static void demand_result(const inertial_result *expected) {
+    desk_assert_nothing_refused();
+    faulty_port_answers_again(&port);
+    const inertial_result found = inertial_read();
+    inertial_assert_same(expected, &found);
+}
+
 /* --- late cameras, other clocks --- */
 
 static void test_readings_wait_for_a_late_camera_as_twists_do(void) {
@@ -27,10 +35,7 @@ static void test_readings_wait_for_a_late_camera_as_twists_do(void) {
         desk_clear(1);
         desk_use_setting("twist-delay", 0.25);
         inertial_run(i == 0 ? &late : &late_batches);
-        desk_assert_nothing_refused();
-        faulty_port_answers_again(&port);
-        const inertial_result found = inertial_read();
-        inertial_assert_same(&in_time, &found);
+        demand_result(&in_time);
         TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
     }
 }
@@ -102,10 +107,7 @@ static void test_in_the_order_of_stamps_camera_offset_costs_no_reading(void) {
             desk_use_setting("twist-delay", tried[i].delay_s);
             send_in_order_of_stamps(batches[b], tried[i].behind);
             plr_session_finish(&session);
-            desk_assert_nothing_refused();
-            faulty_port_answers_again(&port);
-            const inertial_result found = inertial_read();
-            inertial_assert_same(&expected, &found);
+            demand_result(&expected);
             TEST_ASSERT_EQUAL_UINT32(0, session.totals.imu_refused);
         }
 }
