@@ -26,17 +26,22 @@ from report_runs import built_programs
 MS = 1_000_000
 
 
-@pytest.fixture(scope="module")
-def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Half a minute at 20 readings a second, whose noise is not what the HEADER suggests."""
+def simulate(tmp_path_factory: pytest.TempPathFactory, *options: str) -> Path:
+    """A recording for the whole module."""
     built_programs()
     from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
 
     path = tmp_path_factory.mktemp("check") / "drive.plr"
+    assert main(["simulate", str(path), *options]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Half a minute at 20 readings a second, whose noise is not what the HEADER suggests."""
     noise = ("--pixel-sigma", "1.5", "--velocity-sigma", "0.3", "--gyro-sigma", "0.03")
     rates = ("--duration", "30", "--lap", "10", "--twist-rate", "20", "--observations", "30")
-    assert main(["simulate", str(path), "--seed", "3", *noise, *rates]) == 0
-    return path
+    return simulate(tmp_path_factory, "--seed", "3", *noise, *rates)
 
 
 WRONG = {"pixel-sigma": "0.8", "velocity-sigma": "0.08", "gyro-sigma": "0.1"}
@@ -96,14 +101,9 @@ def test_the_timing_of_the_readings_is_found(simulated: Path, tmp_path: Path) ->
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Half a minute by an IMU of 100 readings a second, that turns and accelerates."""
-    built_programs()
-    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
-
-    path = tmp_path_factory.mktemp("check") / "flight.plr"
     noise = ("--gyro-noise", "0.002", "--accel-noise", "0.03", "--pixel-sigma", "0.8")
     rates = ("--duration", "40", "--lap", "6", "--imu-rate", "100", "--observations", "40")
-    assert main(["simulate", str(path), "--seed", "7", *noise, *rates]) == 0
-    return path
+    return simulate(tmp_path_factory, "--seed", "7", *noise, *rates)
 
 
 def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(

@@ -27,6 +27,17 @@ def project(camera: Camera, q_C: Floats) -> Floats:
     return np.stack((u_left, v, camera.fx_px * (x - camera.baseline_m) / z + camera.cx_px, v), -1)
 
 
+def sum_by_frame(frame: Indices, count: int, values: Floats) -> Floats:
+    """(count, ...): of values (n, ...) that stand by ascending frame."""
+    counts = np.bincount(frame, minlength=count)
+    out = np.zeros((count, *values.shape[1:]))
+    if len(values):
+        filled = counts > 0
+        starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
+        out[filled] = np.add.reduceat(values, starts[filled], axis=0)
+    return out
+
+
 def triangulate(camera: Camera, pixels: Floats) -> Floats:
     """(n, 4) px with positive disparity -> points in the left camera (n, 3), m."""
     u_left, v_left, u_right, v_right = pixels.T

@@ -17,7 +17,7 @@ from pelorus.console import progress
 from pelorus.frames import Camera
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
-from pelorus.tracks import Indices, Tracks, project, triangulate
+from pelorus.tracks import Indices, Tracks, project, sum_by_frame, triangulate
 
 DISPARITY_MIN_PX = 1.0  # below it a triangulated depth means little
 ROW_GAP_MAX_PX = 2.0  # a rectified pair shows a point in one row; more is a bad match
@@ -114,8 +114,8 @@ def _gauss_newton(
     weight = ahead / (1 + np.einsum("na,nab,nb->n", residual, W, residual) / scale_px**2) ** 2
     J = np.concatenate((D, -D @ se3.skew(q)), axis=-1)
     WJ = (W @ J) * weight[:, None, None]
-    H = _sum_by_frame(seen, np.swapaxes(J, 1, 2) @ WJ) + RIDGE * np.eye(6)
-    g = _sum_by_frame(seen, np.einsum("nai,na->ni", WJ, residual))
+    H = sum_by_frame(seen.frame, seen.frame_count, np.swapaxes(J, 1, 2) @ WJ) + RIDGE * np.eye(6)
+    g = sum_by_frame(seen.frame, seen.frame_count, np.einsum("nai,na->ni", WJ, residual))
     step = np.clip(np.linalg.solve(H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
     return step[:, :3], step[:, 3:]
 
@@ -142,16 +142,6 @@ def point_jacobian(camera: Camera, q: Floats) -> Floats:
     D[:, 2, 2] = -camera.fx_px * (x - camera.baseline_m) / z**2
     D[:, 1, 2] = D[:, 3, 2] = -camera.fy_px * y / z**2
     return D
-
-
-def _sum_by_frame(seen: SeenPairs, values: Floats) -> Floats:
-    counts = seen.counts()
-    out = np.zeros((seen.frame_count, *values.shape[1:]))
-    if len(values):
-        filled = counts > 0
-        starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
-        out[filled] = np.add.reduceat(values, starts[filled], axis=0)
-    return out
 
 
 def pixel_sigma(seen: SeenPairs, camera: Camera, motion: Poses) -> float:

@@ -22,6 +22,8 @@ COARSE_S = 0.01  # from one offset tried to the next, at least
 NEAR_STEPS = 2  # of these, where the offset is roughly known
 NEAR_S = 0.04  # to either side of the best of them: farther off it is no parabola
 SHRINK = 3.0
+# The middle of what a reading stands for, in readings beside its own time, by the timing's name.
+MIDDLES = {"start": 0.5, "mid": 0.0, "end": -0.5}
 FINEST_S = 2e-5
 STEP_SIGMAS = 2.0  # steps of so many sigmas tell the foot best
 SURE_OF_PARTS = 0.04  # of a reading: with such a sigma the least is not made by its parts

@@ -13,7 +13,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pelorus.check.outcome import Bench, Outcome, Settings
+from pelorus.check.parameters import Parameter, limits, written
 
+COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"  # of a rough answer
 FARTHEST = 2.0  # steps that a parabola may lead away
 WORTH_ANOTHER = 0.01  # an observation: so much from a wide step asks for one more
 LEAST_COST = 2e-5  # an observation: less is no improvement
@@ -29,21 +31,34 @@ class Found:
     outcome: Outcome
 
 
+def search_noises(
+    bench: Bench,
+    side: Settings,
+    start: Mapping[str, float],
+    parameters: Mapping[str, Parameter],
+    steps: Sequence[float],
+    what: str = "noise",
+) -> Found:
+    """Of parameters within their limits, beside settings that stay."""
+    build = lambda v: {**side, **written(v, parameters)}  # noqa: E731 - named where it is used
+    return search(bench, start, limits(start, parameters), build, steps, what)
+
+
 def search(
     bench: Bench,
     start: Mapping[str, float],
-    limits: Mapping[str, tuple[float, float]],
+    within: Mapping[str, tuple[float, float]],
     build: Build,
     steps: Sequence[float],
     what: str = "noise",
 ) -> Found:
-    """From `start`, by rounds; `build` makes settings of the values."""
+    """From `start`, by rounds; `build` makes settings of the values, each within its limits."""
     best = Found(dict(start), bench.run(build(start)))
     for round_, step in enumerate(steps):
         said = f"{what}, round {round_ + 1} of {len(steps)}"
-        better = _round(bench, best, limits, build, step, said)
+        better = _round(bench, best, within, build, step, said)
         while step > 1.9 and better.outcome.cost < best.outcome.cost - WORTH_ANOTHER:
-            best, better = better, _round(bench, better, limits, build, step, said)
+            best, better = better, _round(bench, better, within, build, step, said)
         best = better
     return best
 
@@ -51,7 +66,7 @@ def search(
 def _round(
     bench: Bench,
     best: Found,
-    limits: Mapping[str, tuple[float, float]],
+    within: Mapping[str, tuple[float, float]],
     build: Build,
     step: float,
     what: str,
@@ -59,13 +74,13 @@ def _round(
     tried: list[dict[str, float]] = []
     for name in best.values:
         for factor in (step, 1 / step):
-            tried.append(best.values | {name: _within(limits[name], best.values[name] * factor)})
+            tried.append(best.values | {name: _clipped(within[name], best.values[name] * factor)})
     outcomes = bench.run_all([build(values) for values in tried], what)
     moved = dict(best.values)
     for k, name in enumerate(best.values):
         up, down = outcomes[2 * k].cost, outcomes[2 * k + 1].cost
         steps = foot(down, best.outcome.cost, up)
-        moved[name] = _within(limits[name], best.values[name] * step**steps)
+        moved[name] = _clipped(within[name], best.values[name] * step**steps)
     together = Found(moved, bench.run(build(moved)))
     singly = (Found(v, o) for v, o in zip(tried, outcomes, strict=True))
     return min((best, together, *singly), key=lambda found: found.outcome.cost)
@@ -81,5 +96,5 @@ def foot(down: float, middle: float, up: float) -> float:
     return max(-FARTHEST, min(FARTHEST, 0.5 * (down - up) / bend))
 
 
-def _within(limits: tuple[float, float], value: float) -> float:
-    return min(max(value, limits[0]), limits[1])
+def _clipped(within: tuple[float, float], value: float) -> float:
+    return min(max(value, within[0]), within[1])

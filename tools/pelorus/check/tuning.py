@@ -11,7 +11,7 @@ halves of the drive, else the latter stays.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -23,14 +23,13 @@ from pelorus.check.parameters import (
     TWIST,
     Tuned,
     fewer_slots,
-    limits,
     merged,
     offset_settings,
     pooled,
     starting,
     written,
 )
-from pelorus.check.search import Found, search
+from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
 from pelorus.check.tracks_noise import TrackNoise, track_noise
 from pelorus.converters.twist_noise import difference_of_a_reading
 from pelorus.layout import Floats
@@ -39,11 +38,9 @@ WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
 PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
 SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
 ALIKE = 0.7  # cosine of the angle between them
-COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
 FINE = (1.3, 1.15)
 OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
 CLOCK = ("camera-offset", "twist-timing", "imu-timing")
-MIDDLES = {"start": 0.5, "mid": 0.0, "end": -0.5}  # of what a reading stands for, in readings
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
@@ -84,13 +81,13 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | fewer_slots(given)
-    values = _search(bench, rough | {LENGTH: COARSE_FRAMES}, start, COARSE).values
+    values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, start, TWIST, COARSE).values
     offset = clock.of_twists(bench, rough | written(values, TWIST))
     if offset.gain > PAYS:  # what a wrong clock does is no noise
         rough[OFFSET] = f"{offset.best_s:.6f}"
-        values = _search(bench, rough | {LENGTH: COARSE_FRAMES}, values, COARSE).values
+        values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
-    values = _search(bench, moved, values, (1.5, 1.25)).values
+    values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = _bias(bench, moved, values)
     fixed, found, of_clock = clocked(bench, fixed, values, given)
     found, of_axes = _axes(bench, fixed, found)
@@ -98,17 +95,6 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)
     said = [of_bias, of_clock, of_axes]
     return Tuned(settings, before, found.outcome, noise, said, offset_s, [of_clock])
-
-
-def _search(
-    bench: Bench,
-    side: Settings,
-    values: Mapping[str, float],
-    steps: Sequence[float],
-    what: str = "noise",
-) -> Found:
-    build = lambda v: {**side, **written(v, TWIST)}  # noqa: E731 - named where it is used
-    return search(bench, values, limits(values, TWIST), build, steps, what)
 
 
 # --- tracks that drift ----------------------------------------------------------------------------
@@ -237,7 +223,7 @@ def clocked(
             settings["twist-timing"] = others[best - 1]
             gain = ran[best].gain_over(ran[0])
             words = f"twist-timing is {others[best - 1]}, not {timing} (likelihood {gain:+.0f})"
-    return settings, _search(bench, settings, values, FINE), words
+    return settings, search_noises(bench, settings, values, TWIST, FINE), words
 
 
 def _moved(
@@ -247,7 +233,7 @@ def _moved(
     period_s = clock.seconds(bench.examined.twist_t_ns)
     near_s = max(3 * offset.sigma_s, 0.25 * period_s)
     for name in ("start", "end"):
-        as_far_s = (MIDDLES[timing] - MIDDLES[name]) * period_s
+        as_far_s = (clock.MIDDLES[timing] - clock.MIDDLES[name]) * period_s
         if name != timing and abs(offset.best_s - as_far_s) < near_s:
             words = f"twist-timing is {name}, not {timing} (likelihood {offset.gain:+.0f}), or the "
             words += f"camera's clock is {abs(as_far_s) * 1e3:.0f} ms off: one is like the other"
@@ -270,8 +256,10 @@ def _axes(bench: Bench, fixed: Settings, found: Found) -> tuple[Found, str]:
         for axis in AXES:
             key = f"{name}-{axis}"
             split[key] = found.values[key] if key in found.values else found.values[name]
-    rough = _search(bench, {**fixed, **fewer_slots(fixed)}, split, OF_AXES, "noise by axis")
-    result = _search(bench, fixed, rough.values, FINE[1:], "noise by axis")
+    rough = search_noises(
+        bench, {**fixed, **fewer_slots(fixed)}, split, TWIST, OF_AXES, "noise by axis"
+    )
+    result = search_noises(bench, fixed, rough.values, TWIST, FINE[1:], "noise by axis")
     said = []
     for name in ("velocity", "gyro"):
         alike = {k: v for k, v in result.values.items() if not k.startswith(name)}

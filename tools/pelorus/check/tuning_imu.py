@@ -9,7 +9,7 @@ both again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,26 +21,22 @@ from pelorus.check.parameters import (
     PAYS,
     PIXEL,
     WALKS,
-    Parameter,
     Tuned,
     fewer_slots,
-    limits,
     merged,
     offset_settings,
     starting,
     written,
 )
-from pelorus.check.search import Found, search
+from pelorus.check.search import COARSE, COARSE_FRAMES, search_noises
 from pelorus.check.tracks_noise import TrackNoise, track_noise
 
-COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"
 LOOSE = 10.0  # times the noises, while the clock is far off
 MIDDLE = (2.0, 2.0, 1.5)  # the whole drive with few landmarks, once the clock is about right
 FINE = (1.5, 1.2)
 WALK_STEPS = (4.0, 2.0)
 TOLD = 9.0  # 3 sigma, to either side
 TOLD_FACTOR = 3.0
-TIMINGS = {"start": 0.5, "mid": 0.0, "end": -0.5}  # the middle of what a reading stands for
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
@@ -57,12 +53,12 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     side |= written(walks, WALKS)
     values, offset = _roughly(bench, side, values)
     side[OFFSET] = f"{offset.best_s:.6f}"
-    values = _search(bench, side | fewer_slots(given), values, MIDDLE).values
+    values = search_noises(bench, side | fewer_slots(given), values, IMU, MIDDLE).values
     offset = clock.of_imu(bench, side | written(values, IMU), offset.best_s, clock.NEAR_STEPS)
     side, words = _clock(side | written(values, IMU), offset, given)
     said.append(words)
     side, words = _walks(bench, side, walks)
-    found = _search(bench, side, values, FINE)
+    found = search_noises(bench, side, values, IMU, FINE)
     said.append(words)
     side, outcome, words = _timing(bench, side | written(found.values, IMU), found.outcome, offset)
     said.append(words)
@@ -75,17 +71,6 @@ def _settings() -> set[str]:
     return {parameter.setting for parameter in (*IMU.values(), *WALKS.values())}
 
 
-def _search(
-    bench: Bench,
-    side: Settings,
-    values: Mapping[str, float],
-    steps: Sequence[float],
-    parameters: Mapping[str, Parameter] = IMU,
-) -> Found:
-    build = lambda v: {**side, **written(v, parameters)}  # noqa: E731 - named where it is used
-    return search(bench, values, limits(values, parameters), build, steps)
-
-
 # --- clock ----------------------------------------------------------------------------------------
 
 
@@ -96,14 +81,14 @@ def _roughly(
     clock with an IMU that is believed less: else nothing is a valley but its very foot.
     """
     short = {**side, **fewer_slots(side), LENGTH: COARSE_FRAMES}
-    coarse = _search(bench, short, values, COARSE).values
+    coarse = search_noises(bench, short, values, IMU, COARSE).values
     loose = {name: LOOSE * max(coarse[name], values[name]) for name in ("gyro", "accel")}
     loose["pixel"] = coarse["pixel"]
     rough = {**side, **fewer_slots(side), **written(loose, IMU)}
     offset = clock.of_imu(bench, rough, float(side[OFFSET]))
     if offset.gain > PAYS:
         short[OFFSET] = f"{offset.best_s:.6f}"
-        coarse = _search(bench, short, coarse, COARSE).values
+        coarse = search_noises(bench, short, coarse, IMU, COARSE).values
     else:
         offset = replace(offset, best_s=float(side[OFFSET]))
     return coarse, offset
@@ -141,9 +126,9 @@ def _timing(
         name: {
             **settings,
             "imu-timing": name,
-            OFFSET: f"{float(settings[OFFSET]) + (middle - TIMINGS[given]) * period_s:.6f}",
+            OFFSET: f"{float(settings[OFFSET]) + (middle - clock.MIDDLES[given]) * period_s:.6f}",
         }
-        for name, middle in TIMINGS.items()
+        for name, middle in clock.MIDDLES.items()
         if name != given
     }
     ran = dict(zip(tried, bench.run_all(list(tried.values()), "timing"), strict=True))
@@ -161,7 +146,7 @@ def _timing(
 def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[dict[str, str], str]:
     """How fast the biases wander, where the drive is long enough to tell."""
     quick = {**side, **fewer_slots(side)}
-    found = _search(bench, quick, given, WALK_STEPS, WALKS)
+    found = search_noises(bench, quick, given, WALKS, WALK_STEPS)
     kept = dict(given)
     words = []
     for name in WALKS:

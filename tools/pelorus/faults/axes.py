@@ -31,16 +31,20 @@ LETTERS = (("forward", "backward"), ("left", "right"), ("up", "down"))
 FORWARD_LEFT_UP_IN_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 
 
-def turns() -> list[Floats]:
-    """The 24 rotations that map axes to axes; identity first."""
+def ways() -> list[Floats]:
+    """The 48 matrices that permute axes and turn them round; identity first."""
     found: list[Floats] = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             F: Floats = np.zeros((3, 3))
             F[range(3), order] = signs
-            if np.linalg.det(F) > 0:
-                found.append(F)
+            found.append(F)
     return found
+
+
+def turns() -> list[Floats]:
+    """The 24 of them that are rotations."""
+    return [F for F in ways() if np.linalg.det(F) > 0]
 
 
 def mend(recording: Recording) -> tuple[Recording, Finding]:

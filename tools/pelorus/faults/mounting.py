@@ -12,11 +12,11 @@ d = b - F b, taken some frames beside, which has no part in the noise of this fr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations, product
 
 import numpy as np
 
 from pelorus import se3
+from pelorus.faults.axes import ways
 from pelorus.layout import Floats
 
 BESIDE = (1, 2)
@@ -26,17 +26,6 @@ BLOCKS = 40
 ROUNDS = 4
 SAMPLES_MIN = 50
 TILT_RAD, LEVER_M = 0.05, 1.0
-
-
-def ways() -> list[Floats]:
-    """The 48 matrices that permute axes and turn them round; identity first."""
-    found: list[Floats] = []
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            F: Floats = np.zeros((3, 3))
-            F[range(3), order] = signs
-            found.append(F)
-    return found
 
 
 @dataclass(frozen=True)

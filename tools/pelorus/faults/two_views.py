@@ -20,7 +20,7 @@ from pelorus.console import progress
 from pelorus.frames import Camera
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
-from pelorus.tracks import Indices, Tracks
+from pelorus.tracks import Indices, Tracks, sum_by_frame
 
 ROW_GAP_MAX_PX = 4.0  # a rectified pair shows a point in one row; more is a bad match
 ITERATIONS, WIDE_ITERATIONS = 8, 3
@@ -125,8 +125,8 @@ class _Solver:
         d2 = np.einsum("ni,nij,nj->n", e, W, e)
         weight = 1 / (1 + d2 / (3 * (accepts * self.sigma) ** 2)) ** 2
         JW = np.swapaxes(J, 1, 2) @ (W * weight[:, None, None])
-        self.H = self._by_frame(JW @ J) + RIDGE * np.eye(6)
-        g = self._by_frame(np.einsum("nij,nj->ni", JW, e))
+        self.H = sum_by_frame(frame, self._count, JW @ J) + RIDGE * np.eye(6)
+        g = sum_by_frame(frame, self._count, np.einsum("nij,nj->ni", JW, e))
         step = np.clip(np.linalg.solve(self.H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
         moved = se3.compose(se3.exp(step[:, :3], step[:, 3:]), Poses(self.R, self.p))
         self.R, self.p = moved
@@ -137,12 +137,3 @@ class _Solver:
         self.d2 = d2
         if len(d2):
             self.sigma = max(float(np.sqrt(np.median(d2) / CHI2_3_MEDIAN)), SIGMA_LEAST_PX)
-
-    def _by_frame(self, values: Floats) -> Floats:
-        counts = np.bincount(self._frame, minlength=self._count)
-        out = np.zeros((self._count, *values.shape[1:]))
-        filled = counts > 0
-        starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
-        if len(values):
-            out[filled] = np.add.reduceat(values, starts[filled], axis=0)
-        return out
