@@ -11,24 +11,16 @@
 /* Reads one named value that is not a row of the table. */
 typedef bool (*special_function)(setting_list *list, const char *value, char *problem);
 
-/* What was given for single axes of a setting that is now given for all of them. */
-static void forget_axes(setting_list *list, const plr_setting *whole) {
-    unsigned kept = 0;
-    for (unsigned i = 0; i < list->count; i++)
-        if (plr_setting_of_axis(plr_setting_by_id(list->settings[i].id)) != whole)
-            list->settings[kept++] = list->settings[i];
-    list->count = kept;
-}
-
+/* In the place of what was given before, for the setting or for single axes of it. */
 static void set_row(setting_list *list, const plr_setting *setting, double value) {
-    forget_axes(list, setting);
-    unsigned i = 0;
-    while (i < list->count && list->settings[i].id != setting->id)
-        i++;
-    list->settings[i].id = setting->id;
-    list->settings[i].value = value;
-    if (i == list->count)
-        list->count++;
+    unsigned kept = 0;
+    for (unsigned i = 0; i < list->count; i++) {
+        const plr_setting *old = plr_setting_by_id(list->settings[i].id);
+        if (old != setting && plr_setting_of_axis(old) != setting)
+            list->settings[kept++] = list->settings[i];
+    }
+    list->settings[kept] = (plr_wire_setting){.id = setting->id, .value = value};
+    list->count = kept + 1;
 }
 
 static void set(setting_list *list, const char *name, double value) {

@@ -87,17 +87,6 @@ plr_status plr_layers_compose(plr_config *config, const plr_layers *layers,
     return status == PLR_OK ? plr_config_check(config, culprit) : status;
 }
 
-/* What was wanted for single axes of a setting that is now wanted for all of them. */
-static void forget_axes(plr_config_message *wanted, const plr_setting *whole) {
-    uint8_t kept = 0;
-    for (unsigned i = 0; i < wanted->count; i++) {
-        const plr_setting *setting = plr_setting_by_id(wanted->settings[i].id);
-        if (plr_setting_of_axis(setting) != whole)
-            wanted->settings[kept++] = wanted->settings[i];
-    }
-    wanted->count = kept;
-}
-
 bool plr_layers_allow(const plr_wire_setting *values, unsigned count) {
     plr_config scratch;
     const plr_setting *culprit;
@@ -108,15 +97,17 @@ bool plr_layers_allow(const plr_wire_setting *values, unsigned count) {
 plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
     if (!plr_layers_allow(&value, 1))
         return PLR_E_CONFIG;
-    forget_axes(wanted, plr_setting_by_id(value.id));
-    unsigned i = 0;
-    while (i < wanted->count && wanted->settings[i].id != value.id)
-        i++;
-    if (i == PLR_WIRE_MAX_SETTINGS)
+    const plr_setting *setting = plr_setting_by_id(value.id);
+    uint8_t kept = 0;
+    for (unsigned i = 0; i < wanted->count; i++) { /* what is set anew goes, for one axis or all */
+        const plr_setting *old = plr_setting_by_id(wanted->settings[i].id);
+        if (old != setting && plr_setting_of_axis(old) != setting)
+            wanted->settings[kept++] = wanted->settings[i];
+    }
+    wanted->count = kept;
+    if (kept == PLR_WIRE_MAX_SETTINGS)
         return PLR_E_CONFIG;
-    wanted->settings[i] = value;
-    if (i == wanted->count)
-        wanted->count++;
+    wanted->settings[wanted->count++] = value;
     return PLR_OK;
 }
 

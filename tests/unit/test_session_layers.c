@@ -206,12 +206,12 @@ static void test_wanted_values_replace_each_other_and_bad_ones_change_nothing(vo
     want("pixel-sigma", 2);
     want("slots", 7);
     TEST_ASSERT_EQUAL_UINT8(2, wanted.count);
-    TEST_ASSERT_EQUAL_DOUBLE(7, wanted.settings[0].value);
+    TEST_ASSERT_EQUAL_DOUBLE(7, wanted.settings[1].value);
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_layers_want(&wanted, value("slots", 0)));
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_layers_want(&wanted, value("slots", (double)NAN)));
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_layers_want(&wanted, (plr_wire_setting){200, 1}));
     TEST_ASSERT_EQUAL_UINT8(2, wanted.count);
-    TEST_ASSERT_EQUAL_DOUBLE(7, wanted.settings[0].value);
+    TEST_ASSERT_EQUAL_DOUBLE(7, wanted.settings[1].value);
 }
 
 static void test_what_is_described_is_what_is_in_force(void) {
