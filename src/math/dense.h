@@ -59,15 +59,6 @@ static inline void plr_mat6_mul(plr_real C[PLR_POSE_SQUARE], const plr_real A[PL
                 PLR_POSE_DIM);
 }
 
-/* C = A B^T for 6x6; C may not be A or B */
-static inline void plr_mat6_mul_nt(plr_real C[PLR_POSE_SQUARE], const plr_real A[PLR_POSE_SQUARE],
-                                   const plr_real B[PLR_POSE_SQUARE]) {
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
-        C[i] = 0;
-    plr_gemm_nt(PLR_POSE_DIM, PLR_POSE_DIM, PLR_POSE_DIM, A, PLR_POSE_DIM, B, PLR_POSE_DIM, C,
-                PLR_POSE_DIM);
-}
-
 /* S = A P A^T for 6x6: P symmetric; S overlaps neither and comes out symmetric to the bit. */
 void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]);
 
