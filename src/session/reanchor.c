@@ -106,20 +106,25 @@ static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_send_text(s);
 }
 
-/* The last pose at t_ns, with what is then known of it. */
+/* The last pose, and what is known of it after so many seconds. */
+static plr_status last_pose(const plr_filter *f, double seconds, plr_pose *pose, double P[36]) {
+    const plr_status status = plr_filter_pose(f, pose);
+    return status == PLR_OK ? widen(P, f, seconds) : status;
+}
+
+static plr_status set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *pose, double P[36]) {
+    const plr_status status = plr_filter_set_pose(f, t_ns, pose, P);
+    if (status != PLR_E_ARGUMENT)
+        return status;
+    know_nothing(P);
+    return plr_filter_set_pose(f, t_ns, pose, P);
+}
+
 static plr_status carry_pose(plr_filter *f, plr_time_ns t_ns, double seconds) {
     plr_pose pose;
     double P[36];
-    plr_status status = plr_filter_pose(f, &pose);
-    if (status == PLR_OK)
-        status = widen(P, f, seconds);
-    if (status == PLR_OK)
-        status = plr_filter_set_pose(f, t_ns, &pose, P);
-    if (status == PLR_E_ARGUMENT) {
-        know_nothing(P);
-        status = plr_filter_set_pose(f, t_ns, &pose, P);
-    }
-    return status;
+    const plr_status status = last_pose(f, seconds, &pose, P);
+    return status == PLR_OK ? set_pose(f, t_ns, &pose, P) : status;
 }
 
 /* With an IMU tilt and velocity are lost too: the filter starts anew, with the last place and heading,
@@ -129,9 +134,7 @@ static plr_status start_anew(plr_session *s, plr_time_ns t_ns, double seconds) {
     const uint32_t resets = plr_send_resets(s);
     double P[36], bias[6], P_b[36], variance[6];
     plr_pose pose;
-    plr_status status = plr_filter_pose(f, &pose);
-    if (status == PLR_OK)
-        status = widen(P, f, seconds);
+    plr_status status = last_pose(f, seconds, &pose, P);
     if (status == PLR_OK)
         status = plr_filter_bias(f, bias, P_b);
     if (status == PLR_OK)
@@ -142,11 +145,7 @@ static plr_status start_anew(plr_session *s, plr_time_ns t_ns, double seconds) {
         variance[i] = P_b[7 * i];
     (void)plr_filter_set_bias(f, bias,
                               variance); /* those of a filter that diverged are not taken */
-    status = plr_filter_set_pose(f, t_ns, &pose, P);
-    if (status == PLR_E_ARGUMENT) {
-        know_nothing(P);
-        status = plr_filter_set_pose(f, t_ns, &pose, P);
-    }
+    status = set_pose(f, t_ns, &pose, P);
     plr_send_resets_become(s, resets + 1);
     return status;
 }
