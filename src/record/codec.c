@@ -13,6 +13,13 @@ void plr_codec_fail(plr_codec *c, plr_status status) {
         c->status = status;
 }
 
+bool plr_codec_take(void *context, uint8_t *bytes, unsigned n) {
+    const uint8_t **next = context;
+    memcpy(bytes, *next, n);
+    *next += n;
+    return true;
+}
+
 static void require(plr_codec *c, bool holds) {
     if (!holds)
         plr_codec_fail(c, PLR_E_ARGUMENT);

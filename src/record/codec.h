@@ -86,6 +86,9 @@ static inline bool plr_codec_reads(const plr_codec *c) {
 /* Records a fault, unless there was one before. */
 void plr_codec_fail(plr_codec *c, plr_status status);
 
+/* A plr_codec_move that reads: `context` points to a pointer to the next byte. */
+bool plr_codec_take(void *context, uint8_t *bytes, unsigned n);
+
 /* Passes n fields of a struct, in the order of the table. Only READ changes the struct. */
 void plr_codec_fields(plr_codec *c, void *object, const plr_field *fields, unsigned n);
 

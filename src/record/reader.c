@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <string.h>
-
 #include "pelorus/assertions.h"
 #include "record/bytes.h"
 #include "record/cobs.h"
@@ -31,14 +29,6 @@ static void count_missing(plr_reader *r, uint16_t sequence) {
     r->next_sequence = (uint16_t)(sequence + 1);
 }
 
-/* Takes the next n bytes of a payload. */
-static bool from_payload(void *context, uint8_t *bytes, unsigned n) {
-    const uint8_t **payload = context;
-    memcpy(bytes, *payload, n);
-    *payload += n;
-    return true;
-}
-
 /* The message of a body whose checksum is good. PLR_OK, or as plr_message_pass. */
 static plr_status decode(plr_reader *r, plr_message *message) {
     PLR_ASSERT(r->length >= PLR_WIRE_OVERHEAD && r->length <= r->buffer_size);
@@ -49,7 +39,7 @@ static plr_status decode(plr_reader *r, plr_message *message) {
     const uint8_t *payload = r->buffer + AT_PAYLOAD;
     const plr_observation_room room = {r->observations, r->max_observations};
     plr_codec codec = {.direction = PLR_CODEC_READ,
-                       .move = from_payload,
+                       .move = plr_codec_take,
                        .context = &payload,
                        .left = r->length - PLR_WIRE_OVERHEAD};
     message->kind = (plr_kind)r->buffer[0];

@@ -29,17 +29,10 @@ static const plr_field header_fields[] = {
 
 enum { STORE_VERSION = 1, OWN_CRC = PLR_STORE_HEADER - 4 /* where the last field begins */ };
 
-/* Moves the next bytes of a header that is written or read. */
+/* Moves the next bytes of a header that is written. */
 static bool to_header(void *context, uint8_t *bytes, unsigned n) {
     uint8_t **at = context;
     memcpy(*at, bytes, n);
-    *at += n;
-    return true;
-}
-
-static bool from_header(void *context, uint8_t *bytes, unsigned n) {
-    const uint8_t **at = context;
-    memcpy(bytes, *at, n);
     *at += n;
     return true;
 }
@@ -63,8 +56,10 @@ static void write_header(uint8_t bytes[PLR_STORE_HEADER], slot_header header) {
  * PLR_E_FOREIGN of another version: only the generation means something. */
 static plr_status read_header(const uint8_t bytes[PLR_STORE_HEADER], slot_header *header) {
     const uint8_t *at = bytes;
-    plr_codec codec = {
-        .direction = PLR_CODEC_READ, .move = from_header, .context = &at, .left = PLR_STORE_HEADER};
+    plr_codec codec = {.direction = PLR_CODEC_READ,
+                       .move = plr_codec_take,
+                       .context = &at,
+                       .left = PLR_STORE_HEADER};
     memset(header, 0, sizeof *header);
     pass_header(&codec, header);
     if (header->magic != SLOT_MAGIC)
