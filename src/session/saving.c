@@ -135,7 +135,7 @@ static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_vari
 
 /* The restored state is the start: nothing that came before it sets the pose. */
 static void start_from_state(plr_session *s, plr_phase_event event) {
-    plr_send_resets_from_here(s);
+    plr_send_resets_become(s, 0);
     s->start_pending = false;
     plr_phase_change(&s->phase, event);
     plr_clock_watch_init(&s->watch);

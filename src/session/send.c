@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "session/layers.h"
+#include "session/line.h"
 
 static void put(plr_session *s, uint32_t bit, const plr_message *message) {
     if (s->port.write == NULL || (s->options.output & bit) == 0)
@@ -64,10 +65,6 @@ static bool describe_pose(plr_pose_message *pose, const plr_filter *f, bool afte
 static uint32_t resets(const plr_filter *f) {
     plr_totals totals;
     return plr_filter_totals(f, &totals) == PLR_OK ? totals.resets + totals.widened : 0;
-}
-
-void plr_send_resets_from_here(plr_session *s) {
-    plr_send_resets_become(s, 0);
 }
 
 uint32_t plr_send_resets(const plr_session *s) {
@@ -153,6 +150,12 @@ void plr_send_text(plr_session *s) {
     put(s, PLR_OUTPUT_TEXT, &s->out);
     if (s->options.observer.text != NULL)
         s->options.observer.text(s->options.observer.context, &s->out.as.text);
+}
+
+void plr_send_words(plr_session *s, plr_severity severity, const char *words) {
+    plr_line_begin(&s->out.as.text, severity);
+    plr_line_text(&s->out.as.text, words);
+    plr_send_text(s);
 }
 
 void plr_send_describe_end(const plr_session *s, plr_end *end) {

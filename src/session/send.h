@@ -17,9 +17,6 @@ void plr_send_config(plr_session *s);
  * there is none. */
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 
-/* Sets the reset_count of a POSE to 0. */
-void plr_send_resets_from_here(plr_session *s);
-
 /* reset_count of POSE, before it is cut to 16 bits; and to make it another number. */
 uint32_t plr_send_resets(const plr_session *s);
 void plr_send_resets_become(plr_session *s, uint32_t number);
@@ -44,6 +41,9 @@ void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmar
 
 /* Sends the text in s->out.as.text, which was built with session/line.h. */
 void plr_send_text(plr_session *s);
+
+/* Sends one whole text. */
+void plr_send_words(plr_session *s, plr_severity severity, const char *words);
 
 /* Fills in `differs` and `arrived`: the kinds of which another number of messages arrived in this
  * drive than the END that was just received says. */

@@ -77,12 +77,6 @@ void plr_start_begin(plr_session *s) {
     plr_phase_change(&s->phase, PLR_EVENT_HEADER);
 }
 
-static void say(plr_session *s, plr_severity severity, const char *text) {
-    plr_line_begin(&s->out.as.text, severity);
-    plr_line_text(&s->out.as.text, text);
-    plr_send_text(s);
-}
-
 static void report_setting(plr_session *s, plr_wire_setting given, const plr_setting *setting) {
     plr_text *line = &s->out.as.text;
     plr_line_begin(line, PLR_SEVERITY_WARNING);
@@ -114,7 +108,8 @@ void plr_start_change_settings(plr_session *s) {
         report_setting(s, config->settings[i], setting);
     }
     if (config->build_fingerprint != 0 && config->build_fingerprint != plr_build_fingerprint())
-        say(s, PLR_SEVERITY_INFO,
+        plr_send_words(
+            s, PLR_SEVERITY_INFO,
             "this log comes from another build (precision, capacity or version): the settings are "
             "taken, the bits may differ");
 }
@@ -155,11 +150,13 @@ static bool asks_for_known(const plr_config *config) {
 static void warn_about(plr_session *s, const plr_config *config) {
     if (config->model == PLR_MODEL_WORLD && sizeof(plr_real) == sizeof(float) &&
         config->mode != PLR_MODE_DEAD_RECKONING && config->mode != PLR_MODE_MAPPING)
-        say(s, PLR_SEVERITY_WARNING,
+        plr_send_words(
+            s, PLR_SEVERITY_WARNING,
             "model = world breaks down in float32 if points are far (max-depth helps), the "
             "start is uncertain or the drive is long: take the float64 build, or model = body");
     if (asks_for_known(config) && s->known.count == 0)
-        say(s, PLR_SEVERITY_WARNING,
+        plr_send_words(
+            s, PLR_SEVERITY_WARNING,
             "known landmarks are asked for, and none was given: LANDMARK (known) must come "
             "before the data");
 }
@@ -219,7 +216,7 @@ plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns
     }
     plr_clock_watch_init(&s->watch);
     if (s->phase == PLR_PHASE_STARTING)
-        plr_send_resets_from_here(s);
+        plr_send_resets_become(s, 0);
     plr_phase_change(&s->phase, PLR_EVENT_POSE);
     return PLR_OK;
 }

@@ -35,15 +35,13 @@ static void refuse_other(plr_session *s, plr_kind kind, plr_time_ns t_ns) {
     if (s->totals.other_process++ > 0)
         return;
     plr_send_refusal(s, kind, t_ns, PLR_E_MODE, plr_setting_by_name("process"));
-    plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING);
-    plr_line_text(
-        &s->out.as.text,
+    plr_send_words(
+        s, PLR_SEVERITY_WARNING,
         kind == PLR_KIND_IMU
             ? "IMU readings come, and the setting process is twist: none of them is used. "
               "Set process = imu, or let the HEADER say so"
             : "TWISTs come, and the setting process is imu: none of them is used. Send "
               "measured speeds as READINGs of a wheel, or set process = twist");
-    plr_send_text(s);
 }
 
 /* Each fault of the IMU is told once in a drive. */
