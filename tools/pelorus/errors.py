@@ -21,16 +21,27 @@ def writing(path: Path) -> Iterator[None]:
         raise PelorusError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
+@contextmanager
+def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
+    """Where to write files that shall be whole: they get their names when all are written, and if
+    that fails nothing of them is left behind.
+    """
+    parts = tuple(path.with_name(path.name + ".part") for path in paths)
+    try:
+        yield parts
+        for path, part in zip(paths, parts, strict=True):
+            with writing(path):
+                part.replace(path)
+    finally:  # after a good end they have their own names
+        for part in parts:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+
+
 def write_text(path: Path, text: str) -> None:
     """The whole file, or nothing of it."""
-    part = path.with_name(path.name + ".part")
-    try:
-        with writing(path):
-            part.write_text(text, encoding="utf-8")
-            part.replace(path)
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+    with whole(path) as (part,), writing(path):
+        part.write_text(text, encoding="utf-8")
 
 
 def made(folder: Path) -> Path:

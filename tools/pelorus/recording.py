@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 
 from pelorus import inertial, motion, packed_file, se3
 from pelorus.console import progress
-from pelorus.errors import PelorusError, writing
+from pelorus.errors import PelorusError, whole, writing
 from pelorus.frames import (
     IMU_READINGS_MAX,
     Header,
@@ -151,20 +151,17 @@ class Recording:
     def write(self, path: Path) -> int:
         """Write the whole file; its size in bytes. Nothing is left behind if that fails."""
         self._check(path)
-        part = path.with_name(path.name + ".part")
-        try:
-            with writing(path):
-                with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
-                    writer = Writer(stream)
-                    for message in progress(self.messages(), "writing", len(self)):
-                        writer.write(message)
-                    writer.end()
-                size = part.stat().st_size
-                part.replace(path)
-        finally:  # after a good end it has its own name
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-        return size
+        packed = packed_file.is_packed(path)
+        with (
+            whole(path) as (part,),
+            writing(path),
+            closing(packed_file.create(part, packed)) as stream,
+        ):
+            writer = Writer(stream)
+            for message in progress(self.messages(), "writing", len(self)):
+                writer.write(message)
+            writer.end()
+        return path.stat().st_size
 
     def _check(self, path: Path) -> None:
         for name, times in (

@@ -16,7 +16,7 @@ from rich.markup import escape
 
 from pelorus import packed_file
 from pelorus.console import err, waiting
-from pelorus.errors import PelorusError, writing
+from pelorus.errors import PelorusError, write_text, writing
 from pelorus.frames import Kind, Message, Pose
 from pelorus.wire import Writer, messages_of
 
@@ -77,8 +77,7 @@ def replay(
         summary = json.loads(stdout)
     except json.JSONDecodeError as error:
         raise PelorusError(f"{program}: its summary is no JSON: {error}") from error
-    with writing(outputs.summary):
-        outputs.summary.write_text(stdout, encoding="utf-8")
+    write_text(outputs.summary, stdout)
     return summary, [line for line in stderr.splitlines() if line.strip()]
 
 

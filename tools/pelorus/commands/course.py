@@ -14,7 +14,7 @@ from rich.table import Table
 from pelorus import road
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
-from pelorus.errors import PelorusError, made, writing
+from pelorus.errors import PelorusError, made, write_text
 from pelorus.packed_file import bare_name
 from pelorus.replay import find_programs
 from pelorus.report.results import Subject, read_subject
@@ -143,8 +143,7 @@ def _publish(trials: list[Trial], folder: Path) -> None:
     text = table.markdown(trials)
     style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)
     style.save(lambda: pictures.figure_2(trials), folder / FIGURE_2)
-    with writing(folder / TABLE):
-        (folder / TABLE).write_text(text, encoding="utf-8")
+    write_text(folder / TABLE, text)
     shown = Table(box=None, pad_edge=False)
     for k, title in enumerate(table.TITLES[: -table.TRACES]):
         shown.add_column(title, justify="left" if k < 2 else "right", no_wrap=k < 2)

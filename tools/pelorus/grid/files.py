@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus.errors import writing
+from pelorus.errors import whole, writing
 from pelorus.grid.occupancy import Band, Grid
 
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.25
@@ -74,15 +74,8 @@ def write(folder: Path, grid: Grid, draw: Callable[[Path], None]) -> None:
         PICTURE: draw,
         TEXT: lambda path: path.write_text(text(grid), encoding="ascii"),  # names the image: last
     }
-    parts = {name: folder / f"{name}.part" for name in makers}
-    try:
-        with writing(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            for name, make in makers.items():
-                make(parts[name])
-            for name, part in parts.items():
-                part.replace(folder / name)
-    finally:
-        for part in parts.values():
-            if part.is_file():
-                part.unlink(missing_ok=True)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with whole(*(folder / name for name in makers)) as parts:
+            for make, part in zip(makers.values(), parts, strict=True):
+                make(part)

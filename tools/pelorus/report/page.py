@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from pelorus.errors import writing
+from pelorus.errors import write_text
 from pelorus.report import words
 from pelorus.report.comparison import Comparison
 from pelorus.report.pictures import Picture
@@ -58,8 +58,7 @@ def write(
         _commands(compared.runs),
         "</body>\n</html>\n",
     ]
-    with writing(path):
-        path.write_text("\n".join(parts), encoding="utf-8")
+    write_text(path, "\n".join(parts))
 
 
 def _facts(compared: Comparison) -> str:

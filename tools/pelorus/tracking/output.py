@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
-from pelorus.errors import writing
+from pelorus.errors import whole, writing
 from pelorus.motion import Times
 from pelorus.tracks import Tracks
 
@@ -22,18 +21,10 @@ def csv_text(t_ns: Times, tracks: Tracks) -> str:
 
 
 def write_all(files: Mapping[Path, bytes]) -> None:
-    """All of them whole, or none of them anew: they get their names when all are written."""
-    parts = {path: path.with_name(path.name + ".part") for path in files}
-    try:
-        for path, part in parts.items():
+    """All of them whole, or none of them anew."""
+    with whole(*files) as parts:
+        for (path, content), part in zip(files.items(), parts, strict=True):
             with writing(path):
                 if path.is_dir():
                     raise IsADirectoryError(21, "is a folder")
-                part.write_bytes(files[path])
-        for path, part in parts.items():
-            with writing(path):
-                part.replace(path)
-    finally:
-        for part in parts.values():
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
+                part.write_bytes(content)
