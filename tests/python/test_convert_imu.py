@@ -225,7 +225,7 @@ BAD = [
     ({"calib": {"fx": None}}, "calib: lacks fx"),
     ({"calib": {"fx": "wide"}}, "calib: fx is 'wide'"),
     ({"calib": {"fx": -1}}, "must be positive"),
-    ({"calib": {"T_imu_cam0": [1, 2]}}, "calib: T_imu_cam0 is [1, 2]; 4 x 4 numbers"),
+    ({"calib": {"T_imu_cam0": [1, 2]}}, "calib: T_imu_cam0 is [1, 2]; 4 x 4 finite numbers"),
     ({"calib": {"T_imu_cam0": np.zeros((4, 4)).tolist()}}, "T_imu_cam0 is no rotation"),
     ({"calib": {"baseline_m": 0.5}}, "that of a rectified pair is due, baseline_m = 0.5"),
     ({"calib": {"gravity_world": [0, 9.81, 0]}}, "z of the world is up"),

@@ -265,7 +265,7 @@ def harmed(content: dict[str, Any], camera: str, **changes: Any) -> dict[str, An
         (
             "cam0",
             {"intrinsics": [1, 2, 3]},
-            "cam0: intrinsics is [1, 2, 3]; an array of shape (4,)",
+            "cam0: intrinsics is [1, 2, 3]; 4 finite numbers are due",
         ),
         ("cam0", {"intrinsics": [-1.0, 2, 3, 4]}, "[fx, fy, cx, cy] in px is due"),
         ("cam1", {"distortion_model": "fov"}, "none or radtan or"),

@@ -42,8 +42,9 @@ class Named:
         value = self.get(name)
         array = as_numbers(value)
         if array is None or array.shape != shape or not sane(array):
-            due = f"an array of shape {shape} of finite numbers" if shape else "a finite number"
-            raise self.error(name, value, f"{due} is due")
+            size = " x ".join(map(str, shape))
+            due = f"{size} finite numbers are due" if shape else "a finite number is due"
+            raise self.error(name, value, due)
         return array
 
     def number(self, name: str) -> float:

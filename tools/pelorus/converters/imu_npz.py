@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,7 @@ from pelorus.frames import (
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats, pack_symmetric
 from pelorus.motion import Times
+from pelorus.named import Named
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
@@ -106,7 +107,7 @@ def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
 def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, imu_noise.TrueMotion]:
     """The file as it is, and what it tells of the true motion."""
     file = arrays.read_npz(source)
-    calib = _Calib(source, foreign.json_words(source, file.words("calib")))
+    calib = _Calib(source, foreign.json_words(source, file.words("calib")), "calib")
     readings = _readings(file)
     init = file.get("init", shape=(17,))
     begin_ns = _start_time(source, float(init[0]), readings.t_ns)
@@ -270,57 +271,35 @@ NOISES = {  # in a HEADER, and in calib
 }
 
 
-class _Calib:
-    def __init__(self, path: Path, content: dict[str, Any]) -> None:
-        self.path = path
-        self.content = content
-
+class _Calib(Named):
     def header(self, name: str) -> Header:
         fx, fy, cx, cy, baseline = (
-            self._number(key) for key in ("fx", "fy", "cx", "cy", "baseline_m")
+            self.number(key) for key in ("fx", "fy", "cx", "cy", "baseline_m")
         )
         T_CB = se3.inverse(self._extrinsic(baseline))
-        if self._number("cam_imu_time_offset_s", 0.0):
-            raise self._error("cam_imu_time_offset_s", "0 is due: times on one clock")
+        if self._number_or_0("cam_imu_time_offset_s"):
+            raise self._wrong("cam_imu_time_offset_s", "0 is due: times on one clock")
         return Header(
             arrays.camera_of(self.path, fx, fy, cx, cy, baseline),
             T_CB.R,
             T_CB.p,
             body_axes=body_axes(T_CB.R),
             twist_timing=TwistTiming.MID,
-            image_width_px=int(self._number("width", 0.0)),
-            image_height_px=int(self._number("height", 0.0)),
+            image_width_px=int(self._number_or_0("width")),
+            image_height_px=int(self._number_or_0("height")),
             noise=Noise(gravity=self._gravity(), **self._noises()),
             name=header_name(name),
             process=Process.IMU,
         )
 
-    def _error(self, key: str, due: str) -> ForeignFileError:
-        return ForeignFileError(self.path, f"{key} is {self.content[key]!r}", at="calib", due=due)
+    def _wrong(self, key: str, due: str) -> ForeignFileError:
+        return self.error(key, self.get(key), due)
 
-    def _number(self, key: str, standard: float | None = None) -> float:
-        value = self._value(key) if standard is None else self.content.get(key, standard)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self._error(key, "a number is due")
-        return float(value)
-
-    def _value(self, key: str) -> Any:
-        if key not in self.content:
-            there = ", ".join(self.content) or "none"
-            raise ForeignFileError(self.path, f"lacks {key}", at="calib", due=f"there are: {there}")
-        return self.content[key]
-
-    def _array(self, key: str, *shape: int) -> Floats:
-        try:
-            array = np.array(self._value(key), dtype=np.float64)
-        except (TypeError, ValueError):
-            array = np.array(np.nan)
-        if array.shape != shape or not np.isfinite(array).all():
-            raise self._error(key, f"{' x '.join(map(str, shape))} numbers are due")
-        return array
+    def _number_or_0(self, key: str) -> float:
+        return self.number(key) if key in self else 0.0
 
     def _pose(self, key: str) -> Poses:
-        matrix = self._array(key, 4, 4)
+        matrix = self.array(key, 4, 4)
         return Poses(arrays.rotation(self.path, f"calib: {key}", matrix[:3, :3]), matrix[:3, 3])
 
     def _extrinsic(self, baseline: float) -> Poses:
@@ -333,7 +312,7 @@ class _Calib:
                 float(np.abs(right.p - [baseline, 0.0, 0.0]).max()),
             )
             if off > ALIGNED_M:
-                raise self._error(
+                raise self._wrong(
                     "T_imu_cam1",
                     f"that of a rectified pair is due, baseline_m = {baseline:g} to the right of "
                     "T_imu_cam0",
@@ -342,14 +321,14 @@ class _Calib:
 
     def _gravity(self) -> float:
         """Its size; it must point down the world's z."""
-        g = self._array("gravity_world", 3)
+        g = self.array("gravity_world", 3)
         if not g[2] < 0 or np.abs(g[:2]).max() > GRAVITY_TILT:
-            raise self._error("gravity_world", "(0, 0, -9.81) or so is due: z of the world is up")
+            raise self._wrong("gravity_world", "(0, 0, -9.81) or so is due: z of the world is up")
         return float(-g[2])
 
     def _noises(self) -> dict[str, float]:
-        found = {name: self._number(key) for name, key in NOISES.items()}
+        found = {name: self.number(key) for name, key in NOISES.items()}
         for name, sigma in found.items():
             if not sigma > 0:
-                raise self._error(NOISES[name], "a positive number is due")
+                raise self._wrong(NOISES[name], "a positive number is due")
         return found
