@@ -21,7 +21,7 @@ from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.streams import Streams, Twists
+from pelorus.converters.streams import Streams
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.rig.lens import LensModel
@@ -204,12 +204,5 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> r
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
     for remark in found.remarks:
         out.print(escape(remark))
-    recording = streams.recording(found)
     timing = usual if asked.timing is None else asked.timing
-    if timing is not None:
-        recording = recording.with_header(twist_timing=timing)
-    if not asked.fix:
-        write(recording, [], target)
-        return
-    whole = isinstance(found.motion, Twists) and found.motion.is_whole
-    write(*streams.examined(recording, whole), target)
+    write(*streams.converted(found, timing, asked.fix), target)

@@ -85,14 +85,7 @@ def convert(
 
     `readings` are the files of small sensors, by name.
     """
-    found = read(sources, readings or {}, twist_timing)
-    recording = streams.recording(found)
-    if twist_timing is not None:
-        recording = recording.with_header(twist_timing=twist_timing)
-    if not fix:
-        return recording, []
-    whole = isinstance(found.motion, Twists) and found.motion.is_whole
-    return streams.examined(recording, whole)
+    return streams.converted(read(sources, readings or {}, twist_timing), twist_timing, fix)
 
 
 def read(

@@ -114,14 +114,20 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     return made.with_truth(*_at_frames(streams.truth, t_ns))
 
 
-def examined(made: Recording, whole_twists: bool = True) -> tuple[Recording, list[Finding]]:
-    """Mended as far as its own data tell, and the twists' noise measured.
+def converted(
+    found: Streams, timing: TwistTiming | None, fix: bool
+) -> tuple[Recording, list[Finding]]:
+    """The recording; if asked mended as far as its own data tell, and the twists' noise measured.
 
-    Without all six velocities only the tracks can be judged, without twists nothing.
+    `timing` overrides the calibration's. Without all six velocities only the tracks can be judged,
+    without twists nothing.
     """
-    if not len(made.twist_t_ns):
+    made = recording(found)
+    if timing is not None:
+        made = made.with_header(twist_timing=timing)
+    if not fix or not isinstance(found.motion, Twists):
         return made, []
-    if not whole_twists:
+    if not found.motion.is_whole:
         made, finding = stale.mend(made)
         return made, [finding]
     given = made
