@@ -179,8 +179,7 @@ def rigid_fit(source: Floats, target: Floats) -> Poses:
     Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991.
     """
     middle_source, middle_target = source.mean(axis=0), target.mean(axis=0)
-    u, _, vt = np.linalg.svd((target - middle_target).T @ (source - middle_source))
-    R = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    R = se3.nearest_rotation((target - middle_target).T @ (source - middle_source))
     return Poses(R, middle_target - R @ middle_source)
 
 
@@ -196,8 +195,6 @@ def path_m(poses: Poses) -> float:
 
 
 # --- maps -----------------------------------------------------------------------------------------
-
-UNMOVED = Poses(np.eye(3), np.zeros(3))
 
 
 def made_in(messages: Sequence[Message]) -> list[Landmark]:
@@ -217,7 +214,9 @@ def sigmas_m(landmarks: Sequence[Landmark]) -> Floats:
     return np.asarray(np.sqrt(np.trace(unpack_symmetric(packed, 3), axis1=1, axis2=2) / 3))
 
 
-def map_figures(made: Sequence[Landmark], known: Sequence[Landmark], A: Poses = UNMOVED) -> Figures:
+def map_figures(
+    made: Sequence[Landmark], known: Sequence[Landmark], A: Poses = se3.IDENTITY
+) -> Figures:
     """A filter's landmarks against known ones, which A brings to its world."""
     places = {landmark.id: landmark.p_W_m for landmark in known}
     mine = [m for m in made if m.id in places]
@@ -297,5 +296,5 @@ def judge(
         figures |= inertial_evaluation.figures(
             messages, truths or messages, accuracy.t_ns, accuracy.error, accuracy.P
         )
-    A = accuracy.A if accuracy else UNMOVED
+    A = accuracy.A if accuracy else se3.IDENTITY
     return figures | map_figures(_found_by_itself(messages), known or known_in(messages), A)

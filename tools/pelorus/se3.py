@@ -28,6 +28,9 @@ class Poses(NamedTuple):
         return Poses(self.R[index], self.p[index])
 
 
+IDENTITY = Poses(np.eye(3), np.zeros(3))
+
+
 def skew(x: ArrayLike) -> Floats:
     """[x]x, (..., 3) -> (..., 3, 3)."""
     x = np.asarray(x, float)

@@ -106,12 +106,9 @@ def _require_places(target: Path, sheet_file: Path | None) -> None:
 
 
 def _read(pairs: list[Pair], shown: dict[int, Gray]) -> Iterator[tuple[Gray, Gray]]:
-    """Pair by pair, all of the first one's size; the left pictures of the sheet stay in `shown`."""
+    """Pair by pair; the left pictures of the sheet stay in `shown`."""
     wanted = set(sheet.chosen(len(pairs)))
-    shape = None
-    for k, pair in enumerate(progress(pairs, "tracking", len(pairs))):
-        left, right = images.read(pair, shape)
-        shape = left.shape
+    for k, (left, right) in enumerate(images.in_order(progress(pairs, "tracking", len(pairs)))):
         if k in wanted:
             shown[k] = left
         yield left, right

@@ -8,7 +8,7 @@ mav0/state_groundtruth_estimate0 or mocap0    data.csv (ns, position, quaternion
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +25,6 @@ from pelorus.named import Named
 from pelorus.rig import kalibr
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rectification import Gray
 from pelorus.rig.rig import rigid
 from pelorus.se3 import Poses
 from pelorus.tracking import images
@@ -126,15 +125,8 @@ def _pictures(top: Path, ordered: Sequence[str]) -> tuple[Pictures, list[str]]:
     if len(both) < images.PAIRS_MIN:
         raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are due")
     pairs = [Pair(left[t], right[t]) for t in both]
-
-    def pixels() -> Iterator[tuple[Gray, Gray]]:
-        shape = None
-        for pair in pairs:
-            first, second = images.read(pair, shape)
-            shape = first.shape
-            yield first, second
-
-    return Pictures(where, np.array(both, np.int64), pixels), [str(t) for t in alone]
+    t_ns = np.array(both, np.int64)
+    return Pictures(where, t_ns, lambda: images.in_order(pairs)), [str(t) for t in alone]
 
 
 def _listed(camera: Path) -> dict[int, Path]:
@@ -195,6 +187,5 @@ def _truth(top: Path, body_of_imu: Poses | None) -> Trajectory | None:
         return None
     t_ns, poses = trajectory.read_stamped(folder / "data.csv")
     T_BS, T_BI = _of_body(folder), body_of_imu
-    identity = Poses(np.eye(3), np.zeros(3))
-    T_SI = se3.compose(se3.inverse(T_BS or identity), T_BI or identity)
+    T_SI = se3.compose(se3.inverse(T_BS or se3.IDENTITY), T_BI or se3.IDENTITY)
     return Trajectory(t_ns, se3.compose(poses, T_SI))

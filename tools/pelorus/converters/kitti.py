@@ -7,7 +7,7 @@ odometry   sequences/NN/image_0, image_1 (or 2, 3), calib.txt, times.txt; poses/
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,7 +27,6 @@ from pelorus.motion import Times
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated
-from pelorus.rig.rectification import Gray
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 from pelorus.tracking import images
@@ -249,14 +248,8 @@ def _calibrated(folder: Path, rig: Rig, asked: Asked) -> Calibrated:
 
 
 def _pictures(pairs: list[images.Pair], t_ns: Times) -> Pictures:
-    def pixels() -> Iterator[tuple[Gray, Gray]]:
-        shape = None
-        for pair in pairs:
-            left, right = images.read(pair, shape)
-            shape = left.shape
-            yield left, right
-
-    return Pictures((pairs[0].left.parent, pairs[0].right.parent), t_ns, pixels)
+    where = pairs[0].left.parent, pairs[0].right.parent
+    return Pictures(where, t_ns, lambda: images.in_order(pairs))
 
 
 def _shift(P: Floats) -> Poses:

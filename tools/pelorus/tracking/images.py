@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -139,6 +140,15 @@ def read(pair: Pair, shape: tuple[int, ...] | None = None) -> tuple[Gray, Gray]:
     right = gray(pair.right)
     _require_shape(pair.right, right, due, "the left ones have")
     return left, right
+
+
+def in_order(found: Iterable[Pair]) -> Iterator[tuple[Gray, Gray]]:
+    """Pair by pair, all of the first one's size."""
+    shape = None
+    for pair in found:
+        left, right = read(pair, shape)
+        shape = left.shape
+        yield left, right
 
 
 def _require_shape(path: Path, image: Gray, due: tuple[int, ...], who: str) -> None:
