@@ -17,7 +17,7 @@ from pelorus.cli import main
 from pelorus.converters import ece276a
 from pelorus.frames import Message
 from pelorus.robot import stream
-from replay_drive import BIN, drive, encode
+from replay_drive import BIN, Record, drive, encode, recorder
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
@@ -36,6 +36,11 @@ class Said(NamedTuple):
     status: int
     out: str
     err: str
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Record:
+    return recorder(tmp_path)
 
 
 @pytest.fixture

@@ -34,17 +34,10 @@ from replay_drive import (
     known,
     log_of,
     poses_of,
-    recorder,
     run,
     t_ns,
     true_pose,
 )
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
-
 
 # --- results --------------------------------------------------------------------------------------
 

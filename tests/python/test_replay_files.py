@@ -37,7 +37,6 @@ from replay_drive import (
     later,
     log_of,
     poses_of,
-    recorder,
     run,
     stereo,
     t_ns,
@@ -46,11 +45,6 @@ from replay_drive import (
 )
 
 FROZEN_IMAGE = 1 << 16  # plr_reason
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 # --- files that are no recordings -----------------------------------------------------------------

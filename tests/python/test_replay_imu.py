@@ -21,7 +21,6 @@ from replay_drive import (
     header,
     judged,
     log_of,
-    recorder,
     run,
     stereo,
     t_ns,
@@ -32,11 +31,6 @@ from replay_drive import (
 
 BATCH, PERIOD_NS = 10, 10_000_000
 OFFSET_NS = 30_000_000
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 def readings(k: int) -> Imu:

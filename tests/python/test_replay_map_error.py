@@ -22,17 +22,11 @@ from replay_drive import (
     known,
     log_of,
     points,
-    recorder,
     run,
 )
 
 SLOTS = ("--slots", "256", "--bias", "off", "--pixel-sigma", "0.5", "--gate", "off")
 MAPPING = (*SLOTS, "--mode", "mapping")
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 def with_known(frames: int, change: Callable[[Landmark], Landmark] = lambda m: m) -> list[Message]:

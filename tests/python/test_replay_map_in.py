@@ -22,7 +22,6 @@ from replay_drive import (
     known,
     log_of,
     poses_of,
-    recorder,
     run,
     stereo,
     truth,
@@ -33,11 +32,6 @@ HALF = 320  # steps: once round the circle
 SLOTS = ("--slots", "256")
 LOCALIZE = (*SLOTS, "--mode", "localization")
 ROUND = np.array([1.0, 0, 1, 0, 0, 1])  # 1 m^2 along each axis
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 def half(first: int) -> list[Message]:

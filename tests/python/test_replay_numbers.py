@@ -29,16 +29,9 @@ from replay_drive import (
     header,
     known,
     poses_of,
-    recorder,
     run,
     t_ns,
 )
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
-
 
 STRANGE = (math.nan, math.inf, -math.inf, 1e300, -1e300)
 

@@ -23,7 +23,6 @@ from replay_drive import (
     later,
     log_of,
     poses_of,
-    recorder,
     run,
     stereo,
     t_ns,
@@ -33,11 +32,6 @@ from replay_drive import (
 
 CUT = 17
 FOREIGN, MODE = -16, -9  # plr_status
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 @pytest.fixture

@@ -9,15 +9,10 @@ from pathlib import Path
 
 import pytest
 from pelorus import packed_file
-from replay_drive import BIN, OK, RECORDING, Record, bits_of, drive, recorder, run
+from replay_drive import BIN, OK, RECORDING, Record, bits_of, drive, run
 
 ZSTD = shutil.which("zstd")
 pytestmark = pytest.mark.skipif(ZSTD is None, reason="the program zstd is not here")
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 def zstd(*arguments: str | Path, stdin: bytes = b"") -> bytes:

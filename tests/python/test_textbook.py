@@ -21,7 +21,6 @@ from replay_drive import (
     judged,
     known,
     log_of,
-    recorder,
     run,
     t_ns,
 )
@@ -29,11 +28,6 @@ from replay_drive import (
 TEXTBOOK = "pelorus-textbook"
 MEMORY = 5
 COURSE = ("--preset", "course")
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    return recorder(tmp_path)
 
 
 def textbook(*arguments: str | Path, stdin: bytes = b"") -> Result:
