@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: MIT
 /* P stays symmetric and positive through thousands of random frames: turns, outliers, evictions,
  * budgets, pauses. (Packed, P cannot be but symmetric; what comes out of it is looked at.) */
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <unity.h>
 
 #include "state/covariance.h"
-#include "support/matrices.h"
-#include "support/oracle.h"
 #include "support/rig.h"
-#include "support/specimens.h"
 
 enum { FRAMES = PELORUS_SLOW_BUILD ? 1000 : 3000, EVERY = 50 };
 
@@ -22,19 +17,6 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-}
-
-/* Smallest eigenvalue of the matrix of correlations. */
-static double smallest_correlation(void) {
-    const unsigned n = plr_covariance_dim(&rig.filter);
-    double *P = specimen_covariance(&rig.filter), *C = specimen_zeros(n, n);
-    for (unsigned i = 0; i < n; i++)
-        for (unsigned j = 0; j < n; j++)
-            C[i * n + j] = P[i * n + j] / sqrt(P[i * n + i] * P[j * n + j]);
-    const double smallest = oracle_smallest_eigenvalue(n, C);
-    free(C);
-    free(P);
-    return smallest;
 }
 
 /* A step of 2 to 60 ms, now and then a second. */
@@ -65,7 +47,7 @@ static void run(void) {
         TEST_ASSERT_TRUE_MESSAGE(plr_covariance_is_positive(&rig.filter), at);
         if (k % EVERY == EVERY - 1) {
             double P_xi[36];
-            TEST_ASSERT_GREATER_THAN_DOUBLE(0, smallest_correlation());
+            TEST_ASSERT_GREATER_THAN_DOUBLE(0, rig_smallest_correlation());
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P_xi));
             for (int i = 0; i < 36; i++)
                 TEST_ASSERT_DOUBLE_WITHIN(0, P_xi[i], P_xi[6 * (i % 6) + i / 6]);

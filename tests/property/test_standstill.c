@@ -3,7 +3,6 @@
  * positive. The filter learns nothing new for 100,000 frames, and must not talk itself into anything. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <unity.h>
 
 #include "state/covariance.h"
@@ -11,7 +10,6 @@
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rig.h"
-#include "support/specimens.h"
 
 /* Nearly three hours at ten frames a second; in a slow build five minutes. */
 enum { FRAMES = PELORUS_SLOW_BUILD ? 3000 : 100000, LANDMARKS = 12, EVERY = 1000 };
@@ -23,19 +21,6 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-}
-
-/* Smallest eigenvalue of the matrix of correlations. */
-static double smallest_correlation(void) {
-    const unsigned n = plr_covariance_dim(&rig.filter);
-    double *P = specimen_covariance(&rig.filter), *C = specimen_zeros(n, n);
-    for (unsigned i = 0; i < n; i++)
-        for (unsigned j = 0; j < n; j++)
-            C[i * n + j] = P[i * n + j] / sqrt(P[i * n + i] * P[j * n + j]);
-    const double smallest = oracle_smallest_eigenvalue(n, C);
-    free(C);
-    free(P);
-    return smallest;
 }
 
 static void demand_still_there(void) {
@@ -62,7 +47,7 @@ static void check_hours(bool bias) {
         /* all that is left uncertain is common to all landmarks, so their correlations are near 1,
          * and every frame leaves one rounding there */
         TEST_ASSERT_GREATER_THAN_DOUBLE(-(double)(k + EVERY) * REAL_EPSILON,
-                                        smallest_correlation());
+                                        rig_smallest_correlation());
     }
     TEST_ASSERT_EQUAL_UINT(rig.report.matched, LANDMARKS - rig.report.poor);
     TEST_ASSERT_EQUAL_UINT64(0, rig.filter.totals.evicted);
@@ -86,7 +71,7 @@ static void test_hours_without_noise_stay_exact(void) {
     rig_begin();
     rig_stand(FRAMES);
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
-    TEST_ASSERT_GREATER_THAN_DOUBLE(0, smallest_correlation());
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, rig_smallest_correlation());
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.p_WB[0]);
 }
 

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "support/rig.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unity.h>
 
+#include "state/covariance.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
@@ -24,6 +27,12 @@ void rig_begin(void) {
     scene_start(&rig.world, &rig.options);
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_filter_init(&rig.filter, &rig.calibration, &rig.config, &rig.map));
+}
+
+void rig_begin_with(plr_mode mode, bool bias) {
+    rig.config.mode = (uint8_t)mode;
+    rig.config.bias = bias;
+    rig_begin();
 }
 
 void rig_twist(void) {
@@ -70,6 +79,18 @@ double rig_squared_error(double e[6]) {
     for (int i = 0; i < 6; i++)
         sum += e[i] * weighted[i];
     return sum;
+}
+
+double rig_smallest_correlation(void) {
+    const unsigned n = plr_covariance_dim(&rig.filter);
+    double *P = specimen_covariance(&rig.filter), *C = specimen_zeros(n, n);
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j < n; j++)
+            C[i * n + j] = P[i * n + j] / sqrt(P[i * n + i] * P[j * n + j]);
+    const double smallest = oracle_smallest_eigenvalue(n, C);
+    free(C);
+    free(P);
+    return smallest;
 }
 
 void rig_remember(void) {

@@ -28,6 +28,8 @@ void rig_set_up(void);
 /* A new filter and a new drive with the settings as they stand in `rig`. Demands PLR_OK. */
 void rig_begin(void);
 
+void rig_begin_with(plr_mode mode, bool bias);
+
 /* A reading now, and 10 ms of driving. Demands PLR_OK. */
 void rig_twist(void);
 
@@ -43,6 +45,9 @@ void rig_stand(unsigned frames);
 /* e = Log(T^^-1 T), the pose's error. Returns e^T P^-1 e: chi-square with six degrees of freedom, if
  * the covariance is right. */
 double rig_squared_error(double e[6]);
+
+/* The smallest eigenvalue of the matrix of correlations. */
+double rig_smallest_correlation(void);
 
 /* Keeps the state, against which rig_demand_refusal compares. */
 void rig_remember(void);

@@ -7,10 +7,28 @@
 plr_session session;
 plr_session_options options;
 faulty_port port;
+plr_status refused_status;
+plr_kind refused_kind;
+const plr_setting *refused_setting;
+
+static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                       const plr_setting *culprit) {
+    (void)context;
+    (void)t_ns;
+    if (refused_status != PLR_OK)
+        return;
+    refused_status = status;
+    refused_kind = subject;
+    refused_setting = culprit;
+}
 
 void desk_clear(uint64_t seed) {
     faulty_port_init(&port, seed);
     plr_session_options_default(&options);
+    options.observer.refused = on_refused;
+    refused_status = PLR_OK;
+    refused_kind = PLR_KIND_NONE;
+    refused_setting = NULL;
 }
 
 void desk_begin(void) {

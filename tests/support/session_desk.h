@@ -16,6 +16,11 @@ extern plr_session session;
 extern plr_session_options options;
 extern faulty_port port;
 
+/* What the observer heard first of a refusal since desk_clear. */
+extern plr_status refused_status;
+extern plr_kind refused_kind;
+extern const plr_setting *refused_setting;
+
 /* An empty port that does nothing wrong yet, and default options: for setUp. */
 void desk_clear(uint64_t seed);
 

@@ -16,12 +16,6 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-static void begin_with(plr_mode mode, bool bias) {
-    rig.config.mode = (uint8_t)mode;
-    rig.config.bias = bias;
-    rig_begin();
-}
-
 /* ---------------------------------------------------------------- init */
 
 static void test_a_new_filter_stands_at_the_origin(void) {
@@ -42,7 +36,7 @@ static void test_a_new_filter_stands_at_the_origin(void) {
 
 static void test_the_bias_prior_is_that_of_the_settings(void) {
     double b[6], P[36];
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
     for (int i = 0; i < 36; i++) {
         const double sigma =

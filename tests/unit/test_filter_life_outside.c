@@ -17,12 +17,6 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-static void begin_with(plr_mode mode, bool bias) {
-    rig.config.mode = (uint8_t)mode;
-    rig.config.bias = bias;
-    rig_begin();
-}
-
 /* ---------------------------------------------------------------- pose from outside */
 
 static void test_a_pose_from_outside_is_taken_with_its_covariance(void) {
@@ -73,7 +67,7 @@ static void test_poses_from_outside_are_counted_once_the_clock_runs(void) {
 
 static void test_a_pose_from_outside_keeps_the_bias_and_its_covariance(void) {
     double b[6], P[36], b_after[6], P_after[36];
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     rig_drive(5);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
     TEST_ASSERT_EQUAL_INT(PLR_OK,
@@ -85,7 +79,7 @@ static void test_a_pose_from_outside_keeps_the_bias_and_its_covariance(void) {
 }
 
 static void test_a_pose_from_outside_heals_a_diverged_filter(void) {
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     rig_drive(5);
     rig.filter.P[plr_packed_at(7, 7)] = (plr_real)NAN; /* of the biases too */
     rig.filter.diverged = 1;
@@ -147,7 +141,7 @@ static void test_set_pose_refuses_what_is_no_pose(void) {
 }
 
 static void test_mapping_takes_no_pose_but_by_move_to(void) {
-    begin_with(PLR_MODE_MAPPING, false);
+    rig_begin_with(PLR_MODE_MAPPING, false);
     rig_remember();
     rig_demand_refusal(PLR_E_MODE, plr_filter_set_pose(&rig.filter, 1, &rig_identity, NULL));
 }
@@ -157,7 +151,7 @@ static void test_mapping_takes_no_pose_but_by_move_to(void) {
 static void test_a_bias_prior_is_taken_before_the_first_twist(void) {
     const double mean[6] = {0.5, -0.25, 0, 0.125, 0, -1}, variance[6] = {1, 2, 4, 8, 0, 16};
     double b[6], P[36];
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_bias(&rig.filter, mean, variance));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
     TEST_ASSERT_EQUAL_DOUBLE_ARRAY(mean, b, 6);
@@ -167,7 +161,7 @@ static void test_a_bias_prior_is_taken_before_the_first_twist(void) {
 
 static void test_set_bias_refuses_what_is_no_prior(void) {
     double mean[6] = {0}, variance[6] = {1, 1, 1, 1, 1, 1};
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     rig_remember();
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_bias(NULL, mean, variance));
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_set_bias(&rig.filter, NULL, variance));
@@ -188,7 +182,7 @@ static void test_set_bias_refuses_what_is_no_prior(void) {
 static void test_a_bias_prior_comes_too_late_after_a_twist(void) {
     const double mean[6] = {0}, variance[6] = {0};
     const plr_twist twist = {{0}, {0}};
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, 1, &twist));
     rig_remember();
     rig_demand_refusal(PLR_E_MODE, plr_filter_set_bias(&rig.filter, mean, variance));
@@ -197,7 +191,7 @@ static void test_a_bias_prior_comes_too_late_after_a_twist(void) {
 /* Frames alone tie the pose to the bias too: a filter without twists stands still, with noise. */
 static void test_a_bias_prior_comes_too_late_after_a_frame(void) {
     const double mean[6] = {0}, variance[6] = {1e-6, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8};
-    begin_with(PLR_MODE_SLAM, true);
+    rig_begin_with(PLR_MODE_SLAM, true);
     for (int k = 0; k < 3; k++) {
         const plr_frame frame = scene_look(&rig.world);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, NULL));
@@ -209,7 +203,7 @@ static void test_a_bias_prior_comes_too_late_after_a_frame(void) {
 
 static void test_without_bias_states_there_is_no_prior(void) {
     const double mean[6] = {0}, variance[6] = {0};
-    begin_with(PLR_MODE_SLAM, false);
+    rig_begin_with(PLR_MODE_SLAM, false);
     rig_remember();
     rig_demand_refusal(PLR_E_MODE, plr_filter_set_bias(&rig.filter, mean, variance));
 }

@@ -6,27 +6,8 @@
 
 #include "support/session_desk.h"
 
-static plr_status refused_status;
-static plr_kind refused_kind;
-static const plr_setting *refused_setting;
-
-static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
-                       const plr_setting *culprit) {
-    (void)context;
-    (void)t_ns;
-    if (refused_status != PLR_OK)
-        return; /* the first is of interest */
-    refused_status = status;
-    refused_kind = subject;
-    refused_setting = culprit;
-}
-
 void setUp(void) {
     desk_clear(1);
-    options.observer.refused = on_refused;
-    refused_status = PLR_OK;
-    refused_kind = PLR_KIND_NONE;
-    refused_setting = NULL;
 }
 
 void tearDown(void) {

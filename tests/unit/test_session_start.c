@@ -7,25 +7,8 @@
 #include "support/reseal.h"
 #include "support/session_desk.h"
 
-static plr_status refused_status;
-static plr_kind refused_kind;
-
-static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
-                       const plr_setting *culprit) {
-    (void)context;
-    (void)t_ns;
-    (void)culprit;
-    if (refused_status != PLR_OK)
-        return; /* the first is of interest */
-    refused_status = status;
-    refused_kind = subject;
-}
-
 void setUp(void) {
     desk_clear(1);
-    options.observer.refused = on_refused;
-    refused_status = PLR_OK;
-    refused_kind = PLR_KIND_NONE;
 }
 
 void tearDown(void) {
