@@ -126,9 +126,10 @@ typedef struct plr_config {
      * Take the gyro's noise at the rate of its readings, plus vibration. */
     double gyro_sigma[3];
 
-    /* Setting bias-velocity-sigma [m/s]: 0 to 1e2, default 0.03.
-     * Standard deviation of the velocity bias at the start, before anything is known of it. Too
-     * small shows as the reason BIAS_OFF_PRIOR. */
+    /* Setting bias-velocity-sigma [m/s]: 0 to 1e2, default 0.005.
+     * Standard deviation of the velocity bias at the start, before anything is known of it. Wheels
+     * have no offset; the default is half a percent at walking pace. Too small shows as the reason
+     * BIAS_OFF_PRIOR; too large, and points that drift in the picture become a bias. */
     double bias_velocity_sigma_mps;
 
     /* Setting bias-gyro-sigma [rad/s]: 0 to 10, default 0.01.

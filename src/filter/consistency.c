@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "filter/health.h"
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
@@ -178,19 +179,25 @@ static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
     return sum;
 }
 
-/* d <- Ad(D^-1) d + n: d is the twist of the body from the pose by twists to the pose by pictures.
- * nu is n in the twists' own sigmas, and `noise` the expected square of nu if it is only noise. */
-static void propagate_difference(plr_filter *f, const plr_applied_motion *applied,
-                                 const plr_real n[PLR_POSE_DIM], const plr_real nu[PLR_POSE_DIM],
-                                 plr_real noise) {
+/* d <- Ad(D^-1) d: d is the twist of the body from the pose by twists to the pose by pictures. */
+static void propagate_difference(plr_filter *f, const plr_applied_motion *applied) {
     plr_real R[9], A[PLR_POSE_SQUARE], d[PLR_POSE_DIM];
     plr_se3_rotation(R, applied->E);
     plr_se3_adjoint_inverse(A, R, applied->p);
-    plr_mat6_vec(d, A, f->consistency.difference);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        f->consistency.difference[k] = d[k] + n[k];
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+    memcpy(d, f->consistency.difference, sizeof d);
+    plr_mat6_vec(f->consistency.difference, A, d);
+}
+
+/* d <- d + n. nu is n in the twists' own sigmas, and `noise` the expected square of nu if it is
+ * only noise. */
+static void add_difference(plr_filter *f, const plr_real n[PLR_POSE_DIM],
+                           const plr_real nu[PLR_POSE_DIM], plr_real noise) {
+    if (plr_health_readings_are_old(f))
+        return;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        f->consistency.difference[k] += n[k];
         f->consistency.difference_sigmas[k] += nu[k];
+    }
     f->consistency.difference_noise += noise;
 }
 
@@ -227,15 +234,11 @@ static void contradict(plr_filter *f) {
 }
 
 /* A drift has been found: the difference begins with what has accumulated in a window. */
-static void begin_difference(plr_consistency *c, const plr_applied_motion *believed,
+static void begin_difference(plr_filter *f, const plr_applied_motion *believed,
                              const plr_consistency_window *w) {
     plr_real way[PLR_POSE_DIM];
     plr_mat6_vec(way, believed->L, w->sum);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        c->difference[k] += way[k];
-        c->difference_sigmas[k] += w->sum[k];
-    }
-    c->difference_noise += trace(w->variance);
+    add_difference(f, way, w->sum, trace(w->variance));
 }
 
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
@@ -247,7 +250,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     if (outright) {
         plr_mat6_vec(n, applied->L, nu);
         in_sigmas(believed->L, n, own);
-        propagate_difference(f, applied, n, own, 0);
+        propagate_difference(f, applied);
+        add_difference(f, n, own, 0);
         contradict(f);
         c->excess = plr_norm2_of_6(own);
         return;
@@ -262,22 +266,21 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         to_twist_sigmas(applied->L, believed->L, J, b);
     if (!estimate(J, b, own, V))
         return;
-    plr_real way[PLR_POSE_DIM] = {0};
+    if (c->contradicted || c->drifting || c->doubtful) /* it stays until it is resolved */
+        propagate_difference(f, applied);
     if (c->contradicted || c->drifting) {
+        plr_real way[PLR_POSE_DIM];
         estimate_by_vision(own, V, n);
         plr_mat6_vec(way, believed->L, n);
-        propagate_difference(f, applied, way, own, trace(V));
-    } else if (c->doubtful) { /* the difference stays until it is resolved */
-        static const plr_real none[PLR_POSE_DIM] = {0};
-        propagate_difference(f, applied, none, none, 0);
+        add_difference(f, way, own, trace(V));
     }
     for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
-        if (w < FAST_WINDOWS || !c->contradicted)
+        if (w < FAST_WINDOWS || !(c->contradicted || plr_health_readings_are_old(f)))
             add_to_window(&c->windows[w], decay[w], own, V);
     const plr_real fast = fast_statistic(f), slow = statistic(&c->windows[FAST_WINDOWS]);
     const plr_real most = fast > slow ? fast : slow;
     if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
-        begin_difference(c, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
+        begin_difference(f, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
     c->drifting = most > DRIFTING_ABOVE || (c->drifting && most > AGREEING_BELOW);
     const bool much = is_material(&c->windows[0], believed->L, applied);
     c->small_frames = much ? 0 : (uint16_t)(c->small_frames + (c->small_frames < UINT16_MAX));

@@ -63,14 +63,17 @@ static double seconds_since(plr_time_ns then, plr_time_ns now) {
     return then == 0 || now < then ? 0 : (double)(now - then) * 1e-9;
 }
 
+bool plr_health_readings_are_old(const plr_filter *f) {
+    const double held = seconds_since(f->reading_ns, f->t_ns);
+    return f->config.mode != PLR_MODE_MAPPING &&
+           (!f->reading_valid || held > HELD_INTERVALS * (double)f->interval_s + HELD_S);
+}
+
 /* True if a twist was refused since the last frame, or if the last one is too old. */
 static bool lacks_twists(plr_filter *f) {
     const bool refused = f->totals.twists_refused != f->refused_before;
     f->refused_before = f->totals.twists_refused;
-    if (f->config.mode == PLR_MODE_MAPPING)
-        return false;
-    const double held = seconds_since(f->reading_ns, f->t_ns);
-    return refused || !f->reading_valid || held > HELD_INTERVALS * (double)f->interval_s + HELD_S;
+    return (refused && f->config.mode != PLR_MODE_MAPPING) || plr_health_readings_are_old(f);
 }
 
 /* The same, and a fault of an IMU has passed if readings come again. */

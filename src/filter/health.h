@@ -24,6 +24,9 @@ bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report);
  * with the pose's uncertainty, and would reject everything for ever. */
 bool plr_health_fixed_gate_is_open(const plr_filter *f);
 
+/* True if the last reading is too old to say how the body moves now. */
+bool plr_health_readings_are_old(const plr_filter *f);
+
 /* Fills health and reasons of a frame that was processed. */
 void plr_health_judge(plr_filter *f, const plr_frame_events *events, plr_report *report);
 

@@ -42,7 +42,7 @@ static const plr_row rows[] = {
     {{8, "pixel-sigma", "px", "noise of a pixel coordinate", PLR_SETTING_NUMBER, NULL, 1e-3, 1e3, 2}, AT(pixel_sigma_px), STORE_DOUBLE},
     {{9, "velocity-sigma", "m/s", "noise of a velocity reading: of each axis, or of x, y, z", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma), STORE_AXES},
     {{10, "gyro-sigma", "rad/s", "noise of a rate reading: of each axis, or of x, y, z", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.01}, AT(gyro_sigma), STORE_AXES},
-    {{11, "bias-velocity-sigma", "m/s", "prior of the velocity bias", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.03}, AT(bias_velocity_sigma_mps), STORE_DOUBLE},
+    {{11, "bias-velocity-sigma", "m/s", "prior of the velocity bias", PLR_SETTING_NUMBER, NULL, 0, 1e2, 0.005}, AT(bias_velocity_sigma_mps), STORE_DOUBLE},
     {{12, "bias-gyro-sigma", "rad/s", "prior of the gyro bias", PLR_SETTING_NUMBER, NULL, 0, 10, 0.01}, AT(bias_gyro_sigma_radps), STORE_DOUBLE},
     {{13, "bias-velocity-walk", "(m/s)^2/s", "variance that the velocity bias gains in a second", PLR_SETTING_NUMBER, NULL, 0, 1e2, 1e-8}, AT(bias_velocity_walk), STORE_DOUBLE},
     {{14, "bias-gyro-walk", "(rad/s)^2/s", "variance that the gyro bias gains in a second", PLR_SETTING_NUMBER, NULL, 0, 1e2, 1e-10}, AT(bias_gyro_walk), STORE_DOUBLE},

@@ -152,6 +152,7 @@ static void test_a_bias_is_found(void) {
     const double true_bias[6] = {0.06, -0.04, 0.02, 0.01, -0.012, 0.008};
     double b[6], P[36];
     memcpy(rig.options.bias, true_bias, sizeof true_bias);
+    rig.config.bias_velocity_sigma_mps = 0.03;
     begin_with_bias();
     rig_drive(150);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, P));
