@@ -61,7 +61,7 @@ static void answer(plr_session *s, plr_notice notice, const plr_stored_state *st
     if (stored->damaged > 0)
         plr_line_text(line, "; the other slot holds a damaged one");
     plr_send_text(s);
-    plr_send_state_answer(s, t_ns, notice);
+    plr_send_answer(s, PLR_KIND_STATE, t_ns, PLR_OK, notice);
 }
 
 /* ---------------------------------------------------------------- save */

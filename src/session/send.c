@@ -106,8 +106,8 @@ void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_
     put_report(s, PLR_KIND_STEREO, report, compute_ns, PLR_NOTICE_NONE);
 }
 
-static void answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
-                   plr_notice notice) {
+void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                     plr_notice notice) {
     plr_report report;
     memset(&report, 0, sizeof report);
     report.t_ns = t_ns;
@@ -119,18 +119,10 @@ static void answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_statu
     put_report(s, subject, &report, 0, notice);
 }
 
-void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status) {
-    answer(s, subject, t_ns, status, PLR_NOTICE_NONE);
-}
-
-void plr_send_state_answer(plr_session *s, plr_time_ns t_ns, plr_notice notice) {
-    answer(s, PLR_KIND_STATE, t_ns, PLR_OK, notice);
-}
-
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                       const plr_setting *culprit) {
     s->totals.refused++;
-    plr_send_answer(s, subject, t_ns, status);
+    plr_send_answer(s, subject, t_ns, status, PLR_NOTICE_NONE);
     if (s->options.observer.refused != NULL)
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
 }

@@ -24,11 +24,10 @@ void plr_send_resets_become(plr_session *s, uint32_t number);
 /* Sends the report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
 
-/* Sends the REPORT that answers a message other than a STEREO; its health is that of the last frame. */
-void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status);
-
-/* Sends the REPORT that answers a successful STATE. */
-void plr_send_state_answer(plr_session *s, plr_time_ns t_ns, plr_notice notice);
+/* Sends the REPORT that answers a message other than a STEREO; its health is that of the last frame.
+ * `notice` says what a successful STATE has done. */
+void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
+                     plr_notice notice);
 
 /* Counts a refused message, calls the observer, and sends a REPORT. `culprit` is the setting to
  * change, or NULL. */

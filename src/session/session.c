@@ -61,7 +61,7 @@ static void answer_skip(plr_session *s) {
     const plr_kind subject =
         why == PLR_SKIP_DAMAGED ? PLR_KIND_NONE : (plr_kind)s->reader.skipped_kind;
     if (why != (plr_skip)s->last_skip)
-        plr_send_answer(s, subject, 0, statuses[why]);
+        plr_send_answer(s, subject, 0, statuses[why], PLR_NOTICE_NONE);
     s->last_skip = (uint8_t)why;
 }
 
