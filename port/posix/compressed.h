@@ -12,12 +12,6 @@
 /* Was libzstd there? Without it the functions that open give NULL. */
 bool compressed_is_built_in(void);
 
-/* Do these bytes begin a zstd file? Fewer than four do not. */
-bool compressed_begins(const uint8_t *bytes, size_t n);
-
-/* Does a file of this name want to be compressed? */
-bool compressed_is_name(const char *path);
-
 /* --- reading --- */
 
 typedef struct compressed_input compressed_input;

@@ -8,6 +8,12 @@
 #include <time.h>
 #include <unistd.h>
 
+/* Do these bytes begin a zstd file? Fewer than four do not. */
+static bool is_compressed(const uint8_t *bytes, size_t n) {
+    static const uint8_t magic[4] = {0x28, 0xB5, 0x2F, 0xFD};
+    return n >= sizeof magic && memcmp(bytes, magic, sizeof magic) == 0;
+}
+
 static bool is_open(file_port *port) {
     struct stat about;
     if (port->input < 0)
@@ -21,7 +27,7 @@ static bool is_open(file_port *port) {
     }
     uint8_t head[4];
     const bool packed = S_ISREG(about.st_mode) && pread(port->input, head, sizeof head, 0) == 4 &&
-                        compressed_begins(head, sizeof head);
+                        is_compressed(head, sizeof head);
     if (S_ISREG(about.st_mode) && !packed)
         port->size = (uint64_t)about.st_size;
     return true;
@@ -75,7 +81,7 @@ static void begin(file_port *port) {
         port->head_count += count > 0 ? (size_t)count : 0;
     }
     port->head_at = 0;
-    if (!compressed_begins(port->head, port->head_count))
+    if (!is_compressed(port->head, port->head_count))
         return;
     port->unpacker = compressed_input_open(fetch_raw, port);
     if (port->unpacker == NULL)

@@ -133,7 +133,8 @@ static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_st
 /* A flight log NAME.zst is compressed while it is written. */
 static bool open_log(replay *run) {
     const replay_options *o = &run->options;
-    const bool packed = o->out != NULL && compressed_is_name(o->out);
+    const size_t length = o->out != NULL ? strlen(o->out) : 0;
+    const bool packed = length > 4 && strcmp(o->out + length - 4, ".zst") == 0;
     if (packed && !compressed_is_built_in()) {
         fprintf(stderr,
                 PELORUS_NAME ": %s: this build has no libzstd: give --out OUT.plr, and zstd it "
