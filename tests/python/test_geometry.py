@@ -9,7 +9,7 @@ from drives import clean
 from pelorus import motion, se3, visual_motion
 from pelorus.frames import Camera, TwistTiming
 from pelorus.se3 import Poses
-from pelorus.tracks import Tracks, project, triangulate
+from pelorus.tracks import Tracks, point_jacobian, project, triangulate
 from scipy.linalg import expm
 
 CAMERA = Camera(500.0, 480.0, 320.0, 240.0, 0.3)
@@ -75,7 +75,7 @@ def test_triangulation_undoes_projection_and_its_jacobian_is_the_difference() ->
         step[column] = 1e-5
         slope = (triangulate(CAMERA, pixels + step) - triangulate(CAMERA, pixels - step)) / 2e-5
         assert np.allclose(J[:, :, column], slope, rtol=1e-5, atol=1e-6)
-    D = visual_motion.point_jacobian(CAMERA, q)
+    D = point_jacobian(CAMERA, q)
     for column in range(3):
         step3 = np.zeros(3)
         step3[column] = 1e-6

@@ -27,6 +27,18 @@ def project(camera: Camera, q_C: Floats) -> Floats:
     return np.stack((u_left, v, camera.fx_px * (x - camera.baseline_m) / z + camera.cx_px, v), -1)
 
 
+def point_jacobian(camera: Camera, q: Floats) -> Floats:
+    """d project / d q, (n, 4, 3)."""
+    x, y, z = q.T
+    D = np.zeros((len(q), 4, 3))
+    D[:, 0, 0] = D[:, 2, 0] = camera.fx_px / z
+    D[:, 1, 1] = D[:, 3, 1] = camera.fy_px / z
+    D[:, 0, 2] = -camera.fx_px * x / z**2
+    D[:, 2, 2] = -camera.fx_px * (x - camera.baseline_m) / z**2
+    D[:, 1, 2] = D[:, 3, 2] = -camera.fy_px * y / z**2
+    return D
+
+
 def sum_by_frame(frame: Indices, count: int, values: Floats) -> Floats:
     """(count, ...): of values (n, ...) that stand by ascending frame."""
     counts = np.bincount(frame, minlength=count)

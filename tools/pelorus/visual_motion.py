@@ -17,7 +17,14 @@ from pelorus.console import progress
 from pelorus.frames import Camera
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
-from pelorus.tracks import Indices, Tracks, project, sum_by_frame, triangulate
+from pelorus.tracks import (
+    Indices,
+    Tracks,
+    point_jacobian,
+    project,
+    sum_by_frame,
+    triangulate,
+)
 
 DISPARITY_MIN_PX = 1.0  # below it a triangulated depth means little
 ROW_GAP_MAX_PX = 2.0  # a rectified pair shows a point in one row; more is a bad match
@@ -130,18 +137,6 @@ def triangulation_jacobian(camera: Camera, pixels: Floats, q_C: Floats) -> Float
     J[:, 0, 0] += scale
     J[:, 1, 1] = J[:, 1, 3] = 0.5 * scale * camera.fx_px / camera.fy_px
     return J
-
-
-def point_jacobian(camera: Camera, q: Floats) -> Floats:
-    """d project / d q, (n, 4, 3)."""
-    x, y, z = q.T
-    D = np.zeros((len(q), 4, 3))
-    D[:, 0, 0] = D[:, 2, 0] = camera.fx_px / z
-    D[:, 1, 1] = D[:, 3, 1] = camera.fy_px / z
-    D[:, 0, 2] = -camera.fx_px * x / z**2
-    D[:, 2, 2] = -camera.fx_px * (x - camera.baseline_m) / z**2
-    D[:, 1, 2] = D[:, 3, 2] = -camera.fy_px * y / z**2
-    return D
 
 
 def pixel_sigma(seen: SeenPairs, camera: Camera, motion: Poses) -> float:

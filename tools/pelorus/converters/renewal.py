@@ -23,7 +23,7 @@ from pelorus.frames import Camera, Text
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.tracks import Indices, Tracks, project, triangulate
+from pelorus.tracks import Indices, Tracks, point_jacobian, project, triangulate
 from pelorus.trajectory import Trajectory
 
 PASSES = 8  # of Gauss-Newton: a point from stereo is near
@@ -126,7 +126,7 @@ def _points(camera: Camera, tracks: Tracks, T_CW: Poses, landmarks: Indices) -> 
     for _ in range(PASSES):
         q = se3.apply(T_CW, points[landmarks])
         q[:, 2] = np.maximum(q[:, 2], DEPTH_MIN_M)
-        J = _projection(camera, q) @ T_CW.R
+        J = point_jacobian(camera, q) @ T_CW.R
         r = tracks.pixels - project(camera, q)
         N = _sums(landmarks, np.einsum("nki,nkj->nij", J, J))
         b = _sums(landmarks, np.einsum("nki,nk->ni", J, r))
@@ -139,16 +139,4 @@ def _sums(groups: Indices, values: Floats) -> Floats:
     """The sum of the values (n, ...) of each group."""
     out = np.zeros((int(groups.max()) + 1, *values.shape[1:]))
     np.add.at(out, groups, values)
-    return out
-
-
-def _projection(camera: Camera, q: Floats) -> Floats:
-    """(n, 4, 3): d(uL vL uR vR) / dq."""
-    x, y, z = q.T
-    out = np.zeros((len(q), 4, 3))
-    out[:, (0, 2), 0] = (camera.fx_px / z)[:, None]
-    out[:, (1, 3), 1] = (camera.fy_px / z)[:, None]
-    out[:, 0, 2] = -camera.fx_px * x / z**2
-    out[:, 2, 2] = -camera.fx_px * (x - camera.baseline_m) / z**2
-    out[:, (1, 3), 2] = (-camera.fy_px * y / z**2)[:, None]
     return out
