@@ -17,10 +17,11 @@ import numpy as np
 
 from pelorus import se3
 from pelorus.foreign import ForeignFileError
+from pelorus.frames import Noise
 from pelorus.layout import Floats
 from pelorus.named import Named, as_numbers, sane
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
-from pelorus.rig.rig import ImuNoise, Rig, rigid
+from pelorus.rig.rig import Rig, rigid
 from pelorus.se3 import Poses
 
 LENSES = {
@@ -86,14 +87,14 @@ def pair(first: Named, second: Named) -> Rig:
     return replace(rig, offset_s=offset, topics=ordered)
 
 
-def imu(content: Named) -> ImuNoise:
+def imu(content: Named) -> Noise:
     """What the file says of its noise."""
     own = content.object("imu0") if "imu0" in content else content
     told = {name: own.number(key) for name, key in NOISE.items() if key in own}
     for name, value in told.items():
         if value < 0:
             raise own.error(NOISE[name], value, "a number that is not negative is due")
-    return ImuNoise(**told)
+    return Noise(**told)
 
 
 def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:

@@ -15,11 +15,11 @@ from pathlib import Path
 
 from pelorus import calibration, foreign
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header
+from pelorus.frames import Header, Noise
 from pelorus.named import Named
 from pelorus.rig import kalibr, opencv
 from pelorus.rig.lens import LensModel
-from pelorus.rig.rig import ImuNoise, Rig
+from pelorus.rig.rig import Rig
 
 KNOWN = (
     "Kalibr's camchain (cam0, cam1), its IMU file (gyroscope_noise_density), OpenCV's stereo "
@@ -33,7 +33,7 @@ class Calibrated:
 
     header: Header
     rig: Rig | None = None
-    imu: ImuNoise = field(default_factory=ImuNoise)
+    imu: Noise = field(default_factory=Noise)
 
 
 def read(

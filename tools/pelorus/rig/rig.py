@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from pelorus import arrays, se3
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, header_name
+from pelorus.frames import Header, Noise, header_name
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.rig.lens import Lens, LensModel
@@ -24,16 +24,6 @@ SAME = 1e-9  # so little off, a pair counts as rectified
 
 
 @dataclass(frozen=True)
-class ImuNoise:
-    """Densities and walks of an IMU, in SI units; negative: not told."""
-
-    gyro_noise: float = -1.0  # rad/s/sqrt(Hz)
-    accel_noise: float = -1.0  # m/s^2/sqrt(Hz)
-    gyro_walk: float = -1.0  # rad/s^2/sqrt(Hz)
-    accel_walk: float = -1.0  # m/s^3/sqrt(Hz)
-
-
-@dataclass(frozen=True)
 class Rig:
     """q_R = T_RL q_L; q_L = T_LB s_B, None where the file says nothing of a body."""
 
@@ -42,7 +32,7 @@ class Rig:
     right: Lens
     T_RL: Poses
     T_LB: Poses | None = None
-    imu: ImuNoise = ImuNoise()
+    imu: Noise = field(default_factory=Noise)  # of an IMU, where the file tells it
     offset_s: float = 0.0  # the body's clock = the cameras' + offset
     swapped: bool = False  # the file's second camera is the left one
     topics: tuple[str, ...] = ()  # of the left and the right camera, where the file names them
