@@ -64,7 +64,7 @@ def step(state: Moving, tau_s: Floats, a: Floats, w: Floats, g_W: Floats) -> Mov
     W = se3.skew(turn)
     square = W @ W
     t2 = np.sum(turn * turn, axis=-1)[..., None, None]
-    s1, s2, s3, s4 = (_series(t2, order) for order in (1, 2, 3, 4))
+    s1, s2, s3, s4 = (series(t2, order, SERIES_TERMS) for order in (1, 2, 3, 4))
     E = np.eye(3) + s1 * W + s2 * square
     G1 = np.eye(3) + s2 * W + s3 * square
     G2 = 0.5 * np.eye(3) + s3 * W + s4 * square
@@ -78,12 +78,15 @@ def _times(M: Floats, x: Floats) -> Floats:
     return np.asarray(np.einsum("...ij,...j->...i", M, x))
 
 
-def _series(t2: Floats, order: int) -> Floats:
-    """sum_k (-t2)^k / (2k + order)!."""
-    total = np.ones_like(t2)
-    for k in range(SERIES_TERMS, 0, -1):
+def series(s: Floats, order: int, terms: int) -> Floats:
+    """sum_k (-s)^k / (2k + order)!, s = a^2.
+
+    That is sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for order 1, 2 and 3.
+    """
+    total = np.ones_like(s)
+    for k in range(terms, 0, -1):
         n = 2 * k + order
-        total = 1 - t2 / (n * (n - 1)) * total
+        total = 1 - s / (n * (n - 1)) * total
     return np.asarray(total / (1.0, 1.0, 2.0, 6.0, 24.0)[order])
 
 

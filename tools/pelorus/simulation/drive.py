@@ -9,6 +9,7 @@ import numpy as np
 
 from pelorus import motion
 from pelorus.frames import TwistTiming
+from pelorus.inertial import series
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
@@ -28,13 +29,6 @@ class Drive(NamedTuple):
     v_B_mps: Floats
     w_B_radps: Floats
     poses: Poses
-
-    def until(self, count: int) -> Drive:
-        """The first so many readings and poses."""
-        first = slice(0, count)
-        return Drive(
-            self.t_ns[first], self.v_B_mps[first], self.w_B_radps[first], self.poses.at(first)
-        )
 
 
 def drive(
@@ -114,7 +108,7 @@ def exp(rho: Floats, theta: Floats) -> Poses:
     s = theta[:, 0] ** 2 + theta[:, 1] ** 2 + theta[:, 2] ** 2
     if len(s) and s.max() > TURN_MAX_RAD**2:
         raise ValueError(f"a step of {np.sqrt(s.max()):.2f} rad, at most {TURN_MAX_RAD} are exact")
-    a, b, c = _series(s, 1), _series(s, 2), _series(s, 3)
+    a, b, c = (series(s, order, SERIES_TERMS) for order in (1, 2, 3))
     identity = np.broadcast_to(np.eye(3), (len(s), 3, 3))
     hat: Floats = np.zeros((len(s), 3, 3))
     hat[:, 2, 1], hat[:, 0, 2], hat[:, 1, 0] = theta[:, 0], theta[:, 1], theta[:, 2]
@@ -123,18 +117,6 @@ def exp(rho: Floats, theta: Floats) -> Poses:
     R = identity + a[:, None, None] * hat + b[:, None, None] * squared
     V = identity + b[:, None, None] * hat + c[:, None, None] * squared
     return Poses(R, rotate(V, rho))
-
-
-def _series(s: Floats, order: int) -> Floats:
-    """sum_k (-s)^k / (2k + order)!, s = a^2.
-
-    That is sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for order 1, 2 and 3.
-    """
-    total = np.ones_like(s)
-    for k in range(SERIES_TERMS, 0, -1):
-        n = 2 * k + order
-        total = 1 - s / (n * (n - 1)) * total
-    return total / (1.0, 1.0, 2.0, 6.0)[order]
 
 
 def rotate(R: Floats, x: Floats) -> Floats:
