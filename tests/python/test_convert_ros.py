@@ -17,9 +17,8 @@ from converted import SHORT, Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
 from pelorus.converters import ros, ros_frames
-from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag
-from pelorus.converters.streams import Pictures
+from pelorus.converters.streams import Asked, Pictures
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist

@@ -17,11 +17,10 @@ from pelorus.commands.choices import Fix, Timing
 from pelorus.commands.conversion import write
 from pelorus.console import out
 from pelorus.converters import bag, csv, euroc, kitti, ros, streams
-from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.streams import Streams
+from pelorus.converters.streams import Asked, Streams
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.rig.lens import LensModel

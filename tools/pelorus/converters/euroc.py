@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pelorus import foreign, se3, trajectory
-from pelorus.converters.asked import Asked
-from pelorus.converters.streams import Pictures, Readings, Streams
+from pelorus.converters.streams import Asked, Pictures, Readings, Streams
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.inertial import Inertial

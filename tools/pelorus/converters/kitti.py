@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from pelorus import arrays, foreign, se3, trajectory
 from pelorus.console import progress
-from pelorus.converters.asked import Asked
-from pelorus.converters.streams import Pictures, Streams, Twists
+from pelorus.converters.streams import Asked, Pictures, Streams, Twists
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats

@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from pelorus.console import progress
 from pelorus.converters import ros_frames, streams
-from pelorus.converters.asked import Asked
 from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
-from pelorus.converters.streams import Readings, Streams, Twists
+from pelorus.converters.streams import Asked, Readings, Streams, Twists
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import TwistTiming

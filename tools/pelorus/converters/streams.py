@@ -27,6 +27,7 @@ from pelorus.inertial import NO_READINGS, Inertial
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
+from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
 from pelorus.tracking import images
@@ -63,6 +64,23 @@ class Readings:
 
     where: Path
     inertial: Inertial
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a folder or a bag does not say, or says otherwise than its user: in place of its own.
+
+    `calibration`, `extrinsic` and `lens` are as rig.read has them.
+    """
+
+    calibration: tuple[Path, ...] = ()
+    extrinsic: Path | None = None
+    lens: LensModel | None = None
+    motion: Twists | Readings | None = None
+    truth: Trajectory | None = None
+    measured: frozenset[str] = Twists.measured  # of the source's own twists
+    timing: TwistTiming | None = None
+    fix: bool = True
 
 
 @dataclass(frozen=True)
