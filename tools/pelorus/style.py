@@ -13,8 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pelorus.errors import writing
-from pelorus.layout import Floats
-from pelorus.motion import Times
 
 RHO = "\N{GREEK SMALL LETTER RHO}"
 THETA = "\N{GREEK SMALL LETTER THETA}"
@@ -94,11 +92,6 @@ def legend_above(figure: Figure, axes: Axes, columns: int = 6, markers: float = 
     """One row over the panels, where it covers no data."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, markerscale=markers)
-
-
-def seconds(t_ns: Times, origin_ns: int) -> Floats:
-    """Time since the first frame."""
-    return np.asarray((t_ns - origin_ns) * 1e-9)
 
 
 def save(draw: Callable[[], Figure], path: Path) -> None:

@@ -23,7 +23,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import style
 from pelorus.errors import PelorusError
 from pelorus.evaluation import Accuracy, assess, by_imu, on_its_clock
 from pelorus.frames import Kind, Landmark, Message, Report, Role, Stereo
@@ -77,7 +76,6 @@ def traces(messages: Sequence[Message], t_ns: Times, active: Floats) -> Traces:
     return Traces(times, columns[:, 1], columns[:, 2], len(ids))
 
 
-MAIN = OWN
 COURSE = "course"
 
 
@@ -107,7 +105,7 @@ class Comparison:
 
     @cached_property
     def main(self) -> Run:
-        return self.run(MAIN)
+        return self.run(OWN)
 
     def run(self, name: str) -> Run:
         return next(run for run in self.runs if run.name == name)
@@ -136,4 +134,4 @@ class Comparison:
 
     def seconds(self, t_ns: Times) -> Floats:
         """Time since the first frame."""
-        return style.seconds(t_ns, self.origin_ns)
+        return np.asarray((t_ns - self.origin_ns) * 1e-9)

@@ -19,8 +19,8 @@ from pelorus.grid.files import heights
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.report import top_view
-from pelorus.report.comparison import COURSE, MAIN, Comparison
-from pelorus.report.results import Run
+from pelorus.report.comparison import COURSE, Comparison
+from pelorus.report.results import OWN, Run
 from pelorus.style import (
     BLACK,
     BLUE,
@@ -43,7 +43,7 @@ from pelorus.style import (
 )
 from pelorus.trajectory import POSE_SIZE
 
-JUDGED = (MAIN, "world", COURSE)  # dead reckoning has no error worth a picture
+JUDGED = (OWN, "world", COURSE)  # dead reckoning has no error worth a picture
 CURVE_MIN = 2  # frames: one point is no curve
 NAMES = (
     *("top-view", "error-yours", "error-world", "error-course", "nees", "covariance", "bias"),
@@ -365,13 +365,13 @@ def hero(compared: Comparison) -> Figure:
 
 
 def _position_errors(figure: Figure, compared: Comparison) -> None:
-    accuracy = compared.accuracy[MAIN]
+    accuracy = compared.accuracy[OWN]
     t = compared.seconds(accuracy.t_ns)
     error, band = accuracy.error[:, :3], SIGMAS * accuracy.sigma[:, :3]
     for k, name in enumerate("xyz"):
         bottom = BOTTOM_IN + (2 - k) * (RIGHT_HEIGHT_IN + GAP_IN)
         axes = panel(figure, RIGHT_IN, bottom, RIGHT_WIDTH_IN, RIGHT_HEIGHT_IN)
-        _error_in_band(axes, t, error[:, k], band[:, k], MAIN)
+        _error_in_band(axes, t, error[:, k], band[:, k], OWN)
         axes.set_ylim(*limits(error, band))
         axes.set_ylabel(f"{RHO} {name} (m)")
         axes.tick_params(labelbottom=name == "z")

@@ -13,7 +13,8 @@ from pelorus import se3
 from pelorus.grid import plane
 from pelorus.grid.plane import Plane
 from pelorus.layout import Floats
-from pelorus.report.comparison import MAIN, Comparison
+from pelorus.report.comparison import Comparison
+from pelorus.report.results import OWN
 from pelorus.style import BLACK, DPI, GREEN, PENS, PURPLE, TRUTH, WIDTH_IN, panel
 
 MARGIN = 0.15  # of the larger side
@@ -63,7 +64,7 @@ class View(NamedTuple):
 
 def view(compared: Comparison) -> View:
     """Choose the plane and the picture's limits."""
-    main = compared.accuracy.get(MAIN)
+    main = compared.accuracy.get(OWN)
     looked_at = plane.choose(compared.subject.header.body_axes, compared.main.trajectory.poses)
 
     def flat(points: Floats) -> Floats:
@@ -83,7 +84,7 @@ def view(compared: Comparison) -> View:
 
 def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
     """Around the main run and the truth; the other runs widen it, but cannot blow it up."""
-    core = paths[MAIN] if truth is None else np.concatenate((paths[MAIN], truth))
+    core = paths[OWN] if truth is None else np.concatenate((paths[OWN], truth))
     inner = Box(core.min(axis=0), core.max(axis=0))
     outmost = inner.grown(STRAY * inner.side)
     everything = np.concatenate((core, *paths.values()))
@@ -136,7 +137,7 @@ def fill(axes: Axes, seen: View, width_to_height: float) -> None:
 
 
 def _mark_ends(axes: Axes, seen: View) -> None:
-    path = seen.paths[MAIN]
+    path = seen.paths[OWN]
     style: dict[str, Any] = {
         "color": PURPLE,
         "markeredgecolor": BLACK,
