@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from converted import Run
 from drives import clean
-from pelorus import __version__, wire
+from pelorus import __version__, replay, wire
 from pelorus.cli import COMMANDS
 from pelorus.frames import End, Header, Stereo, Truth, Twist
 
@@ -80,6 +80,15 @@ def test_every_command_starts_where_there_is_no_termios() -> None:
     assert done.returncode == 0, done.stderr.decode()
     for command in SUBCOMMANDS:
         assert f"Usage: pelorus {' '.join(command)} " in done.stdout.decode()
+
+
+def test_the_replay_is_found_beside_the_package_from_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("PELORUS_BIN", raising=False)
+    built = replay.find_programs(None).float32.resolve()
+    monkeypatch.chdir(tmp_path)
+    assert replay.find_programs(None).float32 == built
 
 
 def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> None:

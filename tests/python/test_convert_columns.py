@@ -250,6 +250,29 @@ def test_velocities_that_are_not_there_are_named_with_what_to_do(
     assert "--measured vx,wz. If they are called otherwise: --columns vy=COLUMN:mps" in outcome.err
 
 
+def test_a_complaint_calls_a_column_as_its_file_does(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(**SHORT)
+    options = options_of(tmp_path, drive, "--twists")
+    rows = len(drive.twist_t_ns)
+    odometry = {
+        "stamp_ms": (drive.twist_t_ns // 10**6).tolist(),
+        "speed_kmh": [3] * rows,
+    }
+
+    def complaint(mapping: str, rate: str) -> str:
+        turning = odometry | {"roll_rate_dps": [rate, *([0] * (rows - 1))]}
+        path = write_csv(tmp_path / "odometry.csv", turning)
+        given = ("--measured", "vx,wx", "--columns", mapping, "--twists", path)
+        outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr", *given)
+        assert outcome.status == 1
+        return outcome.err
+
+    named = "v=speed_kmh,wx=roll_rate_dps"
+    assert "row 2: roll_rate_dps is not finite" in complaint(f"{named},twists.t=stamp_ms", "nan")
+    typed = complaint(f"{named},twists.t=stmp_ms", "0")
+    assert "lacks the column stmp_ms; there are: stamp_ms, speed_kmh, roll_rate_dps" in typed
+
+
 def test_the_first_screen_of_convert_tells_whose_data_are_for_which_command(pelorus: Run) -> None:
     said = pelorus("convert", "--help").out
     own, known = said.index("Your own data"), said.index("Files of known data sets")

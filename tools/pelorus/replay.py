@@ -20,7 +20,7 @@ from pelorus.errors import PelorusError, write_text, writing
 from pelorus.frames import Kind, Message, Pose
 from pelorus.wire import Writer, messages_of
 
-SOURCE_ROOT = Path(__file__).resolve().parents[3]
+SOURCE_ROOT = Path(__file__).resolve().parents[2]
 USUAL_FOLDER = Path("build/bin")
 SETTINGS_MAX_DEPTH = "max-depth"
 

@@ -16,6 +16,7 @@ from pelorus.layout import Floats
 DIGITS_MAX = 19  # 2^63 has as many
 SHOWN_MAX = 40
 TIME_UNITS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}  # a column t_ms and so on; in ns
+TIME_COLUMNS = [f"t_{unit}" for unit in TIME_UNITS]
 
 
 class Table:
@@ -25,6 +26,8 @@ class Table:
         self.path = path
         self._columns = columns
         self._factor: dict[str, float] = {}
+        self._own: dict[str, str] = {}  # what a renamed column is called in the file
+        self._missed: dict[str, str] = {}  # the names that another column should have had
 
     @classmethod
     def read(cls, path: Path) -> Table:
@@ -52,16 +55,21 @@ class Table:
             )
         self._columns = {name if old == column else old: c for old, c in self._columns.items()}
         self._factor[name] = factor
+        self._own[name] = column
+
+    def miss(self, column: str, name: str) -> None:
+        """`column`, which is not here, should have been renamed."""
+        self._missed[name] = column
 
     def require(self, *names: str) -> None:
         """Refuse a file without these columns."""
         lacking = [name for name in names if name not in self._columns]
         if lacking:
-            there = ", ".join(self._columns)
+            there = ", ".join(self._called(name) for name in self._columns)
             hint = "; commas should part them" if len(self._columns) == 1 and ";" in there else ""
             raise ForeignFileError(
                 self.path,
-                f"lacks the column {', '.join(lacking)}",
+                f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",
                 due=f"there are: {there}{hint}",
             )
 
@@ -79,7 +87,8 @@ class Table:
             if not text.isdecimal() or len(text) > DIGITS_MAX or int(text) > highest:
                 raise ForeignFileError(
                     self.path,
-                    f"{name} is {_shown(text)}, a whole number from 0 to {highest} is due",
+                    f"{self._called(name)} is {_shown(text)}, a whole number from 0 to {highest} "
+                    "is due",
                     at=f"row {row + 2}",
                 )
             out[row] = int(text)
@@ -95,14 +104,15 @@ class Table:
 
     def times(self) -> NDArray[np.int64]:
         """ns from the column t_ns, t_us, t_ms or t_s; not yet checked to ascend."""
-        unit = next((unit for unit in TIME_UNITS if f"t_{unit}" in self._columns), "s")
+        known = [*self._columns, *self._missed]
+        unit = next((name[2:] for name in known if name in TIME_COLUMNS), "s")
         name = f"t_{unit}"
         if unit == "ns":
             t_ns = self.integers(name, 2**63 - 1)
         else:
             numbers = self.numbers(name)[:, 0]
             if len(numbers):
-                arrays.check_seconds(self.path, name, numbers, TIME_UNITS[unit])
+                arrays.check_seconds(self.path, self._called(name), numbers, TIME_UNITS[unit])
             t_ns = self._exact_ns(name, TIME_UNITS[unit])
         if not len(t_ns):
             raise ForeignFileError(self.path, "holds column names but no row")
@@ -124,6 +134,10 @@ class Table:
             )
         return t_ns
 
+    def _called(self, name: str) -> str:
+        """As the file has it, for its owner to find."""
+        return self._own.get(name, name)
+
     def _column(self, name: str) -> Floats:
         cells = self._columns[name]
         try:
@@ -131,11 +145,15 @@ class Table:
         except ValueError:
             row = next(k for k, cell in enumerate(cells) if not _is_number(cell))
             raise ForeignFileError(
-                self.path, f"{name} is {_shown(cells[row])}, a number is due", at=f"row {row + 2}"
+                self.path,
+                f"{self._called(name)} is {_shown(cells[row])}, a number is due",
+                at=f"row {row + 2}",
             ) from None
         if not np.isfinite(column).all():
             row = int(np.nonzero(~np.isfinite(column))[0][0])
-            raise ForeignFileError(self.path, f"{name} is not finite", at=f"row {row + 2}")
+            raise ForeignFileError(
+                self.path, f"{self._called(name)} is not finite", at=f"row {row + 2}"
+            )
         factor = self._factor.get(name, 1.0)
         return column if factor == 1.0 else column * factor
 

@@ -66,9 +66,13 @@ class Columns:
         table = Table.read(path)
         self.seen[path] = table.names
         for one in self.given:
-            if one.file in ("", file) and table.has(one.column):
+            if one.file not in ("", file):
+                continue
+            if table.has(one.column):
                 table.rename(one.column, one.target, one.factor)
                 one.used = True
+            else:
+                table.miss(one.column, one.target)
         return table
 
     def require_used(self) -> None:
