@@ -265,7 +265,8 @@ def test_a_complaint_calls_a_column_as_its_file_does(tmp_path: Path, pelorus: Ru
         given = ("--measured", "vx,wx", "--columns", mapping, "--twists", path)
         outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr", *given)
         assert outcome.status == 1
-        return outcome.err
+        said: str = outcome.err
+        return said
 
     named = "v=speed_kmh,wx=roll_rate_dps"
     assert "row 2: roll_rate_dps is not finite" in complaint(f"{named},twists.t=stamp_ms", "nan")
