@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pelorus.check.apart import Apart, Inflated
 from pelorus.check.outcome import NOTHING
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
@@ -17,7 +18,9 @@ from pelorus.tracks import Tracks
 FRAMES, POINTS = 12, 60
 
 
-def tracks(bend: NDArray[np.float64], noise_px: float = 0.1, points: int = POINTS) -> Tracks:
+def tracks(
+    bend: NDArray[np.float64], noise_px: float = 0.1, points: int = POINTS
+) -> Tracks:
     """Points all over 800 x 400 px; vL - vR is bend . (1, x, y, x y), x and y from -1 to 1."""
     chance = np.random.default_rng(1)
     n = FRAMES * points
@@ -71,12 +74,20 @@ class AnyBench:
         return NOTHING
 
 
-def test_check_takes_no_pixel_sigma_below_what_the_rectification_leaves() -> None:
-    def sigma(bend: list[float], given: str) -> float:
-        noise = TrackNoise({}, float("nan"), row_gaps(tracks(np.array(bend))), 49)
-        tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, noise)
-        return float(with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"])
+def test_what_the_rectification_leaves_is_added_to_the_pixel_sigma_in_squares() -> None:
+    alike = Inflated(0.3, 0.3, Apart({}, 0), Apart({}, 0))
 
-    assert abs(sigma([0.4, 0, 0, 0], "0.3") - 7 * 0.4 / np.sqrt(2)) < 0.05
-    assert sigma([0.4, 0, 0, 0], "5") == 5
-    assert sigma([0.1, 0, 0, 0], "0.3") == 0.3  # as good as pairs are
+    def sigma(bend: list[float], given: str, halves: Inflated | None) -> float:
+        noise = TrackNoise({}, float("nan"), row_gaps(tracks(np.array(bend))), 49)
+        tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, noise, halves=halves)
+        return float(
+            with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"]
+        )
+
+    shared_px = 7 * 0.4 / np.sqrt(2)
+    assert abs(sigma([0.4, 0, 0, 0], "0.3", alike) - np.hypot(0.3, shared_px)) < 0.05
+    assert abs(sigma([0.4, 0, 0, 0], "5", alike) - np.hypot(5, shared_px)) < 0.05
+    assert sigma([0.1, 0, 0, 0], "0.3", alike) == 0.3  # as good as pairs are
+    # where halves were not compared, what a larger sigma stands for is not known
+    assert abs(sigma([0.4, 0, 0, 0], "0.3", None) - shared_px) < 0.05
+    assert sigma([0.4, 0, 0, 0], "5", None) == 5

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from pelorus import wire
 from pelorus.check import verdict
-from pelorus.check.outcome import Bench, Settings, options_of
+from pelorus.check.halves_alike import with_halves_alike
+from pelorus.check.options import Settings, options_of
+from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tuning import tune
@@ -48,7 +50,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.words) for f in named]
     if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
-    tuned = with_shared_rows(bench, tune(bench, given))
+    tuned = with_shared_rows(bench, with_halves_alike(bench, tune(bench, given)))
     truth = truth_in(messages)
     both = progress((("before", given), ("after", tuned.settings)), "whole drive")
     before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)

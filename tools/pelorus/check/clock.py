@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.check.outcome import OFFSET, OFFSET_MOST_S, Bench, Settings
+from pelorus.check.options import Settings
+from pelorus.check.outcome import OFFSET, OFFSET_MOST_S, Bench
 from pelorus.layout import Floats
 from pelorus.motion import Times
 

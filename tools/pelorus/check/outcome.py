@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from pelorus import wire
+from pelorus.check.apart import Parts
 from pelorus.check.contents import (
     first_frames,
     half,
@@ -30,10 +31,12 @@ from pelorus.check.contents import (
     within,
     write,
 )
+from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
 from pelorus.frames import Header, Kind, Message, Pose, Process, Report, Stereo
 from pelorus.layout import Floats
 from pelorus.replay import run_program
+from pelorus.schema import number
 
 # While settings are compared the gate stands where an observation begins to be more likely an
 # outlier than a rare one; the usual gate cuts 1 % of the sound ones, and so would favour sigmas
@@ -44,8 +47,7 @@ BEGIN_NS = 1_000_000_000  # a recording may begin at zero, and its frames be too
 OFFSET_MOST_S = 0.1
 OFFSET, PART, LENGTH = "@offset", "@part", "@frames"
 CAMERA_OFFSET = "camera-offset"
-
-Settings = Mapping[str, str]
+CONTRADICTED = number("reason", "POSE_MAY_BE_WRONG")
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Outcome:
     nis: float  # a degree of freedom: 1 is due
     bias: Floats  # at the end, (b_v, b_w)
     bias_variance: Floats
+    contradicted: float = 0.0  # of the frames: in these vision contradicts twists or IMU
 
     def gain_over(self, other: Outcome) -> float:
         """How much likelier this run makes what was seen: -2 ln of the ratio, over the drive."""
@@ -96,6 +99,14 @@ class Bench:
     @property
     def replays(self) -> int:
         return len(self._known)
+
+    def holds(self, kind: Kind) -> bool:
+        return any(message.kind == kind for message in self._messages)
+
+    def parts(self, offset_s: float) -> Parts:
+        """Of what is replayed here, to ask whether parts of the points tell the same motion."""
+        messages = shifted(self._messages, round(offset_s * 1e9))
+        return Parts(self._program, messages, self._folder)
 
     def run(self, settings: Settings) -> Outcome:
         return self.run_all([settings])[0]
@@ -142,14 +153,10 @@ def _by_offset(settings: Settings) -> Settings:
     return {**kept, OFFSET: f"{moved:.6f}"}
 
 
-def options_of(settings: Settings) -> list[str]:
-    """As pelorus-replay takes them."""
-    return [word for name, value in settings.items() for word in (f"--{name}", value)]
-
-
 def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
     """From a filter's REPORTs and POSEs."""
     total, rows, d2, matched, used, gated, frames = 0.0, 0, 0.0, 0, 0, 0, 0
+    contradicted = 0
     last: Pose | None = None
     for message in answers:
         if isinstance(message, Pose) and message.after_stereo:
@@ -157,6 +164,7 @@ def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
         if not isinstance(message, Report) or message.subject != Kind.STEREO or message.status:
             continue
         frames += 1
+        contradicted += bool(message.reasons & CONTRADICTED)
         matched, used = matched + message.matched, used + message.used
         gated += message.gated
         d2, rows = d2 + message.innovation_d2, rows + message.innovation_rows
@@ -174,6 +182,7 @@ def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
         d2 / rows,
         np.asarray(last.bias, np.float64),
         variance,
+        contradicted / frames,
     )
 
 

@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus.check.outcome import Outcome, Settings
+from pelorus.check.apart import Inflated
+from pelorus.check.options import Settings
+from pelorus.check.outcome import Outcome
 from pelorus.check.tracks_noise import TrackNoise
 from pelorus.frames import Header
 
@@ -58,6 +60,7 @@ class Tuned:
     said: list[str] = field(default_factory=list)
     offset_s: float = 0.0
     of_clock: list[str] = field(default_factory=list)  # of what was said
+    halves: Inflated | None = None  # None: not compared
 
 
 def of_process(by_imu: bool) -> dict[str, Parameter]:

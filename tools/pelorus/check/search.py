@@ -12,7 +12,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from pelorus.check.outcome import Bench, Outcome, Settings
+from pelorus.check.options import Settings
+from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import Parameter, limits, written
 
 COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"  # of a rough answer

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
 
@@ -12,9 +14,18 @@ SETTING = "pixel-sigma"
 
 
 def with_shared_rows(bench: Bench, tuned: Tuned) -> Tuned:
-    """The same with at least the sigma that the rectification leaves."""
-    least_px = tuned.noise.rows_px
-    if SETTING not in tuned.settings or float(tuned.settings[SETTING]) >= least_px:
+    """The same with the sigma that the rectification leaves, too.
+
+    What all points share moves no half of them beside another (halves_alike.py): the two are other
+    errors, and their squares add up. Where halves were not compared, the sigma is at least as
+    large: what is in it already is not known.
+    """
+    shared_px = tuned.noise.rows_px
+    if SETTING not in tuned.settings or not shared_px > 0:
         return tuned
-    settings = tuned.settings | {SETTING: f"{least_px:.3g}"}
+    was_px = float(tuned.settings[SETTING])
+    sigma_px = (
+        max(was_px, shared_px) if tuned.halves is None else float(np.hypot(was_px, shared_px))
+    )
+    settings = tuned.settings | {SETTING: f"{sigma_px:.3g}"}
     return replace(tuned, settings=settings, after=bench.run(settings))

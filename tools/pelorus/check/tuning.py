@@ -16,7 +16,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from pelorus.check import clock, tuning_imu
-from pelorus.check.outcome import LENGTH, OFFSET, PART, Bench, Settings
+from pelorus.check.options import Settings
+from pelorus.check.outcome import LENGTH, OFFSET, PART, Bench
 from pelorus.check.parameters import (
     AXES,
     PAYS,
@@ -31,11 +32,12 @@ from pelorus.check.parameters import (
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
 from pelorus.check.tracks_noise import TrackNoise, track_noise
-from pelorus.converters.twist_noise import difference_of_a_reading
+from pelorus.converters.twist_noise import Spread, difference_of_a_reading
 from pelorus.layout import Floats
 
 WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
 PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
+FRAMES_FEW = 20  # tell a spread to a fifth: enough to begin with
 SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
 ALIKE = 0.7  # cosine of the angle between them
 FINE = (1.3, 1.15)
@@ -81,7 +83,7 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | fewer_slots(given)
-    values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, start, TWIST, COARSE).values
+    values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)
     offset = clock.of_twists(bench, rough | written(values, TWIST))
     if offset.gain > PAYS:  # what a wrong clock does is no noise
         rough[OFFSET] = f"{offset.best_s:.6f}"
@@ -97,6 +99,27 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     return Tuned(settings, before, found.outcome, noise, said, offset_s, [of_clock])
 
 
+def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[str, float]:
+    """From what is given, and from what the images say of the twists: the likelier of the two.
+
+    With sigmas that are far too small a filter finds contradictions all along and widens what it
+    believes, which can be the best for many steps around.
+    """
+    starts = [start]
+    most = difference_of_a_reading(bench.examined, FRAMES_FEW)
+    if most is not None:
+        starts.append(dict(start) | _of_twists(start, most))
+    found = [search_noises(bench, side, some, TWIST, COARSE) for some in starts]
+    return min(found, key=lambda some: some.outcome.cost).values
+
+
+def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
+    """The sigmas of the twists alone."""
+    said = {"velocity": spread.velocity_mps, "gyro": spread.gyro_radps}
+    of = {name: said.get(name.partition("-")[0], 0.0) for name in start}
+    return {name: value for name, value in of.items() if value > 0}
+
+
 # --- tracks that drift ----------------------------------------------------------------------------
 
 
@@ -108,11 +131,8 @@ def _of_drifting_tracks(
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     most = difference_of_a_reading(bench.examined)
     if most is not None:
-        for name, value in start.items():
-            if name.startswith("velocity"):
-                values[name] = min(value, most.velocity_mps)
-            elif name.startswith("gyro"):
-                values[name] = min(value, most.gyro_radps)
+        of_twists = _of_twists(start, most)
+        values |= {name: min(start[name], value) for name, value in of_twists.items()}
     return Found(values, bench.run({**fixed, **written(values, TWIST)}))
 
 

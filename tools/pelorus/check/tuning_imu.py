@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from pelorus.check import clock
-from pelorus.check.outcome import LENGTH, OFFSET, Bench, Outcome, Settings
+from pelorus.check.options import Settings
+from pelorus.check.outcome import LENGTH, OFFSET, Bench, Outcome
 from pelorus.check.parameters import (
     IMU,
     PAYS,

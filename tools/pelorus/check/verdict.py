@@ -86,6 +86,7 @@ def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
         *_nis(run, tuned),
         *_biases(run),
         *_tracks(tuned),
+        *_halves(tuned),
         *(Remark(Grade.GOOD, words) for words in tuned.said),
     ]
 
@@ -137,6 +138,8 @@ def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
     words = f"innovations are {run.nis:.2f} times what the noise says, 1 is due"
     if tuned.noise.drifts:
         yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for drift as well")
+    elif run.nis < NIS_LOW and tuned.halves is not None and tuned.halves.is_larger:
+        yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for what points share")
     elif run.nis < NIS_LOW and tuned.noise.rows_px > 0:
         yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for the rectification")
     elif NIS_LOW <= run.nis <= NIS_HIGH:
@@ -172,8 +175,8 @@ def _tracks(tuned: Tuned) -> Iterator[Remark]:
             Grade.CARE,
             f"the rectification is off: the rows of left and right differ by "
             f"{noise.rows.smooth_px:.2f} px RMS, smoothly over the picture and up to "
-            f"{noise.rows.largest_px:.1f} px, which all points share: pixel-sigma is at least "
-            f"{noise.rows_px:.2g} for that. A better calibration is due",
+            f"{noise.rows.largest_px:.1f} px, which all points share: in pixel-sigma, "
+            f"{noise.rows_px:.2g} px stand for that. A better calibration is due",
         )
     if not noise.drifts:
         return
@@ -182,10 +185,33 @@ def _tracks(tuned: Tuned) -> Iterator[Remark]:
     yield Remark(
         Grade.CARE,
         f"the tracks drift: points are off by {known[first]:.2f} px after {first} frame and by "
-        f"{known[last]:.2f} px after {last}; pixel-sigma {noise.stands_for_px:.2g} stands for "
-        "that. Timing, clocks and the noise of single axes cannot be told by the likelihood of "
-        "single steps then, and stay as given",
+        f"{known[last]:.2f} px after {last}; in pixel-sigma, {noise.stands_for_px:.2g} px or more "
+        "stand for that. Timing, clocks and the noise of single axes cannot be told by the "
+        "likelihood of single steps then, and stay as given",
     )
+
+
+def _halves(tuned: Tuned) -> Iterator[Remark]:
+    """Whether parts of the points tell the same motion."""
+    found = tuned.halves
+    if found is None or not np.isfinite(found.before.ratio):
+        return
+    ratio = f"{found.before.ratio:.2g} times as much (squared) as noise that is new in every frame"
+    if not found.before.ratio > found.before.by_chance:
+        yield Remark(
+            Grade.GOOD,
+            f"motions by halves of the points differ {ratio} would make them; up to "
+            f"{found.before.by_chance:.2g} may be chance",
+        )
+        return
+    words = f"motions by halves of the points ({found.before.way}) differ {ratio} of "
+    words += f"{found.was_px:.2g} px would make them: points share errors, of lens, rectification, "
+    words += "tracker or things that move"
+    if found.is_larger:
+        words += f"; in pixel-sigma, {found.sigma_px:.2g} px stand for that"
+    if found.after.ratio > found.after.by_chance:
+        words += f"; no pixel-sigma brings them together (still {found.after.ratio:.2g} times)"
+    yield Remark(Grade.CARE, words)
 
 
 def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:

@@ -62,13 +62,13 @@ def suggest(recording: Recording) -> tuple[Recording, Finding]:
     return _decide(recording, twists, images, Finding(subject, False, _words(twists, images), ""))
 
 
-def difference_of_a_reading(recording: Recording) -> Spread | None:
+def difference_of_a_reading(recording: Recording, fewest: int = FRAMES_ENOUGH) -> Spread | None:
     """By how much twists and images differ, as the sigma of a reading: the most that the twists'
-    noise can be. None where the images tell too little.
+    noise can be. None where fewer frames have tracks enough.
     """
     seen = seen_pairs(recording.tracks, recording.header.camera, 1)
     usable = seen.counts() >= PAIRS_ENOUGH
-    if usable.sum() < FRAMES_ENOUGH:
+    if usable.sum() < fewest:
         return None
     tau_s = np.diff(recording.frame_t_ns)[usable] * 1e-9
     whole = _body(recording, visual_motion.estimate(seen, recording.header.camera))

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+"""Halves of the points: they agree where the noise is new in every frame, and show what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pelorus import se3, wire
+from pelorus.check import halves_alike
+from pelorus.check.apart import Apart, Parts, compare, halves, of_points, windows
+from pelorus.check.contents import recording_of
+from pelorus.check.outcome import NOTHING, Bench
+from pelorus.check.parameters import Tuned
+from pelorus.check.tracks_noise import TrackNoise
+from pelorus.evaluation import judge
+from pelorus.frames import Header, Kind, Message, Start, Stereo, Twist
+from pelorus.replay import replayed
+from pelorus.trajectory import Trajectory
+from replay_drive import drive, header
+from report_runs import built_programs
+
+SIGMA_PX = 0.3
+TWISTS = {"velocity-sigma": "0.3", "gyro-sigma": "0.03", "bias": "off"}
+Pixels = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> list[Message]:
+    """Twenty seconds of a drive whose twists are poor and whose pixels are good."""
+    built_programs()
+    from pelorus.cli import main
+
+    path = tmp_path_factory.mktemp("apart") / "drive.plr"
+    twists = ("--velocity-sigma", "0.3", "--gyro-sigma", "0.03", "--twist-rate", "10")
+    biases = ("--bias-velocity-sigma", "0", "--bias-gyro-sigma", "0", "--outliers", "0")
+    drive = ("--seed", "3", "--duration", "20", "--baseline", "0.4", "--speed", "5")
+    pixels = ("--pixel-sigma", str(SIGMA_PX), "--loss", "0.03")
+    assert main(["simulate", str(path), *drive, *twists, *biases, *pixels]) == 0
+    return [m for m in wire.messages_of(path) if m.kind != Kind.END]
+
+
+def moved(messages: list[Message], by: Callable[[Stereo], Pixels]) -> list[Message]:
+    """With other pixels."""
+    out: list[Message] = []
+    for message in messages:
+        if isinstance(message, Stereo):
+            pixels = (message.pixels + by(message)).astype(np.float32)
+            message = replace(message, pixels=pixels)
+        out.append(message)
+    return out
+
+
+def bent(message: Stereo) -> Pixels:
+    """The right picture is off by up to a pixel, more so in the corners, and in u alone."""
+    off = np.zeros(message.pixels.shape)
+    x, y = ((message.pixels[:, :2] - (320, 240)) / (320, 240)).T
+    off[:, 2] = 1.5 * x * y + 0.5 * x
+    return off
+
+
+def walking(sigma_px: float) -> Callable[[Stereo], Pixels]:
+    """Each track wanders off on its own."""
+    chance = np.random.default_rng(2)
+    off: dict[int, Pixels] = {}
+
+    def step(message: Stereo) -> Pixels:
+        for id in message.ids.tolist():
+            off[id] = off.get(id, np.zeros(4)) + sigma_px * chance.normal(size=4)
+        return np.array([off[id] for id in message.ids.tolist()]).reshape(-1, 4)
+
+    return step
+
+
+def nees(messages: list[Message], sigma_px: float) -> float:
+    """Of the whole drive against truth."""
+    options = [w for k, v in TWISTS.items() for w in (f"--{k}", v)]
+    program = built_programs().float32
+    log = replayed(program, messages, [*options, "--pixel-sigma", f"{sigma_px:.4g}"])
+    found = judge(log)["nees_per_dof"]
+    assert found is not None
+    return found
+
+
+def untrue(messages: list[Message]) -> list[Message]:
+    return [m for m in messages if m.kind != Kind.TRUTH]
+
+
+def test_white_noise_moves_halves_as_far_as_their_covariances_say(
+    simulated: list[Message], tmp_path: Path
+) -> None:
+    parts = Parts(built_programs().float32, untrue(simulated), tmp_path)
+    found = halves_alike.inflate(parts, TWISTS, SIGMA_PX, 100)
+    assert not found.is_larger
+    assert found.before.windows == 3
+    assert 0.5 < min(found.before.by_way.values())
+    assert found.before.ratio < found.before.by_chance
+    small = halves_alike.inflate(
+        parts, TWISTS, SIGMA_PX / 4, 100
+    )  # a sigma that is too small
+    assert small.sigma_px == pytest.approx(SIGMA_PX, rel=0.3)
+
+
+@pytest.mark.parametrize("fault", [bent, walking(0.25)], ids=["bent", "walking"])
+def test_errors_that_points_keep_are_stood_for_until_the_covariance_is_true(
+    simulated: list[Message], tmp_path: Path, fault: Callable[[Stereo], Pixels]
+) -> None:
+    off = moved(simulated, fault)
+    parts = Parts(built_programs().float32, untrue(off), tmp_path)
+    found = halves_alike.inflate(parts, TWISTS, SIGMA_PX, 100)
+    assert found.before.ratio > 2 * found.before.by_chance
+    assert found.after.ratio < found.after.by_chance
+    assert nees(off, SIGMA_PX) > 5
+    assert nees(off, found.sigma_px) < 3
+
+
+def test_no_sigma_is_taken_that_brings_halves_no_nearer() -> None:
+    class Asked:
+        """Halves that are as far apart with any sigma."""
+
+        def apart(self, settings: dict[str, str]) -> Apart:
+            return Apart({"near and far": 9.0 + 0 * len(settings)}, 4)
+
+    found = halves_alike.inflate(cast(Parts, Asked()), {}, 1.0, 100.0)
+    assert not found.is_larger
+    assert found.after.ratio == 9
+
+
+def test_halves_are_not_compared_where_vision_contradicts_the_twists(
+    tmp_path: Path,
+) -> None:
+    recording = tmp_path / "drive.plr"
+    from pelorus.check.contents import write
+
+    write(recording, drive(20))
+    bench = Bench(built_programs().float32, recording, tmp_path)
+    noise = TrackNoise({}, float("nan"))
+    calm = Tuned({"pixel-sigma": "0.5"}, NOTHING, NOTHING, noise)
+    assert halves_alike.with_halves_alike(bench, calm).halves is not None
+    denied = replace(calm, after=replace(NOTHING, contradicted=0.6))
+    assert halves_alike.with_halves_alike(bench, denied).halves is None
+    mapped = replace(calm, settings={**calm.settings, "mode": "localization"})
+    assert halves_alike.with_halves_alike(bench, mapped).halves is None
+
+
+def test_windows_are_whole_drives_with_the_twists_of_their_first_frame() -> None:
+    messages = [header(), Start(0), *drive(150)[1:]]
+    found = list(windows(messages))
+    assert [sum(isinstance(m, Stereo) for m in w) for w in found] == [75, 75]
+    for window in found:
+        assert isinstance(window[0], Header)
+        assert not any(isinstance(m, Start) for m in window)
+        first = next(m for m in window if isinstance(m, Stereo))
+        assert any(isinstance(m, Twist) and m.t_ns == first.t_ns for m in window)
+    times = [m.t_ns for w in found for m in w if isinstance(m, Stereo)]
+    assert times == [m.t_ns for m in messages if isinstance(m, Stereo)]
+
+
+def test_halves_share_no_point_and_have_as_many_observations() -> None:
+    messages = drive(40)
+    tracks = recording_of(messages).tracks
+    ids, masks = halves(tracks)
+    assert set(masks) == {
+        "left and right",
+        "upper and lower",
+        "near and far",
+        "any two halves",
+    }
+    for first in masks.values():
+        share = np.isin(tracks.id, ids[first]).mean()
+        assert 0.3 < share <= 0.5
+    left = masks["left and right"]
+    u = [
+        tracks.pixels[np.isin(tracks.id, ids[some]), 0].mean() for some in (left, ~left)
+    ]
+    assert u[0] < u[1]
+    part = of_points(messages, ids[left])
+    seen = [m.ids for m in part if isinstance(m, Stereo)]
+    assert set(np.concatenate(seen).tolist()) == set(ids[left].tolist())
+
+
+def test_what_a_half_may_differ_by_is_what_it_knows_less() -> None:
+    """Directions in which it knows as much are not compared."""
+    chance = np.random.default_rng(4)
+    n, known = 2000, np.diag([1.0, 2.0, 1.0, 1.0, 1.0, 1.0]) * 1e-4
+    less = np.diag([2.0, 2.0, 0.5, 0.05, 1.0, 1.0]) * 1e-4
+    less[3, 3] = 0.05e-4  # a twentieth: too little to be told
+    d = chance.normal(size=(n, 6)) * np.sqrt(np.diag(less))
+    t_ns = np.arange(n, dtype=np.int64)
+    stands = se3.Poses(np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)))
+    whole = Trajectory(t_ns, stands), np.tile(known, (n, 1, 1))
+    part = (
+        Trajectory(t_ns, se3.exp(d[:, :3], d[:, 3:])),
+        np.tile(known + less, (n, 1, 1)),
+    )
+    d2, count = compare(whole, part)
+    assert count == 5 * (n - 3)
+    assert d2 / count == pytest.approx(1, abs=0.05)
+    unknown = part[0], np.full((n, 6, 6), np.nan)
+    assert compare(whole, cast(Any, unknown)) == (0.0, 0)
