@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pelorus import se3, wire
 from pelorus.check import halves_alike
 from pelorus.check.apart import Apart, Parts, compare, halves, of_points, windows
-from pelorus.check.contents import recording_of
+from pelorus.check.contents import recording_of, write
 from pelorus.check.outcome import NOTHING, Bench
 from pelorus.check.parameters import Tuned
 from pelorus.check.tracks_noise import TrackNoise
@@ -34,7 +34,7 @@ Pixels = NDArray[np.float64]
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> list[Message]:
     """Twenty seconds of a drive whose twists are poor and whose pixels are good."""
     built_programs()
-    from pelorus.cli import main
+    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
 
     path = tmp_path_factory.mktemp("apart") / "drive.plr"
     twists = ("--velocity-sigma", "0.3", "--gyro-sigma", "0.03", "--twist-rate", "10")
@@ -51,7 +51,7 @@ def moved(messages: list[Message], by: Callable[[Stereo], Pixels]) -> list[Messa
     for message in messages:
         if isinstance(message, Stereo):
             pixels = (message.pixels + by(message)).astype(np.float32)
-            message = replace(message, pixels=pixels)
+            message = replace(message, pixels=pixels)  # noqa: PLW2901
         out.append(message)
     return out
 
@@ -98,11 +98,9 @@ def test_white_noise_moves_halves_as_far_as_their_covariances_say(
     found = halves_alike.inflate(parts, TWISTS, SIGMA_PX, 100)
     assert not found.is_larger
     assert found.before.windows == 3
-    assert 0.5 < min(found.before.by_way.values())
+    assert min(found.before.by_way.values()) > 0.5
     assert found.before.ratio < found.before.by_chance
-    small = halves_alike.inflate(
-        parts, TWISTS, SIGMA_PX / 4, 100
-    )  # a sigma that is too small
+    small = halves_alike.inflate(parts, TWISTS, SIGMA_PX / 4, 100)  # a sigma that is too small
     assert small.sigma_px == pytest.approx(SIGMA_PX, rel=0.3)
 
 
@@ -135,8 +133,6 @@ def test_halves_are_not_compared_where_vision_contradicts_the_twists(
     tmp_path: Path,
 ) -> None:
     recording = tmp_path / "drive.plr"
-    from pelorus.check.contents import write
-
     write(recording, drive(20))
     bench = Bench(built_programs().float32, recording, tmp_path)
     noise = TrackNoise({}, float("nan"))
@@ -175,9 +171,7 @@ def test_halves_share_no_point_and_have_as_many_observations() -> None:
         share = np.isin(tracks.id, ids[first]).mean()
         assert 0.3 < share <= 0.5
     left = masks["left and right"]
-    u = [
-        tracks.pixels[np.isin(tracks.id, ids[some]), 0].mean() for some in (left, ~left)
-    ]
+    u = [tracks.pixels[np.isin(tracks.id, ids[some]), 0].mean() for some in (left, ~left)]
     assert u[0] < u[1]
     part = of_points(messages, ids[left])
     seen = [m.ids for m in part if isinstance(m, Stereo)]

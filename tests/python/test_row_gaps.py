@@ -18,9 +18,7 @@ from pelorus.tracks import Tracks
 FRAMES, POINTS = 12, 60
 
 
-def tracks(
-    bend: NDArray[np.float64], noise_px: float = 0.1, points: int = POINTS
-) -> Tracks:
+def tracks(bend: NDArray[np.float64], noise_px: float = 0.1, points: int = POINTS) -> Tracks:
     """Points all over 800 x 400 px; vL - vR is bend . (1, x, y, x y), x and y from -1 to 1."""
     chance = np.random.default_rng(1)
     n = FRAMES * points
@@ -80,9 +78,7 @@ def test_what_the_rectification_leaves_is_added_to_the_pixel_sigma_in_squares() 
     def sigma(bend: list[float], given: str, halves: Inflated | None) -> float:
         noise = TrackNoise({}, float("nan"), row_gaps(tracks(np.array(bend))), 49)
         tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, noise, halves=halves)
-        return float(
-            with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"]
-        )
+        return float(with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"])
 
     shared_px = 7 * 0.4 / np.sqrt(2)
     assert abs(sigma([0.4, 0, 0, 0], "0.3", alike) - np.hypot(0.3, shared_px)) < 0.05
