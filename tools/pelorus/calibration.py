@@ -35,17 +35,12 @@ def read_extrinsic(path: Path) -> Poses:
     return _Calibration(path, foreign.json_object(path)).extrinsic()
 
 
-class _Calibration:
-    def __init__(self, path: Path, content: dict[str, Any]) -> None:
-        self.path = path
-        self.content = content
-        self.named = Named(path, content)
-
+class _Calibration(Named):
     def header(self) -> Header:
         known = {*CAMERA, "R_CB", "t_CB_m", "R_BC", "t_BC_m", *OPTIONAL}
         self._only(self.content, known, "the calibration")
         T_CB = self.extrinsic()
-        numbers = [self.named.number(name) for name in CAMERA]
+        numbers = [self.number(name) for name in CAMERA]
         axes = self._choice("body_axes", AXES, body_axes(T_CB.R))
         timings = {timing.name.lower(): timing for timing in TwistTiming}
         return Header(
@@ -63,7 +58,7 @@ class _Calibration:
     def _name(self) -> str:
         name = self.content.get("name", self.path.stem)
         if not isinstance(name, str):
-            raise self.named.error("name", name, "words are due")
+            raise self.error("name", name, "words are due")
         return header_name(name)
 
     def extrinsic(self) -> Poses:
@@ -76,8 +71,8 @@ class _Calibration:
                 "(the camera's pose in the body) are due",
             )
         pair = given[0]
-        R = arrays.rotation(self.path, f"R_{pair}", self.named.array(f"R_{pair}", 3, 3))
-        T = Poses(R, self.named.array(f"t_{pair}_m", 3))
+        R = arrays.rotation(self.path, f"R_{pair}", self.array(f"R_{pair}", 3, 3))
+        T = Poses(R, self.array(f"t_{pair}_m", 3))
         return T if pair == "CB" else se3.inverse(T)
 
     def _choice(self, name: str, choices: dict[str, Any], standard: Any) -> Any:
@@ -85,13 +80,13 @@ class _Calibration:
             return standard
         word = self.content[name]
         if not isinstance(word, str) or word not in choices:
-            raise self.named.error(name, word, f"{' or '.join(choices)} is due")
+            raise self.error(name, word, f"{' or '.join(choices)} is due")
         return choices[word]
 
     def _size(self, name: str) -> int:
         size = self.content.get(name, 0)
         if not isinstance(size, int) or not 0 <= size <= IMAGE_SIZE_MAX:
-            raise self.named.error(name, size, f"0 to {IMAGE_SIZE_MAX} is due")
+            raise self.error(name, size, f"0 to {IMAGE_SIZE_MAX} is due")
         return size
 
     def _noise(self) -> Noise:
@@ -100,7 +95,7 @@ class _Calibration:
             isinstance(value, (int, float)) and np.isfinite(float(value))
             for value in given.values()
         ):
-            raise self.named.error("noise", given, "names with numbers are due")
+            raise self.error("noise", given, "names with numbers are due")
         self._only(given, set(vars(Noise())), "noise")
         return Noise(**{name: float(value) for name, value in given.items()})
 
