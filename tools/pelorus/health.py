@@ -89,6 +89,10 @@ class TimeLine:
         ]
         return ", ".join((f"good in {good} of {self.frames} frames", *others))
 
+    def told(self, origin_ns: int) -> list[str]:
+        """The summary, and each spell."""
+        return [self.summary(), *(spell.words(origin_ns) for spell in self.spells)]
+
 
 def time_line(messages: Iterable[Message]) -> TimeLine | None:
     """Of a filter's result; None where there is no answer to a frame."""

@@ -31,13 +31,12 @@ class Also(StrEnum):
     WORLD = "world"
 
 
-def register(parent: typer.Typer) -> None:
-    """Add `report` to the command line."""
-    parent.command(
-        epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on",
-    )(report)
+app = typer.Typer()
 
 
+@app.command(
+    epilog="Example:  pelorus report drive.plr --out out --config robot.conf --set bias=on",
+)
 def report(
     recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to replay."),
     folder: Path = typer.Option(
@@ -96,8 +95,8 @@ def _tell(compared: Comparison, lines: list[str], page: Path) -> None:
     out.print(table)
     for line in lines:
         out.print(f"[yellow]-[/] {escape(line)}")
-    health = compared.main.health
-    out.print(f"health: {health.summary()}")
-    for spell in health.spells:
-        out.print(f"  {escape(spell.words(compared.origin_ns))}")
+    summary, *spells = compared.main.health.told(compared.origin_ns)
+    out.print(f"health: {summary}")
+    for spell in spells:
+        out.print(f"  {escape(spell)}")
     out.print(f"report: {escape(str(page))}")

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from pelorus.course.trial import Trial
 from pelorus.layout import Floats
 from pelorus.report.results import OWN
+from pelorus.report.top_view import Box, around
 from pelorus.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
 
 NAMES = {
@@ -67,11 +68,8 @@ def _trajectories(axes: Axes, trial: Trial) -> None:
 def _limit(axes: Axes, paths: dict[str, Floats], true: Floats | None) -> None:
     """Around the two filters and the reference; dead reckoning may stray so far and no farther."""
     core = np.concatenate([paths["course"], paths[OWN], *([] if true is None else [true])])
-    low, high = core.min(axis=0), core.max(axis=0)
-    side = max(float((high - low).max()), 1e-3)
-    everything = np.concatenate((core, paths["dead-reckoning"]))
-    low = np.maximum(everything.min(axis=0), low - STRAY * side) - MARGIN * side
-    high = np.minimum(everything.max(axis=0), high + STRAY * side) + MARGIN * side
+    side = Box(core.min(axis=0), core.max(axis=0)).side
+    low, high = around(core, [paths["dead-reckoning"]], STRAY).grown(MARGIN * side)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
 

@@ -53,7 +53,7 @@ def write(
         _table(compared),
         f"<p>{escape(MEANING)}</p>",
         _list("What is off", lines),
-        _list("Health", _health(compared)),
+        _list("Health", compared.main.health.told(compared.origin_ns)),
         *(_figure(picture, file) for picture, file in drawn if picture.caption),
         _commands(compared.runs),
         "</body>\n</html>\n",
@@ -71,12 +71,6 @@ def _facts(compared: Comparison) -> str:
         f"path {summary['path_m']:.1f} m; body axes "
         f"{header.body_axes.name.lower().replace('_', '-')}."
     )
-
-
-def _health(compared: Comparison) -> list[str]:
-    """Of the user's own run: every spell, for a page has room."""
-    found = compared.main.health
-    return [found.summary(), *(spell.words(compared.origin_ns) for spell in found.spells)]
 
 
 def _table(compared: Comparison) -> str:

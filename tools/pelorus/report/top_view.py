@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,13 +86,17 @@ def view(compared: Comparison) -> View:
 def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
     """Around the main run and the truth; the other runs widen it, but cannot blow it up."""
     core = paths[OWN] if truth is None else np.concatenate((paths[OWN], truth))
-    inner = Box(core.min(axis=0), core.max(axis=0))
-    outmost = inner.grown(STRAY * inner.side)
-    everything = np.concatenate((core, *paths.values()))
-    low = np.maximum(everything.min(axis=0), outmost.low)
-    high = np.minimum(everything.max(axis=0), outmost.high)
-    whole = Box(low, high)
+    whole = around(core, tuple(paths.values()), STRAY)
     return whole.grown(MARGIN * whole.side)
+
+
+def around(core: Floats, others: Sequence[Floats], stray: float) -> Box:
+    """All of the core; others widen the box by so much of its side at most."""
+    inner = Box(core.min(axis=0), core.max(axis=0))
+    outmost = inner.grown(stray * inner.side)
+    everything = np.concatenate((core, *others))
+    low = np.maximum(everything.min(axis=0), outmost.low)
+    return Box(low, np.minimum(everything.max(axis=0), outmost.high))
 
 
 def draw(compared: Comparison) -> Figure:
