@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The command `pelorus`. Each command lives in its own file under pelorus/commands.
 
-To add one: write commands/NAME.py with a function `register(app)` and name it in COMMANDS. Only
+To add one: write commands/NAME.py with an `app` that has it, and name it in COMMANDS. Only
 the command that is called is imported: plotting takes longer to load than most of them to run.
 """
 
@@ -45,7 +45,7 @@ def _app(commands: Iterable[str]) -> typer.Typer:
         callback=_options,
     )
     for command in commands:
-        import_module(f"pelorus.commands.{command}").register(app)
+        app.add_typer(import_module(f"pelorus.commands.{command}").app)
     return app
 
 

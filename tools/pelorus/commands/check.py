@@ -23,12 +23,10 @@ if TYPE_CHECKING:
 COLOURS = ("green", "yellow", "red")
 MARKS = ("good", "care", "bad")
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `check` to the command line."""
-    parent.command(epilog="Example:  pelorus check drive.plr --out tuned.conf")(check)
+app = typer.Typer()
 
 
+@app.command(epilog="Example:  pelorus check drive.plr --out tuned.conf")
 def check(
     recording: Path = typer.Argument(
         ..., metavar="RECORDING", help="A .plr file; no truth needed."

@@ -31,14 +31,12 @@ SAME_SOURCES = (
 )
 STARTS = ("truth", "identity", "recorded")
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `compare` to the command line."""
-    parent.command(
-        epilog="Example:  pelorus compare flight.plr",
-    )(compare)
+app = typer.Typer()
 
 
+@app.command(
+    epilog="Example:  pelorus compare flight.plr",
+)
 def compare(
     log: Path = typer.Argument(
         ...,

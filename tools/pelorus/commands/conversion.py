@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every converter says of the recording that it made."""
+"""What every converter, and the simulation, says of the recording that it made."""
 
 from __future__ import annotations
 

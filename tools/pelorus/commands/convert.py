@@ -28,18 +28,12 @@ SOURCE = typer.Argument(..., metavar="IN", help="The file to convert.")
 DATA_SETS = "Files of known data sets"
 
 app = typer.Typer(
+    name="convert",
     help="Make a recording (.plr) of other formats. Which is yours? docs/CONVERT.md has a command "
     "for each.",
     no_args_is_help=True,
     epilog="Example:  pelorus convert euroc V1_01_easy V1_01.plr",
 )
-
-
-def register(parent: typer.Typer) -> None:
-    """Add `convert` to the command line."""
-    importers.register(app)
-    app.registered_commands.sort(key=lambda command: command.rich_help_panel != OWN_DATA)
-    parent.add_typer(app, name="convert")
 
 
 @app.command(
@@ -247,3 +241,7 @@ def map_(
         f"{escape(str(target))}: {size} bytes, {len(sigma)} known landmarks, sigma "
         f"{min(sigma):.3g} to {max(sigma):.3g} m"
     )
+
+
+importers.register(app)
+app.registered_commands.sort(key=lambda command: command.rich_help_panel != OWN_DATA)

@@ -25,15 +25,13 @@ if TYPE_CHECKING:
 
 FIGURE_1, FIGURE_2, TABLE = "figure1.png", "figure2.png", "table.md"
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `course` to the command line."""
-    parent.command(
-        epilog="Example:  pelorus course 03.plr 0027.plr --config tools/config/03.conf "
-        "--config tools/config/0027.conf --road road.csv --out out/course",
-    )(course)
+app = typer.Typer()
 
 
+@app.command(
+    epilog="Example:  pelorus course 03.plr 0027.plr --config tools/config/03.conf "
+    "--config tools/config/0027.conf --road road.csv --out out/course",
+)
 def course(
     recordings: list[Path] = typer.Argument(
         ..., metavar="RECORDING...", help="A column of the figures each."

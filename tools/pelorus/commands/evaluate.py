@@ -29,14 +29,12 @@ MEANING = evaluation.MEANING | {
     "step_change_m": "RMS change of the step from pose to pose: how erratic it is",
 }
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `evaluate` to the command line."""
-    parent.command(
-        epilog="Example:  pelorus evaluate drive.plr --config robot.conf --set bias=on",
-    )(evaluate)
+app = typer.Typer()
 
 
+@app.command(
+    epilog="Example:  pelorus evaluate drive.plr --config robot.conf --set bias=on",
+)
 def evaluate(
     source: Path = typer.Argument(
         ...,

@@ -13,14 +13,10 @@ from pelorus.evaluation import made_in
 from pelorus.frame_table import frame_table, write_csv
 from pelorus.replay import result_of
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `export` to the command line."""
-    parent.command(epilog="Example:  pelorus export log.plr --frames frames.csv --map map.ply")(
-        export
-    )
+app = typer.Typer()
 
 
+@app.command(epilog="Example:  pelorus export log.plr --frames frames.csv --map map.ply")
 def export(
     source: Path = typer.Argument(
         ..., metavar="RECORDING|RESULT", help="A recording, or what a filter left of it."

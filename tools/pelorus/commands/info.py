@@ -24,12 +24,10 @@ SPELLS_SHOWN = 40
 FAULTS_SHOWN = 10
 SEVERITIES = ("info", "warning", "error")
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `info` to the command line."""
-    parent.command(epilog="Example:  pelorus info drive.plr")(info)
+app = typer.Typer()
 
 
+@app.command(epilog="Example:  pelorus info drive.plr")
 def info(
     recording: Path = typer.Argument(..., metavar="IN.plr", help="The recording to look into."),
     as_json: bool = typer.Option(False, "--json", help="The same as one JSON object."),

@@ -17,15 +17,13 @@ from pelorus.grid.occupancy import Band, Grid, Wish
 from pelorus.grid.sightings import sightings
 from pelorus.replay import result_of
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `map` to the command line."""
-    parent.command(
-        "map",
-        epilog="Example:  pelorus map drive.plr --config robot.conf --out out/map --height -0.3 3",
-    )(map_)
+app = typer.Typer()
 
 
+@app.command(
+    "map",
+    epilog="Example:  pelorus map drive.plr --config robot.conf --out out/map --height -0.3 3",
+)
 def map_(
     source: Path = typer.Argument(
         ..., metavar="RECORDING|RESULT", help="A recording, or what a filter left of it."

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import typer
-from rich.markup import escape
 
 from pelorus.commands.choices import Timing
-from pelorus.console import err, out
+from pelorus.commands.conversion import write
+from pelorus.console import err
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.recording import Recording
@@ -25,29 +25,15 @@ from pelorus.small_sensors import SMALL_SENSORS, SmallSensor
 
 TARGET = typer.Argument(..., metavar="OUT.plr", help="The recording to write.")
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `simulate` to the command line."""
-    run.__dict__["__signature__"] = inspect.Signature(
-        [
-            inspect.Parameter(
-                "target", inspect.Parameter.KEYWORD_ONLY, default=TARGET, annotation=Path
-            ),
-            *_parameters(Options, None),
-            *_parameters(Imu, "IMU in place of twists"),
-            *_parameters(Mishaps, "What goes wrong"),
-            *_parameters(ImuFaults, "What goes wrong with an IMU"),
-            *(p for sensor in SMALL_SENSORS for p in _of_sensor(sensor)),
-        ]
-    )
-    parent.command(
-        "simulate",
-        epilog="Example:  pelorus simulate slip.plr --slip 0.5 --slip-from 20 --slip-for 5\n\n"
-        "pelorus simulate gnss.plr --position-rate 5 --position-sigma 0.05 --position-at 0.2,0,1.1"
-        "\n\npelorus simulate carried.plr --imu-rate 400 --rest 2 --start none",
-    )(run)
+app = typer.Typer()
 
 
+@app.command(
+    "simulate",
+    epilog="Example:  pelorus simulate slip.plr --slip 0.5 --slip-from 20 --slip-for 5\n\n"
+    "pelorus simulate gnss.plr --position-rate 5 --position-sigma 0.05 --position-at 0.2,0,1.1"
+    "\n\npelorus simulate carried.plr --imu-rate 400 --rest 2 --start none",
+)
 def run(target: Path, **given: Any) -> None:
     """Simulate a drive through a field of landmarks, with the truth.
 
@@ -66,13 +52,7 @@ def run(target: Path, **given: Any) -> None:
     )
     recording = simulate(options).recording
     _tell_blindness(recording)
-    size = recording.write(target)
-    out.print(
-        f"{escape(str(target))}: {size} bytes, {recording.motion_words}, "
-        f"{len(recording.frame_t_ns)} frames with {len(recording.tracks)} observations, "
-        f"{len(recording.truth_t_ns)} truth poses, {len(recording.known)} known landmarks"
-        + (f", {len(recording.readings)} readings" if recording.readings else "")
-    )
+    write(recording, [], target)
 
 
 # --- settings as options --------------------------------------------------------------------------
@@ -179,3 +159,17 @@ def _tell_blindness(recording: Recording) -> None:
         raise PelorusError(trouble)
     if trouble:
         err.print(f"[bold yellow]warning:[/] {trouble}")
+
+
+run.__dict__["__signature__"] = inspect.Signature(
+    [
+        inspect.Parameter(
+            "target", inspect.Parameter.KEYWORD_ONLY, default=TARGET, annotation=Path
+        ),
+        *_parameters(Options, None),
+        *_parameters(Imu, "IMU in place of twists"),
+        *_parameters(Mishaps, "What goes wrong"),
+        *_parameters(ImuFaults, "What goes wrong with an IMU"),
+        *(p for sensor in SMALL_SENSORS for p in _of_sensor(sensor)),
+    ]
+)

@@ -30,12 +30,10 @@ from pelorus.wire import header_of, read_file
 TEXTS_SHOWN = 200
 BOARDS = ", ".join(MACHINES)
 
-
-def register(app: typer.Typer) -> None:
-    """Add `stream` to the command line."""
-    app.command(epilog="Example:  pelorus stream drive.plr --to qemu:stm32f405 --compare")(stream)
+app = typer.Typer()
 
 
+@app.command(epilog="Example:  pelorus stream drive.plr --to qemu:stm32f405 --compare")
 def stream(
     source: Path = typer.Argument(..., metavar="IN.plr", help="The recording to send."),
     to: str = typer.Option(

@@ -22,12 +22,10 @@ from pelorus.tracks import Tracks
 USUAL = Settings()
 EXAMPLE = "pelorus track image_l image_r stereo.csv --rate 10 --sheet tracks.png"
 
-
-def register(parent: typer.Typer) -> None:
-    """Add `track` to the command line."""
-    parent.command(epilog=f"Example:  {EXAMPLE}")(track)
+app = typer.Typer()
 
 
+@app.command(epilog=f"Example:  {EXAMPLE}")
 def track(
     left: Path = typer.Argument(..., metavar="LEFT", help="Folder of the left camera's pictures."),
     right: Path = typer.Argument(
