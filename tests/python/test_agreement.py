@@ -23,8 +23,10 @@ DRIVE = Options(
 
 @cache
 def driven(seed: int = 11) -> Recording:
-    """No bias of the velocity, and none that the HEADER tells of."""
-    return simulate(replace(DRIVE, seed=seed)).recording
+    """No bias of the velocity, and the HEADER says so."""
+    recording = simulate(replace(DRIVE, seed=seed)).recording
+    noise = replace(recording.header.noise, bias_velocity_sigma_mps=0.0)
+    return recording.with_header(noise=noise)
 
 
 def agreed(recording: Recording) -> Agreement:
@@ -72,6 +74,14 @@ def test_a_bias_that_the_header_tells_of_is_no_scale() -> None:
     recording = driven()
     shifted = replace(recording, v_B_mps=recording.v_B_mps + np.array([0.1, 0, 0]))
     noise = replace(recording.header.noise, bias_velocity_sigma_mps=0.1)
+    assert scale_in(shifted.with_header(noise=noise)) == []
+
+
+def test_a_bias_that_the_settings_allow_is_no_scale() -> None:
+    recording = driven()
+    noise = replace(recording.header.noise, bias_velocity_sigma_mps=-1.0)
+    shifted = replace(recording, v_B_mps=recording.v_B_mps + np.array([0.06, 0, 0]))
+    assert len(scale_in(shifted)) == 1, "where there is no bias it is a scale"
     assert scale_in(shifted.with_header(noise=noise)) == []
 
 

@@ -25,6 +25,7 @@ from pelorus.converters import imu_noise, renewal
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
 from pelorus.faults.finding import Finding
+from pelorus.faults.mend import held_to_fit
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import (
     Header,
@@ -88,7 +89,7 @@ class Choices:
 
 
 def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
-    """The recording, and how its readings fit its truth."""
+    """The recording, how its readings fit its truth, and what is wrong with it by name."""
     recording, truth = read(source, choices.start)
     findings = [imu_noise.compare(recording, truth)]
     chance = np.random.Generator(np.random.PCG64(choices.seed or 0))
@@ -101,7 +102,7 @@ def convert(source: Path, choices: Choices) -> tuple[Recording, list[Finding]]:
         tracks = recording.tracks
         shuffle = None if choices.seed is None else chance
         recording = replace(recording, tracks=renewal.with_new_ids(tracks, shuffle))
-    return recording, findings
+    return held_to_fit(recording, recording, findings)
 
 
 def read(source: Path, start: StartSigmas = START_SIGMAS) -> tuple[Recording, imu_noise.TrueMotion]:

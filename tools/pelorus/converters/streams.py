@@ -137,14 +137,16 @@ def converted(
 ) -> tuple[Recording, list[Finding]]:
     """The recording; if asked mended as far as its own data tell, and the twists' noise measured.
 
-    `timing` overrides the calibration's. Without all six velocities only the tracks can be judged,
-    without twists nothing.
+    `timing` overrides the calibration's. Without all six velocities only the tracks can be judged.
+    An IMU's drive is judged, not mended.
     """
     made = recording(found)
     if timing is not None:
         made = made.with_header(twist_timing=timing)
-    if not fix or not isinstance(found.motion, Twists):
+    if not fix:
         return made, []
+    if not isinstance(found.motion, Twists):
+        return held_to_fit(made, made, [])
     if not found.motion.is_whole:
         made, finding = stale.mend(made)
         return made, [finding]

@@ -11,12 +11,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pelorus.faults import mounting
-from pelorus.faults.agreement import Agreement, Body, Seen, agreement
+from pelorus.faults import imu_axes, mounting
+from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.axes import turns
 from pelorus.faults.fault import UNTOLD, Fault
-from pelorus.faults.handeye import FRAMES_ENOUGH, HandEye, angle_between, hand_eye
+from pelorus.faults.handeye import (
+    FRAMES_ENOUGH,
+    HandEye,
+    angle_between,
+    hand_eye,
+    share_of_fit,
+)
+from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.moving import moving
+from pelorus.faults.seen import Seen
+from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
@@ -32,29 +41,39 @@ UNIT_NEAR = 0.15
 FAR_LAG = 3
 MOVING_SHARE = 0.14  # of what is seen on roads 5 to 12 % drives, or is tracked so badly
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 3.0, 0.015, 0.15
+BIAS_MPS = 0.03  # default of the setting bias-velocity-sigma
 CLOCK_SIGMAS, CLOCK_OFF_S = 3.0, 0.015
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
+PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
 
 
 def geometry(recording: Recording, views: TwoViews) -> Iterator[Fault]:
     """`views` of neighbouring frames. Nothing where all is well."""
-    found = hand_eye(recording, views)
-    if not found.told:
-        yield Fault(
-            UNTOLD,
-            f"only {found.frames} frames share points enough with the one before ({FRAMES_ENOUGH} "
-            "are due): axes, units and scale cannot be judged",
-            stops=False,
-            grave=False,
-        )
+    by_imu = len(recording.inertial.t_ns) > 0
+    wrong = list(_of_imu(recording, views) if by_imu else _of_twists(recording, views))
+    if wrong:
+        yield from wrong
         return
-    if found.fit < FIT_LEAST:
-        yield Fault(
-            "scene",
-            f"only {found.fit:.0%} of the points of two frames agree on one motion: wrong ids, a "
-            "wrong calibration, or much of the scene moves",
-        )
+    moves = list(_moving(recording, views))
+    yield from moves
+    agreed = agreement(recording, views)
+    if agreed.told:
+        lever = [*_lever(recording, agreed)] or [*_place(recording, agreed)] * by_imu
+        yield from lever
+        if not moves:  # what moves looks like another scale
+            told = recording.header.noise.bias_velocity_sigma_mps
+            bias = told if told >= 0 else BIAS_MPS
+            yield from _scale_by_imu(agreed) if by_imu else _scale(agreed, bias)
+        yield from _clock(recording, agreed)
+
+
+def _of_twists(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+    """Too little to tell by, units, axes and the extrinsic's rotation."""
+    found = hand_eye(recording, views)
+    unfit = [*_unfit(found.frames, found.fit)]
+    if unfit:
+        yield from unfit
         return
     turned = [*_units(found)] or [*_extrinsic(recording, found, views)]
     if turned:
@@ -66,15 +85,58 @@ def geometry(recording: Recording, views: TwoViews) -> Iterator[Fault]:
             f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is "
             "left unexplained), and no known fault explains why",
         )
+
+
+def _of_imu(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+    """The same of an IMU's."""
+    seen = Seen.of(recording, views)
+    unfit = [*_unfit(int(seen.usable.sum()), share_of_fit(views))]
+    if unfit:
+        yield from unfit
         return
-    moves = list(_moving(recording, views))
-    yield from moves
-    agreed = agreement(recording, views)
-    if agreed.told:
-        yield from _lever(recording, agreed)
-        if not moves:  # what moves looks like another scale
-            yield from _scale(agreed, recording.header.noise.bias_velocity_sigma_mps)
-        yield from _clock(recording, agreed)
+    found = imu_axes.measured(recording, seen, ImuBody(recording, seen))
+    if found is None:
+        yield Fault(
+            "time-apart", "readings and frames are of different times, hardly any in common"
+        )
+        return
+    given = recording.T_CB.R
+    why = imu_axes.explained(found, given)
+    if why is None:
+        return
+    off = angle_between(why.of_turn, np.eye(3))
+    if why.name == "no-fit":
+        yield Fault(
+            "no-fit",
+            "camera and IMU do not tell the same motion, and no known fault explains why",
+        )
+    elif why.name == "inverted":
+        yield _inverted(angle_between(given, given.T))
+    elif why.name == "axes":
+        words = _words(why.F)
+        yield Fault("axes", f"the IMU's axes are turned or mirrored: {why.words} {words}")
+    elif why.name != "turned":
+        yield Fault(why.name, why.words)
+    elif off > TURNED_DEG:
+        yield _turned(given, given @ why.of_turn, off)
+
+
+def _unfit(frames: int, fit: float) -> Iterator[Fault]:
+    """Too little to tell by, or points that tell no motion."""
+    if frames < FRAMES_ENOUGH:
+        yield Fault(
+            UNTOLD,
+            f"only {frames} frames share points enough with the one before ({FRAMES_ENOUGH} "
+            "are due): axes, units and scale cannot be judged",
+            stops=False,
+            grave=False,
+        )
+    elif fit < FIT_LEAST:
+        yield Fault(
+            "scene",
+            f"only {fit:.0%} of the points of two frames agree on one motion: wrong ids, a "
+            "wrong calibration, or much of the scene moves",
+        )
 
 
 # --- units ----------------------------------------------------------------------------------------
@@ -119,7 +181,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
 
 def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
     seen = Seen.of(recording, views)
-    rates = Body(recording).rates(recording.frame_t_ns, 1, 0.0)
+    rates = TwistBody(recording).rates(recording.frame_t_ns, 1, 0.0)
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     own = np.where(seen.usable[:, None], seen.rates, np.nan)
     of_turn = mounting.best_axes(own[:, 3:], rates[:, 3:])
@@ -210,12 +272,34 @@ def _lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
         )
 
 
+def _place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """Is the camera where it is said to be? Of an IMU, which measures where it is; wheels measure
+    the velocity of some other point than the one that their data sheet names.
+    """
+    T = recording.T_CB
+    arm = -T.R.T @ T.p
+    doubt = LEVER_SHARE * float(np.linalg.norm(arm)) + 0.01
+    known = np.linalg.inv(agreed.lever_covariance + doubt**2 * np.eye(3))
+    off = float(np.linalg.norm(agreed.lever_m))
+    if float(agreed.lever_m @ known @ agreed.lever_m) > PLACE_SURE and off > PLACE_OFF_M:
+        sigma = np.sqrt(np.diagonal(agreed.lever_covariance))
+        yield Fault(
+            "lever",
+            f"turns put the camera {_metres(arm + agreed.lever_m)} from the IMU, known to "
+            f"{sigma.max():.2f} m; the extrinsic puts it {_metres(arm)}",
+            stops=False,
+            grave=False,
+        )
+
+
 def _metres(p: Floats) -> str:
     return "at (" + ", ".join(f"{x:.2f}" for x in p) + ") m"
 
 
 def _scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
-    """`bias_sigma` as the HEADER tells it: such a bias is nothing new. Negative: it tells none."""
+    """`bias_sigma` as the HEADER tells it, or else as the filter's settings allow it: where the
+    speed varies too little to tell a scale from a bias, one of that size is nothing new.
+    """
     off, sigma = agreed.scale - 1, agreed.scale_sigma
     turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
     through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
@@ -253,23 +337,56 @@ def _scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
         )
 
 
+def _scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
+    """Turns tell the focal length, forces the baseline; the gyro's scale is the rest."""
+    way = f"the images show {agreed.scale:.3f} +- {agreed.scale_sigma:.3f} times the IMU's way"
+    for off, sigma, words in (
+        (
+            agreed.focal - 1,
+            agreed.focal_sigma,
+            f"a focal length of {agreed.focal:.3f} +- {agreed.focal_sigma:.3f} times the given one "
+            "fits the turns best",
+        ),
+        (
+            agreed.scale - 1,
+            agreed.scale_sigma,
+            f"{way}. Baseline, or the accelerometer's scale",
+        ),
+    ):
+        if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
+            wild = abs(off) > SCALE_WILD
+            yield Fault(
+                "scale", f"stereo and IMU disagree in scale: {words}", stops=wild, grave=wild
+            )
+            return
+
+
 def _clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
     """One reading later or earlier is another timing: what of it a timing explains is said."""
     offset, sigma = agreed.offset_s, agreed.offset_sigma_s
     if abs(offset) < max(CLOCK_SIGMAS * sigma, CLOCK_OFF_S):
         return
+    by_imu = len(recording.inertial.t_ns) > 0
+    body, way = "IMU" if by_imu else "twists", "later" if offset > 0 else "earlier"
     words = (
-        f"camera and twists agree best with the frames {abs(offset) * 1e3:.0f} +- "
-        f"{sigma * 1e3:.0f} ms {'later' if offset > 0 else 'earlier'} (camera-offset)"
+        f"camera and {body} agree best with the frames {abs(offset) * 1e3:.0f} +- "
+        f"{sigma * 1e3:.0f} ms {way} (camera-offset)"
     )
+    if not by_imu:
+        words += _timing(recording, offset)
+    yield Fault("clock", words, stops=False, grave=False)
+
+
+def _timing(recording: Recording, offset: float) -> str:
+    """What of an offset another timing of the twists would explain."""
     period = float(np.median(np.diff(recording.twist_t_ns))) * 1e-9
     given = recording.header.twist_timing
     lates = {TwistTiming.START: 0.0, TwistTiming.MID: 0.5 * period, TwistTiming.END: period}
     timing = min(lates, key=lambda t: abs(offset - (lates[t] - lates[given])))
-    if timing is not given:
-        part = (lates[timing] - lates[given]) * 1e3
-        words += f"; twist-timing {timing.name.lower()} would make up for {part:.0f} ms of it"
-    yield Fault("clock", words, stops=False, grave=False)
+    if timing is given:
+        return ""
+    part = (lates[timing] - lates[given]) * 1e3
+    return f"; twist-timing {timing.name.lower()} would make up for {part:.0f} ms of it"
 
 
 def _moving(recording: Recording, views: TwoViews) -> Iterator[Fault]:

@@ -74,13 +74,18 @@ def first_part(recording: Recording, most: int = FRAMES_MOST) -> Recording:
 
 def hand_eye(recording: Recording, views: TwoViews) -> HandEye:
     """Fit both motions to one another; `views` are of neighbouring frames."""
-    fits = views.d2 < np.maximum(FITS_D2, (FITS_PX / views.sigma_px) ** 2)
-    fit = float(np.mean(fits)) if len(fits) else 0.0
+    fit = share_of_fit(views)
     tau = np.diff(recording.frame_t_ns) * 1e-9
     # motion maps camera k to k + 1: the body's own motion is its inverse
     of_camera = se3.log(se3.inverse(views.motion)) / tau[:, None]
     of_body = se3.log(se3.inverse(recording.body_motion(1))) / tau[:, None]
     return _fit(recording, of_camera, of_body, views.counts >= POINTS_MIN, fit)
+
+
+def share_of_fit(views: TwoViews) -> float:
+    """Of the pairs of observations those that their frame's motion explains."""
+    fits = views.d2 < np.maximum(FITS_D2, (FITS_PX / views.sigma_px) ** 2)
+    return float(np.mean(fits)) if len(fits) else 0.0
 
 
 def _fit(

@@ -11,53 +11,62 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.faults import identity
 from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import geometry
 from pelorus.faults.handeye import first_part
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.frames import Message, Stereo, Twist
+from pelorus.frames import Imu, Message, Stereo, Twist
+from pelorus.inertial_survey import readings_of
 from pelorus.motion import Times
 from pelorus.recording import Recording
 
+Flags = NDArray[np.bool_]
 SWAPPED_SHARE = 0.5
 ROW_GAP_PX = 2.0  # of a rectified pair the median is below one
 ROW_BIN, ROW_BINS = 50, 4  # observations and parts of the picture by which rows are compared
 ROW_OFF_PX = 1.0
 FROZEN_FRAMES = 3
+MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 GAP_TIMES = 10.0
-TWISTS, FRAMES = "twists", "frames"
-USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, FRAMES: 5e5}
+FROM_TIMES, SPANS_APART = 10, 50.0
+TWISTS, READINGS, FRAMES = "twists", "readings", "frames"
+USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, READINGS: 2e4, FRAMES: 5e5}
 
 
 def faults_of(messages: Sequence[Message], recording: Recording) -> list[Fault]:
     """Of a file's messages, times as they stand, and of what a filter would take of them."""
-    times = {
-        name: np.array([m.t_ns for m in messages if isinstance(m, kind)], np.int64)
-        for kind, name in ((Twist, TWISTS), (Stereo, FRAMES))
-    }
-    return _faults(times, recording)
+    frames = np.array([m.t_ns for m in messages if isinstance(m, Stereo)], np.int64)
+    if len(recording.inertial.t_ns):
+        imu = [m for m in messages if isinstance(m, Imu)]
+        readings = readings_of(imu).t_ns if imu else frames[:0]
+        return _faults({READINGS: readings, FRAMES: frames}, recording)
+    twists = np.array([m.t_ns for m in messages if isinstance(m, Twist)], np.int64)
+    return _faults({TWISTS: twists, FRAMES: frames}, recording)
 
 
 def faults_in(recording: Recording) -> list[Fault]:
     """Of a recording that is not written yet."""
-    return _faults({TWISTS: recording.twist_t_ns, FRAMES: recording.frame_t_ns}, recording)
+    frames = recording.frame_t_ns
+    if len(recording.inertial.t_ns):
+        return _faults({READINGS: recording.inertial.t_ns, FRAMES: frames}, recording)
+    return _faults({TWISTS: recording.twist_t_ns, FRAMES: frames}, recording)
 
 
 def _faults(times_ns: Mapping[str, Times], recording: Recording) -> list[Fault]:
     """The likeliest first; empty if nothing is wrong that this knows of."""
     times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
+    times += _spans(*times_ns.items())
     short = first_part(recording)
     pixels = list(_pixels(short))
-    if pixels or any(fault.name == "time-unit" for fault in times):
+    if pixels or any(fault.name in ("time-unit", "time-apart") for fault in times):
         return [*pixels, *times]  # what follows would be built on sand
     views = two_views(short.tracks, short.header.camera, 1)
     ids = list(_ids(short, views))
     if ids:
         return [*ids, *times]
-    if not len(recording.twist_t_ns):
-        return times  # an IMU: how the body moved is not known before the filter says it
     return [*geometry(short, views), *_frozen(recording), *times]
 
 
@@ -83,6 +92,19 @@ def _times(name: str, t_ns: Times) -> Iterator[Fault]:
             f"{usual * 1e-9:.3g} s from one of the {name} to the next: is the time in other "
             "units (ms, us)?",
         )
+
+
+def _spans(body: tuple[str, Times], camera: tuple[str, Times]) -> Iterator[Fault]:
+    """Both streams are of one drive: of like length, and of the same time."""
+    if min(len(body[1]), len(camera[1])) < FROM_TIMES:
+        return
+    lengths = [float(t_ns.max() - t_ns.min()) * 1e-9 for _, t_ns in (body, camera)]
+    words = f"the {body[0]} span {lengths[0]:.4g} s, the {camera[0]} {lengths[1]:.4g} s"
+    ratio = max(lengths) / max(min(lengths), 1e-9)
+    if ratio > SPANS_APART and min(abs(np.log(ratio / x)) for x in (1e3, 1e6, 1e9)) < np.log(2):
+        yield Fault("time-unit", f"{words}: is one of the clocks in other units (ms, us)?")
+    elif body[1].max() < camera[1].min() or camera[1].max() < body[1].min():
+        yield Fault("time-apart", f"{words}, and they do not overlap: clocks of their own?")
 
 
 # --- pixels and ids -------------------------------------------------------------------------------
@@ -144,14 +166,14 @@ def _ids(recording: Recording, views: TwoViews) -> Iterator[Fault]:
 
 
 def _frozen(recording: Recording) -> Iterator[Fault]:
-    """The same picture several times in a row, though the twists say that the body moves."""
+    """The same picture several times in a row, though twists or gyro say that the body moves."""
     pairs = recording.tracks.pairs(1)
     same = (recording.tracks.pixels[pairs.first] == recording.tracks.pixels[pairs.second]).all(1)
     count = np.bincount(pairs.frame, minlength=recording.tracks.frame_count)
     repeated = np.bincount(pairs.frame, same, minlength=recording.tracks.frame_count)
     frozen = (count >= 3) & (repeated == count)
-    moved = np.linalg.norm(recording.body_motion(1).p, axis=1)
-    frozen[: len(moved)] &= moved > 0.005
+    moves = _moves(recording)
+    frozen[: len(moves)] &= moves
     longest = _longest_run(frozen)
     if longest >= FROZEN_FRAMES:
         t = (recording.frame_t_ns - recording.frame_t_ns[0]) * 1e-9
@@ -164,7 +186,19 @@ def _frozen(recording: Recording) -> Iterator[Fault]:
         )
 
 
-def _longest_run(flags: np.ndarray) -> int:
+def _moves(recording: Recording) -> Flags:
+    """Whether the body moves from each frame to the next; with an IMU, whether it turns."""
+    readings = recording.inertial
+    if not len(readings.t_ns):
+        return np.asarray(np.linalg.norm(recording.body_motion(1).p, axis=1) > MOVES_M)
+    w = readings.w_B_radps - np.median(readings.w_B_radps, axis=0)
+    steps = np.diff(readings.t_ns, prepend=readings.t_ns[:1]) * 1e-9
+    angle = np.cumsum(w * steps[:, None], axis=0)
+    at = np.searchsorted(readings.t_ns, recording.frame_t_ns).clip(0, len(angle) - 1)
+    return np.asarray(np.linalg.norm(np.diff(angle[at], axis=0), axis=1) > TURNS_RAD)
+
+
+def _longest_run(flags: Flags) -> int:
     run = best = 0
     for flag in flags.tolist():
         run = run + 1 if flag else 0

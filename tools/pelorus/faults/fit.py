@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Robust least squares over pairs of frames, whose standard errors are those of whole blocks of the
+drive: they need no model of the noise, and hold when it is not white.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.faults.seen import Seen
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+
+ROUNDS = 8
+BLOCKS_MOST, BLOCK_FRAMES = 40, 10
+SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
+PARAMETERS = 19
+
+
+@dataclass(frozen=True)
+class Design:
+    """y = X x + noise by pairs of frames, (k, 6): v and w. `Z` are instruments: X but for what
+    shares the noise of y. `g` is the camera's velocity as the body has it.
+    """
+
+    y: Floats
+    X: Floats  # (k, 6, m), the first PARAMETERS as named above
+    Z: Floats
+    variance: Floats  # what the images add
+    prior: Floats  # (m, m), inverse variances
+    g: Floats
+
+
+class Body(Protocol):
+    """What twists or an IMU say of the motion between frames."""
+
+    def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
+        """(k, 3) w on average from each frame to the next, if these were later by so much. NaN
+        where nothing is known.
+        """
+
+    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
+        """Of the pairs that can be used; `bias` is the sigma of what the velocity, or the specific
+        force, is off by.
+        """
+
+
+class Fit:
+    """All unknowns of a design."""
+
+    def __init__(self, design: Design, blocks_most: int = BLOCKS_MOST) -> None:
+        y, X, Z, variance, prior = design.y, design.X, design.Z, design.variance, design.prior
+        self.g, self.frames = design.g, len(y)
+        count = len(y)
+        extra: Floats = np.median(y**2, axis=0)
+        weight = np.ones(count)
+        for _ in range(ROUNDS):
+            trust = weight[:, None] / (variance + extra)
+            A = np.einsum("nai,naj,na->ij", Z, X, trust, optimize=True) + prior
+            x = np.linalg.solve(A, np.einsum("nai,na,na->i", Z, y, trust))
+            left = y - X @ x
+            spread = 2.198 * np.median(left**2, axis=0)  # of a normal distribution the variance
+            extra = np.maximum(spread - np.median(variance, axis=0), 0) + 1e-10
+            d2 = np.sum(left**2 / (variance + extra), axis=1) / y.shape[1]
+            weight = 1 / (1 + d2 / 9) ** 2
+        score = np.einsum("nai,na,na->ni", Z, left, trust)
+        blocks = int(np.clip(count // BLOCK_FRAMES, 8, blocks_most))
+        sums = np.zeros((blocks, X.shape[2]))
+        np.add.at(sums, np.arange(count) * blocks // count, score)
+        meat = sums.T @ sums * blocks / (blocks - 3)
+        inverse = np.linalg.inv(A)
+        self.x = np.asarray(x)
+        self.cost = float(np.sum(np.log(spread)))
+        self.covariance = inverse @ (meat + prior) @ inverse.T
+        self.sigma = np.sqrt(np.diagonal(self.covariance))
+        shared = variance / (variance + extra)  # of the variance what the images add
+        middle = np.einsum("nai,naj,na->ij", Z, Z, trust * shared, optimize=True)
+        images = inverse @ middle @ inverse.T
+        self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
+
+
+def beside(x: Floats, *lags: int) -> Floats:
+    """The mean of the values so many frames before and behind; NaN at the ends."""
+    return np.asarray(sum(_moved(x, k) + _moved(x, -k) for k in lags) / (2 * len(lags)))
+
+
+def slope(x: Floats, lag: int, tau_s: float) -> Floats:
+    """By the time, from the values so many frames before and behind."""
+    return np.asarray((_moved(x, lag) - _moved(x, -lag)) / (2 * lag * tau_s))
+
+
+def _moved(x: Floats, by: int) -> Floats:
+    """x of k + by."""
+    out = np.full_like(x, np.nan)
+    if by > 0:
+        out[:-by] = x[by:]
+    else:
+        out[-by:] = x[:by]
+    return out

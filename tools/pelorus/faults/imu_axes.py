@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: MIT
+"""Is an IMU in the axes and units that the extrinsic and the HEADER mean?
+
+Between what the images show in body axes and what the readings say stands a matrix, of which the
+identity is due: M_w for the rates of turn, M_a for the specific force. Both are measured, and the
+simplest fault that explains both is named: units and signs, the extrinsic's inverse, axes that are
+turned, mirrored or swapped, for gyro and accelerometer together or for one of them, any rotation.
+Attitudes are the images' own where the gyro is wrong, so that it does not spoil the force. What the
+drive does not move, the matrices do not tell, and nothing is said of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from pelorus import se3
+from pelorus.faults.axes import ways
+from pelorus.faults.fit import Design, Fit
+from pelorus.faults.force import by_images, force
+from pelorus.faults.imu_body import ImuBody
+from pelorus.faults.seen import Seen
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+
+LIMIT = 50.0  # by which d^2, of 18 degrees of freedom, may be above the least of all
+UNFIT, UNFIT_SHARE = 300.0, 0.2  # above, and above such a share of what it is as given, none fits
+DOUBT = 0.03  # by which an entry of a matrix may be off besides, of its scale
+FREE_SCALE = 0.25  # calibrations are off by less; what is off so little is judged elsewhere
+OFFSETS_S = np.arange(-10, 11) * 0.04
+OFFSET_SURE = 0.05  # of the cost, by which another offset must be better than none
+LEVER_M, BIAS_MPS2, MATRIX = 3.0, 1.0, 1e3
+BLOCKS = 20
+ROUNDS = 8
+GRAVITY = 9.81
+TURN_UNITS = {
+    1.0: "",
+    np.pi / 180: "rates of turn are in degrees",
+    180 / np.pi: "degrees were made of radians twice",
+}
+FORCE_UNITS = {
+    1.0: "",
+    GRAVITY: "specific forces are in g",
+    GRAVITY * 1e-3: "specific forces are in thousandths of g",
+    1e-3: "specific forces are in mm/s^2",
+}
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Measured: M, and the covariance of its nine numbers row by row."""
+
+    M: Floats
+    covariance: Floats
+
+    def held_against(self, N: Floats, free: bool = True) -> float:
+        """d^2 of N, at the scale beside its own that fits best."""
+        size = float(np.linalg.norm(N) / np.sqrt(3))
+        known = np.linalg.inv(self.covariance + (DOUBT * size) ** 2 * np.eye(9))
+        n, m = N.ravel(), self.M.ravel()
+        scale = 1.0
+        if free:
+            scale = float(np.clip(n @ known @ m / (n @ known @ n), 1 - FREE_SCALE, 1 + FREE_SCALE))
+        left = m - scale * n
+        return float(left @ known @ left)
+
+    @property
+    def is_told(self) -> bool:
+        """Whether it is something, and not nothing: what is not of this drive has no part in it."""
+        m = self.M.ravel()
+        return float(m @ np.linalg.solve(self.covariance, m)) > LIMIT
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What is due if this is the fault."""
+
+    name: str
+    words: str
+    of_turn: Floats
+    of_force: Floats
+
+    @property
+    def F(self) -> Floats:
+        """The axes of the one of both that is not as it should be."""
+        return self.of_turn if np.allclose(self.of_force, np.eye(3)) else self.of_force
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Of the rates of turn, and of the specific force."""
+
+    turn: Matrix
+    force: Matrix
+
+    def held_against(self, why: Explained) -> float:
+        """d^2 of both together."""
+        return self.turn.held_against(why.of_turn) + self.force.held_against(why.of_force)
+
+
+def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None:
+    """At the clock's offset at which the turns fit best. None with too little to tell by."""
+    t_ns = recording.frame_t_ns
+    at_offsets = {0.0: _turn(body, seen, t_ns, 0.0)}
+    at_offsets |= {float(s): _turn(body, seen, t_ns, float(s)) for s in OFFSETS_S}
+    fits = {offset: fit for offset, fit in at_offsets.items() if fit is not None}
+    if not fits:
+        return None
+    offset = min(fits, key=lambda s: fits[s].cost)
+    if 0.0 in fits and fits[0.0].cost - fits[offset].cost < OFFSET_SURE * 3:
+        offset = 0.0
+    turn_fit = fits[offset]
+    turn = _matrix(turn_fit)
+    told = body.force(t_ns, offset)
+    if turn.held_against(np.eye(3)) > 0.5 * LIMIT:
+        frame_s = body.frame_s(t_ns, offset)
+        turns = np.where(seen.usable[:, None], seen.rates[:, 3:] * seen.tau_s[:, None], 0.0)
+        told = force(body.readings, by_images(body.readings, frame_s, turns), frame_s)
+    stretches = told.of_stretches()
+    arm = se3.skew(_turns_without_noise(body.turns(t_ns, offset), turn_fit))
+    nine = told.of_force.reshape(-1, 3, 9)
+    X = np.concatenate((nine, told.of_bias, arm, stretches), axis=2)
+    good = seen.usable & np.isfinite(told.turn).all(axis=1) & np.isfinite(X).all(axis=(1, 2))
+    beside = [BIAS_MPS2] * 3 + [LEVER_M] * 3 + [100.0] * stretches.shape[2]
+    fit = _fit(seen.rates[good, :3], X[good], seen.variance[good, :3], beside)
+    return Measured(turn, _matrix(fit))
+
+
+def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
+    """The images' own as the gyro has them: what both are off by would look like a lever."""
+    return np.asarray(w @ fit.x[:9].reshape(3, 3).T + fit.x[9:])
+
+
+def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Fit | None:
+    w = body.turns(frame_t_ns, offset_s)
+    good = seen.usable & np.isfinite(w).all(axis=1)
+    if good.sum() < 0.5 * seen.usable.sum():
+        return None
+    X = np.zeros((int(good.sum()), 3, 12))
+    for i in range(3):
+        X[:, i, 3 * i : 3 * i + 3] = w[good]
+        X[:, i, 9 + i] = 1
+    return _fit(seen.rates[good, 3:], X, seen.variance[good, 3:], [1.0] * 3)
+
+
+def _fit(y: Floats, X: Floats, variance: Floats, beside: list[float]) -> Fit:
+    prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
+    return Fit(Design(y, X, X, variance, prior, y), BLOCKS)
+
+
+def _matrix(fit: Fit) -> Matrix:
+    return Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9])
+
+
+# --- what explains it -----------------------------------------------------------------------------
+
+
+def explained(found: Measured, R_CB: Floats) -> Explained | None:
+    """The simplest that fits; None if all is as it should be. `name` is "no-fit" if nothing does,
+    and "turned" for a rotation of no name, which is then `of_turn`.
+    """
+    none = Explained("", "", np.eye(3), np.eye(3))
+    kinds = (_units, _Inverted(R_CB), _of_both, _of_one, _turned, _of_each, _scaled)
+    likely = [none, *(min(kind(found), key=found.held_against) for kind in kinds)]
+    apart = [found.held_against(kind) for kind in likely]
+    least = min(apart)
+    silent = apart[0] > least + LIMIT and not (found.turn.is_told and found.force.is_told)
+    if silent or least > max(UNFIT, UNFIT_SHARE * apart[0]):
+        return Explained("no-fit", "", found.turn.M, found.force.M)
+    simplest = next(e for e, d2 in zip(likely, apart, strict=True) if d2 < least + LIMIT)
+    return None if simplest is none else simplest
+
+
+def _units(_: Measured) -> Iterator[Explained]:
+    none = np.eye(3)
+    for (turn, of_turn), (force_, of_force) in product(TURN_UNITS.items(), FORCE_UNITS.items()):
+        words = "; ".join(w for w in (of_turn, of_force) if w)
+        if words:
+            name = "unit-degrees" if of_turn else "unit-force"
+            yield Explained(name, f"the IMU's {words}", turn * none, force_ * none)
+    words = (
+        "the specific force has the wrong sign: an IMU at rest reads +9.81 m/s^2 along the axis "
+        "that points up"
+    )
+    yield Explained("gravity-sign", words, none, -none)
+
+
+class _Inverted:
+    """By this extrinsic."""
+
+    def __init__(self, R_CB: Floats) -> None:
+        self.Q = R_CB.T @ R_CB.T
+
+    def __call__(self, _: Measured) -> Iterator[Explained]:
+        yield Explained("inverted", "", self.Q, self.Q)
+
+
+def _of_both(_: Measured) -> Iterator[Explained]:
+    """A frame that is turned or mirrored, and columns that are swapped as they stand."""
+    for F in ways():
+        yield Explained("axes", "gyro and accelerometer have", np.linalg.det(F) * F, F)
+        yield Explained("axes", "gyro and accelerometer have", F, F)
+
+
+def _of_one(_: Measured) -> Iterator[Explained]:
+    none = np.eye(3)
+    for F in ways():
+        yield Explained("axes", "the gyro has", F, none)
+        yield Explained("axes", "the accelerometer has", none, F)
+
+
+def _of_each(found: Measured) -> Iterator[Explained]:
+    turn = min(ways(), key=found.turn.held_against)
+    of_force = min(ways(), key=found.force.held_against)
+    yield Explained("axes", "gyro and accelerometer differ: the gyro has", turn, of_force)
+
+
+def _scaled(found: Measured) -> Iterator[Explained]:
+    """Off by any factor."""
+    none = np.eye(3)
+    of_turn, of_force = (float(np.trace(m.M)) / 3 for m in (found.turn, found.force))
+    words = (
+        f"the images show {of_turn:.3g} times the gyro's turns and {of_force:.3g} times the "
+        "accelerometer's forces: units, baseline or focal length"
+    )
+    yield Explained("scale", words, of_turn * none, of_force * none)
+
+
+def _turned(found: Measured) -> Iterator[Explained]:
+    """The rotation of both that fits best."""
+    for F in ways():
+        if np.linalg.det(F) > 0:
+            Q = _nearest(found, F)
+            yield Explained("turned", "", Q, Q)
+
+
+def _nearest(found: Measured, Q: Floats) -> Floats:
+    """Gauss and Newton from Q on."""
+    matrices = [found.turn, found.force]
+    known = [np.linalg.inv(m.covariance + DOUBT**2 * np.eye(9)) for m in matrices]
+    for _ in range(ROUNDS):
+        J = np.stack([(se3.skew(e) @ Q).ravel() for e in np.eye(3)], axis=1)
+        H = sum(J.T @ W @ J for W in known) + 1e-9 * np.eye(3)
+        g = sum(J.T @ W @ (m.M - Q).ravel() for W, m in zip(known, matrices, strict=True))
+        step = np.clip(np.linalg.solve(H, g), -0.5, 0.5)
+        Q = se3.exp(np.zeros(3), step).R @ Q
+    return Q

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""What an IMU says of the body's motion, and what may be wrong with it. With f the velocity that
+the specific force gives within a stretch but for its start and for gravity (pelorus.faults.force):
+
+    w = a w_B - b_w + phi x w_B + dt w_B'
+    v = s g - b_a.. + phi x g + w_B x dr + dt g',      g = f + R' (V + g t) + w_B x r
+
+A baseline that is off is s; a focal length changes turns and ways as the images tell themselves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.faults.fit import (
+    BIAS,
+    CLOCK,
+    FOCAL,
+    GYRO,
+    LEVER,
+    PARAMETERS,
+    SCALE,
+    TILT,
+    TURN,
+    TURN_SCALE,
+    Design,
+    Fit,
+    beside,
+    slope,
+)
+from pelorus.faults.force import Force, by_gyro, force, rates_of_turn, thinned
+from pelorus.faults.seen import Seen
+from pelorus.inertial import Inertial
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+
+Flags = NDArray[np.bool_]
+START_MPS, GRAVITY_MPS2 = 100.0, 100.0  # sigmas of what a stretch begins with
+GYRO_SCALE = 0.005  # sigma: better than a focal length is known without it
+
+
+class ImuBody:
+    """What the readings say of the motion between frames."""
+
+    def __init__(self, recording: Recording, seen: Seen) -> None:
+        self.readings = thinned(_until(recording))
+        self._R = by_gyro(self.readings, np.zeros(3))
+        self._set_bias(recording.frame_t_ns, seen)
+
+    def _set_bias(self, frame_t_ns: NDArray[np.int64], seen: Seen) -> None:
+        """Of the gyro, as far as the images tell it: the middle of what both differ by."""
+        off = self.turns(frame_t_ns, 0.0) - seen.rates[:, 3:]
+        bias = np.nanmedian(off[seen.usable], axis=0)
+        if np.isfinite(bias).all():
+            self._R = by_gyro(self.readings, bias)
+
+    def force(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Force:
+        """If the frames were later by so much."""
+        return force(self.readings, self._R, self.frame_s(frame_t_ns, offset_s))
+
+    def frame_s(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
+        return np.asarray((frame_t_ns - self.readings.t_ns[0]) * 1e-9 + offset_s)
+
+    def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
+        """As fit.Body."""
+        return rates_of_turn(self.readings, self._R, self.frame_s(frame_t_ns, offset_s))
+
+    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
+        """As fit.Body. Of what has the images' own noise, the frames beside are the instrument."""
+        told = self.force(recording.frame_t_ns, offset_s)
+        w = told.turn
+        arm = -recording.T_CB.R.T @ recording.T_CB.p
+        stretches = told.of_stretches()
+        g = told.way + np.cross(w, arm)
+        good = seen.usable & np.isfinite(w).all(axis=1)
+        left = np.where(good[:, None], seen.rates[:, :3] - g, 0.0)
+        first = _start(left[good], stretches[good], seen.variance[good, :3])
+        g = g + stretches @ first
+        both = np.hstack((g, w))
+        X = np.zeros((len(g), 6, PARAMETERS + stretches.shape[2]))
+        X[:, :3, SCALE] = g
+        X[:, :3, BIAS : BIAS + 3] = told.of_bias
+        X[:, :3, LEVER : LEVER + 3] = se3.skew(w)
+        X[:, :3, TILT : TILT + 3] = -se3.skew(g)
+        X[:, 3:, TILT : TILT + 3] = -se3.skew(w)
+        X[:, :3, GYRO : GYRO + 3] = told.of_gyro
+        X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
+        X[:, 3:, TURN_SCALE] = w
+        X[:, :, CLOCK] = slope(both, 1, float(np.median(seen.tau_s)))
+        X[:, :3, PARAMETERS:] = stretches
+        Z = X.copy()
+        if seen.by_focal is not None:
+            X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, beside(seen.by_focal, 1, 2)
+        k = good & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
+        y = seen.rates - both
+        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, stretches.shape[2]), g[k])
+
+
+def _until(recording: Recording) -> Inertial:
+    """The readings that the frames need."""
+    readings = recording.inertial
+    numbers = np.hstack((readings.a_B_mps2, readings.w_B_radps))
+    finite: Flags = np.asarray(np.isfinite(numbers).all(axis=1), np.bool_)
+    readings = readings.at(finite)
+    t = readings.t_ns
+    most = int(np.searchsorted(t, recording.frame_t_ns[-1] + 10**9))
+    least = max(int(np.searchsorted(t, recording.frame_t_ns[0] - 10**9)), 0)
+    return readings.at(slice(least, most))
+
+
+def _start(y: Floats, X: Floats, variance: Floats) -> Floats:
+    """What the stretches begin with, robustly, as if all else were right."""
+    sigma = np.resize([START_MPS] * 3 + [GRAVITY_MPS2] * 3, X.shape[2])
+    fit = Fit(Design(y, X, X, variance, np.diag(sigma**-2), y))
+    return fit.x
+
+
+def _prior(bias: float, starts: int) -> Floats:
+    """Inverse variances: all but the accelerometer's bias are hardly known."""
+    sigma = np.full(PARAMETERS + starts, 10.0)
+    sigma[BIAS : BIAS + 3] = bias
+    sigma[LEVER : LEVER + 3] = 3.0
+    sigma[TILT : TILT + 3] = sigma[TURN : TURN + 3] = 0.2
+    sigma[CLOCK] = 0.3
+    sigma[GYRO : GYRO + 3] = 0.3
+    sigma[TURN_SCALE] = GYRO_SCALE
+    sigma[PARAMETERS:] = np.resize([START_MPS] * 3 + [GRAVITY_MPS2] * 3, starts)
+    return np.diag(sigma**-2)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""How fast the camera goes and turns, as the images alone have it, in the axes of the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.faults.two_views import TwoViews, two_views
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+
+POINTS_MIN = 6  # of a pair of frames
+LONGER = 0.02  # by which a focal length is changed to see what that does
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The camera's own v and w in body axes as given, (k, 6), their variances, and which count."""
+
+    rates: Floats
+    variance: Floats
+    usable: NDArray[np.bool_]
+    tau_s: Floats
+    by_focal: Floats | None = None  # (k, 6) by the logarithm of the focal length that is given
+
+    @classmethod
+    def of(cls, recording: Recording, views: TwoViews) -> Seen:
+        lag, R = views.lag, recording.T_CB.R
+        tau = np.asarray(recording.frame_t_ns[lag:] - recording.frame_t_ns[:-lag]) * 1e-9
+        rates = se3.log(se3.inverse(views.motion)) / tau[:, None]
+        in_body = np.hstack((rates[:, :3] @ R, rates[:, 3:] @ R))
+        turn = np.kron(np.eye(2), R)
+        covariance = np.asarray(turn.T @ views.covariance @ turn, np.float64)
+        of_axes = np.asarray(np.diagonal(covariance, axis1=1, axis2=2), np.float64)
+        variance = of_axes / tau[:, None] ** 2
+        usable = (views.counts >= POINTS_MIN) & np.isfinite(in_body).all(axis=1)
+        return cls(in_body, variance, usable, tau)
+
+    def with_focal(self, recording: Recording, views: TwoViews) -> Seen:
+        """And what another focal length would make of it. Neither turns nor ways simply scale with
+        it: of near points the one is mistaken for the other.
+        """
+        camera = recording.header.camera
+        longer = replace(
+            camera, fx_px=(1 + LONGER) * camera.fx_px, fy_px=(1 + LONGER) * camera.fy_px
+        )
+        other = Seen.of(recording, two_views(recording.tracks, longer, views.lag))
+        return replace(self, by_focal=(other.rates - self.rates) / LONGER)

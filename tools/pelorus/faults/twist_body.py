@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""What the twists say of the body's motion, and what may be wrong with it:
+
+w = a w_B - b_w + phi_w x w_B + dt w_B'
+v = s g - b_v + phi_v x g + w_B x dr + dt g',      g = v_B + w_B x r
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import se3
+from pelorus.faults.fit import (
+    BIAS,
+    CLOCK,
+    GYRO,
+    LEVER,
+    PARAMETERS,
+    SCALE,
+    TILT,
+    TURN,
+    TURN_SCALE,
+    Design,
+    beside,
+    slope,
+)
+from pelorus.faults.seen import Seen
+from pelorus.layout import Floats
+from pelorus.motion import dead_reckoning
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+
+
+class TwistBody:
+    """What the twists say of the motion between any two times."""
+
+    def __init__(self, recording: Recording) -> None:
+        header = recording.header
+        self._t_ns, self._v, self._w = recording.twist_t_ns, recording.v_B_mps, recording.w_B_radps
+        self._nodes = dead_reckoning(self._t_ns, self._v, self._w, header.twist_timing)
+        self._held = header.twist_timing.name
+
+    def at(self, t_s: Floats) -> Poses:
+        """Poses at seconds since the first twist; between two nodes at an even rate."""
+        nodes = (self._t_ns - self._t_ns[0]) * 1e-9
+        k = np.clip(np.searchsorted(nodes, t_s, side="right") - 1, 0, len(nodes) - 2)
+        whole = se3.compose(se3.inverse(self._nodes.at(k)), self._nodes.at(k + 1))
+        share = (t_s - nodes[k]) / (nodes[k + 1] - nodes[k])
+        part = se3.log(whole) * np.clip(share, 0, 1)[:, None]
+        return se3.compose(self._nodes.at(k), se3.exp(part[:, :3], part[:, 3:]))
+
+    def rates(self, frame_t_ns: NDArray[np.int64], lag: int, offset_s: float) -> Floats:
+        """(k, 6) v and w on average between frames k and k + lag, if these were later by so much.
+        NaN where the twists do not reach.
+        """
+        t = (frame_t_ns - self._t_ns[0]) * 1e-9 + offset_s
+        path = self.at(t)
+        tau = t[lag:] - t[:-lag]
+        motion = se3.compose(se3.inverse(path.at(slice(None, -lag))), path.at(slice(lag, None)))
+        out = np.asarray(se3.log(motion) / tau[:, None])
+        end = (self._t_ns[-1] - self._t_ns[0]) * 1e-9
+        out[(t[:-lag] < 0) | (t[lag:] > end)] = np.nan
+        return out
+
+    def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
+        """As fit.Body."""
+        return self.rates(frame_t_ns, 1, offset_s)[:, 3:]
+
+    def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
+        """As fit.Body. Scale and time are free of the twists' noise by instruments: the same motion
+        some frames away.
+        """
+        rates = self.rates(recording.frame_t_ns, 1, offset_s)
+        arm = -recording.T_CB.R.T @ recording.T_CB.p
+        w = rates[:, 3:]
+        g = rates[:, :3] + np.cross(w, arm)
+        usable = seen.usable & np.isfinite(beside(np.hstack((g, w)), 3)).all(axis=1)
+        usable &= np.isfinite(rates).all(axis=1)
+        y = seen.rates - np.hstack((g, w))
+        X, Z = _columns(g, w, float(np.median(seen.tau_s)))
+        k = usable
+        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias), g[k])
+
+
+def _prior(bias: float) -> Floats:
+    """Inverse variances: all but the velocity's bias are hardly known."""
+    sigma = np.full(PARAMETERS, 10.0)
+    sigma[BIAS : BIAS + 3] = bias
+    sigma[LEVER : LEVER + 3] = 3.0
+    sigma[TILT : TILT + 3] = sigma[TURN : TURN + 3] = 0.2
+    sigma[CLOCK] = 0.3
+    sigma[GYRO : GYRO + 3] = 0.3
+    return np.diag(sigma**-2)
+
+
+def _columns(g: Floats, w: Floats, tau_s: float) -> tuple[Floats, Floats]:
+    """(k, 6, 18): what each unknown adds to (v, w), and the instruments."""
+    count = len(g)
+    X = np.zeros((count, 6, PARAMETERS))
+    X[:, :3, SCALE] = g
+    X[:, :3, BIAS : BIAS + 3] = X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
+    X[:, :3, LEVER : LEVER + 3] = se3.skew(w)
+    X[:, :3, TILT : TILT + 3] = -se3.skew(g)
+    X[:, 3:, TURN : TURN + 3] = -se3.skew(w)
+    X[:, 3:, TURN_SCALE] = w
+    both = np.hstack((g, w))
+    X[:, :, CLOCK] = slope(both, 1, tau_s)
+    Z = X.copy()
+    Z[:, :3, SCALE] = beside(g, 2, 3)
+    Z[:, 3:, TURN_SCALE] = beside(w, 2, 3)
+    Z[:, :, CLOCK] = slope(both, 2, tau_s)
+    return X, Z
