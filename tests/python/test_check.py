@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from converted import Run
 from pelorus import wire
-from pelorus.check import clock, outcome, parameters, search, tracks_noise, tuning
+from pelorus.check import clock, outcome, parameters, search, tracks_noise, tuning, tuning_imu
 from pelorus.check.contents import first_frames, half, recording_of, shifted, write
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
@@ -124,8 +124,38 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     assert float(settings["accel-noise"]) == pytest.approx(0.03, rel=0.2)
     assert found["camera_offset_s"] == pytest.approx(0.02, rel=0.1)
     assert settings["camera-offset"] == f"{found['camera_offset_s']:.4g}"
-    assert any("cannot be told" in remark["text"] for remark in found["remarks"]), "the walks"
+    texts = [remark["text"] for remark in found["remarks"]]
+    assert any("walk" in text and "cannot be told" in text for text in texts)
+    assert "pixel-sigma, gyro-noise and accel-noise are told by the drive" in texts
     assert "# gyro-noise 0.0005 should be" in conf.read_text(encoding="utf-8")
+
+
+def test_a_noise_that_a_drive_does_not_tell_is_said_and_stays() -> None:
+    class Flat:
+        """A bench that is blind for accel-noise, and tells the rest to a tenth."""
+
+        def run(self, settings: dict[str, str]) -> Outcome:
+            return self.run_all([settings])[0]
+
+        def run_all(self, many: list[dict[str, str]], what: str = "") -> list[Outcome]:
+            return [self._outcome(settings, what) for settings in many]
+
+        def _outcome(self, settings: dict[str, str], _: str) -> Outcome:
+            off = [
+                np.log(float(settings[k]) / v)
+                for k, v in (("pixel-sigma", 1), ("gyro-noise", 1e-3))
+            ]
+            return replace(outcome.NOTHING, cost=50 * float(np.square(off).sum()), matched=1000)
+
+    bench = Flat()
+    values = {"pixel": 1.0, "gyro": 1e-3, "accel": 4e-4}
+    usual = bench.run(parameters.written(values, parameters.IMU))
+    given = {"pixel": 2.0, "gyro": 5e-3, "accel": 2e-2}
+    found, words = tuning_imu.noises(bench, {}, search.Found(values, usual), given)  # type: ignore[arg-type]
+    assert found.values == {"pixel": 1.0, "gyro": 1e-3, "accel": 2e-2}
+    assert words.startswith(
+        "accel-noise cannot be told within 3 times by this drive (0.02 is written)"
+    )
 
 
 def test_every_offset_of_an_imu_is_judged_by_the_same_frames(flown: Path, tmp_path: Path) -> None:
@@ -371,6 +401,14 @@ def test_a_recording_with_nothing_to_check_says_what_it_lacks(
     said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN)
     assert said.status == 1
     assert ("no twists" if kind is Twist else "no stereo frames") in said.err
+    assert not (tmp_path / "t.conf").exists()
+
+
+def test_a_folder_is_refused_with_what_would_be_right(tmp_path: Path, pelorus: Run) -> None:
+    said = pelorus("check", tmp_path, "--out", tmp_path / "t.conf", "--bin", BIN)
+    assert said.status == 1
+    words = " ".join(said.err.split())
+    assert "is a folder, a recording is a .plr file: `pelorus convert` makes one" in words
     assert not (tmp_path / "t.conf").exists()
 
 

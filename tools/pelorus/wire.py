@@ -237,6 +237,11 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
 
     Raises PelorusError where nothing can be read.
     """
+    if path.is_dir():
+        raise PelorusError(
+            f"{path}: is a folder, a recording is a .plr file: `pelorus convert` makes one of a "
+            "folder of pictures, a ROS 2 bag or a KITTI drive"
+        )
     reader = Reader()
     received: list[Received] = []
     try:
@@ -264,7 +269,7 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
 
 def messages_of(path: Path) -> list[Message]:
     """What a recording holds, without its damaged frames; it must have a HEADER."""
-    if not path.is_file():
+    if not path.exists():
         raise PelorusError(f"{path}: there is no such file")
     received, _ = read_file(path)
     header_of(received, path)

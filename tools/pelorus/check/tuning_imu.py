@@ -22,6 +22,7 @@ from pelorus.check.parameters import (
     PAYS,
     PIXEL,
     WALKS,
+    Parameter,
     Tuned,
     fewer_slots,
     merged,
@@ -29,7 +30,7 @@ from pelorus.check.parameters import (
     starting,
     written,
 )
-from pelorus.check.search import COARSE, COARSE_FRAMES, search_noises
+from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
 from pelorus.check.tracks_noise import TrackNoise, track_noise
 
 LOOSE = 10.0  # times the noises, while the clock is far off
@@ -44,13 +45,14 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     """`given` are the settings as they are: they hold wherever nothing better is found."""
     before = bench.run(given)
     noise = track_noise(bench.examined)
-    values = starting(bench.header, given, IMU | WALKS)
+    values = start = starting(bench.header, given, IMU | WALKS)
     side = {k: v for k, v in given.items() if k not in _settings()}
     side[OFFSET] = side.pop("camera-offset", "0")
     said: list[str] = []
     if noise.drifts:
         return _of_drifting_tracks(bench, side, values, before, noise)
-    walks = {name: values.pop(name) for name in WALKS}
+    walks = {name: start[name] for name in WALKS}
+    values = {name: start[name] for name in IMU}
     side |= written(walks, WALKS)
     values, offset = _roughly(bench, side, values)
     side[OFFSET] = f"{offset.best_s:.6f}"
@@ -60,6 +62,8 @@ def tune(bench: Bench, given: Settings) -> Tuned:
     said.append(words)
     side, words = _walks(bench, side, walks)
     found = search_noises(bench, side, values, IMU, FINE)
+    said.append(words)
+    found, words = noises(bench, side, found, start)
     said.append(words)
     side, outcome, words = _timing(bench, side | written(found.values, IMU), found.outcome, offset)
     said.append(words)
@@ -149,26 +153,59 @@ def _walks(bench: Bench, side: Settings, given: Mapping[str, float]) -> tuple[di
     quick = {**side, **fewer_slots(side)}
     found = search_noises(bench, quick, given, WALKS, WALK_STEPS)
     kept = dict(given)
-    words = []
     for name in WALKS:
-        sides = [
-            {**found.values, name: found.values[name] * factor}
-            for factor in (TOLD_FACTOR, 1 / TOLD_FACTOR)
-        ]
-        ran = bench.run_all([{**quick, **written(v, WALKS)} for v in sides], "walks")
-        told = all(found.outcome.gain_over(other) > TOLD for other in ran)
         alone = bench.run({**quick, **written({**found.values, name: given[name]}, WALKS)})
         if found.outcome.gain_over(alone) > PAYS:
             kept[name] = found.values[name]
-        if not told:
-            words.append(name)
+    untold = _untold(bench, quick, found, WALKS)
     said = "gyro-walk and accel-walk are told by the drive"
-    if words:
-        said = (
-            f"{' and '.join(words)} cannot be told within {TOLD_FACTOR:g} times by this drive: "
-            "hours at rest would (Allan deviation)"
-        )
+    if untold:
+        said = f"{_of_drive(untold)}: hours at rest would (Allan deviation)"
     return {**side, **written(kept, WALKS)}, said
+
+
+# --- what a drive does not tell -------------------------------------------------------------------
+
+
+def _untold(
+    bench: Bench, side: Settings, found: Found, parameters: Mapping[str, Parameter]
+) -> list[str]:
+    """The settings of which much more or much less would be about as likely."""
+    out = []
+    for name, parameter in parameters.items():
+        value, most, least = found.values[name], parameter.most, parameter.least
+        sides = [min(value * TOLD_FACTOR, most), max(value / TOLD_FACTOR, least)]
+        tried = [{**side, **written({**found.values, name: v}, parameters)} for v in sides]
+        ran = bench.run_all(tried, "what is told")
+        if not all(found.outcome.gain_over(other) > TOLD for other in ran):
+            out.append(parameter.setting)
+    return out
+
+
+def _of_drive(untold: list[str]) -> str:
+    return f"{' and '.join(untold)} cannot be told within {TOLD_FACTOR:g} times by this drive"
+
+
+def noises(
+    bench: Bench, side: Settings, found: Found, given: Mapping[str, float]
+) -> tuple[Found, str]:
+    """The given one of each noise that the drive does not tell, if that is about as likely.
+
+    Where the frames tell the motion far better than the accelerometer does, or gravity's direction
+    as well as its noise allows, less noise or more makes what is seen no likelier.
+    """
+    untold = _untold(bench, side, found, IMU)
+    for name, parameter in IMU.items():
+        if parameter.setting in untold:
+            values = {**found.values, name: given[name]}
+            usual = bench.run({**side, **written(values, IMU)})
+            if found.outcome.gain_over(usual) < PAYS:
+                found = Found(values, usual)
+    if not untold:
+        return found, "pixel-sigma, gyro-noise and accel-noise are told by the drive"
+    kept = ", ".join(f"{found.values[n]:.3g}" for n in IMU if IMU[n].setting in untold)
+    words = f"{_of_drive(untold)} ({kept} is written): a datasheet or hours at rest tell it"
+    return found, words
 
 
 # --- tracks that drift ----------------------------------------------------------------------------
