@@ -27,7 +27,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pelorus import inertial_evaluation, se3
+from pelorus import inertial_evaluation, motion, se3
 from pelorus.consistency import Figures, mean, nees_per_dof, rms
 from pelorus.frames import Landmark, Message, Role
 from pelorus.layout import Floats, unpack_symmetric
@@ -163,11 +163,7 @@ def match(
     estimate: Trajectory, truth: Trajectory, tolerance_ns: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Indices of the poses of equal time, each truth used once."""
-    right = np.clip(np.searchsorted(truth.t_ns, estimate.t_ns), 1, max(len(truth.t_ns) - 1, 1))
-    right = np.minimum(right, len(truth.t_ns) - 1)
-    left = np.maximum(right - 1, 0)
-    closer = estimate.t_ns - truth.t_ns[left] <= truth.t_ns[right] - estimate.t_ns
-    nearest = np.where(closer, left, right)
+    nearest = motion.nearest(truth.t_ns, estimate.t_ns)
     good = np.nonzero(np.abs(truth.t_ns[nearest] - estimate.t_ns) <= tolerance_ns)[0]
     _, first = np.unique(nearest[good], return_index=True)
     return good[first], nearest[good[first]]

@@ -29,6 +29,14 @@ def steps(t_ns: Times, v: Floats, w: Floats, timing: TwistTiming) -> Poses:
     return se3.exp(tau * held(v, timing), tau * held(w, timing))
 
 
+def nearest(t_ns: Times, wanted_t_ns: Times) -> NDArray[np.intp]:
+    """Which of ascending times is nearest to each wanted one; of two the earlier."""
+    at = np.clip(np.searchsorted(t_ns, wanted_t_ns), 1, max(len(t_ns) - 1, 1))
+    before, after = at - 1, np.minimum(at, len(t_ns) - 1)
+    earlier = wanted_t_ns - t_ns[before] <= t_ns[after] - wanted_t_ns
+    return np.where(earlier, before, after)
+
+
 def chain(motions: Poses, first: Poses | None = None) -> Poses:
     """T_0, T_0 D_0, T_0 D_0 D_1, ...: n motions give n + 1 poses. T_0 is identity by default."""
     count = len(motions.p) + 1

@@ -106,8 +106,7 @@ def _camera_poses(source: Path, recording: Recording) -> Poses:
             f"{len(recording.frame_t_ns) - len(mine)} frames have no truth of their time",
             due="for --seed one each is due",
         )
-    T_CB = Poses(np.asarray(recording.header.R_CB), np.asarray(recording.header.t_CB_m))
-    poses = se3.compose(T_CB, se3.inverse(recording.truth.at(theirs)))
+    poses = se3.compose(recording.T_CB, se3.inverse(recording.truth.at(theirs)))
     return poses.at(recording.tracks.frame)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pelorus import se3
+from pelorus import motion, se3
 from pelorus.console import progress
 from pelorus.converters.bag import Bag, require_messages
 from pelorus.converters.streams import Pictures, Seen
@@ -126,9 +126,7 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
 
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
     """(n, 2) times."""
-    at = np.clip(np.searchsorted(right, left), 1, max(len(right) - 1, 1))
-    before, after = right[at - 1], right[np.minimum(at, len(right) - 1)]
-    nearest = np.where(left - before <= after - left, before, after)
+    nearest = right[motion.nearest(right, left)]
     near = np.abs(nearest - left) <= cameras.apart_ns
     if near.sum() < max(len(left) // 2, images.PAIRS_MIN):
         apart_ms = np.median(np.abs(nearest - left)) * 1e-6

@@ -70,8 +70,8 @@ class Trial:
         """Points of a run's world (n, 3) -> the picture (n, 2)."""
         if name in self.road_fits:
             return self.road_fits[name].place(points)
-        seen = plane.choose(self.subject.header.body_axes, self.compared.main.trajectory.poses)
-        return np.stack((seen.right.of(points), seen.up.of(points)), axis=-1)
+        poses = self.compared.main.trajectory.poses
+        return plane.choose(self.subject.header.body_axes, poses).flat(points)
 
     def scatter(self, name: str) -> Floats:
         """(n, 2): the landmarks of a run that are near and certain enough to be drawn."""

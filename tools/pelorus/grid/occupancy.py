@@ -88,11 +88,6 @@ class Grid:
         return np.asarray(expit(self.log_odds))
 
 
-def flat(seen_from: Plane, points: Floats) -> Floats:
-    """(..., 3) -> (..., 2)."""
-    return np.stack((seen_from.right.of(points), seen_from.up.of(points)), axis=-1)
-
-
 def occupancy(seen: Sightings, wish: Wish) -> Grid:
     """The grid; PelorusError where nothing stands in it or it would be absurdly large."""
     looked_at = plane.choose_for_map(seen.body_axes, seen.poses, seen.landmarks_W)
@@ -100,7 +95,7 @@ def occupancy(seen: Sightings, wish: Wish) -> Grid:
     up = _up(seen, looked_at)
     last = seen.last_frame
     height = np.sum((seen.landmarks_W - seen.poses.p[last]) * up[last], axis=1)
-    way = flat(looked_at, seen.landmarks_W - seen.camera_W[last])
+    way = looked_at.flat(seen.landmarks_W - seen.camera_W[last])
     distance = np.linalg.norm(way, axis=1)
     spread = _flat_covariance(seen.spread, looked_at)
     sigma = _along(spread, way / np.maximum(distance, 1e-9)[:, None])
@@ -113,8 +108,8 @@ def occupancy(seen: Sightings, wish: Wish) -> Grid:
             f"others lie outside {band.low_m:g} to {band.high_m:g} m about the body or beyond "
             f"{wish.range_m:g} m; widen --height or --range"
         )
-    path = flat(looked_at, seen.poses.p)
-    points = flat(looked_at, seen.landmarks_W)
+    path = looked_at.flat(seen.poses.p)
+    points = looked_at.flat(seen.landmarks_W)
     shown = np.concatenate((path, points[stands]))
     resolution = wish.resolution_m or _resolution(spread[stands], shown)
     sheet = _Sheet.around(seen, shown, resolution)
@@ -229,7 +224,7 @@ class _Rays(NamedTuple):
 
 def _free(sheet: _Sheet, seen: Sightings, rays: _Rays, range_m: float) -> Floats:
     """Log-odds that the rays give each cell."""
-    eyes = flat(rays.looked_at, seen.camera_W)
+    eyes = rays.looked_at.flat(seen.camera_W)
     frame, landmark = _once(sheet, seen, eyes, rays.sure)
     way = rays.points[landmark] - eyes[frame]
     length = np.linalg.norm(way, axis=1)

@@ -38,6 +38,10 @@ class Plane(NamedTuple):
     up: Axis
     why: str
 
+    def flat(self, points: Floats) -> Floats:
+        """(..., 3) -> (..., 2)."""
+        return np.stack((self.right.of(points), self.up.of(points)), axis=-1)
+
 
 def choose(axes: BodyAxes, poses: Poses) -> Plane:
     """From above, where the body's axes tell what is up; else the plane of largest extent."""

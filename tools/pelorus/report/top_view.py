@@ -67,20 +67,16 @@ def view(compared: Comparison) -> View:
     """Choose the plane and the picture's limits."""
     main = compared.accuracy.get(OWN)
     looked_at = plane.choose(compared.subject.header.body_axes, compared.main.trajectory.poses)
-
-    def flat(points: Floats) -> Floats:
-        return np.stack((looked_at.right.of(points), looked_at.up.of(points)), axis=-1)
-
-    paths = {run.name: flat(run.trajectory.poses.p) for run in compared.runs}
-    truth = flat(main.truth.p) if main else None
+    paths = {run.name: looked_at.flat(run.trajectory.poses.p) for run in compared.runs}
+    truth = looked_at.flat(main.truth.p) if main else None
     box = _limits(paths, truth)
     points = compared.main.landmarks
     shown = points.sigma_m <= SIGMA_MAX * box.side
     known = compared.subject.known_W_m
     if main:  # they lie in the truth's world, and the picture is in the estimate's
         known = se3.apply(main.A, known)
-    landmarks = flat(points.p_W_m[shown])
-    return View(looked_at, paths, truth, flat(known), landmarks, int((~shown).sum()), box)
+    landmarks = looked_at.flat(points.p_W_m[shown])
+    return View(looked_at, paths, truth, looked_at.flat(known), landmarks, int((~shown).sum()), box)
 
 
 def _limits(paths: dict[str, Floats], truth: Floats | None) -> Box:
