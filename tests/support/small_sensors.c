@@ -21,8 +21,9 @@ void small_sensors_set_up(void) {
     rig.config.pixel_sigma_px = rig.options.pixel_sigma_px;
     each_axis(rig.config.velocity_sigma, rig.options.velocity_sigma_mps);
     each_axis(rig.config.gyro_sigma, rig.options.gyro_sigma_radps);
-    rig.config.bias_gyro_sigma_radps = 0.002; /* so that dead reckoning stays nearly linear */
-    rig.config.gate_d2 = 40;                  /* wide: what it cuts off is missing in the errors */
+    rig.config.bias_velocity_sigma_mps = 0.03; /* so that there is something to be found */
+    rig.config.bias_gyro_sigma_radps = 0.002;  /* so that dead reckoning stays nearly linear */
+    rig.config.gate_d2 = 40;                   /* wide: what it cuts off is missing in the errors */
 }
 
 plr_reading reading_of(plr_sensor sensor, uint8_t axes, double sigma) {

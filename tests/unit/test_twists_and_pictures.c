@@ -31,6 +31,8 @@ void setUp(void) {
     chance = rng_seeded(61);
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, false, 4);
     plr_consistency_clear(&filter);
+    filter.reading_valid = 1; /* and just come */
+    filter.reading_ns = filter.t_ns;
     memset(&believed, 0, sizeof believed);
     believed.p[0] = (plr_real)WAY_M;
     for (unsigned k = 0; k < 6; k++) {
@@ -239,6 +241,14 @@ static void test_a_frame_may_contradict_the_twists_outright(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-2, pow(0.4 / SIGMA_M, 2), (double)filter.consistency.excess);
 }
 
+static void test_an_old_reading_is_no_rival_of_the_picture(void) {
+    filter.t_ns += 1000000000;
+    contradict_outright(0.4);
+    TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge());
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.consistency.difference[0]);
+}
+
 static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
     const double before = (double)filter.P[plr_packed_at(0, 0)];
     const uint32_t widened = filter.totals.widened;
@@ -371,6 +381,7 @@ int main(void) {
     RUN_TEST(test_twists_that_are_contradicted_are_believed_less);
     RUN_TEST(test_the_covariance_covers_both_stories);
     RUN_TEST(test_a_frame_may_contradict_the_twists_outright);
+    RUN_TEST(test_an_old_reading_is_no_rival_of_the_picture);
     RUN_TEST(test_after_fifteen_frames_of_agreement_it_is_settled);
     RUN_TEST(test_a_frame_that_differs_begins_the_settling_anew);
     RUN_TEST(test_wheels_that_slip_do_not_carry_the_pose_away);
