@@ -95,10 +95,14 @@ static double percent(uint64_t part, uint64_t whole) {
     return whole > 0 ? 100 * (double)part / (double)whole : 0;
 }
 
-/* A sound filter loses to the gate what the gate is set to, and outliers. Much more than that is a
- * noise setting that does not fit, and a user who does not know that looks everywhere else first. */
-static void print_gate_hint(const summary *s, const plr_config *config) {
+/* A sound filter loses to the gate what the gate is set to, and outliers. Much more than that is an
+ * everyday fault of geometry, ids or clocks, or a noise setting that does not fit: a user who knows
+ * of one of these alone looks there for long. */
+static void print_gate_hint(const summary *s, const plr_session *session) {
     enum { ENOUGH = 100 };
+    static const char clocks[] = "--twist-timing, --camera-offset";
+    const plr_config *config = plr_filter_config(&session->filter);
+    const bool imu = session->totals.imus > 0;
     static const double suspicious = 10, times_due = 5;
     const double share = percent(s->gated, s->matched);
     const double due = 100 * gate_excess(config->gate_d2);
@@ -106,12 +110,15 @@ static void print_gate_hint(const summary *s, const plr_config *config) {
         share < suspicious || share < times_due * due)
         return;
     printf(
-        "              hint: of sound observations this gate turns away %.2g %%. Either many are "
-        "wrong,\n"
-        "              or a setting says less noise than there is: --velocity-sigma, "
-        "--gyro-sigma,\n"
-        "              --pixel-sigma, --bias and its walks (docs/NUMERICS.md)\n",
-        due);
+        "              hint: of sound observations this gate turns away %.2g %%. Is one of these "
+        "off?\n"
+        "              geometry: extrinsic, lever, axes and units of %s, baseline, focal length\n"
+        "              ids: each must follow one point; left and right; a scene that moves\n"
+        "              clocks: %s\n"
+        "              noise: %s, --pixel-sigma, --bias and its walks\n"
+        "              pelorus check tells which, as far as the recording does\n",
+        due, imu ? "the IMU" : "the twists", imu ? "--camera-offset" : clocks,
+        imu ? "--gyro-noise, --accel-noise" : "--velocity-sigma, --gyro-sigma");
 }
 
 /* Of small sensors, where there are any. */
@@ -145,7 +152,7 @@ static void print_counts(const summary *s, const plr_session *session) {
            "%" PRIu64 " new, %" PRIu64 " evicted\n",
            s->observations, s->used, s->gated, percent(s->gated, s->matched), s->created,
            s->evicted);
-    print_gate_hint(s, plr_filter_config(&session->filter));
+    print_gate_hint(s, session);
     printf("not used      %" PRIu64 " without a slot, %" PRIu64 " too poor to start from, %" PRIu64
            " malformed, %" PRIu64 " doubled, %" PRIu64 " over budget\n",
            s->no_room, s->poor, s->refused_observations, s->duplicates, s->left_out);

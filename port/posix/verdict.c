@@ -60,10 +60,13 @@ int verdict_on_recording(const char *path, const plr_session *s, const outcome *
 }
 
 int verdict_on_frames(const char *path, const plr_session *s, const summary *summed) {
-    char words[128];
+    char words[192];
     if (summed->frames > 0)
         return REPLAY_EXIT_OK;
-    snprintf(words, sizeof words, "no frame could be used: %" PRIu32 " STEREO, %" PRIu64 " refused",
+    snprintf(words, sizeof words,
+             "no frame could be used: %" PRIu32 " STEREO, %" PRIu64
+             " refused; are all times on one "
+             "clock, and in ns?",
              s->totals.stereos, summed->frames_refused);
     return verdict_say(path, REPLAY_EXIT_RECORDING, words);
 }

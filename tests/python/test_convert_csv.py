@@ -169,6 +169,7 @@ BAD_CSV = [
     (edited("camera.json", '"twist_timing": "end"', '"twist_timing": "late"'), "start or end"),
     (edited("camera.json", '"pixel_sigma_px": 0.5', '"pixel_sigma": 1'), "unknown name pixel_"),
     (edited("camera.json", '"baseline_m": 0.2', '"baseline_m": -1'), "must be positive"),
+    (edited("camera.json", '"baseline_m": 0.2', '"baseline_m": 200'), "are these millimetres"),
     (edited("camera.json", '"baseline_m": 0.2', '"baseline_m": "wide"'), "a finite number"),
     (edited("camera.json", '"image_width_px": 640', '"image_width_px": 1e9'), "0 to 65535"),
     (edited("camera.json", "{", "["), "is no JSON"),

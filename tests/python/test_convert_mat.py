@@ -96,3 +96,14 @@ def test_starry_night_without_landmarks_is_refused(tmp_path: Path, pelorus: Run)
     assert "rho_i_pj_i has 2" in outcome.err
     outcome = pelorus("convert", "starry-night", source, tmp_path / "o.plr", "--landmark-sigma", 0)
     assert "must be positive" in outcome.err
+
+
+def test_what_is_wrong_with_a_drive_is_named(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(**SHORT | {"duration_s": 8.0})
+    arrays = mat_arrays(drive)
+    arrays["w_vk_vk_i"] = np.degrees(arrays["w_vk_vk_i"])
+    source, target = tmp_path / "klt.mat", tmp_path / "klt.plr"
+    savemat(source, arrays)
+    said = pelorus("convert", "klt", source, target)
+    assert said.status == 0, said.err
+    assert "unit-degrees: FOUND" in said.out

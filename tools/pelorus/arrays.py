@@ -14,6 +14,7 @@ from pelorus.frames import Camera
 from pelorus.layout import Floats
 
 ORTHOGONAL_TOLERANCE = 1e-3
+BASELINES_M = (1e-3, 5.0)  # what a body can carry
 SECONDS_MAX = 9e9  # below 2^63 ns
 
 
@@ -95,7 +96,19 @@ def camera_of(path: Path, fx: float, fy: float, cx: float, cy: float, baseline: 
         raise ForeignFileError(
             path, f"focal lengths {fx}, {fy} px and baseline {baseline} m must be positive"
         )
+    require_baseline(path, baseline)
     return Camera(fx, fy, cx, cy, baseline)
+
+
+def require_baseline(path: Path, length_m: float) -> None:
+    """One that a body can carry."""
+    if not BASELINES_M[0] <= length_m <= BASELINES_M[1]:
+        raise ForeignFileError(
+            path,
+            f"the cameras stand {length_m:g} apart",
+            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are due: are these millimetres, or "
+            "squares of the board? Divide so that it is in metres",
+        )
 
 
 def nanoseconds(path: Path, what: str, seconds: Floats) -> NDArray[np.int64]:

@@ -21,6 +21,7 @@ from pelorus.converters import ece276a as ece276a_converter
 from pelorus.converters import imu_npz as imu_npz_converter
 from pelorus.converters import landmark_map, matlab, readings_csv
 from pelorus.converters.columns import Columns
+from pelorus.faults.mend import held_to_fit
 from pelorus.rig.lens import LensModel
 from pelorus.small_sensors import SMALL_SENSORS
 
@@ -81,7 +82,7 @@ def starry_night(
 ) -> None:
     """A .mat of UTIAS's Starry Night, with its landmarks as known ones."""
     recording = matlab.starry_night(source, twist_timing.value_in_header, landmark_sigma)
-    write(recording, [], target)
+    write(*held_to_fit(recording, recording, []), target)
 
 
 @app.command(
@@ -94,7 +95,8 @@ def klt(
     twist_timing: Timing = typer.Option(Timing.MID, help="When a twist reading holds."),
 ) -> None:
     """A KITTI drive with KLT stereo tracks (.mat)."""
-    write(matlab.klt(source, twist_timing.value_in_header), [], target)
+    recording = matlab.klt(source, twist_timing.value_in_header)
+    write(*held_to_fit(recording, recording, []), target)
 
 
 def _with_small_sensors(command: Callable[..., None]) -> Callable[..., None]:

@@ -19,7 +19,6 @@ from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rectification import Rectification
 from pelorus.se3 import Poses
 
-BASELINES_M = (1e-3, 5.0)
 SAME = 1e-9  # so little off, a pair counts as rectified
 
 
@@ -42,7 +41,7 @@ class Rig:
         cls, path: Path, first: Lens, second: Lens, T_21: Poses, T_1B: Poses | None = None
     ) -> Rig:
         """Whichever of the two stands on the left becomes the left one."""
-        _require_baseline(path, T_21)
+        arrays.require_baseline(path, float(np.linalg.norm(T_21.p)))
         x = -(T_21.R.T @ T_21.p)[0]
         if x > 0:
             return cls(path, first, second, T_21, T_1B)
@@ -95,17 +94,6 @@ class Rig:
                 f"{self.path}: an offset of {self.offset_s} s brings the first picture before 0 s"
             )
         return shifted
-
-
-def _require_baseline(path: Path, T_21: Poses) -> None:
-    length = float(np.linalg.norm(T_21.p))
-    if not BASELINES_M[0] <= length <= BASELINES_M[1]:
-        raise ForeignFileError(
-            path,
-            f"the cameras stand {length:g} apart",
-            due=f"{BASELINES_M[0]:g} to {BASELINES_M[1]:g} m are due: are these millimetres, or "
-            "squares of the board? Divide T so that it is in metres",
-        )
 
 
 def rigid(path: Path, name: str, matrix: Floats) -> Poses:
