@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from converted import Run
 from imu_drives import NOISY, npz_arrays, options, written
 from pelorus import se3
+from pelorus.faults.mend import held_to_fit
 from pelorus.faults.named import faults_in
 from pelorus.recording import Recording
 from pelorus.simulation.simulate import Simulation, simulate
@@ -96,15 +98,22 @@ def test_a_fault_of_an_imu_is_named(drive: Recording, name: str) -> None:
     assert said[0].name == due, said
 
 
-def test_a_clean_drive_by_an_imu_has_no_faults(drive: Recording) -> None:
-    assert faults_in(drive) == []
-
-
 def test_forces_that_are_no_motions_fit_nothing(drive: Recording) -> None:
     chance = np.random.default_rng(1)
     noise = chance.normal(0, 1, (2, len(drive.inertial.t_ns), 3))
     own = drive.inertial._replace(w_B_radps=noise[0], a_B_mps2=5 * noise[1])
     assert [fault.name for fault in faults_in(replace(drive, inertial=own))] == ["no-fit"]
+
+
+def test_the_converter_says_how_well_it_knows_that_a_clean_drive_has_no_faults(
+    drive: Recording,
+) -> None:
+    [known] = held_to_fit(drive, drive, [])[1]
+    assert not known.found
+    assert re.search(
+        r"scale of the way [\d.]+ \+- 0\.0\d+, clock [-+]\d+ \+- \d ms", known.evidence
+    )
+    assert "cannot be seen" in known.action
 
 
 def test_the_converter_says_what_is_wrong(tmp_path: Path, pelorus: Run) -> None:

@@ -8,6 +8,7 @@ matters. What the data cannot tell apart is not guessed at.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,24 +49,36 @@ PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
 
 
-def geometry(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+@dataclass(frozen=True)
+class Judged:
+    """What is wrong, and where it came to that, how far camera and body agree."""
+
+    faults: list[Fault]
+    agreed: Agreement | None = None
+
+
+def geometry(recording: Recording, views: TwoViews) -> Judged:
     """`views` of neighbouring frames. Nothing where all is well."""
     by_imu = len(recording.inertial.t_ns) > 0
     wrong = list(_of_imu(recording, views) if by_imu else _of_twists(recording, views))
     if wrong:
-        yield from wrong
-        return
+        return Judged(wrong)
     moves = list(_moving(recording, views))
-    yield from moves
     agreed = agreement(recording, views)
-    if agreed.told:
-        lever = [*_lever(recording, agreed)] or [*_place(recording, agreed)] * by_imu
-        yield from lever
-        if not moves:  # what moves looks like another scale
-            told = recording.header.noise.bias_velocity_sigma_mps
-            bias = told if told >= 0 else BIAS_MPS
-            yield from _scale_by_imu(agreed) if by_imu else _scale(agreed, bias)
-        yield from _clock(recording, agreed)
+    if not agreed.told:
+        return Judged(moves)
+    faults = [*moves, *_lever(recording, agreed)]
+    if by_imu and not any(fault.name == "lever" for fault in faults):
+        faults += _place(recording, agreed)
+    if not moves:  # what moves looks like another scale
+        faults += _scale_by_imu(agreed) if by_imu else _scale(agreed, _bias_mps(recording))
+    return Judged([*faults, *_clock(recording, agreed)], agreed)
+
+
+def _bias_mps(recording: Recording) -> float:
+    """Sigma of the velocity's bias."""
+    told = recording.header.noise.bias_velocity_sigma_mps
+    return told if told >= 0 else BIAS_MPS
 
 
 def _of_twists(recording: Recording, views: TwoViews) -> Iterator[Fault]:
@@ -175,8 +188,16 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
     elif axes:
         yield from axes
     # the way tells where the camera looks; the roll about it only the turns do, which may be noise
-    elif sure and found.way_left < LEFT_MOST and (headed > TURNED_DEG or rolled):
+    elif (
+        sure and found.way_left < LEFT_MOST and (headed > _straight_deg(recording, found) or rolled)
+    ):
         yield _turned(given, found.R, off)
+
+
+def _straight_deg(recording: Recording, found: HandEye) -> float:
+    """Within which the way is along the camera: a bias across it turns it."""
+    bias = SCALE_SIGMAS * _bias_mps(recording) / (found.speed_mps + 1e-12)
+    return float(np.hypot(TURNED_DEG, np.degrees(np.arctan(bias))))
 
 
 def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:

@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from pelorus.faults import axes, lever, stale
 from pelorus.faults.fault import UNTOLD, Fault
 from pelorus.faults.finding import Finding
-from pelorus.faults.named import faults_in
+from pelorus.faults.geometry import Judged
+from pelorus.faults.named import judged
 from pelorus.recording import Recording
 
 NOTHING_LASTS = "ids-new"
+AGREES = "camera and body"
+SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
 
 
 def mend(recording: Recording) -> tuple[Recording, list[Finding]]:
@@ -34,21 +39,37 @@ def held_to_fit(
     """The absolute test. An extrinsic that was changed stays so only if all fits with it; and what
     is wrong besides is told by name.
     """
-    named = faults_in(mended)
-    if mended.tracks is not given.tracks and any(fault.name == NOTHING_LASTS for fault in named):
-        mended = replace(
-            mended, tracks=given.tracks
-        )  # pictures that stand still, not single tracks
-        findings = [_taken_back(finding, named[0], stale.SUBJECT) for finding in findings]
-        named = faults_in(mended)
+    found = judged(mended)
+    if mended.tracks is not given.tracks and any(
+        fault.name == NOTHING_LASTS for fault in found.faults
+    ):
+        # pictures that stand still, not single tracks
+        mended = replace(mended, tracks=given.tracks)
+        findings = [_taken_back(finding, found.faults[0], stale.SUBJECT) for finding in findings]
+        found = judged(mended)
     changed = mended.header.R_CB is not given.header.R_CB
     changed |= mended.header.t_CB_m is not given.header.t_CB_m
-    wrong = [fault for fault in named if fault.stops]
+    wrong = [fault for fault in found.faults if fault.stops]
     if changed and wrong:
         findings = [_taken_back(f, wrong[0], axes.SUBJECT, lever.SUBJECT) for f in findings]
         mended = mended.with_extrinsic(given.T_CB)
-        named = faults_in(mended)
-    return mended, [*findings, *(_told(fault) for fault in named if fault.name != UNTOLD)]
+        found = judged(mended)
+    return mended, [*findings, *(_told(fault) for fault in found.faults), *_known(found)]
+
+
+def _known(found: Judged) -> Iterator[Finding]:
+    """How well the drive tells what it was asked, so that silence is not taken for a promise."""
+    agreed = found.agreed
+    if agreed is None or found.faults:
+        return
+    place_m = float(np.sqrt(np.diagonal(agreed.lever_covariance)).max())
+    evidence = (
+        f"scale of the way {agreed.scale:.3f} +- {agreed.scale_sigma:.3f}, clock "
+        f"{agreed.offset_s * 1e3:+.0f} +- {agreed.offset_sigma_s * 1e3:.0f} ms, the camera's place "
+        f"to {place_m:.2f} m"
+    )
+    action = "what is off by less than three times as much cannot be seen in this drive"
+    yield Finding(AGREES, False, evidence, action, told=agreed.scale_sigma < SCALE_TOLD)
 
 
 def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
@@ -59,6 +80,8 @@ def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
 
 
 def _told(fault: Fault) -> Finding:
+    if fault.name == UNTOLD:
+        return Finding(AGREES, False, fault.words, "nothing was changed", told=False)
     action = "nothing was changed; the filter can live with it, and pelorus check tells more"
     if fault.grave:
         action = "nothing was changed: mend it where the data or the calibration come from"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pelorus.faults import identity
 from pelorus.faults.fault import Fault
-from pelorus.faults.geometry import geometry
+from pelorus.faults.geometry import Judged, geometry
 from pelorus.faults.handeye import first_part
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
@@ -42,32 +42,38 @@ def faults_of(messages: Sequence[Message], recording: Recording) -> list[Fault]:
     if len(recording.inertial.t_ns):
         imu = [m for m in messages if isinstance(m, Imu)]
         readings = readings_of(imu).t_ns if imu else frames[:0]
-        return _faults({READINGS: readings, FRAMES: frames}, recording)
+        return _judged({READINGS: readings, FRAMES: frames}, recording).faults
     twists = np.array([m.t_ns for m in messages if isinstance(m, Twist)], np.int64)
-    return _faults({TWISTS: twists, FRAMES: frames}, recording)
+    return _judged({TWISTS: twists, FRAMES: frames}, recording).faults
 
 
 def faults_in(recording: Recording) -> list[Fault]:
     """Of a recording that is not written yet."""
+    return judged(recording).faults
+
+
+def judged(recording: Recording) -> Judged:
+    """The same, and how well it is known."""
     frames = recording.frame_t_ns
     if len(recording.inertial.t_ns):
-        return _faults({READINGS: recording.inertial.t_ns, FRAMES: frames}, recording)
-    return _faults({TWISTS: recording.twist_t_ns, FRAMES: frames}, recording)
+        return _judged({READINGS: recording.inertial.t_ns, FRAMES: frames}, recording)
+    return _judged({TWISTS: recording.twist_t_ns, FRAMES: frames}, recording)
 
 
-def _faults(times_ns: Mapping[str, Times], recording: Recording) -> list[Fault]:
+def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     """The likeliest first; empty if nothing is wrong that this knows of."""
     times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
     times += _spans(*times_ns.items())
     short = first_part(recording)
     pixels = list(_pixels(short))
     if pixels or any(fault.name in ("time-unit", "time-apart") for fault in times):
-        return [*pixels, *times]  # what follows would be built on sand
+        return Judged([*pixels, *times])  # what follows would be built on sand
     views = two_views(short.tracks, short.header.camera, 1)
     ids = list(_ids(short, views))
     if ids:
-        return [*ids, *times]
-    return [*geometry(short, views), *_frozen(recording), *times]
+        return Judged([*ids, *times])
+    found = geometry(short, views)
+    return Judged([*found.faults, *_frozen(recording), *times], found.agreed)
 
 
 # --- time -----------------------------------------------------------------------------------------
