@@ -41,9 +41,9 @@ SURE_SIGMAS = 4.0
 UNIT_NEAR = 0.15
 FAR_LAG = 3
 MOVING_SHARE = 0.14  # of what is seen on roads 5 to 12 % drives, or is tracked so badly
-SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 3.0, 0.015, 0.15
-BIAS_MPS = 0.03  # default of the setting bias-velocity-sigma
-CLOCK_SIGMAS, CLOCK_OFF_S = 3.0, 0.015
+SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
+BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
+CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
@@ -196,7 +196,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
 
 def _straight_deg(recording: Recording, found: HandEye) -> float:
     """Within which the way is along the camera: a bias across it turns it."""
-    bias = SCALE_SIGMAS * _bias_mps(recording) / (found.speed_mps + 1e-12)
+    bias = BIAS_SIGMAS * _bias_mps(recording) / (found.speed_mps + 1e-12)
     return float(np.hypot(TURNED_DEG, np.degrees(np.arctan(bias))))
 
 
@@ -344,7 +344,7 @@ def _scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
         )
         return
     bias = abs(through) * agreed.speed_mps
-    told = bias > SCALE_SIGMAS * bias_sigma and abs(through) > SCALE_OFF
+    told = bias > BIAS_SIGMAS * bias_sigma and abs(through) > SCALE_OFF
     either = abs(through - off) < 2 * sigma and abs(through) < SCALE_SIGMAS * sigma
     if told and either and abs(through) > SCALE_SIGMAS * its_sigma:
         wild = abs(through) > SCALE_WILD

@@ -68,7 +68,7 @@ def _known(found: Judged) -> Iterator[Finding]:
         f"{agreed.offset_s * 1e3:+.0f} +- {agreed.offset_sigma_s * 1e3:.0f} ms, the camera's place "
         f"to {place_m:.2f} m"
     )
-    action = "what is off by less than three times as much cannot be seen in this drive"
+    action = "what is off by less than four times as much cannot be seen in this drive"
     yield Finding(AGREES, False, evidence, action, told=agreed.scale_sigma < SCALE_TOLD)
 
 
