@@ -190,6 +190,12 @@ def test_the_foot_of_a_parabola_and_how_sure_it_is() -> None:
     jumping = clock.foot(at, ((at - 0.004) / 0.002) ** 2 + 40 * np.array([0, 1, 0, 1, 0, 1, 0]))
     assert jumping.sigma_s > offset.sigma_s  # a parabola that does not fit is not believed
     assert clock.foot(at, -(at**2)).sigma_s == np.inf
+    feet = np.array([-0.02, 0.02] * 10)  # parts of a drive that do not agree on the foot
+    parts = ((at[:, None] - feet) / 0.002) ** 2
+    apart = clock.foot(at, parts)
+    assert apart.best_s == pytest.approx(0, abs=1e-9)
+    assert apart.sigma_s == pytest.approx(0.02 / np.sqrt(19), rel=0.05)
+    assert clock.foot(at, parts.sum(axis=1)).sigma_s < 0.001
     assert clock.foot(at[:2], at[:2]).gain == 0
 
 

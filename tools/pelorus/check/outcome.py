@@ -15,7 +15,7 @@ import os
 import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +63,9 @@ class Outcome:
     bias: Floats  # at the end, (b_v, b_w)
     bias_variance: Floats
     contradicted: float = 0.0  # of the frames: in these vision contradicts twists or IMU
+    by_frame: Floats = field(
+        default_factory=lambda: np.zeros(0)
+    )  # -2 ln of each frame's likelihood
 
     def gain_over(self, other: Outcome) -> float:
         """How much likelier this run makes what was seen: -2 ln of the ratio, over the drive."""
@@ -155,34 +158,35 @@ def _by_offset(settings: Settings) -> Settings:
 
 def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
     """From a filter's REPORTs and POSEs."""
-    total, rows, d2, matched, used, gated, frames = 0.0, 0, 0.0, 0, 0, 0, 0
-    contradicted = 0
+    rows, d2, matched, used, gated, contradicted = 0, 0.0, 0, 0, 0, 0
+    by_frame: list[float] = []
     last: Pose | None = None
     for message in answers:
         if isinstance(message, Pose) and message.after_stereo:
             last = message
         if not isinstance(message, Report) or message.subject != Kind.STEREO or message.status:
             continue
-        frames += 1
         contradicted += bool(message.reasons & CONTRADICTED)
         matched, used = matched + message.matched, used + message.used
         gated += message.gated
         d2, rows = d2 + message.innovation_d2, rows + message.innovation_rows
-        total += message.innovation_log_det
+        normal = message.innovation_rows * math.log(2 * math.pi) + message.innovation_log_det
+        by_frame.append(normal + message.innovation_d2 + message.gated * cost_of_outlier)
     if not matched or not rows or last is None:
         return NOTHING
-    cost = total + d2 + rows * math.log(2 * math.pi) + gated * cost_of_outlier
+    cost = math.fsum(by_frame)
     variance = np.asarray(last.bias_variance, np.float64)
     return Outcome(
         cost / matched if math.isfinite(cost) else math.inf,
         matched,
         used,
         gated,
-        frames,
+        len(by_frame),
         d2 / rows,
         np.asarray(last.bias, np.float64),
         variance,
-        contradicted / frames,
+        contradicted / len(by_frame),
+        np.array(by_frame),
     )
 
 
