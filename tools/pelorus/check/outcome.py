@@ -47,7 +47,7 @@ BEGIN_NS = 1_000_000_000  # a recording may begin at zero, and its frames be too
 OFFSET_MOST_S = 0.1
 OFFSET, PART, LENGTH = "@offset", "@part", "@frames"
 CAMERA_OFFSET = "camera-offset"
-CONTRADICTED = number("reason", "POSE_MAY_BE_WRONG")
+CONTRADICTED = number("reason", "TWIST_CONTRADICTED")
 
 
 @dataclass(frozen=True)
