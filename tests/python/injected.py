@@ -16,7 +16,7 @@ import numpy as np
 from pelorus import se3, wire
 from pelorus.check.contents import recording_of
 from pelorus.faults.fault import Fault
-from pelorus.faults.named import faults_of
+from pelorus.faults.named import faults_in, faults_of
 from pelorus.frames import Message, Stereo, Twist
 from pelorus.recording import Recording
 from pelorus.tracks import project, triangulate
@@ -158,7 +158,7 @@ def frozen(recording: Recording, k: int) -> Recording:
 
 
 Change = Callable[[Recording, int], Recording]
-ALIKE = ("inverted", "degrees", "km/h", "mm/s", "left-right", "u-v")  # at any strength
+ALIKE = ("inverted", "degrees", "km/h", "mm/s", "left-right", "u-v", "gravity")  # at any strength
 OF_RECORDINGS: dict[str, tuple[Change, tuple[str, ...]]] = {
     "inverted": (inverted, ("inverted", "axes", "extrinsic")),
     "axes": (axes, ("axes",)),
@@ -178,6 +178,72 @@ OF_RECORDINGS: dict[str, tuple[Change, tuple[str, ...]]] = {
     "moving": (wandering, ("moving",)),
     "frozen": (frozen, ("frozen",)),
 }
+
+
+def imu(recording: Recording, of_gyro: np.ndarray, of_force: np.ndarray) -> Recording:
+    """An IMU in other axes or units."""
+    own = recording.inertial
+    turned = own._replace(w_B_radps=own.w_B_radps @ of_gyro.T, a_B_mps2=own.a_B_mps2 @ of_force.T)
+    return replace(recording, inertial=turned)
+
+
+def mirrored_imu(recording: Recording, k: int) -> Recording:
+    """A left-handed frame."""
+    F = np.diag(np.where(np.arange(3) == k, -1.0, 1.0))
+    return imu(recording, -F, F)
+
+
+def turned_imu(recording: Recording, k: int) -> Recording:
+    """Both in other axes than the extrinsic's."""
+    F = np.array([[[0, 1, 0], [-1, 0, 0], [0, 0, 1]], [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+                  [[0, 0, 1], [1, 0, 0], [0, 1, 0]]][k], np.float64)  # fmt: skip
+    return imu(recording, F, F)
+
+
+def swapped_imu(recording: Recording, k: int) -> Recording:
+    """x and y: of both, of the force, of the gyro with a sign."""
+    F = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])
+    return imu(recording, (F, np.eye(3), -F)[k], (F, F, np.eye(3))[k])
+
+
+def calibrated(recording: Recording, baseline: float, focal: float) -> Recording:
+    """Another calibration than the camera's own."""
+    camera = recording.header.camera
+    f = {name: focal * getattr(camera, name) for name in ("fx_px", "fy_px")}
+    return recording.with_header(
+        camera=replace(camera, baseline_m=baseline * camera.baseline_m, **f)
+    )
+
+
+def imu_clock(recording: Recording, k: int) -> Recording:
+    """Stamps of the readings in other units than the frames'."""
+    own = recording.inertial
+    t_ns = (own.t_ns // 1000, own.t_ns // 10**6, own.t_ns * 1000)[k]
+    return replace(recording, inertial=own._replace(t_ns=t_ns))
+
+
+NONE = np.eye(3)
+OF_IMU: dict[str, tuple[Change, tuple[str, ...]]] = {
+    "inverted": (inverted, ("inverted",)),
+    "lever": (swapped_lever, ("lever",)),
+    "axes": (turned_imu, ("axes",)),
+    "mirrored": (mirrored_imu, ("axes",)),
+    "x-y": (swapped_imu, ("axes",)),
+    "degrees": (lambda r, k: imu(r, NONE * (57.2958, 57.2958, 0.0174533)[k], NONE),
+                ("unit-degrees",)),
+    "g": (lambda r, k: imu(r, NONE, NONE / (9.81, 9.81e-3, 1e-3)[k]), ("unit-force",)),
+    "gravity": (lambda r, _: imu(r, NONE, -NONE), ("gravity-sign",)),
+    "baseline": (lambda r, k: calibrated(r, (1.02, 0.95, 1.12)[k], 1.0), ("scale",)),
+    "focal": (lambda r, k: calibrated(r, 1.0, (0.98, 1.05, 0.9)[k]), ("scale",)),
+    "pitch": (pitched, ("pitch",)),
+    "clock": (late, ("clock",)),
+    "time-unit": (imu_clock, ("time-unit",)),
+    "left-right": OF_RECORDINGS["left-right"],
+    "u-v": OF_RECORDINGS["u-v"],
+    "unrectified": OF_RECORDINGS["unrectified"],
+    "ids-rows": OF_RECORDINGS["ids-rows"],
+    "ids-slots": OF_RECORDINGS["ids-slots"],
+}  # fmt: skip
 
 
 def of_times(messages: list[Message], k: int, name: str) -> list[Message]:
@@ -207,9 +273,10 @@ def found_in(recording: Recording) -> list[Fault]:
 
 def injections(recording: Recording) -> Iterator[tuple[str, int, list[Fault], tuple[str, ...]]]:
     """Fault, strength, what was named, what is due."""
-    for name, (change, due) in OF_RECORDINGS.items():
+    by_imu = len(recording.inertial.t_ns) > 0
+    for name, (change, due) in (OF_IMU if by_imu else OF_RECORDINGS).items():
         for k in range(1 if name in ALIKE else 3):
-            yield name, k, found_in(change(recording, k)), due
+            yield name, k, faults_in(change(recording, k)), due
 
 
 def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
@@ -218,7 +285,9 @@ def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
     rows = (tracks.frame >= first) & (tracks.frame < first + most)
     t = recording.frame_t_ns[first : first + most]
     count = len(t)
-    return replace(recording, frame_t_ns=t, tracks=type(tracks)(
+    own = recording.inertial
+    own = own.at((own.t_ns > t[0] - 10**9) & (own.t_ns < t[-1] + 10**9))
+    return replace(recording, frame_t_ns=t, inertial=own, tracks=type(tracks)(
         count, tracks.frame[rows] - first, tracks.id[rows], tracks.pixels[rows]))  # fmt: skip
 
 

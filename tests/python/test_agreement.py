@@ -11,6 +11,7 @@ import pytest
 from pelorus import se3
 from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.fault import Fault
+from pelorus.faults.geometry import of_scale
 from pelorus.faults.named import faults_in
 from pelorus.faults.two_views import two_views
 from pelorus.recording import Recording
@@ -83,6 +84,14 @@ def test_a_bias_that_the_settings_allow_is_no_scale() -> None:
     shifted = replace(recording, v_B_mps=recording.v_B_mps + np.array([0.06, 0, 0]))
     assert len(scale_in(shifted)) == 1, "where there is no bias it is a scale"
     assert scale_in(shifted.with_header(noise=noise)) == []
+
+
+def test_ways_that_have_nothing_in_common_are_no_scale() -> None:
+    recording = driven()
+    found = replace(agreed(recording), scale=0.08, scale_sigma=0.06)
+    assert [fault.name for fault in of_scale(found, 0.0)] == ["no-fit"]
+    baseline = replace(found, scale=0.3, scale_sigma=0.01)
+    assert [fault.name for fault in of_scale(baseline, 0.0)] == ["scale"]
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.03, -0.12])

@@ -43,6 +43,7 @@ FAR_LAG = 3
 MOVING_SHARE = 0.14  # of what is seen on roads 5 to 12 % drives, or is tracked so badly
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
 BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
+SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
@@ -71,7 +72,7 @@ def geometry(recording: Recording, views: TwoViews) -> Judged:
     if by_imu and not any(fault.name == "lever" for fault in faults):
         faults += _place(recording, agreed)
     if not moves:  # what moves looks like another scale
-        faults += _scale_by_imu(agreed) if by_imu else _scale(agreed, _bias_mps(recording))
+        faults += _scale_by_imu(agreed) if by_imu else of_scale(agreed, _bias_mps(recording))
     return Judged([*faults, *_clock(recording, agreed)], agreed)
 
 
@@ -317,13 +318,20 @@ def _metres(p: Floats) -> str:
     return "at (" + ", ".join(f"{x:.2f}" for x in p) + ") m"
 
 
-def _scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
+def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
     """`bias_sigma` as the HEADER tells it, or else as the filter's settings allow it: where the
     speed varies too little to tell a scale from a bias, one of that size is nothing new.
     """
     off, sigma = agreed.scale - 1, agreed.scale_sigma
     turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
     through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
+    if abs(off) > SCALE_WILD and agreed.scale < SCALE_KNOWN * sigma:
+        yield Fault(
+            "no-fit",
+            f"camera and twists do not tell the same motion: the images show {agreed.scale:.2f} +- "
+            f"{sigma:.2f} times the twists' way. Extrinsic, axes or units, but which is not told",
+        )
+        return
     if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
         yield Fault(
             "scale",
