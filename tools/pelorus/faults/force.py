@@ -141,7 +141,7 @@ def rates_of_turn(readings: Inertial, R: Floats, frame_s: Floats) -> Floats:
 def _stretches(frame_s: Floats) -> tuple[NDArray[np.intp], Floats]:
     """Which stretch an interval is in, and when each begins."""
     whole = max(frame_s[-1] - frame_s[0], 1e-9)
-    count = max(int(whole / STRETCH_S), 1)
+    count = max(int(np.ceil(whole / STRETCH_S)), 1)
     count = max(min(count, (len(frame_s) - 1) // STRETCH_FRAMES), 1)
     begin = frame_s[0] + np.arange(count) * whole / count
     own = np.searchsorted(begin, frame_s[:-1], side="right") - 1
