@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 from converted import Run
 from pelorus import wire
-from pelorus.check import clock, outcome, parameters, search, tracks_noise, tuning, tuning_imu
+from pelorus.check import (
+    clock,
+    outcome,
+    parameters,
+    search,
+    tracks_noise,
+    tuning,
+    tuning_imu,
+    verdict,
+)
 from pelorus.check.contents import first_frames, half, recording_of, shifted, write
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
@@ -320,6 +329,13 @@ def test_noises_that_suit_one_half_of_the_drive_alone_are_not_written(
     assert held.settings["camera-offset"] == "0.01"  # of which a parabola has judged
     assert "clock" in held.said
     assert kept or "yours stay" in held.said[0]
+
+
+def test_of_few_frames_is_said_what_they_cannot_tell() -> None:
+    (remark,) = verdict.of_length(51)
+    assert remark.grade is verdict.Grade.CARE
+    assert remark.text.startswith("only 51 frames")
+    assert not list(verdict.of_length(100))
 
 
 # --- biases, tracks, parts ------------------------------------------------------------------------

@@ -25,6 +25,7 @@ NIS_LOW, NIS_HIGH = 0.6, 1.6
 BIAS_SIGMAS = 3.0
 OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
+FRAMES_FEW = 100
 
 
 class Grade(IntEnum):
@@ -80,6 +81,7 @@ class Run:
 def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
     """Of the run with the tuned settings, and of what tuning has found."""
     return [
+        *of_length(run.health.frames),
         *_health(run),
         *_gate(run, origin_ns),
         *_used(run),
@@ -94,6 +96,16 @@ def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
 def overall(found: Sequence[Remark]) -> Grade:
     """As the worst of them."""
     return max((remark.grade for remark in found), default=Grade.GOOD)
+
+
+def of_length(frames: int) -> Iterator[Remark]:
+    """What so few frames cannot tell."""
+    if frames < FRAMES_FEW:
+        yield Remark(
+            Grade.CARE,
+            f"only {frames} frames: of so few, noises are found to a fifth at best, and timing and "
+            "biases may be chance. Compare before and after, or record a minute",
+        )
 
 
 def _health(run: Run) -> Iterator[Remark]:
