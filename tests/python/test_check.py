@@ -23,6 +23,7 @@ from pelorus.check import (
     tuning_imu,
     verdict,
 )
+from pelorus.check.biases import common_bias
 from pelorus.check.contents import first_frames, half, recording_of, shifted, write
 from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.parameters import PAYS
@@ -343,11 +344,13 @@ def test_of_few_frames_is_said_what_they_cannot_tell() -> None:
 
 def test_a_bias_must_be_told_by_both_halves_alike() -> None:
     bias, variance = np.array([0.010, -0.012, 0.009]), np.full(3, 1e-6)
-    assert tuning.common_bias(bias, variance, 1.1 * bias, variance) == pytest.approx(0.011, rel=0.1)
-    assert tuning.common_bias(bias, variance, -bias, variance) == 0
-    assert tuning.common_bias(bias, variance, np.roll(bias, 1) * [1, -1, 1], variance) == 0
-    assert tuning.common_bias(bias, 1e4 * variance, bias, 1e4 * variance) == 0  # may be chance
-    assert tuning.common_bias(bias, -np.ones(3), bias, variance) == 0  # not known
+    told = common_bias(bias, variance, 1.1 * bias, variance)
+    assert told.size == pytest.approx(0.011, rel=0.1)
+    assert told.known == pytest.approx(1e-3 / np.sqrt(2))
+    assert common_bias(bias, variance, -bias, variance).size == 0
+    assert common_bias(bias, variance, np.roll(bias, 1) * [1, -1, 1], variance).size == 0
+    assert common_bias(bias, 1e4 * variance, bias, 1e4 * variance).size == 0  # may be chance
+    assert common_bias(bias, -np.ones(3), bias, variance).size == 0  # not known
 
 
 def moving_tracks(drift_px: float) -> list[Message]:

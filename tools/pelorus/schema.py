@@ -69,6 +69,9 @@ LIMITS: dict[str, int] = _TABLES["limits"]
 PLAUSIBLE: dict[str, float] = _TABLES["plausible"]  # what a session refuses is beyond
 MESSAGES: dict[str, MessageTable] = {row["name"]: _message(row) for row in _TABLES["messages"]}
 SETTINGS: dict[int, Setting] = {row["id"]: _setting(row) for row in _TABLES["settings"]}
+DEFAULTS: dict[str, float] = {
+    row["name"]: row["default"] for row in _TABLES["settings"] if "default" in row
+}
 STATUSES = _words("status")
 HEALTHS = _words("health")
 REASONS = _words("reason")

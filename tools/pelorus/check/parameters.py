@@ -61,6 +61,7 @@ class Tuned:
     offset_s: float = 0.0
     of_clock: list[str] = field(default_factory=list)  # of what was said
     halves: Inflated | None = None  # None: not compared
+    doubts: list[str] = field(default_factory=list)
 
 
 def of_process(by_imu: bool) -> dict[str, Parameter]:

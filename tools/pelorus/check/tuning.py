@@ -16,6 +16,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pelorus.check import clock, tuning_imu
+from pelorus.check.biases import WIDE, told_by_halves, told_in_drift
 from pelorus.check.options import Settings
 from pelorus.check.outcome import LENGTH, OFFSET, PART, Bench
 from pelorus.check.parameters import (
@@ -33,13 +34,8 @@ from pelorus.check.parameters import (
 from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
 from pelorus.check.tracks_noise import TrackNoise, track_noise
 from pelorus.converters.twist_noise import Spread, difference_of_a_reading
-from pelorus.layout import Floats
 
-WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
-PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
 FRAMES_FEW = 20  # tell a spread to a fifth: enough to begin with
-SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
-ALIKE = 0.7  # cosine of the angle between them
 FINE = (1.3, 1.15)
 OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
 CLOCK = ("camera-offset", "twist-timing", "imu-timing")
@@ -78,7 +74,7 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     fixed[OFFSET] = fixed.pop("camera-offset", "0")
     if noise.drifts:
         found = _of_drifting_tracks(bench, fixed, start, noise)
-        fixed, words = _bias_of_halves(bench, fixed, found.values)
+        fixed, words = told_in_drift(bench, fixed, found.values)
         offset_s = float(fixed.pop(OFFSET))
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
         return Tuned(settings, before, bench.run(settings), noise, [words])
@@ -90,7 +86,7 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
         values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
-    fixed, of_bias = _bias(bench, moved, values)
+    fixed, of_bias = told_by_halves(bench, moved, values)
     fixed, found, of_clock = clocked(bench, fixed, values, given)
     found, of_axes = _axes(bench, fixed, found)
     offset_s = float(fixed.pop(OFFSET))
@@ -134,83 +130,6 @@ def _of_drifting_tracks(
         of_twists = _of_twists(start, most)
         values |= {name: min(start[name], value) for name, value in of_twists.items()}
     return Found(values, bench.run({**fixed, **written(values, TWIST)}))
-
-
-# --- biases ---------------------------------------------------------------------------------------
-
-
-def _bias(bench: Bench, fixed: Settings, values: Mapping[str, float]) -> tuple[dict[str, str], str]:
-    """Of each kind that both halves of the drive tell alike, if the drive is likelier with it.
-
-    As wide as what they tell: of priors the likeliest may be narrower than the bias of the one axis
-    that has one, for the three axes share it.
-    """
-    side = {**fixed, **WIDE, **written(values, TWIST)}
-    halves = _halves(bench, side)
-    said = []
-    for name, unit in PRIORS.items():
-        tried = [{**side, name: "0"}, {**side, name: f"{halves[name]:.2g}"}]
-        none, some = bench.run_all(tried, "biases")
-        pays = halves[name] > 0 and some.gain_over(none) > PAYS
-        side[name] = f"{halves[name]:.2g}" if pays else "0"
-        if pays:
-            said.append(f"of the {name.split('-')[1]} readings of about {side[name]} {unit}")
-    kept = {k: side[k] for k in PRIORS}
-    if not said:
-        without = {k: v for k, v in fixed.items() if k not in WIDE}
-        return {**without, "bias": "off"}, "no bias that both halves of the drive agree on"
-    words = f"biases {' and '.join(said)}, in both halves alike"
-    return {**fixed, "bias": "on", **kept}, words
-
-
-def _halves(bench: Bench, settings: Settings) -> dict[str, float]:
-    """The size of the bias that both halves of the drive tell alike, by the name of its prior.
-
-    What else looks like a bias for a while does not stay the same. An axis that nothing measures
-    has none.
-    """
-    ran = bench.run_all([{**settings, PART: part} for part in "01"], "biases of both halves")
-    twists = bench.examined
-    found = {}
-    for name, axes, readings in (
-        ("bias-gyro-sigma", slice(3, 6), twists.w_B_radps),
-        ("bias-velocity-sigma", slice(0, 3), twists.v_B_mps),
-    ):
-        there = np.any(readings != 0, axis=0)
-        told = [(half.bias[axes][there], half.bias_variance[axes][there]) for half in ran]
-        found[name] = common_bias(*told[0], *told[1]) if there.any() else 0.0
-    return found
-
-
-def _bias_of_halves(
-    bench: Bench, fixed: Settings, values: Mapping[str, float]
-) -> tuple[dict[str, str], str]:
-    """Both halves of the drive must tell the same gyro bias.
-
-    Tracks that drift look like a bias of the velocity all along, so with them there is none of it
-    to be told, and likelihood would find one.
-    """
-    size = _halves(bench, {**fixed, **WIDE, **written(values, TWIST)})["bias-gyro-sigma"]
-    if not size > 0:
-        return {**fixed, "bias": "off"}, "no bias that both halves of the drive agree on"
-    prior = {"bias-velocity-sigma": "0", "bias-gyro-sigma": f"{size:.2g}"}
-    words = f"biases of the gyro readings of about {size:.2g} rad/s, in both halves alike"
-    return {**fixed, "bias": "on", **prior}, words
-
-
-def common_bias(b0: Floats, var0: Floats, b1: Floats, var1: Floats) -> float:
-    """The size of an axis' bias that two drives tell alike; 0 if chance may have made it.
-
-    The errors of the two are independent: their products have no mean but the bias squared.
-    """
-    if not (min(var0.min(), var1.min()) > 0):
-        return 0.0
-    products = b0 * b1
-    score = float(np.sum(products / np.sqrt(var0 * var1))) / np.sqrt(len(products))
-    alike = float(np.sum(products)) / float(np.linalg.norm(b0) * np.linalg.norm(b1) + 1e-30)
-    if score < SURE or alike < ALIKE:
-        return 0.0
-    return float(np.sqrt(np.mean(products)))
 
 
 # --- clocks ---------------------------------------------------------------------------------------

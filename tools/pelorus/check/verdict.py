@@ -17,12 +17,12 @@ from pelorus.schema import HEALTHS
 from pelorus.settings import in_force
 
 GOOD = HEALTHS[0]
-GOOD_MOST, LOST_MANY = 0.95, 0.1  # of the frames
+GOOD_MOST, GOOD_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
 GATED_MANY, GATED_MOST = 0.1, 0.3  # of the matches
 WINDOW_S = 5.0
 WORSE = 3.0  # times the usual share of a window that is worth naming
 NIS_LOW, NIS_HIGH = 0.6, 1.6
-BIAS_SIGMAS = 3.0
+BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
 OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
 FRAMES_FEW = 100
@@ -89,6 +89,7 @@ def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
         *_biases(run),
         *_tracks(tuned),
         *_halves(tuned),
+        *(Remark(Grade.CARE, words) for words in tuned.doubts),
         *(Remark(Grade.GOOD, words) for words in tuned.said),
     ]
 
@@ -111,7 +112,7 @@ def of_length(frames: int) -> Iterator[Remark]:
 def _health(run: Run) -> Iterator[Remark]:
     lost = 1 - sum(run.health.by_health.get(HEALTHS[k], 0) for k in (0, 1)) / run.health.frames
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
-    grade = Grade.BAD if lost > LOST_MANY else grade
+    grade = Grade.BAD if lost > LOST_MANY or run.good_share < GOOD_HALF else grade
     yield Remark(grade, f"health {run.health.summary()}")
 
 
@@ -173,10 +174,10 @@ def _biases(run: Run) -> Iterator[Remark]:
         prior = in_force(run.messages, f"bias-{kind}-sigma") or 0.0
         value = float(run.frames[name][-1])
         if prior > 0 and abs(value) > BIAS_SIGMAS * prior:
+            beyond = abs(value) / prior
             yield Remark(
-                Grade.CARE,
-                f"the {kind} bias of {axis} is {value:.3g}, {abs(value) / prior:.1f} sigma of its "
-                f"prior: {why}",
+                Grade.BAD if beyond > BIAS_SIGMAS_BAD else Grade.CARE,
+                f"the {kind} bias of {axis} is {value:.3g}, {beyond:.1f} sigma of its prior: {why}",
             )
 
 

@@ -16,6 +16,7 @@ from pelorus.faults.two_views import TwoViews
 from pelorus.tracks import Tracks
 
 OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 sound pairs
+DRIFT_PX = 1.5  # a tracker may lose its point by so much between the views
 VIEWS_LEAST = 4  # pairs of a track that tell
 MOST_OF_THEM = 0.5
 TRACKS_LEAST = 20
@@ -36,7 +37,8 @@ def moving(tracks: Tracks, near: TwoViews, far: TwoViews) -> Moving:
     count = int(number.max()) + 1 if len(number) else 0
     whose = number[far.first]
     views = np.bincount(whose, minlength=count)
-    off = np.bincount(whose, far.d2 > OFF_D2 * _noise(tracks, near, far) ** 2, minlength=count)
+    least = max(OFF_D2 * _noise(tracks, near, far) ** 2, (DRIFT_PX / far.sigma_px) ** 2)
+    off = np.bincount(whose, far.d2 > least, minlength=count)
     long = views >= VIEWS_LEAST
     if long.sum() < TRACKS_LEAST:
         return Moving(int(long.sum()), 0.0)
