@@ -63,22 +63,27 @@ static double seconds_since(plr_time_ns then, plr_time_ns now) {
     return then == 0 || now < then ? 0 : (double)(now - then) * 1e-9;
 }
 
-bool plr_health_readings_are_old(const plr_filter *f) {
-    const double held = seconds_since(f->reading_ns, f->t_ns);
+static bool readings_are_old(const plr_filter *f, plr_time_ns now) {
+    const double held = seconds_since(f->reading_ns, now);
     return f->config.mode != PLR_MODE_MAPPING &&
            (!f->reading_valid || held > HELD_INTERVALS * (double)f->interval_s + HELD_S);
 }
 
-/* True if a twist was refused since the last frame, or if the last one is too old. */
-static bool lacks_twists(plr_filter *f) {
-    const bool refused = f->totals.twists_refused != f->refused_before;
-    f->refused_before = f->totals.twists_refused;
-    return (refused && f->config.mode != PLR_MODE_MAPPING) || plr_health_readings_are_old(f);
+bool plr_health_readings_are_old(const plr_filter *f) {
+    return readings_are_old(f, f->t_ns);
 }
 
-/* The same, and a fault of an IMU has passed if readings come again. */
+/* True if a twist was refused since the last frame, or if the last one is too old. */
+static bool lacks_twists(const plr_filter *f, plr_time_ns now) {
+    const bool refused = f->totals.twists_refused != f->refused_before;
+    return (refused && f->config.mode != PLR_MODE_MAPPING) || readings_are_old(f, now);
+}
+
+/* The same of a frame, and a fault of an IMU has passed if readings come again. */
 static uint32_t judge_readings(plr_filter *f) {
-    if (lacks_twists(f))
+    const bool lacking = lacks_twists(f, f->t_ns);
+    f->refused_before = f->totals.twists_refused;
+    if (lacking)
         return PLR_REASON_NO_TWISTS;
     if (f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
         f->inertial.fault = PLR_IMU_FAULT_NONE;
@@ -225,9 +230,7 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
         health->reasons |= PLR_REASON_NO_FRAMES;
     if (looks && health->seconds_without_use > LOST_S)
         health->reasons |= PLR_REASON_NO_OBSERVATIONS;
-    if (f->config.mode != PLR_MODE_MAPPING &&
-        (!f->reading_valid || f->totals.twists_refused != f->refused_before ||
-         health->seconds_without_twist > HELD_INTERVALS * (double)f->interval_s + HELD_S))
+    if (lacks_twists(f, now))
         health->reasons |= PLR_REASON_NO_TWISTS;
     health->reasons |= rejected_readings(f) | imu_reasons(f);
     health->health = health_of(health->reasons, lost_by(f, now));

@@ -5,7 +5,6 @@
  * in the middle of a contradiction made the pose's covariance grow without end, and within seconds it
  * was no number.
  */
-#include <math.h>
 #include <unity.h>
 
 #include "support/rig.h"
@@ -17,12 +16,6 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-}
-
-static double sigma_m(void) {
-    double P[36];
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
-    return sqrt(P[0] + P[7] + P[14]);
 }
 
 /* Wheels that slip: the twists tell half of the way. */
@@ -45,7 +38,7 @@ static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone
     rig_drive(20);
     slip(10);
     TEST_ASSERT_EQUAL_UINT8(1, rig.filter.consistency.contradicted);
-    const double before = sigma_m();
+    const double before = rig_sigma_m();
     for (unsigned k = 0; k < DARK_FRAMES; k++) {
         for (unsigned i = 0; i < RIG_TWISTS; i++)
             rig_twist();
@@ -54,7 +47,7 @@ static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone
         TEST_ASSERT_EQUAL_UINT32(0, rig.filter.totals.recoveries);
     }
     /* half a minute at 0.05 m/s and 0.01 rad/s, each reading on its own, on a way of 60 m */
-    TEST_ASSERT_LESS_THAN_DOUBLE(2 * before + 2, sigma_m());
+    TEST_ASSERT_LESS_THAN_DOUBLE(2 * before + 2, rig_sigma_m());
 }
 
 int main(void) {

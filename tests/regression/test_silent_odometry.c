@@ -4,7 +4,6 @@
  * contradicted it, and the pose by that twist, which nobody claimed any more, counted as one that the
  * true one could be: after half a minute the covariance said 84 m where the pose was 0.4 m off.
  */
-#include <math.h>
 #include <unity.h>
 
 #include "support/rig.h"
@@ -18,12 +17,6 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-static double sigma_m(void) {
-    double P[36];
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
-    return sqrt(P[0] + P[7] + P[14]);
-}
-
 static void test_a_twist_that_nobody_sends_any_more_is_no_rival_of_vision(void) {
     double e[6];
     rig_begin();
@@ -35,11 +28,11 @@ static void test_a_twist_that_nobody_sends_any_more_is_no_rival_of_vision(void) 
         TEST_ASSERT_TRUE(k < 3 || rig.report.health != PLR_HEALTH_GOOD);
     }
     TEST_ASSERT_GREATER_THAN_UINT32(0, rig.filter.totals.contradictions);
-    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, sigma_m());
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, rig_sigma_m());
     TEST_ASSERT_LESS_THAN_DOUBLE(6 * 5 * 5, rig_squared_error(e));
     rig_drive(AGAIN_FRAMES);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health);
-    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, sigma_m());
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, rig_sigma_m());
 }
 
 int main(void) {

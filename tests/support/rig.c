@@ -81,6 +81,12 @@ double rig_squared_error(double e[6]) {
     return sum;
 }
 
+double rig_sigma_m(void) {
+    double P[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    return sqrt(P[0] + P[7] + P[14]);
+}
+
 double rig_smallest_correlation(void) {
     const unsigned n = plr_covariance_dim(&rig.filter);
     double *P = specimen_covariance(&rig.filter), *C = specimen_zeros(n, n);

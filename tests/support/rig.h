@@ -46,6 +46,9 @@ void rig_stand(unsigned frames);
  * the covariance is right. */
 double rig_squared_error(double e[6]);
 
+/* How far off the place may be: the root of the trace of its covariance. */
+double rig_sigma_m(void);
+
 /* The smallest eigenvalue of the matrix of correlations. */
 double rig_smallest_correlation(void);
 

@@ -71,7 +71,7 @@ def survey(readings: Inertial) -> ImuSurvey:
         accel_range=_ranges(sound.a_B_mps2),
         gyro_range=_ranges(sound.w_B_radps),
         not_finite=int((~finite).sum()),
-        longest_same=_longest_run((numbers[1:] == numbers[:-1]).all(axis=1)) + 1,
+        longest_same=longest_run((numbers[1:] == numbers[:-1]).all(axis=1)) + 1,
         still=_still(sound),
     )
 
@@ -82,7 +82,8 @@ def _ranges(numbers: Floats) -> tuple[tuple[float, float], ...]:
     return tuple(zip(numbers.min(axis=0).tolist(), numbers.max(axis=0).tolist(), strict=True))
 
 
-def _longest_run(flags: NDArray[np.bool_]) -> int:
+def longest_run(flags: NDArray[np.bool_]) -> int:
+    """How many in succession are True."""
     begin, end = _longest(flags)
     return end - begin
 

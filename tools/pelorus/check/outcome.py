@@ -99,10 +99,6 @@ class Bench:
     def by_imu(self) -> bool:
         return len(self.examined.inertial.t_ns) > 0
 
-    @property
-    def replays(self) -> int:
-        return len(self._known)
-
     def holds(self, kind: Kind) -> bool:
         return any(message.kind == kind for message in self._messages)
 

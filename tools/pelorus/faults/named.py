@@ -19,7 +19,7 @@ from pelorus.faults.geometry import Judged, geometry
 from pelorus.faults.handeye import first_part
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
-from pelorus.inertial_survey import readings_of
+from pelorus.inertial_survey import longest_run, readings_of
 from pelorus.motion import Times
 from pelorus.recording import Recording
 
@@ -180,7 +180,7 @@ def _frozen(recording: Recording) -> Iterator[Fault]:
     frozen = (count >= 3) & (repeated == count)
     moves = _moves(recording)
     frozen[: len(moves)] &= moves
-    longest = _longest_run(frozen)
+    longest = longest_run(frozen)
     if longest >= FROZEN_FRAMES:
         t = (recording.frame_t_ns - recording.frame_t_ns[0]) * 1e-9
         at = t[np.nonzero(frozen)[0]]
@@ -202,11 +202,3 @@ def _moves(recording: Recording) -> Flags:
     angle = np.cumsum(w * steps[:, None], axis=0)
     at = np.searchsorted(readings.t_ns, recording.frame_t_ns).clip(0, len(angle) - 1)
     return np.asarray(np.linalg.norm(np.diff(angle[at], axis=0), axis=1) > TURNS_RAD)
-
-
-def _longest_run(flags: Flags) -> int:
-    run = best = 0
-    for flag in flags.tolist():
-        run = run + 1 if flag else 0
-        best = max(best, run)
-    return best
