@@ -15,7 +15,7 @@ PACKAGES_BUILD=(gcc libc6-dev make cmake python3 python3-venv ca-certificates)
 PACKAGES_TEST=(g++ 'clang-14|clang' libopenblas-dev liblapacke-dev
     gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm)
 # Without these a check is skipped, saying so.
-PACKAGES_WANTED=(clang-format-14 libzstd-dev)
+PACKAGES_WANTED=(clang-format-14 libzstd-dev ninja-build)
 
 heading() {
     printf '\n=== %s\n' "$*"
@@ -122,6 +122,14 @@ ensure_python() {
 }
 
 # --- building ------------------------------------------------------------------------------------
+
+# prefer_ninja: it needs a sixth less time than make for hundreds of small targets. A folder that has been
+# configured keeps its generator.
+prefer_ninja() {
+    if command -v ninja >/dev/null; then
+        export CMAKE_GENERATOR=Ninja
+    fi
+}
 
 # build_preset NAME [CMAKE OPTION...]: configures and builds, in the preset's own folder.
 build_preset() {

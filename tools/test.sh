@@ -150,15 +150,6 @@ run_ctest() {
     return $status
 }
 
-# build_and_test PRESET WHAT [CMAKE OPTION...]: a further build, in build-PRESET. What is tested on
-# the sources alone has been tested before.
-build_and_test() {
-    local preset=$1 what=$2
-    shift 2
-    step "build: $what" build_preset "$preset" "$@" &&
-        step "test: $what" run_ctest "build-$preset" --label-exclude sources
-}
-
 check_format() {
     find include src port tests tools -name '*.[ch]' -print0 |
         xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
@@ -189,6 +180,7 @@ else
     ensure_packages "${PACKAGES_BUILD[@]}" "${PACKAGES_TEST[@]}" "${PACKAGES_WANTED[@]/%/?}"
 fi
 ensure_python
+prefer_ninja
 if [ -d "$PELORUS_DATA" ]; then
     echo "real recordings: $PELORUS_DATA"
 else
@@ -217,14 +209,16 @@ step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS"
 
 if [ $extent != quick ]; then
     clang=$(command -v clang-14 || command -v clang)
-    build_and_test debug 'sanitizers' "${strict[@]}"
-    # Their bits are those of gcc: the golden tests and the step below say so. What long drives and other
-    # blocks find has been found by then; the portable build, whose fused multiply-add is in software, is
-    # asked for its bits and its units alone.
-    same=(-DPELORUS_SLOW_BUILD=ON -DPELORUS_TEST_BLOCKS=OFF)
-    build_and_test clang 'clang' "${strict[@]}" "${same[@]}" -DCMAKE_C_COMPILER="$clang"
-    build_and_test portable 'portable' "${strict[@]}" "${same[@]}" '-DPELORUS_TEST_KINDS=unit;golden'
-    step 'build: less optimised' build_replays o2 -DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON
+    step 'build: sanitizers' build_preset debug "${strict[@]}" &&
+        step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
+    # Another compiler, and without a fused multiply-add instruction: every test is built, for its warnings,
+    # and asked are the bits and the units. Of the same bits long drives would say the same again.
+    step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_TEST_BLOCKS=OFF \
+        -DCMAKE_C_COMPILER="$clang" &&
+        step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
+    replays=(-DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON)
+    step 'build: clang' build_replays clang "${replays[@]}" -DCMAKE_C_COMPILER="$clang"
+    step 'build: less optimised' build_replays o2 "${replays[@]}"
     beside 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then

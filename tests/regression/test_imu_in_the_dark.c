@@ -9,6 +9,8 @@
 
 #include "support/imu_rig.h"
 
+enum { SEEDS = PELORUS_SLOW_BUILD ? 1 : 3 };
+
 void setUp(void) {
     imu_rig_set_up();
 }
@@ -23,7 +25,7 @@ static void dark_frame(void) {
 }
 
 static void test_after_a_long_darkness_the_first_frames_find_the_velocity(void) {
-    for (uint64_t seed = 1; seed <= 3; seed++) {
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         imu_rig_begin(IMU_RIG_GIVEN, seed);
         imu_rig_fly(50);
         for (unsigned frame = 0; frame < 200; frame++) {
@@ -44,7 +46,7 @@ static void test_after_a_long_darkness_the_first_frames_find_the_velocity(void) 
 }
 
 static void test_without_an_imu_the_pictures_lead_on(void) {
-    for (uint64_t seed = 1; seed <= 3; seed++) {
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         imu_rig_begin(IMU_RIG_GIVEN, seed);
         imu_rig_fly(50);
         for (unsigned frame = 0; frame < 150; frame++) {

@@ -71,15 +71,22 @@ total() {
 heading 'Set-up'
 ensure_packages "${PACKAGES_BUILD[@]}" "${PACKAGES_TEST[@]}"
 ensure_python
+prefer_ninja
 mkdir -p "$LOGS"
 
 heading 'Building firmware, and the desktop in two ways (build/robot)'
+"$VENV/bin/python" "$ROOT/tests/target/recordings.py" "$ROBOT/recordings" "${long[@]}" \
+    >"$LOGS/target-recordings.log" 2>&1 &
+recordings=$!
 if ! build_all >"$LOGS/target-build.log" 2>&1; then
     tail -40 "$LOGS/target-build.log"
     die 'the build failed: the whole of it is in build-logs/target-build.log'
 fi
-"$VENV/bin/python" "$ROOT/tests/target/recordings.py" "$ROBOT/recordings" "${long[@]}" ||
-    die 'the recordings could not be made'
+if ! wait $recordings; then
+    tail -20 "$LOGS/target-recordings.log"
+    die 'the recordings could not be made: build-logs/target-recordings.log'
+fi
+grep '^SKIPPED ' "$LOGS/target-recordings.log"
 echo "built after $SECONDS s"
 
 heading "Emulated boards: ${BOARDS[*]} (build-logs/target-boards.log)"
