@@ -14,7 +14,8 @@ import pytest
 from converted import Converted, Once
 from flight_logs import Compare, robots_log
 from pelorus.cli import main
-from pelorus.converters import ece276a
+from pelorus.converters import ece276a, imu_npz
+from pelorus.converters.imu_npz import Choices
 from pelorus.frames import Message
 from pelorus.robot import stream
 from replay_drive import BIN, Record, drive, encode, recorder
@@ -98,6 +99,26 @@ def of_03(real: Callable[[str], Path], kept: Callable[..., Any]) -> Converted:
     """The course's 03, mended, and what was found."""
     source = real("ece276a/03.npz")
     return Converted(*kept("03", lambda: ece276a.convert(source)))
+
+
+@pytest.fixture
+def of_imu(real: Callable[[str], Path], kept: Callable[..., Any]) -> Callable[[str], Converted]:
+    """A recording of imu/ by its name, and what was found: a simulated one with seed 1's noise."""
+
+    def get(name: str) -> Converted:
+        choices = Choices(seed=None if name.startswith("euroc") else 1)
+        source = real(f"imu/{name}.npz")
+        return Converted(*kept(name, lambda: imu_npz.convert(source, choices)))
+
+    return get
+
+
+@pytest.fixture
+def plr_imu(of_imu: Callable[[str], Converted], once: Once) -> Callable[[str], Path]:
+    def get(name: str) -> Path:
+        return once(f"{name}.plr", of_imu(name).recording.write)
+
+    return get
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from converted import Run, messages_of
+from converted import Converted, Run, messages_of
 from imu_drives import calib, noisy, npz_arrays, written
 from pelorus import evaluation, se3
 from pelorus.converters import imu_npz, renewal
@@ -275,9 +275,9 @@ SIMULATED = ["tum_corridor1-60-seed0", "udel_gore_zupt-60-seed0"]
 
 @pytest.mark.parametrize("name", SIMULATED)
 def test_a_simulators_recording_has_the_noise_that_it_tells(
-    real: Callable[[str], Path], name: str
+    of_imu: Callable[[str], Converted], name: str
 ) -> None:
-    recording, findings = imu_npz.convert(real(f"imu/{name}.npz"), Choices(seed=1))
+    recording, findings = of_imu(name)
     assert not findings[0].found
     assert "gyro is off by 1.0" in findings[0].evidence
     assert "accelerometer by 1.0" in findings[0].evidence
@@ -295,8 +295,10 @@ def test_a_second_draw_finds_the_landmarks_of_the_first(real: Callable[[str], Pa
     assert off == pytest.approx(1.0, abs=0.01)
 
 
-def test_real_readings_are_noisier_than_their_data_sheet(real: Callable[[str], Path]) -> None:
-    recording, findings = imu_npz.convert(real("imu/euroc-V102-real-imu.npz"), Choices())
+def test_real_readings_are_noisier_than_their_data_sheet(
+    of_imu: Callable[[str], Converted],
+) -> None:
+    recording, findings = of_imu("euroc-V102-real-imu")
     assert findings[0].found
     assert "accelerometer by 4.3" in findings[0].evidence
     assert recording.header.noise.accel_noise == 0.002, "the HEADER has what calib tells"

@@ -70,12 +70,8 @@ def test_imu_conf_leaves_the_noises_to_the_recording(recording: Path) -> None:
 # --- the real recordings, in the first part of each, so that it takes seconds ---------------------
 
 
-def figures(
-    pelorus: Run, source: Path, target: Path, *options: object, seed: int | None = None
-) -> dict[str, float]:
-    drawn = () if seed is None else ("--seed", seed)
-    assert pelorus("convert", "imu-npz", source, target, *drawn).status == 0
-    said = pelorus("evaluate", target, "--bin", BIN, "--json", *options)
+def figures(pelorus: Run, recording: Path, *options: object) -> dict[str, float]:
+    said = pelorus("evaluate", recording, "--bin", BIN, "--json", *options)
     assert said.status == 0, said.err
     found: dict[str, float] = json.loads(said.out)
     return found
@@ -86,17 +82,15 @@ NEES = ("position", "rotation", "velocity", "bias_accel", "bias_gyro")
 
 @pytest.mark.parametrize(("slots", "metres", "degrees"), [(60, 0.06, 0.15), (16, 0.12, 0.4)])
 def test_a_walk_through_a_corridor_drifts_by_centimetres(
-    real: Callable[[str], Path],
+    plr_imu: Callable[[str], Path],
     pelorus: Run,
-    tmp_path: Path,
     slots: int,
     metres: float,
     degrees: float,
 ) -> None:
     """Of five draws the median is half of these limits; this is one of them."""
-    source = real("imu/tum_corridor1-60-seed0.npz")
     options = ("--config", CONFIG / "imu.conf", "--set", f"slots={slots}", "--first", 120)
-    found = figures(pelorus, source, tmp_path / "corridor.plr", *options, seed=1)
+    found = figures(pelorus, plr_imu("tum_corridor1-60-seed0"), *options)
     assert found["err0_m"] < metres
     assert found["rot_deg"] < degrees
     assert found["truth_frames"] == 1201
@@ -105,12 +99,11 @@ def test_a_walk_through_a_corridor_drifts_by_centimetres(
 
 
 def test_real_readings_need_the_noises_of_a_real_IMU(
-    real: Callable[[str], Path], pelorus: Run, tmp_path: Path
+    plr_imu: Callable[[str], Path], pelorus: Run
 ) -> None:
-    source, target = real("imu/euroc-V102-real-imu.npz"), tmp_path / "euroc.plr"
-    options = ("--set", "slots=60", "--config")
-    honest = figures(pelorus, source, target, *options, CONFIG / "imu-adis16448.conf")
-    told = figures(pelorus, source, target, *options, CONFIG / "imu.conf")
+    recording, options = plr_imu("euroc-V102-real-imu"), ("--set", "slots=60", "--config")
+    honest = figures(pelorus, recording, *options, CONFIG / "imu-adis16448.conf")
+    told = figures(pelorus, recording, *options, CONFIG / "imu.conf")
     assert honest["err0_m"] < 0.005 * honest["path_m"]
     assert 0.5 < honest["nees_per_dof"] < 2
     assert told["nees_velocity"] > 10, "the data sheet's noise is not that of the real readings"

@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from converted import Run
+from converted import Converted, Run
 from imu_drives import EXACT, NOISY, options
 from pelorus import inertial_survey
-from pelorus.converters import imu_npz
-from pelorus.converters.imu_npz import Choices
 from pelorus.inertial_survey import Still
 from pelorus.simulation.imu import ImuFaults
 from pelorus.simulation.settings import Span
@@ -112,11 +110,10 @@ def test_readings_whose_time_goes_back_are_surveyed_too() -> None:
 
 
 def test_real_readings_at_rest_are_noisier_than_their_data_sheet(
-    real: Callable[[str], Path],
+    of_imu: Callable[[str], Converted],
 ) -> None:
     """EuRoC's before the flight: by this, and not by a data sheet, its noises are set."""
-    source = real("imu/euroc-V102-real-imu.npz")
-    recording, _ = imu_npz.convert(source, Choices())
+    recording, _ = of_imu("euroc-V102-real-imu")
     found = inertial_survey.survey(recording.inertial).still
     assert found is not None
     noise = recording.header.noise
