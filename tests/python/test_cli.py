@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from converted import Run
 from drives import clean
 from pelorus import __version__, replay, wire
 from pelorus.cli import COMMANDS
+from pelorus.errors import write_text
 from pelorus.frames import End, Header, Stereo, Truth, Twist
 
 SUBCOMMANDS = [
@@ -106,3 +108,24 @@ def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> No
     assert not list(tmp_path.glob("*.part"))
     ids = [m.ids for m in messages if isinstance(m, Stereo)]
     assert all((np.diff(x.astype(np.int64)) > 0).all() for x in ids)
+
+
+def test_a_pipe_that_is_written_to_stays_a_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write_text(pipe, "some text")
+        assert pipe.is_fifo()
+        assert os.read(reader, 100) == b"some text"
+    finally:
+        os.close(reader)
+
+
+def test_a_link_that_is_written_to_stays_a_link(tmp_path: Path) -> None:
+    there, link = tmp_path / "there.txt", tmp_path / "link.txt"
+    there.write_text("old", encoding="utf-8")
+    link.symlink_to(there)
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert there.read_text(encoding="utf-8") == "new"

@@ -24,18 +24,29 @@ def writing(path: Path) -> Iterator[None]:
 @contextmanager
 def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
     """Where to write files that shall be whole: they get their names when all are written, and if
-    that fails nothing of them is left behind.
+    that fails nothing of them is left behind. What is there already and is no file, a pipe or
+    /dev/null, is written to as it stands: a file that took its name would put an end to it. A link
+    keeps pointing at its file.
     """
-    parts = tuple(path.with_name(path.name + ".part") for path in paths)
+    files = tuple(path.resolve() if path.is_symlink() else path for path in paths)
+    parts = tuple(_part(file) for file in files)
     try:
         yield parts
-        for path, part in zip(paths, parts, strict=True):
-            with writing(path):
-                part.replace(path)
+        for path, file, part in zip(paths, files, parts, strict=True):
+            if part != file:
+                with writing(path):
+                    part.replace(file)
     finally:  # after a good end they have their own names
-        for part in parts:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
+        for file, part in zip(files, parts, strict=True):
+            if part != file:
+                with suppress(OSError):
+                    part.unlink(missing_ok=True)
+
+
+def _part(file: Path) -> Path:
+    """Where to write a file until it is whole; of a device or a pipe itself."""
+    is_device = file.exists() and not file.is_file() and not file.is_dir()
+    return file if is_device else file.with_name(file.name + ".part")
 
 
 def write_text(path: Path, text: str) -> None:
