@@ -90,6 +90,8 @@ def test_ways_that_have_nothing_in_common_are_no_scale() -> None:
     recording = driven()
     found = replace(agreed(recording), scale=0.08, scale_sigma=0.06)
     assert [fault.name for fault in of_scale(found, 0.0)] == ["no-fit"]
+    unknown = replace(found, scale=1.27, scale_sigma=0.16, speed_mps=0.01)
+    assert list(of_scale(unknown, 0.03)) == [], "at one speed no scale is known, and none is missed"
     baseline = replace(found, scale=0.3, scale_sigma=0.01)
     assert [fault.name for fault in of_scale(baseline, 0.0)] == ["scale"]
 
@@ -101,6 +103,42 @@ def test_a_clock_is_found_to_some_milliseconds(late_s: float) -> None:
     found = agreed(moved)
     assert found.offset_s == pytest.approx(-late_s, abs=0.008)
     assert found.offset_sigma_s < 0.008
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_clock_is_known_no_better_than_noisy_twists_tell_it(seed: int) -> None:
+    """As 0027 has them: between two readings a mean of both is taken, whose noise is smaller, and
+    half a reading early or late looked like the right offset, known to some milliseconds.
+    """
+    noisy = replace(DRIVE, seed=seed, duration_s=40.0, twist_rate_hz=10.0)
+    recording = simulate(replace(noisy, velocity_sigma_mps=0.5, gyro_sigma_radps=0.1)).recording
+    found = agreed(recording)
+    assert abs(found.offset_s) < 4 * found.offset_sigma_s
+    assert [fault.name for fault in faults_in(recording)] == []
+
+
+def gyro_late(recording: Recording, readings: int) -> Recording:
+    late = np.roll(recording.w_B_radps, readings, axis=0)
+    late[:readings] = recording.w_B_radps[0]
+    return replace(recording, w_B_radps=late)
+
+
+def test_a_gyro_that_is_late_is_no_clock_of_the_frames() -> None:
+    exact = replace(DRIVE, seed=11, pixel_sigma_px=0.2, velocity_sigma_mps=0.01)
+    late = gyro_late(simulate(exact).recording, 6)
+    found = agreed(late).clocks
+    assert found.turns_late_s == pytest.approx(0.12, abs=4 * found.turns_late_sigma_s)
+    assert found.turns_late_sigma_s < 0.02
+    assert [fault.name for fault in faults_in(late)] == ["clock-turns"]
+    both = replace(late, frame_t_ns=late.frame_t_ns + 60 * 10**6)
+    named = faults_in(both)
+    assert [fault.name for fault in named] == ["clock", "clock-turns"]
+    assert "velocities agree best with the frames" in named[0].words
+
+
+def test_frames_that_are_late_are_no_late_gyro() -> None:
+    moved = replace(driven(), frame_t_ns=driven().frame_t_ns + 120 * 10**6)
+    assert [fault.name for fault in faults_in(moved)] == ["clock"]
 
 
 def test_the_cameras_place_is_found_from_turns() -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pelorus.faults.clocks import FRAMES_MIN, UNTOLD, TwoClocks, offset_of, two_clocks
 from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TURN_SCALE, Body, Fit
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
@@ -22,13 +23,10 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.tracks import Tracks
 
-FRAMES_MIN = 50
 NO_BIAS_MPS = 1e-4
 BIAS_MPS = 0.1  # sigma of the velocity's bias, as the filter's setting
 BIAS_MPS2 = 0.3  # and of an accelerometer's, where the HEADER tells none: a cheap one's
 CHANCE = 2.0  # standard errors that near and far may differ by
-OFFSETS_S = np.arange(-20, 21) * 0.02  # where the clock's offset is looked for at first
-CLOCK_ROUNDS, CLOCK_STEP_S, CLOCK_FOUND_S = 10, 0.05, 2e-4
 
 
 @dataclass(frozen=True)
@@ -49,6 +47,7 @@ class Agreement:
     turn_scale_sigma: float
     focal: float = 1.0  # times the given one, by an IMU; 1 is due
     focal_sigma: float = float("inf")
+    clocks: TwoClocks = UNTOLD  # of velocities and turns, each by itself; not of an IMU
 
     @property
     def told(self) -> bool:
@@ -65,7 +64,7 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
             nan, nan,
         )  # fmt: skip
     body, bias = _body(recording, seen)
-    offset = _offset(recording, body, seen, bias)
+    offset = offset_of(recording, body, seen, bias)
     by_imu = len(recording.inertial.t_ns) > 0
     if by_imu:
         seen = seen.with_focal(recording, views)
@@ -89,6 +88,7 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         float(found.sigma[TURN_SCALE]),
         1 - float(found.x[FOCAL]),
         float(found.sigma[FOCAL]) if by_imu else float("inf"),
+        UNTOLD if by_imu else two_clocks(recording, seen, offset, bias),
     )
 
 
@@ -107,38 +107,6 @@ def _body(recording: Recording, seen: Seen) -> tuple[Body, float]:
         return ImuBody(recording, seen), told if told > 0 else BIAS_MPS2
     told = noise.bias_velocity_sigma_mps
     return TwistBody(recording), told if told > 0 else BIAS_MPS
-
-
-def _offset(recording: Recording, body: Body, seen: Seen, bias: float) -> float:
-    """Of the clock, from where it should be and from where the turns go together most."""
-    ends = []
-    for start in dict.fromkeys((0.0, _likely_offset(recording, body, seen))):
-        offset = start
-        for _ in range(CLOCK_ROUNDS):
-            fit = Fit(body.design(recording, seen, offset, bias))
-            step = float(np.clip(fit.x[CLOCK], -CLOCK_STEP_S, CLOCK_STEP_S))
-            offset += step
-            if abs(step) < CLOCK_FOUND_S:
-                break
-        ends.append((fit.cost, offset))
-    return min(ends)[1]
-
-
-def _likely_offset(recording: Recording, body: Body, seen: Seen) -> float:
-    """Where the turns of both go together most."""
-    best, at = -np.inf, 0.0
-    own = seen.rates[:, 3:]
-    for offset in OFFSETS_S:
-        w = body.turns(recording.frame_t_ns, float(offset))
-        good = seen.usable & np.isfinite(w).all(axis=1)
-        if good.sum() < FRAMES_MIN:
-            continue
-        parts = [x[good] - np.median(x[good], axis=0) for x in (own, w)]
-        size = 4 * np.median(np.linalg.norm(parts[0], axis=1)) + 1e-9
-        together = float(np.mean(np.sum(np.clip(parts[0], -size, size) * parts[1], axis=1)))
-        if together > best * (1 + 1e-9):
-            best, at = together, float(offset)
-    return at
 
 
 def _doubt_by_depth(

@@ -18,7 +18,8 @@ from pelorus.recording import Recording
 ROUNDS = 8
 BLOCKS_MOST, BLOCK_FRAMES = 40, 10
 SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
-PARAMETERS = 19
+TURN_CLOCK = 19
+PARAMETERS = 20
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,7 @@ SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
 BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
 SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
+APART_SIGMAS, APART_S = 6.0, 0.03  # by which the clocks of velocities and turns may differ
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
@@ -325,7 +326,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
     off, sigma = agreed.scale - 1, agreed.scale_sigma
     turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
     through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
-    if abs(off) > SCALE_WILD and agreed.scale < SCALE_KNOWN * sigma:
+    if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_WILD) and agreed.scale < SCALE_KNOWN * sigma:
         yield Fault(
             "no-fit",
             f"camera and twists do not tell the same motion: the images show {agreed.scale:.2f} +- "
@@ -391,19 +392,34 @@ def _scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
 
 
 def _clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """One reading later or earlier is another timing: what of it a timing explains is said."""
+    """One reading later or earlier is another timing: what of it a timing explains is said. Where
+    the rates of turn have a clock of their own, the frames are held to the velocities'.
+    """
+    own = agreed.clocks
+    apart = abs(own.turns_late_s) > max(APART_SIGMAS * own.turns_late_sigma_s, APART_S)
     offset, sigma = agreed.offset_s, agreed.offset_sigma_s
-    if abs(offset) < max(CLOCK_SIGMAS * sigma, CLOCK_OFF_S):
-        return
-    by_imu = len(recording.inertial.t_ns) > 0
-    body, way = "IMU" if by_imu else "twists", "later" if offset > 0 else "earlier"
-    words = (
-        f"camera and {body} agree best with the frames {abs(offset) * 1e3:.0f} +- "
-        f"{sigma * 1e3:.0f} ms {way} (camera-offset)"
-    )
-    if not by_imu:
-        words += _timing(recording, offset)
-    yield Fault("clock", words, stops=False, grave=False)
+    if apart:
+        offset, sigma = own.ways_s, own.ways_sigma_s
+    if abs(offset) > max(CLOCK_SIGMAS * sigma, CLOCK_OFF_S):
+        by_imu = len(recording.inertial.t_ns) > 0
+        body = "IMU" if by_imu else "velocities" if apart else "twists"
+        words = (
+            f"camera and {body} agree best with the frames {abs(offset) * 1e3:.0f} +- "
+            f"{sigma * 1e3:.0f} ms {'later' if offset > 0 else 'earlier'} (camera-offset)"
+        )
+        if not by_imu:
+            words += _timing(recording, offset)
+        yield Fault("clock", words, stops=False, grave=False)
+    if apart:
+        yield Fault(
+            "clock-turns",
+            f"the twists' rates of turn come {abs(own.turns_late_s) * 1e3:.0f} +- "
+            f"{own.turns_late_sigma_s * 1e3:.0f} ms "
+            f"{'after' if own.turns_late_s > 0 else 'before'} their velocities: a filter, or "
+            "stamps of another clock. No setting makes up for it: move the gyro's stamps",
+            stops=False,
+            grave=False,
+        )
 
 
 def _timing(recording: Recording, offset: float) -> str:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """What the twists say of the body's motion, and what may be wrong with it:
 
-w = a w_B - b_w + phi_w x w_B + dt w_B'
+w = a w_B - b_w + phi_w x w_B + (dt + dt_w) w_B'
 v = s g - b_v + phi_v x g + w_B x dr + dt g',      g = v_B + w_B x r
+
+dt_w, by which the rates of turn are later than the velocities, is 0 unless it is asked for.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from pelorus.faults.fit import (
     SCALE,
     TILT,
     TURN,
+    TURN_CLOCK,
     TURN_SCALE,
     Design,
     beside,
@@ -31,12 +34,19 @@ from pelorus.motion import dead_reckoning
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 
+ONE_CLOCK_S, OWN_CLOCK_S = 1e-6, 0.3  # sigmas of by how much the rates of turn are later
+SPREAD_MOST = 3.0  # of what images and twists differ by, in its own spread
+FAR, NEAR = 3, 2  # frames from which a slope is taken: farther than a reading's noise reaches
+
 
 class TwistBody:
-    """What the twists say of the motion between any two times."""
+    """What the twists say of the motion between any two times. `turns_late_s`: the rates of turn
+    are taken so much later than the velocities, and how far they are from that is asked, too.
+    """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, turns_late_s: float | None = None) -> None:
         header = recording.header
+        self._turns_late_s = turns_late_s
         self._t_ns, self._v, self._w = recording.twist_t_ns, recording.v_B_mps, recording.w_B_radps
         self._nodes = dead_reckoning(self._t_ns, self._v, self._w, header.twist_timing)
         self._held = header.twist_timing.name
@@ -54,6 +64,13 @@ class TwistBody:
         """(k, 6) v and w on average between frames k and k + lag, if these were later by so much.
         NaN where the twists do not reach.
         """
+        out = self._rates(frame_t_ns, lag, offset_s)
+        if self._turns_late_s:
+            out[:, 3:] = self._rates(frame_t_ns, lag, offset_s + self._turns_late_s)[:, 3:]
+        return out
+
+    def _rates(self, frame_t_ns: NDArray[np.int64], lag: int, offset_s: float) -> Floats:
+        """Of one clock."""
         t = (frame_t_ns - self._t_ns[0]) * 1e-9 + offset_s
         path = self.at(t)
         tau = t[lag:] - t[:-lag]
@@ -78,26 +95,26 @@ class TwistBody:
         usable = seen.usable & np.isfinite(beside(np.hstack((g, w)), 3)).all(axis=1)
         usable &= np.isfinite(rates).all(axis=1)
         y = seen.rates - np.hstack((g, w))
-        X, Z = _columns(g, w, float(np.median(seen.tau_s)))
+        X, Z = _columns(g, w, seen)
         k = usable
-        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias), g[k])
+        own = ONE_CLOCK_S if self._turns_late_s is None else OWN_CLOCK_S
+        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, own), g[k])
 
 
-def _prior(bias: float) -> Floats:
+def _prior(bias: float, turns_late: float) -> Floats:
     """Inverse variances: all but the velocity's bias are hardly known."""
     sigma = np.full(PARAMETERS, 10.0)
     sigma[BIAS : BIAS + 3] = bias
     sigma[LEVER : LEVER + 3] = 3.0
     sigma[TILT : TILT + 3] = sigma[TURN : TURN + 3] = 0.2
-    sigma[CLOCK] = 0.3
+    sigma[CLOCK], sigma[TURN_CLOCK] = 0.3, turns_late
     sigma[GYRO : GYRO + 3] = 0.3
     return np.diag(sigma**-2)
 
 
-def _columns(g: Floats, w: Floats, tau_s: float) -> tuple[Floats, Floats]:
-    """(k, 6, 18): what each unknown adds to (v, w), and the instruments."""
-    count = len(g)
-    X = np.zeros((count, 6, PARAMETERS))
+def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
+    """(k, 6, m): what each unknown adds to (v, w), and the instruments."""
+    X = np.zeros((len(g), 6, PARAMETERS))
     X[:, :3, SCALE] = g
     X[:, :3, BIAS : BIAS + 3] = X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
     X[:, :3, LEVER : LEVER + 3] = se3.skew(w)
@@ -105,9 +122,28 @@ def _columns(g: Floats, w: Floats, tau_s: float) -> tuple[Floats, Floats]:
     X[:, 3:, TURN : TURN + 3] = -se3.skew(w)
     X[:, 3:, TURN_SCALE] = w
     both = np.hstack((g, w))
-    X[:, :, CLOCK] = slope(both, 1, tau_s)
+    X[:, :, CLOCK] = slope(both, 1, float(np.median(seen.tau_s)))
     Z = X.copy()
     Z[:, :3, SCALE] = beside(g, 2, 3)
     Z[:, 3:, TURN_SCALE] = beside(w, 2, 3)
-    Z[:, :, CLOCK] = slope(both, 2, tau_s)
+    Z[:, :, CLOCK] = _slope_beside(both, seen)
+    X[:, 3:, TURN_CLOCK], Z[:, 3:, TURN_CLOCK] = X[:, 3:, CLOCK], Z[:, 3:, CLOCK]
     return X, Z
+
+
+def _slope_beside(told: Floats, seen: Seen) -> Floats:
+    """By the time, from what images and twists tell together of the frames beside, each as far as
+    it is the surer one. Between two readings the twists are a mean of both, and share their noise
+    with the next but one: of them the slope is taken from farther off. An instrument that
+    shares it makes any offset by half a reading look like the right one.
+    """
+    tau_s = float(np.median(seen.tau_s))
+    off = np.where(seen.usable[:, None], seen.rates - told, 0.0)
+    off = np.where(np.isfinite(off), off, 0.0)
+    off -= np.median(off, axis=0)
+    spread = 2.198 * np.median(off[seen.usable] ** 2, axis=0) + 1e-12
+    of_images = np.median(seen.variance[seen.usable], axis=0)
+    share = np.clip(1 - of_images / spread, 0, 1)  # of the noise, what the twists have
+    most = SPREAD_MOST * np.sqrt(spread)
+    by_images = slope(told + np.clip(off, -most, most), NEAR, tau_s)
+    return np.asarray(share * by_images + (1 - share) * slope(told, FAR, tau_s))
