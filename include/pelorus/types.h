@@ -102,10 +102,11 @@ typedef enum plr_reason {
     /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
      * says, until they agree with vision again. Drive with care, or set the pose to end it. */
     PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,
-    /* A bias estimate is beyond 3 sigma of its prior. With twists: stereo and odometry disagree in
-     * scale (baseline, focal length, wheel radius; which of them cannot be known), or bias-*-sigma
-     * is too small. With an IMU: bias-accel-sigma or bias-gyro-sigma is too small, a START told
-     * biases that are not true, or the camera's place on the body is wrong. */
+    /* A bias estimate is beyond 3.9 sigma of its prior, and while it is uncertain at less. With
+     * twists: stereo and odometry disagree in scale (baseline, focal length, wheel radius; which of
+     * them cannot be known), or bias-*-sigma is too small. With an IMU: bias-accel-sigma or
+     * bias-gyro-sigma is too small, a START told biases that are not true, or the camera's place on
+     * the body is wrong. */
     PLR_REASON_BIAS_OFF_PRIOR = 1 << 14,
     /* Innovations are far smaller than the noise says, over many frames: pixel-sigma is too large,
      * or the tracker smooths what it sees. The pose is better than its covariance says. */

@@ -15,7 +15,7 @@
 
 enum {
     FAST_WINDOWS = 2,     /* windows that decide whether the twists get less weight */
-    AGREEING_FRAMES = 15, /* successive frames in agreement that end a doubt */
+    AGREEING_FRAMES = 15, /* successive frames in agreement that end any doubt */
     FEW = 3,              /* points */
     FROZEN_SHARE = 2, /* a picture is repeated if at least one match in two has the same pixels */
     MIN_MATCHES = 10  /* with fewer matches in the sums, the share of rejected ones is not judged */
@@ -24,8 +24,8 @@ enum {
 /* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */
 static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), PLR_R(0.985)};
 
-/* Chi-square with 6 degrees of freedom: white noise exceeds these once in 25,000 and once in 70. */
-#define DRIFTING_ABOVE PLR_R(30)
+/* Chi-square with 6 degrees of freedom: white noise exceeds these once in 60,000 and once in 70. */
+#define DRIFTING_ABOVE PLR_R(32)
 #define AGREEING_BELOW PLR_R(16)
 /* Noise settings are never quite true. The twists get less weight only where the difference exceeds
  * its noise by far, and is a good part of the motion itself: a filter that doubted them earlier
@@ -45,8 +45,11 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 #define SIDEWAYS_SHARE PLR_R(0.2)
 /* Added to variances, so that directions that were hardly observed do not count. */
 #define UNOBSERVED PLR_R(0.05)
-/* A bias is off if it differs from its prior by more than this many sigmas. */
-#define BIAS_SIGMAS PLR_R(3.3)
+/* A bias is off if it differs from its prior by more than this many sigmas: of six that are as
+ * stated one does so in about one drive of 300. A bias is not judged before it has lost this share
+ * of its prior's variance. */
+#define BIAS_SIGMAS  PLR_R(3.9)
+#define LEARNT_SHARE PLR_R(0.25)
 /* What the sums of counts keep from frame to frame. */
 #define COUNTS_DECAY PLR_R(0.9)
 /* If a larger share of the matches is rejected, the scene contradicts itself. */
@@ -266,7 +269,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         to_twist_sigmas(applied->L, believed->L, J, b);
     if (!estimate(J, b, own, V))
         return;
-    if (c->contradicted || c->drifting || c->doubtful) /* it stays until it is resolved */
+    if (c->contradicted || c->drifting ||
+        c->settling_frames > 0) /* it stays until it is resolved */
         propagate_difference(f, applied);
     if (c->contradicted || c->drifting) {
         plr_real way[PLR_POSE_DIM];
@@ -368,12 +372,17 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
 
 /* ---------------------------------------------------------------- the verdict */
 
+/* If prior and noise are as stated, an estimate differs from the mean of its prior by
+ * N(0, P_0 + walked - P): by less than the prior's sigma as long as little has been learnt. */
 static bool bias_is_off(const plr_filter *f) {
+    plr_real P[PLR_POSE_SQUARE];
+    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real walked = plr_process_of(f)->walked(f, k), sigma = f->bias_prior_sigma[k];
-        const plr_real limit =
-            BIAS_SIGMAS * (walked > 0 ? PLR_SQRT(sigma * sigma + walked) : sigma);
-        if (limit > 0 && plr_abs(f->bias[k] - f->bias_prior[k]) > limit)
+        const plr_real sigma = f->bias_prior_sigma[k], off = f->bias[k] - f->bias_prior[k];
+        const plr_real prior = sigma * sigma + plr_process_of(f)->walked(f, k);
+        const plr_real learnt = prior - P[(PLR_POSE_DIM + 1) * k];
+        if (prior > 0 && learnt > LEARNT_SHARE * prior &&
+            off * off > BIAS_SIGMAS * BIAS_SIGMAS * learnt)
             return true;
     }
     return false;
@@ -433,26 +442,30 @@ static void resolve(plr_filter *f) {
     memset(c->difference_sigmas, 0, sizeof c->difference_sigmas);
     c->difference_noise = 0;
     memset(c->windows, 0, sizeof c->windows);
-    c->contradicted = c->drifting = c->doubtful = 0;
+    c->contradicted = c->drifting = c->settling_frames = 0;
     c->agreeing_frames = 0;
+}
+
+void plr_consistency_doubt(plr_filter *f) {
+    f->consistency.settling_frames = AGREEING_FRAMES;
 }
 
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost) {
     plr_consistency *c = &f->consistency;
     count(f, report);
     uint32_t reasons = find_reasons(f, report);
-    const uint32_t serious =
-        PLR_REASON_TWIST_CONTRADICTED | PLR_REASON_FROZEN_IMAGE | PLR_REASON_SCENE_DISAGREES;
-    if (lost || (reasons & serious))
-        c->doubtful = 1;
+    if (lost || c->contradicted || c->frozen || (reasons & PLR_REASON_SCENE_DISAGREES))
+        plr_consistency_doubt(f);
+    else if (c->drifting && c->settling_frames < AGREEING_FRAMES)
+        c->settling_frames++; /* a drift: as long as it lasted, so that noise is soon forgotten */
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
                         fast_statistic(f) < AGREEING_BELOW &&
                         !(reasons & PLR_REASON_SCENE_DISAGREES);
     c->agreeing_frames =
         agrees ? (uint16_t)(c->agreeing_frames + (c->agreeing_frames < UINT16_MAX)) : 0;
-    if (c->doubtful && c->agreeing_frames >= AGREEING_FRAMES)
+    if (c->settling_frames > 0 && c->agreeing_frames >= c->settling_frames)
         resolve(f);
-    return c->doubtful ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;
+    return c->settling_frames > 0 ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;
 }
 
 void plr_consistency_enlarge(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {

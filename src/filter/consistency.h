@@ -42,6 +42,9 @@ void plr_consistency_note_motion(plr_filter *f);
  * plr_reason. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);
 
+/* The pose may be wrong, until pictures and twists have agreed for as long as after a contradiction. */
+void plr_consistency_doubt(plr_filter *f);
+
 /* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers
  * the poses by twists and by pictures: by d d^T, where d is the difference between the two, and by
  * a part of |d|^2 in all directions. */

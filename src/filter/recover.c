@@ -83,7 +83,7 @@ void plr_filter_recover(plr_filter *f) {
     plr_motion_clear(f);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_consistency_clear(f);
-    f->consistency.doubtful = 1;
+    plr_consistency_doubt(f);
     plr_filter_begin_velocity(f);
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;

@@ -6,6 +6,8 @@
 #include "filter/consistency.h"
 #include "filter/health.h"
 #include "process/process.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
 #include "support/specimens.h"
 
 static plr_filter filter;
@@ -232,18 +234,21 @@ static void test_a_scene_that_disagrees_with_itself_is_said(void) {
 }
 
 static void test_a_bias_beyond_its_prior_is_said(void) {
+    static const double known[6] = {0};
     filter.config.bias = 1;
+    filter.count = 0;
     plr_process_twist.lay_out(&filter);
+    plr_covariance_begin_diagonal(&filter, PLR_BLOCK_BIAS, known);
     for (int k = 0; k < 6; k++) {
         filter.bias[k] = filter.bias_prior[k] = PLR_R(0.2);
         filter.bias_prior_sigma[k] = PLR_R(0.01);
     }
     for (int k = 0; k < 6; k++) {
         for (int sign = -1; sign <= 1; sign += 2) {
-            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0329) * (plr_real)sign;
+            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0389) * (plr_real)sign;
             frame(10, 1);
             judge(0, PLR_HEALTH_GOOD);
-            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0331) * (plr_real)sign;
+            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0391) * (plr_real)sign;
             frame(10, 1);
             judge(PLR_REASON_BIAS_OFF_PRIOR, PLR_HEALTH_DEGRADED);
         }

@@ -129,7 +129,7 @@ static void test_a_contradiction_that_was_open_stays_covered(void) {
     plr_filter_recover(&rig.filter);
     reseal(&rig.filter);
     TEST_ASSERT_EQUAL_UINT8(0, rig.filter.consistency.contradicted);
-    TEST_ASSERT_EQUAL_UINT8(1, rig.filter.consistency.doubtful);
+    TEST_ASSERT_EQUAL_UINT8(15, rig.filter.consistency.settling_frames);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, after));
     TEST_ASSERT_TRUE(after[0] > 0.25);
 }

@@ -161,7 +161,8 @@ static void fill_consistency(rng *chance, plr_consistency *c) {
     c->agreeing_frames = 0x1122;
     c->contradicting_frames = 0x3344;
     c->small_frames = 0x5566;
-    c->contradicted = c->drifting = c->frozen = c->doubtful = 1;
+    c->contradicted = c->drifting = c->frozen = 1;
+    c->settling_frames = 15;
 }
 
 /* A field that a later version adds to the filter, and forgets here, is found by this. */

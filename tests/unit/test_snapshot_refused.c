@@ -19,7 +19,7 @@ enum {
     INTERVAL_AT = COUNT_AT + 4 + 16,
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
     FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 143 * REAL,
-    HEALTH_AT = FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 329 * REAL, /* doubtful stands before it */
+    HEALTH_AT = FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 329 * REAL, /* settling_frames stands before it */
     SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
     SLOT_SIZE = 8 * REAL + 35,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,
@@ -150,15 +150,22 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 }
 
 static void test_a_flag_is_0_or_1(void) {
-    const uint32_t flags[] = {CLOCK_STARTED_AT, CLOCK_STARTED_AT + 1, HEALTH_AT - 4,
-                              HEALTH_AT - 3,    HEALTH_AT - 2,        HEALTH_AT - 1,
-                              KNOWN_AT,         KNOWN_AT + SLOT_SIZE};
+    const uint32_t flags[] = {CLOCK_STARTED_AT,    CLOCK_STARTED_AT + 1, HEALTH_AT - 4,
+                              HEALTH_AT - 3,       HEALTH_AT - 2,        KNOWN_AT,
+                              KNOWN_AT + SLOT_SIZE};
     for (unsigned i = 0; i < sizeof flags / sizeof *flags; i++) {
         state_bytes_save(&state, &filter);
         TEST_ASSERT_LESS_OR_EQUAL_UINT8(1, state.bytes[flags[i]]);
         state.bytes[flags[i]] = 2;
         refuses(PLR_E_CORRUPT);
     }
+}
+
+static void test_a_doubt_takes_at_most_fifteen_frames_to_settle(void) {
+    state.bytes[HEALTH_AT - 1] = 16;
+    refuses(PLR_E_CORRUPT);
+    state.bytes[HEALTH_AT - 1] = 15;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
 
 static void test_whatever_bit_flips_a_refusal_changes_nothing(void) {
@@ -267,6 +274,7 @@ int main(void) {
     RUN_TEST(test_numbers_that_are_not_finite_are_refused);
     RUN_TEST(test_a_negative_variance_is_refused_and_a_negative_covariance_is_not);
     RUN_TEST(test_a_flag_is_0_or_1);
+    RUN_TEST(test_a_doubt_takes_at_most_fifteen_frames_to_settle);
     RUN_TEST(test_whatever_bit_flips_a_refusal_changes_nothing);
     RUN_TEST(test_a_sink_that_fails_ends_the_save);
     RUN_TEST(test_a_source_that_fails_changes_nothing_or_resets_the_filter);

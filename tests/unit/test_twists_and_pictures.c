@@ -8,6 +8,8 @@
 #include "filter/consistency.h"
 #include "math/dense.h"
 #include "math/packed.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
 #include "state/motion.h"
 #include "support/matrices.h"
 #include "support/reseal.h"
@@ -160,7 +162,7 @@ static void test_a_second_slip_adds_to_what_the_first_left_unsettled(void) {
             add_agreement();
             (void)judge();
         }
-        TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.doubtful); /* not settled yet */
+        TEST_ASSERT_EQUAL_UINT8(15, filter.consistency.settling_frames); /* not settled yet */
     }
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.9 * 90 * WAY_M, apart);
     plr_real P[36] = {0};
@@ -264,7 +266,7 @@ static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
     add_agreement();
     TEST_ASSERT_EQUAL_HEX32(0, judge());
     TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
-    TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.doubtful);
+    TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.settling_frames);
     TEST_ASSERT_EQUAL_UINT32(widened + 1,
                              filter.totals.widened); /* what was between them is in P */
     TEST_ASSERT_DOUBLE_WITHIN(0.06 * apart * apart, before + 1.04 * apart * apart,
@@ -285,6 +287,66 @@ static void test_a_frame_that_differs_begins_the_settling_anew(void) {
         TEST_ASSERT_TRUE(judge() & MAY_BE_WRONG);
         add_agreement();
     }
+}
+
+/* Frames in agreement that end the doubt, after `frames` that differ by `sigmas`. */
+static unsigned doubted_after(unsigned frames, double sigmas) {
+    const double nu[6] = {0, sigmas};
+    unsigned settled = 0;
+    setUp();
+    for (unsigned k = 0; k < frames; k++) {
+        add(nu, 0);
+        TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted); /* 1 cm a frame is little */
+        (void)judge();
+    }
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.drifting);
+    do {
+        add_agreement();
+        settled += !filter.consistency.drifting;
+    } while (judge() & MAY_BE_WRONG);
+    return settled;
+}
+
+static void test_a_drift_is_doubted_as_long_as_it_lasted_and_no_longer_than_a_contradiction(void) {
+    TEST_ASSERT_LESS_THAN_UINT(SETTLED - 5, doubted_after(1, 6)); /* as noise may, in 60,000 */
+    TEST_ASSERT_EQUAL_UINT(SETTLED, doubted_after(30, 2.5));
+}
+
+/* ---------------------------------------------------------------- the biases */
+
+/* Is a bias told as off its prior, `sigmas` of that away, if `share` of its variance is gone? */
+static bool is_told(unsigned axis, double sigmas, double share) {
+    double variance[6];
+    plr_report report = {.matched = 10, .used = 10, .nis = 40, .nis_dof = 40};
+    rig_set_up();
+    rig.config.bias = true;
+    rig_begin();
+    for (unsigned k = 0; k < 6; k++) {
+        const double prior = (double)rig.filter.bias_prior_sigma[k];
+        variance[k] = (k == axis ? 1 - share : 1.0) * prior * prior;
+    }
+    plr_covariance_begin_diagonal(&rig.filter, PLR_BLOCK_BIAS, variance);
+    rig.filter.bias[axis] =
+        rig.filter.bias_prior[axis] + (plr_real)sigmas * rig.filter.bias_prior_sigma[axis];
+    return (plr_consistency_judge(&rig.filter, &report, false) & PLR_REASON_BIAS_OFF_PRIOR) != 0;
+}
+
+/* An estimate of which half has been learnt should be within sqrt(1/2) of the prior's sigmas. */
+static void test_a_bias_is_held_against_what_has_been_learnt_of_it(void) {
+    for (unsigned axis = 0; axis < 6; axis++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            TEST_ASSERT_TRUE(is_told(axis, sign * 4.0, 0.99));
+            TEST_ASSERT_FALSE(is_told(axis, sign * 3.8, 0.99));
+            TEST_ASSERT_TRUE(is_told(axis, sign * 2.85, 0.5));
+            TEST_ASSERT_FALSE(is_told(axis, sign * 2.65, 0.5));
+        }
+}
+
+static void test_a_bias_of_which_little_is_known_is_not_judged(void) {
+    TEST_ASSERT_FALSE(is_told(0, 5, 0));
+    TEST_ASSERT_FALSE(is_told(0, 5, 0.2));
+    TEST_ASSERT_FALSE(is_told(0, 5, -0.5)); /* it has walked since */
+    TEST_ASSERT_TRUE(is_told(0, 5, 0.3));
 }
 
 /* ---------------------------------------------------------------- on a drive */
@@ -384,6 +446,9 @@ int main(void) {
     RUN_TEST(test_an_old_reading_is_no_rival_of_the_picture);
     RUN_TEST(test_after_fifteen_frames_of_agreement_it_is_settled);
     RUN_TEST(test_a_frame_that_differs_begins_the_settling_anew);
+    RUN_TEST(test_a_drift_is_doubted_as_long_as_it_lasted_and_no_longer_than_a_contradiction);
+    RUN_TEST(test_a_bias_is_held_against_what_has_been_learnt_of_it);
+    RUN_TEST(test_a_bias_of_which_little_is_known_is_not_judged);
     RUN_TEST(test_wheels_that_slip_do_not_carry_the_pose_away);
     RUN_TEST(test_a_picture_that_is_sent_again_does_not_hold_a_moving_body);
     RUN_TEST(test_a_body_that_stands_may_see_the_same_picture);
