@@ -58,6 +58,12 @@ def pitched(recording: Recording, k: int) -> Recording:
     return recording.with_extrinsic(recording.T_CB._replace(R=tilt.R @ recording.T_CB.R))
 
 
+def pitched_a_little(recording: Recording, k: int) -> Recording:
+    """Such a one as a calibration gets wrong."""
+    tilt = se3.exp(np.zeros(3), np.radians([(6, -7, 8)[k], 0, 0]))
+    return recording.with_extrinsic(recording.T_CB._replace(R=tilt.R @ recording.T_CB.R))
+
+
 def pixels(recording: Recording, new: np.ndarray) -> Recording:
     """Other pixels on the same tracks."""
     return replace(recording, tracks=replace(recording.tracks, pixels=new))
@@ -164,6 +170,7 @@ OF_RECORDINGS: dict[str, tuple[Change, tuple[str, ...]]] = {
     "axes": (axes, ("axes",)),
     "mirrored": (mirrored, ("axes",)),
     "pitch": (pitched, ("pitch",)),
+    "small-pitch": (pitched_a_little, ("pitch",)),
     "degrees": (lambda r, _: replace(r, w_B_radps=np.degrees(r.w_B_radps)), ("unit-degrees",)),
     "km/h": (lambda r, _: replace(r, v_B_mps=3.6 * r.v_B_mps), ("unit-km/h",)),
     "mm/s": (lambda r, _: replace(r, v_B_mps=1e3 * r.v_B_mps), ("unit-mm/s",)),

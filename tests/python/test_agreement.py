@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from injected import OF_RECORDINGS
 from pelorus import se3
 from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.fault import Fault
@@ -130,6 +131,9 @@ def test_a_gyro_that_is_late_is_no_clock_of_the_frames() -> None:
     assert found.turns_late_s == pytest.approx(0.12, abs=4 * found.turns_late_sigma_s)
     assert found.turns_late_sigma_s < 0.02
     assert [fault.name for fault in faults_in(late)] == ["clock-turns"]
+    T = late.T_CB
+    assert np.linalg.norm(agreed(late).lever_m) < 0.1, "asked of motions that belong together"
+    assert np.linalg.norm(T.p) > 0.1, "a drive whose lever would tell"
     both = replace(late, frame_t_ns=late.frame_t_ns + 60 * 10**6)
     named = faults_in(both)
     assert [fault.name for fault in named] == ["clock", "clock-turns"]
@@ -139,6 +143,41 @@ def test_a_gyro_that_is_late_is_no_clock_of_the_frames() -> None:
 def test_frames_that_are_late_are_no_late_gyro() -> None:
     moved = replace(driven(), frame_t_ns=driven().frame_t_ns + 120 * 10**6)
     assert [fault.name for fault in faults_in(moved)] == ["clock"]
+
+
+def test_what_spoils_the_result_is_named_before_what_a_setting_mends() -> None:
+    moved = replace(driven(), frame_t_ns=driven().frame_t_ns + 120 * 10**6)
+    change, _ = OF_RECORDINGS["frozen"]
+    assert [fault.name for fault in faults_in(change(moved, 1))] == ["frozen", "clock"]
+
+
+def pitched(recording: Recording, deg: float) -> Recording:
+    tilt = se3.exp(np.zeros(3), np.radians([deg, 0, 0]))
+    return recording.with_extrinsic(recording.T_CB._replace(R=tilt.R @ recording.T_CB.R))
+
+
+@cache
+def slow() -> Recording:
+    """At 0.5 m/s a bias of three times 0.03 m/s across the way looks like ten degrees."""
+    options = replace(DRIVE, seed=7, speed_mps=0.5, velocity_sigma_mps=0.02)
+    recording = simulate(options).recording
+    noise = replace(recording.header.noise, bias_velocity_sigma_mps=-1.0)
+    return recording.with_header(noise=noise)
+
+
+@pytest.mark.parametrize("deg", [6.0, -8.0])
+def test_a_pitch_of_some_degrees_is_named_at_any_speed(deg: float) -> None:
+    assert [fault.name for fault in faults_in(slow())] == []
+    wrong = pitched(slow(), deg)
+    assert faults_in(wrong)[0].name == "pitch"
+    tilt = agreed(wrong).tilt_rad
+    assert tilt is not None
+    assert np.degrees(wrong.T_CB.R[0] @ tilt) == pytest.approx(-deg, abs=1)
+
+
+def test_a_bias_across_the_way_is_no_pitch() -> None:
+    up = replace(slow(), v_B_mps=slow().v_B_mps + np.array([0, 0, 0.07]))
+    assert [fault.name for fault in faults_in(up)] == []
 
 
 def test_the_cameras_place_is_found_from_turns() -> None:

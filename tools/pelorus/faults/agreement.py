@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pelorus.faults.clocks import FRAMES_MIN, UNTOLD, TwoClocks, offset_of, two_clocks
-from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TURN_SCALE, Body, Fit
+from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TILT, TURN, TURN_SCALE, Body, Fit
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
@@ -47,6 +47,8 @@ class Agreement:
     turn_scale_sigma: float
     focal: float = 1.0  # times the given one, by an IMU; 1 is due
     focal_sigma: float = float("inf")
+    tilt_rad: Floats | None = None  # of the camera in the body's axes, beside the given; by twists
+    tilt_covariance: Floats | None = None
     clocks: TwoClocks = UNTOLD  # of velocities and turns, each by itself; not of an IMU
 
     @property
@@ -68,11 +70,16 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     by_imu = len(recording.inertial.t_ns) > 0
     if by_imu:
         seen = seen.with_focal(recording, views)
-    found = none = Fit(body.design(recording, seen, offset, bias))
+    clocks = UNTOLD if by_imu else two_clocks(recording, seen, offset, bias)
+    at = offset
+    if clocks.apart:  # all else is asked of motions that belong together
+        body, at = TwistBody(recording, clocks.turns_late_s), clocks.ways_s
+    found = none = Fit(body.design(recording, seen, at, bias))
     if not by_imu:
-        none = Fit(body.design(recording, seen, offset, NO_BIAS_MPS))
-    doubt = _doubt_by_depth(recording, views, body, (offset, bias if by_imu else NO_BIAS_MPS))
+        none = Fit(body.design(recording, seen, at, NO_BIAS_MPS))
+    doubt = _doubt_by_depth(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS))
     lever = slice(LEVER, LEVER + 3)
+    tilt = (None, None) if by_imu else _tilt(found)
     return Agreement(
         found.frames,
         1 + float(found.x[SCALE]),
@@ -88,8 +95,21 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         float(found.sigma[TURN_SCALE]),
         1 - float(found.x[FOCAL]),
         float(found.sigma[FOCAL]) if by_imu else float("inf"),
-        UNTOLD if by_imu else two_clocks(recording, seen, offset, bias),
+        tilt_rad=tilt[0],
+        tilt_covariance=tilt[1],
+        clocks=clocks,
     )
+
+
+def _tilt(fit: Fit) -> tuple[Floats, Floats]:
+    """What velocities and rates of turn say of it together, each as well as it knows. The one may
+    be a bias across the way, the other knows nothing of what is along the axis of the turns.
+    """
+    both = [*range(TILT, TILT + 3), *range(TURN, TURN + 3)]
+    known = np.linalg.inv(fit.covariance[np.ix_(both, both)])
+    same = np.vstack((np.eye(3), np.eye(3)))
+    covariance = np.linalg.inv(same.T @ known @ same)
+    return np.asarray(covariance @ same.T @ known @ fit.x[both]), np.asarray(covariance)
 
 
 def _sigma(fit: Fit, by_imu: bool) -> float:

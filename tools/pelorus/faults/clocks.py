@@ -23,6 +23,7 @@ from pelorus.recording import Recording
 FRAMES_MIN = 50
 OFFSETS_S = np.arange(-20, 21) * 0.02  # where the clock's offset is looked for at first
 ROUNDS, STEP_S, FOUND_S = 10, 0.05, 2e-4
+APART_SIGMAS, APART_S = 6.0, 0.03
 WORTH_SIGMAS = 2.0  # below, a clock of the turns' own is not followed
 
 
@@ -34,6 +35,11 @@ class TwoClocks:
     ways_sigma_s: float = float("inf")
     turns_late_s: float = 0.0
     turns_late_sigma_s: float = float("inf")
+
+    @property
+    def apart(self) -> bool:
+        """Whether there are two of them, beyond doubt."""
+        return abs(self.turns_late_s) > max(APART_SIGMAS * self.turns_late_sigma_s, APART_S)
 
 
 UNTOLD = TwoClocks()

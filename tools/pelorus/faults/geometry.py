@@ -37,6 +37,8 @@ LEFT_MOST = 0.7  # of a motion's size that the twists leave unexplained
 MOVES_MPS = 1.0  # a camera that hardly moves need not agree with the twists' noise
 TURNED_DEG, ROLLED_DEG, NEAR_DEG, AXES_DEG = 6.0, 50.0, 20.0, 40.0
 PITCH_MOST_DEG = 60.0
+MOSTLY, HEADED_SHARE = 0.85, 0.7  # of a turn, what is about one axis, and what the way tells
+PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 6.0  # where velocities and turns tell it together
 SURE_SIGMAS = 4.0
 UNIT_NEAR = 0.15
 FAR_LAG = 3
@@ -45,7 +47,6 @@ SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
 BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
 SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
-APART_SIGMAS, APART_S = 6.0, 0.03  # by which the clocks of velocities and turns may differ
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
@@ -69,7 +70,7 @@ def geometry(recording: Recording, views: TwoViews) -> Judged:
     agreed = agreement(recording, views)
     if not agreed.told:
         return Judged(moves)
-    faults = [*moves, *_lever(recording, agreed)]
+    faults = [*moves, *_pitch(recording, agreed), *_lever(recording, agreed)]
     if by_imu and not any(fault.name == "lever" for fault in faults):
         faults += _place(recording, agreed)
     if not moves:  # what moves looks like another scale
@@ -193,7 +194,12 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
     elif (
         sure and found.way_left < LEFT_MOST and (headed > _straight_deg(recording, found) or rolled)
     ):
-        yield _turned(given, found.R, off)
+        of_way = np.cross(given @ found.heading_B, found.R @ found.heading_B)
+        by_pitch = abs(of_way[0]) > MOSTLY * float(np.linalg.norm(of_way))
+        if by_pitch and HEADED_SHARE * off < headed and off < NEAR_DEG:
+            yield _pitched(f"{headed:.0f}")  # the rest is roll, known worse
+        else:
+            yield _turned(given, found.R, off)
 
 
 def _straight_deg(recording: Recording, found: HandEye) -> float:
@@ -242,12 +248,25 @@ def _turned(given: Floats, found: Floats, off: float) -> Fault:
         words = _words(turned)
         return Fault("axes", f"the body's axes are turned or mirrored: the twists have {words}")
     axis = _axis_of(found @ given.T)
-    if abs(axis[0]) > 0.85 and off < PITCH_MOST_DEG:
-        return Fault(
-            "pitch",
-            f"the camera is pitched by {off:.0f} degrees beside the extrinsic: forgotten?",
-        )
+    if abs(axis[0]) > MOSTLY and off < PITCH_MOST_DEG:
+        return _pitched(f"{off:.0f}")
     return Fault("extrinsic", f"the extrinsic's rotation is off by {off:.0f} degrees")
+
+
+def _pitch(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """A few degrees, which the way alone cannot tell from a velocity that is biased across it."""
+    if agreed.tilt_rad is None or agreed.tilt_covariance is None:
+        return
+    across = recording.T_CB.R[0]  # the camera's x in the body
+    off = float(np.degrees(across @ agreed.tilt_rad))
+    sigma = float(np.degrees(np.sqrt(across @ agreed.tilt_covariance @ across)))
+    if abs(off) > max(PITCH_SIGMAS * sigma, PITCH_OFF_DEG):
+        yield _pitched(f"{abs(off):.1f} +- {sigma:.1f}")
+
+
+def _pitched(degrees: str) -> Fault:
+    words = f"the camera is pitched by {degrees} degrees beside the extrinsic: forgotten?"
+    return Fault("pitch", words)
 
 
 def _sigma_deg(found: HandEye, given: Floats) -> float:
@@ -396,7 +415,7 @@ def _clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
     the rates of turn have a clock of their own, the frames are held to the velocities'.
     """
     own = agreed.clocks
-    apart = abs(own.turns_late_s) > max(APART_SIGMAS * own.turns_late_sigma_s, APART_S)
+    apart = own.apart
     offset, sigma = agreed.offset_s, agreed.offset_sigma_s
     if apart:
         offset, sigma = own.ways_s, own.ways_sigma_s

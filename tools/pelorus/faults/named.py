@@ -61,7 +61,7 @@ def judged(recording: Recording) -> Judged:
 
 
 def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
-    """The likeliest first; empty if nothing is wrong that this knows of."""
+    """What spoils the result first, then the likeliest; empty if nothing is known to be wrong."""
     times = [fault for name, t_ns in times_ns.items() for fault in _times(name, t_ns)]
     times += _spans(*times_ns.items())
     short = first_part(recording)
@@ -73,7 +73,8 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     if ids:
         return Judged([*ids, *times])
     found = geometry(short, views)
-    return Judged([*found.faults, *_frozen(recording), *times], found.agreed)
+    faults = [*found.faults, *_frozen(recording), *times]
+    return Judged(sorted(faults, key=lambda fault: not fault.grave), found.agreed)
 
 
 # --- time -----------------------------------------------------------------------------------------
