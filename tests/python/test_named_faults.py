@@ -44,6 +44,20 @@ def test_a_fault_is_named(simulated: Recording, name: str, strength: int) -> Non
     assert said[0].name in due, said
 
 
+@pytest.mark.parametrize("name", ["inverted", "degrees", "mm/s"])
+def test_points_that_come_back_are_no_slots_where_the_twists_are_wrong(
+    simulated: Recording, name: str
+) -> None:
+    """Twists that are wrong put every point elsewhere: where it must be is what the images say."""
+    tracks = simulated.tracks
+    keep = (tracks.frame + tracks.id) % 7 > 1
+    blinking = replace(simulated, tracks=type(tracks)(
+        tracks.frame_count, tracks.frame[keep], tracks.id[keep], tracks.pixels[keep]))  # fmt: skip
+    assert found_in(blinking) == []
+    change, due = OF_RECORDINGS[name]
+    assert found_in(change(blinking, 0))[0].name in due
+
+
 @pytest.mark.parametrize("name", ["axes", "pitch", "degrees", "km/h", "u-v", "ids-slots"])
 def test_a_fault_in_a_real_recording_is_named(of_03: Converted, name: str) -> None:
     clean = piece(of_03.recording, 300)

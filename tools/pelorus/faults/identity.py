@@ -18,7 +18,7 @@ from pelorus import se3
 from pelorus.faults.two_views import TwoViews, measured, predicted
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
-from pelorus.tracks import Tracks
+from pelorus.tracks import Indices, Tracks
 
 Flags = NDArray[np.bool_]
 ROWS_LEAST = 4
@@ -26,7 +26,8 @@ ROWS_SHARE, WRONG_TOGETHER = 0.9, 0.15
 JUMP_PX, SOUND_D2 = 12.0, 16.0
 JUMPS_LEAST, JUMPS_SHARE = 5, 0.2  # of the tracks that end
 GAPS_LEAST, ELSEWHERE_SHARE = 10, 0.6  # of the points that are seen again
-GAP_MOST = 5  # frames over which the twists tell where a point must be
+POINTS_MIN = 6  # of a pair of frames
+GAP_MOST = 5  # frames over which the images tell where a point must be
 ELSEWHERE = 0.08  # of the picture's width
 
 
@@ -90,24 +91,39 @@ def jumps(recording: Recording, views: TwoViews) -> Jumps:
     seen_next = np.zeros(len(tracks), bool)
     seen_next[views.first] = True
     last = np.nonzero(ends & ~seen_next & (tracks.frame < tracks.frame_count - 1))[0]
-    return Jumps(int(jumped.sum()), len(last), *_again(recording))
+    return Jumps(int(jumped.sum()), len(last), *_again(recording, views))
 
 
-def _again(recording: Recording) -> tuple[int, int]:
-    """Points that come back within a few frames, and those that come back elsewhere."""
+def _again(recording: Recording, views: TwoViews) -> tuple[int, int]:
+    """Points that come back within a few frames, and those that come back elsewhere: by the images'
+    own motion, for twists in wrong units or axes would put every point elsewhere.
+    """
     tracks, camera = recording.tracks, recording.header.camera
     order = np.lexsort((tracks.frame, tracks.id))
     one, two = order[:-1], order[1:]
     gap = tracks.frame[two] - tracks.frame[one]
     known = (tracks.id[one] == tracks.id[two]) & (gap > 1) & (gap <= GAP_MOST)
+    untold = np.concatenate(([0], np.cumsum(views.counts < POINTS_MIN)))
+    known &= untold[tracks.frame[two]] == untold[tracks.frame[one]]
     one, two = one[known], two[known]
     if not len(one) or not len(recording.twist_t_ns):
         return 0, 0
-    body = recording.dead_reckoning()
-    T_CW = se3.compose(recording.T_CB, se3.inverse(body))
-    motion = se3.compose(T_CW.at(tracks.frame[two]), se3.inverse(T_CW.at(tracks.frame[one])))
+    motion = _between(views.motion, tracks.frame[one], tracks.frame[two])
     x = measured(camera, tracks.pixels[one])
-    h, _, _ = predicted(camera, x, *Poses(motion.R, motion.p))
+    h, _, _ = predicted(camera, x, *motion)
     off = np.linalg.norm((h - measured(camera, tracks.pixels[two]))[:, :2], axis=1)
     width = float(np.ptp(tracks.pixels[:, 0]))
     return len(one), int(np.sum(off > ELSEWHERE * width))
+
+
+def _between(steps: Poses, first: Indices, last: Indices) -> Poses:
+    """All steps from one frame to another, GAP_MOST at most."""
+    motion = Poses(np.tile(np.eye(3), (len(first), 1, 1)), np.zeros((len(first), 3)))
+    for k in range(GAP_MOST):
+        more = first + k < last
+        step = steps.at(np.where(more, first + k, 0))
+        on = se3.compose(step, motion)
+        motion = Poses(
+            np.where(more[:, None, None], on.R, motion.R), np.where(more[:, None], on.p, motion.p)
+        )
+    return motion
