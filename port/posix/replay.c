@@ -167,6 +167,14 @@ static bool close_outputs(replay *run) {
     return good;
 }
 
+/* Where the run came to nothing: what stood there before stays. Nothing to do behind the above. */
+static void discard_outputs(replay *run) {
+    (void)compressed_output_close(run->port.packer);
+    run->port.packer = NULL;
+    result_file_discard(&run->trajectory);
+    result_file_discard(&run->out);
+}
+
 static plr_status start_session(replay *run) {
     const plr_port port = file_port_functions(&run->port);
     plr_session_options options;
@@ -290,6 +298,7 @@ static int usage_error(const char *problem) {
 }
 
 static int run_recording(replay *run) {
+    bool written = true;
     read_recording(run);
     int status = verdict_on_recording(run->options.input, &run->session, &run->outcome);
     if (status == REPLAY_EXIT_OK)
@@ -302,10 +311,10 @@ static int run_recording(replay *run) {
     }
     if (status == REPLAY_EXIT_OK) {
         tell_ending(run);
+        written = close_outputs(run); /* a summary that nobody reads ends the program */
         status = verdict_on_frames(run->options.input, &run->session, &run->summary);
     }
     const bool printed = status != REPLAY_EXIT_OK || print_results(run);
-    const bool written = close_outputs(run);
     const bool complete = memory_sufficed(run);
     const int kept = storage_verdict_on_save(&run->storage, &run->options);
     if (status == REPLAY_EXIT_OK && !(printed && written && complete))
@@ -352,6 +361,7 @@ static int open_and_run(replay *run) {
                      ? run_recording(run)
                      : usage_error("the settings asked for are outside their limits");
     }
+    discard_outputs(run);
     summary_free(&run->summary);
     storage_close(&run->storage);
     map_in_free(&run->map_in);
