@@ -180,6 +180,18 @@ def test_a_bias_across_the_way_is_no_pitch() -> None:
     assert [fault.name for fault in faults_in(up)] == []
 
 
+def test_a_lever_that_is_off_is_no_turn_of_the_camera_at_walking_speed() -> None:
+    """Turning, a camera half a metre off goes as if it looked elsewhere."""
+    T = slow().T_CB
+    arm = np.array([0.6, 0.3, 0.5])
+    moved = replace(slow(), v_B_mps=slow().v_B_mps - np.cross(slow().w_B_radps, arm))
+    right = moved.with_extrinsic(T._replace(p=T.p - T.R @ arm))
+    assert [fault.name for fault in faults_in(right)] == []
+    for wrong in (-right.T_CB.p, -T.R.T @ right.T_CB.p):
+        named = faults_in(moved.with_extrinsic(T._replace(p=wrong)))
+        assert [fault.name for fault in named] == ["lever"]
+
+
 def test_the_cameras_place_is_found_from_turns() -> None:
     recording = driven()
     T = recording.T_CB

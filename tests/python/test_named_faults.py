@@ -44,6 +44,12 @@ def test_a_fault_is_named(simulated: Recording, name: str, strength: int) -> Non
     assert said[0].name in due, said
 
 
+@pytest.mark.parametrize("by", [3.6, 1 / 3.6])
+def test_a_unit_is_named_whichever_way_it_was_mistaken(simulated: Recording, by: float) -> None:
+    said = found_in(replace(simulated, v_B_mps=by * simulated.v_B_mps))
+    assert [fault.name for fault in said] == ["unit-km/h"]
+
+
 @pytest.mark.parametrize("name", ["inverted", "degrees", "mm/s"])
 def test_points_that_come_back_are_no_slots_where_the_twists_are_wrong(
     simulated: Recording, name: str

@@ -166,6 +166,7 @@ def _units(found: HandEye) -> Iterator[Fault]:
         ("km/h", found.way_scale, 1 / 3.6, "velocities: they are in km/h"),
         ("cm/s", found.way_scale, 1e-2, "velocities: they are in cm/s"),
         ("mm/s", found.way_scale, 1e-3, "velocities: they are in mm/s"),
+        ("km/h", found.way_scale, 3.6, "velocities: m/s were made of km/h twice"),
     ):
         near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
         if name == "degrees" and not found.turns_told:
@@ -196,10 +197,24 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
     ):
         of_way = np.cross(given @ found.heading_B, found.R @ found.heading_B)
         by_pitch = abs(of_way[0]) > MOSTLY * float(np.linalg.norm(of_way))
+        if off < NEAR_DEG and _otherwise(recording, views, off):
+            return
         if by_pitch and HEADED_SHARE * off < headed and off < NEAR_DEG:
             yield _pitched(f"{headed:.0f}")  # the rest is roll, known worse
         else:
             yield _turned(given, found.R, off)
+
+
+def _otherwise(recording: Recording, views: TwoViews, off: float) -> bool:
+    """Whether what looks like a turn is none once all else may be wrong as well: at walking speed a
+    lever that is off turns the way of the camera by as much.
+    """
+    agreed = agreement(recording, views)
+    if agreed.tilt_rad is None or agreed.tilt_covariance is None:
+        return False
+    left = float(np.degrees(np.linalg.norm(agreed.tilt_rad)))
+    sigma = float(np.degrees(np.sqrt(np.trace(agreed.tilt_covariance))))
+    return left + SURE_SIGMAS * sigma < off / 2
 
 
 def _straight_deg(recording: Recording, found: HandEye) -> float:
