@@ -24,10 +24,12 @@
  * whatever its data; the bounds are in docs/SIZES.md. A program may have several filters. One
  * filter is not thread-safe: calls on it must not overlap.
  *
- * A refused call (status < 0) changes nothing but the counts of refused calls. A function that
- * takes a const filter changes nothing at all: whether you call it or not, later results have the
- * same bits. Every call first checks that the filter's memory is as the previous call left it; if
- * not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
+ * A refused call (status < 0) changes nothing but the counts of refused calls; of an IMU's refused
+ * reading the filter also remembers what was wrong, and how many like it came in succession
+ * (plr_filter_inertial). A function that takes a const filter changes nothing at all: whether you
+ * call it or not, later results have the same bits. Every call first checks that the filter's memory
+ * is as the previous call left it; if not, it returns PLR_E_DAMAGED, and so does every later call
+ * until plr_filter_init.
  *
  * The error of a pose is defined on its right side: with T the true pose and T^ the estimate, T =
  * T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias is
@@ -102,7 +104,9 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
  * gyro taken at t_ns. Until tilt and velocity are known (setting imu-start) readings are averaged,
  * the pose stays, and health says NOT_STARTED. Takes the same time for any number of landmarks.
  * Refused readings count in plr_filter_totals().twists_refused; where the sensor is to blame,
- * plr_filter_imu_fault says how, and health says IMU_FAULT.
+ * plr_filter_imu_fault says how, and health says IMU_FAULT. Spikes and repeated numbers are told by
+ * what came before, refused or not: two spikes in succession are refused and a third is taken, for it
+ * is a step or a shock; the same numbers are taken nine times more, and then refused until others come.
  * Statuses as of plr_filter_predict, and: PLR_E_RANGE at the limit of gyro_range or accel_range,
  * or a spike; PLR_E_ARGUMENT the same numbers ten times; PLR_E_MODE the process is another. */
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
@@ -165,6 +169,10 @@ plr_time_ns plr_filter_time(const plr_filter *f);
 /* The pose of the body in the world, T_WB. */
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB);
 
+/* The covariances below are symmetric to the bit, and positive as plr_filter_set_pose asks for it.
+ * Where rounding in float32 has left a state whose covariance is not, its variances are enlarged until
+ * it is. PLR_E_DIVERGED: a variance is negative, or (velocity and landmark, too) a number not finite. */
+
 /* Covariance of the pose's error (rho, theta), 6x6, m and rad. While vision contradicts the twists,
  * or the IMU, it is enlarged so that it covers the pose by vision and theirs (docs/MATH.md 17). */
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi);
@@ -182,7 +190,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u);
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b);
 
 /* Trace of the covariance of the whole state. It adds different units, so only its trend means
- * anything. 0 if the filter is not initialised or damaged. */
+ * anything. 0 if the filter is not initialised, damaged or diverged, or if it is not finite. */
 double plr_filter_trace(const plr_filter *f);
 
 /* --- landmarks --- */
@@ -193,8 +201,8 @@ unsigned plr_filter_landmark_count(const plr_filter *f);
 /* The landmark in a slot, 0 to count - 1: position in the world, m, with covariance. That
  * covariance is a small difference of larger ones: where pose and landmark are uncertain by metres
  * and it is a matter of centimetres, rounding in float32 may leave a negative variance. The map
- * sink gets the same numbers.
- * PLR_E_ARGUMENT beyond the last slot. */
+ * sink gets the same numbers, but none that are not finite: such a landmark is dropped.
+ * PLR_E_ARGUMENT beyond the last slot; PLR_E_DIVERGED. */
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark);
 
 /* Puts a landmark of known world position and covariance into the state. Its error is assumed to be

@@ -21,7 +21,7 @@ extern "C" {
 typedef uint64_t plr_time_ns;
 
 /* The result of a call. Errors are negative. After an error the filter is as it was before the
- * call, except for its counts. */
+ * call, except for its counts, and for what it remembers of refused IMU readings (filter.h). */
 typedef enum plr_status {
     PLR_OK = 0,
     PLR_E_ARGUMENT = -1,    /* a null pointer, a count beyond the capacity, an impossible value */
@@ -50,7 +50,7 @@ typedef enum plr_status {
 
 /* How far the estimate may be trusted. */
 typedef enum plr_health {
-    PLR_HEALTH_GOOD = 0,     /* nothing to report */
+    PLR_HEALTH_GOOD = 0,     /* nothing that makes the estimate worse than it should be */
     PLR_HEALTH_DEGRADED = 1, /* works, with less than it should have: see the reasons */
     PLR_HEALTH_LOST = 2,    /* the pose is predicted from twists or IMU alone (no observation and no
                                 position was used for a second or two), vision contradicts it, or
@@ -58,8 +58,9 @@ typedef enum plr_health {
     PLR_HEALTH_DIVERGED = 3 /* something else wrote to the filter's memory: init again */
 } plr_health;
 
-/* Why health is not good: bits of plr_report.reasons and plr_health_state.reasons. Above each: what
- * it means, what causes it, what to do. */
+/* What there is to say of health: bits of plr_report.reasons and plr_health_state.reasons. All but
+ * three say why it is not good; GATE_INERT, NO_ROOM and NIS_LOW ask for better settings or more
+ * slots, and by themselves leave it GOOD. Above each: what it means, what causes it, what to do. */
 typedef enum plr_reason {
     /* Fewer than 3 observations used in this frame: a bare wall, darkness, a covered camera, or the
      * gate rejects what is seen. Usually passes; if it stays, check the tracker. */
@@ -71,14 +72,14 @@ typedef enum plr_reason {
      * moved, ids changed their meaning, or a sigma is far too small. */
     PLR_REASON_GATE_LOCKED = 1 << 2,
     /* None of the last 1000 matches rejected: gate-d2 or pixel-sigma is too large for the gate to
-     * reject an outlier. */
+     * reject an outlier. Health stays GOOD. */
     PLR_REASON_GATE_INERT = 1 << 3,
     /* An innovation covariance could not be factorised; its observations were left out. Numbers of
      * very different size: check pixel-sigma, start-sigma and the covariances that were given. */
     PLR_REASON_BLOCK_FAILED = 1 << 4,
     /* The map sink refused a landmark, which therefore keeps its slot. Make room in the sink. */
     PLR_REASON_SINK_FAILED = 1 << 5,
-    /* New landmarks found no slot. More slots, or fewer features from the tracker. */
+    /* New landmarks found no slot; health stays GOOD. More slots, or fewer features. */
     PLR_REASON_NO_ROOM = 1 << 6,
     /* Observations were malformed or ids were doubled: a fault of the tracker or of the link. */
     PLR_REASON_REFUSED_INPUT = 1 << 7,
@@ -109,7 +110,8 @@ typedef enum plr_reason {
      * the body is wrong. */
     PLR_REASON_BIAS_OFF_PRIOR = 1 << 14,
     /* Innovations are far smaller than the noise says, over many frames: pixel-sigma is too large,
-     * or the tracker smooths what it sees. The pose is better than its covariance says. */
+     * or the tracker smooths what it sees. The pose is better than its covariance says. Health stays
+     * GOOD. */
     PLR_REASON_NIS_LOW = 1 << 15,
     /* The same pixels in successive frames while twists or IMU report motion: a camera or tracker
      * that sends the same image again. Restart it. */

@@ -6,6 +6,8 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "filter/mount.h"
+#include "math/dense.h"
+#include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -19,6 +21,53 @@ static bool ready(const plr_filter *f) {
 static void to_double(double *y, const plr_real *x, unsigned n) {
     for (unsigned i = 0; i < n; i++)
         y[i] = (double)x[i];
+}
+
+/* The first share by which variances are enlarged, and the last: with it they are 13 times what
+ * they were, more than the six that make any correlations possible. */
+#define FIRST_SHARE (1.0 / (1 << 20))
+#define LAST_SHARE  4.0
+/* What is positive with variances less by this share is positive by more than rounding. */
+#define SURE_SHARE (PLR_R(256) * PLR_EPSILON + PLR_R(1e-8))
+
+/* Most covariances are, and to know it costs little beside plr_is_covariance where double is not in
+ * hardware. Uses the lower triangle. */
+static bool is_surely_positive(const plr_real P[PLR_POSE_SQUARE]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
+    for (unsigned i = 0, at = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = i; j < PLR_POSE_DIM; j++, at++)
+            U[at] = P[PLR_POSE_DIM * j + i] * (i == j ? PLR_R(1) - SURE_SHARE : PLR_R(1));
+    return plr_cholesky_upper(PLR_POSE_DIM, U);
+}
+
+/* A covariance as it is told, 6x6: symmetric to the bit, and positive, so that plr_filter_set_pose
+ * takes it back. Where directions are known by very different amounts, rounding in float32 leaves a
+ * P that is not quite positive (docs/NUMERICS.md 2), though each of its variances is. Variances are
+ * then enlarged, all by the same share, until it is; if that does not help, because correlations are
+ * beyond 1, none are told. PLR_E_DIVERGED if a number is not finite or a variance is negative. */
+static plr_status tell_covariance(double *told, const plr_real P[PLR_POSE_SQUARE]) {
+    enum { N = PLR_POSE_DIM };
+    double C[PLR_POSE_SQUARE], share = FIRST_SHARE;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++)
+            C[N * i + j] = (double)P[i >= j ? N * i + j : N * j + i];
+    if (is_surely_positive(P)) {
+        memcpy(told, C, sizeof C);
+        return PLR_OK;
+    }
+    if (!plr_all_finite(C, PLR_POSE_SQUARE))
+        return PLR_E_DIVERGED;
+    for (int i = 0; i < N; i++)
+        if (C[(N + 1) * i] < 0)
+            return PLR_E_DIVERGED;
+    for (; share <= LAST_SHARE && !plr_is_covariance(C, N); share *= 4)
+        for (int i = 0; i < N; i++)
+            C[(N + 1) * i] *= 1 + share;
+    if (share > LAST_SHARE && !plr_is_covariance(C, N))
+        for (int i = 0; i < PLR_POSE_SQUARE; i++)
+            C[i] = i % (N + 1) == 0 ? C[i] : 0;
+    memcpy(told, C, sizeof C);
+    return PLR_OK;
 }
 
 /* The pose's covariance now, enlarged while vision contradicts the twists. */
@@ -54,8 +103,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
     plr_real P[PLR_POSE_SQUARE];
     pose_covariance(f, P);
     plr_mount_covariance_out(f, P);
-    to_double(P_xi, P, PLR_POSE_SQUARE);
-    return PLR_OK;
+    return tell_covariance(P_xi, P);
 }
 
 plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
@@ -67,6 +115,9 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
     plr_real u[PLR_POSE_DIM];
     plr_process_of(f)->now(f, u, NULL);
     plr_mount_twist_out(f, u, NULL);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        if (!plr_is_finite(u[i]))
+            return PLR_E_DIVERGED;
     to_double(velocity->v_B_mps, u, 3);
     to_double(velocity->w_B_radps, u + 3, 3);
     return PLR_OK;
@@ -83,8 +134,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
     plr_process_of(f)->now(f, u, P);
     plr_mount_twist_out(f, u, P);
-    to_double(P_u, P, PLR_POSE_SQUARE);
-    return PLR_OK;
+    return tell_covariance(P_u, P);
 }
 
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
@@ -95,11 +145,14 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
         return sound;
     if (f->diverged && P_b)
         return PLR_E_DIVERGED;
-    plr_real P[PLR_POSE_SQUARE];
-    plr_process_of(f)->bias_covariance(f, P);
+    if (P_b) {
+        plr_real P[PLR_POSE_SQUARE];
+        plr_process_of(f)->bias_covariance(f, P);
+        const plr_status status = tell_covariance(P_b, P);
+        if (status != PLR_OK)
+            return status;
+    }
     to_double(b, f->bias, PLR_POSE_DIM);
-    if (P_b)
-        to_double(P_b, P, PLR_POSE_SQUARE);
     return PLR_OK;
 }
 
@@ -121,7 +174,7 @@ double plr_filter_trace(const plr_filter *f) {
     }
     for (int i = 0; i < PLR_POSE_DIM; i++)
         trace += (double)P[(PLR_POSE_DIM + 1) * i];
-    return trace;
+    return plr_all_finite(&trace, 1) ? trace : 0;
 }
 
 plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals) {

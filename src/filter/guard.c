@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include "filter/filter_internal.h"
+#include "math/small.h"
 #include "state/covariance.h"
+#include "state/polar.h"
 
 enum {
     LANES = 8, /* sums side by side: some processors add them at once */
@@ -110,12 +112,12 @@ bool plr_guard_is_in_range(const plr_filter *f) {
            f->motion.noisy <= 1;
 }
 
-/* R^T R = I to rounding and more, p a number. */
-static bool is_pose(const plr_filter *f) {
+bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {
     const plr_real allowed = PLR_R(1e-3);
-    const plr_real *R = f->R_WB;
+    const plr_real *R = R_WB;
+    plr_real third[3];
     for (unsigned i = 0; i < 3; i++) {
-        if (!(f->p_WB[i] - f->p_WB[i] <= 0))
+        if (!(p_WB[i] - p_WB[i] <= 0))
             return false;
         for (unsigned j = 0; j <= i; j++) {
             const plr_real dot = R[i] * R[j] + R[3 + i] * R[3 + j] + R[6 + i] * R[6 + j];
@@ -124,7 +126,14 @@ static bool is_pose(const plr_filter *f) {
                 return false;
         }
     }
-    return true;
+    plr_cross3(third, R, R + 3);
+    return plr_dot3(third, R + 6) > 0;
+}
+
+bool plr_guard_is_landmark(const plr_filter *f, const plr_slot *slot) {
+    const plr_real range2 = plr_dot3(slot->x, slot->x);
+    const plr_real least = f->model == PLR_MODEL_BODY ? PLR_R(0.5) * PLR_MIN_RANGE : PLR_R(0);
+    return range2 >= least * least && plr_is_finite(range2);
 }
 
 /* ---------------------------------------------------------------- checks and seals */
@@ -142,8 +151,8 @@ plr_status plr_guard_check_constant(const plr_filter *f) {
 plr_status plr_guard_check(const plr_filter *f) {
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
-    return sound(plr_guard_is_in_range(f) && is_pose(f) && constant_sum(f) == f->guard.constant &&
-                 small_sum(f) == f->guard.small);
+    return sound(plr_guard_is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&
+                 constant_sum(f) == f->guard.constant && small_sum(f) == f->guard.small);
 }
 
 plr_status plr_guard_check_whole(const plr_filter *f) {

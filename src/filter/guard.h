@@ -33,6 +33,13 @@ plr_status plr_guard_check_constant(const plr_filter *f);
 /* Counts and choices are in their ranges: no index can leave its array. */
 bool plr_guard_is_in_range(const plr_filter *f);
 
+/* R^T R = I, but for rounding and more, no mirror image, and p finite. */
+bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]);
+
+/* The point is one that a landmark of the filter's model can have: in `body`, one whose chart is
+ * defined (state/polar.h). */
+bool plr_guard_is_landmark(const plr_filter *f, const plr_slot *slot);
+
 /* After a call that changed the small state; landmarks or P too; and once, at init. */
 void plr_guard_seal(plr_filter *f);
 void plr_guard_seal_whole(plr_filter *f);

@@ -25,7 +25,7 @@ enum {
 #define HELD_INTERVALS 3.0
 #define HELD_S         0.05
 
-/* Reasons that leave the estimate as good as it should be. */
+/* Reasons that leave the estimate as good as it should be, and health GOOD: types.h names them. */
 #define HARMLESS (PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW)
 /* Reasons that do not apply in dead reckoning. */
 #define OBSERVATION_REASONS (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)

@@ -22,7 +22,10 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
         return PLR_E_ARGUMENT;
     if (f->diverged)
         return PLR_E_DIVERGED;
-    plr_slots_export(f, slot, landmark);
+    plr_landmark found;
+    if (!plr_slots_export(f, slot, &found))
+        return PLR_E_DIVERGED;
+    *landmark = found;
     return PLR_OK;
 }
 
@@ -68,8 +71,7 @@ plr_status plr_filter_flush_map(plr_filter *f) {
         return PLR_E_DIVERGED;
     for (unsigned slot = f->count; slot-- > 0;) { /* backwards: removing moves the last */
         plr_landmark landmark;
-        plr_slots_export(f, slot, &landmark);
-        if (f->map.sink(f->map.context, &landmark) == 0)
+        if (!plr_slots_export(f, slot, &landmark) || f->map.sink(f->map.context, &landmark) == 0)
             plr_slots_remove(f, slot);
     }
     plr_guard_seal_whole(f);

@@ -35,6 +35,12 @@ typedef struct plr_state_count {
     uint32_t landmarks;
 } plr_state_count;
 
+/* Of the filter, in between: what is read is looked at before it is stored. */
+typedef struct plr_state_pose {
+    plr_real R_WB[9];
+    double p_WB[3];
+} plr_state_pose;
+
 #define TABLE(name, times) static const plr_field name##_fields[] = {
 #define GROUP(about)
 #define FIELD(type, member, kind_, count_, most_, about)                                           \
@@ -61,7 +67,7 @@ uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
     if (!f || plr_guard_check(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
-           SIZE(filter) + landmarks * SIZE(slot) +
+           SIZE(time) + SIZE(pose) + SIZE(filter) + landmarks * SIZE(slot) +
            elements(f, landmarks) * (uint32_t)sizeof(plr_real);
 }
 
@@ -120,8 +126,13 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
                    .move = to_sink,
                    .context = &out};
     const plr_state_count count = {f->count};
+    plr_state_pose pose;
+    memcpy(pose.R_WB, f->R_WB, sizeof pose.R_WB);
+    memcpy(pose.p_WB, f->p_WB, sizeof pose.p_WB);
     pass_origin(&c, f);
     PASS(&c, &count, count);
+    PASS(&c, f, time);
+    PASS(&c, &pose, pose);
     PASS(&c, f, filter);
     for (unsigned slot = 0; slot < f->count; slot++)
         PASS(&c, &f->slots[slot], slot);
@@ -179,6 +190,31 @@ static plr_status check_covariance(plr_codec *c, unsigned dim) {
     return as_stored(c);
 }
 
+/* Reads the pose; f = NULL: only checks it. */
+static plr_status read_pose(plr_codec *c, plr_filter *f) {
+    plr_state_pose pose;
+    PASS(c, &pose, pose);
+    if (c->status == PLR_OK && !plr_guard_is_pose(pose.R_WB, pose.p_WB))
+        return PLR_E_CORRUPT;
+    if (f) {
+        memcpy(f->R_WB, pose.R_WB, sizeof f->R_WB);
+        memcpy(f->p_WB, pose.p_WB, sizeof f->p_WB);
+    }
+    return as_stored(c);
+}
+
+/* Reads one landmark, without its rows of P; f = NULL: only checks it. */
+static plr_status read_slot(plr_codec *c, plr_filter *f, const plr_filter *like, unsigned number) {
+    plr_slot slot;
+    memset(&slot, 0, sizeof slot);
+    PASS(c, &slot, slot);
+    if (c->status == PLR_OK && !plr_guard_is_landmark(like, &slot))
+        return PLR_E_CORRUPT;
+    if (f)
+        memcpy(&f->slots[number], &slot, sizeof slot);
+    return as_stored(c);
+}
+
 /* Reads the whole state. f = NULL: only checks it. `like` is the filter that it must
  * belong to. PLR_E_FOREIGN: of another build, of other settings, of another camera. */
 static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like) {
@@ -195,6 +231,8 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     if (length !=
         plr_filter_saved_size(like, count.landmarks)) /* which is 0 if these are too many */
         return PLR_E_CORRUPT;
+    PASS(c, f, time);
+    plr_status status = read_pose(c, f);
     PASS(c, f, filter);
     if (f) {
         f->count = count.landmarks;
@@ -204,8 +242,10 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         memset(f->readings_rejected, 0, sizeof f->readings_rejected);
         f->last_position_ns = 0;
     }
-    for (unsigned slot = 0; slot < count.landmarks; slot++)
-        PASS(c, f ? &f->slots[slot] : NULL, slot);
+    for (unsigned slot = 0; slot < count.landmarks && status == PLR_OK; slot++)
+        status = read_slot(c, f, like, slot);
+    if (status != PLR_OK)
+        return status;
     if (!f)
         return check_covariance(c, plr_covariance_row(like, count.landmarks));
     plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));

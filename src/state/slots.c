@@ -36,8 +36,7 @@ bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed) {
         return false;
     if (f->map.sink) {
         plr_landmark landmark;
-        plr_slots_export(f, slot, &landmark);
-        if (f->map.sink(f->map.context, &landmark) != 0) {
+        if (plr_slots_export(f, slot, &landmark) && f->map.sink(f->map.context, &landmark) != 0) {
             *sink_failed = true;
             return false;
         }
@@ -66,7 +65,7 @@ void plr_slots_remove(plr_filter *f, unsigned slot) {
         f->slots[slot] = f->slots[f->count];
 }
 
-void plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark) {
+bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark) {
     const plr_slot *s = &f->slots[slot];
     plr_world_point point;
     plr_real P[9];
@@ -77,9 +76,15 @@ void plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark
     landmark->times_gated = s->times_gated;
     landmark->last_seen_ns = s->last_seen_ns;
     landmark->known = s->known != 0;
-    for (int i = 0; i < 3; i++)
+    double sum = 0; /* NaN, or infinite, if any of the numbers is */
+    for (int i = 0; i < 3; i++) {
         landmark->p_W_m[i] = point.p_W[i];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            landmark->P_W_m2[3 * i + j] = (double)P[i >= j ? 3 * i + j : 3 * j + i];
+        sum += point.p_W[i] - point.p_W[i];
+        for (int j = 0; j < 3; j++) {
+            const double variance = (double)P[i >= j ? 3 * i + j : 3 * j + i];
+            landmark->P_W_m2[3 * i + j] = variance;
+            sum += variance - variance;
+        }
+    }
+    return sum == 0;
 }

@@ -27,7 +27,8 @@ void plr_slots_append(plr_filter *f, uint32_t id, bool known, const plr_new_land
 /* Drops a landmark; the last slot takes its place. */
 void plr_slots_remove(plr_filter *f, unsigned slot);
 
-/* Landmark in the world with covariance. All motion must be applied. */
-void plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark);
+/* Landmark in the world with covariance. All motion must be applied. False if one of the numbers is
+ * not finite: then it is nowhere. */
+bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark);
 
 #endif

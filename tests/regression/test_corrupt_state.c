@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+/*
+ * A saved state with a flipped bit was restored with PLR_OK where it held numbers that no filter can
+ * have: a pose that is no rotation, after which every call found the filter damaged; a landmark so far
+ * off that a question about it was answered with infinity. What a restore takes now stands the guard's
+ * own checks, and no question is answered with a number that is not finite.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+#include "support/rig.h"
+#include "support/specimens.h"
+#include "support/state_bytes.h"
+
+enum {
+    REAL = sizeof(plr_real),
+    /* Where fields stand (docs/STATE-FORMAT.md). */
+    COUNT_AT = 13 + 9 * 50 + 17 * REAL,
+    POSE_AT = COUNT_AT + 4 + 16 + REAL + 2,
+    POSITION_AT = POSE_AT + 9 * REAL,
+    REST_AT = POSITION_AT + 24,
+    SLOT_SIZE = 8 * REAL + 35
+};
+
+static plr_filter other;
+static state_bytes state;
+
+void setUp(void) {
+    rig_set_up();
+    rig.config.bias = 1;
+    rig_begin();
+    rig_drive(5);
+    rig_twist();
+    state_bytes_save(&state, &rig.filter);
+}
+
+void tearDown(void) {
+}
+
+static uint32_t slots_at(void) {
+    const unsigned n = plr_filter_landmark_count(&rig.filter), rows = 12 + 3 * n;
+    return state.length - rows * (rows + 1) / 2 * REAL - n * SLOT_SIZE;
+}
+
+static bool is_finite(const double *x, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return false;
+    return true;
+}
+
+/* Every question is refused or answered with finite numbers. */
+static void ask_everything(const char *at) {
+    plr_pose pose;
+    plr_twist twist;
+    plr_landmark landmark;
+    double x[6], P[36];
+    if (plr_filter_pose(&other, &pose) == PLR_OK)
+        TEST_ASSERT_TRUE_MESSAGE(is_finite(pose.R, 9) && is_finite(pose.p, 3), at);
+    if (plr_filter_velocity(&other, &twist) == PLR_OK)
+        TEST_ASSERT_TRUE_MESSAGE(is_finite(twist.v_B_mps, 3) && is_finite(twist.w_B_radps, 3), at);
+    if (plr_filter_pose_covariance(&other, P) == PLR_OK)
+        TEST_ASSERT_TRUE_MESSAGE(is_finite(P, 36), at);
+    if (plr_filter_velocity_covariance(&other, P) == PLR_OK)
+        TEST_ASSERT_TRUE_MESSAGE(is_finite(P, 36), at);
+    if (plr_filter_bias(&other, x, P) == PLR_OK)
+        TEST_ASSERT_TRUE_MESSAGE(is_finite(x, 6) && is_finite(P, 36), at);
+    TEST_ASSERT_TRUE_MESSAGE(isfinite(plr_filter_trace(&other)), at);
+    for (unsigned slot = 0; slot < plr_filter_landmark_count(&other); slot++)
+        if (plr_filter_landmark(&other, slot, &landmark) == PLR_OK)
+            TEST_ASSERT_TRUE_MESSAGE(is_finite(landmark.p_W_m, 3) && is_finite(landmark.P_W_m2, 9),
+                                     at);
+}
+
+/* Restores with one bit flipped. */
+static plr_status restore_with(uint32_t bit) {
+    char at[48];
+    snprintf(at, sizeof at, "byte %u, bit %u", (unsigned)(bit / 8), (unsigned)(bit % 8));
+    memcpy(&other, &rig.filter, sizeof other);
+    state.bytes[bit / 8] ^= (uint8_t)(1U << bit % 8);
+    const plr_status status = state_bytes_restore(&state, &other);
+    state.bytes[bit / 8] ^= (uint8_t)(1U << bit % 8);
+    TEST_ASSERT_TRUE_MESSAGE(status == PLR_OK || status == PLR_E_FOREIGN || status == PLR_E_CORRUPT,
+                             at);
+    if (status != PLR_OK)
+        return status;
+    const plr_twist still = {{0}, {0}};
+    plr_pose pose;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(PLR_OK, plr_filter_pose(&other, &pose), at);
+    ask_everything(at);
+    TEST_ASSERT_NOT_EQUAL_INT_MESSAGE(
+        PLR_E_DAMAGED, plr_filter_predict(&other, rig.filter.t_ns + RIG_STEP_NS, &still), at);
+    ask_everything(at);
+    return status;
+}
+
+static unsigned refused_from(uint32_t from, uint32_t to, unsigned stride) {
+    unsigned refused = 0;
+    for (uint32_t bit = 8 * from; bit < 8 * to; bit += stride)
+        refused += restore_with(bit) != PLR_OK;
+    return refused;
+}
+
+static void test_what_a_restore_takes_the_next_call_does_not_find_damaged(void) {
+    TEST_ASSERT_GREATER_THAN_UINT(9 * 8, refused_from(POSE_AT, POSITION_AT, 1));
+    TEST_ASSERT_EQUAL_UINT(0, refused_from(POSITION_AT, REST_AT - 2, 64)); /* the lowest bits */
+    (void)refused_from(COUNT_AT, POSE_AT, 1);
+    (void)refused_from(POSITION_AT, slots_at(), 13);
+}
+
+static void test_no_question_is_answered_with_a_number_that_is_not_finite(void) {
+    const uint32_t first = slots_at();
+    TEST_ASSERT_GREATER_THAN_UINT(4, plr_filter_landmark_count(&rig.filter));
+    TEST_ASSERT_GREATER_THAN_UINT(2, refused_from(first, first + 3 * REAL, 1));
+    (void)refused_from(first, first + SLOT_SIZE, 1);
+    (void)refused_from(state.length - 10 * REAL, state.length, 1); /* of P */
+    (void)refused_from(first, state.length, 211);
+}
+
+static void test_a_mirror_image_is_no_pose(void) {
+    plr_real R[9];
+    memcpy(R, rig.filter.R_WB, sizeof R);
+    for (unsigned i = 0; i < 9; i += 3)
+        R[i] = -R[i];
+    memcpy(state.bytes + POSE_AT, R, sizeof R); /* the tests run on little-endian machines */
+    memcpy(&other, &rig.filter, sizeof other);
+    TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, state_bytes_restore(&state, &other));
+    TEST_ASSERT_EQUAL_MEMORY(&rig.filter, &other, sizeof other);
+}
+
+static void test_a_landmark_in_the_camera_is_none(void) {
+    memset(state.bytes + slots_at(), 0, 3 * REAL);
+    memcpy(&other, &rig.filter, sizeof other);
+    TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, state_bytes_restore(&state, &other));
+    TEST_ASSERT_EQUAL_MEMORY(&rig.filter, &other, sizeof other);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_what_a_restore_takes_the_next_call_does_not_find_damaged);
+    RUN_TEST(test_no_question_is_answered_with_a_number_that_is_not_finite);
+    RUN_TEST(test_a_mirror_image_is_no_pose);
+    RUN_TEST(test_a_landmark_in_the_camera_is_none);
+    return UNITY_END();
+}
