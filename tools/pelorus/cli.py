@@ -3,20 +3,14 @@
 
 To add one: write commands/NAME.py with an `app` that has it, and name it in COMMANDS. Only
 the command that is called is imported: plotting takes longer to load than most of them to run.
+Nothing is imported here before `main` is there to take a Ctrl-C.
 """
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Iterable, Sequence
-from importlib import import_module
-
-import typer
-from rich.markup import escape
-
-from pelorus import __version__
-from pelorus.console import err, out
-from pelorus.errors import PelorusError
+from collections.abc import Sequence
 
 COMMANDS = (
     "convert",
@@ -33,45 +27,56 @@ COMMANDS = (
     "compare",
 )
 
-
-def _app(commands: Iterable[str]) -> typer.Typer:
-    app = typer.Typer(
-        name="pelorus",
-        help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
-        epilog="Example:  pelorus simulate drive.plr  &&  pelorus info drive.plr",
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        callback=_options,
-    )
-    for command in commands:
-        app.add_typer(import_module(f"pelorus.commands.{command}").app)
-    return app
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        out.print(f"pelorus {__version__}")
-        raise typer.Exit
-
-
-def _options(
-    version: bool = typer.Option(
-        False, "--version", help="Print the version.", callback=_show_version, is_eager=True
-    ),
-) -> None:
-    del version  # its callback has done the work
+INTERRUPTED = 130  # as a shell tells the signal of Ctrl-C
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; 0, or 1 after an error that was told, or 2 if the call makes no sense."""
     words = sys.argv[1:] if arguments is None else list(arguments)
-    app = _app(words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS)
     try:
-        app(args=words, prog_name="pelorus")
+        return _run(words)
+    except KeyboardInterrupt:  # while importing; later the application takes it
+        return INTERRUPTED
+
+
+def _run(words: list[str]) -> int:
+    from rich.markup import escape  # noqa: PLC0415 - see above
+
+    from pelorus.application import application  # noqa: PLC0415
+    from pelorus.console import err  # noqa: PLC0415
+    from pelorus.errors import PelorusError  # noqa: PLC0415
+
+    app = application(words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS)
+    status = 0
+    try:
+        try:
+            app(args=words, prog_name="pelorus")
+        except SystemExit as leaving:
+            status = leaving.code if isinstance(leaving.code, int) else 1
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except PelorusError as error:
         err.print(f"[bold red]error:[/] {escape(str(error))}")
         return 1
-    except SystemExit as leaving:
-        return leaving.code if isinstance(leaving.code, int) else 1
-    return 0
+    except OSError as error:
+        if not _give_up_output():
+            raise
+        if not isinstance(error, BrokenPipeError):  # who closed the pipe has read enough
+            err.print(f"pelorus: cannot write to standard output: {error.strerror}", markup=False)
+        return 1
+    return status
+
+
+def _give_up_output() -> bool:
+    """Whether it is standard output that fails: then it does not take a line more. From here on it
+    goes nowhere, or Python would complain once more while leaving.
+    """
+    try:
+        sys.stdout.flush()
+        os.write(sys.stdout.fileno(), b"\n")
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        return True
+    return False

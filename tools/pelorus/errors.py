@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+PART_FOLDER = ".part"  # in a folder: what is not yet whole
 
 
 class PelorusError(Exception):
@@ -62,6 +65,34 @@ def made(folder: Path) -> Path:
     except OSError as error:
         raise PelorusError(f"{folder}: cannot be made: {error.strerror}") from error
     return folder
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Where to make files that belong together: they move into the folder when all are made, in
+    place of those of their names, and if that fails nothing of them is left behind.
+    """
+    absent = [path for path in (folder, *folder.parents) if not path.exists()]
+    part = folder / PART_FOLDER
+    try:
+        shutil.rmtree(made(folder) / PART_FOLDER, ignore_errors=True)  # of one that was killed
+        yield made(part)
+        with writing(folder):
+            _move(part, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+        for path in absent:
+            with suppress(OSError):  # after a good end they hold something
+                path.rmdir()
+
+
+def _move(part: Path, folder: Path) -> None:
+    for path in sorted(part.iterdir()):
+        if path.is_dir():
+            (folder / path.name).mkdir(exist_ok=True)
+            _move(path, folder / path.name)
+        else:
+            path.replace(folder / path.name)
 
 
 def read_text(path: Path) -> str:

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, progress
-from pelorus.errors import made
+from pelorus.errors import made, whole_folder
 from pelorus.replay import find_programs
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
@@ -60,20 +60,31 @@ def report(
     require_twists(subject, also)
     options = replay_options(config, settings)
     plans = plan_runs(find_programs(programs), recording, options, also)
-    runs_folder = made(folder / "runs")
-    runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
+    with whole_folder(folder) as part:
+        runs_folder = made(part / "runs")
+        runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
 
-    from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
+        from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
 
-    _publish(Comparison(subject, runs), folder)
+        compared = Comparison(subject, runs)
+        lines = _draw(compared, part)
+        _remove_pictures(folder)
+    _tell(compared, lines, folder / PAGE)
 
 
-def _publish(compared: Comparison, folder: Path) -> None:
+def _remove_pictures(folder: Path) -> None:
+    """Of an earlier report: not every recording has all of them."""
+    from pelorus.report import pictures  # noqa: PLC0415 - as above
+
+    for name in pictures.NAMES:
+        (folder / f"{name}.png").unlink(missing_ok=True)
+
+
+def _draw(compared: Comparison, folder: Path) -> list[str]:
+    """The pictures and the page; the verdicts on it."""
     from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.report import page, pictures  # noqa: PLC0415 - as above
 
-    for name in pictures.NAMES:  # of an earlier report: not every recording has all of them
-        (folder / f"{name}.png").unlink(missing_ok=True)
     drawn = []
     for picture in progress(pictures.pictures(compared), "drawing"):
         path = folder / f"{picture.name}.png"
@@ -81,7 +92,7 @@ def _publish(compared: Comparison, folder: Path) -> None:
         drawn.append((picture, path))
     lines = words.verdicts(compared)
     page.write(folder / PAGE, compared, lines, drawn)
-    _tell(compared, lines, folder / PAGE)
+    return lines
 
 
 def _tell(compared: Comparison, lines: list[str], page: Path) -> None:

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""The commands' application: what `pelorus` itself says, and the commands that are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+
+import typer
+
+from pelorus import __version__
+from pelorus.console import out
+
+
+def application(commands: Iterable[str]) -> typer.Typer:
+    """With these commands, which are imported here."""
+    app = typer.Typer(
+        name="pelorus",
+        help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
+        epilog="Example:  pelorus simulate drive.plr  &&  pelorus info drive.plr",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        callback=_options,
+    )
+    for command in commands:
+        app.add_typer(import_module(f"pelorus.commands.{command}").app)
+    return app
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        out.print(f"pelorus {__version__}")
+        raise typer.Exit
+
+
+def _options(
+    version: bool = typer.Option(
+        False, "--version", help="Print the version.", callback=_show_version, is_eager=True
+    ),
+) -> None:
+    del version  # its callback has done the work
