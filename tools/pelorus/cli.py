@@ -8,7 +8,6 @@ Nothing is imported here before `main` is there to take a Ctrl-C.
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 
@@ -44,7 +43,7 @@ def _run(words: list[str]) -> int:
 
     from pelorus.application import application  # noqa: PLC0415
     from pelorus.console import err  # noqa: PLC0415
-    from pelorus.errors import PelorusError  # noqa: PLC0415
+    from pelorus.errors import PelorusError, gives_up_output  # noqa: PLC0415
 
     app = application(words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS)
     status = 0
@@ -59,24 +58,9 @@ def _run(words: list[str]) -> int:
         err.print(f"[bold red]error:[/] {escape(str(error))}")
         return 1
     except OSError as error:
-        if not _give_up_output():
+        if not gives_up_output():
             raise
         if not isinstance(error, BrokenPipeError):  # who closed the pipe has read enough
             err.print(f"pelorus: cannot write to standard output: {error.strerror}", markup=False)
         return 1
     return status
-
-
-def _give_up_output() -> bool:
-    """Whether it is standard output that fails: then it does not take a line more. From here on it
-    goes nowhere, or Python would complain once more while leaving.
-    """
-    try:
-        sys.stdout.flush()
-        os.write(sys.stdout.fileno(), b"\n")
-    except OSError:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
-        return True
-    return False

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -103,3 +105,18 @@ def read_text(path: Path) -> str:
         raise PelorusError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise PelorusError(f"{path}: is no text in UTF-8") from error
+
+
+def gives_up_output() -> bool:
+    """Whether it is standard output that fails: then it does not take a line more. From here on it
+    goes nowhere, or Python would complain once more while leaving.
+    """
+    try:
+        sys.stdout.flush()
+        os.write(sys.stdout.fileno(), b"\n")
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        return True
+    return False

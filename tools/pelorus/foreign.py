@@ -121,10 +121,9 @@ def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
             raise ForeignFileError(
                 path, f"has {len(cells)} numbers", at=at, due=f"{due} a row are due"
             )
-        try:
-            out[k] = [float(cell) for cell in cells]
-        except ValueError:
-            raise ForeignFileError(path, "holds something that is no number", at=at) from None
+        if not all(map(is_number, cells)):
+            raise ForeignFileError(path, "holds something that is no number", at=at)
+        out[k] = [float(cell) for cell in cells]
         if not np.isfinite(out[k]).all():
             raise ForeignFileError(path, "holds a number that is not finite", at=at)
     return out
@@ -133,23 +132,69 @@ def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
 # --- CSV ------------------------------------------------------------------------------------------
 
 
-def csv_rows(path: Path) -> list[list[str]]:
-    """The cells of every row that is not blank; the first row names the columns."""
+COMMENT = "#"
+
+
+class Csv(NamedTuple):
+    """The columns' names, the rows below, and the number of the first of these in the file."""
+
+    names: list[str]
+    rows: list[list[str]]
+    first_row: int
+
+
+def csv_rows(path: Path) -> Csv:
+    """The cells of every row that is not blank; the first row names the columns.
+
+    Rows that begin with # before the first one of data are comments. The last of them names the
+    columns where no other row does: `#timestamp [ns],w_RS_S_x [rad s^-1]`, as EuRoC has it.
+    """
     try:
         table = list(csv.reader(io.StringIO(text(path), newline="")))
     except csv.Error as error:
         raise ForeignFileError(path, f"is no CSV text: {error}") from error
     table = [row for row in table if any(cell.strip() for cell in row)]
+    comments, skipped = _comments(table)
+    table = table[skipped:]
+    if comments and (not table or _may_name(comments[-1], table[0])):
+        table.insert(0, comments[-1])
+        skipped -= 1
     if not table:
         raise ForeignFileError(path, "the file is empty", due="a row of column names is due")
-    for number, row in enumerate(table[1:], start=2):
-        if len(row) != len(table[0]):
+    names, below = table[0], table[1:]
+    _, more = _comments(below)
+    first_row = skipped + more + 2
+    for number, row in enumerate(below[more:], start=first_row):
+        if len(row) != len(names):
             raise ForeignFileError(
                 path,
-                f"has {len(row)} cells, the first row names {len(table[0])}",
+                f"has {len(row)} cells, the first row names {len(names)}",
                 at=f"row {number}",
             )
-    return table
+    return Csv(names, below[more:], first_row)
+
+
+def _comments(table: list[list[str]]) -> tuple[list[list[str]], int]:
+    """The first rows if they are comments, without their #; and how many there are."""
+    count = next(
+        (k for k, row in enumerate(table) if not row[0].lstrip().startswith(COMMENT)), len(table)
+    )
+    bare = [[row[0].lstrip().lstrip(COMMENT), *row[1:]] for row in table[:count]]
+    return bare, count
+
+
+def _may_name(comment: list[str], row: list[str]) -> bool:
+    """Whether the comment has a name for each cell of the row, which holds numbers itself."""
+    return len(comment) == len(row) and any(is_number(cell) for cell in row)
+
+
+def is_number(cell: str) -> bool:
+    """As people write them: Python's own 1_763 is a slip of the hand, or a name."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell
 
 
 # --- JSON -----------------------------------------------------------------------------------------

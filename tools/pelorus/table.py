@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from decimal import Decimal
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from pelorus.layout import Floats
 
 DIGITS_MAX = 19  # 2^63 has as many
 SHOWN_MAX = 40
+WHOLE = re.compile(r"(?<=\d)\.0*$")  # behind a whole number: pandas writes 3.0
 TIME_UNITS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}  # a column t_ms and so on; in ns
 TIME_COLUMNS = [f"t_{unit}" for unit in TIME_UNITS]
 
@@ -22,8 +24,9 @@ TIME_COLUMNS = [f"t_{unit}" for unit in TIME_UNITS]
 class Table:
     """The columns of one file, by name; blanks around names and numbers do not matter."""
 
-    def __init__(self, path: Path, columns: dict[str, list[str]]) -> None:
+    def __init__(self, path: Path, columns: dict[str, list[str]], first_row: int = 2) -> None:
         self.path = path
+        self.first_row = first_row  # of the numbers, counted as messages do: from 1
         self._columns = columns
         self._factor: dict[str, float] = {}
         self._own: dict[str, str] = {}  # what a renamed column is called in the file
@@ -31,12 +34,13 @@ class Table:
 
     @classmethod
     def read(cls, path: Path) -> Table:
-        rows = foreign.csv_rows(path)
-        names = [name.strip() for name in rows[0]]
+        found = foreign.csv_rows(path)
+        names = [name.strip() for name in found.names]
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             raise ForeignFileError(path, f"names the column {twice[0]} twice", at="row 1")
-        return cls(path, {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)})
+        columns = {name: [row[k] for row in found.rows] for k, name in enumerate(names)}
+        return cls(path, columns, found.first_row)
 
     @property
     def names(self) -> list[str]:
@@ -46,6 +50,10 @@ class Table:
     def count(self) -> int:
         """Of the rows."""
         return len(next(iter(self._columns.values())))
+
+    def row(self, k: int) -> str:
+        """Where the k-th row of numbers stands in the file."""
+        return f"row {self.first_row + k}"
 
     def rename(self, column: str, name: str, factor: float) -> None:
         """Give a column another name; its numbers are `factor` times what stands there."""
@@ -83,13 +91,13 @@ class Table:
         self.require(name)
         out = np.empty(len(self._columns[name]), np.int64)
         for row, cell in enumerate(self._columns[name]):
-            text = cell.strip()
+            text = WHOLE.sub("", cell.strip())
             if not text.isdecimal() or len(text) > DIGITS_MAX or int(text) > highest:
                 raise ForeignFileError(
                     self.path,
-                    f"{self._called(name)} is {_shown(text)}, a whole number from 0 to {highest} "
-                    "is due",
-                    at=f"row {row + 2}",
+                    f"{self._called(name)} is {_shown(cell.strip())}, "
+                    f"a whole number from 0 to {highest} is due",
+                    at=self.row(row),
                 )
             out[row] = int(text)
         return out
@@ -130,7 +138,7 @@ class Table:
             raise ForeignFileError(
                 self.path,
                 f"time does not ascend ({t_ns[back[0]]} ns, then {t_ns[back[0] + 1]} ns)",
-                at=f"row {int(back[0]) + 3}",
+                at=self.row(int(back[0]) + 1),
             )
         return t_ns
 
@@ -141,18 +149,20 @@ class Table:
     def _column(self, name: str) -> Floats:
         cells = self._columns[name]
         try:
+            if any("_" in cell for cell in cells):  # numpy takes 1_763, as Python does
+                raise ValueError
             column = np.array(cells, dtype=np.float64)
         except ValueError:
-            row = next(k for k, cell in enumerate(cells) if not _is_number(cell))
+            row = next(k for k, cell in enumerate(cells) if not foreign.is_number(cell))
             raise ForeignFileError(
                 self.path,
                 f"{self._called(name)} is {_shown(cells[row])}, a number is due",
-                at=f"row {row + 2}",
+                at=self.row(row),
             ) from None
         if not np.isfinite(column).all():
             row = int(np.nonzero(~np.isfinite(column))[0][0])
             raise ForeignFileError(
-                self.path, f"{self._called(name)} is not finite", at=f"row {row + 2}"
+                self.path, f"{self._called(name)} is not finite", at=self.row(row)
             )
         factor = self._factor.get(name, 1.0)
         return column if factor == 1.0 else column * factor
@@ -160,11 +170,3 @@ class Table:
 
 def _shown(cell: str) -> str:
     return repr(cell if len(cell) <= SHOWN_MAX else f"{cell[:SHOWN_MAX]}...")
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True

@@ -2,12 +2,13 @@
 """How the columns of a user's CSV are called, and their units: `--columns v=speed_kmh,t=stamp_ms`.
 
 NAME=COLUMN gives a column of the file the project's name; the unit is what stands behind its last
-underscore, or behind a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file alone. A number
-without a unit is refused, not guessed.
+underscore, in brackets, or behind a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file alone. A
+number without a unit is refused, not guessed.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
@@ -96,7 +97,7 @@ def _column(words: str) -> Column:
             f"{', '.join(NAMES)}, also for one file: wheel.t=stamp_ms"
         )
     target, units = NAMES[short]
-    unit = unit if colon else column.rpartition("_")[2]
+    unit = unit if colon else _unit_in(column)
     if units is NUMBER:
         return Column(words, file, target, column, 1.0)
     if unit not in units:
@@ -107,3 +108,11 @@ def _column(words: str) -> Column:
     if units is TIME_UNITS:
         return Column(words, file, f"t_{unit}", column, 1.0)
     return Column(words, file, target, column, units[unit])
+
+
+def _unit_in(column: str) -> str:
+    """Of speed_mps, or of w_RS_S_x [rad s^-1], as EuRoC has it."""
+    bracket = re.search(r"\[(.*)\]$", column)
+    if bracket is None:
+        return column.rpartition("_")[2]
+    return re.sub(r" s\^-(\d)", r"/s\1", bracket[1]).replace("/s1", "/s").replace("/s2", "/s^2")

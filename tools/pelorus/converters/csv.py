@@ -207,7 +207,7 @@ def _stereo(table: Table) -> tuple[Times, Tracks]:
     if twice.any():
         k = int(np.nonzero(twice)[0][0])
         t_ns = frame_t_ns[tracks.frame[k]]
-        rows = np.nonzero((row_t_ns == t_ns) & (id == tracks.id[k]))[0] + 2
+        rows = np.nonzero((row_t_ns == t_ns) & (id == tracks.id[k]))[0] + table.first_row
         raise ForeignFileError(
             path,
             f"id {tracks.id[k]} stands twice in the frame at {t_ns} ns: "
@@ -218,7 +218,8 @@ def _stereo(table: Table) -> tuple[Times, Tracks]:
 
 def truth_of(path: Path, columns: Columns) -> Trajectory:
     """A CSV with named columns, else a TUM file or EuRoC's."""
-    first = next((line for line in foreign.text(path).splitlines() if line.strip()), "")
+    lines = (line.lstrip() for line in foreign.text(path).splitlines())
+    first = next((line for line in lines if line and not line.startswith("#")), "")
     if not _names_columns(first.split(",")):
         return trajectory.read_stamped(path)
     table = columns.read(path, "truth")
@@ -229,7 +230,7 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
         raise ForeignFileError(
             path,
             "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
-            at=f"row {int(off.argmax()) + 2}",
+            at=table.row(int(off.argmax())),
         )
     poses = Poses(
         Rotation.from_quat(quaternions).as_matrix(), table.numbers("px_m", "py_m", "pz_m")
@@ -238,6 +239,6 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
 
 
 def _names_columns(cells: Sequence[str]) -> bool:
-    """Whether the first row holds names; one behind a # is a comment of EuRoC's and TUM's files."""
+    """Whether the first row behind comments holds names; in EuRoC's and TUM's files it does not."""
     words = [cell for cell in cells if cell.strip()[:1].isalpha()]
-    return not cells[0].startswith("#") and len(words) > NAMES_ITS_COLUMNS * len(cells)
+    return len(words) > NAMES_ITS_COLUMNS * len(cells)

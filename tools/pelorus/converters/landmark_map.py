@@ -69,7 +69,7 @@ def _csv(path: Path) -> Points:
         _require_world(path, table)
     if table.has(SIGMA):
         sigma = table.numbers(SIGMA)[:, 0]
-        _refuse_where(path, sigma < 0, np.arange(len(p)) + 2, f"{SIGMA} is negative")
+        _refuse_where(path, sigma < 0, np.arange(len(p)) + table.first_row, f"{SIGMA} is negative")
         P = sigma[:, None, None] ** 2 * np.eye(3)
     elif any(table.has(name) for name in COVARIANCE):
         P = unpack_symmetric(table.numbers(*COVARIANCE), 3)
@@ -80,11 +80,11 @@ def _csv(path: Path) -> Points:
             due=f"a column {SIGMA}, or {', '.join(COVARIANCE)}, is due",
         )
     id = table.integers("id", ID_MAX)
-    return Points(id, p, P, np.arange(len(p)) + 2)
+    return Points(id, p, P, np.arange(len(p)) + table.first_row)
 
 
 def _require_world(path: Path, table: Table) -> None:
-    for row, frame in enumerate(table.words("frame"), start=2):
+    for row, frame in enumerate(table.words("frame"), start=table.first_row):
         if frame != WORLD:
             raise ForeignFileError(
                 path,

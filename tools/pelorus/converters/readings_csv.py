@@ -86,7 +86,7 @@ def _sigma(table: Table, name: str) -> Floats:
         raise ForeignFileError(
             table.path,
             f"{name} is {sigma[bad[0]]:g}, a positive number is due",
-            at=f"row {int(bad[0]) + 2}",
+            at=table.row(int(bad[0])),
         )
     return sigma
 
@@ -98,6 +98,6 @@ def _within(table: Table, name: str, most: float) -> Floats:
         raise ForeignFileError(
             table.path,
             f"{name} is {numbers[beyond[0]]:g}, at most {most:g} is due",
-            at=f"row {int(beyond[0]) + 2}",
+            at=table.row(int(beyond[0])),
         )
     return numbers
