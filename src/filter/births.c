@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/births.h"
 
+#include "filter/gate.h"
 #include "filter/predict.h"
 #include "filter/tracks.h"
 #include "sensor/stereo.h"
@@ -54,8 +55,8 @@ void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n)
 void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
                         const plr_report *report) {
     plr_workspace *w = &f->work;
-    const bool may = f->config.model == PLR_MODEL_BODY && plr_births_are_allowed(f);
-    if (!may || 2 * report->gated >= report->matched)
+    const bool agrees = 2 * report->gated < report->matched;
+    if (f->config.model != PLR_MODEL_BODY || !plr_births_are_allowed(f))
         return;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[w->order[k]];
@@ -63,10 +64,13 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
             continue;
         const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
         const plr_slot before = f->slots[slot];
-        if (!plr_track_may_restart(&before) || !plr_stereo_makes_landmark(f, o))
+        const bool lost = w->gain[k] == PLR_GAIN_LOST, makes = plr_stereo_makes_landmark(f, o);
+        if (!lost && !(makes && agrees && plr_track_may_restart(&before)))
             continue;
         plr_predict_apply_prior(f);
         plr_slots_remove(f, slot);
+        if (!makes)
+            continue;
         append_new(f, o);
         plr_track_restart(&f->slots[f->count - 1], &before);
     }

@@ -15,6 +15,11 @@ typedef struct plr_verdict {
     plr_real gain; /* det(S); a larger one means more information for the state */
 } plr_verdict;
 
+/* In work.gain, where an accepted observation has a number that is not negative. A lost landmark's
+ * bearing is so uncertain that a linear correction would be wrong, whatever is seen. */
+#define PLR_GAIN_REJECTED PLR_R(-1)
+#define PLR_GAIN_LOST     PLR_R(-2)
+
 /* Compares d^2 with `gate-d2`; with the setting `gate-residual`, the squared norm of the raw
  * residuals with that, px^2. */
 bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2);

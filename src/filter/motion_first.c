@@ -14,8 +14,9 @@
 #include "state/slots.h"
 
 enum {
-    MIN_POINTS = 3,        /* of fewer points none can be checked by the others */
-    MIN_AGAINST_TWISTS = 6 /* fewer points never outweigh the twists */
+    MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
+    MIN_AGAINST_TWISTS = 6, /* fewer points never outweigh the twists */
+    MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 
 /* An observation supports one of two motions if its squared residual is smaller there by more than
@@ -30,13 +31,35 @@ enum {
  * share to its prediction. Below it the observation has determined the motion itself. */
 #define LEAST_SHARE PLR_R(0.05)
 
+/* A landmark seen again after this time is lost at a small variance already: what is uncertain of its
+ * bearing is not its own range, which the next frames would tell, but the way since. */
+#define UNSEEN_NS    1000000000U
+#define UNSEEN_SHARE PLR_R(0.08)
+
+/* True if no frame of the last second saw it before this one. */
+static bool is_unseen(const plr_filter *f, const plr_slot *slot) {
+    return f->t_ns - slot->last_seen_ns > UNSEEN_NS;
+}
+
+/* True if a landmark's bearing is too uncertain to linearise at, though the motion were known: it was
+ * out of sight while the pose drifted. */
+static bool is_lost(const plr_search *s, unsigned i) {
+    const plr_slot *slot = plr_search_slot(s, i);
+    const plr_real *P = s->sightings[i].P;
+    plr_real limit = plr_stereo_max_bearing_variance(s->f);
+    if (is_unseen(s->f, slot))
+        limit *= UNSEEN_SHARE;
+    return !slot->known && !(P[0] <= limit && P[4] <= limit);
+}
+
 /* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
  * S, and gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and
  * the observation takes no part in the search. */
 static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
-    if (at->behind) {
+    at->lost = is_lost(s, i);
+    if (at->behind || at->lost) {
         at->active = 0;
         return;
     }
@@ -60,7 +83,8 @@ static void judge_by_prior(plr_search *s, unsigned i) {
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
         basis = basis && sum - plr_stereo_variance(s->f, r) <= limit;
     }
-    if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
+    at->lost = !basis && !plr_search_slot(s, i)->known;
+    if (at->lost || !plr_cholesky3(M)) {
         at->active = 0;
         return;
     }
@@ -235,6 +259,25 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
     return active;
 }
 
+/* What a prediction over metres says of its own uncertainty is right to first order only: of its d^2 this
+ * share is compared with the gate. */
+#define ASTRAY_SHARE PLR_R(0.25)
+
+/* True if at the end of a search at least a quarter of the points disagree that the twists allow: from a
+ * prediction that is off by metres the bounded number of trials may not lead to the minimum. */
+static bool is_astray(const plr_search *s) {
+    unsigned active = 0, astray = 0;
+    for (unsigned i = 0; i < s->count; i++) {
+        const plr_sighting *at = &s->sightings[i];
+        if (!(at->active > 0))
+            continue;
+        active++;
+        const bool allowed = plr_gate_accepts(s->f, at->prior_d2 * ASTRAY_SHARE, 0);
+        astray += allowed && (at->behind || !plr_gate_accepts(s->f, plr_dot3(at->e, at->e), 0));
+    }
+    return active >= MIN_AGAINST_TWISTS && 4 * astray >= active;
+}
+
 void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
                      float *nis) {
     plr_search s = {.f = f, .frame = frame, .sightings = (plr_sighting *)(void *)f->work.Vt};
@@ -251,6 +294,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     first->found = active >= MIN_POINTS;
     if (active > 0)
         plr_search_descend(&s, &best);
+    for (unsigned again = 0; again < MORE_SEARCHES && is_astray(&s); again++)
+        plr_search_descend(&s, &best);
     first->contradicted =
         first->found && may_contradict(&s, &best) && search_without_twists(&s, &best);
     first->found = first->found && plr_search_factorise(&best, 0, U);
@@ -260,8 +305,13 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     const plr_real usual = plr_vantage_usual(f);
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
-        f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain : PLR_R(-1);
-        const plr_slot *slot = plr_search_slot(&s, i);
+        plr_slot *slot = plr_search_slot(&s, i);
+        const bool lost = s.sightings[i].lost || (!accepted && !slot->known && is_unseen(f, slot));
+        f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain
+                                        : lost   ? PLR_GAIN_LOST
+                                                 : PLR_GAIN_REJECTED;
+        if (lost) /* as if unseen: the frame does not correct it as it does others */
+            slot->last_frame = f->frame_number - 1;
         if (accepted && !slot->known)
             f->work.noise.range_shift[slot - f->slots] = plr_vantage_offset(
                 slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);

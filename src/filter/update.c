@@ -41,9 +41,6 @@ static bool position_before(const void *context, uint16_t a, uint16_t b) {
     return a < b;
 }
 
-/* In work.gain, where an accepted observation has a positive number. */
-#define REJECTED PLR_R(-1)
-
 /* work.used: the positions in order that pass the gate, at most `budget` of them: those with the
  * largest gain, ties to the lower id. */
 static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
@@ -80,7 +77,7 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
         plr_measurement m;
         if (plr_stereo_measure(f, w->slot_of[k], &frame->observations[w->order[k]], &m))
             verdict = plr_gate_judge(f, &m);
-        w->gain[k] = verdict.accepted ? verdict.gain : REJECTED;
+        w->gain[k] = verdict.accepted ? verdict.gain : PLR_GAIN_REJECTED;
         report->nis += verdict.accepted ? (float)verdict.d2 : 0;
     }
 }
@@ -162,7 +159,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     unsigned n = plr_match_in_order(f, frame, report);
     plr_match_slots(f, seen, n);
     plr_match_known(f, seen, n, &events, report);
-    plr_match_count(f, n);
+    const unsigned matched = n;
     if (f->config.model == PLR_MODEL_BODY && plr_consistency_is_frozen(f, frame, n))
         n = 0; /* it does not show the present */
     plr_reading still;
@@ -175,6 +172,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
                        f->config.mode == PLR_MODE_SLAM;
     const plr_correction correction =
         finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
+    plr_match_count(f, matched);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_batches;
     report->innovation_rows = (uint16_t)correction.innovation.rows;

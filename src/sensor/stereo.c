@@ -82,6 +82,10 @@ plr_real plr_stereo_max_variance(const plr_filter *f) {
     return f->par.camera.fx * f->par.camera.fx;
 }
 
+plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
+    return PLR_R(5) * PLR_SQRT(f->par.pixel_variance) / f->par.camera.fx;
+}
+
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m) {
     const plr_camera *camera = &f->par.camera;
