@@ -59,13 +59,15 @@ static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
     at->lost = is_lost(s, i);
+    at->adrift = false;
     if (at->behind || at->lost) {
         at->active = 0;
         return;
     }
     const plr_real *U = at->U[s->current];
     plr_real M[6], x[3];
-    plr_real limit = plr_stereo_max_variance(s->f);
+    const plr_real limit = plr_stereo_max_variance(s->f);
+    const plr_real adrift = limit * UNSEEN_SHARE * plr_stereo_max_bearing_variance(s->f);
     bool basis = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
@@ -81,7 +83,9 @@ static void judge_by_prior(plr_search *s, unsigned i) {
             for (unsigned l = 0; l < 3; l++)
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
-        basis = basis && sum - plr_stereo_variance(s->f, r) <= limit;
+        const plr_real variance = sum - plr_stereo_variance(s->f, r);
+        basis = basis && variance <= limit;
+        at->adrift = at->adrift || variance > adrift;
     }
     at->lost = !basis && !plr_search_slot(s, i)->known;
     if (at->lost || !plr_cholesky3(M)) {
@@ -306,7 +310,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const bool lost = s.sightings[i].lost || (!accepted && !slot->known && is_unseen(f, slot));
+        const bool lost = s.sightings[i].lost || (!accepted && s.sightings[i].adrift &&
+                                                  !slot->known && is_unseen(f, slot));
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain
                                         : lost   ? PLR_GAIN_LOST
                                                  : PLR_GAIN_REJECTED;
