@@ -31,25 +31,20 @@ enum {
  * share to its prediction. Below it the observation has determined the motion itself. */
 #define LEAST_SHARE PLR_R(0.05)
 
-/* A landmark seen again after this time is lost at a small variance already: what is uncertain of its
- * bearing is not its own range, which the next frames would tell, but the way since. */
-#define UNSEEN_NS    1000000000U
-#define UNSEEN_SHARE PLR_R(0.08)
+/* A landmark that no frame of this time saw was out of sight. */
+#define UNSEEN_NS 1000000000U
 
-/* True if no frame of the last second saw it before this one. */
-static bool is_unseen(const plr_filter *f, const plr_slot *slot) {
-    return f->t_ns - slot->last_seen_ns > UNSEEN_NS;
+/* True if a landmark was out of sight before this frame, and may be lost. */
+static bool is_unseen(const plr_search *s, unsigned i) {
+    const plr_slot *slot = plr_search_slot(s, i);
+    return !slot->known && s->f->t_ns - slot->last_seen_ns > UNSEEN_NS;
 }
 
-/* True if a landmark's bearing is too uncertain to linearise at, though the motion were known: it was
- * out of sight while the pose drifted. */
+/* True if its bearing is too uncertain to linearise at, though the motion were known: the pose drifted
+ * meanwhile. */
 static bool is_lost(const plr_search *s, unsigned i) {
-    const plr_slot *slot = plr_search_slot(s, i);
-    const plr_real *P = s->sightings[i].P;
-    plr_real limit = plr_stereo_max_bearing_variance(s->f);
-    if (is_unseen(s->f, slot))
-        limit *= UNSEEN_SHARE;
-    return !slot->known && !(P[0] <= limit && P[4] <= limit);
+    const plr_real limit = plr_stereo_max_bearing_variance(s->f), *P = s->sightings[i].P;
+    return is_unseen(s, i) && !(P[0] <= limit && P[4] <= limit);
 }
 
 /* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
@@ -59,7 +54,7 @@ static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
     at->lost = is_lost(s, i);
-    at->adrift = false;
+    at->adrift = true; /* if nothing can be said of it */
     if (at->behind || at->lost) {
         at->active = 0;
         return;
@@ -67,8 +62,9 @@ static void judge_by_prior(plr_search *s, unsigned i) {
     const plr_real *U = at->U[s->current];
     plr_real M[6], x[3];
     const plr_real limit = plr_stereo_max_variance(s->f);
-    const plr_real adrift = limit * UNSEEN_SHARE * plr_stereo_max_bearing_variance(s->f);
-    bool basis = true;
+    /* px^2, as the limit is */
+    const plr_real adrift = limit * plr_stereo_max_bearing_variance(s->f);
+    bool basis = true, within = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
             M[k] = plr_dot3(at->a + PLR_POSE_DIM * r, at->a + PLR_POSE_DIM * c) +
@@ -85,10 +81,10 @@ static void judge_by_prior(plr_search *s, unsigned i) {
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
         const plr_real variance = sum - plr_stereo_variance(s->f, r);
         basis = basis && variance <= limit;
-        at->adrift = at->adrift || variance > adrift;
+        within = within && variance <= adrift;
     }
-    at->lost = !basis && !plr_search_slot(s, i)->known;
-    if (at->lost || !plr_cholesky3(M)) {
+    at->adrift = !within;
+    if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
         at->active = 0;
         return;
     }
@@ -310,8 +306,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const bool lost = s.sightings[i].lost || (!accepted && s.sightings[i].adrift &&
-                                                  !slot->known && is_unseen(f, slot));
+        const bool lost =
+            s.sightings[i].lost || (!accepted && s.sightings[i].adrift && is_unseen(&s, i));
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain
                                         : lost   ? PLR_GAIN_LOST
                                                  : PLR_GAIN_REJECTED;

@@ -83,7 +83,7 @@ plr_real plr_stereo_max_variance(const plr_filter *f) {
 }
 
 plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
-    return PLR_R(5) * PLR_SQRT(f->par.pixel_variance) / f->par.camera.fx;
+    return PLR_R(0.4) * PLR_SQRT(f->par.pixel_variance) / f->par.camera.fx;
 }
 
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,

@@ -46,8 +46,7 @@ plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen)
 plr_real plr_stereo_max_variance(const plr_filter *f);
 
 /* The largest variance of a landmark's bearing, rad^2, at which a projection is taken for linear: what
- * that leaves out, fx sigma^2 / 2, is then two and a half pixel sigmas. A smaller limit would lose
- * points that pass by while their range is uncertain. */
+ * that leaves out, fx sigma^2 / 2, is then a fifth of a pixel sigma. */
 plr_real plr_stereo_max_bearing_variance(const plr_filter *f);
 
 /* An observation of a landmark, linearised at the present estimate. False if the landmark is nearer
