@@ -301,7 +301,8 @@ static int run_recording(replay *run) {
     bool written = true;
     read_recording(run);
     int status = verdict_on_recording(run->options.input, &run->session, &run->outcome);
-    if (status == REPLAY_EXIT_OK)
+    const bool read = status == REPLAY_EXIT_OK; /* then the log says why a state is refused */
+    if (read)
         status = storage_verdict_on_load(&run->storage, &run->options);
     if (status == REPLAY_EXIT_OK && run->outcome.foreign_map)
         status = usage_error(run->outcome.map_problem);
@@ -309,11 +310,12 @@ static int run_recording(replay *run) {
         config_file_print(plr_filter_config(&run->session.filter));
         return fflush(stdout) == 0 ? REPLAY_EXIT_OK : REPLAY_EXIT_OUTPUT;
     }
-    if (status == REPLAY_EXIT_OK) {
+    if (status == REPLAY_EXIT_OK)
         tell_ending(run);
+    if (read)
         written = close_outputs(run); /* a summary that nobody reads ends the program */
+    if (status == REPLAY_EXIT_OK)
         status = verdict_on_frames(run->options.input, &run->session, &run->summary);
-    }
     const bool printed = status != REPLAY_EXIT_OK || print_results(run);
     const bool complete = memory_sufficed(run);
     const int kept = storage_verdict_on_save(&run->storage, &run->options);
