@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK=1
 PACKAGES_BUILD=(gcc libc6-dev make cmake python3 python3-venv ca-certificates)
 PACKAGES_TEST=(g++ 'clang-14|clang' libopenblas-dev liblapacke-dev
     gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm)
-# Without these a check is skipped, saying so.
+# Without these a check is skipped, saying so; without ninja builds take longer.
 PACKAGES_WANTED=(clang-format-14 libzstd-dev ninja-build)
 
 heading() {

@@ -211,8 +211,8 @@ if [ $extent != quick ]; then
     clang=$(command -v clang-14 || command -v clang)
     step 'build: sanitizers' build_preset debug "${strict[@]}" &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
-    # Another compiler, and without a fused multiply-add instruction: every test is built, for its warnings,
-    # and asked are the bits and the units. Of the same bits long drives would say the same again.
+    # Another compiler, and without a fused multiply-add instruction. Every test is built, for its warnings;
+    # the golden tests and the units are run. Where they compute the same bits, so would the long drives.
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_TEST_BLOCKS=OFF \
         -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'

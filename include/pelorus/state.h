@@ -198,9 +198,8 @@ typedef struct plr_consistency {
     uint8_t contradicted;                   /* 1: the twists are given less weight */
     uint8_t drifting;                       /* 1: over many frames the difference exceeds noise */
     uint8_t frozen;                         /* 1: this frame's picture equals the one before */
-    uint8_t
-        settling_frames; /* successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG;
-                                0: it does not hold */
+    /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
+    uint8_t settling_frames;
 } plr_consistency;
 
 /* Settings and camera in the filter's precision; of sigmas the squares. */

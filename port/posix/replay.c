@@ -167,7 +167,7 @@ static bool close_outputs(replay *run) {
     return good;
 }
 
-/* Where the run came to nothing: what stood there before stays. Nothing to do behind the above. */
+/* Where the run came to nothing: what stood there before stays. After close_outputs it does nothing. */
 static void discard_outputs(replay *run) {
     (void)compressed_output_close(run->port.packer);
     run->port.packer = NULL;

@@ -64,8 +64,11 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
             continue;
         const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
         const plr_slot before = f->slots[slot];
-        const bool lost = w->gain[k] == PLR_GAIN_LOST, makes = plr_stereo_makes_landmark(f, o);
-        if (!lost && !(makes && agrees && plr_track_may_restart(&before)))
+        const bool lost = w->gain[k] == PLR_GAIN_LOST;
+        if (!lost && !(agrees && plr_track_may_restart(&before)))
+            continue;
+        const bool makes = plr_stereo_makes_landmark(f, o);
+        if (!lost && !makes)
             continue;
         plr_predict_apply_prior(f);
         plr_slots_remove(f, slot);

@@ -19,8 +19,9 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
  * everything for too long. Their observations count as new ones. */
 void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n);
 
-/* Drops a lost landmark (gate.h), and initialises it again from this frame if its pixels allow it; and, if at least half of the frame was
- * accepted, one that was rejected for long, which is taken to be wrong. */
+/* Drops a lost landmark (gate.h), and initialises it again from this frame if its pixels allow it. If
+ * at least half of the frame was accepted, a landmark that was rejected for long is taken to be wrong,
+ * and is initialised again too. */
 void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
                         const plr_report *report);
 

@@ -116,9 +116,9 @@ bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]) {
     const plr_real allowed = PLR_R(1e-3);
     const plr_real *R = R_WB;
     plr_real third[3];
+    if (!plr_all_finite(p_WB, 3))
+        return false;
     for (unsigned i = 0; i < 3; i++) {
-        if (!(p_WB[i] - p_WB[i] <= 0))
-            return false;
         for (unsigned j = 0; j <= i; j++) {
             const plr_real dot = R[i] * R[j] + R[3 + i] * R[3 + j] + R[6 + i] * R[6 + j];
             const plr_real off = dot - (i == j ? PLR_R(1) : PLR_R(0));

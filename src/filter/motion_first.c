@@ -53,9 +53,8 @@ static bool is_lost(const plr_search *s, unsigned i) {
 static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
-    at->lost = is_lost(s, i);
-    at->adrift = true; /* if nothing can be said of it */
-    if (at->behind || at->lost) {
+    at->adrift = true; /* unless the prediction below says otherwise */
+    if (at->behind || is_lost(s, i)) {
         at->active = 0;
         return;
     }
@@ -263,8 +262,9 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
  * share is compared with the gate. */
 #define ASTRAY_SHARE PLR_R(0.25)
 
-/* True if at the end of a search at least a quarter of the points disagree that the twists allow: from a
- * prediction that is off by metres the bounded number of trials may not lead to the minimum. */
+/* True if at least a quarter of the points disagree with the result of a search although the twists'
+ * prediction allows them: from a prediction that is off by metres the bounded number of trials may not
+ * lead to the minimum. */
 static bool is_astray(const plr_search *s) {
     unsigned active = 0, astray = 0;
     for (unsigned i = 0; i < s->count; i++) {
@@ -306,8 +306,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const bool lost =
-            s.sightings[i].lost || (!accepted && s.sightings[i].adrift && is_unseen(&s, i));
+        const bool lost = !accepted && s.sightings[i].adrift && is_unseen(&s, i);
         f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain
                                         : lost   ? PLR_GAIN_LOST
                                                  : PLR_GAIN_REJECTED;

@@ -27,8 +27,7 @@ typedef struct plr_sighting {
     plr_real gain;           /* det S of that prediction */
     plr_real active;         /* 1: takes part in the search; 0: a known landmark, or excluded */
     bool behind;             /* at the last point the landmark lies behind the camera */
-    bool lost;               /* its bearing is too uncertain to linearise at, whatever nu is */
-    bool adrift;             /* as the prediction has it, with nu uncertain, it is so too */
+    bool adrift;             /* the prediction is too uncertain for a linear correction */
     plr_real twist_d2;       /* |e|^2 at the result of the search with the twists */
 } plr_sighting;
 
