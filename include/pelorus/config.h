@@ -38,7 +38,7 @@ extern "C" {
 #endif
 
 /* Most observations in one frame: 1 to 4096, default 128. A frame with more is refused, so choose
- * the most that the tracker can send. Each takes about 10 bytes of RAM in the filter, and 60 in a
+ * the most that the tracker can send. Each takes 4 bytes of RAM in the filter, and 60 in a
  * session. */
 #ifndef PLR_MAX_OBSERVATIONS
 #define PLR_MAX_OBSERVATIONS 128

@@ -234,21 +234,35 @@ typedef struct plr_noise {
     uint8_t open;                       /* 1: W belongs to the covariance and is not in P yet */
 } plr_noise;
 
+/* The observation of a landmark, linearised once in a frame and kept until the correction: three
+ * rows r = H x + noise (src/sensor/measurement.h). */
+typedef struct plr_kept_rows {
+    plr_real H[PLR_ROWS * PLR_LANDMARK_DIM]; /* derivative by the landmark */
+    plr_real r[PLR_ROWS];
+} plr_kept_rows;
+
+/* Of all observations of a frame. Where they depend on the pose too, in `world`, that derivative
+ * stands in plr_noise.Wt: such a model leaves it unused. */
+typedef struct plr_kept_measurements {
+    plr_kept_rows of_slot[PLR_MAX_LANDMARKS];
+    plr_real R[PLR_ROWS]; /* variances of the noise, which all have in common */
+    uint8_t terms;        /* 2: they depend on the pose too */
+} plr_kept_measurements;
+
 /* Workspace of one call; its contents are not used by later calls. */
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
      * The kernels read a little further than they use, hence the margins. */
     plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
-    plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
-               PLR_KERNEL_MARGIN]; /* packed upper triangle */
-    plr_real y[PLR_BLOCK_ROWS];
     plr_real dx[PLR_MAX_LD];
-    plr_real diagonal[PLR_MAX_LD];       /* diagonal of P after the block under test */
-    plr_noise noise;                     /* of the motion that this frame applies */
-    plr_real gain[PLR_MAX_OBSERVATIONS]; /* of order[k], plr_verdict.gain in gate.h; -1: rejected */
+    plr_real diagonal[PLR_MAX_LD];          /* diagonal of P after the block under test */
+    plr_noise noise;                        /* of the motion that this frame applies */
+    plr_kept_measurements kept;             /* those of `used`, by slot */
+    plr_real gain[PLR_MAX_LANDMARKS];       /* by slot_of[k]: plr_verdict.gain in gate.h; negative:
+                                            rejected */
     uint16_t order[PLR_MAX_OBSERVATIONS];   /* valid observations of the frame, ascending by id */
     uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* the slot of order[k], or PLR_NO_SLOT */
-    uint16_t used[PLR_MAX_OBSERVATIONS];    /* positions k in order that the update uses */
+    uint16_t used[PLR_MAX_LANDMARKS];       /* positions k in order that the update uses */
 } plr_workspace;
 
 /* Checksums of the filter's memory, to find out whether something else wrote to it. */

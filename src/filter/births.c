@@ -44,7 +44,7 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
 void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
-        const bool was_rejected = w->slot_of[k] != PLR_NO_SLOT && w->gain[k] < 0;
+        const bool was_rejected = w->slot_of[k] != PLR_NO_SLOT && w->gain[w->slot_of[k]] < 0;
         if (was_rejected)
             plr_slots_remove(f, plr_slots_find(f, frame->observations[w->order[k]].id));
     }
@@ -60,11 +60,11 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
         return;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[w->order[k]];
-        if (w->slot_of[k] == PLR_NO_SLOT || w->gain[k] >= 0)
+        if (w->slot_of[k] == PLR_NO_SLOT || w->gain[w->slot_of[k]] >= 0)
             continue;
         const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
         const plr_slot before = f->slots[slot];
-        const bool lost = w->gain[k] == PLR_GAIN_LOST;
+        const bool lost = w->gain[w->slot_of[k]] == PLR_GAIN_LOST;
         if (!lost && !(agrees && plr_track_may_restart(&before)))
             continue;
         const bool makes = plr_stereo_makes_landmark(f, o);

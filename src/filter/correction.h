@@ -26,16 +26,12 @@ typedef struct plr_correction {
     bool moved;                /* a motion with noise was applied: nu and Lambda are filled */
 } plr_correction;
 
-/* Where measurements come from: measure() fills number i, linearised at the current estimate. */
-typedef struct plr_measurement_source {
-    void (*measure)(const plr_filter *f, const void *context, unsigned i, plr_measurement *m);
-    const void *context;
-} plr_measurement_source;
-
-/* Applies `count` measurements, and the information about the biases that velocities have added
+/* Applies the measurements that were kept (sensor/measurement.h) of the first `seen` observations in
+ * work.used, then the `given` ones, and the information about the biases that velocities have added
  * since the last correction (process/velocity.h). All are linearised at the current estimate, and
  * the estimate is corrected once, at the end. If a variance would not be positive or the correction
  * is not finite, the filter is marked as diverged and keeps the result of the batches before. */
-plr_correction plr_correct(plr_filter *f, const plr_measurement_source *sensed, unsigned count);
+plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *given,
+                           unsigned count);
 
 #endif

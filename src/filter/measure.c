@@ -110,17 +110,10 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
     return accepted;
 }
 
-/* plr_measurement_source.measure: the context holds the measurements. */
-static void given(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
-    (void)f;
-    *m = ((const plr_measurement *)context)[i];
-}
-
 /* Corrects the state by measurements that were accepted. */
 static bool correct(plr_filter *f, const plr_measurement *m, unsigned count) {
-    const plr_measurement_source sensed = {given, m};
     if (!f->diverged)
-        (void)plr_correct(f, &sensed, count);
+        (void)plr_correct(f, 0, m, count);
     if (!f->diverged)
         return true;
     plr_filter_recover(f);

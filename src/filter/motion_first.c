@@ -307,7 +307,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
         const bool lost = !accepted && s.sightings[i].adrift && is_unseen(&s, i);
-        f->work.gain[f->work.used[i]] = accepted ? s.sightings[i].gain
+        f->work.gain[slot - f->slots] = accepted ? s.sightings[i].gain
                                         : lost   ? PLR_GAIN_LOST
                                                  : PLR_GAIN_REJECTED;
         if (lost) /* as if unseen: the frame does not correct it as it does others */

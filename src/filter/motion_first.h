@@ -19,7 +19,7 @@ typedef struct plr_motion_first {
                                   `motion` is that one, with a prior wide enough for it */
 } plr_motion_first;
 
-/* Finds nu and gates every matched observation: work.gain[k] >= 0 if accepted, else as in gate.h.
+/* Finds nu and gates every matched observation: work.gain >= 0 if accepted, else as in gate.h.
  * Adds d^2 of the accepted ones to *nis. Call it before the motion is applied to landmarks and P. */
 void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
                      float *nis);

@@ -32,8 +32,9 @@
 /* ---------------------------------------------------------------- gate and budget */
 
 static bool gain_before(const void *context, uint16_t a, uint16_t b) {
-    const plr_real *gain = context;
-    return gain[a] > gain[b] || (!(gain[a] < gain[b]) && a < b);
+    const plr_workspace *w = context;
+    const plr_real gain_a = w->gain[w->slot_of[a]], gain_b = w->gain[w->slot_of[b]];
+    return gain_a > gain_b || (!(gain_a < gain_b) && a < b);
 }
 
 static bool position_before(const void *context, uint16_t a, uint16_t b) {
@@ -51,8 +52,8 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         if (slot == PLR_NO_SLOT)
             continue;
         report->matched++;
-        plr_track_count(&f->slots[slot], w->gain[k] < 0);
-        if (w->gain[k] < 0) {
+        plr_track_count(&f->slots[slot], w->gain[slot] < 0);
+        if (w->gain[slot] < 0) {
             report->gated++;
             continue;
         }
@@ -60,24 +61,27 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
     }
     if (used <= frame->budget)
         return used;
-    plr_order_sort(w->used, used, gain_before, w->gain);
+    plr_order_sort(w->used, used, gain_before, w);
     report->left_out = (uint16_t)(used - frame->budget);
     plr_order_sort(w->used, frame->budget, position_before, NULL);
     return frame->budget;
 }
 
 /* Fills work.gain by each observation's own prediction, when the motion has been applied
- * already. */
+ * already, and keeps the measurements. */
 static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
-        if (w->slot_of[k] == PLR_NO_SLOT)
+        const uint16_t slot = w->slot_of[k];
+        if (slot == PLR_NO_SLOT)
             continue;
         plr_verdict verdict = {.accepted = false};
         plr_measurement m;
-        if (plr_stereo_measure(f, w->slot_of[k], &frame->observations[w->order[k]], &m))
+        if (plr_stereo_measure(f, slot, &frame->observations[w->order[k]], &m)) {
             verdict = plr_gate_judge(f, &m);
-        w->gain[k] = verdict.accepted ? verdict.gain : PLR_GAIN_REJECTED;
+            plr_measurement_keep(f, slot, &m);
+        }
+        w->gain[slot] = verdict.accepted ? verdict.gain : PLR_GAIN_REJECTED;
         report->nis += verdict.accepted ? (float)verdict.d2 : 0;
     }
 }
@@ -88,8 +92,9 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
  * accumulating, so that a dark camera does not affect P. */
 static bool needs_motion_applied(const plr_filter *f, const plr_frame *frame, unsigned n) {
     for (unsigned k = 0; k < n; k++) {
-        const bool used = f->work.slot_of[k] != PLR_NO_SLOT && f->work.gain[k] >= 0;
-        const bool born = f->work.slot_of[k] == PLR_NO_SLOT && plr_births_are_allowed(f) &&
+        const uint16_t slot = f->work.slot_of[k];
+        const bool used = slot != PLR_NO_SLOT && f->work.gain[slot] >= 0;
+        const bool born = slot == PLR_NO_SLOT && plr_births_are_allowed(f) &&
                           plr_stereo_makes_landmark(f, &frame->observations[f->work.order[k]]);
         if (used || born)
             return true;
@@ -97,24 +102,15 @@ static bool needs_motion_applied(const plr_filter *f, const plr_frame *frame, un
     return false;
 }
 
-/* plr_measurement_source.measure: number i of the observations used. If the motion has moved
- * the landmark behind the camera, the measurement has no effect. */
-static void measure(const plr_filter *f, const void *frame, unsigned i, plr_measurement *m) {
-    const plr_frame *seen = frame;
-    const uint16_t k = f->work.used[i];
-    if (plr_stereo_measure(f, f->work.slot_of[k], &seen->observations[f->work.order[k]], m))
-        return;
-    memset(m, 0, sizeof *m);
-    m->H.terms = 1;
-    m->H.term[0].row = plr_covariance_row(f, f->work.slot_of[k]);
-    m->H.term[0].columns = PLR_LANDMARK_DIM;
-    for (unsigned r = 0; r < PLR_ROWS; r++)
-        m->R[r] = plr_stereo_variance(f, r);
-}
-
-static plr_correction correct(plr_filter *f, const plr_frame *frame, unsigned used) {
-    const plr_measurement_source sensed = {measure, frame};
-    return plr_correct(f, &sensed, used);
+/* Keeps the measurements of the first `used` of work.used, where the gate has judged without them.
+ * One whose landmark the motion has moved behind the camera has no effect. */
+static void measure_used(plr_filter *f, const plr_frame *frame, unsigned used) {
+    for (unsigned i = 0; i < used; i++) {
+        const uint16_t k = f->work.used[i], slot = f->work.slot_of[k];
+        plr_measurement m;
+        (void)plr_stereo_measure(f, slot, &frame->observations[f->work.order[k]], &m);
+        plr_measurement_keep(f, slot, &m);
+    }
 }
 
 /* Finds the motion, judges the observations by it, and corrects. */
@@ -135,7 +131,9 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
-    correction = correct(f, frame, choose(f, frame, n, report));
+    const unsigned used = choose(f, frame, n, report);
+    measure_used(f, frame, used);
+    correction = plr_correct(f, used, NULL, 0);
     if (correction.moved && !f->diverged)
         plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda,
                             first.contradicted);
@@ -150,7 +148,7 @@ static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, uns
     if (f->diverged)
         return none;
     gate_each(f, frame, n, report);
-    return correct(f, frame, choose(f, frame, n, report));
+    return plr_correct(f, choose(f, frame, n, report), NULL, 0);
 }
 
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
@@ -228,10 +226,9 @@ static plr_status check(const plr_filter *f, const plr_frame *frame) {
  * biases. */
 static void dead_reckon(plr_filter *f) {
     if (f->motion.pending && plr_velocity_informs_bias(f)) {
-        const plr_measurement_source nothing = {NULL, NULL};
         plr_predict_apply_pending(f);
         if (!f->diverged)
-            (void)plr_correct(f, &nothing, 0);
+            (void)plr_correct(f, 0, NULL, 0);
     } else {
         plr_predict_apply_prior(f);
     }

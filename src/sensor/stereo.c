@@ -4,6 +4,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
+#include "state/covariance.h"
 #include "state/polar.h"
 
 /* ---------------------------------------------------------------- the pair of cameras */
@@ -86,13 +87,24 @@ plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
     return PLR_R(0.4) * PLR_SQRT(f->par.pixel_variance) / f->par.camera.fx;
 }
 
+static void measure_nothing(const plr_filter *f, unsigned slot, plr_measurement *m) {
+    memset(m, 0, sizeof *m);
+    m->H.terms = 1;
+    m->H.term[0].row = plr_covariance_row(f, slot);
+    m->H.term[0].columns = PLR_LANDMARK_DIM;
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        m->R[i] = plr_stereo_variance(f, i);
+}
+
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m) {
     const plr_camera *camera = &f->par.camera;
     plr_real z[3], Dz[9], along[3];
     plr_view view;
-    if (!plr_model_of(f)->look(f, slot, &view))
+    if (!plr_model_of(f)->look(f, slot, &view)) {
+        measure_nothing(f, slot, m);
         return false;
+    }
     plr_stereo_project(z, camera, view.q);
     plr_stereo_jacobian(Dz, camera, view.q);
     along_the_ray(camera, along);

@@ -24,13 +24,13 @@ static plr_filter filter, before;
 static rng chance;
 static plr_observation seen[MANY];
 
-/* plr_measurement_source.measure: observation i of slot i. */
-static void measure(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
-    const plr_observation *observations = context;
-    TEST_ASSERT_TRUE(plr_stereo_measure(f, i, &observations[i], m));
+/* By observation i of slot i, i = 0 .. count-1. */
+static plr_correction correct(unsigned count) {
+    static plr_measurement m[MANY];
+    for (unsigned i = 0; i < count; i++)
+        TEST_ASSERT_TRUE(plr_stereo_measure(&filter, i, &seen[i], &m[i]));
+    return plr_correct(&filter, 0, m, count);
 }
-
-static const plr_measurement_source of_slots = {measure, seen};
 
 void setUp(void) {
     chance = rng_seeded(52);
@@ -85,7 +85,7 @@ static void check_against_dense(plr_model_kind model, bool bias, unsigned count)
     dense_correction(count, dx, P);
     double bias_before[6];
     to_doubles(bias_before, filter.bias, 6);
-    const plr_correction correction = plr_correct(&filter, &of_slots, count);
+    const plr_correction correction = correct(count);
     TEST_ASSERT_EQUAL_UINT(count, correction.applied);
     TEST_ASSERT_EQUAL_UINT(0, correction.failed_batches);
     TEST_ASSERT_EQUAL_UINT(0, correction.cut);
@@ -122,7 +122,7 @@ static void test_blocks_give_the_correction_of_one_gain(void) {
 static void test_no_observations_change_nothing(void) {
     take_specimen(PLR_MODEL_BODY, true);
     before = filter;
-    const plr_correction correction = plr_correct(&filter, &of_slots, 0);
+    const plr_correction correction = correct(0);
     TEST_ASSERT_EQUAL_UINT(0, correction.applied);
     TEST_ASSERT_EQUAL_MEMORY(filter.P, before.P, sizeof filter.P);
     TEST_ASSERT_EQUAL_MEMORY(filter.slots, before.slots, sizeof filter.slots);
@@ -154,7 +154,7 @@ static void test_a_block_that_cannot_be_factorised_leaves_the_estimate(void) {
     take_specimen(PLR_MODEL_BODY, true);
     spoil(1);
     before = filter;
-    const plr_correction correction = plr_correct(&filter, &of_slots, 2);
+    const plr_correction correction = correct(2);
     if (PLR_BLOCK_OBSERVATIONS == 1) {
         TEST_ASSERT_EQUAL_UINT(1, correction.applied);
         TEST_ASSERT_EQUAL_UINT(1, correction.failed_batches);
@@ -172,7 +172,7 @@ static void test_blocks_beside_a_failed_one_are_applied(void) {
     const unsigned second = (MANY - first + blocks - 2) / (blocks - 1);
     take_specimen(PLR_MODEL_BODY, false);
     spoil(first);
-    const plr_correction correction = plr_correct(&filter, &of_slots, MANY);
+    const plr_correction correction = correct(MANY);
     TEST_ASSERT_EQUAL_UINT(1, correction.failed_batches);
     TEST_ASSERT_EQUAL_UINT(MANY - second, correction.applied);
 }
@@ -186,7 +186,7 @@ static void test_a_variance_that_would_be_lost_stops_the_correction(void) {
     filter.P[plr_packed_at(0, 0)] = PLR_R(1e-4);
     filter.P[plr_packed_at(row, 0)] = (plr_real)(20 * sqrt((double)own * 1e-4));
     before = filter;
-    const plr_correction correction = plr_correct(&filter, &of_slots, 1);
+    const plr_correction correction = correct(1);
     TEST_ASSERT_EQUAL_UINT(0, correction.applied);
     TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
     TEST_ASSERT_EQUAL_UINT64(filter.t_ns, filter.totals.diverged_ns);
@@ -201,7 +201,7 @@ static void test_a_senseless_correction_marks_the_filter_diverged(void) {
             filter.P[plr_packed_at(i, k)] *= i < 3 ? PLR_R(4e10) : PLR_R(2e5);
     seen[0].uL_px += 30;
     const plr_pose pose = {{0}, {filter.p_WB[0], filter.p_WB[1], filter.p_WB[2]}};
-    (void)plr_correct(&filter, &of_slots, 1);
+    (void)correct(1);
     TEST_ASSERT_EQUAL_UINT8(1, filter.diverged);
     TEST_ASSERT_EQUAL_MEMORY(pose.p, filter.p_WB, sizeof pose.p);
 }
@@ -230,7 +230,7 @@ static void test_corrections_beyond_the_largest_range_are_kept(void) {
         (double)(filter.par.camera.fx * filter.par.camera.baseline); /* px m, along the axis */
     for (unsigned slot = 0; slot < 3; slot++)
         seen[slot].uR_px = seen[slot].uL_px + 30; /* beyond infinity */
-    const plr_correction correction = plr_correct(&filter, &of_slots, 3);
+    const plr_correction correction = correct(3);
     TEST_ASSERT_EQUAL_UINT(0, correction.cut);
     TEST_ASSERT_EQUAL_UINT(3, correction.applied);
     for (unsigned slot = 0; slot < 3; slot++) {
@@ -247,7 +247,7 @@ static void test_corrections_at_the_least_range_are_counted(void) {
     take_loose_specimen();
     filter.par.pixel_variance = PLR_R(1e-6);
     seen[0].uR_px = seen[0].uL_px - 1e5F; /* a millimetre before the lens */
-    const plr_correction correction = plr_correct(&filter, &of_slots, 1);
+    const plr_correction correction = correct(1);
     TEST_ASSERT_EQUAL_UINT(1, correction.applied);
     TEST_ASSERT_EQUAL_UINT(1, correction.cut);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.01, range_of(0));

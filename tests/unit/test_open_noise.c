@@ -185,12 +185,6 @@ static void test_without_observations_the_noise_comes_back_into_P(void) {
 
 /* ---------------------------------------------------------------- with observations */
 
-/* plr_measurement_source.measure: observation i of slot i. */
-static void measure(const plr_filter *f, const void *context, unsigned i, plr_measurement *m) {
-    const plr_observation *observations = context;
-    TEST_ASSERT_TRUE(plr_stereo_measure(f, i, &observations[i], m));
-}
-
 typedef struct joint_update {
     unsigned n, m;
     double *P, *mean; /* of the state with the noise in it: P + W W^T and dx - W z */
@@ -283,6 +277,7 @@ static void demand_joint(noise_kind kind, unsigned count, const plr_filter *befo
 
 static void check_update(noise_kind kind, bool bias, bool shifted) {
     static plr_observation seen[MANY];
+    static plr_measurement measured[MANY];
     static plr_filter before;
     take_specimen(kind, bias, shifted);
     plr_predict_apply(&filter, &motion);
@@ -293,12 +288,12 @@ static void check_update(noise_kind kind, bool bias, bool shifted) {
         if (!(filter.slots[slot].x[2] > 1)) /* a shift may take one beside the camera */
             filter.slots[slot].x[2] = 1;
         seen[slot] = specimen_observation(&filter, slot, shift);
+        TEST_ASSERT_TRUE(plr_stereo_measure(&filter, slot, &seen[slot], &measured[slot]));
     }
-    const plr_measurement_source sensed = {measure, seen};
     joint_update joint = take_together(seen, count);
     one_gain(&joint);
     before = filter;
-    const plr_correction correction = plr_correct(&filter, &sensed, count);
+    const plr_correction correction = plr_correct(&filter, 0, measured, count);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(count, correction.applied, at);
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, filter.diverged, at);
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, filter.work.noise.open, at);

@@ -56,7 +56,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (SESSION, (*PORT, TELEMETRY)),
     (r"plr_input_handle", HANDLERS),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
-    (r"plr_correct", (r"(body|world)_retract", r"update\.c:measure", "given")),
+    (r"plr_correct", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
     (r"bias_is_off", (PROCESS,)),

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#include "sensor/measurement.h"
+
+#include <string.h>
+
+#include "pelorus/assertions.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
+
+enum { BY_POSE = PLR_ROWS * PLR_POSE_DIM }; /* elements of a derivative by the pose */
+
+void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m) {
+    plr_kept_measurements *kept = &f->work.kept;
+    const plr_term *own = &m->H.term[0], *pose = &m->H.term[1];
+    PLR_ASSERT(own->row == plr_covariance_row(f, slot) && own->columns == PLR_LANDMARK_DIM);
+    memcpy(kept->of_slot[slot].H, own->H, sizeof kept->of_slot[slot].H);
+    memcpy(kept->of_slot[slot].r, m->r, sizeof kept->of_slot[slot].r);
+    memcpy(kept->R, m->R, sizeof kept->R);
+    kept->terms = (uint8_t)m->H.terms;
+    if (m->H.terms == 1)
+        return;
+    PLR_ASSERT(pose->row == plr_row_of(f, PLR_BLOCK_POSE) && pose->columns == PLR_POSE_DIM);
+    PLR_ASSERT(!f->work.noise.open);
+    memcpy(f->work.noise.Wt + BY_POSE * slot, pose->H, BY_POSE * sizeof *pose->H);
+}
+
+void plr_measurement_recall(const plr_filter *f, unsigned slot, plr_measurement *m) {
+    const plr_kept_measurements *kept = &f->work.kept;
+    plr_term *own = &m->H.term[0], *pose = &m->H.term[1];
+    m->H.terms = kept->terms;
+    own->row = plr_covariance_row(f, slot);
+    own->columns = PLR_LANDMARK_DIM;
+    memcpy(own->H, kept->of_slot[slot].H, sizeof kept->of_slot[slot].H);
+    memcpy(m->r, kept->of_slot[slot].r, sizeof m->r);
+    memcpy(m->R, kept->R, sizeof m->R);
+    m->extra_d2 = m->residual2 = m->max_variance = 0;
+    if (kept->terms == 1)
+        return;
+    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
+    pose->columns = PLR_POSE_DIM;
+    memcpy(pose->H, f->work.noise.Wt + BY_POSE * slot, BY_POSE * sizeof *pose->H);
+}
