@@ -7,6 +7,7 @@
 #include "filter/guard.h"
 #include "filter/mount.h"
 #include "math/dense.h"
+#include "math/finite.h"
 #include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
@@ -81,9 +82,7 @@ plr_time_ns plr_filter_time(const plr_filter *f) {
 }
 
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
-    if (!f || !T_WB)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = T_WB ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     to_double(T_WB->R, f->R_WB, 9);
@@ -93,9 +92,7 @@ plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
 }
 
 plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
-    if (!f || !P_xi)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = P_xi ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->diverged)
@@ -107,9 +104,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
 }
 
 plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
-    if (!f || !velocity)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = velocity ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     plr_real u[PLR_POSE_DIM];
@@ -124,9 +119,7 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
 }
 
 plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
-    if (!f || !P_u)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = P_u ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->diverged)
@@ -138,9 +131,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
 }
 
 plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
-    if (!f || !b)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = b ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->diverged && P_b)
@@ -157,7 +148,7 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
 }
 
 double plr_filter_trace(const plr_filter *f) {
-    if (!f || plr_guard_check_whole(f) != PLR_OK || f->diverged)
+    if (plr_guard_check_whole(f) != PLR_OK || f->diverged)
         return 0;
     plr_real P[PLR_POSE_SQUARE], P_b[PLR_POSE_SQUARE] = {0};
     double trace = plr_covariance_trace(f);

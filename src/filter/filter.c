@@ -9,6 +9,7 @@
 #include "filter/guard.h"
 #include "filter/mount.h"
 #include "filter/predict.h"
+#include "math/finite.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
@@ -173,8 +174,6 @@ static void restore_bias_prior(plr_filter *f) {
 
 plr_status plr_filter_reset(plr_filter *f) {
     double P_xi[PLR_POSE_SQUARE];
-    if (!f)
-        return PLR_E_ARGUMENT;
     const plr_status sound = plr_guard_check_constant(f);
     if (sound != PLR_OK)
         return sound;
@@ -252,9 +251,7 @@ static void store_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
 
 plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB,
                                const double *P_xi) {
-    if (!f || !T_WB)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check_whole(f);
+    const plr_status sound = T_WB ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.mode == PLR_MODE_MAPPING)
@@ -301,9 +298,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
 }
 
 plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *variance) {
-    if (!f || !mean || !variance)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check_whole(f);
+    const plr_status sound = mean && variance ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (!plr_has_block(f, PLR_BLOCK_BIAS) || f->totals.twists > 0 || f->totals.frames > 0 ||
@@ -324,9 +319,7 @@ plr_status plr_filter_set_bias(plr_filter *f, const double *mean, const double *
 }
 
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB) {
-    if (!f || !T_WB)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = T_WB ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.mode != PLR_MODE_MAPPING)

@@ -47,8 +47,6 @@ void plr_filter_recover(plr_filter *f);
 bool plr_landmark_is_valid(const plr_landmark *landmark);
 
 /* Checks of what comes in as double. */
-bool plr_all_finite(const double *x, unsigned n);
-bool plr_all_within(const double *x, unsigned n, double limit); /* |x_i| <= limit; false for NaN */
 bool plr_is_rotation(const double R[9]);
 bool plr_is_covariance(const double *P, unsigned n);
 

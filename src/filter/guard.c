@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "filter/filter_internal.h"
+#include "math/finite.h"
 #include "math/small.h"
 #include "state/covariance.h"
 #include "state/polar.h"
@@ -143,12 +144,16 @@ static plr_status sound(bool is_sound) {
 }
 
 plr_status plr_guard_check_constant(const plr_filter *f) {
+    if (!f)
+        return PLR_E_ARGUMENT;
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
     return sound(constant_sum(f) == f->guard.constant);
 }
 
 plr_status plr_guard_check(const plr_filter *f) {
+    if (!f)
+        return PLR_E_ARGUMENT;
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
     return sound(plr_guard_is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&

@@ -21,7 +21,8 @@
 
 #include "pelorus/state.h"
 
-/* For a call that reads or changes the small state alone. PLR_E_NOT_READY; PLR_E_DAMAGED. */
+/* For a call that reads or changes the small state alone. PLR_E_ARGUMENT if f is NULL;
+ * PLR_E_NOT_READY; PLR_E_DAMAGED. */
 plr_status plr_guard_check(const plr_filter *f);
 
 /* For a call that reads or changes landmarks or P. */

@@ -9,6 +9,7 @@
 #include "filter/guard.h"
 #include "filter/mount.h"
 #include "filter/predict.h"
+#include "math/finite.h"
 #include "math/small.h"
 #include "process/alignment.h"
 #include "process/process.h"
@@ -113,9 +114,7 @@ static void learn(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_PO
 
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
     plr_real reading[PLR_POSE_DIM];
-    if (!f || !imu)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = imu ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_IMU)
@@ -204,9 +203,7 @@ void plr_filter_follow_start(plr_filter *f, const plr_report *report) {
 plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
                                    const double variance[3]) {
     plr_real v[3], P_v[3];
-    if (!f || !v_B_mps || !variance)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check_whole(f);
+    const plr_status sound = v_B_mps && variance ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_IMU || !f->inertial.pose_given || f->count > 0 ||

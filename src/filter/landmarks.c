@@ -2,6 +2,7 @@
 /* Landmarks as the caller sees them: in the world, in and out. */
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "math/finite.h"
 #include "process/alignment.h"
 #include "process/process.h"
 #include "state/covariance.h"
@@ -9,13 +10,11 @@
 #include "state/slots.h"
 
 unsigned plr_filter_landmark_count(const plr_filter *f) {
-    return f && plr_guard_check(f) == PLR_OK ? f->count : 0;
+    return plr_guard_check(f) == PLR_OK ? f->count : 0;
 }
 
 plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landmark) {
-    if (!f || !landmark)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check_whole(f);
+    const plr_status sound = landmark ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (slot >= f->count)
@@ -30,9 +29,7 @@ plr_status plr_filter_landmark(plr_filter *f, unsigned slot, plr_landmark *landm
 }
 
 plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) {
-    if (!f || !landmark)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check_whole(f);
+    const plr_status sound = landmark ? plr_guard_check_whole(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (!plr_all_finite(landmark->p_W_m, 3) || !plr_all_finite(landmark->P_W_m2, 9))
@@ -60,8 +57,6 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
 }
 
 plr_status plr_filter_flush_map(plr_filter *f) {
-    if (!f)
-        return PLR_E_ARGUMENT;
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;

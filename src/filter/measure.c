@@ -13,6 +13,7 @@
 #include "filter/mount.h"
 #include "filter/predict.h"
 #include "math/dense.h"
+#include "math/finite.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
 #include "process/alignment.h"

@@ -8,6 +8,7 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "math/dense.h"
+#include "math/finite.h"
 #include "math/small.h"
 #include "process/process.h"
 #include "state/covariance.h"
@@ -156,9 +157,7 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
 }
 
 plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *twist) {
-    if (!f || !twist)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = twist ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     if (f->config.process != PLR_PROCESS_TWIST)

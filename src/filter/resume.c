@@ -5,6 +5,7 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "filter/mount.h"
+#include "math/finite.h"
 #include "process/alignment.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -22,8 +23,6 @@ static plr_status check_moved(const plr_filter *f, const double *P_moved) {
 }
 
 plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_moved) {
-    if (!f)
-        return PLR_E_ARGUMENT;
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;

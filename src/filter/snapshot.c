@@ -64,7 +64,7 @@ static uint32_t elements(const plr_filter *f, unsigned landmarks) {
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
-    if (!f || plr_guard_check(f) != PLR_OK || landmarks > f->config.slots)
+    if (plr_guard_check(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
            SIZE(time) + SIZE(pose) + SIZE(filter) + landmarks * SIZE(slot) +
@@ -113,8 +113,6 @@ static bool to_sink(void *context, uint8_t *bytes, unsigned n) {
 }
 
 plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *context) {
-    if (!f)
-        return PLR_E_ARGUMENT;
     const plr_status sound = plr_guard_check_whole(f);
     if (sound != PLR_OK)
         return sound;
@@ -254,9 +252,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
 
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,
                               void *context) {
-    if (!f || !source)
-        return PLR_E_ARGUMENT;
-    const plr_status sound = plr_guard_check(f);
+    const plr_status sound = source ? plr_guard_check(f) : PLR_E_ARGUMENT;
     if (sound != PLR_OK)
         return sound;
     const plr_state_in start = {.source = source, .context = context, .length = length};

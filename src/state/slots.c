@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/finite.h"
 #include "state/covariance.h"
 #include "state/model.h"
 
@@ -76,15 +77,10 @@ bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark
     landmark->times_gated = s->times_gated;
     landmark->last_seen_ns = s->last_seen_ns;
     landmark->known = s->known != 0;
-    double sum = 0; /* NaN, or infinite, if any of the numbers is */
     for (int i = 0; i < 3; i++) {
         landmark->p_W_m[i] = point.p_W[i];
-        sum += point.p_W[i] - point.p_W[i];
-        for (int j = 0; j < 3; j++) {
-            const double variance = (double)P[i >= j ? 3 * i + j : 3 * j + i];
-            landmark->P_W_m2[3 * i + j] = variance;
-            sum += variance - variance;
-        }
+        for (int j = 0; j < 3; j++)
+            landmark->P_W_m2[3 * i + j] = (double)P[i >= j ? 3 * i + j : 3 * j + i];
     }
-    return sum == 0;
+    return plr_all_finite(landmark->p_W_m, 3) && plr_all_finite(landmark->P_W_m2, 9);
 }

@@ -5,6 +5,7 @@
 #include <unity.h>
 
 #include "filter/filter_internal.h"
+#include "math/finite.h"
 #include "support/matrices.h"
 #include "support/random.h"
 

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+/* Whether numbers that came in, or go out, as double are numbers. */
+#ifndef PLR_MATH_FINITE_H
+#define PLR_MATH_FINITE_H
+
+#include <stdbool.h>
+
+/* True if none of them is NaN or infinite. */
+bool plr_all_finite(const double *x, unsigned n);
+
+/* True if |x_i| <= limit for all of them; false for NaN. */
+bool plr_all_within(const double *x, unsigned n, double limit);
+
+#endif
