@@ -148,15 +148,16 @@ build_replays() {
         cmake --build --preset "$preset" -j "$JOBS" --target pelorus-replay pelorus-replay-f64)
 }
 
-# build_robot TARGET...: firmware, in build/robot. Images of every capacity, and the bench images that
-# docs/SIZES.md is measured on (target bench), come out of one build: each library is compiled once.
+# build_robot TARGET...: firmware, in build/robot. Images of every one of $CAPACITIES, and the bench images
+# that docs/SIZES.md is measured on (target bench), come out of one build: each library is compiled once.
 ROBOT=$ROOT/build/robot
+CAPACITIES=${CAPACITIES:-8 16 32 64}
 build_robot() {
     local options=()
     mkdir -p "$ROBOT"
     case " $* " in *' bench '*)
         PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes recordings "$ROBOT" || return 1
-        options=('-DPELORUS_CAPACITIES=8;16;32;64' "-DPELORUS_BENCH_RECORDINGS=$ROBOT/twist.plr;$ROBOT/imu.plr")
+        options=("-DPELORUS_CAPACITIES=${CAPACITIES// /;}" "-DPELORUS_BENCH_RECORDINGS=$ROBOT/twist.plr;$ROBOT/imu.plr")
         ;;
     esac
     cmake -S "$ROOT/port/cortex_m" -B "$ROBOT" -DCMAKE_BUILD_TYPE=None \

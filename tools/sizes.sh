@@ -5,7 +5,8 @@
 #
 # usage: tools/sizes.sh [--check]
 #
-#   --check   measures, and compares with docs/SIZES.md instead of writing it
+#   --check   measures, and compares with docs/SIZES.md instead of writing it; with CAPACITIES='8 32'
+#             in the environment these alone
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
@@ -14,7 +15,7 @@ case ${1-} in
 '') ;;
 --check) action=check ;;
 -h | --help)
-    sed -n '3,8s/^# \{0,1\}//p' "$0"
+    sed -n '3,9s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
 *) die "no option $1: tools/sizes.sh [--check]" ;;
@@ -32,5 +33,5 @@ if ! build_robot boards bench >"$LOGS/sizes-build.log" 2>&1; then
 fi
 
 heading 'Measuring under QEMU'
-PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes "$action" "$ROBOT" "$ROOT/docs/SIZES.md"
+PYTHONPATH=$ROOT/tools "$VENV/bin/python" -m firmware.sizes "$action" "$ROBOT" "$ROOT/docs/SIZES.md" $CAPACITIES
 [ "$action" = check ] || echo 'docs/SIZES.md'

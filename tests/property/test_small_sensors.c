@@ -16,7 +16,7 @@
 #include "support/specimens.h"
 
 /* In a slow build fewer drives, and with them wider bounds. */
-enum { RUNS = PELORUS_SLOW_BUILD ? 4 : 20, DOF = 6 };
+enum { RUNS = PELORUS_SLOW_BUILD ? 2 : 20, DOF = 6 };
 
 typedef struct helpers {
     unsigned wheel_every, standstill_every, position_every; /* in steps of 10 ms; 0: none */

@@ -9,7 +9,7 @@
 
 #include "support/imu_rig.h"
 
-enum { SEEDS = PELORUS_SLOW_BUILD ? 1 : 3, RETURNS = PELORUS_SLOW_BUILD ? 2 : 8 };
+enum { SEEDS = PELORUS_SLOW_BUILD ? 1 : 3, RETURNS = PELORUS_SLOW_BUILD ? 1 : 8 };
 
 void setUp(void) {
     imu_rig_set_up();

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the tests on emulated boards share. tests/target/run.sh builds what they need and calls them
-with --boards (every test is asked of each), --robot (the firmware's build folder) and --desktops
-(folders with the desktop's replay, built in the ways whose bits must agree).
+with --boards (every test is asked of each), --robot (the firmware's build folder) and --desktop
+(the build folder of a desktop's replay with the boards' capacities).
 """
 
 from __future__ import annotations
@@ -47,12 +47,24 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--boards", nargs="+", required=True)
     parser.addoption("--robot", type=Path, required=True)
-    parser.addoption("--desktops", type=Path, nargs="*", default=[])
+    parser.addoption("--desktop", type=Path, required=True)
 
 
 @pytest.fixture(scope="session")
 def board(request: pytest.FixtureRequest) -> str:
     return str(request.param)
+
+
+@pytest.fixture(scope="session")
+def desktop(request: pytest.FixtureRequest) -> Path:
+    """The folder of the desktop's programs."""
+    return Path(request.config.getoption("--desktop")).resolve() / "bin"
+
+
+@pytest.fixture(scope="session")
+def program(desktop: Path) -> Path:
+    """The desktop's replay, in the boards' precision."""
+    return desktop / "pelorus-replay"
 
 
 @pytest.fixture(scope="session")

@@ -43,14 +43,6 @@ def messages(drive: list[Message]) -> list[Message]:
     return first_frames(drive, FRAMES)
 
 
-@pytest.fixture(scope="module")
-def program(request: pytest.FixtureRequest) -> Path:
-    """One desktop build's replay."""
-    folders = request.config.getoption("--desktops")
-    assert folders, "run.sh names the desktop builds"
-    return Path(folders[0]).resolve() / "bin" / "pelorus-replay"
-
-
 # --- the same bytes, there and here ---------------------------------------------------------------
 
 

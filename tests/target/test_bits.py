@@ -32,34 +32,21 @@ def board_poses(board: str, image: Path, recording: Path) -> list[Pose]:
     return outcome.poses
 
 
-def desktop_all_equal(request: pytest.FixtureRequest, recording: Path, program: str) -> list[Pose]:
-    """The poses on which every build of the desktop's replay agrees."""
-    folders = request.config.getoption("--desktops")
-    assert folders, "run.sh names the desktop builds"
-    programs = [Path(folder) / "bin" / program for folder in folders]
-    poses = [desktop_poses(recording, path, SLOTS, OBSERVATIONS) for path in programs]
-    digests = {digest(found) for found in poses}
-    assert len(digests) == 1, "the desktop's builds differ among themselves"
-    return poses[0]
-
-
-def same_bits(desktop: list[Pose], board_answer: list[Pose]) -> None:
-    differ = [k for k, (a, b) in enumerate(zip(desktop, board_answer, strict=True)) if a != b]
+def same_bits(program: Path, recording: Path, board_answer: list[Pose]) -> None:
+    """The poses of a desktop's replay and of a board."""
+    poses = desktop_poses(recording, program, SLOTS, OBSERVATIONS)
+    differ = [k for k, (a, b) in enumerate(zip(poses, board_answer, strict=True)) if a != b]
     assert not differ, f"pose {differ[0]} is the first that differs"
-    assert desktop
-    assert digest(desktop) == digest(board_answer)
+    assert poses
+    assert digest(poses) == digest(board_answer)
     print(f"\n{len(board_answer)} poses, SHA-256 {digest(board_answer)}")
 
 
-def test_float32(
-    request: pytest.FixtureRequest, board: str, firmware: Path, recording: Path
-) -> None:
-    desktop = desktop_all_equal(request, recording, "pelorus-replay")
-    same_bits(desktop, board_poses(board, firmware, recording))
+def test_float32(program: Path, board: str, firmware: Path, recording: Path) -> None:
+    same_bits(program, recording, board_poses(board, firmware, recording))
 
 
 @pytest.mark.boards(FLOAT64_BOARD)
-def test_float64(request: pytest.FixtureRequest, board: str, robot: Path, recording: Path) -> None:
-    desktop = desktop_all_equal(request, recording, "pelorus-replay-f64")
+def test_float64(desktop: Path, board: str, robot: Path, recording: Path) -> None:
     image = robot / "images" / f"pelorus-{board}-n{SLOTS}-f64.elf"
-    same_bits(desktop, board_poses(board, image, recording))
+    same_bits(desktop / "pelorus-replay-f64", recording, board_poses(board, image, recording))

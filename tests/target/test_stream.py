@@ -48,14 +48,6 @@ def endless_drive(robot: Path) -> Path:
     return robot / "recordings" / "light" / "endless.plr"
 
 
-@pytest.fixture(scope="module")
-def program(request: pytest.FixtureRequest) -> Path:
-    """One desktop build's replay."""
-    folders = request.config.getoption("--desktops")
-    assert folders, "run.sh names the desktop builds"
-    return Path(folders[0]).resolve() / "bin" / "pelorus-replay"
-
-
 # --- boards ---------------------------------------------------------------------------------------
 
 
