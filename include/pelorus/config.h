@@ -31,8 +31,8 @@ extern "C" {
 #define PLR_REAL 32
 #endif
 
-/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 20 KB
- * for 16 landmarks, 44 KB for 32 (docs/SIZES.md has more). The setting `slots` can use fewer. */
+/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 23 KB
+ * for 16 landmarks, 49 KB for 32 (docs/SIZES.md has more). The setting `slots` can use fewer. */
 #ifndef PLR_MAX_LANDMARKS
 #define PLR_MAX_LANDMARKS 32
 #endif
@@ -44,7 +44,7 @@ extern "C" {
 #define PLR_MAX_OBSERVATIONS 128
 #endif
 
-/* Observations processed at once in an update: 1 to 16, default 8. More need more workspace.
+/* Observations processed at once in an update: 1 to 16, default 8. More need more memory and stack.
  * Results depend on it in their last bits, so it is part of the build fingerprint: leave it at 8
  * unless you build everything, robot and desk, yourself. */
 #ifndef PLR_BLOCK_OBSERVATIONS

@@ -104,11 +104,12 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
  * gyro taken at t_ns. Until tilt and velocity are known (setting imu-start) readings are averaged,
  * the pose stays, and health says NOT_STARTED. Takes the same time for any number of landmarks.
  * Refused readings count in plr_filter_totals().twists_refused; where the sensor is to blame,
- * plr_filter_imu_fault says how, and health says IMU_FAULT. Spikes and repeated numbers are told by
- * what came before, refused or not: two spikes in succession are refused and a third is taken, for it
- * is a step or a shock; the same numbers are taken nine times more, and then refused until others come.
- * Statuses as of plr_filter_predict, and: PLR_E_RANGE at the limit of gyro_range or accel_range,
- * or a spike; PLR_E_ARGUMENT the same numbers ten times; PLR_E_MODE the process is another. */
+ * plr_filter_imu_fault says how, and health says IMU_FAULT. A reading is compared with those before
+ * it, whether they were refused or not. Of successive spikes two are refused and the third is used,
+ * because it shows a true step or shock. Numbers that stay the same are used ten times, and then
+ * refused until they change.
+ * Statuses: those of plr_filter_predict, and PLR_E_RANGE at the limit of gyro_range or accel_range,
+ * or a spike; PLR_E_ARGUMENT numbers that have stayed the same; PLR_E_MODE the process is another. */
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
 
 /* With an IMU: sets the velocity of the IMU (with the setting imu-arm not that of the body's origin),

@@ -182,7 +182,7 @@ typedef struct plr_session {
     uint64_t predict_ns;   /* computing time since the last frame */
     plr_report last;       /* of the last frame */
     plr_status imu_status; /* of the last IMU reading */
-    uint32_t imu_faults;   /* bits of plr_imu_fault that were told in this drive */
+    uint32_t imu_faults;   /* bits of plr_imu_fault that were reported in this drive */
 } plr_session;
 
 /* --- use --- */

@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 enum {
-    PLR_SESSION_HELD_READINGS = 24, /* most readings of small sensors that wait with them */
+    PLR_SESSION_HELD_READINGS = 24, /* most readings of small sensors that wait with the twists */
     PLR_SESSION_HELD_TWISTS = 64,   /* most twists, or readings of an IMU, that wait because of the
                                        setting twist-delay */
     PLR_SESSION_AGREEING = 3 /* messages that must agree before the session follows a clock that
@@ -43,15 +43,15 @@ typedef struct plr_held_step {
     bool leads; /* it is the first of its message */
 } plr_held_step;
 
-/* Those that wait because of the setting twist-delay: a ring, oldest first. */
+/* Twists or IMU readings that wait because of the setting twist-delay: a ring, oldest first. */
 typedef struct plr_held_steps {
     uint8_t first, count;
-    uint64_t leads; /* bit i: that of place i leads its message */
+    uint64_t leads; /* bit i: the one at place i is the first of its message */
     plr_time_ns t_ns[PLR_SESSION_HELD_TWISTS];
     plr_moved_by by[PLR_SESSION_HELD_TWISTS];
 } plr_held_steps;
 
-/* Readings of small sensors that wait with them, ascending by time. */
+/* Readings of small sensors that wait with the twists, ascending by time. */
 typedef struct plr_held_readings {
     unsigned count;
     plr_reading readings[PLR_SESSION_HELD_READINGS];

@@ -217,9 +217,10 @@ typedef struct plr_config {
     uint8_t process;
 
     /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO.
-     * After a start in motion position and yaw are laid anew two seconds later, where the estimate
-     * then stands, and their covariance with them; the world that plr_filter_set_pose gave is left by
-     * what the first seconds were off. Not so where a position or a map has been used. */
+     * Two seconds after a start in motion the world is defined anew: by the position and yaw that are
+     * then estimated, which from there on count as known to start-sigma. It differs from the world of
+     * plr_filter_set_pose by the errors of the first two seconds. A measured position or a known
+     * landmark prevents this, because they belong to the world as it was given. */
     uint8_t imu_start;
 
     /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.
@@ -312,9 +313,10 @@ const plr_setting *plr_setting_at(unsigned index);
 const plr_setting *plr_setting_by_id(uint8_t id);
 const plr_setting *plr_setting_by_name(const char *name);
 
-/* The row of one axis (0 to 2: x, y, z of the body) of a setting that has three numbers; these are
- * velocity-sigma and gyro-sigma. NULL for a setting of one number. The setting's own row sets all
- * three axes and reads x; further rows set y and z alone, so apply them after it. */
+/* The row of one axis (0 to 2: x, y, z of the body) of a setting that has three numbers:
+ * velocity-sigma, gyro-sigma, imu-turn and imu-arm. NULL for a setting of one number. The setting's
+ * own row sets all three axes and reads x; further rows set y and z alone, so apply them after
+ * it. */
 const plr_setting *plr_setting_axis(const plr_setting *setting, unsigned axis);
 
 /* For the row of a y or z axis: the setting whose own row sets all three axes. NULL for all other

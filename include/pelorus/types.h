@@ -58,9 +58,9 @@ typedef enum plr_health {
     PLR_HEALTH_DIVERGED = 3 /* something else wrote to the filter's memory: init again */
 } plr_health;
 
-/* What there is to say of health: bits of plr_report.reasons and plr_health_state.reasons. All but
- * three say why it is not good; GATE_INERT, NO_ROOM and NIS_LOW ask for better settings or more
- * slots, and by themselves leave it GOOD. Above each: what it means, what causes it, what to do. */
+/* Why health is as it is: bits of plr_report.reasons and plr_health_state.reasons. Three of them
+ * leave it GOOD if no other is set, and ask for better settings or more slots: GATE_INERT, NO_ROOM
+ * and NIS_LOW. Above each: what it means, what causes it, what to do. */
 typedef enum plr_reason {
     /* Fewer than 3 observations used in this frame: a bare wall, darkness, a covered camera, or the
      * gate rejects what is seen. Usually passes; if it stays, check the tracker. */
@@ -101,13 +101,14 @@ typedef enum plr_reason {
      * clocks of camera and IMU differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
-     * says, until they agree with vision again. Drive with care, or set the pose to end it. */
+     * says. Ends when twists, or the IMU, have agreed with vision for a while, or when the pose is
+     * set. Drive with care until then. */
     PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,
-    /* A bias estimate is beyond 3.9 sigma of its prior, and while it is uncertain at less. With
-     * twists: stereo and odometry disagree in scale (baseline, focal length, wheel radius; which of
-     * them cannot be known), or bias-*-sigma is too small. With an IMU: bias-accel-sigma or
-     * bias-gyro-sigma is too small, a START told biases that are not true, or the camera's place on
-     * the body is wrong. */
+    /* A bias estimate lies further from its prior's mean than the prior allows: 3.9 sigma of the
+     * difference that is to be expected of an estimate as certain as this one. With twists: stereo
+     * and odometry disagree in scale (baseline, focal length, wheel radius; which of them cannot be
+     * known), or bias-*-sigma is too small. With an IMU: bias-accel-sigma or bias-gyro-sigma is too
+     * small, the biases in a START are wrong, or the camera's place on the body is. */
     PLR_REASON_BIAS_OFF_PRIOR = 1 << 14,
     /* Innovations are far smaller than the noise says, over many frames: pixel-sigma is too large,
      * or the tracker smooths what it sees. The pose is better than its covariance says. Health stays
