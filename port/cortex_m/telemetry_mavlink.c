@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* MAVLink's ODOMETRY after every frame. A message that does not fit the ring is left out: the next
- * one is better news. Body axes that are neither forward-left-up nor forward-right-down cannot be
+ * one is newer. Body axes that are neither forward-left-up nor forward-right-down cannot be
  * converted, and nothing is sent. */
 #include "../mavlink/encode.h"
 #include "../mavlink/odometry.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /*
- * A stereo frame: predict, match, gate, update, retract, evict, initialise, in this order.
+ * A stereo frame: predict, match, find the motion, gate, correct, evict, initialise, in this order.
  * Observations are processed in the order of their ids, so the order in which they arrive changes
  * no bit.
  */

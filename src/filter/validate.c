@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Checks of numbers that come in as double. */
+/* Checks of rotations, covariances and landmarks that come in as double. */
 #include "filter/filter_internal.h"
 #include "math/finite.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Whether numbers that came in, or go out, as double are numbers. */
+/* Checks that doubles are numbers: not NaN, not infinite, not beyond a limit. */
 #ifndef PLR_MATH_FINITE_H
 #define PLR_MATH_FINITE_H
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Two slots on a block device. A slot: header, padded to whole program units; the state, padded
- * likewise. The header is programmed last: it is what makes a save one. */
+ * likewise. The header is programmed last: without it the slot counts as empty. */
 #include "pelorus/state_store.h"
 
 #include <string.h>
