@@ -138,7 +138,7 @@ def test_halves_are_not_compared_where_vision_contradicts_the_twists(
     noise = TrackNoise({}, float("nan"))
     calm = Tuned({"pixel-sigma": "0.5"}, NOTHING, NOTHING, noise)
     assert halves_alike.with_halves_alike(bench, calm).halves is not None
-    denied = replace(calm, after=replace(NOTHING, contradicted=0.6))
+    denied = replace(calm, after=replace(NOTHING, contradicted=0.3))
     assert halves_alike.with_halves_alike(bench, denied).halves is None
     mapped = replace(calm, settings={**calm.settings, "mode": "localization"})
     assert halves_alike.with_halves_alike(bench, mapped).halves is None

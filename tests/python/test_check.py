@@ -297,41 +297,6 @@ def test_the_search_begins_with_each_axis_own_sigma_where_they_differ() -> None:
     assert parameters.pooled(values, "velocity") == pytest.approx(0.1 * 2 ** (1 / 3))
 
 
-class Halves:
-    """A bench on which settings cost what is said, by half."""
-
-    def __init__(self, costs: dict[str, tuple[float, float]]) -> None:
-        self.costs = costs
-
-    def run(self, settings: dict[str, str]) -> Outcome:
-        return self.run_all([settings])[0]
-
-    def run_all(self, many: list[dict[str, str]], what: str = "") -> list[Outcome]:
-        assert what in ("", "both halves")
-        return [self._outcome(settings) for settings in many]
-
-    def _outcome(self, settings: dict[str, str]) -> Outcome:
-        halves = self.costs[settings.get("pixel-sigma", "given")]
-        cost = halves[int(settings.get(outcome.PART, "0"))]
-        return replace(outcome.NOTHING, cost=cost, matched=1000)
-
-
-@pytest.mark.parametrize(("second_half", "kept"), [(9.0, "1"), (11.0, None)])
-def test_noises_that_suit_one_half_of_the_drive_alone_are_not_written(
-    second_half: float, kept: str | None
-) -> None:
-    bench = Halves({"given": (10.0, 10.0), "1": (5.0, second_half)})
-    white = tracks_noise.TrackNoise({1: 1.0, 5: 1.0}, 1.0)
-    nothing = outcome.NOTHING
-    settings = {"pixel-sigma": "1", "camera-offset": "0.01"}
-    found = parameters.Tuned(settings, nothing, nothing, white, ["a", "clock"], 0.01, ["clock"])
-    held = tuning.held_against(bench, {}, found)  # type: ignore[arg-type]
-    assert held.settings.get("pixel-sigma") == kept
-    assert held.settings["camera-offset"] == "0.01"  # of which a parabola has judged
-    assert "clock" in held.said
-    assert kept or "yours stay" in held.said[0]
-
-
 def test_of_few_frames_is_said_what_they_cannot_tell() -> None:
     (remark,) = verdict.of_length(51)
     assert remark.grade is verdict.Grade.CARE

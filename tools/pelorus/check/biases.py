@@ -13,13 +13,14 @@ import numpy as np
 
 from pelorus.check.options import Settings
 from pelorus.check.outcome import PART, Bench
-from pelorus.check.parameters import PAYS, TWIST, written
+from pelorus.check.parameters import FRAMES_FEW, PAYS, TWIST, written
 from pelorus.layout import Floats
 from pelorus.schema import DEFAULTS
 
 WIDE = {"bias": "on", "bias-velocity-sigma": "0.1", "bias-gyro-sigma": "0.03"}
 PRIORS = {"bias-gyro-sigma": "rad/s", "bias-velocity-sigma": "m/s"}
 SURE = 3.0  # sigmas that the common part of two halves' biases must be from zero
+ALLOWS = 2.0  # sigmas of a prior
 ALIKE = 0.7  # cosine of the angle between them
 
 
@@ -62,17 +63,24 @@ def told_by_halves(
 def told_in_drift(
     bench: Bench, fixed: Settings, values: Mapping[str, float]
 ) -> tuple[dict[str, str], str]:
-    """Where tracks drift both halves of the drive must tell the same gyro bias.
+    """Where tracks drift both halves of the drive must tell the same gyro bias, and a prior that
+    allows it stays. Halves of few frames agree by chance, when errors last for seconds.
 
     Such tracks look like a bias of the velocity all along, so with them there is none of it to be
     told, and likelihood would find one.
     """
-    size = _halves(bench, {**fixed, **WIDE, **written(values, TWIST)})["bias-gyro-sigma"].size
+    name = "bias-gyro-sigma"
+    if len(bench.examined.frame_t_ns) < 2 * FRAMES_FEW:
+        return dict(fixed), f"halves of fewer than {FRAMES_FEW} frames tell no biases"
+    size = _halves(bench, {**fixed, **WIDE, **written(values, TWIST)})[name].size
     if not size > 0:
-        return {**fixed, "bias": "off"}, "no bias that both halves of the drive agree on"
-    prior = {"bias-velocity-sigma": "0", "bias-gyro-sigma": f"{size:.2g}"}
+        return dict(fixed), "no bias that both halves of the drive agree on"
     words = f"biases of the gyro readings of about {size:.2g} rad/s, in both halves alike"
-    return {**fixed, "bias": "on", **prior}, words
+    if fixed.get("bias", "on") == "off":
+        return {**fixed, "bias": "on", "bias-velocity-sigma": "0", name: f"{size:.2g}"}, words
+    if size > ALLOWS * float(fixed.get(name, DEFAULTS[name])):
+        return {**fixed, name: f"{size:.2g}"}, words
+    return dict(fixed), f"{words}, which its prior allows"
 
 
 def _halves(bench: Bench, settings: Settings) -> dict[str, Told]:

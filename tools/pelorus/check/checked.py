@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pelorus import wire
 from pelorus.check import verdict
-from pelorus.check.contradicted import with_no_more_contradictions
 from pelorus.check.halves_alike import with_halves_alike
+from pelorus.check.held import held_against
 from pelorus.check.options import Settings, options_of
 from pelorus.check.outcome import Bench
 from pelorus.check.parameters import Tuned
@@ -51,7 +51,9 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.words) for f in named]
     if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
-    tuned = with_no_more_contradictions(bench, tune(bench, given))
+    found = tune(bench, given)
+    found.lasting.extend(f.words for f in named if f.lasts)
+    tuned = held_against(bench, given, found)
     tuned = with_shared_rows(bench, with_halves_alike(bench, tuned))
     truth = truth_in(messages)
     both = progress((("before", given), ("after", tuned.settings)), "whole drive")

@@ -119,10 +119,10 @@ def _costs(
     tried = [float(f"{at:.6f}") for at in offsets if abs(at) <= OFFSET_MOST_S * 1.001]
     ran = bench.run_all([{**settings, OFFSET: f"{at:.6f}"} for at in tried], "clock")
     most = max((outcome.matched for outcome in ran), default=0)
-    return {at: _of_parts(outcome, most) for at, outcome in zip(tried, ran, strict=True)}
+    return {at: of_parts(outcome, most) for at, outcome in zip(tried, ran, strict=True)}
 
 
-def _of_parts(outcome: Outcome, matched: int) -> Floats:
+def of_parts(outcome: Outcome, matched: int) -> Floats:
     """As if so many had been matched: no offset may win by what it loses."""
     if not np.isfinite(outcome.cost):
         return np.full(PARTS, np.inf)

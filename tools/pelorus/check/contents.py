@@ -113,6 +113,11 @@ def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
     return [*ahead, *(m for _, _, m in sorted(data, key=lambda row: row[:2]))]
 
 
+def scaled(messages: Sequence[Message], times: float) -> list[Message]:
+    """With the twists' velocities so many times as large."""
+    return [replace(m, v_B_mps=times * m.v_B_mps) if isinstance(m, Twist) else m for m in messages]
+
+
 def not_before(messages: Sequence[Message], t_ns: int) -> list[Message]:
     """All later by so much, where they begin before: then every offset moves the same frames."""
     timed = (Stereo, Twist, Imu, Reading, Start)

@@ -27,6 +27,7 @@ from pelorus.check.contents import (
     half,
     not_before,
     recording_of,
+    scaled,
     shifted,
     within,
     write,
@@ -45,7 +46,7 @@ GATE_D2 = "25"
 DISPARITY_SPAN_PX = 100.0
 BEGIN_NS = 1_000_000_000  # a recording may begin at zero, and its frames be too late
 OFFSET_MOST_S = 0.1
-OFFSET, PART, LENGTH = "@offset", "@part", "@frames"
+OFFSET, PART, LENGTH, SCALE = "@offset", "@part", "@frames", "@scale"
 CAMERA_OFFSET = "camera-offset"
 CONTRADICTED = number("reason", "TWIST_CONTRADICTED")
 
@@ -79,7 +80,8 @@ class Bench:
     """Replays a recording with many settings, on all processors, each set once.
 
     Settings may hold OFFSET (the frames' times are later by so many s), PART (0 or 1: the first or
-    the second half of the drive) and LENGTH (so many frames), which are not the filter's.
+    the second half of the drive), LENGTH (so many frames) and SCALE (the twists' velocities so many
+    times as large), which are not the filter's.
     """
 
     def __init__(self, program: Path, recording: Path, folder: Path, process: str = "") -> None:
@@ -93,7 +95,7 @@ class Bench:
         self._program = program
         self._outlier_cost = outlier_cost(self.header, messages)
         self._known: dict[tuple[tuple[str, str], ...], Outcome] = {}
-        self._written: dict[tuple[str, str, str], Path] = {}
+        self._written: dict[tuple[str, ...], Path] = {}
 
     @property
     def by_imu(self) -> bool:
@@ -123,11 +125,13 @@ class Bench:
 
     def _recording(self, settings: Settings) -> Path:
         """What is replayed, written when it is first wanted."""
-        key = settings.get(OFFSET, "0"), settings.get(PART, ""), settings.get(LENGTH, "")
+        asked = ((OFFSET, "0"), (PART, ""), (LENGTH, ""), (SCALE, "1"))
+        key = tuple(settings.get(name, usual) for name, usual in asked)
         if key not in self._written:
             path = self._folder / f"tuning-{len(self._written)}.plr"
             messages = half(self._messages, int(key[1])) if key[1] else self._messages
             messages = first_frames(messages, int(key[2])) if key[2] else messages
+            messages = scaled(messages, float(key[3]))
             write(path, shifted(messages, round(float(key[0]) * 1e9)))
             self._written[key] = path
         return self._written[key]

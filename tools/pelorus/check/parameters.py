@@ -17,6 +17,7 @@ from pelorus.frames import Header
 
 AXES = "xyz"
 PAYS = 20.0  # -2 ln of the likelihood ratio that one parameter more, or another timing, must bring
+FRAMES_FEW = 100  # of fewer, what is found may be chance
 FEWER_SLOTS = 30  # landmarks while a rough answer is looked for: a third of the time
 
 
@@ -62,6 +63,7 @@ class Tuned:
     of_clock: list[str] = field(default_factory=list)  # of what was said
     halves: Inflated | None = None  # None: not compared
     doubts: list[str] = field(default_factory=list)
+    lasting: list[str] = field(default_factory=list)  # what is off for longer than a step
 
 
 def of_process(by_imu: bool) -> dict[str, Parameter]:
@@ -123,6 +125,20 @@ def written(values: Mapping[str, float], parameters: Mapping[str, Parameter]) ->
             out[parameter.setting] = f"{values[name]:.4g}"
         elif f"{name}-x" in values:
             out[parameter.setting] = ",".join(f"{values[f'{name}-{axis}']:.4g}" for axis in AXES)
+    return out
+
+
+def no_narrower(
+    header: Header, given: Settings, found: Settings, parameters: Mapping[str, Parameter]
+) -> dict[str, str]:
+    """The noises that were found, but none below the given one, axis by axis."""
+    out = {}
+    for name, parameter in parameters.items():
+        either = [_axes(header, settings, name, parameter) for settings in (given, found)]
+        count = max(map(len, either))
+        pairs = zip(*(some * (count // len(some)) for some in either), strict=True)
+        larger = [f"{max(pair):.4g}" for pair in pairs]
+        out[parameter.setting] = larger[0] if len(set(larger)) == 1 else ",".join(larger)
     return out
 
 

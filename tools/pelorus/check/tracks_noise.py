@@ -25,6 +25,7 @@ LAGS = (1, 2, 3, 5)
 DRIFTS_ABOVE = 1.25  # of sigma at lag 5 to that at lag 1: simulated white noise gives 0.97 to 1.05
 KEEPS = 0.86  # r: trackers of KITTI drives keep 0.83 to 0.93; lags up to 5 cannot tell it well
 SIGMA_MOST_PX = 5.0
+KNOWN_TO = 1.5  # times: that range of r alone makes sigma 0.8 to 1.3 times as large
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,13 @@ class TrackNoise:
     @property
     def drifts(self) -> bool:
         return self.growth > DRIFTS_ABOVE
+
+
+def told_apart(found: float, given: float) -> bool:
+    """Is a sigma that only stands for something clearly another one than the given one? Not where
+    it is unknown (NaN).
+    """
+    return bool(max(found / given, given / found) > KNOWN_TO)
 
 
 def track_noise(recording: Recording) -> TrackNoise:

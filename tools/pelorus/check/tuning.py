@@ -5,8 +5,8 @@ likeliest.
 A parameter more must pay: what was seen must become so much likelier that chance would not do it.
 Where the tracks drift, the likelihood of a single step is blind to what matters (tracks_noise.py):
 then pixel-sigma is the one that stands for the drift, and the twists' sigmas are as given, but no
-larger than what the images allow. What comes out must be likelier than what was given in both
-halves of the drive, else the latter stays.
+larger than what the images allow. Whether what comes out is better than what was given is asked
+afterwards (held.py).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pelorus.check import clock, tuning_imu
+from pelorus.check import clock, scale, tuning_imu
 from pelorus.check.biases import WIDE, told_by_halves, told_in_drift
 from pelorus.check.options import Settings
-from pelorus.check.outcome import LENGTH, OFFSET, PART, Bench
+from pelorus.check.outcome import LENGTH, OFFSET, SCALE, Bench
 from pelorus.check.parameters import (
     AXES,
     PAYS,
@@ -32,37 +32,17 @@ from pelorus.check.parameters import (
     written,
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import TrackNoise, track_noise
+from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
 from pelorus.converters.twist_noise import Spread, difference_of_a_reading
 
 FRAMES_FEW = 20  # tell a spread to a fifth: enough to begin with
 FINE = (1.3, 1.15)
 OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
-CLOCK = ("camera-offset", "twist-timing", "imu-timing")
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
     """`given` are the settings as they are: they hold wherever nothing better is found."""
-    found = tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given)
-    return held_against(bench, given, found)
-
-
-def held_against(bench: Bench, given: Settings, found: Tuned) -> Tuned:
-    """What fits one half of the drive alone fits no drive to come."""
-    if found.noise.drifts:  # no likelihood was asked
-        return found
-    # the clock was judged by a parabola: a single cost depends on how frames cut the readings, too
-    clocked = {k: v for k, v in found.settings.items() if k in CLOCK}
-    settings = {k: v for k, v in given.items() if k not in CLOCK} | clocked
-    halves = [{**some, PART: part} for part in "01" for some in (settings, found.settings)]
-    ran = bench.run_all(halves, "both halves")
-    if all(new.gain_over(old) >= 0 for old, new in (ran[:2], ran[2:])):
-        return found
-    words = "no noises are likelier than yours in both halves of the drive: yours stay"
-    outcome = bench.run(settings)
-    return Tuned(
-        settings, found.before, outcome, found.noise, [words, *found.of_clock], found.offset_s
-    )
+    return tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given)
 
 
 def _tune(bench: Bench, given: Settings) -> Tuned:
@@ -87,12 +67,15 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = told_by_halves(bench, moved, values)
-    fixed, found, of_clock = clocked(bench, fixed, values, given)
+    off = scale.off_by(bench, moved | written(values, TWIST))
+    fixed, found, of_clock = clocked(bench, fixed, values, given, off)
     found, of_axes = _axes(bench, fixed, found)
     offset_s = float(fixed.pop(OFFSET))
     settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)
     said = [of_bias, of_clock, of_axes]
-    return Tuned(settings, before, found.outcome, noise, said, offset_s, [of_clock])
+    lasting = [scale.words(off)] if off else []
+    outcome = found.outcome
+    return Tuned(settings, before, outcome, noise, said, offset_s, [of_clock], lasting=lasting)
 
 
 def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[str, float]:
@@ -122,13 +105,15 @@ def _of_twists(start: Mapping[str, float], spread: Spread) -> dict[str, float]:
 def _of_drifting_tracks(
     bench: Bench, fixed: Settings, start: Mapping[str, float], noise: TrackNoise
 ) -> Found:
+    """The given ones, where they are not clearly off: nothing here is known better than that."""
     values = dict(start)
-    if np.isfinite(noise.stands_for_px):
+    if told_apart(noise.stands_for_px, start["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     most = difference_of_a_reading(bench.examined)
     if most is not None:
-        of_twists = _of_twists(start, most)
-        values |= {name: min(start[name], value) for name, value in of_twists.items()}
+        for name, value in _of_twists(start, most).items():
+            if value < start[name] and told_apart(value, start[name]):
+                values[name] = value
     return Found(values, bench.run({**fixed, **written(values, TWIST)}))
 
 
@@ -136,25 +121,31 @@ def _of_drifting_tracks(
 
 
 def clocked(
-    bench: Bench, fixed: Settings, values: Mapping[str, float], given: Settings
+    bench: Bench,
+    fixed: Settings,
+    values: Mapping[str, float],
+    given: Settings,
+    off: float = 0.0,
 ) -> tuple[dict[str, str], Found, str]:
     """Timing and the offset of the camera's clock; the noises again where they change.
 
     With several readings a frame the offset tells both: another timing is one of a whole reading.
     With a single one the timings are tried; `mid` competes only if it is given, for it is the mean
-    of two readings, and would win for its smaller noise alone.
+    of two readings, and would win for its smaller noise alone. `off`: so much the velocities are
+    off in scale; what that explains is no clock.
     """
     was_s = float(given.get("camera-offset", "0"))
     timing = fixed.get("twist-timing", bench.header.twist_timing.name.lower())
-    side = {**fixed, **written(values, TWIST), "twist-timing": timing}
+    side = {**fixed, **written(values, TWIST), "twist-timing": timing, SCALE: f"{1 + off:.4f}"}
     offset = clock.of_twists(bench, side)
     settings = {**fixed, "twist-timing": timing, OFFSET: f"{was_s:.6f}"}
-    words = f"twist-timing {timing}, and the clocks agree"
     if np.isfinite(offset.sigma_s):
-        words += f" (known to {2e3 * offset.sigma_s:.2g} ms)"
+        words = f"twist-timing {timing}: no offset of the camera's clock is likelier than yours "
+        words += f"(known to {2e3 * offset.sigma_s:.2g} ms)"
         if ((offset.best_s - was_s) / offset.sigma_s) ** 2 > PAYS:
             settings, words = _moved(bench, settings, offset, timing)
     else:
+        words = f"twist-timing {timing} is the likeliest"
         others = [name for name in ("start", "end") if name != timing]
         ran = bench.run_all([side, *({**side, "twist-timing": name} for name in others)], "timing")
         best = min(range(len(ran)), key=lambda k: ran[k].cost)

@@ -31,7 +31,7 @@ from pelorus.check.parameters import (
     written,
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import TrackNoise, track_noise
+from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
 
 LOOSE = 10.0  # times the noises, while the clock is far off
 MIDDLE = (2.0, 2.0, 1.5)  # the whole drive with few landmarks, once the clock is about right
@@ -220,7 +220,7 @@ def _of_drifting_tracks(
 ) -> Tuned:
     """The IMU's noises stay as given, and the pixels' stands for the drift."""
     values = dict(values)
-    if np.isfinite(noise.stands_for_px):
+    if told_apart(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
     settings = {**side, **written(values, PIXEL | IMU | WALKS)}
     offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))

@@ -9,7 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from pelorus.check.parameters import Tuned, of_process, starting
+from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.frame_table import BIASES, FrameTable, frame_table
 from pelorus.frames import Header, Message
 from pelorus.health import TimeLine, time_line
@@ -25,7 +25,6 @@ NIS_LOW, NIS_HIGH = 0.6, 1.6
 BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
 OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
-FRAMES_FEW = 100
 
 
 class Grade(IntEnum):

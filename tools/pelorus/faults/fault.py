@@ -16,3 +16,8 @@ class Fault:
     words: str
     stops: bool = True  # settings tuned in spite of it would be worth nothing
     grave: bool = True  # it spoils the result; else the filter can live with it
+
+    @property
+    def lasts(self) -> bool:
+        """Is it off alike for longer than a step? Not gaps and order; and a clock can be set."""
+        return self.name != "clock" and not self.name.startswith("time-")
