@@ -117,6 +117,29 @@ def test_errors_that_points_keep_are_stood_for_until_the_covariance_is_true(
     assert nees(off, found.sigma_px) < 3
 
 
+def test_halves_of_a_drive_by_an_imu_are_compared_over_the_whole_of_it(tmp_path: Path) -> None:
+    from pelorus.cli import main  # noqa: PLC0415 - typer is slow to load
+
+    path = tmp_path / "flown.plr"
+    rates = ("--seed", "300", "--duration", "25", "--lap", "8", "--imu-rate", "200")
+    noise = ("--pixel-sigma", "1", "--gyro-noise", "0.002", "--accel-noise", "0.03")
+    assert main(["simulate", str(path), *rates, *noise, "--observations", "30"]) == 0
+    flown = [m for m in wire.messages_of(path) if m.kind != Kind.END]
+    program = built_programs().float32
+    white = halves_alike.inflate(Parts(program, untrue(flown), tmp_path), {}, 1.0, 100)
+    assert white.before.windows == 1
+    assert not white.is_larger
+    kept = moved(flown, walking(0.3))
+    found = halves_alike.inflate(Parts(program, untrue(kept), tmp_path), {}, 1.0, 100)
+    assert found.is_larger
+    assert found.after.ratio < found.after.by_chance
+    log = replayed(program, kept, ["--pixel-sigma", f"{found.sigma_px:.4g}"])
+    assert cast(float, judge(log)["nees_per_dof"]) < 1
+    bench = Bench(program, path, tmp_path)
+    tuned = Tuned({"pixel-sigma": "1"}, NOTHING, NOTHING, TrackNoise({}, float("nan")))
+    assert halves_alike.with_halves_alike(bench, tuned).halves is not None
+
+
 def test_no_sigma_is_taken_that_brings_halves_no_nearer() -> None:
     class Asked:
         """Halves that are as far apart with any sigma."""

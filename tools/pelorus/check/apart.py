@@ -10,7 +10,8 @@ best one from all of it has the covariance P_half - P_all, whatever noise (of th
 (Hausman, Specification tests in econometrics, 1978). So the drive is cut into windows, each
 window's points into halves, left and right, upper and lower, near and far, and at random; each
 half's poses are compared with those from all points. 1 is due. Where they are farther apart,
-pixel-sigma is made larger until they are not.
+pixel-sigma is made larger until they are not. A drive by an IMU is one window: each window would
+have to find the vertical and its speed anew.
 
 An error that all points share alike (a baseline, a mounting) moves no half beside another: it stays
 unseen.
@@ -34,7 +35,8 @@ from pelorus.check.contents import AHEAD, recording_of, write
 from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
 from pelorus.errors import PelorusError
-from pelorus.frames import Kind, Message, Reading, Start, Stereo
+from pelorus.evaluation import world_laid
+from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo
 from pelorus.layout import Floats
 from pelorus.replay import run_program
 from pelorus.tracks import Tracks
@@ -170,10 +172,14 @@ def compare(whole: Estimate, part: Estimate) -> tuple[float, int]:
     """d^T (P_part - P_whole)^-1 d over the frames, where that tells, and how many numbers it is of.
 
     In directions in which the part's variance is hardly larger, both know as much (from the
-    twists): there nothing is compared.
+    twists): there nothing is compared. Nor where the two have not laid the world at one frame, as
+    with an IMU after a start in motion.
     """
+    laid = [world_laid(P) for _, P in (whole, part)]
+    if whole[0].t_ns[laid[0]] != part[0].t_ns[laid[1]]:
+        return 0.0, 0
     _, mine, its = np.intersect1d(whole[0].t_ns, part[0].t_ns, return_indices=True)
-    mine, its = mine[SETTLED:], its[SETTLED:]
+    mine, its = mine[laid[0] + SETTLED :], its[laid[0] + SETTLED :]
     if not len(mine):
         return 0.0, 0
     between = se3.compose(se3.inverse(whole[0].poses.at(mine)), part[0].poses.at(its))
@@ -198,8 +204,11 @@ def compare(whole: Estimate, part: Estimate) -> tuple[float, int]:
 
 def windows(messages: Sequence[Message]) -> Iterator[list[Message]]:
     """Drives of their own, each with the twists since the frame before it. What holds for the
-    whole alone, a start or a compass, is left out.
+    whole alone, a start or a compass, is left out. Of an IMU's drive the whole.
     """
+    if any(isinstance(m, Imu) for m in messages):
+        yield list(messages)
+        return
     left_out = (Start, Reading)
     at = [k for k, m in enumerate(messages) if isinstance(m, Stereo)]
     ahead = [m for m in messages if m.kind in AHEAD]

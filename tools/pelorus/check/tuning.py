@@ -67,7 +67,8 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = told_by_halves(bench, moved, values)
-    off = scale.off_by(bench, moved | written(values, TWIST))
+    of_noise = written(values, TWIST)
+    off = scale.off_by(bench, moved | of_noise, fixed | of_noise)
     fixed, found, of_clock = clocked(bench, fixed, values, given, off)
     found, of_axes = _axes(bench, fixed, found)
     offset_s = float(fixed.pop(OFFSET))
