@@ -100,11 +100,13 @@ def test_beside_a_fault_that_lasts_no_noise_is_written_below_the_given_one(
         assert held.settings == FOUND
         return
     assert held.settings["pixel-sigma"] == "1"
-    assert held.doubts[0].startswith("the gyro lags: off for longer than a step")
+    assert held.doubts[0].startswith("the gyro lags. That is off for longer than a step")
 
 
 def test_faults_that_last_are_those_that_are_neither_clocks_nor_gaps() -> None:
-    lasting = [n for n in ("scale", "clock-turns", "clock", "time-gap") if Fault(n, "").lasts]
+    lasting = [
+        n for n in ("scale", "clock-turns", "clock", "time-gap", "untold") if Fault(n, "").lasts
+    ]
     assert lasting == ["scale", "clock-turns"]
 
 

@@ -24,6 +24,7 @@ from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
 SPELLS_SHOWN = 12
+NAMED = "a fault is named first"
 NOTHING_USED = "no frame could be used"  # words of pelorus-replay
 
 
@@ -52,7 +53,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
     found = tune(bench, given)
-    found.lasting.extend(f.words for f in named if f.lasts)
+    if any(fault.lasts for fault in named):
+        found.lasting.append(NAMED)
     tuned = held_against(bench, given, found)
     tuned = with_shared_rows(bench, with_halves_alike(bench, tuned))
     truth = truth_in(messages)

@@ -61,8 +61,8 @@ def _no_narrower(bench: Bench, given: Settings, found: Tuned, side: Settings) ->
             f"{found.after.contradicted:.0%} of the frames, with yours in "
             f"{found.before.contradicted:.0%}"
         )
-    words = f"{', and '.join(why)}: off for longer than a step, which is no noise. No noise is "
-    words += "written that is smaller than yours"
+    words = f"{'; '.join(why)}. That is off for longer than a step, and no noise: none is written "
+    words += "that is smaller than yours"
     said = found.said if found.noise.drifts else found.of_clock
     after = bench.run(settings)
     return replace(found, settings=settings, after=after, said=said, doubts=[*found.doubts, words])

@@ -20,4 +20,4 @@ class Fault:
     @property
     def lasts(self) -> bool:
         """Is it off alike for longer than a step? Not gaps and order; and a clock can be set."""
-        return self.name != "clock" and not self.name.startswith("time-")
+        return self.name not in ("clock", UNTOLD) and not self.name.startswith("time-")
