@@ -189,14 +189,15 @@ def _of_drive(untold: list[str]) -> str:
 def noises(
     bench: Bench, side: Settings, found: Found, given: Mapping[str, float]
 ) -> tuple[Found, str]:
-    """The given one of each noise that the drive does not tell, if that is about as likely.
+    """The given one of each noise that the drive does not tell, if that is about as likely, and no
+    smaller: an IMU that is believed too much is the worse fault.
 
     Where the frames tell the motion far better than the accelerometer does, or gravity's direction
     as well as its noise allows, less noise or more makes what is seen no likelier.
     """
     untold = _untold(bench, side, found, IMU)
     for name, parameter in IMU.items():
-        if parameter.setting in untold:
+        if parameter.setting in untold and given[name] > found.values[name]:
             values = {**found.values, name: given[name]}
             usual = bench.run({**side, **written(values, IMU)})
             if found.outcome.gain_over(usual) < PAYS:
