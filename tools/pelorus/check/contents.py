@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -67,6 +67,8 @@ def _ascending(messages: list[Timed]) -> list[Timed]:
     return out
 
 
+STEADY_NS = 2_000_000_000
+SIDES: tuple[tuple[int, Literal["left", "right"]], ...] = ((-1, "left"), (1, "right"))
 FRAMES_MOST, SEEN_MOST = 4000, 60_000  # so many tell the sigmas to a percent or two
 AHEAD = (Kind.HEADER, Kind.CONFIG, Kind.LANDMARK)  # what belongs to each part of a recording
 
@@ -114,8 +116,19 @@ def shifted(messages: Sequence[Message], offset_ns: int) -> list[Message]:
 
 
 def scaled(messages: Sequence[Message], times: float) -> list[Message]:
-    """With the twists' velocities so many times as large."""
-    return [replace(m, v_B_mps=times * m.v_B_mps) if isinstance(m, Twist) else m for m in messages]
+    """With the twists' velocities so many times as large, but not their noise: else the likeliest
+    factor is the one that shrinks it. So what is added is their mean over seconds.
+    """
+    twists = [m for m in messages if isinstance(m, Twist)]
+    if times == 1 or not twists:
+        return list(messages)
+    v = np.array([m.v_B_mps for m in twists], np.float64)
+    t = np.array([m.t_ns for m in twists], np.int64)
+    first, last = (np.searchsorted(t, t + sign * STEADY_NS // 2, side) for sign, side in SIDES)
+    total = np.concatenate((np.zeros((1, 3)), np.cumsum(v, axis=0)))
+    mean = (total[last] - total[first]) / np.maximum(last - first, 1)[:, None]
+    moved = iter(v + (times - 1) * mean)
+    return [replace(m, v_B_mps=next(moved)) if isinstance(m, Twist) else m for m in messages]
 
 
 def not_before(messages: Sequence[Message], t_ns: int) -> list[Message]:

@@ -67,8 +67,7 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     moved = fixed | WIDE | {OFFSET: rough[OFFSET]}
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = told_by_halves(bench, moved, values)
-    of_noise = written(values, TWIST)
-    off = scale.off_by(bench, moved | of_noise, fixed | of_noise)
+    off = scale.off_by(bench, moved | written(values, TWIST))
     fixed, found, of_clock = clocked(bench, fixed, values, given, off)
     found, of_axes = _axes(bench, fixed, found)
     offset_s = float(fixed.pop(OFFSET))
