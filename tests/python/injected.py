@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from injected_known import Known
 from pelorus import se3, wire
 from pelorus.check.contents import recording_of
 from pelorus.faults.fault import Fault
@@ -128,7 +129,9 @@ def row_ids(recording: Recording, k: int) -> Recording:
 def slot_ids(recording: Recording, k: int) -> Recording:
     """A live track has a slot; one that ends gives it to the next."""
     tracks = recording.tracks
-    last = {int(i): int(f) for i, f in zip(tracks.id, tracks.frame, strict=True)}
+    pairs = tracks.pairs(1)
+    goes_on = np.zeros(len(tracks), bool)  # a tracker loses what is out of sight
+    goes_on[pairs.first] = True
     free: list[int] = []
     out = np.empty_like(tracks.id)
     held: dict[int, int] = {}
@@ -139,19 +142,20 @@ def slot_ids(recording: Recording, k: int) -> Recording:
             if id not in held:
                 held[id] = free.pop() if free else len(held) + len(free) + k
             out[row] = held[id]
-        for id in [i for i in held if last[i] <= frame]:
-            free.append(held.pop(id))
+        free += [held.pop(int(id)) for id in tracks.id[a:b][~goes_on[a:b]]]
     return replace(recording, tracks=type(tracks).from_rows(
         tracks.frame_count, tracks.frame, out, tracks.pixels))  # fmt: skip
 
 
 def frozen(recording: Recording, k: int) -> Recording:
-    """From a frame in the middle of fast motion on."""
+    """From a frame in the middle of fast motion on that shows some points."""
     tracks = recording.tracks
     speed = np.linalg.norm(recording.body_motion(1).p, axis=1)
     run = (4, 8, 16)[k]
-    at = int(np.argmax(np.convolve(speed, np.ones(run), "valid"))) if len(speed) > run else 0
     bounds, keep = tracks.bounds(), np.ones(len(tracks), bool)
+    way = np.convolve(speed, np.ones(run), "valid")
+    shows = np.diff(bounds)[: len(way)] >= np.median(np.diff(bounds))
+    at = int(np.argmax(np.where(shows, way, -1.0))) if len(speed) > run else 0
     keep[bounds[at + 1] : bounds[at + run + 1]] = False
     rows = np.arange(bounds[at], bounds[at + 1])
     parts = [(tracks.frame[keep], tracks.id[keep], tracks.pixels[keep])]
@@ -278,12 +282,12 @@ def found_in(recording: Recording) -> list[Fault]:
     return faults_of([recording.header], recording)
 
 
-def injections(recording: Recording) -> Iterator[tuple[str, int, list[Fault], tuple[str, ...]]]:
-    """Fault, strength, what was named, what is due."""
+def injections(recording: Recording) -> Iterator[tuple[str, int, Recording, tuple[str, ...]]]:
+    """Fault, strength, the recording that has it, what is due."""
     by_imu = len(recording.inertial.t_ns) > 0
     for name, (change, due) in (OF_IMU if by_imu else OF_RECORDINGS).items():
         for k in range(1 if name in ALIKE else 3):
-            yield name, k, faults_in(change(recording, k)), due
+            yield name, k, change(recording, k), due
 
 
 def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
@@ -299,8 +303,8 @@ def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
 
 
 def main(paths: list[str]) -> None:
-    """Print what was named wrongly, and the two shares."""
-    right, asked, false, clean = 0, 0, 0, 0
+    """Print what was named wrongly, why the drive may not tell it, and the shares."""
+    right, asked, beyond, false, clean = 0, 0, 0, 0, 0
     for path in paths:
         whole = recording_of(wire.messages_of(Path(path)))
         for first in range(0, max(whole.tracks.frame_count - PIECE // 2, 1), PIECE):
@@ -309,12 +313,23 @@ def main(paths: list[str]) -> None:
             false += bool(said)
             if said:
                 print(path, "clean", first, [f"{f.name}: {f.words}" for f in said], flush=True)
-        for name, k, said, due in injections(piece(whole, 0)):
-            good = bool(said) and said[0].name in due
+        first_piece = piece(whole, 0)
+        known = Known.of(first_piece)
+        own = {fault.name for fault in found_in(first_piece)}
+        for name, k, wrong, due in injections(first_piece):
+            said = faults_in(wrong)
+            named = [fault.name for fault in said if fault.name not in own - set(due)]
+            good = bool(named) and named[0] in due
             right, asked = right + good, asked + 1
             if not good:
-                print(path, name, k, [f"{f.name}: {f.words}" for f in said], flush=True)
-    print(f"{right} of {asked} named rightly; {false} of {clean} clean pieces called faulty")
+                why = known.too_little(name, k, wrong)
+                beyond += bool(why)
+                words = [f"{f.name}: {f.words}" for f in said]
+                print(path, name, k, words, f"cannot be told: {why}" if why else "", flush=True)
+    print(
+        f"{right} of {asked} named rightly, {beyond} of the rest cannot be told; "
+        f"{false} of {clean} clean pieces called faulty"
+    )
 
 
 if __name__ == "__main__":

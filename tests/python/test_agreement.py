@@ -10,11 +10,16 @@ import numpy as np
 import pytest
 from injected import OF_RECORDINGS
 from pelorus import se3
+from pelorus.faults import geometry
 from pelorus.faults.agreement import Agreement, agreement
+from pelorus.faults.amounts import of_clock, of_lever, of_scale
+from pelorus.faults.clocks import TwoClocks
 from pelorus.faults.fault import Fault
-from pelorus.faults.geometry import of_scale
+from pelorus.faults.geometry import moving_least
+from pelorus.faults.mounting import best_axes
+from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
-from pelorus.faults.two_views import two_views
+from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.recording import Recording
 from pelorus.simulation.simulate import Options, simulate
 
@@ -190,6 +195,94 @@ def test_a_lever_that_is_off_is_no_turn_of_the_camera_at_walking_speed() -> None
     for wrong in (-right.T_CB.p, -T.R.T @ right.T_CB.p):
         named = faults_in(moved.with_extrinsic(T._replace(p=wrong)))
         assert [fault.name for fault in named] == ["lever"]
+
+
+@pytest.mark.parametrize("off", ["the sign", "the camera's position"])
+def test_a_wrong_lever_is_not_told_as_a_turned_extrinsic(off: str) -> None:
+    """Such a one turns the way of the camera by 10 degrees, and was told as an extrinsic. How far
+    both agree is asked once, though both rules want to know: it takes longer than all the rest.
+    """
+    moved = slow().with_header(noise=driven().header.noise)
+    arm = np.array([0.3, 0.1, 0.2])
+    T = moved.T_CB
+    v = moved.v_B_mps - np.cross(moved.w_B_radps, arm)
+    right = T.p - T.R @ arm
+    wrong = T._replace(p=-right if off == "the sign" else -T.R.T @ right)
+    asked = []
+
+    def counted(recording: Recording, views: TwoViews) -> Agreement:
+        asked.append(1)
+        return agreement(recording, views)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(geometry, "agreement", counted)
+        named = faults_in(replace(moved, v_B_mps=v).with_extrinsic(wrong))
+    assert [fault.name for fault in named] == ["lever"]
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_gyros_noise_moves_no_lever(seed: int) -> None:
+    """What turns with a noisy gyro seemed to turn less, as if the camera sat nearer to the body."""
+    noisy = replace(DRIVE, seed=seed, duration_s=40.0, twist_rate_hz=10.0, gyro_sigma_radps=0.1)
+    recording = simulate(noisy).recording
+    found = agreed(recording)
+    sigma = np.sqrt(np.diag(found.lever_covariance))
+    assert (np.abs(found.lever_m) < 4 * sigma + 0.05).all()
+    assert [fault.name for fault in faults_in(recording)] == []
+
+
+@pytest.mark.parametrize(("speed", "due"), [(15.0, []), (1.0, ["lever"])])
+def test_tyres_that_slip_are_no_wrong_lever(speed: float, due: list[str]) -> None:
+    """On a road at 15 m/s the camera seemed to be 1.5 m farther back, and a good lever was called
+    a camera's position in its place.
+    """
+    car = driven()
+    v = np.tile([speed, 0.0, 0.0], (len(car.v_B_mps), 1))
+    R = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    car = replace(car, v_B_mps=v).with_extrinsic(
+        car.T_CB._replace(R=R, p=-R @ np.array([1.58, 0.0, 0.65]))
+    )
+    found = replace(
+        agreed(driven()),
+        lever_m=np.array([-1.55, 0.29, -0.15]),
+        lever_covariance=np.diag([0.29, 0.36, 0.8]) ** 2,
+    )
+    assert [fault.name for fault in of_lever(car, found)] == due
+
+
+@pytest.mark.parametrize(("ways_sigma_s", "said"), [(0.1, True), (0.01, False)])
+def test_where_velocities_tell_no_clock_it_may_be_the_gyros(
+    ways_sigma_s: float, said: bool
+) -> None:
+    clocks = TwoClocks(0.15, ways_sigma_s, 0.0, 0.1)
+    found = replace(agreed(driven()), offset_s=0.15, offset_sigma_s=0.02, clocks=clocks)
+    (clock,) = of_clock(driven(), found)
+    assert clock.name == "clock"
+    assert ("or the rates of turn alone" in clock.words) == said
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_axes_that_hardly_turn_are_told_from_mirrored_ones(seed: int) -> None:
+    """As of a car on a road, in ten seconds. What is far from the given axes and nearer to the
+    others was not named unless it was far from the middle of both, too.
+    """
+    chance = np.random.default_rng(seed)
+    smooth = np.exp(-0.5 * (np.arange(-15, 16) / 2.5) ** 2)
+    smooth /= np.linalg.norm(smooth)
+    spread = (0.012, 0.01, 0.1)
+    w = np.stack([np.convolve(chance.normal(0, x, 130), smooth, "valid") for x in spread], axis=1)
+    seen = w + chance.normal(0, 0.005, w.shape)
+    told = w + chance.normal(0, 0.005, w.shape)
+    assert not best_axes(seen, told).won
+    mirrored = best_axes(seen, told * [-1, -1, 1])
+    assert mirrored.won
+    assert np.array_equal(np.diag(mirrored.F), [-1, -1, 1])
+
+
+def test_a_moving_scene_of_few_tracks_must_move_more_than_chance_has_it() -> None:
+    assert moving_least(Moving(1000, 0.0)) == pytest.approx(0.145, abs=0.005)
+    assert moving_least(Moving(19, 0.0)) == pytest.approx(0.30, abs=0.01)
 
 
 def test_the_cameras_place_is_found_from_turns() -> None:

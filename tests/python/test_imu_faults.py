@@ -61,6 +61,16 @@ def test_a_fault_of_an_imu_is_named(drive: Recording, name: str, strength: int) 
     assert said[0].name in due, said
 
 
+def test_degrees_are_named_though_they_go_round_between_two_frames() -> None:
+    """Two seconds of a walker's turn are 60 degrees; taken for radians, the gyro goes round once
+    from frame to frame, and what is left of a turn fitted nothing.
+    """
+    turning = simulate(options(NOISY, seed=3, duration_s=12.0, lap_s=8.0, pixel_sigma_px=1.0))
+    change, due = OF_IMU["degrees"]
+    assert faults_in(turning.recording) == []
+    assert faults_in(change(turning.recording, 0))[0].name in due
+
+
 def test_forces_that_are_no_motions_fit_nothing(drive: Recording) -> None:
     chance = np.random.default_rng(1)
     noise = chance.normal(0, 1, (2, len(drive.inertial.t_ns), 3))

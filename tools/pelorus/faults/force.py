@@ -133,7 +133,18 @@ def rates_of_turn(readings: Inertial, R: Floats, frame_s: Floats) -> Floats:
     """(k, 3) on average from each frame to the next; NaN where the readings do not reach."""
     t = seconds(readings)
     turns, _ = _attitudes(R, t, frame_s)
-    rates = turns / np.diff(frame_s)[:, None]
+    return _reached(t, turns / np.diff(frame_s)[:, None], frame_s)
+
+
+def mean_rates(readings: Inertial, frame_s: Floats) -> Floats:
+    """(k, 3) means of the gyro's readings, as rates_of_turn."""
+    t = seconds(readings)
+    turned = np.diff(_interpolated(t, _summed(t, readings.w_B_radps), frame_s), axis=0)
+    return _reached(t, turned / np.diff(frame_s)[:, None], frame_s)
+
+
+def _reached(t: Floats, rates: Floats, frame_s: Floats) -> Floats:
+    """NaN where the readings do not reach."""
     rates[(frame_s[:-1] < 0) | (frame_s[1:] > t[-1])] = np.nan
     return np.asarray(rates)
 

@@ -7,13 +7,23 @@ matters. What the data cannot tell apart is not guessed at.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from pelorus.faults import imu_axes, mounting
 from pelorus.faults.agreement import Agreement, agreement
+from pelorus.faults.amounts import (
+    BIAS_SIGMAS,
+    bias_mps,
+    of_clock,
+    of_lever,
+    of_place,
+    of_scale,
+    of_scale_by_imu,
+)
 from pelorus.faults.axes import turns
 from pelorus.faults.fault import UNTOLD, Fault
 from pelorus.faults.handeye import (
@@ -24,11 +34,10 @@ from pelorus.faults.handeye import (
     share_of_fit,
 )
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.moving import moving
+from pelorus.faults.moving import Moving, moving
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews, two_views
-from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
@@ -42,14 +51,11 @@ PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 6.0  # where velocities and turns tell it tog
 SURE_SIGMAS = 4.0
 UNIT_NEAR = 0.15
 FAR_LAG = 3
-MOVING_SHARE = 0.14  # of what is seen on roads 5 to 12 % drives, or is tracked so badly
-SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
-BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
-SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
-CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
-LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
-PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
-LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
+MOVING_SHARE = 0.14
+MOVING_USUAL, MOVING_SIGMAS = 0.12, 2.3  # on roads 5 to 12 % drives, or is tracked so badly
+
+
+Ask = Callable[[], Agreement]
 
 
 @dataclass(frozen=True)
@@ -63,35 +69,30 @@ class Judged:
 def geometry(recording: Recording, views: TwoViews) -> Judged:
     """`views` of neighbouring frames. Nothing where all is well."""
     by_imu = len(recording.inertial.t_ns) > 0
-    wrong = list(_of_imu(recording, views) if by_imu else _of_twists(recording, views))
+    ask = cache(lambda: agreement(recording, views))  # it takes longer than all the rest
+    wrong = list(_of_imu(recording, views) if by_imu else _of_twists(recording, views, ask))
     if wrong:
         return Judged(wrong)
     moves = list(_moving(recording, views))
-    agreed = agreement(recording, views)
+    agreed = ask()
     if not agreed.told:
         return Judged(moves)
-    faults = [*moves, *_pitch(recording, agreed), *_lever(recording, agreed)]
+    faults = [*moves, *_pitch(recording, agreed), *of_lever(recording, agreed)]
     if by_imu and not any(fault.name == "lever" for fault in faults):
-        faults += _place(recording, agreed)
+        faults += of_place(recording, agreed)
     if not moves:  # what moves looks like another scale
-        faults += _scale_by_imu(agreed) if by_imu else of_scale(agreed, _bias_mps(recording))
-    return Judged([*faults, *_clock(recording, agreed)], agreed)
+        faults += of_scale_by_imu(agreed) if by_imu else of_scale(agreed, bias_mps(recording))
+    return Judged([*faults, *of_clock(recording, agreed)], agreed)
 
 
-def _bias_mps(recording: Recording) -> float:
-    """Sigma of the velocity's bias."""
-    told = recording.header.noise.bias_velocity_sigma_mps
-    return told if told >= 0 else BIAS_MPS
-
-
-def _of_twists(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+def _of_twists(recording: Recording, views: TwoViews, ask: Ask) -> Iterator[Fault]:
     """Too little to tell by, units, axes and the extrinsic's rotation."""
     found = hand_eye(recording, views)
     unfit = [*_unfit(found.frames, found.fit)]
     if unfit:
         yield from unfit
         return
-    turned = [*_units(found)] or [*_extrinsic(recording, found, views)]
+    turned = [*_units(found)] or [*_extrinsic(recording, found, views, ask)]
     if turned:
         yield from turned
         return
@@ -178,7 +179,7 @@ def _units(found: HandEye) -> Iterator[Fault]:
 # --- axes and extrinsic ---------------------------------------------------------------------------
 
 
-def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterator[Fault]:
+def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) -> Iterator[Fault]:
     """The rotation, and whether each of the twists' axes is the one that is meant."""
     given = recording.T_CB.R
     off = angle_between(found.R, given)
@@ -197,7 +198,7 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
     ):
         of_way = np.cross(given @ found.heading_B, found.R @ found.heading_B)
         by_pitch = abs(of_way[0]) > MOSTLY * float(np.linalg.norm(of_way))
-        if off < NEAR_DEG and _otherwise(recording, views, off):
+        if off < NEAR_DEG and _otherwise(ask(), off):
             return
         if by_pitch and HEADED_SHARE * off < headed and off < NEAR_DEG:
             yield _pitched(f"{headed:.0f}")  # the rest is roll, known worse
@@ -205,11 +206,10 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews) -> Iterato
             yield _turned(given, found.R, off)
 
 
-def _otherwise(recording: Recording, views: TwoViews, off: float) -> bool:
+def _otherwise(agreed: Agreement, off: float) -> bool:
     """Whether what looks like a turn is none once all else may be wrong as well: at walking speed a
     lever that is off turns the way of the camera by as much.
     """
-    agreed = agreement(recording, views)
     if agreed.tilt_rad is None or agreed.tilt_covariance is None:
         return False
     left = float(np.degrees(np.linalg.norm(agreed.tilt_rad)))
@@ -219,7 +219,7 @@ def _otherwise(recording: Recording, views: TwoViews, off: float) -> bool:
 
 def _straight_deg(recording: Recording, found: HandEye) -> float:
     """Within which the way is along the camera: a bias across it turns it."""
-    bias = BIAS_SIGMAS * _bias_mps(recording) / (found.speed_mps + 1e-12)
+    bias = BIAS_SIGMAS * bias_mps(recording) / (found.speed_mps + 1e-12)
     return float(np.hypot(TURNED_DEG, np.degrees(np.arctan(bias))))
 
 
@@ -301,177 +301,19 @@ def _axis_of(R: Floats) -> Floats:
     return np.asarray(axis / (np.linalg.norm(axis) + 1e-12))
 
 
-# --- lever, scale and clock -----------------------------------------------------------------------
+# --- the scene ------------------------------------------------------------------------------------
 
 
-def _lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """Is the camera rather where a translation that was mistaken for another one puts it?"""
-    T = recording.T_CB
-    arm = -T.R.T @ T.p
-    doubt = LEVER_SHARE * float(np.linalg.norm(arm)) + 0.01
-    known = np.linalg.inv(agreed.lever_covariance + doubt**2 * np.eye(3))
-    as_given = float(agreed.lever_m @ known @ agreed.lever_m)
-    best, likely = 0.0, ""
-    for place, words in (
-        (T.p, "[R | p] with the camera's position p in the body in place of -R p"),
-        (-arm, "the translation with the wrong sign"),
-    ):
-        apart = place - arm
-        left = agreed.lever_m - apart
-        gain = as_given - float(left @ known @ left)
-        if float(np.sqrt(apart @ known @ apart)) > LEVER_APART and gain > max(best, LEVER_SURE):
-            best, likely = gain, words
-    if likely:
-        yield Fault(
-            "lever",
-            f"turns put the camera {_metres(arm + agreed.lever_m)} in the body, the extrinsic "
-            f"puts it {_metres(arm)}: it looks like {likely}",
-        )
-
-
-def _place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """Is the camera where it is said to be? Of an IMU, which measures where it is; wheels measure
-    the velocity of some other point than the one that their data sheet names.
-    """
-    T = recording.T_CB
-    arm = -T.R.T @ T.p
-    doubt = LEVER_SHARE * float(np.linalg.norm(arm)) + 0.01
-    known = np.linalg.inv(agreed.lever_covariance + doubt**2 * np.eye(3))
-    off = float(np.linalg.norm(agreed.lever_m))
-    if float(agreed.lever_m @ known @ agreed.lever_m) > PLACE_SURE and off > PLACE_OFF_M:
-        sigma = np.sqrt(np.diagonal(agreed.lever_covariance))
-        yield Fault(
-            "lever",
-            f"turns put the camera {_metres(arm + agreed.lever_m)} from the IMU, known to "
-            f"{sigma.max():.2f} m; the extrinsic puts it {_metres(arm)}",
-            stops=False,
-            grave=False,
-        )
-
-
-def _metres(p: Floats) -> str:
-    return "at (" + ", ".join(f"{x:.2f}" for x in p) + ") m"
-
-
-def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
-    """`bias_sigma` as the HEADER tells it, or else as the filter's settings allow it: where the
-    speed varies too little to tell a scale from a bias, one of that size is nothing new.
-    """
-    off, sigma = agreed.scale - 1, agreed.scale_sigma
-    turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
-    through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
-    if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_WILD) and agreed.scale < SCALE_KNOWN * sigma:
-        yield Fault(
-            "no-fit",
-            f"camera and twists do not tell the same motion: the images show {agreed.scale:.2f} +- "
-            f"{sigma:.2f} times the twists' way. Extrinsic, axes or units, but which is not told",
-        )
-        return
-    if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
-        yield Fault(
-            "scale",
-            f"stereo and odometry disagree in scale: the images show {agreed.scale:.3f} +- "
-            f"{sigma:.3f} times the twists' way. Baseline, focal length or the wheels' radius: "
-            "which of them cannot be known",
-            stops=abs(off) > SCALE_WILD,
-            grave=abs(off) > SCALE_WILD,
-        )
-        return
-    if abs(turn) > max(SCALE_SIGMAS * turn_sigma, SCALE_OFF):
-        yield Fault(
-            "scale",
-            f"stereo and odometry disagree in scale: the images show {agreed.turn_scale:.3f} +- "
-            f"{turn_sigma:.3f} times the twists' turns. Focal length or the gyro's scale",
-            stops=abs(turn) > SCALE_WILD,
-            grave=abs(turn) > SCALE_WILD,
-        )
-        return
-    bias = abs(through) * agreed.speed_mps
-    told = bias > BIAS_SIGMAS * bias_sigma and abs(through) > SCALE_OFF
-    either = abs(through - off) < 2 * sigma and abs(through) < SCALE_SIGMAS * sigma
-    if told and either and abs(through) > SCALE_SIGMAS * its_sigma:
-        wild = abs(through) > SCALE_WILD
-        yield Fault(
-            "scale",
-            f"stereo and odometry disagree: the images show {agreed.through_zero:.3f} +- "
-            f"{its_sigma:.3f} times the twists' way. The speed varies too little to tell a scale "
-            f"that is off from a bias of {bias:.2g} m/s",
-            stops=wild,
-            grave=wild,
-        )
-
-
-def _scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
-    """Turns tell the focal length, forces the baseline; the gyro's scale is the rest."""
-    way = f"the images show {agreed.scale:.3f} +- {agreed.scale_sigma:.3f} times the IMU's way"
-    for off, sigma, words in (
-        (
-            agreed.focal - 1,
-            agreed.focal_sigma,
-            f"a focal length of {agreed.focal:.3f} +- {agreed.focal_sigma:.3f} times the given one "
-            "fits the turns best",
-        ),
-        (
-            agreed.scale - 1,
-            agreed.scale_sigma,
-            f"{way}. Baseline, or the accelerometer's scale",
-        ),
-    ):
-        if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
-            wild = abs(off) > SCALE_WILD
-            yield Fault(
-                "scale", f"stereo and IMU disagree in scale: {words}", stops=wild, grave=wild
-            )
-            return
-
-
-def _clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """One reading later or earlier is another timing: what of it a timing explains is said. Where
-    the rates of turn have a clock of their own, the frames are held to the velocities'.
-    """
-    own = agreed.clocks
-    apart = own.apart
-    offset, sigma = agreed.offset_s, agreed.offset_sigma_s
-    if apart:
-        offset, sigma = own.ways_s, own.ways_sigma_s
-    if abs(offset) > max(CLOCK_SIGMAS * sigma, CLOCK_OFF_S):
-        by_imu = len(recording.inertial.t_ns) > 0
-        body = "IMU" if by_imu else "velocities" if apart else "twists"
-        words = (
-            f"camera and {body} agree best with the frames {abs(offset) * 1e3:.0f} +- "
-            f"{sigma * 1e3:.0f} ms {'later' if offset > 0 else 'earlier'} (camera-offset)"
-        )
-        if not by_imu:
-            words += _timing(recording, offset)
-        yield Fault("clock", words, stops=False, grave=False)
-    if apart:
-        yield Fault(
-            "clock-turns",
-            f"the twists' rates of turn come {abs(own.turns_late_s) * 1e3:.0f} +- "
-            f"{own.turns_late_sigma_s * 1e3:.0f} ms "
-            f"{'after' if own.turns_late_s > 0 else 'before'} their velocities: a filter, or "
-            "stamps of another clock. No setting makes up for it: move the gyro's stamps",
-            stops=False,
-            grave=False,
-        )
-
-
-def _timing(recording: Recording, offset: float) -> str:
-    """What of an offset another timing of the twists would explain."""
-    period = float(np.median(np.diff(recording.twist_t_ns))) * 1e-9
-    given = recording.header.twist_timing
-    lates = {TwistTiming.START: 0.0, TwistTiming.MID: 0.5 * period, TwistTiming.END: period}
-    timing = min(lates, key=lambda t: abs(offset - (lates[t] - lates[given])))
-    if timing is given:
-        return ""
-    part = (lates[timing] - lates[given]) * 1e3
-    return f"; twist-timing {timing.name.lower()} would make up for {part:.0f} ms of it"
+def moving_least(found: Moving) -> float:
+    """The share above which it is more than usual; of few tracks chance makes up some."""
+    by_chance = MOVING_SIGMAS * float(np.sqrt(MOVING_USUAL / max(found.tracks, 1)))
+    return max(MOVING_SHARE, MOVING_USUAL + by_chance)
 
 
 def _moving(recording: Recording, views: TwoViews) -> Iterator[Fault]:
     far = two_views(recording.tracks, recording.header.camera, FAR_LAG)
     found = moving(recording.tracks, views, far)
-    if found.share > MOVING_SHARE:
+    if found.share > moving_least(found):
         yield Fault(
             "moving",
             f"{found.share:.0%} of what is seen moves beside the rest ({found.tracks} tracks of "

@@ -120,7 +120,7 @@ def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None
         turns = np.where(seen.usable[:, None], seen.rates[:, 3:] * seen.tau_s[:, None], 0.0)
         told = force(body.readings, by_images(body.readings, frame_s, turns), frame_s)
     stretches = told.of_stretches()
-    arm = se3.skew(_turns_without_noise(body.turns(t_ns, offset), turn_fit))
+    arm = se3.skew(_turns_without_noise(body.mean_turns(t_ns, offset), turn_fit))
     nine = told.of_force.reshape(-1, 3, 9)
     X = np.concatenate((nine, told.of_bias, arm, stretches), axis=2)
     good = seen.usable & np.isfinite(told.turn).all(axis=1) & np.isfinite(X).all(axis=(1, 2))
@@ -135,7 +135,7 @@ def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
 
 
 def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Fit | None:
-    w = body.turns(frame_t_ns, offset_s)
+    w = body.mean_turns(frame_t_ns, offset_s)
     good = seen.usable & np.isfinite(w).all(axis=1)
     if good.sum() < 0.5 * seen.usable.sum():
         return None

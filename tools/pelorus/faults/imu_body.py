@@ -30,7 +30,7 @@ from pelorus.faults.fit import (
     beside,
     slope,
 )
-from pelorus.faults.force import Force, by_gyro, force, rates_of_turn, thinned
+from pelorus.faults.force import Force, by_gyro, force, mean_rates, rates_of_turn, thinned
 from pelorus.faults.seen import Seen
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
@@ -66,6 +66,13 @@ class ImuBody:
     def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
         """As fit.Body."""
         return rates_of_turn(self.readings, self._R, self.frame_s(frame_t_ns, offset_s))
+
+    def mean_turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
+        """(k, 3) the readings' own means from frame to frame: `turns` but for the order of turns,
+        and right in any unit, where a turn by degrees taken for radians goes round several times.
+        """
+        frame_s = self.frame_s(frame_t_ns, offset_s)
+        return mean_rates(self.readings, frame_s)
 
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
         """As fit.Body. Of what has the images' own noise, the frames beside are the instrument."""

@@ -6,12 +6,16 @@ mirrors them in different ways, and a wrong sign may be in one column alone.
 A way to turn F wins if b -> F b explains what the images show and b does not: on the difference
 d = b - F b, taken some frames beside, which has no part in the noise of this frame,
 
-    T = sum d' (y - b) / sum d' d     is 0 if the axes are right, and -1 if F is.
+    T = sum d' (y - b) / sum d' d     is 0 if the axes are right, and -1 if F is:
+
+far from the one, and clearly nearer to the other. Velocities must be the surer of it: what those of
+a road are off by across the way lasts for seconds, and looks like other axes; turns have no such
+errors.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +25,8 @@ from pelorus.layout import Floats
 
 BESIDE = (1, 2)
 EXPLAINED_LEAST = 0.3
-SURE = 6.0  # standard errors by which T must lie beyond the middle
+SURE, BEYOND = 6.0, 3.0  # standard errors by which T must lie below 0, and below the middle
+SURE_OF_WAYS = 6.0  # the same below the middle, by velocities: whole blocks must agree in it
 BLOCKS = 40
 ROUNDS = 4
 SAMPLES_MIN = 50
@@ -30,19 +35,25 @@ TILT_RAD, LEVER_M = 0.05, 1.0
 
 @dataclass(frozen=True)
 class Duel:
-    """The best of all ways, and by how many standard errors it is beyond the given axes."""
+    """The best of all ways beside the given axes."""
 
     F: Floats
-    z: float
     effect: float  # T: 0 to -1
+    sigma: float  # of T
+    z: float  # standard errors by which the blocks of the drive lie below the middle
+    by_ways: bool
     explained: float  # of what the images show on the axes in question, by F
 
     @property
     def won(self) -> bool:
-        return self.z > SURE and self.effect < -0.5 and self.explained > EXPLAINED_LEAST
+        below = -0.5 - self.effect
+        sure = -self.effect > SURE * self.sigma and below > BEYOND * self.sigma
+        if self.by_ways:
+            sure = below > 0 and self.z > SURE_OF_WAYS
+        return sure and self.explained > EXPLAINED_LEAST
 
 
-STAYS = Duel(np.eye(3), 0.0, 0.0, 0.0)
+STAYS = Duel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
 
 
 def best_axes(seen: Floats, told: Floats, turns: Floats | None = None) -> Duel:
@@ -63,7 +74,8 @@ def best_axes(seen: Floats, told: Floats, turns: Floats | None = None) -> Duel:
     best = int(np.argmin(costs))
     if best == 0:
         return STAYS
-    return _duel(candidates[best], seen, told, besides[0], spread)
+    found = _duel(candidates[best], seen, told, besides[0], spread)
+    return replace(found, by_ways=turns is not None)
 
 
 def _beside(told: Floats, turns: Floats | None) -> Floats:
@@ -110,14 +122,16 @@ def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Float
     power = np.sum(beside * d / spread, axis=1) * weight
     blocks = min(BLOCKS, len(along) // 10)
     at = np.arange(len(along)) * blocks // len(along)
-    score = np.bincount(at, along + 0.5 * power)  # under F half the power below zero
     total = float(np.sum(power))
     if total <= 0:
         return STAYS
-    z = -float(np.sum(score)) / (float(np.sqrt(np.sum(score**2))) + 1e-12)
-    # sum / root of the sum of squares is at most the root of the number of blocks
-    z *= np.sqrt(max((blocks - 1) / max(blocks - z * z, 0.5), 1.0)) if z > 0 else 1.0
+    effect = float(np.sum(along)) / total
+    score = np.bincount(at, along - effect * power)
+    sigma = float(np.sqrt(np.sum(score**2) * blocks / (blocks - 1))) / total
+    below = np.bincount(at, along + 0.5 * power)  # under F half the power below zero
+    spread_of = float(np.std(below, ddof=1)) + 1e-12
+    z = -float(np.mean(below)) / spread_of * float(np.sqrt(blocks))
     other = ~np.isclose(np.diag(F), 1)
     left, shown = free(seen - told @ F.T)[:, other], free(seen)[:, other]
     share = np.sum(weight[:, None] * left**2) / (np.sum(weight[:, None] * shown**2) + 1e-12)
-    return Duel(F, z, float(np.sum(along)) / total, 1 - float(share))
+    return Duel(F, effect, sigma, z, False, 1 - float(share))

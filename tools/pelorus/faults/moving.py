@@ -19,7 +19,7 @@ OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 sound pairs
 DRIFT_PX = 1.5  # a tracker may lose its point by so much between the views
 VIEWS_LEAST = 4  # pairs of a track that tell
 MOST_OF_THEM = 0.5
-TRACKS_LEAST = 20
+TRACKS_LEAST = 10
 MAD_TO_SIGMA, NOISE_LEAST, DRIFTS_ABOVE = 1.4826, 0.5, 1.5
 
 

@@ -85,8 +85,8 @@ class TwistBody:
         return self.rates(frame_t_ns, 1, offset_s)[:, 3:]
 
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """As fit.Body. Scale and time are free of the twists' noise by instruments: the same motion
-        some frames away.
+        """As fit.Body. Scale, lever and time are free of the twists' noise by instruments: the same
+        motion some frames away.
         """
         rates = self.rates(recording.frame_t_ns, 1, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
@@ -126,6 +126,7 @@ def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
     Z = X.copy()
     Z[:, :3, SCALE] = beside(g, 2, 3)
     Z[:, 3:, TURN_SCALE] = beside(w, 2, 3)
+    Z[:, :3, LEVER : LEVER + 3] = se3.skew(beside(w, 2))
     Z[:, :, CLOCK] = _slope_beside(both, seen)
     X[:, 3:, TURN_CLOCK], Z[:, 3:, TURN_CLOCK] = X[:, 3:, CLOCK], Z[:, 3:, CLOCK]
     return X, Z

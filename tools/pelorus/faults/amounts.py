@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""How much lever, scale and clock are off, put into words where it is beyond doubt and matters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pelorus.faults.agreement import Agreement
+from pelorus.faults.fault import Fault
+from pelorus.frames import TwistTiming
+from pelorus.layout import Floats
+from pelorus.recording import Recording
+
+SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
+BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
+SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
+CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
+LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
+PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
+LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
+SLIP_S2_PER_M = (
+    0.003  # a turning car goes sideways by this v^2 w: so far off its camera seems to be
+)
+
+
+def bias_mps(recording: Recording) -> float:
+    """Sigma of the velocity's bias."""
+    told = recording.header.noise.bias_velocity_sigma_mps
+    return told if told >= 0 else BIAS_MPS
+
+
+def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """Is the camera rather where a translation that was mistaken for another one puts it?"""
+    T = recording.T_CB
+    arm = -T.R.T @ T.p
+    known = np.linalg.inv(place_covariance(recording, agreed))
+    as_given = float(agreed.lever_m @ known @ agreed.lever_m)
+    best, likely = 0.0, ""
+    for place, words in (
+        (T.p, "[R | p] with the camera's position p in the body in place of -R p"),
+        (-arm, "the translation with the wrong sign"),
+    ):
+        apart = place - arm
+        left = agreed.lever_m - apart
+        gain = as_given - float(left @ known @ left)
+        if float(np.sqrt(apart @ known @ apart)) > LEVER_APART and gain > max(best, LEVER_SURE):
+            best, likely = gain, words
+    if likely:
+        yield Fault(
+            "lever",
+            f"turns put the camera {_metres(arm + agreed.lever_m)} in the body, the extrinsic "
+            f"puts it {_metres(arm)}: it looks like {likely}",
+        )
+
+
+def place_covariance(recording: Recording, agreed: Agreement) -> Floats:
+    """How well the camera's place is known: by turns, by him who measured it, and along the way of
+    twists as far as tyres slip, of which these know nothing.
+    """
+    doubt = LEVER_SHARE * float(np.linalg.norm(recording.T_CB.p)) + 0.01
+    known = np.asarray(agreed.lever_covariance + doubt**2 * np.eye(3))
+    if len(recording.inertial.t_ns):
+        return known
+    v = recording.v_B_mps
+    speed = float(np.sqrt(np.median(np.sum(v**2, axis=1))))
+    ahead = np.median(v, axis=0) / (speed + 1e-12)
+    return np.asarray(known + (SLIP_S2_PER_M * speed**2) ** 2 * np.outer(ahead, ahead))
+
+
+def of_place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """Is the camera where it is said to be? Of an IMU, which measures where it is; wheels measure
+    the velocity of some other point than the one that their data sheet names.
+    """
+    T = recording.T_CB
+    arm = -T.R.T @ T.p
+    known = np.linalg.inv(place_covariance(recording, agreed))
+    off = float(np.linalg.norm(agreed.lever_m))
+    if float(agreed.lever_m @ known @ agreed.lever_m) > PLACE_SURE and off > PLACE_OFF_M:
+        sigma = np.sqrt(np.diagonal(agreed.lever_covariance))
+        yield Fault(
+            "lever",
+            f"turns put the camera {_metres(arm + agreed.lever_m)} from the IMU, known to "
+            f"{sigma.max():.2f} m; the extrinsic puts it {_metres(arm)}",
+            stops=False,
+            grave=False,
+        )
+
+
+def _metres(p: Floats) -> str:
+    return "at (" + ", ".join(f"{x:.2f}" for x in p) + ") m"
+
+
+def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
+    """`bias_sigma` as the HEADER tells it, or else as the filter's settings allow it: where the
+    speed varies too little to tell a scale from a bias, one of that size is nothing new.
+    """
+    off, sigma = agreed.scale - 1, agreed.scale_sigma
+    turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
+    through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
+    if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_WILD) and agreed.scale < SCALE_KNOWN * sigma:
+        yield Fault(
+            "no-fit",
+            f"camera and twists do not tell the same motion: the images show {agreed.scale:.2f} +- "
+            f"{sigma:.2f} times the twists' way. Extrinsic, axes or units, but which is not told",
+        )
+        return
+    if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
+        yield Fault(
+            "scale",
+            f"stereo and odometry disagree in scale: the images show {agreed.scale:.3f} +- "
+            f"{sigma:.3f} times the twists' way. Baseline, focal length or the wheels' radius: "
+            "which of them cannot be known",
+            stops=abs(off) > SCALE_WILD,
+            grave=abs(off) > SCALE_WILD,
+        )
+        return
+    if abs(turn) > max(SCALE_SIGMAS * turn_sigma, SCALE_OFF):
+        yield Fault(
+            "scale",
+            f"stereo and odometry disagree in scale: the images show {agreed.turn_scale:.3f} +- "
+            f"{turn_sigma:.3f} times the twists' turns. Focal length or the gyro's scale",
+            stops=abs(turn) > SCALE_WILD,
+            grave=abs(turn) > SCALE_WILD,
+        )
+        return
+    bias = abs(through) * agreed.speed_mps
+    told = bias > BIAS_SIGMAS * bias_sigma and abs(through) > SCALE_OFF
+    either = abs(through - off) < 2 * sigma and abs(through) < SCALE_SIGMAS * sigma
+    if told and either and abs(through) > SCALE_SIGMAS * its_sigma:
+        wild = abs(through) > SCALE_WILD
+        yield Fault(
+            "scale",
+            f"stereo and odometry disagree: the images show {agreed.through_zero:.3f} +- "
+            f"{its_sigma:.3f} times the twists' way. The speed varies too little to tell a scale "
+            f"that is off from a bias of {bias:.2g} m/s",
+            stops=wild,
+            grave=wild,
+        )
+
+
+def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
+    """Turns tell the focal length, forces the baseline; the gyro's scale is the rest."""
+    way = f"the images show {agreed.scale:.3f} +- {agreed.scale_sigma:.3f} times the IMU's way"
+    for off, sigma, words in (
+        (
+            agreed.focal - 1,
+            agreed.focal_sigma,
+            f"a focal length of {agreed.focal:.3f} +- {agreed.focal_sigma:.3f} times the given one "
+            "fits the turns best",
+        ),
+        (
+            agreed.scale - 1,
+            agreed.scale_sigma,
+            f"{way}. Baseline, or the accelerometer's scale",
+        ),
+    ):
+        if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
+            wild = abs(off) > SCALE_WILD
+            yield Fault(
+                "scale", f"stereo and IMU disagree in scale: {words}", stops=wild, grave=wild
+            )
+            return
+
+
+def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
+    """One reading later or earlier is another timing: what of it a timing explains is said. Where
+    the rates of turn have a clock of their own, the frames are held to the velocities'.
+    """
+    own = agreed.clocks
+    apart = own.apart
+    offset, sigma = agreed.offset_s, agreed.offset_sigma_s
+    if apart:
+        offset, sigma = own.ways_s, own.ways_sigma_s
+    if abs(offset) > max(CLOCK_SIGMAS * sigma, CLOCK_OFF_S):
+        by_imu = len(recording.inertial.t_ns) > 0
+        body = "IMU" if by_imu else "velocities" if apart else "twists"
+        words = (
+            f"camera and {body} agree best with the frames {abs(offset) * 1e3:.0f} +- "
+            f"{sigma * 1e3:.0f} ms {'later' if offset > 0 else 'earlier'} (camera-offset)"
+        )
+        if not by_imu:
+            words += _timing(recording, offset) + _or_turns(agreed)
+        yield Fault("clock", words, stops=False, grave=False)
+    if apart:
+        yield Fault(
+            "clock-turns",
+            f"the twists' rates of turn come {abs(own.turns_late_s) * 1e3:.0f} +- "
+            f"{own.turns_late_sigma_s * 1e3:.0f} ms "
+            f"{'after' if own.turns_late_s > 0 else 'before'} their velocities: a filter, or "
+            "stamps of another clock. No setting makes up for it: move the gyro's stamps",
+            stops=False,
+            grave=False,
+        )
+
+
+def _or_turns(agreed: Agreement) -> str:
+    """Whether a gyro that is late by itself would explain as much."""
+    own = agreed.clocks
+    sure = abs(own.ways_s) > CLOCK_SIGMAS * own.ways_sigma_s
+    if sure or own.apart:
+        return ""
+    return "; or the rates of turn alone are off by that: the velocities do not tell"
+
+
+def _timing(recording: Recording, offset: float) -> str:
+    """What of an offset another timing of the twists would explain."""
+    period = float(np.median(np.diff(recording.twist_t_ns))) * 1e-9
+    given = recording.header.twist_timing
+    lates = {TwistTiming.START: 0.0, TwistTiming.MID: 0.5 * period, TwistTiming.END: period}
+    timing = min(lates, key=lambda t: abs(offset - (lates[t] - lates[given])))
+    if timing is given:
+        return ""
+    part = (lates[timing] - lates[given]) * 1e3
+    return f"; twist-timing {timing.name.lower()} would make up for {part:.0f} ms of it"
