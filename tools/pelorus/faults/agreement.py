@@ -74,8 +74,10 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     at = offset
     if clocks.apart:  # all else is asked of motions that belong together
         body, at = TwistBody(recording, clocks.turns_late_s), clocks.ways_s
-    found = none = Fit(body.design(recording, seen, at, bias))
+    found = none = place = Fit(body.design(recording, seen, at, bias))
     if not by_imu:
+        late = clocks.turns_late_s if clocks.apart else None
+        place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
         none = Fit(body.design(recording, seen, at, NO_BIAS_MPS))
     doubt = _doubt_by_depth(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS))
     lever = slice(LEVER, LEVER + 3)
@@ -86,8 +88,8 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         float(np.hypot(_sigma(found, by_imu), doubt)),
         1 + float(none.x[SCALE]),
         float(np.hypot(none.sigma[SCALE], doubt)),
-        found.x[lever],
-        found.covariance[lever, lever],
+        place.x[lever],
+        place.covariance[lever, lever],
         offset,
         float(found.sigma[CLOCK]),
         float(np.median(np.linalg.norm(found.g, axis=1))),

@@ -42,11 +42,18 @@ FAR, NEAR = 3, 2  # frames from which a slope is taken: farther than a reading's
 class TwistBody:
     """What the twists say of the motion between any two times. `turns_late_s`: the rates of turn
     are taken so much later than the velocities, and how far they are from that is asked, too.
+    `for_place`: the lever is free of the gyro's noise, too, and known worse; other unknowns are
+    surer with one that is a little short.
     """
 
-    def __init__(self, recording: Recording, turns_late_s: float | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        turns_late_s: float | None = None,
+        for_place: bool = False,
+    ) -> None:
         header = recording.header
-        self._turns_late_s = turns_late_s
+        self._turns_late_s, self._for_place = turns_late_s, for_place
         self._t_ns, self._v, self._w = recording.twist_t_ns, recording.v_B_mps, recording.w_B_radps
         self._nodes = dead_reckoning(self._t_ns, self._v, self._w, header.twist_timing)
         self._held = header.twist_timing.name
@@ -85,8 +92,8 @@ class TwistBody:
         return self.rates(frame_t_ns, 1, offset_s)[:, 3:]
 
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """As fit.Body. Scale, lever and time are free of the twists' noise by instruments: the same
-        motion some frames away.
+        """As fit.Body. Scale and time are free of the twists' noise by instruments: the same motion
+        some frames away.
         """
         rates = self.rates(recording.frame_t_ns, 1, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
@@ -96,6 +103,8 @@ class TwistBody:
         usable &= np.isfinite(rates).all(axis=1)
         y = seen.rates - np.hstack((g, w))
         X, Z = _columns(g, w, seen)
+        if self._for_place:
+            Z[:, :3, LEVER : LEVER + 3] = se3.skew(beside(w, 2))
         k = usable
         own = ONE_CLOCK_S if self._turns_late_s is None else OWN_CLOCK_S
         return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, own), g[k])
@@ -126,7 +135,6 @@ def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
     Z = X.copy()
     Z[:, :3, SCALE] = beside(g, 2, 3)
     Z[:, 3:, TURN_SCALE] = beside(w, 2, 3)
-    Z[:, :3, LEVER : LEVER + 3] = se3.skew(beside(w, 2))
     Z[:, :, CLOCK] = _slope_beside(both, seen)
     X[:, 3:, TURN_CLOCK], Z[:, 3:, TURN_CLOCK] = X[:, 3:, CLOCK], Z[:, 3:, CLOCK]
     return X, Z
