@@ -14,6 +14,7 @@ add_library(pelorus-textbook-filter STATIC
   "${pelorus_textbook_dir}/search.c"
   "${pelorus_textbook_dir}/body.c"
   "${pelorus_textbook_dir}/update.c"
+  "${pelorus_textbook_dir}/consider.c"
   "${pelorus_textbook_dir}/landmarks.c"
   "${pelorus_oracle_dir}/rigid.c"
   "${pelorus_oracle_dir}/oracle.c"

@@ -13,6 +13,7 @@
 #include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/health.h"
+#include "filter/held_bias.h"
 #include "filter/inertial.h"
 #include "filter/matching.h"
 #include "filter/measure.h"
@@ -113,28 +114,42 @@ static void measure_used(plr_filter *f, const plr_frame *frame, unsigned used) {
     }
 }
 
+/* Finds the motion and judges the observations by it; `believed` is what the twists say. False if the
+ * frame does not need it: it goes on accumulating, with the original Q. */
+static bool find_motion(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report,
+                        plr_applied_motion *believed, plr_motion_first *first) {
+    plr_real Q[PLR_POSE_SQUARE];
+    memcpy(Q, f->motion.Q, sizeof Q);
+    plr_consistency_widen(f, believed);
+    plr_motion_find(f, frame, n, first, &report->nis);
+    if (needs_motion_applied(f, frame, n))
+        return true;
+    memcpy(f->motion.Q, Q, sizeof Q);
+    return false;
+}
+
 /* Finds the motion, judges the observations by it, and corrects. */
 static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsigned n,
                                    plr_report *report) {
     plr_applied_motion believed;
     plr_motion_first first;
+    plr_held_bias before;
     plr_correction correction = {0};
-    plr_real Q[PLR_POSE_SQUARE];
-    memcpy(Q, f->motion.Q, sizeof Q);
-    plr_consistency_widen(f, &believed);
-    plr_motion_find(f, frame, n, &first, &report->nis);
-    if (!needs_motion_applied(f, frame, n)) { /* goes on accumulating, with the original Q */
-        memcpy(f->motion.Q, Q, sizeof Q);
+    if (!find_motion(f, frame, n, report, &believed, &first)) {
         (void)choose(f, frame, n, report);
         return correction;
     }
+    plr_bias_hold(f, first.contradicted, &before);
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
     const unsigned used = choose(f, frame, n, report);
     measure_used(f, frame, used);
     correction = plr_correct(f, used, NULL, 0);
-    if (correction.moved && !f->diverged)
+    if (f->diverged)
+        return correction;
+    plr_bias_put_back(f, &before);
+    if (correction.moved)
         plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda,
                             first.contradicted);
     return correction;

@@ -70,6 +70,8 @@ typedef struct textbook {
     double *blocks;            /* `body`: 3x3 a landmark */
     unsigned *matched;         /* landmark of each observation, count where there is none */
     struct textbook_sighting *sightings; /* `body`: most_seen (search.h) */
+    double *considered; /* zeros for H, 4 most_seen x n, if the next frame may not change the biases
+                           (consider.h); else NULL */
 } textbook;
 
 /* What a frame came to. */

@@ -12,6 +12,7 @@
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "textbook/body.h"
+#include "textbook/consider.h"
 #include "textbook/observe.h"
 #include "textbook/textbook.h"
 
@@ -164,7 +165,10 @@ static bool gain(textbook *t, unsigned n, unsigned m, textbook_report *report) {
     weigh(t, m, report);
     oracle_gemm(ORACLE_TRANSPOSED, ORACLE_PLAIN, n, 1, m, 1, t->rows, t->innovation, 1,
                 t->correction);
-    oracle_downdate(n, m, t->rows, t->P, t->ld);
+    if (t->considered)
+        consider_biases(t, n, m, t->considered);
+    else
+        oracle_downdate(n, m, t->rows, t->P, t->ld);
     t->diverged = !is_sound(t, n);
     return true;
 }
@@ -231,6 +235,9 @@ static unsigned stack_frame(textbook *t, unsigned n, plr_time_ns t_ns, const plr
         if (landmark == t->count || t->landmarks[landmark].rejected)
             continue;
         (void)observe_linearise(t, landmark, &frame->observations[i], &line); /* as before */
+        for (unsigned r = 0; t->considered && r < ROWS; r++)
+            consider_row(t, line.H + COLUMNS * r, line.H + COLUMNS * r + POSE, landmark,
+                         t->considered + (ROWS * at + r) * (size_t)n);
         stack_S(t, n, ROWS * passed, ROWS * at++, landmark, &line);
     }
     return passed;

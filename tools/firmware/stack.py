@@ -59,7 +59,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_correct", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
-    (r"bias_is_off", (PROCESS,)),
+    (r"bias_is_off|plr_bias_\w+", (PROCESS,)),
     (FILTER, (*MODEL, *MAP, PROCESS)),
 )
 

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#include "filter/held_bias.h"
+
+#include <string.h>
+
+#include "process/process.h"
+#include "process/velocity.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
+
+/* Not with an IMU, whose biases, velocity and tilt are found together after a start in motion; nor
+ * if another sensor has told of the biases since the last frame. */
+static bool may_hold(const plr_filter *f) {
+    return plr_has_block(f, PLR_BLOCK_BIAS) && !plr_has_block(f, PLR_BLOCK_VELOCITY) &&
+           !plr_velocity_informs_bias(f);
+}
+
+void plr_bias_hold(const plr_filter *f, bool outright, plr_held_bias *before) {
+    before->held = (f->consistency.contradicted || outright) && may_hold(f);
+    if (!before->held)
+        return;
+    before->seconds = f->motion.seconds;
+    memcpy(before->bias, f->bias, sizeof before->bias);
+    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
+}
+
+void plr_bias_put_back(plr_filter *f, const plr_held_bias *before) {
+    plr_real lost[PLR_BIAS_DIM * PLR_BIAS_DIM];
+    if (!before->held)
+        return;
+    memcpy(f->bias, before->bias, sizeof before->bias);
+    plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, lost);
+    for (unsigned i = 0; i < PLR_BIAS_DIM * PLR_BIAS_DIM; i++)
+        lost[i] = before->P_bb[i] - lost[i];
+    plr_covariance_add(f, PLR_BLOCK_BIAS, lost);
+    plr_process_of(f)->walk(f, before->seconds);
+}
