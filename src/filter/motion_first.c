@@ -31,8 +31,10 @@ enum {
  * share to its prediction. Below it the observation has determined the motion itself. */
 #define LEAST_SHARE PLR_R(0.05)
 
-/* A landmark that no frame of this time saw was out of sight. */
+/* A landmark that no frame of this time saw was out of sight; a motion that no frame of this time
+ * measured was in the dark. */
 #define UNSEEN_NS 1000000000U
+#define DARK_S    PLR_R(1)
 
 /* True if a landmark was out of sight before this frame, and may be lost. */
 static bool is_unseen(const plr_search *s, unsigned i) {
@@ -53,7 +55,7 @@ static bool is_lost(const plr_search *s, unsigned i) {
 static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
-    at->adrift = true; /* unless the prediction below says otherwise */
+    at->adrift = s->f->motion.seconds > DARK_S; /* unless the prediction below says otherwise */
     if (at->behind || is_lost(s, i)) {
         at->active = 0;
         return;
@@ -82,7 +84,7 @@ static void judge_by_prior(plr_search *s, unsigned i) {
         basis = basis && variance <= limit;
         within = within && variance <= adrift;
     }
-    at->adrift = !within;
+    at->adrift = !within && s->f->motion.seconds > DARK_S;
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
         at->active = 0;
         return;
