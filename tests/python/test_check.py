@@ -233,6 +233,13 @@ def test_a_gated_observation_costs_what_one_anywhere_would() -> None:
     assert outcome.outcome_of([good, refused, pose], 40.0).matched == 10
 
 
+def test_any_run_is_likelier_than_one_that_used_nothing() -> None:
+    some = replace(outcome.NOTHING, cost=10.0, matched=1000)
+    assert some.gain_over(outcome.NOTHING) == np.inf
+    assert outcome.NOTHING.gain_over(some) == -np.inf
+    assert outcome.NOTHING.gain_over(outcome.NOTHING) == 0
+
+
 def test_an_outlier_may_lie_anywhere_in_the_picture() -> None:
     frames = drive()
     sized = header(image_width_px=640, image_height_px=480)

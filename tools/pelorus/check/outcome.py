@@ -69,7 +69,13 @@ class Outcome:
     )  # -2 ln of each frame's likelihood
 
     def gain_over(self, other: Outcome) -> float:
-        """How much likelier this run makes what was seen: -2 ln of the ratio, over the drive."""
+        """How much likelier this run makes what was seen: -2 ln of the ratio, over the drive. Than
+        a run that used nothing any other is likelier.
+        """
+        if not (math.isfinite(self.cost) and math.isfinite(other.cost)):
+            return (
+                0.0 if self.cost == other.cost else math.copysign(math.inf, other.cost - self.cost)
+            )
         return (other.cost - self.cost) * min(self.matched, other.matched)
 
 
