@@ -217,10 +217,11 @@ typedef struct plr_config {
     uint8_t process;
 
     /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO.
-     * Two seconds after a start in motion the world is defined anew: by the position and yaw that are
-     * then estimated, which from there on count as known to start-sigma. It differs from the world of
-     * plr_filter_set_pose by the errors of the first two seconds. A measured position or a known
-     * landmark prevents this, because they belong to the world as it was given. */
+     * After a start in motion position and yaw are misled by some 0.3 m and 2 degrees, and health is
+     * DEGRADED for two seconds (PLR_REASON_POSE_MAY_BE_WRONG). Then the world is defined anew: by the
+     * position and yaw that are estimated, which from there on count as known to start-sigma. A pose
+     * that was set with a covariance, a measured position and a known landmark prevent this, because
+     * they belong to the world as it was given: there the covariance is widened by as much. */
     uint8_t imu_start;
 
     /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.

@@ -129,6 +129,14 @@ typedef struct plr_alignment {
     plr_watched_point points[PLR_WATCHED_POINTS];
 } plr_alignment;
 
+/* What a start in motion has left of position and yaw (docs/MATH.md 19, the anchor). */
+typedef enum plr_anchored {
+    PLR_ANCHOR_DUE,    /* the world is free, and will be laid anew */
+    PLR_ANCHORED,      /* they are fixed: by the start, or the anchor after it */
+    PLR_WORLD_IS_GIVEN /* by a covariance, a measured position or a map: they are to be widened by
+                             what the first second may have added */
+} plr_anchored;
+
 /* What an IMU adds to the state: src/process/imu.c. */
 typedef struct plr_inertial {
     plr_real velocity[PLR_VELOCITY_DIM]; /* of the body in its own axes, m/s */
@@ -143,8 +151,7 @@ typedef struct plr_inertial {
     uint16_t frames;      /* that used observations since the start, up to the anchor */
     uint8_t started;      /* 1: tilt and velocity are known */
     uint8_t pose_given;   /* 1: plr_filter_set_pose was called */
-    uint8_t anchored;     /* 1: position and yaw are fixed: by the start, the anchor after it, a
-                             measured position or a map */
+    uint8_t anchored;     /* plr_anchored: what is known of position and yaw since the start */
     uint8_t fault;        /* plr_imu_fault, found at the start or since */
     uint8_t doubts;       /* successive frames at which the mean reading did not fit gravity */
 } plr_inertial;

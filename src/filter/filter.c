@@ -281,6 +281,8 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_start);
     store_pose(f, t_ns, &at);
     f->inertial.pose_given = 1;
+    if (P_xi)
+        plr_alignment_keep_world(f);
     plr_consistency_clear(f);
     plr_filter_store_for_recovery(f);
     f->diverged = 0;

@@ -6,6 +6,7 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "process/alignment.h"
 
 enum {
     LOCK_FRAMES = 10,       /* successive frames of a gate that rejects nearly all */
@@ -106,6 +107,8 @@ static uint32_t imu_reasons(const plr_filter *f) {
         return 0;
     if (!f->inertial.started)
         reasons |= PLR_REASON_NOT_STARTED;
+    if (plr_alignment_is_unsettled(f))
+        reasons |= PLR_REASON_POSE_MAY_BE_WRONG;
     if (fault != PLR_IMU_FAULT_NONE && fault != PLR_IMU_FAULT_MOVES)
         reasons |= PLR_REASON_IMU_FAULT;
     return reasons;

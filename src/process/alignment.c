@@ -42,6 +42,9 @@ enum { WATCH_FRAMES = 10 };
 /* The anchor comes this much after a start in motion, if this many frames were used. */
 #define ANCHOR_NS UINT64_C(2000000000)
 enum { ANCHOR_FRAMES = 10 };
+/* Within about this time, s, tilt and velocity are found; meanwhile their products of second order
+ * have misled position and yaw. */
+#define FOUND_S PLR_R(0.5)
 
 void plr_alignment_clear(plr_filter *f) {
     memset(&f->inertial, 0, sizeof f->inertial);
@@ -232,7 +235,7 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
     set_tilt_covariance(f, u, theta);
     plr_covariance_set(f, PLR_BLOCK_BIAS, PLR_BLOCK_POSE, cross);
     begin(f, t_ns, interval);
-    f->inertial.anchored = 1;
+    f->inertial.anchored = PLR_ANCHORED;
 }
 
 /* In motion: the tilt from a moment's mean, with a velocity that the first frames will find. */
@@ -252,7 +255,7 @@ void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
                          const plr_real variance[PLR_VELOCITY_DIM]) {
     set_velocity(f, v, variance);
     begin(f, f->t_ns, 0);
-    f->inertial.anchored = 1;
+    f->inertial.anchored = PLR_ANCHORED;
 }
 
 void plr_alignment_does_not_stand(plr_filter *f, plr_imu_fault how) {
@@ -341,8 +344,12 @@ void plr_alignment_watch_gravity(plr_filter *f) {
 
 bool plr_alignment_wants_anchor(const plr_filter *f) {
     const plr_inertial *s = &f->inertial;
-    return s->started && !s->anchored && s->frames >= ANCHOR_FRAMES &&
+    return s->started && s->anchored != PLR_ANCHORED && s->frames >= ANCHOR_FRAMES &&
            f->t_ns - s->started_ns >= ANCHOR_NS && !f->motion.pending;
+}
+
+bool plr_alignment_is_unsettled(const plr_filter *f) {
+    return f->inertial.started && f->inertial.anchored != PLR_ANCHORED;
 }
 
 void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns) {
@@ -353,23 +360,39 @@ void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns) {
 }
 
 void plr_alignment_keep_world(plr_filter *f) {
-    if (f->config.process == PLR_PROCESS_IMU)
-        f->inertial.anchored = 1;
+    if (f->config.process == PLR_PROCESS_IMU && f->inertial.anchored == PLR_ANCHOR_DUE)
+        f->inertial.anchored = PLR_WORLD_IS_GIVEN;
+}
+
+/* Adds variances of the position, in each direction, and of the yaw, about the vertical u. */
+static void add_to_pose(plr_filter *f, const plr_real u[3], plr_real position, plr_real yaw) {
+    plr_real C[PLR_POSE_SQUARE] = {0};
+    for (unsigned i = 0; i < 3; i++) {
+        C[(PLR_POSE_DIM + 1) * i] = position;
+        for (unsigned j = 0; j < 3; j++)
+            C[PLR_POSE_DIM * (3 + i) + 3 + j] = yaw * (u[i] * u[j]);
+    }
+    plr_covariance_add(f, PLR_BLOCK_POSE, C);
+}
+
+/* Removes what is known of position and yaw, and their shares in all else. */
+static void forget_place(plr_filter *f, const plr_real u[3]) {
+    plr_real A[PLR_POSE_SQUARE] = {0};
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++)
+            A[PLR_POSE_DIM * (3 + i) + 3 + j] = (i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j];
+    plr_covariance_turn_pose(f, A);
 }
 
 void plr_alignment_anchor(plr_filter *f) {
     const plr_real variance = (plr_real)(f->config.start_sigma * f->config.start_sigma);
-    const plr_real *u = f->R_WB + 6;
-    plr_real A[PLR_POSE_SQUARE] = {0}, C[PLR_POSE_SQUARE] = {0};
-    for (unsigned i = 0; i < 3; i++) {
-        C[(PLR_POSE_DIM + 1) * i] = variance;
-        for (unsigned j = 0; j < 3; j++) {
-            const plr_real along = u[i] * u[j];
-            A[PLR_POSE_DIM * (3 + i) + 3 + j] = (i == j ? PLR_R(1) : PLR_R(0)) - along;
-            C[PLR_POSE_DIM * (3 + i) + 3 + j] = variance * along;
-        }
+    const plr_real *u = f->R_WB + 6; /* R_WB^T e_z */
+    if (f->inertial.anchored == PLR_WORLD_IS_GIVEN) {
+        const plr_real way2 = f->par.start_velocity_variance * (FOUND_S * FOUND_S);
+        add_to_pose(f, u, TILT * TILT * way2, TILT * TILT * (TILT * TILT));
+    } else {
+        forget_place(f, u);
+        add_to_pose(f, u, variance, variance);
     }
-    plr_covariance_turn_pose(f, A);
-    plr_covariance_add(f, PLR_BLOCK_POSE, C);
-    f->inertial.anchored = 1;
+    f->inertial.anchored = PLR_ANCHORED;
 }

@@ -3,7 +3,9 @@
  * for free although a sensor or a map had just told them, and held them for known to a tenth of a
  * millimetre while they were wrong by half a metre; in mapping, where nothing has to start, an IMU
  * was waited for without end; a known landmark came in before the start, which then turned the pose
- * by which it had come; and the time since the start was counted across a jump of the clock. */
+ * by which it had come; and the time since the start was counted across a jump of the clock. And an
+ * attack from outside: a pose that was known to 26 m, after a pause in motion, counted two seconds later
+ * as known to a tenth of a millimetre. */
 #include <math.h>
 #include <unity.h>
 
@@ -19,14 +21,20 @@ void setUp(void) {
 void tearDown(void) {
 }
 
-/* The position is known to a metre, each axis. */
-static void place_roughly(void) {
-    double T[16], v[3], P[36] = {0};
+static plr_pose true_pose(void) {
+    double T[16], v[3];
     plr_pose pose;
     imu_flight_truth(&imu_rig.flight, T, v);
     rigid_to_pose(&pose, T);
+    return pose;
+}
+
+/* The truth is set as the pose, which is known to `sigma`: metres on each axis, and 0.01 rad. */
+static void place(double sigma) {
+    double P[36] = {0};
+    const plr_pose pose = true_pose();
     for (int i = 0; i < 6; i++)
-        P[7 * i] = i < 3 ? 1 : 1e-4;
+        P[7 * i] = i < 3 ? sigma * sigma : 1e-4;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, imu_rig.flight.t_ns, &pose, P));
 }
 
@@ -53,7 +61,7 @@ static double position_sigma(void) {
 
 static void test_a_measured_position_is_not_given_up_for_an_anchor(void) {
     imu_rig_begin(IMU_RIG_IN_MOTION, 1);
-    place_roughly();
+    place(1);
     imu_rig_fly(10);
     TEST_ASSERT_EQUAL_UINT8(1, f->inertial.started);
     measure_position(0.4);
@@ -72,6 +80,24 @@ static void test_a_measured_position_is_not_given_up_for_an_anchor(void) {
     TEST_ASSERT_TRUE(off2 < 21 * position_sigma() * position_sigma());
 }
 
+/* What is said of the pose's covariance is said of the caller's world, which no anchor may replace. */
+static void test_a_pose_that_was_set_with_a_covariance_stays_in_its_world(void) {
+    static const double sigmas[3] = {1e-4, 0.1, 10};
+    for (unsigned k = 0; k < 3; k++)
+        for (uint64_t seed = 1; seed <= 4; seed++) {
+            imu_rig_begin(IMU_RIG_IN_MOTION, seed);
+            place(sigmas[k]);
+            for (unsigned frame = 0; frame < 60; frame++) {
+                imu_rig_fly(1);
+                const imu_rig_errors e = imu_rig_errors_now();
+                TEST_ASSERT_TRUE(imu_rig.report.health != PLR_HEALTH_GOOD ||
+                                 (e.position < 21 && e.orientation < 21)); /* 1 in 10,000 */
+            }
+            TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, imu_rig.report.health);
+            TEST_ASSERT_TRUE(position_sigma() > sigmas[k]);
+        }
+}
+
 static plr_landmark known_landmark(void) {
     plr_landmark known = {.id = 9000000, .P_W_m2 = {0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01}};
     for (int i = 0; i < 3; i++)
@@ -82,13 +108,14 @@ static plr_landmark known_landmark(void) {
 static void test_a_known_landmark_keeps_the_anchor_away(void) {
     for (int with_map = 0; with_map < 2; with_map++) {
         imu_rig_begin(IMU_RIG_IN_MOTION, 2);
-        place_roughly();
+        const plr_pose pose = true_pose();
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, imu_rig.flight.t_ns, &pose, NULL));
         imu_rig_fly(5);
         const plr_landmark known = known_landmark();
         if (with_map)
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_insert_known(f, &known));
         imu_rig_fly(25);
-        TEST_ASSERT_EQUAL_INT(with_map, position_sigma() > 0.5);
+        TEST_ASSERT_EQUAL_INT(with_map, position_sigma() > 0.1);
     }
 }
 
@@ -141,6 +168,7 @@ static void test_a_jump_of_the_clock_is_no_time_since_the_start(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_measured_position_is_not_given_up_for_an_anchor);
+    RUN_TEST(test_a_pose_that_was_set_with_a_covariance_stays_in_its_world);
     RUN_TEST(test_a_known_landmark_keeps_the_anchor_away);
     RUN_TEST(test_a_known_landmark_has_to_wait_for_the_start);
     RUN_TEST(test_mapping_with_an_imu_makes_landmarks_at_once);

@@ -223,12 +223,18 @@ static void test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was(v
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_filter_health(&session.filter, drive_time_ns(5000.3), &health));
     TEST_ASSERT_TRUE(health.reasons & PLR_REASON_NOT_STARTED);
-    for (int k = 3; k < 50; k++) { /* it moves: it starts in motion after three seconds */
+    double P_then[36], P_now[36];
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P_then));
+    for (int k = 3; k < 70; k++) { /* it moves: it starts in motion after three seconds */
         send_batch(5000 + 0.1 * k);
         desk_send(drive_stereo(5000 + 0.1 * k + 0.09));
     }
     desk_run();
     const inertial_result after = inertial_read();
+    TEST_ASSERT_EQUAL_UINT8(PLR_ANCHORED, session.filter.inertial.anchored);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&session.filter, P_now));
+    for (int i = 0; i < 3; i++) /* how far it went during the jump, no picture has told */
+        TEST_ASSERT_TRUE(P_now[7 * i] > 0.9 * P_then[7 * i]);
     TEST_ASSERT_EQUAL_UINT16(before.pose.reset_count + 1, after.pose.reset_count);
     TEST_ASSERT_TRUE(session.last.used > 3);
 }
