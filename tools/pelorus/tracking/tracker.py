@@ -139,8 +139,8 @@ def track(
         raise PelorusError(
             f"{where[1]}: shows {tracker.matched} of {tracker.corners} corners of {where[0]} in "
             "the same row, further left; a rectified pair is due (are left and right swapped, is "
-            "the transform between the cameras (T_cn_cnm1; R, T) the inverse, are they rectified, is "
-            "the largest disparity too small?)"
+            "the transform between the cameras (T_cn_cnm1; R, T) the inverse, are they rectified, "
+            "is the largest disparity too small?)"
         )
     tracks = tracker.tracks()
     if not len(tracks):
