@@ -10,6 +10,7 @@
 #include "math/dense.h"
 #include "math/small.h"
 #include "sensor/stereo.h"
+#include "state/blocks.h"
 #include "state/motion.h"
 #include "state/slots.h"
 
@@ -49,14 +50,23 @@ static bool is_lost(const plr_search *s, unsigned i) {
     return is_unseen(s, i) && !(P[0] <= limit && P[4] <= limit);
 }
 
+/* True if landmarks may be adrift. What drifted in a darkness is in nu when it ends; by an IMU, which
+ * lost velocity and tilt as well, it stays in the landmarks' own covariance after that. Without
+ * either the prediction is uncertain because the twists are, in every frame. */
+static bool may_be_adrift(const plr_search *s, bool dark) {
+    return dark || plr_has_block(s->f, PLR_BLOCK_VELOCITY);
+}
+
 /* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
  * S, and gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and
  * the observation takes no part in the search. */
 static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
-    at->adrift = s->f->motion.seconds > DARK_S; /* unless the prediction below says otherwise */
-    if (at->behind || is_lost(s, i)) {
+    const bool dark = s->f->motion.seconds > DARK_S, lost = is_lost(s, i);
+    at->adrift =
+        may_be_adrift(s, dark) && (dark || lost); /* unless the prediction says otherwise */
+    if (at->behind || lost) {
         at->active = 0;
         return;
     }
@@ -72,19 +82,21 @@ static void judge_by_prior(plr_search *s, unsigned i) {
                    plr_dot3(at->a + PLR_POSE_DIM * r + 3, at->a + PLR_POSE_DIM * c + 3) +
                    (r == c ? PLR_R(1) : PLR_R(0));
         }
-    for (unsigned r = 0; r < 3; r++) { /* the diagonal of U^T M U - R */
-        plr_real u[3] = {0}, sum = 0;
-        for (unsigned k = 0; k <= r; k++)
+    for (unsigned r = 0; r < 3; r++) {         /* the diagonal of U^T M U - R */
+        plr_real u[3] = {0}, sum = 0, own = 0; /* with nu, and without */
+        for (unsigned k = 0; k <= r; k++) {
             u[k] = U[plr_upper_row(3, k) + r - k];
+            own = PLR_FMA(u[k], u[k], own);
+        }
         for (unsigned k = 0; k < 3; k++)
             for (unsigned l = 0; l < 3; l++)
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
-        const plr_real variance = sum - plr_stereo_variance(s->f, r);
-        basis = basis && variance <= limit;
-        within = within && variance <= adrift;
+        const plr_real noise = plr_stereo_variance(s->f, r);
+        basis = basis && sum - noise <= limit;
+        within = within && (dark ? sum : own) - noise <= adrift;
     }
-    at->adrift = !within && s->f->motion.seconds > DARK_S;
+    at->adrift = !within && may_be_adrift(s, dark);
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
         at->active = 0;
         return;

@@ -82,10 +82,37 @@ static void test_points_of_before_a_long_darkness_do_not_mislead(void) {
     }
 }
 
+/* The same, but what was seen before comes into sight a second after other points: then the drift is no
+ * more in the motion of one frame but in the landmarks. */
+static void test_points_of_before_that_come_late_do_not_mislead(void) {
+    static plr_observation seen[PLR_MAX_OBSERVATIONS];
+    for (uint64_t seed = 1; seed <= RETURNS; seed++) {
+        imu_rig_begin(IMU_RIG_GIVEN, seed);
+        imu_rig_fly(250);
+        const uint32_t first_new = imu_rig.flight.next_id;
+        imu_rig_readings(200 * IMU_RIG_EVERY);
+        for (unsigned frame = 0; frame < 60; frame++) {
+            imu_rig_readings(IMU_RIG_EVERY);
+            plr_frame look = imu_flight_look(&imu_rig.flight);
+            uint16_t count = 0;
+            for (unsigned i = 0; i < look.count; i++)
+                if (frame >= 10 || look.observations[i].id >= first_new)
+                    seen[count++] = look.observations[i];
+            look.count = count;
+            look.observations = seen;
+            TEST_ASSERT_EQUAL_INT(PLR_OK,
+                                  plr_filter_update(&imu_rig.filter, &look, &imu_rig.report));
+            TEST_ASSERT_TRUE(imu_rig.report.health != PLR_HEALTH_GOOD ||
+                             imu_rig_errors_now().position < 32);
+        }
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_after_a_long_darkness_the_first_frames_find_the_velocity);
     RUN_TEST(test_without_an_imu_the_pictures_lead_on);
     RUN_TEST(test_points_of_before_a_long_darkness_do_not_mislead);
+    RUN_TEST(test_points_of_before_that_come_late_do_not_mislead);
     return UNITY_END();
 }
