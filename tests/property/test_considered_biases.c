@@ -52,6 +52,7 @@ void tearDown(void) {
 
 static void begin(void) {
     const plr_map map = {.sink = record_eviction};
+    textbook_free(&book); /* of a drive before */
     scene_start(&world, &options);
     TEST_ASSERT_TRUE(textbook_init(&book, &world.calibration, &config, MOST, PLR_MAX_OBSERVATIONS));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, &map));
