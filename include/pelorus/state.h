@@ -131,10 +131,11 @@ typedef struct plr_alignment {
 
 /* What a start in motion has left of position and yaw (docs/MATH.md 19, the anchor). */
 typedef enum plr_anchored {
-    PLR_ANCHOR_DUE,    /* the world is free, and will be laid anew */
-    PLR_ANCHORED,      /* they are fixed: by the start, or the anchor after it */
-    PLR_WORLD_IS_GIVEN /* by a covariance, a measured position or a map: they are to be widened by
-                             what the first second may have added */
+    PLR_ANCHOR_DUE, /* the world is free, and will be laid anew */
+    PLR_ANCHORED,   /* both are fixed: by the start, or by the anchor after it */
+    /* The world was given by a covariance, a measured position or a map: the anchor will widen their
+     * variances by what the first second may have misled them. */
+    PLR_WORLD_IS_GIVEN
 } plr_anchored;
 
 /* What an IMU adds to the state: src/process/imu.c. */

@@ -50,11 +50,16 @@ static bool is_lost(const plr_search *s, unsigned i) {
     return is_unseen(s, i) && !(P[0] <= limit && P[4] <= limit);
 }
 
-/* True if landmarks may be adrift. What drifted in a darkness is in nu when it ends; by an IMU, which
- * lost velocity and tilt as well, it stays in the landmarks' own covariance after that. Without
- * either the prediction is uncertain because the twists are, in every frame. */
-static bool may_be_adrift(const plr_search *s, bool dark) {
-    return dark || plr_has_block(s->f, PLR_BLOCK_VELOCITY);
+static bool is_dark(const plr_search *s) {
+    return s->f->motion.seconds > DARK_S;
+}
+
+/* True if a rejected landmark is lost, because it is adrift. What drifted in a darkness is in nu when
+ * it ends; by an IMU, which lost velocity and tilt as well, it stays in the landmarks' own covariance
+ * after that. By twists, where frames did measure the motion, one rejection is an outlier. */
+static bool went_astray(const plr_search *s, unsigned i) {
+    const bool may_be = is_dark(s) || plr_has_block(s->f, PLR_BLOCK_VELOCITY);
+    return may_be && s->sightings[i].adrift && is_unseen(s, i);
 }
 
 /* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
@@ -63,9 +68,8 @@ static bool may_be_adrift(const plr_search *s, bool dark) {
 static void judge_by_prior(plr_search *s, unsigned i) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
-    const bool dark = s->f->motion.seconds > DARK_S, lost = is_lost(s, i);
-    at->adrift =
-        may_be_adrift(s, dark) && (dark || lost); /* unless the prediction says otherwise */
+    const bool dark = is_dark(s), lost = is_lost(s, i);
+    at->adrift = dark || lost; /* unless the prediction below says otherwise */
     if (at->behind || lost) {
         at->active = 0;
         return;
@@ -82,8 +86,9 @@ static void judge_by_prior(plr_search *s, unsigned i) {
                    plr_dot3(at->a + PLR_POSE_DIM * r + 3, at->a + PLR_POSE_DIM * c + 3) +
                    (r == c ? PLR_R(1) : PLR_R(0));
         }
-    for (unsigned r = 0; r < 3; r++) {         /* the diagonal of U^T M U - R */
-        plr_real u[3] = {0}, sum = 0, own = 0; /* with nu, and without */
+    /* the diagonal of U^T M U - R: `sum` with the uncertainty of nu, `own` without */
+    for (unsigned r = 0; r < 3; r++) {
+        plr_real u[3] = {0}, sum = 0, own = 0;
         for (unsigned k = 0; k <= r; k++) {
             u[k] = U[plr_upper_row(3, k) + r - k];
             own = PLR_FMA(u[k], u[k], own);
@@ -96,7 +101,7 @@ static void judge_by_prior(plr_search *s, unsigned i) {
         basis = basis && sum - noise <= limit;
         within = within && (dark ? sum : own) - noise <= adrift;
     }
-    at->adrift = !within && may_be_adrift(s, dark);
+    at->adrift = !within;
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
         at->active = 0;
         return;
@@ -320,7 +325,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     for (unsigned i = 0; i < s.count; i++) {
         const bool accepted = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const bool lost = !accepted && s.sightings[i].adrift && is_unseen(&s, i);
+        const bool lost = !accepted && went_astray(&s, i);
         f->work.gain[slot - f->slots] = accepted ? s.sightings[i].gain
                                         : lost   ? PLR_GAIN_LOST
                                                  : PLR_GAIN_REJECTED;

@@ -7,13 +7,13 @@
 #include <string.h>
 
 #include "filter/births.h"
+#include "filter/considered_bias.h"
 #include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/health.h"
-#include "filter/held_bias.h"
 #include "filter/inertial.h"
 #include "filter/matching.h"
 #include "filter/measure.h"
@@ -133,13 +133,13 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
                                    plr_report *report) {
     plr_applied_motion believed;
     plr_motion_first first;
-    plr_held_bias before;
+    plr_considered_bias before;
     plr_correction correction = {0};
     if (!find_motion(f, frame, n, report, &believed, &first)) {
         (void)choose(f, frame, n, report);
         return correction;
     }
-    plr_bias_hold(f, first.contradicted, &before);
+    plr_bias_consider(f, first.contradicted, &before);
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
@@ -148,7 +148,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     correction = plr_correct(f, used, NULL, 0);
     if (f->diverged)
         return correction;
-    plr_bias_put_back(f, &before);
+    plr_bias_restore(f, &before);
     if (correction.moved)
         plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda,
                             first.contradicted);

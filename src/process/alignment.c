@@ -342,14 +342,14 @@ void plr_alignment_watch_gravity(plr_filter *f) {
 
 /* ---------------------------------------------------------------- the anchor */
 
-bool plr_alignment_wants_anchor(const plr_filter *f) {
-    const plr_inertial *s = &f->inertial;
-    return s->started && s->anchored != PLR_ANCHORED && s->frames >= ANCHOR_FRAMES &&
-           f->t_ns - s->started_ns >= ANCHOR_NS && !f->motion.pending;
-}
-
 bool plr_alignment_is_unsettled(const plr_filter *f) {
     return f->inertial.started && f->inertial.anchored != PLR_ANCHORED;
+}
+
+bool plr_alignment_wants_anchor(const plr_filter *f) {
+    const plr_inertial *s = &f->inertial;
+    return plr_alignment_is_unsettled(f) && s->frames >= ANCHOR_FRAMES &&
+           f->t_ns - s->started_ns >= ANCHOR_NS && !f->motion.pending;
 }
 
 void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns) {

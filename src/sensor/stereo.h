@@ -50,8 +50,9 @@ plr_real plr_stereo_max_variance(const plr_filter *f);
 plr_real plr_stereo_max_bearing_variance(const plr_filter *f);
 
 /* An observation of a landmark, linearised at the present estimate. False if the landmark is nearer
- * than min-depth: then the measurement has no effect. Known landmarks are exempt from plr_stereo_max_variance: in localization from a
- * rough start the pose is uncertain, and only they can correct it. */
+ * than min-depth: then the measurement has no effect. Known landmarks are exempt from
+ * plr_stereo_max_variance: in localization from a rough start the pose is uncertain, and only they
+ * can correct it. */
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m);
 

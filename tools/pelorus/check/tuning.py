@@ -35,7 +35,7 @@ from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
 from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
 from pelorus.converters.twist_noise import Spread, difference_of_a_reading
 
-FRAMES_FEW = 20  # tell a spread to a fifth: enough to begin with
+SPREAD_FRAMES = 20  # tell a spread to a fifth: enough to begin with
 FINE = (1.3, 1.15)
 OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
 
@@ -85,7 +85,7 @@ def _roughly(bench: Bench, side: Settings, start: Mapping[str, float]) -> dict[s
     believes, which can be the best for many steps around.
     """
     starts = [start]
-    most = difference_of_a_reading(bench.examined, FRAMES_FEW)
+    most = difference_of_a_reading(bench.examined, SPREAD_FRAMES)
     if most is not None:
         starts.append(dict(start) | _of_twists(start, most))
     found = [search_noises(bench, side, some, TWIST, COARSE) for some in starts]

@@ -14,15 +14,15 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
-BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0  # the default of the setting bias-velocity-sigma
+# Where the HEADER tells no bias: wider than the filter's own default, so that a bias is no scale.
+BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0
 SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
-SLIP_S2_PER_M = (
-    0.003  # a turning car goes sideways by this v^2 w: so far off its camera seems to be
-)
+# A turning car goes sideways by this times v^2 w: so far off its camera seems to be.
+SLIP_S2_PER_M = 0.003
 
 
 def bias_mps(recording: Recording) -> float:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "filter/held_bias.h"
+#include "filter/considered_bias.h"
 
 #include <string.h>
 
@@ -10,23 +10,23 @@
 
 /* Not with an IMU, whose biases, velocity and tilt are found together after a start in motion; nor
  * if another sensor has told of the biases since the last frame. */
-static bool may_hold(const plr_filter *f) {
+static bool may_be_considered(const plr_filter *f) {
     return plr_has_block(f, PLR_BLOCK_BIAS) && !plr_has_block(f, PLR_BLOCK_VELOCITY) &&
            !plr_velocity_informs_bias(f);
 }
 
-void plr_bias_hold(const plr_filter *f, bool outright, plr_held_bias *before) {
-    before->held = (f->consistency.contradicted || outright) && may_hold(f);
-    if (!before->held)
+void plr_bias_consider(const plr_filter *f, bool outright, plr_considered_bias *before) {
+    before->considered = (f->consistency.contradicted || outright) && may_be_considered(f);
+    if (!before->considered)
         return;
     before->seconds = f->motion.seconds;
     memcpy(before->bias, f->bias, sizeof before->bias);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
 }
 
-void plr_bias_put_back(plr_filter *f, const plr_held_bias *before) {
+void plr_bias_restore(plr_filter *f, const plr_considered_bias *before) {
     plr_real lost[PLR_BIAS_DIM * PLR_BIAS_DIM];
-    if (!before->held)
+    if (!before->considered)
         return;
     memcpy(f->bias, before->bias, sizeof before->bias);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, lost);

@@ -5,24 +5,24 @@
  * usual, so that what is left is the Schmidt ("consider") update: the biases' own numbers stay
  * (docs/MATH.md 17).
  */
-#ifndef PLR_FILTER_HELD_BIAS_H
-#define PLR_FILTER_HELD_BIAS_H
+#ifndef PLR_FILTER_CONSIDERED_BIAS_H
+#define PLR_FILTER_CONSIDERED_BIAS_H
 
 #include <stdbool.h>
 
 #include "pelorus/state.h"
 
-typedef struct plr_held_bias {
+typedef struct plr_considered_bias {
     plr_real bias[PLR_BIAS_DIM], P_bb[PLR_BIAS_DIM * PLR_BIAS_DIM];
     plr_real seconds; /* of the motion that is pending */
-    bool held;
-} plr_held_bias;
+    bool considered;
+} plr_considered_bias;
 
 /* Notes the biases before a frame's motion is applied, if this frame may not change them.
  * `outright`: it contradicts the twists by itself. */
-void plr_bias_hold(const plr_filter *f, bool outright, plr_held_bias *before);
+void plr_bias_consider(const plr_filter *f, bool outright, plr_considered_bias *before);
 
 /* After the correction: puts them back as they were, and lets them walk. */
-void plr_bias_put_back(plr_filter *f, const plr_held_bias *before);
+void plr_bias_restore(plr_filter *f, const plr_considered_bias *before);
 
 #endif
