@@ -13,41 +13,25 @@
 #include <unity.h>
 
 #include "support/matrices.h"
-#include "support/scene.h"
-#include "support/twin.h"
+#include "support/twin_drive.h"
 
-enum { STEP_NS = 10000000, TWISTS = 10, FRAMES = 40, FRAGILE_FRAMES = 5, MOST = 64 };
+enum { FRAMES = 40, FRAGILE_FRAMES = 5 };
 
-static plr_filter filter;
-static textbook book;
-static scene world;
-static scene_options options;
-static plr_config config;
-static uint32_t evicted[PLR_MAX_LANDMARKS];
-static unsigned evictions, most_seen; /* most_seen: so many observations of each frame are used */
+static unsigned most_seen; /* so many observations of each frame are used */
 static plr_report report;
 
-static int record_eviction(void *context, const plr_landmark *landmark) {
-    (void)context;
-    evicted[evictions++] = landmark->id;
-    return 0;
-}
-
 void setUp(void) {
-    plr_config_default(&config);
-    config.slots = PLR_MAX_LANDMARKS < MOST ? PLR_MAX_LANDMARKS : MOST;
-    config.start_sigma = 0.01;
-    scene_options_default(&options);
-    options.most_seen = 24;
+    twin_drive_set_up();
+    twins.options.most_seen = 24;
     most_seen = 24;
 }
 
 void tearDown(void) {
-    textbook_free(&book);
+    twin_drive_end();
 }
 
 static bool is_fragile(void) {
-    return PLR_REAL == 32 && config.model == PLR_MODEL_WORLD;
+    return PLR_REAL == 32 && twins.config.model == PLR_MODEL_WORLD;
 }
 
 static unsigned frames(void) {
@@ -58,9 +42,8 @@ static unsigned frames(void) {
 static void for_model(uint8_t model, void (*run)(void)) {
     for (uint8_t bias = 0; bias < 2; bias++) {
         setUp();
-        config.model = model;
-        config.bias = bias;
-        evictions = 0;
+        twins.config.model = model;
+        twins.config.bias = bias;
         run();
     }
 }
@@ -76,27 +59,13 @@ static bool surveyed(void *context, uint32_t id, plr_landmark *landmark) {
     (void)context;
     *landmark = (plr_landmark){.id = id};
     memcpy(landmark->P_W_m2, P_W, sizeof P_W);
-    memcpy(landmark->p_W_m, scene_landmark(&world, id), sizeof landmark->p_W_m);
+    memcpy(landmark->p_W_m, scene_landmark(&twins.world, id), sizeof landmark->p_W_m);
     landmark->p_W_m[id % 3] += 0.01 * (id % 5);
     return true;
 }
 
 static void begin(void) {
-    plr_map map = {.sink = record_eviction};
-    if (config.mode == PLR_MODE_LOCALIZATION)
-        map.source = surveyed;
-    scene_start(&world, &options);
-    textbook_free(&book);
-    TEST_ASSERT_TRUE(textbook_init(&book, &world.calibration, &config, MOST, PLR_MAX_OBSERVATIONS));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, &map));
-}
-
-/* One twist in both; the textbook, which has no clock, then holds it for a step. */
-static void drive(plr_time_ns step_ns) {
-    const plr_twist reading = scene_read(&world);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
-    scene_move(&world, step_ns);
-    textbook_hold(&book, &reading, (double)step_ns * 1e-9, (double)step_ns * 1e-9);
+    twin_drive_begin(twins.config.mode == PLR_MODE_LOCALIZATION ? surveyed : NULL);
 }
 
 /* Known landmarks enter the oracle before the frame, as the filter asks for them. */
@@ -104,49 +73,40 @@ static void adopt(const plr_frame *frame) {
     for (unsigned i = 0; i < frame->count; i++) {
         plr_landmark known;
         const uint32_t id = frame->observations[i].id;
-        if (textbook_find(&book, id) == book.count && surveyed(NULL, id, &known))
-            TEST_ASSERT_TRUE(textbook_insert_known(&book, &known));
+        if (textbook_find(&twins.book, id) == twins.book.count && surveyed(NULL, id, &known))
+            TEST_ASSERT_TRUE(textbook_insert_known(&twins.book, &known));
     }
-}
-
-/* New landmarks in the oracle, in the frame's order and while the filter has a slot. */
-static unsigned create(const plr_frame *frame) {
-    const unsigned before = book.count;
-    for (unsigned i = 0; i < frame->count && book.count < config.slots; i++)
-        if (textbook_find(&book, frame->observations[i].id) == book.count)
-            (void)textbook_create(&book, book.count, frame->t_ns, &frame->observations[i]);
-    return book.count - before;
 }
 
 /* In this frame, after many that rejected it. */
 static bool restarted(const plr_slot *slot) {
-    return slot->last_frame == filter.frame_number && slot->restarts > 0 &&
+    return slot->last_frame == twins.filter.frame_number && slot->restarts > 0 &&
            slot->accepted + slot->rejected == 0;
 }
 
 /* One frame in both. What the filter evicts leaves the oracle too. */
 static void look(void) {
-    plr_frame frame = scene_look(&world);
+    plr_frame frame = scene_look(&twins.world);
     if (frame.count > most_seen)
         frame.count = (uint16_t)most_seen;
-    evictions = 0;
-    if (config.mode == PLR_MODE_LOCALIZATION)
+    twins.evictions = 0;
+    if (twins.config.mode == PLR_MODE_LOCALIZATION)
         adopt(&frame);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &frame, &report));
-    const bool was_pending = book.pending; /* a frame that does nothing is not rounded either */
-    const textbook_report expected = textbook_update(&book, frame.t_ns, &frame);
-    if (expected.used > 0 || (was_pending && !book.pending))
-        twin_make_up_for_rounding(&book, &frame, REAL_EPSILON);
-    for (unsigned i = 0; i < evictions; i++)
-        textbook_remove(&book, textbook_find(&book, evicted[i]));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&twins.filter, &frame, &report));
+    const bool was_pending =
+        twins.book.pending; /* a frame that does nothing is not rounded either */
+    const textbook_report expected = textbook_update(&twins.book, frame.t_ns, &frame);
+    if (expected.used > 0 || (was_pending && !twins.book.pending))
+        twin_make_up_for_rounding(&twins.book, &frame, REAL_EPSILON);
+    twin_drive_evict();
     unsigned anew = 0;
-    for (unsigned slot = 0; slot < filter.count; slot++)
-        if (restarted(&filter.slots[slot])) { /* and is made again below */
-            textbook_remove(&book, textbook_find(&book, filter.slots[slot].id));
+    for (unsigned slot = 0; slot < twins.filter.count; slot++)
+        if (restarted(&twins.filter.slots[slot])) { /* and is made again below */
+            textbook_remove(&twins.book, textbook_find(&twins.book, twins.filter.slots[slot].id));
             anew++;
         }
-    const bool adopts = config.mode == PLR_MODE_LOCALIZATION;
-    const unsigned created = adopts ? report.created : create(&frame) - anew;
+    const bool adopts = twins.config.mode == PLR_MODE_LOCALIZATION;
+    const unsigned created = adopts ? report.created : twin_drive_create(&frame) - anew;
     TEST_ASSERT_EQUAL_UINT(expected.matched, report.matched);
     TEST_ASSERT_EQUAL_UINT(expected.gated, report.gated);
     TEST_ASSERT_EQUAL_UINT(expected.used, report.used);
@@ -162,8 +122,9 @@ static void compare(unsigned frame) {
     const double own = REAL_EPSILON * (is_fragile() ? 50 : 1);
     twin_gap gap;
     char at[48];
-    snprintf(at, sizeof at, "model %d, bias %d, frame %u", config.model, config.bias, frame);
-    TEST_ASSERT_TRUE_MESSAGE(twin_compare(&book, &filter, &gap), at);
+    snprintf(at, sizeof at, "model %d, bias %d, frame %u", twins.config.model, twins.config.bias,
+             frame);
+    TEST_ASSERT_TRUE_MESSAGE(twin_compare(&twins.book, &twins.filter, &gap), at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 500 * own, 0, gap.position_m, at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 50 * own, 0, gap.rotation_rad, at);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-11 + 100 * own, 0, gap.bias, at);
@@ -173,13 +134,8 @@ static void compare(unsigned frame) {
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8 + 8e4 * own, 0, gap.covariance, at);
 }
 
-static void drive_to_the_next_frame(void) {
-    for (unsigned k = 0; k < TWISTS; k++)
-        drive(STEP_NS);
-}
-
 static void run_frame(unsigned frame) {
-    drive_to_the_next_frame();
+    twin_drive_to_the_next_frame();
     look();
     compare(frame);
 }
@@ -198,9 +154,9 @@ static void test_frames_agree_with_the_textbook_filter(void) {
 }
 
 static void run_outliers(void) {
-    options.outliers = 0.1;
+    twins.options.outliers = 0.1;
     run_frames();
-    TEST_ASSERT_GREATER_THAN_UINT(0, filter.totals.gated);
+    TEST_ASSERT_GREATER_THAN_UINT(0, twins.filter.totals.gated);
 }
 
 static void test_the_gate_rejects_what_the_textbook_rejects(void) {
@@ -208,10 +164,10 @@ static void test_the_gate_rejects_what_the_textbook_rejects(void) {
 }
 
 static void run_small_ring(void) {
-    config.slots = 9;
+    twins.config.slots = 9;
     run_frames();
     if (!is_fragile())
-        TEST_ASSERT_GREATER_THAN_UINT(5, filter.totals.evicted);
+        TEST_ASSERT_GREATER_THAN_UINT(5, twins.filter.totals.evicted);
 }
 
 static void test_eviction_removes_rows_and_columns(void) {
@@ -221,15 +177,15 @@ static void test_eviction_removes_rows_and_columns(void) {
 /* ---------------------------------------------------------------- the motion's noise */
 
 static void set_sigmas(const double velocity[3], const double gyro[3]) {
-    memcpy(config.velocity_sigma, velocity, sizeof config.velocity_sigma);
-    memcpy(config.gyro_sigma, gyro, sizeof config.gyro_sigma);
+    memcpy(twins.config.velocity_sigma, velocity, sizeof twins.config.velocity_sigma);
+    memcpy(twins.config.gyro_sigma, gyro, sizeof twins.config.gyro_sigma);
 }
 
 /* Twists that are off by dozens of pixels a frame, beside sharp ones. */
 static void make_uncertain(void) {
     static const double velocity[3] = {0.5, 0.5, 0.5}, gyro[3] = {0.5, 0.5, 0.5};
-    options.velocity_sigma_mps = options.gyro_sigma_radps = 0.5;
-    options.pixel_sigma_px = config.pixel_sigma_px = 0.3;
+    twins.options.velocity_sigma_mps = twins.options.gyro_sigma_radps = 0.5;
+    twins.options.pixel_sigma_px = twins.config.pixel_sigma_px = 0.3;
     set_sigmas(velocity, gyro);
 }
 
@@ -263,7 +219,7 @@ static void run_exact_axes(void) {
     set_sigmas(some, turn);
     run_frames();
     set_sigmas(none, none);
-    options.velocity_sigma_mps = options.gyro_sigma_radps = 0;
+    twins.options.velocity_sigma_mps = twins.options.gyro_sigma_radps = 0;
     run_frames();
 }
 
@@ -272,12 +228,12 @@ static void test_exact_axes_agree(void) {
 }
 
 static void run_step_noise(void) {
-    config.noise = PLR_NOISE_STEP;
+    twins.config.noise = PLR_NOISE_STEP;
     const double way[3] = {2e-3, 1e-3, 3e-3}, turn[3] = {5e-4, 2e-4, 8e-4};
-    memcpy(config.velocity_sigma, way, sizeof way);
-    memcpy(config.gyro_sigma, turn, sizeof turn);
-    if (config.model == PLR_MODEL_WORLD)
-        config.landmark_sigma_m = 1.4;
+    memcpy(twins.config.velocity_sigma, way, sizeof way);
+    memcpy(twins.config.gyro_sigma, turn, sizeof turn);
+    if (twins.config.model == PLR_MODEL_WORLD)
+        twins.config.landmark_sigma_m = 1.4;
     run_frames();
 }
 
@@ -287,9 +243,9 @@ static void test_noise_of_a_step_and_constant_landmarks_agree(void) {
 
 /* The course's new landmark: it does not share the pose's error. */
 static void test_a_prior_independent_of_the_pose_agrees(void) {
-    config.model = PLR_MODEL_WORLD;
-    config.landmark_sigma_m = 1.4;
-    config.landmark_prior = PLR_PRIOR_INDEPENDENT;
+    twins.config.model = PLR_MODEL_WORLD;
+    twins.config.landmark_sigma_m = 1.4;
+    twins.config.landmark_prior = PLR_PRIOR_INDEPENDENT;
     run_frames();
     TEST_ASSERT_GREATER_THAN_UINT(8, report.used);
 }
@@ -301,17 +257,19 @@ static void run_frames_between_twists(void) {
     begin();
     for (unsigned frame = 0; frame < frames(); frame++) {
         plr_twist reading;
-        for (unsigned k = 0; k < TWISTS; k++) {
-            reading = scene_read(&world);
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &reading));
-            const bool last = k + 1 == TWISTS;
-            scene_move(&world, last ? PART_NS : STEP_NS);
-            textbook_hold(&book, &reading, last ? PART_NS * 1e-9 : STEP_NS * 1e-9, STEP_NS * 1e-9);
+        for (unsigned k = 0; k < TWIN_TWISTS; k++) {
+            reading = scene_read(&twins.world);
+            TEST_ASSERT_EQUAL_INT(PLR_OK,
+                                  plr_filter_predict(&twins.filter, twins.world.t_ns, &reading));
+            const bool last = k + 1 == TWIN_TWISTS;
+            scene_move(&twins.world, last ? PART_NS : TWIN_STEP_NS);
+            textbook_hold(&twins.book, &reading, last ? PART_NS * 1e-9 : TWIN_STEP_NS * 1e-9,
+                          TWIN_STEP_NS * 1e-9);
         }
         look();
         compare(frame);
-        scene_move(&world, STEP_NS - PART_NS);
-        textbook_hold(&book, &reading, (STEP_NS - PART_NS) * 1e-9, STEP_NS * 1e-9);
+        scene_move(&twins.world, TWIN_STEP_NS - PART_NS);
+        textbook_hold(&twins.book, &reading, (TWIN_STEP_NS - PART_NS) * 1e-9, TWIN_STEP_NS * 1e-9);
     }
 }
 
@@ -324,15 +282,15 @@ static void test_frames_between_twists_agree(void) {
 static void run_pose_covariance(void) {
     begin();
     for (unsigned frame = 0; frame < FRAGILE_FRAMES; frame++) {
-        for (unsigned k = 0; k < TWISTS; k++) {
+        for (unsigned k = 0; k < TWIN_TWISTS; k++) {
             double P_xi[36], expected[36];
-            drive(STEP_NS);
+            twin_drive_step(TWIN_STEP_NS);
             /* the filter has not yet held the last reading: ask after the next one */
-            const plr_twist ahead = scene_read(&world);
-            plr_filter copy = filter;
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&copy, world.t_ns, &ahead));
+            const plr_twist ahead = scene_read(&twins.world);
+            plr_filter copy = twins.filter;
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&copy, twins.world.t_ns, &ahead));
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&copy, P_xi));
-            textbook_pose_covariance(&book, expected);
+            textbook_pose_covariance(&twins.book, expected);
             for (unsigned i = 0; i < 36; i++)
                 TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 1e4 * REAL_EPSILON) *
                                               sqrt(expected[7 * (i / 6)] * expected[7 * (i % 6)]),
@@ -349,11 +307,11 @@ static void test_pose_covariance_between_frames_agrees(void) {
 /* World positions and covariances of landmarks, through pose and cross terms. */
 static void run_landmarks(void) {
     run_frames();
-    for (unsigned slot = 0; slot < filter.count; slot++) {
+    for (unsigned slot = 0; slot < twins.filter.count; slot++) {
         plr_landmark landmark;
         plr_landmark due;
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&filter, slot, &landmark));
-        textbook_landmark_of(&book, textbook_find(&book, landmark.id), &due);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(&twins.filter, slot, &landmark));
+        textbook_landmark_of(&twins.book, textbook_find(&twins.book, landmark.id), &due);
         const double *P = due.P_W_m2, trace = P[0] + P[4] + P[8],
                      rounding = is_fragile() ? 0.05 : 1e-3;
         const double relative = PLR_REAL == 64 ? 1e-8 : rounding;
@@ -371,19 +329,19 @@ static void test_landmarks_in_the_world_agree(void) {
 static void run_known(void) {
     begin();
     for (unsigned frame = 0; frame < frames(); frame++) {
-        drive_to_the_next_frame();
+        twin_drive_to_the_next_frame();
         look();
         if (frame % 4 == 0) {
             plr_landmark known = {.id = 100 + 7 * frame,
                                   .P_W_m2 = {0.04, 0.01, 0, 0.01, 0.03, -0.01, 0, -0.01, 0.05}};
             for (int i = 0; i < 3; i++)
-                known.p_W_m[i] = scene_landmark(&world, known.id)[i];
-            const plr_status status = plr_filter_insert_known(&filter, &known);
+                known.p_W_m[i] = scene_landmark(&twins.world, known.id)[i];
+            const plr_status status = plr_filter_insert_known(&twins.filter, &known);
             if (status == PLR_OK)
-                TEST_ASSERT_TRUE(textbook_insert_known(&book, &known));
+                TEST_ASSERT_TRUE(textbook_insert_known(&twins.book, &known));
             else
                 TEST_ASSERT_TRUE(status == PLR_E_EXISTS ||
-                                 (status == PLR_E_FULL && book.count == config.slots));
+                                 (status == PLR_E_FULL && twins.book.count == twins.config.slots));
         }
         compare(frame);
     }
@@ -397,19 +355,20 @@ static void test_known_landmarks_enter_as_in_the_textbook(void) {
 static void run_known_between_frames(void) {
     begin();
     for (unsigned frame = 0; frame < frames(); frame++) {
-        for (unsigned k = 0; k < TWISTS; k++) {
-            drive(STEP_NS);
+        for (unsigned k = 0; k < TWIN_TWISTS; k++) {
+            twin_drive_step(TWIN_STEP_NS);
             if (frame % 4 != 1 || k != 6)
                 continue;
             /* the oracle holds each reading at once, the filter when the next one comes */
-            const plr_twist ahead = scene_read(&world);
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, world.t_ns, &ahead));
+            const plr_twist ahead = scene_read(&twins.world);
+            TEST_ASSERT_EQUAL_INT(PLR_OK,
+                                  plr_filter_predict(&twins.filter, twins.world.t_ns, &ahead));
             plr_landmark known;
             TEST_ASSERT_TRUE(surveyed(NULL, 103 + 7 * frame, &known));
-            if (plr_filter_insert_known(&filter, &known) == PLR_OK)
-                TEST_ASSERT_TRUE(textbook_insert_known(&book, &known));
-            scene_move(&world, STEP_NS);
-            textbook_hold(&book, &ahead, STEP_NS * 1e-9, STEP_NS * 1e-9);
+            if (plr_filter_insert_known(&twins.filter, &known) == PLR_OK)
+                TEST_ASSERT_TRUE(textbook_insert_known(&twins.book, &known));
+            scene_move(&twins.world, TWIN_STEP_NS);
+            textbook_hold(&twins.book, &ahead, TWIN_STEP_NS * 1e-9, TWIN_STEP_NS * 1e-9);
         }
         look();
         compare(frame);
@@ -421,8 +380,8 @@ static void test_known_landmarks_enter_between_frames_as_in_the_textbook(void) {
 }
 
 static void run_localization(void) {
-    config.mode = PLR_MODE_LOCALIZATION;
-    config.start_sigma = 0.05;
+    twins.config.mode = PLR_MODE_LOCALIZATION;
+    twins.config.start_sigma = 0.05;
     run_frames();
 }
 
@@ -432,27 +391,27 @@ static void test_localization_agrees(void) {
 }
 
 static void run_mapping(void) {
-    config.mode = PLR_MODE_MAPPING;
+    twins.config.mode = PLR_MODE_MAPPING;
     begin();
     for (unsigned frame = 0; frame < frames(); frame++) {
         plr_pose T_WB;
-        for (unsigned k = 0; k < TWISTS; k++)
-            scene_move(&world, STEP_NS);
-        scene_pose(&world, &T_WB);
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, world.t_ns, &T_WB));
-        textbook_move_to(&book, &T_WB);
+        for (unsigned k = 0; k < TWIN_TWISTS; k++)
+            scene_move(&twins.world, TWIN_STEP_NS);
+        scene_pose(&twins.world, &T_WB);
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&twins.filter, twins.world.t_ns, &T_WB));
+        textbook_move_to(&twins.book, &T_WB);
         look();
         compare(frame);
     }
     double P_xi[36];
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&filter, P_xi));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&twins.filter, P_xi));
     TEST_ASSERT_DOUBLE_WITHIN(0, 0, largest(P_xi, 36));
 }
 
 static void test_mapping_agrees_and_keeps_the_given_pose_exact(void) {
     setUp();
-    config.bias = 0; /* given poses tell nothing of the twists */
-    for (config.model = 0; config.model < 2; config.model++)
+    twins.config.bias = 0; /* given poses tell nothing of the twists */
+    for (twins.config.model = 0; twins.config.model < 2; twins.config.model++)
         run_mapping();
 }
 
@@ -464,13 +423,14 @@ static void run_new_pose(void) {
     for (int i = 0; i < 6; i++)
         P_xi[7 * i] = i < 3 ? 0.01 : 1e-4;
     P_xi[1] = P_xi[6] = 0.004;
-    scene_pose(&world, &T_WB);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, world.t_ns, &T_WB, P_xi));
-    textbook_set_pose(&book, &T_WB, P_xi);
+    scene_pose(&twins.world, &T_WB);
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_filter_set_pose(&twins.filter, twins.world.t_ns, &T_WB, P_xi));
+    textbook_set_pose(&twins.book, &T_WB, P_xi);
     for (unsigned frame = 0; frame < FRAGILE_FRAMES; frame++) {
         look();
         compare(frame);
-        drive_to_the_next_frame();
+        twin_drive_to_the_next_frame();
     }
 }
 
