@@ -11,8 +11,8 @@
 #include "support/imu_rig.h"
 #include "support/rigid.h"
 
-/* In a slow build fewer flights, and with them wider bounds. */
-enum { RUNS = PELORUS_SLOW_BUILD ? 1 : 16, SECOND = 10 /* frames */ };
+/* In the short form fewer flights, and with them wider bounds. */
+enum { RUNS = PELORUS_SHORT_FORM ? 1 : 16, SECOND = 10 /* frames */ };
 
 static plr_filter *const f = &imu_rig.filter;
 

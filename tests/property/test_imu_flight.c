@@ -9,8 +9,8 @@
 #include "support/chi_square.h"
 #include "support/imu_rig.h"
 
-/* In a slow build one flight of each start, and with it wider bounds. */
-enum { RUNS = PELORUS_SLOW_BUILD ? 1 : 20, FRAMES = 300, STARTS = 3 };
+/* In the short form one short flight of each start, and with it wider bounds. */
+enum { RUNS = PELORUS_SHORT_FORM ? 1 : 20, FRAMES = PELORUS_SHORT_FORM ? 100 : 300, STARTS = 3 };
 
 void setUp(void) {
     imu_rig_set_up();

@@ -8,7 +8,7 @@
 #include "support/chi_square.h"
 #include "support/imu_rig.h"
 
-/* Frames at 5 Hz; each fourth is looked at. A slow build flies one minute. */
+/* Frames at 5 Hz; each fourth is looked at. */
 enum { RUNS = 4, MINUTE = 300, MINUTES = 10, LOOK = 4 };
 
 void setUp(void) {

@@ -7,7 +7,7 @@
 #include "state/covariance.h"
 #include "support/rig.h"
 
-enum { FRAMES = PELORUS_SLOW_BUILD ? 1000 : 3000, EVERY = 50 };
+enum { FRAMES = PELORUS_SHORT_FORM ? 1000 : 3000, EVERY = 50 };
 
 static rng chance;
 

@@ -15,8 +15,8 @@
 #include "support/small_sensors.h"
 #include "support/specimens.h"
 
-/* In a slow build fewer drives, and with them wider bounds. */
-enum { RUNS = PELORUS_SLOW_BUILD ? 2 : 20, DOF = 6 };
+/* In the short form fewer drives, and with them wider bounds. */
+enum { RUNS = PELORUS_SHORT_FORM ? 2 : 20, DOF = 6 };
 
 typedef struct helpers {
     unsigned wheel_every, standstill_every, position_every; /* in steps of 10 ms; 0: none */

@@ -102,7 +102,7 @@ def test_the_memory_is_told_first_and_refused_where_it_is_not_there(
         capture_output=True,
         check=False,
         text=True,
-        timeout=60,
+        timeout=1800,
     )
     assert done.returncode == MEMORY
     assert "P is 90006 x 90006 numbers" in done.stderr

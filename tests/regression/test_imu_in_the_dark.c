@@ -9,7 +9,11 @@
 
 #include "support/imu_rig.h"
 
-enum { SEEDS = PELORUS_SLOW_BUILD ? 1 : 3, RETURNS = PELORUS_SLOW_BUILD ? 1 : 8 };
+enum {
+    SEEDS = PELORUS_SHORT_FORM ? 1 : 3,
+    RETURNS = PELORUS_SHORT_FORM ? 1 : 8,
+    BEFORE = PELORUS_SHORT_FORM ? 100 : 250 /* frames */
+};
 
 void setUp(void) {
     imu_rig_set_up();
@@ -70,7 +74,7 @@ static void test_without_an_imu_the_pictures_lead_on(void) {
 static void test_points_of_before_a_long_darkness_do_not_mislead(void) {
     for (uint64_t seed = 1; seed <= RETURNS; seed++) {
         imu_rig_begin(IMU_RIG_GIVEN, seed);
-        imu_rig_fly(250);
+        imu_rig_fly(BEFORE);
         imu_rig_readings(250 * IMU_RIG_EVERY);
         for (unsigned frame = 0; frame < 60; frame++) {
             imu_rig_fly(1);
@@ -88,7 +92,7 @@ static void test_points_of_before_that_come_late_do_not_mislead(void) {
     static plr_observation seen[PLR_MAX_OBSERVATIONS];
     for (uint64_t seed = 1; seed <= RETURNS; seed++) {
         imu_rig_begin(IMU_RIG_GIVEN, seed);
-        imu_rig_fly(250);
+        imu_rig_fly(BEFORE);
         const uint32_t first_new = imu_rig.flight.next_id;
         imu_rig_readings(200 * IMU_RIG_EVERY);
         for (unsigned frame = 0; frame < 60; frame++) {

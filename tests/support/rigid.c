@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "support/rigid.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 void square_multiply(unsigned n, const double *A, const double *B, double *C) {
@@ -24,22 +25,36 @@ static void put_skew(double *S, unsigned ld, unsigned row, unsigned column, cons
     block[2 * ld + 1] = x[0];
 }
 
+/* total += term; false if that changed nothing. */
+static bool added(unsigned n, long double *total, const long double *term) {
+    bool changed = false;
+    for (unsigned i = 0; i < n * n; i++) {
+        const long double before = total[i];
+        total[i] += term[i];
+        changed |= total[i] != before;
+    }
+    return changed;
+}
+
 /* sum = sum_k A^k shift! / (k + shift)! for n x n, in long double: beyond a double's rounding while
- * |A| < 5 or so. */
+ * |A| < 5 or so. It ends where, of terms that only shrink, two in a row changed nothing: in the powers of
+ * a turn about an axis every second one has a zero where its neighbours have none. */
 static void power_series(unsigned n, unsigned shift, const double *A, double *sum) {
-    enum { TERMS = 40, LARGEST = 36 };
+    enum { TERMS = 40, SHRINKING = 10, LARGEST = 36 };
     long double term[LARGEST] = {0}, next[LARGEST], total[LARGEST];
+    unsigned idle = 0;
     for (unsigned i = 0; i < n; i++)
         term[i * n + i] = 1;
     memcpy(total, term, sizeof total);
-    for (unsigned k = 1; k <= TERMS; k++) {
-        memset(next, 0, sizeof next);
-        for (unsigned i = 0; i < n * n; i++)
+    for (unsigned k = 1; k <= TERMS && (idle < 2 || k <= SHRINKING); k++) {
+        for (unsigned i = 0; i < n * n; i++) {
+            next[i] = 0;
             for (unsigned l = 0; l < n; l++)
-                next[i] += term[i / n * n + l] * (long double)A[l * n + i % n] / (k + shift);
-        memcpy(term, next, sizeof term);
-        for (unsigned i = 0; i < n * n; i++)
-            total[i] += term[i];
+                next[i] += term[i / n * n + l] * (long double)A[l * n + i % n];
+            next[i] /= k + shift;
+        }
+        memcpy(term, next, n * n * sizeof *term);
+        idle = added(n, total, term) ? 0 : idle + 1;
     }
     for (unsigned i = 0; i < n * n; i++)
         sum[i] = (double)total[i];
@@ -149,13 +164,17 @@ void rigid_right_jacobian(double Jr[36], const double xi[6]) {
 
 void rigid_log(double xi[6], const double E[16]) {
     rigid_vee(xi, E);
-    for (int step = 0; step < 10; step++) {
+    bool changed = true;
+    for (int step = 0; step < 10 && changed; step++) {
         double X[16], inverse[16], rest[16], d[6];
         rigid_exp(X, xi);
         rigid_inverse(inverse, X);
         square_multiply(4, inverse, E, rest);
         rigid_vee(d, rest);
-        for (int i = 0; i < 6; i++)
+        changed = false;
+        for (int i = 0; i < 6; i++) {
+            changed |= xi[i] + d[i] != xi[i];
             xi[i] += d[i];
+        }
     }
 }

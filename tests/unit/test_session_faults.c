@@ -7,7 +7,7 @@
 
 #include "support/session_desk.h"
 
-enum { SEEDS = PELORUS_SLOW_BUILD ? 5 : 20, FRAMES = 60 };
+enum { SEEDS = PELORUS_SHORT_FORM ? 5 : 20, FRAMES = 60 };
 
 void setUp(void) {
     plr_session_options_default(&options);
