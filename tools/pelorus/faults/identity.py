@@ -110,7 +110,7 @@ def _again(recording: Recording, views: TwoViews) -> tuple[int, int]:
         return 0, 0
     motion = _between(views.motion, tracks.frame[one], tracks.frame[two])
     x = measured(camera, tracks.pixels[one])
-    h, _, _ = predicted(camera, x, *motion)
+    h = predicted(camera, x, *motion)
     off = np.linalg.norm((h - measured(camera, tracks.pixels[two]))[:, :2], axis=1)
     width = float(np.ptp(tracks.pixels[:, 0]))
     return len(one), int(np.sum(off > ELSEWHERE * width))

@@ -81,24 +81,61 @@ def measured(camera: Camera, pixels: Floats) -> Floats:
     return np.stack((u, v, pixels[:, 0] - pixels[:, 2]), axis=-1)
 
 
-def predicted(camera: Camera, x: Floats, R: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where points x of the first view stand in the second, h (n, 3); dh/dx (n, 3, 3); and
-    dh/d motion (n, 3, 6), NaN-free even behind the camera.
+def predicted(camera: Camera, x: Floats, R: Floats, p: Floats) -> Floats:
+    """Where points x (n, 3) of the first view stand in the second, (n, 3)."""
+    return _linearised(camera, x.T, np.moveaxis(R, 0, -1), p.T)[0].T
+
+
+# From here on the points are the last axis: of many small matrices numpy takes one by one, of these
+# each element for all points at once.
+
+
+def _linearised(camera: Camera, x: Floats, R: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
+    """Where points x (3, n) of the first view stand in the second, h (3, n); dh/dx (3, 3, n); and
+    dh/d motion (3, 6, n), NaN-free even behind the camera.
     """
     focal = np.array([camera.fx_px, camera.fy_px, camera.fx_px * camera.baseline_m])
-    ray = np.stack((x[:, 0] / focal[0], x[:, 1] / focal[1], np.ones(len(x))), axis=-1)
-    inverse_depth = x[:, 2] / focal[2]
-    q = np.einsum("nij,nj->ni", R, ray) + inverse_depth[:, None] * p
-    z = np.where(np.abs(q[:, 2]) < 1e-3, 1e-3, q[:, 2])
-    h = focal * np.stack((q[:, 0], q[:, 1], inverse_depth), axis=-1) / z[:, None]
-    D = np.zeros((len(x), 3, 3))  # dh/dq
-    D[:, 0, 0], D[:, 1, 1] = focal[0] / z, focal[1] / z
-    D[:, :, 2] = -h / z[:, None]
-    to_x = np.concatenate((R[:, :, :2] / focal[:2], p[:, :, None] / focal[2]), axis=2)
-    Jx = D @ to_x
-    Jx[:, 2, 2] += 1 / z
-    J_motion = np.concatenate((D * inverse_depth[:, None, None], -D @ se3.skew(q)), axis=-1)
-    return h, Jx, J_motion
+    inverse_depth = x[2] / focal[2]
+    q = R[:, 0] * (x[0] / focal[0]) + R[:, 1] * (x[1] / focal[1]) + R[:, 2] + inverse_depth * p
+    z = np.where(np.abs(q[2]) < 1e-3, 1e-3, q[2])
+    h = focal[:, None] * np.stack((q[0], q[1], inverse_depth)) / z
+    by_x, by_y, by_z = focal[0] / z, focal[1] / z, -h / z  # dh/dq: the first two of one row each
+    to_x = (R[:, 0] / focal[0], R[:, 1] / focal[1], p / focal[2])  # dq/dx
+    Jx = np.stack([by_z * column[2] for column in to_x], axis=1)
+    for k, column in enumerate(to_x):
+        Jx[0, k] += by_x * column[0]
+        Jx[1, k] += by_y * column[1]
+    Jx[2, 2] += 1 / z
+    J = np.zeros((3, 6, len(z)))
+    J[0, 0], J[1, 1], J[:, 2] = by_x, by_y, by_z
+    J[:, :3] *= inverse_depth
+    J[:, 3], J[:, 4] = by_z * q[1], -by_z * q[0]
+    J[0, 4] += by_x * q[2]
+    J[0, 5] = -by_x * q[1]
+    J[1, 3] -= by_y * q[2]
+    J[1, 5] = by_y * q[0]
+    return h, Jx, J
+
+
+def _inverse(S: Floats) -> Floats:
+    """Of symmetric (3, 3, n)."""
+    (a, b, c), (_, d, e), (_, _, f) = S
+    C = np.empty_like(S)
+    C[0, 0], C[1, 1], C[2, 2] = d * f - e * e, a * f - c * c, a * d - b * b
+    C[0, 1] = C[1, 0] = c * e - b * f
+    C[0, 2] = C[2, 0] = b * e - c * d
+    C[1, 2] = C[2, 1] = b * c - a * e
+    return np.asarray(C / (a * C[0, 0] + b * C[0, 1] + c * C[0, 2]))
+
+
+def _apply(A: Floats, x: Floats) -> Floats:
+    """A x, of (i, j, n) and (j, n)."""
+    return np.asarray(np.einsum("ijn,jn->in", A, x))
+
+
+def _product(A: Floats, B: Floats) -> Floats:
+    """A B, of (i, j, n) and (j, k, n)."""
+    return np.asarray(np.einsum("ijn,jkn->ikn", A, B))
 
 
 class _Solver:
@@ -108,7 +145,7 @@ class _Solver:
         self, camera: Camera, frame: Indices, count: int, first: Floats, second: Floats
     ) -> None:
         self._camera, self._frame, self._count = camera, frame, count
-        self._first, self._second = measured(camera, first), measured(camera, second)
+        self._first, self._second = measured(camera, first).T, measured(camera, second).T
         self._x = self._first.copy()
         self.R, self.p = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
         self.H = np.tile(np.eye(6), (count, 1, 1))
@@ -118,22 +155,27 @@ class _Solver:
     def step(self, accepts: float) -> None:
         """All motions by one step, then the points."""
         frame = self._frame
-        h, Jx, J = predicted(self._camera, self._x, self.R[frame], self.p[frame])
-        Jt = np.swapaxes(Jx, 1, 2)
-        e = self._second - h - np.einsum("nij,nj->ni", Jx, self._first - self._x)
-        W = np.linalg.inv(Jx @ NOISE @ Jt + NOISE)
-        d2 = np.einsum("ni,nij,nj->n", e, W, e)
+        R, p = np.moveaxis(self.R, 0, -1)[..., frame], self.p.T[:, frame]
+        h, Jx, J = _linearised(self._camera, self._x, R, p)
+        noisy = np.einsum("ijn,jk->ikn", Jx, NOISE)
+        e = self._second - h - _apply(Jx, self._first - self._x)
+        W = _inverse(_product(noisy, Jx.swapaxes(0, 1)) + NOISE[:, :, None])
+        d2 = np.sum(e * _apply(W, e), axis=0)
         weight = 1 / (1 + d2 / (3 * (accepts * self.sigma) ** 2)) ** 2
-        JW = np.swapaxes(J, 1, 2) @ (W * weight[:, None, None])
-        self.H = sum_by_frame(frame, self._count, JW @ J) + RIDGE * np.eye(6)
-        g = sum_by_frame(frame, self._count, np.einsum("nij,nj->ni", JW, e))
+        JW = _product(J.swapaxes(0, 1), W * weight)
+        self.H = self._sums(_product(JW, J)) + RIDGE * np.eye(6)
+        g = self._sums(_apply(JW, e))
         step = np.clip(np.linalg.solve(self.H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
         moved = se3.compose(se3.exp(step[:, :3], step[:, 3:]), Poses(self.R, self.p))
         self.R, self.p = moved
-        left = e - np.einsum("nij,nj->ni", J, step[frame])
-        better = self._first + np.einsum("nij,nj->ni", NOISE @ Jt @ W, left)
+        left = e - _apply(J, step.T[:, frame])
+        better = self._first + _apply(noisy.swapaxes(0, 1), _apply(W, left))
         near = d2 < FAR_OFF * self.sigma**2
-        self._x = np.where(near[:, None], better, self._first)
+        self._x = np.where(near, better, self._first)
         self.d2 = d2
         if len(d2):
             self.sigma = max(float(np.sqrt(np.median(d2) / CHI2_3_MEDIAN)), SIGMA_LEAST_PX)
+
+    def _sums(self, values: Floats) -> Floats:
+        """Of (..., n) by frame, (count, ...)."""
+        return sum_by_frame(self._frame, self._count, np.moveaxis(values, -1, 0))
