@@ -141,7 +141,8 @@ typedef struct plr_session_totals {
                                the first counts in `refused` */
     uint32_t without_truth; /* mapping: frames without a TRUTH of the same time */
     uint32_t reanchored;    /* times the session followed a jump of the clock */
-    uint32_t held_short;    /* steps that waited less than twist-delay, for want of room */
+    uint32_t held_short;    /* of what waits, used before its time for want of room */
+    uint32_t late;          /* steps that came behind a frame of later time, and were refused */
     uint32_t over_deadline; /* frames that took longer than the deadline */
     uint32_t not_sent;      /* messages that could not be written to the port */
 } plr_session_totals;
@@ -175,7 +176,8 @@ typedef struct plr_session {
     uint32_t start_resets;
     plr_held_steps held;
     plr_held_readings held_readings;
-    plr_waiting_frame waiting;
+    plr_held_frames held_frames;
+    plr_step_order order;
     plr_known_map known;
     plr_clock_watch watch;
     plr_budget budget;
@@ -206,8 +208,8 @@ static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
 }
 
 /* Reads the bytes that are there, up to the end of one frame, and handles its message. The work of
- * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU readings
- * and those that waited, and, at END, one LANDMARK for each slot. */
+ * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU readings,
+ * what waited (PLR_SESSION_HELD_FRAMES updates more), and, at END, one LANDMARK for each slot. */
 plr_step plr_session_step(plr_session *s);
 
 /* Does what END does, for a stream that stopped without one: applies the twists that still wait,

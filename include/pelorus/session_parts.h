@@ -11,6 +11,7 @@ extern "C" {
 #endif
 
 enum {
+    PLR_SESSION_HELD_FRAMES = 3,    /* most frames that wait for twists or readings of an IMU */
     PLR_SESSION_HELD_READINGS = 24, /* most readings of small sensors that wait with the twists */
     PLR_SESSION_HELD_TWISTS = 64,   /* most twists, or readings of an IMU, that wait because of the
                                        setting twist-delay */
@@ -43,7 +44,7 @@ typedef struct plr_held_step {
     bool leads; /* it is the first of its message */
 } plr_held_step;
 
-/* Twists or IMU readings that wait because of the setting twist-delay: a ring, oldest first. */
+/* Twists or IMU readings that wait because of the setting twist-delay: a ring, ascending by time. */
 typedef struct plr_held_steps {
     uint8_t first, count;
     uint64_t leads; /* bit i: the one at place i is the first of its message */
@@ -57,15 +58,31 @@ typedef struct plr_held_readings {
     plr_reading readings[PLR_SESSION_HELD_READINGS];
 } plr_held_readings;
 
-/* A frame whose time, moved by the setting camera-offset, lies beyond the last step: it waits until
- * the steps have come there. */
-typedef struct plr_waiting_frame {
-    bool waits;
-    plr_frame frame;        /* as it came; its observations are those below */
-    plr_time_ns moved_ns;   /* its time by the clock of the steps */
-    plr_time_ns stepped_ns; /* that of the last step */
+/* A frame whose time lies beyond the last step: it waits until the steps have come there. */
+typedef struct plr_held_frame {
+    plr_frame frame;      /* as it came; its observations are those below */
+    plr_time_ns moved_ns; /* its time by the clock of the steps: setting camera-offset */
     plr_observation observations[PLR_MAX_OBSERVATIONS];
-} plr_waiting_frame;
+} plr_held_frame;
+
+/* Such frames: a ring, in the order in which they came. */
+typedef struct plr_held_frames {
+    uint8_t first, count;
+    plr_held_frame frames[PLR_SESSION_HELD_FRAMES];
+} plr_held_frames;
+
+/* Whether steps and frames come in the order of their times: src/session/steps.h. */
+typedef struct plr_step_order {
+    bool came;              /* a step */
+    plr_time_ns newest_ns;  /* the newest time of those that came */
+    bool stepped;           /* the filter took one */
+    plr_time_ns stepped_ns; /* the time of the last that it took */
+    bool used;              /* it took a frame, or a reading of a small sensor */
+    plr_time_ns used_ns;    /* of the last that it took, by the clock of the steps */
+    plr_time_ns ahead_ns;   /* so far was that ahead of the steps that had come */
+    plr_time_ns late_ns;    /* the last used_ns that a step came behind; 0: none did */
+    plr_time_ns told_ns;    /* how long frames were to wait, when a TEXT last told of it */
+} plr_step_order;
 
 /* Landmarks of known position, ascending by id. */
 typedef struct plr_known_map {

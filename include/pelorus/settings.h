@@ -198,9 +198,11 @@ typedef struct plr_config {
     double max_gap_s;
 
     /* Setting twist-delay [s]: 0 to 10, default 0.
-     * Used by plr_session alone: it holds each twist or IMU reading for this long, so that a frame
-     * which arrives later than newer ones is still processed in order of time. Choose the camera's
-     * delay from shutter to message. At most PLR_SESSION_HELD_TWISTS are held. */
+     * Used by plr_session alone: twists, IMU readings and frames wait this long for each other, so
+     * that all are processed in the order of time. Choose the longer of two delays: the camera's,
+     * from shutter to message, and that of the readings, from the first of a batch to its message.
+     * At most PLR_SESSION_HELD_TWISTS and PLR_SESSION_HELD_FRAMES wait; a frame that is not ahead
+     * of the readings does not. */
     double twist_delay_s;
 
     /* Setting standstill-sigma [m/s]: 0 to 1, default 0.
@@ -281,7 +283,7 @@ typedef struct plr_config {
      * Used by plr_session alone: added to the time of every frame, so that it is the clock of IMU
      * or twists (Kalibr's timeshift_cam_imu). If it is negative, twists and readings wait that much
      * longer than twist-delay. If it is positive and a frame comes before the steps up to its time,
-     * as in a recording in order of stamps, it waits for them, until the next frame at the most. */
+     * as in a recording in order of stamps, it waits that much longer for them. */
     double camera_offset_s;
 } plr_config;
 

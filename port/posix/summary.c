@@ -135,10 +135,11 @@ static void print_readings(const plr_session *session) {
 /* What moved the body, and what came of the other kind. */
 static void print_steps(const plr_session *session) {
     const plr_session_totals *totals = &session->totals;
-    if (totals->imus > 0)
+    const bool by_imu = totals->imus > 0 || session->header.process == PLR_PROCESS_IMU;
+    if (by_imu)
         printf("%" PRIu32 " IMU readings, %" PRIu32 " refused%s", totals->imu_readings,
                totals->imu_refused, totals->twists > 0 ? "; " : "");
-    if (totals->twists > 0 || totals->imus == 0)
+    if (totals->twists > 0 || !by_imu)
         printf("%" PRIu32 " twists", totals->twists);
     if (totals->other_process > 0)
         printf("; %" PRIu32 " messages not used, see the setting process", totals->other_process);

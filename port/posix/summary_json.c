@@ -97,6 +97,7 @@ static void put_damage(json_object *o, const summary *s, const plr_session *sess
     json_count(o, "messages_refused", session->totals.refused);
     json_count(o, "without_truth", session->totals.without_truth);
     json_count(o, "reanchored", session->totals.reanchored);
+    json_count(o, "late", session->totals.late);
     json_count(o, "held_short", session->totals.held_short);
     json_count(o, "over_deadline", session->totals.over_deadline);
     json_count(o, "warnings", s->warnings);

@@ -56,7 +56,7 @@ static const plr_row rows[] = {
     {{22, "landmark-sigma", "m", "initial landmark, world model; 0 = from the pixels", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0}, AT(landmark_sigma_m), STORE_DOUBLE},
     {{23, "max-range", "m", "greatest distance of any landmark", PLR_SETTING_NUMBER, NULL, 1, 1e6, 1e5}, AT(max_range_m), STORE_DOUBLE},
     {{24, "max-gap", "s", "longest pause in the data that is bridged", PLR_SETTING_NUMBER, NULL, 1e-3, 60, 2}, AT(max_gap_s), STORE_DOUBLE},
-    {{25, "twist-delay", "s", "twists and IMU readings wait so long for a late camera", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
+    {{25, "twist-delay", "s", "frames, twists and IMU readings wait so long for each other", PLR_SETTING_NUMBER, NULL, 0, 10, 0}, AT(twist_delay_s), STORE_DOUBLE},
     {{26, "landmark-prior", "", "does a new landmark of world share the pose's error?", PLR_SETTING_CHOICE, prior_words, 0, 1, PLR_PRIOR_CORRELATED}, AT(landmark_prior), STORE_U8},
     {{27, "velocity-sigma-y", "m/s", "of the y axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[1]), STORE_DOUBLE},
     {{28, "velocity-sigma-z", "m/s", "of the z axis alone", PLR_SETTING_NUMBER, NULL, 0, 1e3, 0.1}, AT(velocity_sigma[2]), STORE_DOUBLE},

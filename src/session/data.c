@@ -7,6 +7,7 @@
 
 #include "session/budget.h"
 #include "session/clock.h"
+#include "session/held.h"
 #include "session/line.h"
 #include "session/plausible.h"
 #include "session/reanchor.h"
@@ -87,6 +88,7 @@ static void use_frame(plr_session *s, const plr_frame *frame, const plr_frame *m
     }
     if (status != PLR_OK)
         s->totals.refused++;
+    plr_steps_note_used(s, moved->t_ns);
     s->last = report;
     s->last.t_ns = frame->t_ns; /* by which its sender knows it */
     learn(s, update_ns);
@@ -129,36 +131,68 @@ static void use_in_order(plr_session *s, const plr_frame *frame, plr_time_ns mov
         use_frame(s, frame, &moved);
 }
 
-static void wait(plr_waiting_frame *waiting, const plr_frame *frame, plr_time_ns moved_ns) {
-    PLR_ASSERT(!waiting->waits && frame->count <= PLR_MAX_OBSERVATIONS);
-    waiting->waits = true;
-    waiting->frame = *frame;
-    waiting->moved_ns = moved_ns;
-    memcpy(waiting->observations, frame->observations, frame->count * sizeof *frame->observations);
-    waiting->frame.observations = waiting->observations;
+static void use_oldest(plr_session *s) {
+    const plr_held_frame *held = plr_held_pop_frame(&s->held_frames);
+    use_in_order(s, &held->frame, held->moved_ns);
+    if (s->held_frames.count == 0)
+        plr_steps_apply_due(s);
 }
 
 void plr_data_use_waiting(plr_session *s) {
-    if (!s->waiting.waits)
-        return;
-    s->waiting.waits = false;
-    use_in_order(s, &s->waiting.frame, s->waiting.moved_ns);
-    plr_steps_apply_due(s);
+    while (s->held_frames.count > 0)
+        use_oldest(s);
+}
+
+/* Those whose time, by the clock of the steps, is at most t_ns. */
+static void use_waiting_until(plr_session *s, plr_time_ns t_ns) {
+    const plr_held_frame *oldest;
+    while ((oldest = plr_held_oldest_frame(&s->held_frames)) != NULL && oldest->moved_ns <= t_ns)
+        use_oldest(s);
+}
+
+void plr_data_begin_before(plr_session *s, plr_time_ns t_ns) {
+    if (s->phase == PLR_PHASE_STARTING && t_ns > 0)
+        use_waiting_until(s, t_ns - 1);
 }
 
 void plr_data_use_waiting_in_time(plr_session *s) {
-    if (s->waiting.stepped_ns >= s->waiting.moved_ns)
-        plr_data_use_waiting(s);
+    use_waiting_until(s, s->order.newest_ns);
+}
+
+/* How long a frame waits for the steps up to its time: as long as these wait for frames, and as
+ * camera-offset moves it ahead of what is there. */
+static plr_time_ns patience_ns(const plr_session *s, plr_time_ns t_ns, plr_time_ns moved_ns) {
+    const plr_config *config = plr_filter_config(&s->filter);
+    const plr_time_ns ahead_ns = moved_ns > t_ns ? moved_ns - t_ns : 0;
+    if (config->mode == PLR_MODE_MAPPING)
+        return 0; /* each frame has its TRUTH, and needs no step */
+    return (plr_time_ns)(config->twist_delay_s * 1e9 + 0.5) + ahead_ns;
+}
+
+static void hold(plr_session *s, const plr_frame *frame, plr_time_ns moved_ns) {
+    if (s->held_frames.count == PLR_SESSION_HELD_FRAMES) {
+        s->totals.held_short++;
+        use_oldest(s);
+    }
+    plr_held_push_frame(&s->held_frames, frame, moved_ns);
 }
 
 void plr_data_use_stereo(plr_session *s) {
     const plr_frame *frame = &s->in.as.stereo;
+    const plr_held_frame *before = plr_held_newest_frame(&s->held_frames);
     plr_time_ns moved_ns;
-    plr_data_use_waiting(s);
-    if (!move(s, frame->t_ns, &moved_ns))
+    if (!move(s, frame->t_ns, &moved_ns) ||
+        (before != NULL && before->frame.t_ns == frame->t_ns)) { /* doubled by a link */
         plr_data_refuse_frame(s, frame, PLR_E_TIME);
-    else if (moved_ns > frame->t_ns && moved_ns > s->waiting.stepped_ns)
-        wait(&s->waiting, frame, moved_ns);
+        return;
+    }
+    const plr_time_ns patience = patience_ns(s, frame->t_ns, moved_ns);
+    if (before != NULL && moved_ns < before->moved_ns)
+        plr_data_use_waiting(s); /* a clock was set back */
+    else if (moved_ns >= patience)
+        use_waiting_until(s, moved_ns - patience);
+    if (patience > 0 && moved_ns > s->order.newest_ns)
+        hold(s, frame, moved_ns);
     else
         use_in_order(s, frame, moved_ns);
 }

@@ -5,15 +5,23 @@
 
 #include "pelorus/session.h"
 
-/* Each applies its message to the filter, which must be initialised. A STEREO that the setting
- * camera-offset moves beyond the last step waits for those up to its time. */
+/* Each applies its message to the filter, which must be initialised.
+ *
+ * With twist-delay, or if camera-offset moves it ahead, a STEREO beyond the last step waits for those
+ * up to its time: an IMU may come in batches, or late. It waits until they are there, or until another
+ * STEREO is newer by twist-delay and what camera-offset moves it, or until the place of those that
+ * wait is taken (then totals.held_short counts it). Only messages tell the time, so that a replay
+ * does the same. */
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
 
-/* Uses the STEREO that waits, if there is one, and the steps that waited with it. */
+/* A START or TRUTH of that time may set the start pose: STEREOs that wait and are older come before it. */
+void plr_data_begin_before(plr_session *s, plr_time_ns t_ns);
+
+/* Uses the STEREOs that wait, and the steps that waited with them. */
 void plr_data_use_waiting(plr_session *s);
 
-/* Does so if the steps have come to its time. */
+/* Does so with those to whose time the steps have come. */
 void plr_data_use_waiting_in_time(plr_session *s);
 
 /* Sets the filter's pose to that of a START. */

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "session/held.h"
 
+#include <string.h>
+
 #include "pelorus/assertions.h"
+
+/* --- steps --- */
 
 void plr_held_init(plr_held_steps *held) {
     held->first = 0;
@@ -18,31 +22,46 @@ static unsigned place(const plr_held_steps *held, unsigned behind) {
     return (held->first + behind) % PLR_SESSION_HELD_TWISTS;
 }
 
-static plr_time_ns newest_ns(const plr_held_steps *held) {
-    return held->t_ns[place(held, held->count - 1U)];
+static plr_held_step step_at(const plr_held_steps *held, unsigned at) {
+    const plr_held_step step = {
+        .t_ns = held->t_ns[at], .by = held->by[at], .leads = (held->leads >> at & 1) != 0};
+    return step;
 }
 
-void plr_held_push(plr_held_steps *held, const plr_held_step *step) {
-    PLR_ASSERT(!plr_held_full(held));
-    const unsigned at = place(held, held->count);
+static void put(plr_held_steps *held, unsigned at, const plr_held_step *step) {
     const uint64_t bit = UINT64_C(1) << at;
     held->t_ns[at] = step->t_ns;
     held->by[at] = step->by;
     held->leads = step->leads ? held->leads | bit : held->leads & ~bit;
-    held->count++;
 }
 
-bool plr_held_contradicts(const plr_held_steps *held, plr_time_ns t_ns) {
-    return held->count > 0 && t_ns <= newest_ns(held);
+static plr_time_ns newest_ns(const plr_held_steps *held) {
+    return held->t_ns[place(held, held->count - 1U)];
+}
+
+bool plr_held_insert(plr_held_steps *held, const plr_held_step *step) {
+    PLR_ASSERT(!plr_held_full(held));
+    unsigned at = held->count;
+    while (at > 0 && held->t_ns[place(held, at - 1U)] > step->t_ns)
+        at--;
+    if (at > 0 && held->t_ns[place(held, at - 1U)] == step->t_ns)
+        return false;
+    for (unsigned i = held->count++; i > at; i--) {
+        const plr_held_step later = step_at(held, place(held, i - 1U));
+        put(held, place(held, i), &later);
+    }
+    put(held, place(held, at), step);
+    return true;
+}
+
+bool plr_held_contradicts(const plr_held_steps *held, plr_time_ns t_ns, plr_time_ns max_gap_ns) {
+    return held->count > 0 && t_ns < newest_ns(held) && newest_ns(held) - t_ns > max_gap_ns;
 }
 
 bool plr_held_pop(plr_held_steps *held, plr_held_step *step) {
     if (held->count == 0)
         return false;
-    const unsigned at = held->first;
-    step->t_ns = held->t_ns[at];
-    step->by = held->by[at];
-    step->leads = (held->leads >> at & 1) != 0;
+    *step = step_at(held, held->first);
     held->first = (uint8_t)place(held, 1);
     held->count--;
     return true;
@@ -60,7 +79,38 @@ bool plr_held_pop_due(plr_held_steps *held, plr_time_ns delay_ns, plr_held_step 
     return plr_held_pop(held, step);
 }
 
-void plr_held_insert(plr_held_readings *held, const plr_reading *reading) {
+/* --- frames --- */
+
+void plr_held_push_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns) {
+    PLR_ASSERT(held->count < PLR_SESSION_HELD_FRAMES && frame->count <= PLR_MAX_OBSERVATIONS);
+    const unsigned behind = held->first + held->count++;
+    plr_held_frame *to = &held->frames[behind % PLR_SESSION_HELD_FRAMES];
+    to->frame = *frame;
+    to->moved_ns = moved_ns;
+    memcpy(to->observations, frame->observations, frame->count * sizeof *frame->observations);
+    to->frame.observations = to->observations;
+}
+
+const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held) {
+    return held->count > 0 ? &held->frames[held->first] : NULL;
+}
+
+const plr_held_frame *plr_held_newest_frame(const plr_held_frames *held) {
+    const unsigned behind = held->first + held->count - 1U;
+    return held->count > 0 ? &held->frames[behind % PLR_SESSION_HELD_FRAMES] : NULL;
+}
+
+const plr_held_frame *plr_held_pop_frame(plr_held_frames *held) {
+    PLR_ASSERT(held->count > 0);
+    const plr_held_frame *oldest = &held->frames[held->first];
+    held->first = (uint8_t)((held->first + 1U) % PLR_SESSION_HELD_FRAMES);
+    held->count--;
+    return oldest;
+}
+
+/* --- readings --- */
+
+void plr_held_insert_reading(plr_held_readings *held, const plr_reading *reading) {
     PLR_ASSERT(held->count < PLR_SESSION_HELD_READINGS);
     unsigned at = held->count++;
     for (; at > 0 && held->readings[at - 1].t_ns > reading->t_ns; at--)

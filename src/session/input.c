@@ -187,6 +187,8 @@ void plr_input_handle(plr_session *s) {
         if (s->phase == PLR_PHASE_READY)
             start(s);
     }
+    if (row == PLR_KIND_START || row == PLR_KIND_TRUTH)
+        plr_data_begin_before(s, time_of(&s->in));
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
     PLR_ASSERT(rule != FIRST);
     if (rule == IGNORE)

@@ -28,8 +28,8 @@ void plr_start_clear(plr_session *s) {
     s->imu_faults = 0;
     plr_held_init(&s->held);
     s->held_readings.count = 0;
-    s->waiting.waits = false;
-    s->waiting.stepped_ns = 0;
+    s->held_frames.count = 0;
+    memset(&s->order, 0, sizeof s->order);
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)
         (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */

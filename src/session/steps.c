@@ -17,6 +17,51 @@ static plr_kind kind_of_steps(const plr_session *s) {
     return is_inertial(s) ? PLR_KIND_IMU : PLR_KIND_TWIST;
 }
 
+/* After an IMU message that came late its faults are not told for so long: of readings that have
+ * holes nearly everything looks wrong. */
+#define LATE_NS UINT64_C(1000000000)
+
+static plr_time_ns max_gap_ns(const plr_session *s) {
+    return (plr_time_ns)(plr_filter_config(&s->filter)->max_gap_s * 1e9 + 0.5);
+}
+
+/* --- late ones --- */
+
+void plr_steps_note_used(plr_session *s, plr_time_ns t_ns) {
+    plr_step_order *order = &s->order;
+    order->used = true;
+    order->used_ns = t_ns;
+    order->ahead_ns = order->came && t_ns > order->newest_ns ? t_ns - order->newest_ns : 0;
+}
+
+/* True if the filter refused a step because something of later time was used before it, and no step. */
+static bool is_late(const plr_session *s, plr_time_ns t_ns, plr_status status) {
+    const plr_step_order *order = &s->order;
+    return status == PLR_E_TIME && order->used && t_ns < order->used_ns &&
+           order->used_ns == plr_filter_time(&s->filter) &&
+           (!order->stepped || t_ns > order->stepped_ns);
+}
+
+/* Told once, and again where it has become twice as much. */
+static void note_late(plr_session *s, plr_time_ns t_ns) {
+    plr_step_order *order = &s->order;
+    plr_text *line = &s->out.as.text;
+    const plr_time_ns behind_ns = order->used_ns - t_ns;
+    const plr_time_ns needed_ns = behind_ns > order->ahead_ns ? behind_ns : order->ahead_ns;
+    s->totals.late++;
+    order->late_ns = order->used_ns;
+    if (needed_ns < 2 * order->told_ns || needed_ns > max_gap_ns(s))
+        return;
+    order->told_ns = needed_ns;
+    plr_line_begin(line, PLR_SEVERITY_WARNING);
+    plr_line_text(line, is_inertial(s) ? "IMU readings" : "TWISTs");
+    plr_line_text(line, " come late: what was used before them is newer, here by ");
+    plr_line_time(line, needed_ns + 999999); /* upwards, for it is to be enough */
+    plr_line_text(line, ", and they are refused. Set twist-delay to that or more: then frames and "
+                        "readings of other sensors wait for them");
+    plr_send_text(s);
+}
+
 /* --- refusing --- */
 
 static void refuse_step(plr_session *s, plr_time_ns t_ns, plr_status status) {
@@ -48,7 +93,9 @@ static void refuse_other(plr_session *s, plr_kind kind, plr_time_ns t_ns) {
 static void report_fault(plr_session *s) {
     const plr_imu_fault fault = plr_filter_imu_fault(&s->filter);
     const uint32_t bit = UINT32_C(1) << fault;
-    if (fault == PLR_IMU_FAULT_NONE || (s->imu_faults & bit) != 0)
+    const plr_time_ns now = plr_filter_time(&s->filter), late = s->order.late_ns;
+    const bool full_of_holes = late != 0 && now >= late && now - late < LATE_NS;
+    if (fault == PLR_IMU_FAULT_NONE || (s->imu_faults & bit) != 0 || full_of_holes)
         return;
     s->imu_faults |= bit;
     plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING);
@@ -61,7 +108,9 @@ static void report_fault(plr_session *s) {
 
 static void apply_reading(plr_session *s, const plr_reading *reading) {
     const plr_status status = plr_filter_measure(&s->filter, reading, NULL);
-    if (status != PLR_OK)
+    if (status == PLR_OK)
+        plr_steps_note_used(s, reading->t_ns);
+    else
         plr_send_refusal(s, PLR_KIND_READING, reading->t_ns, status, NULL);
 }
 
@@ -89,12 +138,17 @@ static void apply_step(plr_session *s, const plr_held_step *step) {
     /* of a batch the first speaks for the sender's clock: the others have their times from it */
     if ((step->leads || status == PLR_OK) && plr_reanchor_follow(s, step->t_ns, status))
         status = predict(s, step);
+    const bool late = is_late(s, step->t_ns, status);
+    if (late)
+        note_late(s, step->t_ns);
     if (is_inertial(s))
         report_fault(s);
     if (status != PLR_OK) {
-        refuse_step(s, step->t_ns, status);
+        refuse_step(s, step->t_ns, late ? PLR_E_LATE : status);
         return;
     }
+    s->order.stepped = true;
+    s->order.stepped_ns = step->t_ns;
     s->imu_status = PLR_OK;
     if ((s->options.output & PLR_OUTPUT_TWIST_POSE) != 0)
         (void)plr_send_pose(s, false);
@@ -117,7 +171,7 @@ static plr_time_ns delay_ns(const plr_session *s) {
 }
 
 static bool steps_wait(const plr_session *s) {
-    return delay_ns(s) > 0 || s->waiting.waits;
+    return delay_ns(s) > 0 || s->held_frames.count > 0;
 }
 
 void plr_steps_apply_due(plr_session *s) {
@@ -128,19 +182,28 @@ void plr_steps_apply_due(plr_session *s) {
 
 static void delay_step(plr_session *s, const plr_held_step *step) {
     plr_held_step due;
-    if (plr_held_contradicts(&s->held, step->t_ns))
+    if (plr_held_contradicts(&s->held, step->t_ns, max_gap_ns(s)))
         plr_steps_apply_held(s, UINT64_MAX);
     if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
         s->totals.held_short++;
         apply_step(s, &due);
     }
-    plr_held_push(&s->held, step);
-    if (!s->waiting.waits)
+    if (!plr_held_insert(&s->held, step))
+        refuse_step(s, step->t_ns, PLR_E_TIME);
+    if (s->held_frames.count == 0)
         plr_steps_apply_due(s);
 }
 
+/* The newest time of a step; a clock that was set back is followed. */
+static void note_time(plr_session *s, plr_time_ns t_ns) {
+    plr_time_ns *newest_ns = &s->order.newest_ns;
+    s->order.came = true;
+    if (t_ns > *newest_ns || *newest_ns - t_ns > max_gap_ns(s))
+        *newest_ns = t_ns;
+}
+
 static void use_step(plr_session *s, const plr_held_step *step) {
-    s->waiting.stepped_ns = step->t_ns;
+    note_time(s, step->t_ns);
     if (steps_wait(s))
         delay_step(s, step);
     else
@@ -187,5 +250,5 @@ void plr_steps_use_reading(plr_session *s) {
         s->totals.held_short++;
         apply_reading(s, &oldest);
     }
-    plr_held_insert(&s->held_readings, reading);
+    plr_held_insert_reading(&s->held_readings, reading);
 }

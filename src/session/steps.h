@@ -8,6 +8,10 @@
  * that says what would be right; the others are only counted (totals.other_process). IMU readings that
  * are refused for the same reason one after the other are answered once, for the first of them; all
  * are counted (totals.imu_refused).
+ *
+ * A step that comes after a frame or a reading of later time cannot be used any more: it is refused
+ * with PLR_E_LATE, counted (totals.late), and a TEXT says how long those would have to wait. While
+ * that goes on no fault of the IMU is told: of readings with holes nearly everything looks wrong.
  */
 #ifndef PLR_SESSION_STEPS_H
 #define PLR_SESSION_STEPS_H
@@ -24,5 +28,8 @@ void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns);
 
 /* Applies those that have waited for twist-delay. */
 void plr_steps_apply_due(plr_session *s);
+
+/* The filter took a frame or a reading of a small sensor of this time. */
+void plr_steps_note_used(plr_session *s, plr_time_ns t_ns);
 
 #endif

@@ -175,7 +175,7 @@ def test_pictures_without_a_partner_are_left_out_if_they_are_few(
     for name in ("data.csv", f"data/{Scene().t_ns[2]}.png"):
         (folder / "mav0" / "cam1" / name).unlink()
     target = tmp_path / "out.plr"
-    monkeypatch.setattr("pelorus.converters.euroc.ALONE_MAX", 0.3)
+    monkeypatch.setattr("pelorus.tracking.images.ALONE_MAX", 0.3)
     assert pelorus("convert", "euroc", folder, target).status == 0
     assert len(messages_of(target, Stereo)) == FRAMES - 1
     assert "1 pictures have no partner" in pelorus("info", target).out

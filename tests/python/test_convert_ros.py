@@ -310,7 +310,7 @@ def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
             "has no two topics of sensor_msgs/msg/CameraInfo for its cameras; --calibration FILE",
         ),
         ((*given, "--truth-topic", "/odom"), "what moves the body? 0 topics hold twists"),
-        ((*given, "--pair-within", "0.5"), "0 have one of /cam1/image_raw within 0.5 ms (median 1"),
+        ((*given, "--pair-within", "0.5"), "0 have one of the 6 of /cam1/image_raw within 0.5"),
         ((*given, "--joint", "left"), "wheels: --joint-topic TOPIC, --joint NAME (once or more)"),
         ((*given, "--tracks-topic", "/odom"), "holds no tracks: lacks id, uL, vL, uR, vR"),
     ):
@@ -320,6 +320,21 @@ def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
         if "there are:" in said:
             assert "/cam0/image_raw  sensor_msgs/msg/Image  6 messages, 9.98 Hz" in outcome.err
         assert not list(tmp_path.glob("out*"))
+
+
+def test_a_bag_that_lacks_many_partners_is_refused_as_a_folder_is(
+    pairs: list[Any], kalibr: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = Recorder()
+    for k, (t_ns, (left, right)) in enumerate(zip(Scene().t_ns, pairs, strict=True)):
+        recorder.image("/cam0/image_raw", t_ns, left)
+        if k % 2 == 0:
+            recorder.image("/cam1/image_raw", t_ns, right)
+    bag, target = written(with_odometry(recorder), tmp_path, "mcap"), tmp_path / "out.plr"
+    outcome = pelorus("convert", "ros", bag, target, "--calibration", kalibr)
+    assert outcome.status == 1
+    assert "of 6 pictures of /cam0/image_raw 3 have one of the 3 of /cam1/image_raw" in outcome.err
+    assert not target.exists()
 
 
 def test_pictures_of_another_size_in_mid_bag_are_told(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The queue of twists that wait for a late camera. */
+/* The queues of steps that wait for a late camera, and of frames that wait for late steps. */
 #include <unity.h>
 
 #include "session/held.h"
@@ -15,7 +15,7 @@ void tearDown(void) {
 
 static void push(plr_time_ns t_ns) {
     const plr_held_step step = {.t_ns = t_ns};
-    plr_held_push(&held, &step);
+    TEST_ASSERT_TRUE(plr_held_insert(&held, &step));
 }
 
 static void test_twists_come_out_in_the_order_they_went_in(void) {
@@ -45,7 +45,7 @@ static void test_each_is_given_back_as_it_was(void) {
     for (unsigned i = 0; i < 3 * PLR_SESSION_HELD_TWISTS; i++) {
         const plr_held_step pushed = {
             .t_ns = 1000 + i, .by.imu = {{i, 0.5, -1.0}, {2.0 * i, 0, 3}}, .leads = i % 3 == 0};
-        plr_held_push(&held, &pushed);
+        TEST_ASSERT_TRUE(plr_held_insert(&held, &pushed));
         if (i < 20)
             continue;
         TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
@@ -87,12 +87,71 @@ static void test_a_frame_takes_the_twists_up_to_its_time(void) {
     TEST_ASSERT_EQUAL_UINT(1, held.count);
 }
 
-static void test_time_that_repeats_or_goes_back_contradicts(void) {
-    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 0));
+static void test_steps_that_come_in_any_order_leave_in_that_of_time(void) {
+    plr_held_step step;
+    for (unsigned first = 0; first < PLR_SESSION_HELD_TWISTS; first += 7) { /* wherever it begins */
+        for (plr_time_ns k = 0; k < PLR_SESSION_HELD_TWISTS; k++) {
+            const plr_time_ns t = 1 + 37 * k % PLR_SESSION_HELD_TWISTS; /* 37 and 64: all once */
+            const plr_held_step inserted = {
+                .t_ns = t, .by.twist = {{(double)t, 0, 0}, {0, 0, 0}}, .leads = t % 3 == 0};
+            TEST_ASSERT_TRUE(plr_held_insert(&held, &inserted));
+        }
+        for (plr_time_ns t = 1; t <= PLR_SESSION_HELD_TWISTS; t++) {
+            TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
+            TEST_ASSERT_EQUAL_UINT64(t, step.t_ns);
+            TEST_ASSERT_EQUAL_INT(t % 3 == 0, step.leads);
+            TEST_ASSERT_EQUAL_DOUBLE((double)t, step.by.twist.v_B_mps[0]);
+        }
+        for (unsigned i = 0; i < 7; i++) {
+            push(i);
+            TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
+        }
+    }
+}
+
+static void test_a_step_of_a_time_that_is_there_is_not_taken(void) {
+    plr_held_step step = {.t_ns = 20, .by.twist = {{9, 0, 0}, {0, 0, 0}}};
     push(10);
-    TEST_ASSERT_TRUE(plr_held_contradicts(&held, 9));
-    TEST_ASSERT_TRUE(plr_held_contradicts(&held, 10));
-    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 11));
+    push(20);
+    push(30);
+    TEST_ASSERT_FALSE(plr_held_insert(&held, &step));
+    TEST_ASSERT_EQUAL_UINT(3, held.count);
+    TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
+    TEST_ASSERT_TRUE(plr_held_pop(&held, &step));
+    TEST_ASSERT_EQUAL_DOUBLE(0, step.by.twist.v_B_mps[0]);
+}
+
+static void test_time_that_goes_back_by_more_than_the_gap_contradicts(void) {
+    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 0, 5));
+    push(10);
+    TEST_ASSERT_TRUE(plr_held_contradicts(&held, 4, 5));
+    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 5, 5));
+    TEST_ASSERT_FALSE(plr_held_contradicts(&held, 10, 5));
+    TEST_ASSERT_FALSE(plr_held_contradicts(&held, UINT64_MAX, 5));
+}
+
+/* --- frames --- */
+
+static void test_frames_leave_as_they_came_with_their_observations(void) {
+    static plr_held_frames frames;
+    plr_observation seen[2] = {{.id = 0}, {.id = 1}};
+    TEST_ASSERT_NULL(plr_held_oldest_frame(&frames));
+    TEST_ASSERT_NULL(plr_held_newest_frame(&frames));
+    for (unsigned k = 0; k < 4 * PLR_SESSION_HELD_FRAMES; k++) {
+        seen[0].id = 100 + k;
+        const plr_frame frame = {k, PLR_NO_BUDGET, 2, seen};
+        plr_held_push_frame(&frames, &frame, 1000 + k);
+        TEST_ASSERT_EQUAL_UINT64(k, plr_held_newest_frame(&frames)->frame.t_ns);
+        if (k + 1 < PLR_SESSION_HELD_FRAMES)
+            continue;
+        const unsigned due = k + 1 - PLR_SESSION_HELD_FRAMES;
+        TEST_ASSERT_EQUAL_UINT64(due, plr_held_oldest_frame(&frames)->frame.t_ns);
+        const plr_held_frame *held_frame = plr_held_pop_frame(&frames);
+        TEST_ASSERT_EQUAL_UINT64(1000 + due, held_frame->moved_ns);
+        TEST_ASSERT_EQUAL_UINT32(100 + due, held_frame->frame.observations[0].id);
+        TEST_ASSERT_EQUAL_UINT16(2, held_frame->frame.count);
+    }
+    TEST_ASSERT_EQUAL_UINT8(PLR_SESSION_HELD_FRAMES - 1, frames.count);
 }
 
 int main(void) {
@@ -103,6 +162,9 @@ int main(void) {
     RUN_TEST(test_it_is_full_at_its_capacity_and_not_before);
     RUN_TEST(test_a_twist_is_due_when_the_newest_is_the_delay_ahead);
     RUN_TEST(test_a_frame_takes_the_twists_up_to_its_time);
-    RUN_TEST(test_time_that_repeats_or_goes_back_contradicts);
+    RUN_TEST(test_steps_that_come_in_any_order_leave_in_that_of_time);
+    RUN_TEST(test_a_step_of_a_time_that_is_there_is_not_taken);
+    RUN_TEST(test_time_that_goes_back_by_more_than_the_gap_contradicts);
+    RUN_TEST(test_frames_leave_as_they_came_with_their_observations);
     return UNITY_END();
 }

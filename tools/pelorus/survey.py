@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pelorus import inertial_survey, wire
+from pelorus import arrivals, inertial_survey, wire
 from pelorus.errors import PelorusError
 from pelorus.frames import (
     Config,
@@ -212,6 +212,7 @@ def _remarks(found: Survey, received: list[Received]) -> list[str]:
     for kind, stream in found.streams.items():
         if stream.steps_back:
             said.append(f"{kind.name}: time does not ascend {stream.steps_back} times")
+    said.extend(late.words for late in arrivals.late_ones([r.message for r in received]))
     if found.imu is not None:
         said.extend(_imu_remarks(found.imu))
     for name, sensor in found.sensors.items():

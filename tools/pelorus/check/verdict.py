@@ -9,14 +9,16 @@ from enum import IntEnum
 
 import numpy as np
 
+from pelorus.arrivals import late_ones
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.frame_table import BIASES, FrameTable, frame_table
-from pelorus.frames import Header, Message
+from pelorus.frames import Header, Message, Report
 from pelorus.health import TimeLine, time_line
-from pelorus.schema import HEALTHS
+from pelorus.schema import HEALTHS, number
 from pelorus.settings import in_force
 
 GOOD = HEALTHS[0]
+LATE = number("status", "LATE")
 GOOD_MOST, GOOD_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
 GATED_MANY, GATED_MOST = 0.1, 0.3  # of the matches
 WINDOW_S = 5.0
@@ -82,6 +84,7 @@ def remarks(run: Run, tuned: Tuned, origin_ns: int) -> list[Remark]:
     return [
         *of_length(run.health.frames),
         *_health(run),
+        *_order(run),
         *_gate(run, origin_ns),
         *_used(run),
         *_nis(run, tuned),
@@ -113,6 +116,14 @@ def _health(run: Run) -> Iterator[Remark]:
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
     grade = Grade.BAD if lost > LOST_MANY or run.good_share < GOOD_HALF else grade
     yield Remark(grade, f"health {run.health.summary()}")
+
+
+def _order(run: Run) -> Iterator[Remark]:
+    """Where the recording is not in the order of time, and no twist-delay puts it there."""
+    refused = [m.subject for m in run.messages if isinstance(m, Report) and m.status == LATE]
+    for late in late_ones(run.messages):
+        if refused.count(late.kind):
+            yield Remark(Grade.BAD, late.words)
 
 
 def _gate(run: Run, origin_ns: int) -> Iterator[Remark]:

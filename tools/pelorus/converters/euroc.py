@@ -34,7 +34,6 @@ CAMERAS = ("cam0", "cam1")
 IMU = "imu0"
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0")
 IMU_COLUMNS = 7
-ALONE_MAX = 0.1  # of the pictures may lack their partner, as in V2_03; more is another fault
 NS_MAX = 2**63
 
 
@@ -116,7 +115,7 @@ def _pictures(top: Path, ordered: Sequence[str]) -> tuple[Pictures, list[str]]:
     both = sorted(left.keys() & right.keys())
     alone = sorted(left.keys() ^ right.keys())
     where = top / ordered[0], top / ordered[1]
-    if len(alone) > ALONE_MAX * max(len(both), 1):
+    if images.too_many_alone(len(both), len(alone)):
         raise PelorusError(
             f"{where[0]} and {where[1]}: {len(both)} pairs have equal times, {len(alone)} pictures "
             f"are alone ({alone[0]} ns first); the cameras' times should be the same"

@@ -128,12 +128,13 @@ def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
     """(n, 2) times."""
     nearest = right[motion.nearest(right, left)]
     near = np.abs(nearest - left) <= cameras.apart_ns
-    if near.sum() < max(len(left) // 2, images.PAIRS_MIN):
+    alone = len(left) + len(right) - 2 * int(near.sum())
+    if images.too_many_alone(int(near.sum()), alone) or near.sum() < images.PAIRS_MIN:
         apart_ms = np.median(np.abs(nearest - left)) * 1e-6
         raise PelorusError(
             f"{bag.path}: of {len(left)} pictures of {cameras.left} {int(near.sum())} have one of "
-            f"{cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median {apart_ms:.3g} ms); "
-            "cameras that are triggered together are due, or --pair-within MS"
+            f"the {len(right)} of {cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median "
+            f"{apart_ms:.3g} ms); cameras that are triggered together are due, or --pair-within MS"
         )
     return np.stack((left[near], nearest[near]), axis=-1)
 

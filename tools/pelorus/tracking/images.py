@@ -20,6 +20,7 @@ Gray = NDArray[np.uint8]
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff")
 PAIRS_MIN = 3  # an id is admitted after as many frames
+ALONE_MAX = 0.1  # of the pictures may lack their partner, as in EuRoC V2_03; more is another fault
 SIDE_MIN_PX = 64  # less shows no track worth having
 IMAGE_BYTES_MAX = 1 << 28
 NAMES_SHOWN = 3
@@ -78,6 +79,11 @@ def pictures(folder: Path) -> dict[str, Path]:
             )
         found[path.stem] = path
     return found
+
+
+def too_many_alone(pairs: int, alone: int) -> bool:
+    """Whether so many pictures without a partner are another fault than some that were lost."""
+    return alone > ALONE_MAX * max(pairs, 1)
 
 
 def _require_partners(
