@@ -250,6 +250,42 @@ def test_velocities_that_are_not_there_are_named_with_what_to_do(
     assert "--measured vx,wz. If they are called otherwise: --columns vy=COLUMN:mps" in outcome.err
 
 
+def test_columns_of_other_names_are_told_how_to_be_named_whichever_file_lacks_them(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    """All of them other: vx, vy, ... as most would call them; no hint stood there."""
+    files = csv_files(tmp_path, clean(**SHORT))
+    for name, old, new, hint in (
+        ("twists.csv", "ps", "", "--columns vx=COLUMN:mps"),
+        ("truth.csv", "_m", "", "--columns px=COLUMN:m"),
+        ("stereo.csv", "_px", "", "--columns uL=COLUMN"),
+        ("stereo.csv", "t_ns", "stamp", "--columns t=COLUMN:s"),
+    ):
+        text = (tmp_path / name).read_text()
+        first, rest = text.split("\n", 1)
+        (tmp_path / name).write_text(first.replace(old, new) + "\n" + rest)
+        outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr")
+        assert outcome.status == 1
+        assert f"called otherwise: {hint}" in outcome.err
+        (tmp_path / name).write_text(text)
+
+
+def test_the_name_that_the_project_asks_for_names_its_unit(tmp_path: Path, pelorus: Run) -> None:
+    drive = clean(**SHORT)
+    files = csv_files(tmp_path, drive)
+    twists = tmp_path / "twists.csv"
+    twists.write_text(twists.read_text().replace("vx_mps", "vx").replace("wz_radps", "rate_dps"))
+    named = ("--columns", "vx_mps=vx,wz_radps=rate_dps")
+    target = tmp_path / "out.plr"
+    assert pelorus("convert", "csv", *files, target, *named, "--fix", "none").status == 0
+    found = messages_of(target, Twist)
+    assert np.allclose([m.v_B_mps[0] for m in found], drive.v_B_mps[:, 0])
+    assert np.allclose([m.w_B_radps[2] for m in found], np.radians(drive.w_B_radps[:, 2]))
+    for wrong in ("vx_kg=vx", "mps=vx"):
+        said = pelorus("convert", "csv", *files, target, "--columns", wrong).err
+        assert f"--columns {wrong}: NAME=COLUMN is due" in said
+
+
 def test_a_complaint_calls_a_column_as_its_file_does(tmp_path: Path, pelorus: Run) -> None:
     drive = clean(**SHORT)
     options = options_of(tmp_path, drive, "--twists")

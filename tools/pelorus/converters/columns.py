@@ -65,6 +65,7 @@ class Columns:
     def read(self, path: Path, file: str) -> Table:
         """The file's columns under the project's names; `file` is its option's name."""
         table = Table.read(path)
+        table.hint_of = _hint
         self.seen[path] = table.names
         for one in self.given:
             if one.file not in ("", file):
@@ -87,9 +88,32 @@ class Columns:
                 )
 
 
+def _hint(lacking: str) -> str:
+    """What to do where a column is there under another name."""
+    short = next((name for name, (target, _) in NAMES.items() if target == lacking), None)
+    if lacking == "t_s":
+        short = "t"
+    if short is None:
+        return ""
+    unit = lacking.partition("_")[2]
+    units = NAMES[short][1]
+    example = f"{short}=COLUMN:{unit}" if units is not NUMBER else f"{short}=COLUMN"
+    return f". If it is called otherwise: --columns {example}"
+
+
+def _short(name: str) -> tuple[str, str]:
+    """vx_mps, the project's own name for the column, is vx, and tells the unit."""
+    short, _, unit = name.partition("_")
+    if name in NAMES or short not in NAMES:
+        return name, ""
+    target, units = NAMES[short]
+    return (short, unit) if unit in units or target == name else (name, "")
+
+
 def _column(words: str) -> Column:
     name, equals, rest = words.strip().partition("=")
-    file, _, short = name.rpartition(".")
+    file, _, asked = name.rpartition(".")
+    short, implied = _short(asked)
     column, colon, unit = rest.partition(":")
     if not equals or not column or short not in NAMES:
         raise PelorusError(
@@ -98,6 +122,7 @@ def _column(words: str) -> Column:
         )
     target, units = NAMES[short]
     unit = unit if colon else _unit_in(column)
+    unit = implied if implied and not colon and unit not in units else unit
     if units is NUMBER:
         return Column(words, file, target, column, 1.0)
     if unit not in units:
