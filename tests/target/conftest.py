@@ -40,6 +40,9 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "once: about the host; one board is enough")
     config.addinivalue_line("markers", "boards(*names): for these boards alone")
+    config.addinivalue_line(
+        "markers", "spread: the same source on each board; one of them, and with --long all"
+    )
     # What a shell starts in the background ignores Ctrl-C, and so would what the tests start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -48,6 +51,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--boards", nargs="+", required=True)
     parser.addoption("--robot", type=Path, required=True)
     parser.addoption("--desktop", type=Path, required=True)
+    parser.addoption("--long", action="store_true")
 
 
 @pytest.fixture(scope="session")
@@ -101,14 +105,18 @@ def drive(robot: Path) -> list[Message]:
     return [frame.message for frame in frames[:-1] if frame.message.kind != Kind.TRUTH]
 
 
+def boards_of(test: pytest.Item) -> list[str]:
+    """Those that a test is for."""
+    boards: list[str] = test.config.getoption("--boards")
+    only = test.get_closest_marker("boards")
+    return boards if only is None else [board for board in boards if board in only.args]
+
+
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Each test for each board, and one for each recording that recordings.py could make."""
     if "board" in metafunc.fixturenames:
-        boards = metafunc.config.getoption("--boards")
-        only = metafunc.definition.get_closest_marker("boards")
-        if only is not None:
-            boards = [board for board in boards if board in only.args]
-        elif metafunc.definition.get_closest_marker("once"):
+        boards = boards_of(metafunc.definition)
+        if metafunc.definition.get_closest_marker("once"):
             which = zlib.crc32(metafunc.definition.name.encode())  # so that each is taken for some
             boards = [boards[which % len(boards)]]
         metafunc.parametrize("board", boards, indirect=True, scope="session")
@@ -118,6 +126,22 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("recording", paths, ids=[path.stem for path in paths])
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whole drives first: at the end every processor has something to do."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """What is spread, on one board each. Whole drives first: at the end every processor has
+    something to do.
+    """
+    if not config.getoption("--long"):
+        left_out = [item for item in items if not is_asked(item)]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if is_asked(item)]
     items.sort(key=lambda item: item.path.stem not in LONGEST)
+
+
+def is_asked(item: pytest.Item) -> bool:
+    """By its name and parameters a spread test is for one of its boards, another for each."""
+    if item.get_closest_marker("spread") is None:
+        return True
+    assert isinstance(item, pytest.Function)
+    boards = boards_of(item)
+    board = str(item.callspec.params["board"])
+    return board == boards[zlib.crc32(item.name.replace(board, "").encode()) % len(boards)]

@@ -4,7 +4,7 @@
 usage: recordings.py FOLDER [--long]
 
 The simulated ones always, of which those in FOLDER/light cost a board little; Starry Night, 0027
-and 03 where $PELORUS_DATA has them: 200 steps, 30 and 30 frames of them, with --long the whole of
+and 03 where $PELORUS_DATA has them: 100 steps, 30 and 30 frames of them, with --long the whole of
 all three. What is there already is kept.
 """
 
@@ -20,7 +20,7 @@ from pelorus.wire import Writer, read_file
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
-SIMULATION: tuple[str, ...] = ("simulate", "{out}", "--seed", "7", "--duration", "8")
+SIMULATION: tuple[str, ...] = ("simulate", "{out}", "--seed", "7", "--duration", "4")
 # What costs an emulated board most is a byte on its UART: few observations, few twists.
 LIGHT: dict[str, tuple[str, ...]] = {
     "drive": (*SIMULATION, "--observations", "6", "--speed", "1", "--twist-rate", "20"),
@@ -32,17 +32,18 @@ LIGHT: dict[str, tuple[str, ...]] = {
 }
 # By an IMU that finds its tilt while the body stands, and then drives off.
 INERTIAL: tuple[str, ...] = (
-    *("simulate", "{out}", "--seed", "7", "--duration", "6", "--observations", "20"),
+    *("simulate", "{out}", "--seed", "7", "--duration", "4", "--observations", "20"),
     *("--imu-rate", "200", "--rest", "2", "--start", "pose", "--outliers", "0"),
 )
+AS_IT_IS = ("convert", "ece276a", "{in}", "{out}", "--fix", "none", "--twist-timing", "end")
 REAL: dict[str, tuple[tuple[str, ...], str, int]] = {
     "starry-night": (
         ("convert", "starry-night", "{in}", "{out}"),
         "starry-night/dataset3.mat",
-        200,
+        100,
     ),
-    "0027": (("convert", "ece276a", "{in}", "{out}"), "ece276a/0027.npz", 30),
-    "03": (("convert", "ece276a", "{in}", "{out}"), "ece276a/03.npz", 30),
+    "0027": (AS_IT_IS, "ece276a/0027.npz", 30),
+    "03": (AS_IT_IS, "ece276a/03.npz", 30),
 }
 
 

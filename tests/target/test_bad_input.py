@@ -122,6 +122,7 @@ def hit(stream: bytes, faults: list[Fault], seed: int) -> bytes:
     return bytes(out)
 
 
+@pytest.mark.spread
 @pytest.mark.parametrize(
     ("faults", "seed"),
     [([lost], 1), ([doubled], 2), ([damaged], 3), ([lost, doubled, damaged], 4)],
@@ -144,6 +145,7 @@ def test_lost_doubled_and_damaged_bytes_cost_the_same_frames_as_on_the_desktop(
     assert digest(Streamer(link).run(messages).poses) == clean
 
 
+@pytest.mark.spread
 def test_pieces_of_any_size_change_no_bit(link: Link, messages: list[Message]) -> None:
     stream, dice = frames_of(messages), random.Random(5)
     clean = computed(boards_answers(link, [stream]))
@@ -164,6 +166,7 @@ def frame_of_kind(kind: int, payload: bytes) -> bytes:
     return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + DELIMITER
 
 
+@pytest.mark.spread
 def test_unknown_kinds_are_refused_and_change_no_bit(link: Link, messages: list[Message]) -> None:
     clean = boards_answers(link, [frames_of(messages)])
     assert refusals(clean) == []
@@ -177,6 +180,7 @@ def test_unknown_kinds_are_refused_and_change_no_bit(link: Link, messages: list[
     assert digest(poses(board)) == digest(poses(clean))
 
 
+@pytest.mark.spread
 def test_a_header_of_a_later_version_is_refused_and_the_drive_goes_on(
     link: Link, messages: list[Message]
 ) -> None:
@@ -190,6 +194,7 @@ def test_a_header_of_a_later_version_is_refused_and_the_drive_goes_on(
     assert digest(poses(board)) == digest(poses(clean))
 
 
+@pytest.mark.spread
 def test_data_before_a_header_is_refused_one_by_one(link: Link, messages: list[Message]) -> None:
     board = boards_answers(link, [frames_of(messages[1:])])
     kinds = [message.kind for message in messages[1:]]  # TRUTH is for mapping and evaluation alone
@@ -211,6 +216,7 @@ def session_input(path: Path) -> bytes:
     return stream
 
 
+@pytest.mark.spread
 def test_what_a_fuzzer_recorded_neither_stops_nor_resets_it(
     link: Link, messages: list[Message]
 ) -> None:
@@ -233,6 +239,7 @@ def shifted(message: Message, by_ns: int) -> Message:
     return message
 
 
+@pytest.mark.spread
 @pytest.mark.parametrize(
     "by_ns", [DAY_NS, 5_000_000_000, -3_000_000_000], ids=["day", "5s", "back"]
 )
@@ -251,6 +258,7 @@ def test_time_stamps_that_jump_are_followed_as_on_the_desktop(
     assert last.t_ns == next(m.t_ns for m in reversed(jumping) if isinstance(m, Stereo))
 
 
+@pytest.mark.spread
 def test_time_stamps_that_stand_still_are_refused_as_on_the_desktop(
     link: Link, messages: list[Message], program: Path, tmp_path: Path
 ) -> None:
@@ -274,6 +282,7 @@ CLOCKS = {
 }
 
 
+@pytest.mark.spread
 @pytest.mark.parametrize("what", CLOCKS)
 def test_the_boards_own_clock_changes_no_bit(
     board: str, firmware: Path, messages: list[Message], tmp_path: Path, what: str

@@ -101,6 +101,7 @@ def test_odometry_is_the_pose_in_forward_right_down_axes(
     assert_told(poses, odometries, axes)
 
 
+@pytest.mark.spread
 def test_with_an_imu_velocity_is_the_estimated_one_with_its_covariance(
     emulator: Emulator, robot: Path
 ) -> None:
@@ -139,6 +140,7 @@ def assert_told(poses: list[Pose], odometries: list[Any], axes: BodyAxes) -> Non
         close(symmetric(odometry.pose_covariance), J @ P @ J.T)
 
 
+@pytest.mark.spread
 def test_frames_estimator_quality_and_resets_are_told(
     emulator: Emulator, drive: list[Message]
 ) -> None:
@@ -153,6 +155,7 @@ def test_frames_estimator_quality_and_resets_are_told(
     assert 100 in {odometry.quality for odometry in odometries}
 
 
+@pytest.mark.spread
 def test_other_body_axes_are_not_guessed(emulator: Emulator, drive: list[Message]) -> None:
     poses, odometries = fly(emulator, first_frames(drive, FRAMES), BodyAxes.OTHER)
     assert len(poses) == FRAMES

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from firmware.sizes import PROCESSORS
+from firmware.sizes import objects_of
 from firmware.stack import image_bound
 from gdb_stub import symbol
 
@@ -15,9 +15,7 @@ FLOAT64_BOARD = "mps2_an500"
 
 def demand_room(board: str, robot: Path, image_name: str, bits: int) -> None:
     image = robot / "images" / f"{image_name}.elf"
-    library = f"pelorus-{PROCESSORS[board]}-n32-f{bits}.dir"
-    folders = [robot / "CMakeFiles" / library, robot / "CMakeFiles" / f"{image.stem}.dir"]
-    deepest = image_bound(image, folders)
+    deepest = image_bound(image, objects_of(image, board, 32, bits))
     there = symbol(image, "_stack_top") - symbol(image, "_stack_bottom")
     assert deepest.stack_bytes <= there, " -> ".join(deepest.path)
 

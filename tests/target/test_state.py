@@ -22,18 +22,13 @@ NOT_READY, CORRUPT, FOREIGN, IO = -13, -15, -16, -17  # plr_status
 RETAINED = {"mps2_an386": 0x203C0000, "mps2_an500": 0x203C0000, "mps3_an547": 0x20040000}
 SLOT = 128 * 1024  # half of the region
 INTO_THE_STATE = 100
-WITHOUT_FLASH = {"stm32f405": "QEMU does not model the STM32's flash controller"}
+WITHOUT_FLASH = "stm32f405"  # QEMU does not model its controller
+KEEPS = pytest.mark.boards(*RETAINED)
 
 
 @pytest.fixture(scope="module")
 def messages(drive: list[Message]) -> list[Message]:
     return first_frames(drive, FRAMES)
-
-
-@pytest.fixture(scope="module")
-def keeps(board: str) -> None:
-    if board in WITHOUT_FLASH:
-        pytest.skip(WITHOUT_FLASH[board])
 
 
 def rest_of(messages: list[Message], frames: int) -> list[Message]:
@@ -64,7 +59,7 @@ def told(outcome: Outcome) -> str:
 # --- boards that keep it --------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("keeps")
+@KEEPS
 def test_a_drive_that_was_cut_goes_on_with_the_bits_of_one_that_was_not(
     emulator: Emulator, link: Link, messages: list[Message]
 ) -> None:
@@ -78,7 +73,8 @@ def test_a_drive_that_was_cut_goes_on_with_the_bits_of_one_that_was_not(
     assert digest(kept + after.poses) == digest(whole.poses)
 
 
-@pytest.mark.usefixtures("keeps")
+@pytest.mark.spread
+@KEEPS
 def test_each_reset_finds_the_newest_state(
     emulator: Emulator, link: Link, messages: list[Message]
 ) -> None:
@@ -93,7 +89,8 @@ def test_each_reset_finds_the_newest_state(
     assert digest(poses) == digest(whole.poses[: CUT + 12])
 
 
-@pytest.mark.usefixtures("keeps")
+@pytest.mark.spread
+@KEEPS
 def test_what_may_have_moved_meanwhile_widens_the_covariance(
     emulator: Emulator, link: Link, messages: list[Message]
 ) -> None:
@@ -104,7 +101,8 @@ def test_what_may_have_moved_meanwhile_widens_the_covariance(
     assert after.poses[0].covariance[0] > stood
 
 
-@pytest.mark.usefixtures("keeps")
+@pytest.mark.spread
+@KEEPS
 def test_without_a_restore_the_drive_begins_as_ever(
     emulator: Emulator, link: Link, messages: list[Message]
 ) -> None:
@@ -113,7 +111,8 @@ def test_without_a_restore_the_drive_begins_as_ever(
     assert digest(Streamer(link).run(messages).poses) == digest(whole.poses)
 
 
-@pytest.mark.usefixtures("keeps")
+@pytest.mark.spread
+@KEEPS
 def test_another_calibration_is_refused_and_a_start_taken(
     emulator: Emulator, link: Link, messages: list[Message]
 ) -> None:
@@ -131,7 +130,8 @@ def test_another_calibration_is_refused_and_a_start_taken(
     assert streamer.outcome.poses[-1].p_WB_m[0] == pytest.approx(7.0, abs=0.01)
 
 
-@pytest.mark.usefixtures("keeps")
+@pytest.mark.spread
+@KEEPS
 def test_a_damaged_state_is_refused_and_the_one_before_it_taken(
     board: str, firmware: Path, messages: list[Message]
 ) -> None:
@@ -160,6 +160,7 @@ def test_a_damaged_state_is_refused_and_the_one_before_it_taken(
 # --- every board ----------------------------------------------------------------------------------
 
 
+@pytest.mark.spread
 def test_after_power_on_there_is_nothing_to_restore(link: Link, messages: list[Message]) -> None:
     streamer = Streamer(link)
     with pytest.raises(PelorusError, match="state not restored: nothing was ever saved"):
@@ -180,7 +181,7 @@ def test_a_save_changes_no_bit_of_the_drive(
         if isinstance(message, Stereo):
             asked.append(State(message.t_ns, StateAction.SAVE))
     outcome = Streamer(link).run(asked)
-    status = IO if board in WITHOUT_FLASH else 0
+    status = IO if board == WITHOUT_FLASH else 0
     assert [answer.status for answer in outcome.states] == [status] * FRAMES
     assert [answer.t_ns for answer in outcome.states] == [pose.t_ns for pose in outcome.poses]
     assert digest(outcome.poses) == digest(whole.poses)

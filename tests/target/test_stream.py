@@ -131,6 +131,7 @@ def assert_same_bits(done: subprocess.CompletedProcess[str], log: Path, program:
     assert digest(replayed(log, program)) == digest(robots)
 
 
+@pytest.mark.spread
 @BOTH
 def test_a_board_on_a_wire_computes_the_same_bits(
     behind: Behind, board: str, firmware: Path, short_drive: Path, program: Path, tmp_path: Path
@@ -282,6 +283,7 @@ def test_the_log_of_a_drive_compares_equal_and_one_other_bit_does_not(
     assert "frame 18, " in found.stdout
 
 
+@pytest.mark.spread
 def test_the_log_of_a_board_that_was_reset_compares_equal_in_both_its_lives(
     emulator: Emulator, short_drive: Path, program: Path, tmp_path: Path
 ) -> None:

@@ -211,12 +211,17 @@ def section_sizes(image: Path) -> tuple[int, int]:
     return text + data, data + bss
 
 
+def objects_of(firmware: Path, board: str, capacity: int, bits: int = 32) -> list[Path]:
+    """The folders of the objects that an image is linked of."""
+    library = f"pelorus-{PROCESSORS[board]}-n{capacity}-f{bits}"
+    folder = firmware.parents[1] / "CMakeFiles"
+    return [folder / f"{name}.dir" for name in (library, f"port-{board}", firmware.stem)]
+
+
 def measure(build: Path, board: str, capacity: int) -> Cost:
     """Everything about one board and capacity."""
     firmware = build / "images" / f"pelorus-{board}-n{capacity}.elf"
     flash, ram = section_sizes(firmware)
-    library = f"pelorus-{PROCESSORS[board]}-n{capacity}-f32.dir"
-    folders = [build / "CMakeFiles" / library, build / "CMakeFiles" / f"{firmware.stem}.dir"]
     benches = {
         process.name: run_bench(
             board, build / "images" / f"bench-{process.name}-{board}-n{capacity}.elf"
@@ -231,7 +236,7 @@ def measure(build: Path, board: str, capacity: int) -> Cost:
         ram=ram,
         filter=bench.filter_bytes,
         session=bench.session_bytes - bench.filter_bytes,
-        stack_bound=image_bound(firmware, folders).stack_bytes,
+        stack_bound=image_bound(firmware, objects_of(firmware, board, capacity)).stack_bytes,
         stack_seen=max(each.stack_bytes for each in benches.values()),
         runs={name: each.run for name, each in benches.items()},
     )

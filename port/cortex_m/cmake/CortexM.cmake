@@ -6,8 +6,9 @@ set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
 set(IMAGES "${CMAKE_CURRENT_BINARY_DIR}/images")
 file(MAKE_DIRECTORY "${IMAGES}")
 
-# What every image needs: reset to main, link, clock, fault reports.
-set(PORT_SOURCES startup.c serial.c clock.c fault.c panic.c text.c)
+# What every image needs: reset to main, link, clock, fault reports. It knows nothing of the library's sizes;
+# panic.c, which writes a message, does.
+set(PORT_SOURCES startup.c serial.c clock.c fault.c text.c)
 list(TRANSFORM PORT_SOURCES PREPEND "${PORT}/")
 
 set(telemetry_sources "${PORT}/telemetry_none.c")
@@ -88,13 +89,25 @@ function(cortexm_library result cpu capacity bits)
   set(${result} ${name} PARENT_SCOPE)
 endfunction()
 
+# What all images of a board share, compiled once.
+function(cortexm_port board)
+  set(name port-${board})
+  if(NOT TARGET ${name})
+    set(cpu ${board_${board}_cpu})
+    set(drivers ${board_${board}_drivers} ${cpu_${cpu}_guard})
+    list(TRANSFORM drivers PREPEND "${PORT}/drivers/")
+    add_library(${name} OBJECT ${PORT_SOURCES} ${drivers} "${PORT}/boards/${board}/board.c")
+    cortexm_options(${name} ${cpu})
+    target_include_directories(${name} PRIVATE "${PELORUS_ROOT}/include")
+  endif()
+endfunction()
+
 # An image `name` for a board, out of sources and a library of that precision, in all three forms.
 function(cortexm_image name board library bits)
   set(cpu ${board_${board}_cpu})
-  set(drivers ${board_${board}_drivers} ${cpu_${cpu}_guard})
-  list(TRANSFORM drivers PREPEND "${PORT}/drivers/")
   set(folder "${PORT}/boards/${board}")
-  add_executable(${name} ${ARGN} ${PORT_SOURCES} ${drivers} "${folder}/board.c")
+  cortexm_port(${board})
+  add_executable(${name} ${ARGN} "${PORT}/panic.c" $<TARGET_OBJECTS:port-${board}>)
   cortexm_options(${name} ${cpu})
   set_target_properties(${name} PROPERTIES
     SUFFIX .elf RUNTIME_OUTPUT_DIRECTORY "${IMAGES}"
@@ -110,7 +123,7 @@ function(cortexm_image name board library bits)
 endfunction()
 
 function(cortexm_bringup board)
-  cortexm_library(library ${board_${board}_cpu} 8 32)
+  cortexm_library(library ${board_${board}_cpu} 32 32)
   cortexm_image(bringup-${board} ${board} ${library} 32 "${PORT}/main_bringup.c")
   add_dependencies(bringup bringup-${board})
 endfunction()
@@ -122,7 +135,7 @@ function(cortexm_kernels board)
   if(NOT EXISTS "${source}")
     return()
   endif()
-  cortexm_library(library ${board_${board}_cpu} 8 32)
+  cortexm_library(library ${board_${board}_cpu} 32 32)
   cortexm_image(kernels-${board} ${board} ${library} 32 "${source}")
   target_include_directories(kernels-${board} PRIVATE "${PORT}" "${PELORUS_ROOT}/src")
   add_dependencies(bringup kernels-${board})
