@@ -126,6 +126,12 @@ joined() {
     begun=()
 }
 
+# by_one_job COMMAND...: a build that stands beside others.
+by_one_job() {
+    local JOBS=1
+    "$@"
+}
+
 # What tests said when they left something out: Unity's IGNORE lines, pytest's SKIPPED lines and the
 # words of the scripts in tests/layering. Shown, and counted.
 count_skips() {
@@ -170,7 +176,8 @@ build_fuzz() {
 }
 
 # Warnings are errors, and the machine must have OpenBLAS: no test is left out in silence.
-strict=(-DPELORUS_BUILD_TESTS=ON -DPELORUS_WERROR=ON -DPELORUS_REQUIRE_ORACLE=ON)
+strict=(-DPELORUS_BUILD_TESTS=ON -DPELORUS_WERROR=ON -DPELORUS_REQUIRE_ORACLE=ON
+    -DPELORUS_LONG_TESTS=$([ $extent = long ] && echo ON || echo OFF))
 
 heading 'Set-up'
 [ $extent = long ] && PACKAGES_WANTED+=(libclang-rt-14-dev) # libFuzzer
@@ -179,13 +186,24 @@ if [ $extent = quick ]; then
 else
     ensure_packages "${PACKAGES_BUILD[@]}" "${PACKAGES_TEST[@]}" "${PACKAGES_WANTED[@]/%/?}"
 fi
-ensure_python
 prefer_ninja
 if [ -d "$PELORUS_DATA" ]; then
     echo "real recordings: $PELORUS_DATA"
 else
     echo "skipped: no real recordings at $PELORUS_DATA; tests that need them say so"
 fi
+
+# --- what needs no Python, beside its environment -------------------------------------------------
+
+if [ $extent != quick ]; then
+    clang=$(command -v clang-14 || command -v clang)
+    replays=(-DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON)
+    beside 'Python environment' ensure_python
+    beside 'build: clang' by_one_job build_replays clang "${replays[@]}" -DCMAKE_C_COMPILER="$clang"
+    beside 'build: less optimised' by_one_job build_replays o2 "${replays[@]}"
+    joined
+fi
+ensure_python # there by now; if not, it says why and ends this
 
 # --- form ----------------------------------------------------------------------------------------
 
@@ -205,10 +223,10 @@ joined
 # --- the desktop ---------------------------------------------------------------------------------
 
 step 'build: gcc' build_preset release "${strict[@]}" && step 'test: gcc' run_ctest build
-step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" tests/python
+step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" --dist worksteal \
+    tests/python
 
 if [ $extent != quick ]; then
-    clang=$(command -v clang-14 || command -v clang)
     step 'build: sanitizers' build_preset debug "${strict[@]}" &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
     # Another compiler, and without a fused multiply-add instruction. Every test is built, for its warnings;
@@ -216,9 +234,6 @@ if [ $extent != quick ]; then
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_TEST_BLOCKS=OFF \
         -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
-    replays=(-DPELORUS_BUILD_TESTS=OFF -DPELORUS_WERROR=ON)
-    step 'build: clang' build_replays clang "${replays[@]}" -DCMAKE_C_COMPILER="$clang"
-    step 'build: less optimised' build_replays o2 "${replays[@]}"
     beside 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then
