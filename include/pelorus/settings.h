@@ -239,6 +239,17 @@ typedef struct plr_config {
      * Three numbers: where the IMU is on the body, in the body's axes. */
     double imu_arm_m[3];
 
+    /* Setting focal-sigma: 0 to 0.1, default 0.005.
+     * By what share the focal length may be wrong, one sigma. Where speed and turn are constant
+     * nothing shows such an error, and it does not average out: each turn is off by the same share.
+     * What is told of covariances contains it, of pose, velocity, biases and landmarks; estimates
+     * take no notice. 0: the camera is exact, as a simulated one is. */
+    double focal_sigma;
+
+    /* Setting baseline-sigma: 0 to 0.1, default 0.005.
+     * The same of the baseline: each way is off by the same share. */
+    double baseline_sigma;
+
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
      * Take several times the data sheet's figure: vibration, scale and timing errors come on top,

@@ -210,6 +210,14 @@ typedef struct plr_consistency {
     uint8_t settling_frames;
 } plr_consistency;
 
+/* Relative errors of the camera's calibration that covariances take into account:
+ * src/state/sensitivity.h. */
+typedef enum plr_calibration_error {
+    PLR_FOCAL_LENGTH,
+    PLR_BASELINE,
+    PLR_CALIBRATIONS
+} plr_calibration_error;
+
 /* Settings and camera in the filter's precision; of sigmas the squares. */
 typedef struct plr_parameters {
     plr_camera camera;
@@ -221,6 +229,7 @@ typedef struct plr_parameters {
     plr_real min_disparity, max_depth, max_row_gap, min_depth;
     plr_real landmark_variance;
     plr_real min_inverse_range;
+    plr_real calibration_variance[PLR_CALIBRATIONS]; /* by plr_calibration_error; 0: exact */
     plr_time_ns max_gap_ns;
     plr_real R_BI[9], imu_arm[3]; /* the IMU on the body; the camera above is seen from the arm */
     plr_real gravity;             /* m/s^2 */
@@ -235,6 +244,7 @@ typedef struct plr_noise {
     plr_real Wt[PLR_POSE_DIM * PLR_MAX_LD + PLR_KERNEL_MARGIN]; /* W^T, 6 x dim */
     plr_real Lambda[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];     /* 6x6, packed upper triangle */
     plr_real eta[PLR_POSE_DIM];
+    plr_real eta_of_S[PLR_CALIBRATIONS][PLR_POSE_DIM]; /* the same of the columns of S */
     plr_real z[PLR_POSE_DIM];               /* the value of nu at which the motion was linearised */
     plr_real motion_variance[PLR_POSE_DIM]; /* of the six numbers of the motion; 0: exact */
     plr_real
@@ -299,6 +309,7 @@ typedef struct plr_filter {
     double p_WB[3]; /* double in both builds: adding a small step to a float32 would lose it */
     plr_real bias[PLR_BIAS_DIM];
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
+    double bias_walked_s; /* for how long the biases have walked since that was their prior */
     plr_real recovery_P
         [PLR_POSE_TRIANGLE]; /* the pose's covariance when it was last in order, plus the motion
                                 since; packed lower triangle */
@@ -310,6 +321,8 @@ typedef struct plr_filter {
     plr_slot slots[PLR_MAX_LANDMARKS];
     plr_real P[PLR_PACKED_SIZE + PLR_KERNEL_MARGIN]; /* packed lower triangle: the blocks of
                                                         plr_layout, landmarks */
+    plr_real S[PLR_CALIBRATIONS][PLR_MAX_LD];        /* the error of each row of P by those of the
+                                                 calibration, relative: src/state/sensitivity.h */
     plr_workspace work;
 
     plr_consistency consistency;

@@ -373,13 +373,12 @@ bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n
 /* ---------------------------------------------------------------- the verdict */
 
 /* If prior and noise are as stated, an estimate differs from the mean of its prior by
- * N(0, P_0 + walked - P): by less than the prior's sigma as long as little has been learnt. */
+ * N(0, P_0 - P), with P_0 the prior's variance and the walk's since: by less than the prior's sigma as long as little has been learnt. */
 static bool bias_is_off(const plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real sigma = f->bias_prior_sigma[k], off = f->bias[k] - f->bias_prior[k];
-        const plr_real prior = sigma * sigma + plr_process_of(f)->walked(f, k);
+        const plr_real prior = plr_bias_prior_variance(f, k), off = f->bias[k] - f->bias_prior[k];
         const plr_real learnt = prior - P[(PLR_POSE_DIM + 1) * k];
         if (prior > 0 && learnt > LEARNT_SHARE * prior &&
             off * off > BIAS_SIGMAS * BIAS_SIGMAS * learnt)

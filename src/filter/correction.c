@@ -7,12 +7,14 @@
 #include "math/log_product.h"
 #include "math/small.h"
 #include "process/velocity.h"
+#include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
 #include "state/rigid_fit.h"
+#include "state/sensitivity.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
@@ -32,7 +34,8 @@ typedef struct plr_batch {
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
                PLR_KERNEL_MARGIN]; /* packed upper triangle */
     plr_real y[PLR_BLOCK_ROWS];
-    plr_real E[WIDE * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
+    plr_real y_of_S[PLR_CALIBRATIONS][PLR_BLOCK_ROWS]; /* the same of the columns of S */
+    plr_real E[WIDE * PLR_BLOCK_ROWS];                 /* rows x 6: H W, then U^-T H W */
 } plr_batch;
 
 /* The sums behind a plr_innovation. */
@@ -81,6 +84,37 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
         plr_velocity_bias_rows(f, i - sensed->count, &m->H, m->r);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             m->R[r] = 1;
+    }
+}
+
+/* A column of S is corrected as an estimate is of which the residual were -H_s: by how much the
+ * error of the calibration changes what is predicted. */
+static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, unsigned i,
+                              const plr_rows *H, plr_batch *batch, unsigned first) {
+    plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS] = {{0}}, column[PLR_ROWS];
+    if (i < sensed->seen)
+        plr_stereo_by_calibration(f, f->work.slot_of[f->work.used[i]], H_s);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        if (!plr_considers(f, k))
+            continue;
+        plr_rows_apply(H, f->S[k], column);
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            batch->y_of_S[k][first + r] = -H_s[k][r] - column[r];
+    }
+}
+
+/* S += V y and eta += E^T y, of each column with its own y. */
+static void correct_sensitivity(plr_filter *f, plr_batch *batch) {
+    plr_noise *noise = &f->work.noise;
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real *y = batch->y_of_S[k], *eta = noise->eta_of_S[k];
+        if (!plr_considers(f, k))
+            continue;
+        plr_solve_upper_transposed(batch->rows, 1, batch->S, y, 1);
+        plr_sensitivity_combine(f, k, batch->rows, y, f->work.Vt, batch->ld);
+        for (unsigned c = 0; noise->open && c < PLR_POSE_DIM; c++)
+            for (unsigned r = 0; r < batch->rows; r++)
+                eta[c] = PLR_FMA(batch->E[WIDE * r + c], y[r], eta[c]);
     }
 }
 
@@ -149,11 +183,13 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     plr_solve_upper_transposed(batch->rows, 1, batch->S, batch->y, 1);
     if (!plr_covariance_subtract(f, batch->rows))
         return false;
+    if (w->noise.open)
+        plr_solve_upper_transposed(batch->rows, PLR_POSE_DIM, batch->S, batch->E, WIDE);
+    correct_sensitivity(f, batch);
     if (!w->noise.open) {
         plr_combine_rows(batch->n, batch->rows, batch->y, w->Vt, batch->ld, w->dx);
         return true;
     }
-    plr_solve_upper_transposed(batch->rows, PLR_POSE_DIM, batch->S, batch->E, WIDE);
     add_noise_information(&w->noise, batch);
     update_estimate(f, batch);
     return true;
@@ -171,6 +207,7 @@ static void correct_by_batch(plr_filter *f, const plr_sensed *sensed, unsigned a
         plr_measurement m;
         get_measurement(f, sensed, at + i, &m);
         stack(f, &m, PLR_ROWS * i, &batch);
+        stack_sensitivity(f, sensed, at + i, &m.H, &batch, PLR_ROWS * i);
     }
     if (apply_batch(f, &batch, &factorised)) {
         for (unsigned i = at; i < at + size; i++)

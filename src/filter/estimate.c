@@ -13,6 +13,7 @@
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
+#include "state/sensitivity.h"
 #include "state/slots.h"
 
 static bool ready(const plr_filter *f) {
@@ -71,9 +72,11 @@ static plr_status tell_covariance(double *told, const plr_real P[PLR_POSE_SQUARE
     return PLR_OK;
 }
 
-/* The pose's covariance now, enlarged while vision contradicts the twists. */
+/* The pose's covariance now, enlarged by what the calibration may be wrong, and while vision
+ * contradicts the twists. */
 static void pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     plr_motion_pose_covariance(f, P_xi);
+    plr_sensitivity_add_to_pose(f, P_xi);
     plr_consistency_enlarge(f, P_xi);
 }
 
@@ -126,6 +129,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
         return PLR_E_DIVERGED;
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
     plr_process_of(f)->now(f, u, P);
+    plr_sensitivity_add_to_velocity(f, P);
     plr_mount_twist_out(f, u, P);
     return tell_covariance(P_u, P);
 }
@@ -139,6 +143,8 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     if (P_b) {
         plr_real P[PLR_POSE_SQUARE];
         plr_process_of(f)->bias_covariance(f, P);
+        if (plr_has_block(f, PLR_BLOCK_BIAS))
+            plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM, P);
         const plr_status status = tell_covariance(P_b, P);
         if (status != PLR_OK)
             return status;

@@ -78,6 +78,8 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     par->min_depth = (plr_real)c->min_depth_m;
     par->landmark_variance = squared(c->landmark_sigma_m);
     par->min_inverse_range = (plr_real)(1 / c->max_range_m);
+    par->calibration_variance[PLR_FOCAL_LENGTH] = squared(c->focal_sigma);
+    par->calibration_variance[PLR_BASELINE] = squared(c->baseline_sigma);
     par->gravity = (plr_real)c->gravity_mps2;
     par->accel_density = squared(c->accel_noise);
     par->gyro_density = squared(c->gyro_noise);
@@ -145,6 +147,7 @@ static void set_bias_prior(plr_filter *f, const double mean[PLR_POSE_DIM],
         f->bias[i] = f->bias_prior[i] = (plr_real)mean[i];
         f->bias_prior_sigma[i] = PLR_SQRT((plr_real)variance[i]);
     }
+    f->bias_walked_s = 0;
     plr_filter_begin_bias(f, variance);
 }
 
@@ -165,9 +168,9 @@ static void start_bias(plr_filter *f) {
 /* After the biases' covariance was lost. */
 static void restore_bias_prior(plr_filter *f) {
     double variance[PLR_POSE_DIM];
-    for (int i = 0; i < PLR_POSE_DIM; i++) {
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
         f->bias[i] = f->bias_prior[i];
-        variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
+        variance[i] = (double)plr_bias_prior_variance(f, i);
     }
     plr_filter_begin_bias(f, variance);
 }
@@ -199,6 +202,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
     f->refused_before = 0;
     memset(f->bias_prior, 0, sizeof f->bias_prior);
+    f->bias_walked_s = 0;
     plr_consistency_clear(f);
     start_covariance(f, P_xi);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);

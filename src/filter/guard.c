@@ -96,6 +96,8 @@ static uint64_t large_sum(const plr_filter *f) {
     add(&sum, f->slots, f->count * sizeof *f->slots);
     add(&sum, &f->consistency, sizeof f->consistency);
     add(&sum, plr_covariance_elements(f), plr_covariance_size(f, f->count) * sizeof(plr_real));
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        add(&sum, f->S[k], plr_covariance_dim(f) * sizeof *f->S[k]);
     return mixed(&sum);
 }
 

@@ -22,6 +22,7 @@
 #include "sensor/sensor.h"
 #include "state/blocks.h"
 #include "state/motion.h"
+#include "state/sensitivity.h"
 
 /* Beyond this a lever arm or a sigma is an error of the sender, m and so on. */
 #define MAX_ARM   1e3
@@ -160,6 +161,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     plr_sandwich3(S, HP, m.H.term[0].H, P_xi);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = PLR_FMA(SHARPEST * PLR_EPSILON, S[4 * i], m.R[i]);
+    plr_sensitivity_add_to_pose(f, P_xi); /* a camera that is off by a share is no wrong reading */
     if (!accepts(f, distance2(m.H.term[0].H, P_xi, m.R, m.r), result) ||
         plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;

@@ -20,6 +20,7 @@
 
 static void finish_motion(plr_filter *f) {
     plr_process_of(f)->walk(f, f->motion.seconds);
+    f->bias_walked_s += (double)f->motion.seconds;
     plr_motion_clear(f);
 }
 

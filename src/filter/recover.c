@@ -8,9 +8,11 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
+#include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/motion.h"
+#include "state/sensitivity.h"
 
 static void pack(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]) {
     for (unsigned i = 0, at = 0; i < PLR_POSE_DIM; i++)
@@ -38,7 +40,7 @@ static void prior_of_drivers(const plr_filter *f, const plr_real P[PLR_POSE_SQUA
         const unsigned row = first + d, bias = plr_row_of(f, PLR_BLOCK_BIAS);
         plr_real *own = &S[(drivers + 1) * d];
         if (row >= bias)
-            *own = f->bias_prior_sigma[row - bias] * f->bias_prior_sigma[row - bias];
+            *own = plr_bias_prior_variance(f, row - bias);
         else if (row >= PLR_POSE_DIM)
             *own = f->par.start_velocity_variance;
         else
@@ -71,6 +73,8 @@ void plr_filter_recover(plr_filter *f) {
         plr_filter_propagate_recovery(f);
     unpack(f, P);
     plr_consistency_enlarge(f, P);
+    if (plr_sensitivity_is_finite(f))
+        plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];
@@ -88,10 +92,10 @@ void plr_filter_recover(plr_filter *f) {
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real sigma = f->bias_prior_sigma[i], off = f->bias[i] - f->bias_prior[i];
-        if (!(off <= 4 * sigma && off >= -4 * sigma))
+        const plr_real prior = plr_bias_prior_variance(f, i), off = f->bias[i] - f->bias_prior[i];
+        if (!(off * off <= 16 * prior))
             f->bias[i] = f->bias_prior[i];
-        variance[i] = (double)sigma * (double)sigma;
+        variance[i] = (double)prior;
     }
     plr_filter_begin_bias(f, variance);
 }

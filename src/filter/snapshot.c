@@ -15,7 +15,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 3 };
+enum { STATE_VERSION = 4 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -63,12 +63,18 @@ static uint32_t elements(const plr_filter *f, unsigned landmarks) {
     return (uint32_t)plr_covariance_size(f, landmarks);
 }
 
+/* Of one column of the sensitivity. */
+static uint32_t rows(const plr_filter *f, unsigned landmarks) {
+    return (uint32_t)plr_covariance_row(f, landmarks);
+}
+
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
     if (plr_guard_check(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
            SIZE(time) + SIZE(pose) + SIZE(filter) + landmarks * SIZE(slot) +
-           elements(f, landmarks) * (uint32_t)sizeof(plr_real);
+           (elements(f, landmarks) + PLR_CALIBRATIONS * rows(f, landmarks)) *
+               (uint32_t)sizeof(plr_real);
 }
 
 /* What the state belongs to: build, settings, camera. */
@@ -136,6 +142,8 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
         PASS(&c, &f->slots[slot], slot);
     plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f),
                       elements(f, f->count));
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)f->S[k], rows(f, f->count));
     if (c.status == PLR_OK && !flush(&out))
         c.status = PLR_E_IO;
     return c.status;
@@ -176,7 +184,7 @@ static plr_status as_stored(const plr_codec *c) {
     return c->status == PLR_OK || c->status == PLR_E_IO ? c->status : PLR_E_CORRUPT;
 }
 
-/* Checks the covariance without storing it: finite numbers, variances not negative. */
+/* Checks covariance and sensitivity without storing them: finite numbers, variances not negative. */
 static plr_status check_covariance(plr_codec *c, unsigned dim) {
     for (unsigned i = 0; i < dim && c->status == PLR_OK; i++) {
         plr_real variance = 0;
@@ -185,6 +193,7 @@ static plr_status check_covariance(plr_codec *c, unsigned dim) {
         if (c->status == PLR_OK && !(variance >= 0))
             return PLR_E_CORRUPT;
     }
+    plr_codec_numbers(c, PLR_FIELD_REAL, NULL, PLR_CALIBRATIONS * dim);
     return as_stored(c);
 }
 
@@ -247,6 +256,8 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     if (!f)
         return check_covariance(c, plr_covariance_row(like, count.landmarks));
     plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
     return as_stored(c);
 }
 

@@ -165,6 +165,7 @@ static void begin(plr_filter *f, plr_time_ns t_ns, plr_real interval) {
     plr_inertial *s = &f->inertial;
     s->started = 1;
     s->started_ns = s->still_ns = t_ns;
+    f->bias_walked_s = 0; /* the biases begin with their prior's variances */
     s->usual_s = interval;
     memcpy(s->slow, f->either.alignment.mean, sizeof s->slow);
     memset(&f->either.alignment, 0, sizeof f->either.alignment); /* as after a restore */

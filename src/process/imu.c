@@ -380,9 +380,8 @@ static void walk(plr_filter *f, plr_real seconds) {
     (void)seconds;
 }
 
-static plr_real walked(const plr_filter *f, unsigned k) {
-    const plr_real seconds = (plr_real)((double)(f->t_ns - f->inertial.started_ns) * 1e-9);
-    return seconds * (k < 3 ? f->par.accel_walk : f->par.gyro_walk);
+static plr_real bias_walk(const plr_filter *f, unsigned k) {
+    return k < 3 ? f->par.accel_walk : f->par.gyro_walk;
 }
 
 static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
@@ -485,7 +484,7 @@ const plr_process plr_process_imu = {
     .hold = hold,
     .rest = rest,
     .walk = walk,
-    .walked = walked,
+    .bias_walk = bias_walk,
     .now = now,
     .bias_covariance = bias_covariance,
     .measure = measure,

@@ -42,8 +42,8 @@ typedef struct plr_process {
      * besides plr_covariance_carry_core. */
     void (*walk)(plr_filter *f, plr_real seconds);
 
-    /* The variance by which bias k may have walked away from its prior since the start. */
-    plr_real (*walked)(const plr_filter *f, unsigned k);
+    /* The variance that bias k gains in a second. */
+    plr_real (*bias_walk)(const plr_filter *f, unsigned k);
 
     /* The body's present twist (v, w) with its covariance, 6x6, which may be NULL. */
     void (*now)(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
@@ -71,6 +71,13 @@ static inline bool plr_process_has_started(const plr_filter *f) {
 
 static inline const plr_process *plr_process_of(const plr_filter *f) {
     return f->config.process == PLR_PROCESS_IMU ? &plr_process_imu : &plr_process_twist;
+}
+
+/* The variance of bias k about the mean of its prior, if nothing had been learnt of it: it has walked
+ * since. */
+static inline plr_real plr_bias_prior_variance(const plr_filter *f, unsigned k) {
+    const plr_real sigma = f->bias_prior_sigma[k], seconds = (plr_real)f->bias_walked_s;
+    return sigma * sigma + seconds * plr_process_of(f)->bias_walk(f, k);
 }
 
 #endif

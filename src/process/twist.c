@@ -26,10 +26,14 @@ static void lay_out(plr_filter *f) {
     f->layout.drivers = bias;
 }
 
+static plr_real bias_walk(const plr_filter *f, unsigned k) {
+    return k < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk;
+}
+
 static void walk(plr_filter *f, plr_real seconds) {
     plr_real variance[PLR_BIAS_DIM];
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-        variance[i] = seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
+        variance[i] = seconds * bias_walk(f, i);
     plr_covariance_add_variance(f, PLR_BLOCK_BIAS, variance);
 }
 
@@ -38,9 +42,8 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) 
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
-    for (int i = 0; i < PLR_BIAS_DIM; i++)
-        P_b[(PLR_BIAS_DIM + 1) * i] +=
-            f->motion.seconds * (i < 3 ? f->par.bias_velocity_walk : f->par.bias_gyro_walk);
+    for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+        P_b[(PLR_BIAS_DIM + 1) * i] += f->motion.seconds * bias_walk(f, i);
 }
 
 static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
@@ -99,13 +102,6 @@ static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
         held[i] = timing == PLR_TWIST_END     ? reading[i]
                   : timing == PLR_TWIST_START ? f->reading[i]
                                               : PLR_R(0.5) * (f->reading[i] + reading[i]);
-}
-
-/* The walk of twists stands for slow changes and is not counted. */
-static plr_real walked(const plr_filter *f, unsigned k) {
-    (void)f;
-    (void)k;
-    return 0;
 }
 
 static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
@@ -179,7 +175,7 @@ const plr_process plr_process_twist = {
     .hold = hold,
     .rest = rest,
     .walk = walk,
-    .walked = walked,
+    .bias_walk = bias_walk,
     .now = now,
     .bias_covariance = bias_covariance,
 };

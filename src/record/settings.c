@@ -82,6 +82,8 @@ static const plr_row rows[] = {
     {{48, "imu-arm", "m", "where the IMU is on the body: x, y, z", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m), STORE_AXES},
     {{49, "imu-arm-y", "m", "along the y axis alone", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m[1]), STORE_DOUBLE},
     {{50, "imu-arm-z", "m", "along the z axis alone", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m[2]), STORE_DOUBLE},
+    {{51, "focal-sigma", "", "by what share the focal length may be wrong; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(focal_sigma), STORE_DOUBLE},
+    {{52, "baseline-sigma", "", "the same of the baseline", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(baseline_sigma), STORE_DOUBLE},
 };
 /* clang-format on */
 

@@ -120,6 +120,21 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     return true;
 }
 
+void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
+                               plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]) {
+    const plr_camera *camera = &f->par.camera;
+    plr_view view;
+    plr_real along[3], z[3];
+    if (!plr_model_of(f)->look(f, slot, &view))
+        return;
+    along_the_ray(camera, along);
+    plr_stereo_project(z, camera, view.q);
+    H_s[PLR_FOCAL_LENGTH][0] = z[0] - camera->cx;
+    H_s[PLR_FOCAL_LENGTH][1] = z[1] - camera->cx;
+    H_s[PLR_FOCAL_LENGTH][2] = z[2] - camera->cy;
+    H_s[PLR_BASELINE][1] = -along[1] / view.q[2];
+}
+
 /* ---------------------------------------------------------------- during the search for the
  * motion */
 

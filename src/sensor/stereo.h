@@ -56,6 +56,11 @@ plr_real plr_stereo_max_bearing_variance(const plr_filter *f);
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m);
 
+/* H_s: how the three rows would change if the camera's focal length or baseline were longer by a
+ * share. Left as it is where the landmark is nearer than min-depth. */
+void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
+                               plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]);
+
 /* --- during the search for the motion: `body` alone --- */
 
 /* The prediction of an observation after a motion of the camera; q0 is the landmark before it. */

@@ -7,6 +7,7 @@
 #include "math/small.h"
 #include "state/blocks.h"
 #include "state/elements.h"
+#include "state/sensitivity.h"
 
 unsigned plr_covariance_row(const plr_filter *f, unsigned slot) {
     return plr_core_dim(f) + PLR_LANDMARK_DIM * slot;
@@ -27,6 +28,7 @@ unsigned plr_covariance_ld(const plr_filter *f) {
 
 void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own) {
     const unsigned row = plr_row_of(f, block), size = plr_block_size(f, block);
+    plr_sensitivity_clear(f, row, size);
     for (unsigned i = row; i < plr_core_dim(f); i++)
         for (unsigned j = 0; j <= i; j++) {
             const bool own_row = i < row + size, own_column = j >= row && j < row + size;
@@ -55,6 +57,7 @@ void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, 
 
 void plr_covariance_forget(plr_filter *f, plr_block_id block, const plr_real *variance) {
     const unsigned row = plr_row_of(f, block), n = plr_covariance_dim(f);
+    plr_sensitivity_clear(f, row, plr_block_size(f, block));
     for (unsigned i = row; i < row + plr_block_size(f, block); i++) {
         for (unsigned j = 0; j < n; j++)
             f->P[plr_packed_at(i, j)] = 0;
@@ -144,6 +147,7 @@ void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
                         PLR_POSE_DIM, own + 3 * i, 3);
     }
     plr_set_block(f, s, 3, s, 3, own);
+    plr_sensitivity_append(f, s, landmark);
 }
 
 void plr_covariance_remove(plr_filter *f, unsigned slot) {
@@ -151,6 +155,7 @@ void plr_covariance_remove(plr_filter *f, unsigned slot) {
     const unsigned from = plr_covariance_row(f, f->count - 1);
     if (to == from)
         return;
+    plr_sensitivity_remove(f, to, from);
     plr_real own[9];
     plr_get_block(f, from, 3, from, 3, own);
     for (unsigned i = 0; i < 3; i++)

@@ -7,6 +7,7 @@
 #include "state/blocks.h"
 #include "state/elements.h"
 #include "state/pose.h"
+#include "state/sensitivity.h"
 
 enum { POSE_ROW = 0 }; /* the pose comes first in every layout */
 
@@ -85,6 +86,7 @@ static void turn_pose(plr_filter *f, unsigned end, const plr_real A[PLR_POSE_SQU
     transpose6(At, A);
     for (unsigned i = PLR_POSE_DIM; i < end; i++)
         turn_pose_columns(f->P + plr_packed_row(i), At);
+    plr_sensitivity_turn_pose(f, A);
 }
 
 void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]) {
@@ -97,6 +99,7 @@ void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], 
     turn_pose(f, plr_core_dim(f), A, At);
     for (unsigned slot = 0; slot < f->count; slot++)
         transport_landmark(f, slot, At, F);
+    plr_sensitivity_turn_landmarks(f, F);
 }
 
 void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
@@ -161,17 +164,18 @@ static void carry_core_covariance(plr_filter *f, const plr_real V[PLR_VELOCITY_D
 }
 
 void plr_covariance_carry_core(plr_filter *f) {
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
-        carry_core_covariance(f, f->core_motion.V);
+    if (!plr_has_block(f, PLR_BLOCK_VELOCITY))
+        return;
+    carry_core_covariance(f, f->core_motion.V);
+    plr_sensitivity_carry_velocity(f, f->core_motion.V);
 }
 
-/* The same, and the rows of velocity and biases in Vt, their covariance with nu, which gains that
- * of their noise with the motion's. */
-static void carry_core(plr_filter *f, const plr_applied_motion *motion, plr_real *Vt, size_t ld) {
+/* The same but for S, and the rows of velocity and biases in Vt, their covariance with nu, which
+ * gains that of their noise with the motion's. */
+static void carry_core(plr_filter *f, const plr_applied_motion *motion,
+                       const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], plr_real *Vt, size_t ld) {
     const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
-    plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], X[PLR_POSE_DIM * PLR_REST_DIM];
-    memcpy(V, f->core_motion.V, sizeof V);
-    drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, V);
+    plr_real X[PLR_POSE_DIM * PLR_REST_DIM];
     carry_core_covariance(f, V);
     memcpy(X, f->core_motion.Q_nc, sizeof X);
     plr_motion_solve(motion->L, PLR_REST_DIM, X, PLR_REST_DIM);
@@ -193,23 +197,31 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
         noise->eta[k] = -motion->z[k];
         noise->z[k] = motion->z[k];
     }
+    memset(noise->eta_of_S, 0, sizeof noise->eta_of_S);
     noise->open = 1;
     if (f->layout.drivers == 0)
         return;
-    plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY], Kt[PLR_MOTION_BY];
+    const bool carries = plr_has_block(f, PLR_BLOCK_VELOCITY);
+    plr_real *Vt = f->work.Vt, K[PLR_MOTION_BY], Kt[PLR_MOTION_BY],
+             V[PLR_VELOCITY_DIM * PLR_DRIVERS];
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         memset(Vt + k * ld + n, 0, (ld - n) * sizeof *Vt);
     plr_motion_by_drivers(f, motion->L, K);
     drivers_after_motion(f, motion->E, PLR_POSE_DIM, K);
     plr_motion_transpose(K, Kt);
+    if (carries) {
+        memcpy(V, f->core_motion.V, sizeof V);
+        drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, V);
+    }
+    plr_sensitivity_move(f, K, carries ? V : NULL, noise->Wt, ld);
     for (unsigned i = 0; i < n; i++) {
         plr_real v[PLR_POSE_DIM];
         plr_covariance_motion_share(f, i, 1, Kt, v);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
             Vt[k * ld + i] = v[k];
     }
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
-        carry_core(f, motion, Vt, ld);
+    if (carries)
+        carry_core(f, motion, V, Vt, ld);
     for (unsigned i = 0; i < n; i++)
         for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
             const plr_real v = Vt[k * ld + i];
@@ -233,6 +245,7 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     plr_solve_upper_transposed(PLR_POSE_DIM, ld, noise->Lambda, Xt, ld);
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta, 1);
     plr_combine_rows(n, PLR_POSE_DIM, noise->eta, Xt, ld, f->work.dx);
+    plr_sensitivity_close_noise(f, Xt, ld);
     for (unsigned i = 0; i < PLR_POSE_DIM * ld; i++)
         minus[i] = -Xt[i];
     plr_packed_subtract(n, PLR_POSE_DIM, minus, Xt, ld, f->P);
@@ -273,6 +286,8 @@ void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         turned[i] += M[i];
     plr_set_block(f, POSE_ROW, PLR_POSE_DIM, POSE_ROW, PLR_POSE_DIM, turned);
+    plr_sensitivity_turn_pose(f, A);
+    plr_sensitivity_move_pose(f, B);
 
     /* the other rows begin with their pose columns, and the bias columns follow */
     plr_real At[PLR_POSE_SQUARE];

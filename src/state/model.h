@@ -24,6 +24,8 @@ typedef struct plr_new_landmark {
     bool uses_pose;                           /* false: J_pose is zero and not filled */
     plr_real J_pose[PLR_ROWS * PLR_POSE_DIM]; /* 3x6 */
     plr_real P[9];                            /* 3x3 */
+    plr_real by_calibration[PLR_CALIBRATIONS][PLR_LANDMARK_DIM]; /* its error by the camera's;
+                                                                    zeros if it is known */
 } plr_new_landmark;
 
 /* A landmark's position in the world, and its derivative by the state. */
@@ -52,7 +54,8 @@ struct plr_model {
 
     /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
      * S_q is passed and not the product: for a far point the variance along the ray is so large
-     * that rounding would destroy the variance across it. */
+     * that rounding would destroy the variance across it. If the baseline is longer by a
+     * share, q is farther along its ray by the same; if the focal length is, in its depth alone. */
     void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 

@@ -212,6 +212,10 @@ static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_
     plr_mat3_mul_nt(landmark->P, JS, JS);
     memcpy(landmark->x, q, 3 * sizeof *q);
     landmark->uses_pose = false;
+    memset(landmark->by_calibration, 0, sizeof landmark->by_calibration);
+    landmark->by_calibration[PLR_BASELINE][2] = -PLR_R(1) / chart.r; /* Jw q */
+    for (int i = 0; i < 3; i++)
+        landmark->by_calibration[PLR_FOCAL_LENGTH][i] = Jw[3 * i + 2] * q[2];
 }
 
 /* P = J P_W J^T, 3x3, in double: the bearing variance of a far point is smaller than its range
@@ -252,6 +256,7 @@ static bool body_adopt(const plr_filter *f, const plr_landmark *known, plr_new_l
     plr_polar_at(&chart, landmark->x);
     chart_by_body_twist(f, &chart, landmark->J_pose);
     landmark->uses_pose = true;
+    memset(landmark->by_calibration, 0, sizeof landmark->by_calibration);
     plr_polar_from_point(Jw, &chart);
     plr_mat3_mul_nt(R_CW, f->par.camera.R_CB, R_WB);
     plr_mat3_mul(J_W, Jw, R_CW);

@@ -76,6 +76,9 @@ static void world_initialise(const plr_filter *f, const plr_real q[3], const plr
     plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
     plr_mat3_mul(RS, R_WC, S_q);
     plr_mat3_mul_nt(landmark->P, RS, RS);
+    plr_mat3_vec(landmark->by_calibration[PLR_BASELINE], R_WC, q);
+    for (int i = 0; i < 3; i++)
+        landmark->by_calibration[PLR_FOCAL_LENGTH][i] = R_WC[3 * i + 2] * q[2];
 }
 
 static bool world_adopt(const plr_filter *f, const plr_landmark *known,
@@ -86,6 +89,7 @@ static bool world_adopt(const plr_filter *f, const plr_landmark *known,
     for (int i = 0; i < 9; i++)
         landmark->P[i] = (plr_real)known->P_W_m2[i];
     landmark->uses_pose = false;
+    memset(landmark->by_calibration, 0, sizeof landmark->by_calibration);
     return true;
 }
 

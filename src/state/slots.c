@@ -6,6 +6,7 @@
 #include "math/finite.h"
 #include "state/covariance.h"
 #include "state/model.h"
+#include "state/sensitivity.h"
 
 uint16_t plr_slots_find(const plr_filter *f, uint32_t id) {
     for (unsigned slot = 0; slot < f->count; slot++)
@@ -72,6 +73,7 @@ bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark
     plr_real P[9];
     plr_model_of(f)->in_world(f, s, &point);
     plr_covariance_of_rows(f, &point.J, P);
+    plr_sensitivity_add_to_rows(f, &point.J, P);
     landmark->id = s->id;
     landmark->times_seen = s->times_seen;
     landmark->times_gated = s->times_gated;

@@ -42,6 +42,9 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     each_axis(config.velocity_sigma, s->velocity_mps);
     each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
+    if (s->mishap != BASELINE &&
+        s->mishap != FOCAL) /* the camera is exact, and P alone is judged */
+        config.focal_sigma = config.baseline_sigma = 0;
     if (s->slots)
         config.slots = (uint16_t)s->slots;
     world_calibration(s, &calibration);

@@ -17,7 +17,7 @@
 enum {
     REAL = sizeof(plr_real),
     /* Where fields stand (docs/STATE-FORMAT.md). */
-    COUNT_AT = 13 + 9 * 50 + 17 * REAL,
+    COUNT_AT = 13 + 9 * 52 + 17 * REAL,
     POSE_AT = COUNT_AT + 4 + 16 + REAL + 2,
     POSITION_AT = POSE_AT + 9 * REAL,
     REST_AT = POSITION_AT + 24,
@@ -41,7 +41,7 @@ void tearDown(void) {
 
 static uint32_t slots_at(void) {
     const unsigned n = plr_filter_landmark_count(&rig.filter), rows = 12 + 3 * n;
-    return state.length - rows * (rows + 1) / 2 * REAL - n * SLOT_SIZE;
+    return state.length - (rows * (rows + 1) / 2 + 2 * rows) * REAL - n * SLOT_SIZE;
 }
 
 static bool is_finite(const double *x, unsigned n) {
@@ -115,7 +115,7 @@ static void test_no_question_is_answered_with_a_number_that_is_not_finite(void) 
     TEST_ASSERT_GREATER_THAN_UINT(4, plr_filter_landmark_count(&rig.filter));
     TEST_ASSERT_GREATER_THAN_UINT(2, refused_from(first, first + 3 * REAL, 1));
     (void)refused_from(first, first + SLOT_SIZE, 1);
-    (void)refused_from(state.length - 10 * REAL, state.length, 1); /* of P */
+    (void)refused_from(state.length - 10 * REAL, state.length, 1); /* of S, the end */
     (void)refused_from(first, state.length, 211);
 }
 

@@ -18,6 +18,7 @@ void imu_rig_set_up(void) {
     plr_config *config = &imu_rig.config;
     imu_flight_options_default(options);
     plr_config_default(config);
+    config->focal_sigma = config->baseline_sigma = 0; /* it is exact */
     config->process = PLR_PROCESS_IMU;
     config->pixel_sigma_px = options->pixel_sigma_px;
     config->gyro_noise = options->gyro_noise;

@@ -19,6 +19,7 @@ void rig_set_up(void) {
     scene_options_default(&rig.options);
     scene_calibration(&rig.calibration);
     plr_config_default(&rig.config);
+    rig.config.focal_sigma = rig.config.baseline_sigma = 0; /* it is exact */
     memset(&rig.map, 0, sizeof rig.map);
     rig_begin();
 }

@@ -53,7 +53,8 @@ bool state_bytes_same(const state_bytes *a, const state_bytes *b) {
 
 bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
     static plr_filter copy;
-    const size_t P = plr_packed_row(plr_covariance_dim(a));
+    const unsigned n = plr_covariance_dim(a);
+    const size_t P = plr_packed_row(n);
     if (a->count != b->count)
         return false;
     memcpy(&copy, a, sizeof copy);
@@ -62,5 +63,7 @@ bool state_bytes_same_filter(const plr_filter *a, const plr_filter *b) {
     memcpy(copy.slots + a->count, b->slots + a->count,
            (PLR_MAX_LANDMARKS - a->count) * sizeof *copy.slots);
     memcpy(copy.P + P, b->P + P, (PLR_PACKED_SIZE - P) * sizeof *copy.P);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        memcpy(copy.S[k] + n, b->S[k] + n, (PLR_MAX_LD - n) * sizeof *copy.S[k]);
     return memcmp(&copy, b, sizeof copy) == 0;
 }

@@ -254,6 +254,16 @@ static void test_a_bias_beyond_its_prior_is_said(void) {
         }
         filter.bias[k] = PLR_R(0.2);
     }
+    filter.bias[1] = PLR_R(0.2) + PLR_R(0.0391); /* no wonder after three hours of its walk */
+    filter.par.bias_velocity_walk = PLR_R(1e-8);
+    filter.bias_walked_s = 10000;
+    frame(10, 1);
+    judge(0, PLR_HEALTH_GOOD);
+    filter.bias[1] = PLR_R(0.2) + PLR_R(0.056);
+    frame(10, 1);
+    judge(PLR_REASON_BIAS_OFF_PRIOR, PLR_HEALTH_DEGRADED);
+    filter.bias[1] = PLR_R(0.2);
+    filter.bias_walked_s = 0;
     filter.bias_prior_sigma[2] = 0; /* no prior, no limit */
     filter.bias[2] = 5;
     frame(10, 1);

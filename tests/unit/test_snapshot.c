@@ -200,6 +200,7 @@ static void test_every_field_is_carried(void) {
     fill_reals(&chance, driven.bias, PLR_BIAS_DIM);
     fill_reals(&chance, driven.bias_prior, PLR_BIAS_DIM);
     fill_reals(&chance, driven.bias_prior_sigma, PLR_BIAS_DIM);
+    driven.bias_walked_s = 12345.678;
     fill_reals(&chance, driven.recovery_P, 21);
     fill_consistency(&chance, &driven.consistency);
     driven.health = PLR_HEALTH_LOST;
@@ -277,9 +278,9 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 /* docs/STATE-FORMAT.md, by its own figures. */
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
-    const uint32_t count_at = 13 + 9 * 50 + 17 * real;
+    const uint32_t count_at = 13 + 9 * 52 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 143 * real;
-    const uint32_t health_at = frames_at + 4 + 16 + 10 + 6 + 4 + 329 * real;
+    const uint32_t health_at = frames_at + 4 + 16 + 10 + 6 + 4 + 8 + 329 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
     const uint32_t slots_at = totals_at + 68 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
@@ -288,9 +289,9 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t dim = 12 + 3 * driven.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
-    TEST_ASSERT_EQUAL_UINT32(3, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(4, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
-    TEST_ASSERT_EQUAL_UINT(50, state.bytes[12]);
+    TEST_ASSERT_EQUAL_UINT(52, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.frame_number, number_at(frames_at, 4));
@@ -302,9 +303,9 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(708 + 489 * real, slots_at);
-    TEST_ASSERT_EQUAL_UINT32(slots_at + driven.count * slot + dim * (dim + 1) / 2 * real,
-                             state.length);
+    TEST_ASSERT_EQUAL_UINT32(734 + 489 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(
+        slots_at + driven.count * slot + (dim * (dim + 1) / 2 + 2 * dim) * real, state.length);
 }
 
 static void test_the_size_is_known_beforehand(void) {

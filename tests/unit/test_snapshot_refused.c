@@ -14,12 +14,13 @@ enum {
     /* Where fields stand (docs/STATE-FORMAT.md). */
     FINGERPRINT_AT = 8,
     SETTINGS_AT = 13,
-    CAMERA_AT = SETTINGS_AT + 9 * 50,
+    CAMERA_AT = SETTINGS_AT + 9 * 52,
     COUNT_AT = CAMERA_AT + 17 * REAL,
     INTERVAL_AT = COUNT_AT + 4 + 16,
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
     FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 143 * REAL,
-    HEALTH_AT = FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 329 * REAL, /* settling_frames stands before it */
+    HEALTH_AT =
+        FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 8 + 329 * REAL, /* settling_frames stands before it */
     SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
     SLOT_SIZE = 8 * REAL + 35,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,

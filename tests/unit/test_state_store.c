@@ -129,7 +129,7 @@ static void test_the_erased_value_does_not_matter(void) {
 }
 
 static void test_what_fills_the_last_units_is_zero(void) {
-    start_store(2 * 6400, 6400, 100);
+    start_store(2 * 6800, 6800, 100);
     saves(0);
     for (uint32_t at = PLR_STORE_HEADER; at < 100; at++)
         TEST_ASSERT_EQUAL_UINT8(0, flash.bytes[at]);

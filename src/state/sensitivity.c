@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+#include "state/sensitivity.h"
+
+#include <string.h>
+
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "state/blocks.h"
+#include "state/covariance.h"
+
+/* ---------------------------------------------------------------- as P changes */
+
+void plr_sensitivity_clear(plr_filter *f, unsigned row, unsigned rows) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        memset(f->S[k] + row, 0, rows * sizeof *f->S[k]);
+}
+
+void plr_sensitivity_append(plr_filter *f, unsigned row, const plr_new_landmark *landmark) {
+    const unsigned pose = plr_row_of(f, PLR_BLOCK_POSE);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real *S = f->S[k];
+        for (unsigned i = 0; i < PLR_LANDMARK_DIM; i++) {
+            S[row + i] = landmark->by_calibration[k][i];
+            for (unsigned c = 0; landmark->uses_pose && c < PLR_POSE_DIM; c++)
+                S[row + i] =
+                    PLR_FMA(landmark->J_pose[PLR_POSE_DIM * i + c], S[pose + c], S[row + i]);
+        }
+    }
+}
+
+void plr_sensitivity_remove(plr_filter *f, unsigned to, unsigned from) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        memcpy(f->S[k] + to, f->S[k] + from, PLR_LANDMARK_DIM * sizeof *f->S[k]);
+}
+
+void plr_sensitivity_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real *S_xi = f->S[k] + plr_row_of(f, PLR_BLOCK_POSE), turned[PLR_POSE_DIM];
+        plr_mat6_vec(turned, A, S_xi);
+        memcpy(S_xi, turned, sizeof turned);
+    }
+}
+
+void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        if (!plr_considers(f, k))
+            continue;
+        plr_real *S = f->S[k] + plr_covariance_row(f, 0), turned[PLR_LANDMARK_DIM];
+        for (unsigned slot = 0; slot < f->count; slot++, S += PLR_LANDMARK_DIM) {
+            plr_mat3_vec(turned, F + 9 * slot, S);
+            memcpy(S, turned, sizeof turned);
+        }
+    }
+}
+
+/* out = X S_d, rows x drivers, PLR_DRIVERS between the rows of X. */
+static void by_drivers(const plr_filter *f, unsigned parameter, unsigned rows, const plr_real *X,
+                       plr_real *out) {
+    const plr_real *S_d = f->S[parameter] + f->layout.driver;
+    for (unsigned r = 0; r < rows; r++, X += PLR_DRIVERS) {
+        out[r] = 0;
+        for (unsigned d = 0; d < f->layout.drivers; d++)
+            out[r] = PLR_FMA(X[d], S_d[d], out[r]);
+    }
+}
+
+static void set_velocity(plr_filter *f, unsigned parameter, const plr_real v[PLR_VELOCITY_DIM]) {
+    memcpy(f->S[parameter] + plr_row_of(f, PLR_BLOCK_VELOCITY), v, PLR_VELOCITY_DIM * sizeof *v);
+}
+
+void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real v[PLR_VELOCITY_DIM];
+        by_drivers(f, k, PLR_VELOCITY_DIM, V, v);
+        set_velocity(f, k, v);
+    }
+}
+
+void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const plr_real *V,
+                          const plr_real *Wt, size_t ld) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real nu[PLR_POSE_DIM], v[PLR_VELOCITY_DIM];
+        if (!plr_considers(f, k))
+            continue;
+        by_drivers(f, k, PLR_POSE_DIM, K, nu);
+        by_drivers(f, k, V ? PLR_VELOCITY_DIM : 0, V, v);
+        plr_sensitivity_combine(f, k, PLR_POSE_DIM, nu, Wt, ld);
+        if (V)
+            set_velocity(f, k, v);
+    }
+}
+
+void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld) {
+    plr_noise *noise = &f->work.noise;
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        if (!plr_considers(f, k))
+            continue;
+        plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta_of_S[k], 1);
+        plr_sensitivity_combine(f, k, PLR_POSE_DIM, noise->eta_of_S[k], Xt, ld);
+    }
+}
+
+void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real *S_xi = f->S[k] + plr_row_of(f, PLR_BLOCK_POSE), n[PLR_POSE_DIM];
+        by_drivers(f, k, PLR_POSE_DIM, B, n);
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            S_xi[i] += n[i];
+    }
+}
+
+void plr_sensitivity_combine(plr_filter *f, unsigned parameter, unsigned depth, const plr_real *a,
+                             const plr_real *X, size_t ld) {
+    plr_combine_rows(plr_covariance_dim(f), depth, a, X, ld, f->S[parameter]);
+}
+
+/* ---------------------------------------------------------------- what is told */
+
+/* C (n x n) += variance s s^T */
+static void add_outer(unsigned n, plr_real variance, const plr_real *s, plr_real *C) {
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j < n; j++)
+            C[n * i + j] = PLR_FMA(variance * s[i], s[j], C[n * i + j]);
+}
+
+void plr_sensitivity_add_to(const plr_filter *f, unsigned row, unsigned rows, plr_real *C) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        if (plr_considers(f, k))
+            add_outer(rows, f->par.calibration_variance[k], f->S[k] + row, C);
+}
+
+void plr_sensitivity_add_to_pose(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
+    const plr_motion *m = &f->motion;
+    plr_real A[PLR_POSE_SQUARE], R[9];
+    plr_se3_rotation(R, m->E);
+    plr_se3_adjoint_inverse(A, R, m->p);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real turned[PLR_POSE_DIM], n[PLR_POSE_DIM];
+        if (!plr_considers(f, k))
+            continue;
+        plr_mat6_vec(turned, A, f->S[k] + plr_row_of(f, PLR_BLOCK_POSE));
+        by_drivers(f, k, PLR_POSE_DIM, m->B, n);
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            n[i] += turned[i];
+        add_outer(PLR_POSE_DIM, f->par.calibration_variance[k], n, P_xi);
+    }
+}
+
+void plr_sensitivity_add_to_velocity(const plr_filter *f, plr_real P_u[PLR_POSE_SQUARE]) {
+    const unsigned bias = plr_row_of(f, PLR_BLOCK_BIAS);
+    if (!plr_has_block(f, PLR_BLOCK_BIAS))
+        return;
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real u[PLR_POSE_DIM];
+        for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+            u[i] = -f->S[k][bias + i];            /* reading less bias */
+        if (plr_has_block(f, PLR_BLOCK_VELOCITY)) /* after the motion that is pending */
+            by_drivers(f, k, PLR_VELOCITY_DIM, f->core_motion.V, u);
+        add_outer(PLR_POSE_DIM, f->par.calibration_variance[k], u, P_u);
+    }
+}
+
+void plr_sensitivity_add_to_rows(const plr_filter *f, const plr_rows *J, plr_real C[9]) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_real s[PLR_ROWS];
+        if (!plr_considers(f, k))
+            continue;
+        plr_rows_apply(J, f->S[k], s);
+        add_outer(PLR_ROWS, f->par.calibration_variance[k], s, C);
+    }
+}
+
+bool plr_sensitivity_is_finite(const plr_filter *f) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        for (unsigned i = 0; i < plr_core_dim(f); i++)
+            if (!plr_is_finite(f->S[k][i]))
+                return false;
+    return true;
+}

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+/*
+ * What errors of the camera's calibration do to the state.
+ *
+ * The focal length and the baseline of every real camera are off by a part of a percent. No frame
+ * shows it (where speed and turn are constant it looks like a bias of the twists), and it is the
+ * same in all frames, so that it does not average out as noise does. The state's error is therefore
+ * x + S s: x as P says, and S s with s ~ N(0, diag(par.calibration_variance)), the relative errors
+ * of the calibration. S has a column for each and the rows of the state. It is carried along beside
+ * P through motions and corrections, whose gains take no notice of it, and what is told of
+ * covariances contains S diag(...) S^T: a consider covariance analysis (Tapley, Schutz and Born,
+ * Statistical Orbit Determination, chapter 6; docs/MATH.md 20).
+ *
+ * A parameter whose sigma is zero costs nothing.
+ */
+#ifndef PLR_STATE_SENSITIVITY_H
+#define PLR_STATE_SENSITIVITY_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "pelorus/state.h"
+#include "state/model.h"
+
+static inline bool plr_considers(const plr_filter *f, unsigned parameter) {
+    return f->par.calibration_variance[parameter] > 0;
+}
+
+/* ---------------------------------------------------------------- as P changes */
+
+/* The error of these rows does not depend on the calibration. */
+void plr_sensitivity_clear(plr_filter *f, unsigned row, unsigned rows);
+
+/* A landmark's rows, behind all others: it has been made by the camera, or is known. */
+void plr_sensitivity_append(plr_filter *f, unsigned row, const plr_new_landmark *landmark);
+
+/* Landmark rows `from` become rows `to`. */
+void plr_sensitivity_remove(plr_filter *f, unsigned to, unsigned from);
+
+/* S_xi <- A S_xi, 6x6. */
+void plr_sensitivity_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]);
+
+/* The rows of each landmark <- F (3x3, one after the other) times them. */
+void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F);
+
+/* The rows of the velocity <- V S_d, of the drivers d. */
+void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V);
+
+/* S += W K S_d: the drivers d move the state by n = L K d, and Wt (6 x dim, ld between rows) is what
+ * a motion L nu does to it. The velocity's rows, if there are any, <- V S_d. */
+void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const plr_real *V,
+                          const plr_real *Wt, size_t ld);
+
+/* S += X U^-T eta: the information of the observations about the motion's noise, Lambda = U^T U, has
+ * been factorised, and Xt is U^-T W^T. */
+void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld);
+
+/* S_xi += B S_d, where the drivers move the pose alone. */
+void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]);
+
+/* S_k += sum over r of a_r X_r: X is depth x dim, ld between rows. */
+void plr_sensitivity_combine(plr_filter *f, unsigned parameter, unsigned depth, const plr_real *a,
+                             const plr_real *X, size_t ld);
+
+/* ---------------------------------------------------------------- what is told */
+
+/* C (rows x rows) += S diag(calibration_variance) S^T of `rows` rows from `row` on; at most six. */
+void plr_sensitivity_add_to(const plr_filter *f, unsigned row, unsigned rows, plr_real *C);
+
+/* The same of the pose after the motion that has not been applied yet. */
+void plr_sensitivity_add_to_pose(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
+
+/* The same of the body's velocity (v, w). */
+void plr_sensitivity_add_to_velocity(const plr_filter *f, plr_real P_u[PLR_POSE_SQUARE]);
+
+/* The same of a linear function of the state: C = J P J^T (3x3) gains J S diag(...) S^T J^T. */
+void plr_sensitivity_add_to_rows(const plr_filter *f, const plr_rows *J, plr_real C[9]);
+
+/* False after a correction that went wrong. */
+bool plr_sensitivity_is_finite(const plr_filter *f);
+
+#endif
