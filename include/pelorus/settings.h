@@ -110,6 +110,23 @@ typedef struct plr_config {
      * (docs/NUMERICS.md 11). */
     uint16_t slots;
 
+    /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
+     * What moves the state. With IMU velocity is estimated, and the biases are those of
+     * accelerometer and gyro; imu-turn and imu-arm say where it is on the body. */
+    uint8_t process;
+
+    /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO.
+     * After a start in motion position and yaw are misled by some 0.3 m and 2 degrees, and health is
+     * DEGRADED for two seconds (PLR_REASON_POSE_MAY_BE_WRONG). Then the world is defined anew: by the
+     * position and yaw that are estimated, which from there on count as known to start-sigma. A pose
+     * that was set with a covariance, a measured position and a known landmark prevent this, because
+     * they belong to the world as it was given: there the covariance is widened by as much. */
+    uint8_t imu_start;
+
+    /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.
+     * START or END only for an IMU that sends means over an interval instead of samples. */
+    uint8_t imu_timing;
+
     /* Setting pixel-sigma [px]: 1e-3 to 1e3, default 2.
      * Standard deviation of one pixel coordinate. Measure it: the scatter of tracked points about
      * where they should be, usually 0.5 to 5. If health says NIS_HIGH it is too small, NIS_LOW too
@@ -212,23 +229,6 @@ typedef struct plr_config {
      * with this sigma. The pixels cannot tell a slower motion from none: choose about pixel-sigma
      * times the usual depth over the focal length, per second (2 px, 5 m, 500 px: 0.02 m/s). */
     double standstill_sigma_mps;
-
-    /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
-     * What moves the state. With IMU velocity is estimated, and the biases are those of
-     * accelerometer and gyro; imu-turn and imu-arm say where it is on the body. */
-    uint8_t process;
-
-    /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO.
-     * After a start in motion position and yaw are misled by some 0.3 m and 2 degrees, and health is
-     * DEGRADED for two seconds (PLR_REASON_POSE_MAY_BE_WRONG). Then the world is defined anew: by the
-     * position and yaw that are estimated, which from there on count as known to start-sigma. A pose
-     * that was set with a covariance, a measured position and a known landmark prevent this, because
-     * they belong to the world as it was given: there the covariance is widened by as much. */
-    uint8_t imu_start;
-
-    /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.
-     * START or END only for an IMU that sends means over an interval instead of samples. */
-    uint8_t imu_timing;
 
     /* Setting imu-turn [rad]: -3.2 to 3.2, default 0.
      * Three numbers: the rotation vector that turns the IMU's axes into the body's. 3.1416,0,0 for

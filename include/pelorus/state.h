@@ -273,7 +273,6 @@ typedef struct plr_workspace {
      * The kernels read a little further than they use, hence the margins. */
     plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
     plr_real dx[PLR_MAX_LD];
-    plr_real diagonal[PLR_MAX_LD];          /* diagonal of P after the block under test */
     plr_noise noise;                        /* of the motion that this frame applies */
     plr_kept_measurements kept;             /* those of `used`, by slot */
     plr_real gain[PLR_MAX_LANDMARKS];       /* by slot_of[k]: plr_verdict.gain in gate.h; negative:
@@ -335,14 +334,14 @@ typedef struct plr_filter {
     plr_core_motion
         core_motion; /* with an IMU, and then part of the "small" checksum, as the next */
     plr_inertial inertial;
-    uint32_t frame_number; /* from here on part of the "small" checksum */
-    uint8_t health;        /* plr_health of the last frame, and why */
-    uint32_t reasons;
+    uint32_t frame_number;                  /* from here on part of the "small" checksum */
+    uint32_t reasons;                       /* of health, at the last frame */
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */
     uint32_t refused_before;                /* readings refused until the last frame */
-    uint16_t frames_without_use, frames_mostly_gated;
     uint32_t matches_since_gated;
+    uint16_t frames_without_use, frames_mostly_gated;
+    uint8_t health; /* plr_health of the last frame */
     plr_totals totals;
     plr_guard guard;
 } plr_filter;

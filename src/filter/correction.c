@@ -18,6 +18,7 @@
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
+enum { IN_ESTIMATE = PLR_BASELINE }; /* the column of S that fills the second */
 
 /* All measurements of a correction, in their order. After those of its arguments come two of the
  * biases. */
@@ -111,7 +112,8 @@ static void correct_sensitivity(plr_filter *f, plr_batch *batch) {
         if (!plr_considers(f, k))
             continue;
         plr_solve_upper_transposed(batch->rows, 1, batch->S, y, 1);
-        plr_sensitivity_combine(f, k, batch->rows, y, f->work.Vt, batch->ld);
+        if (!(noise->open && k == IN_ESTIMATE))
+            plr_sensitivity_combine(f, k, batch->rows, y, f->work.Vt, batch->ld);
         for (unsigned c = 0; noise->open && c < PLR_POSE_DIM; c++)
             for (unsigned r = 0; r < batch->rows; r++)
                 eta[c] = PLR_FMA(batch->E[WIDE * r + c], y[r], eta[c]);
@@ -156,17 +158,19 @@ static void add_noise_information(plr_noise *noise, const plr_batch *batch) {
     }
 }
 
-/* W -= V E and dx += V y, computed as seven rows of one product, [E, -y]. */
+/* W -= V E, dx += V y and the same of a column of S, computed as eight rows of one product, [E, -y,
+ * -y of S]. */
 static void update_estimate(plr_filter *f, plr_batch *batch) {
     plr_workspace *w = &f->work;
-    plr_real *Wt = w->noise.Wt, *beyond = w->diagonal;
+    plr_real *Wt = w->noise.Wt;
+    const bool considers = plr_considers(f, IN_ESTIMATE);
     const size_t ld = batch->ld;
     for (unsigned r = 0; r < batch->rows; r++) {
         batch->E[WIDE * r + 6] = -batch->y[r];
-        batch->E[WIDE * r + 7] = 0;
+        batch->E[WIDE * r + 7] = considers ? -batch->y_of_S[IN_ESTIMATE][r] : PLR_R(0);
     }
     plr_real *const first[4] = {Wt, Wt + ld, Wt + 2 * ld, Wt + 3 * ld};
-    plr_real *const last[4] = {Wt + 4 * ld, Wt + 5 * ld, w->dx, beyond};
+    plr_real *const last[4] = {Wt + 4 * ld, Wt + 5 * ld, w->dx, f->S[IN_ESTIMATE]};
     plr_subtract_four_rows(batch->ld, batch->rows, batch->E, WIDE, w->Vt, ld, first);
     plr_subtract_four_rows(batch->ld, batch->rows, batch->E + 4, WIDE, w->Vt, ld, last);
 }

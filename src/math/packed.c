@@ -49,23 +49,23 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
     }
 }
 
-void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *restrict Ut,
-                                    size_t ld, const plr_real *restrict P, plr_real *restrict d) {
-    PLR_ASSERT(ld >= n);
-    for (unsigned j = 0; j < n; j += COLUMNS) {
-        const unsigned width = n - j < COLUMNS ? n - j : COLUMNS;
-        plr_real sum[COLUMNS] = {0};
-        for (unsigned c = 0; c < width; c++)
-            sum[c] = P[plr_packed_row(j + c) + j + c];
-        const plr_real *restrict row = Ut + j;
-        for (unsigned k = 0; k < depth; k++) {
-            for (int c = 0; c < COLUMNS; c++)
-                sum[c] = PLR_FMA(-row[c], row[c], sum[c]);
-            row += ld;
-        }
-        for (unsigned c = 0; c < width; c++)
-            d[j + c] = sum[c];
+unsigned plr_packed_subtracted_diagonal(unsigned first, unsigned n, unsigned depth,
+                                        const plr_real *restrict Ut, size_t ld,
+                                        const plr_real *restrict P,
+                                        plr_real d[PLR_TILE_COLUMNS]) {
+    PLR_ASSERT(ld >= n && first % COLUMNS == 0);
+    const unsigned width = n - first < COLUMNS ? n - first : COLUMNS;
+    plr_real sum[COLUMNS] = {0};
+    for (unsigned c = 0; c < width; c++)
+        sum[c] = P[plr_packed_row(first + c) + first + c];
+    const plr_real *restrict row = Ut + first;
+    for (unsigned k = 0; k < depth; k++) {
+        for (int c = 0; c < COLUMNS; c++)
+            sum[c] = PLR_FMA(-row[c], row[c], sum[c]);
+        row += ld;
     }
+    memcpy(d, sum, sizeof sum);
+    return width;
 }
 
 void plr_packed_subtract_plain(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,

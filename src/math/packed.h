@@ -27,10 +27,12 @@ static inline size_t plr_packed_at(size_t i, size_t j) {
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P);
 
-/* d[i] = P_ii - sum_k Ut[k][i]^2 for i = 0 .. n-1: to the bit the diagonal that plr_packed_subtract
- * with W = U would leave. d has n elements. Reads as far beyond the end of U^T as that. */
-void plr_packed_subtracted_diagonal(unsigned n, unsigned depth, const plr_real *Ut, size_t ld,
-                                    const plr_real *P, plr_real *d);
+/* d[i] = P_ii - sum_k Ut[k][i]^2 of the next rows i = first .. n-1, at most PLR_TILE_COLUMNS of them:
+ * to the bit the diagonal that plr_packed_subtract with W = U would leave. Returns how many they are.
+ * `first` is a multiple of PLR_TILE_COLUMNS. Reads as far beyond the end of U^T as that. */
+unsigned plr_packed_subtracted_diagonal(unsigned first, unsigned n, unsigned depth,
+                                        const plr_real *Ut, size_t ld, const plr_real *P,
+                                        plr_real d[PLR_TILE_COLUMNS]);
 
 /* plr_packed_subtract without tiles, element by element: slower, the same bits. */
 void plr_packed_subtract_plain(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,

@@ -105,13 +105,16 @@ void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *ro
 
 bool plr_covariance_subtract(plr_filter *f, unsigned depth) {
     const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
-    plr_real *after = f->work.diagonal;
-    plr_packed_subtracted_diagonal(n, depth, f->work.Vt, ld, f->P, after);
-    for (unsigned i = 0; i < n; i++) {
-        const plr_real before = f->P[plr_packed_row(i) + i];
-        const bool stays_zero = before <= 0 && before >= 0 && after[i] <= 0 && after[i] >= 0;
-        if (!(after[i] > 0) && !stays_zero)
-            return false;
+    plr_real after[PLR_TILE_COLUMNS];
+    for (unsigned i = 0; i < n;) {
+        const unsigned end =
+            i + plr_packed_subtracted_diagonal(i, n, depth, f->work.Vt, ld, f->P, after);
+        for (const plr_real *variance = after; i < end; i++, variance++) {
+            const plr_real before = f->P[plr_packed_row(i) + i];
+            const bool stays_zero = before <= 0 && before >= 0 && *variance <= 0 && *variance >= 0;
+            if (!(*variance > 0) && !stays_zero)
+                return false;
+        }
     }
     plr_packed_subtract(n, depth, f->work.Vt, f->work.Vt, ld, f->P);
     return true;

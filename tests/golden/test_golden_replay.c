@@ -91,17 +91,25 @@ static uint32_t crc_of_bias(void) {
                      sizeof P_u);
 }
 
+static uint32_t crc_of_sensitivity(void) {
+    const unsigned n = plr_covariance_dim(&filter);
+    uint32_t sum = 0;
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        sum = plr_crc32(sum, (const uint8_t *)filter.S[k], n * sizeof *filter.S[k]);
+    return sum;
+}
+
 static void describe(char line[LINE], const plr_report *r) {
     plr_real P_xi[36];
     const unsigned n = plr_covariance_dim(&filter);
     plr_covariance_get(&filter, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P_xi);
     snprintf(line, LINE,
-             "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x "
+             "t %.9f p %.17g %.17g %.17g R %08x P_xi %08x bias %08x landmarks %08x P %08x S %08x "
              "used %u gated %u new %u evicted %u active %u status %d",
              (double)r->t_ns * 1e-9, filter.p_WB[0], filter.p_WB[1], filter.p_WB[2],
              crc(filter.R_WB, sizeof filter.R_WB), crc(P_xi, sizeof P_xi), crc_of_bias(),
-             crc_of_landmarks(), crc(filter.P, n * (n + 1) / 2 * sizeof *filter.P), r->used,
-             r->gated, r->created, r->evicted, r->active, r->status);
+             crc_of_landmarks(), crc(filter.P, n * (n + 1) / 2 * sizeof *filter.P),
+             crc_of_sensitivity(), r->used, r->gated, r->created, r->evicted, r->active, r->status);
 }
 
 /* Says which words of two lines differ, each behind the name that stands before it. */

@@ -109,10 +109,12 @@ static void test_foretold_diagonal_has_the_bits_of_the_subtraction(void) {
         const unsigned depth = 1 + n % DEEPEST;
         const size_t ld = n + rng_below(&r, 6);
         plr_real *Ut = operand(&r, depth, n, ld);
-        plr_real P[MOST * (MOST + 1) / 2 + FRAME], foretold[MOST], diagonal[MOST];
+        plr_real P[MOST * (MOST + 1) / 2 + FRAME], foretold[MOST + PLR_TILE_COLUMNS],
+            diagonal[MOST];
         for (size_t i = 0; i < plr_packed_row(n); i++)
             P[i] = (plr_real)rng_normal(&r);
-        plr_packed_subtracted_diagonal(n, depth, Ut, ld, P, foretold);
+        for (unsigned i = 0; i < n;)
+            i += plr_packed_subtracted_diagonal(i, n, depth, Ut, ld, P, foretold + i);
         plr_packed_subtract(n, depth, Ut, Ut, ld, P);
         for (unsigned i = 0; i < n; i++)
             diagonal[i] = P[plr_packed_at(i, i)];
