@@ -51,8 +51,7 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
 
 unsigned plr_packed_subtracted_diagonal(unsigned first, unsigned n, unsigned depth,
                                         const plr_real *restrict Ut, size_t ld,
-                                        const plr_real *restrict P,
-                                        plr_real d[PLR_TILE_COLUMNS]) {
+                                        const plr_real *restrict P, plr_real d[PLR_TILE_COLUMNS]) {
     PLR_ASSERT(ld >= n && first % COLUMNS == 0);
     const unsigned width = n - first < COLUMNS ? n - first : COLUMNS;
     plr_real sum[COLUMNS] = {0};

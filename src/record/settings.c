@@ -211,8 +211,9 @@ void plr_config_course(plr_config *config) {
         config->gyro_sigma[axis] = 0.03162277660168379;     /* variance 1e-3 rad^2 a step */
     }
     config->landmark_prior = PLR_PRIOR_INDEPENDENT;
-    config->gate_residual_px = 20; /* ours: the report names no limit */
-    config->max_depth_m = 30;      /* ours as well */
+    config->focal_sigma = config->baseline_sigma = 0; /* it knows nothing of such errors */
+    config->gate_residual_px = 20;                    /* ours: the report names no limit */
+    config->max_depth_m = 30;                         /* ours as well */
 }
 
 static plr_status refuse(const plr_setting **culprit, const plr_setting *setting) {

@@ -161,6 +161,10 @@ def err0_m(log: Path) -> float:
     return found
 
 
+# A simulated camera is what it is said to be: what is told is of the noise alone.
+EXACT_CAMERA = ("--focal-sigma", "0", "--baseline-sigma", "0")
+
+
 def judged(
     recording: Path, *options: str | Path, program: str = "pelorus-replay"
 ) -> dict[str, Any]:

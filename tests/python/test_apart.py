@@ -22,7 +22,7 @@ from pelorus.evaluation import judge
 from pelorus.frames import Header, Kind, Message, Start, Stereo, Twist
 from pelorus.replay import replayed
 from pelorus.trajectory import Trajectory
-from replay_drive import drive, header
+from replay_drive import EXACT_CAMERA, drive, header
 from report_runs import built_programs
 
 SIGMA_PX = 0.3
@@ -81,7 +81,8 @@ def nees(messages: list[Message], sigma_px: float) -> float:
     """Of the whole drive against truth."""
     options = [w for k, v in TWISTS.items() for w in (f"--{k}", v)]
     program = built_programs().float32
-    log = replayed(program, messages, [*options, "--pixel-sigma", f"{sigma_px:.4g}"])
+    sigma = ("--pixel-sigma", f"{sigma_px:.4g}")
+    log = replayed(program, messages, [*options, *EXACT_CAMERA, *sigma])
     found = judge(log)["nees_per_dof"]
     assert found is not None
     return found

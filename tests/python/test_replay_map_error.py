@@ -14,6 +14,7 @@ from pelorus.evaluation import judge, made_in
 from pelorus.frames import Landmark, Message
 from replay_drive import (
     BIN,
+    EXACT_CAMERA,
     OK,
     Record,
     drive,
@@ -41,7 +42,8 @@ def test_white_noise_is_mapped_as_well_as_the_map_claims(
 ) -> None:
     path = record(with_known(300))
     log = tmp_path / "log.plr"
-    assert run(path, *MAPPING, "--quiet", "--out", log, program=program).status == OK
+    options = (*MAPPING, *EXACT_CAMERA, "--quiet", "--out", log)
+    assert run(path, *options, program=program).status == OK
     told: dict[str, Any] = dict(judge(log_of(log)))
     made = made_in(log_of(log))
     errors = [float(np.linalg.norm(m.p_W_m - points()[m.id])) for m in made]

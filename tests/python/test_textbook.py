@@ -12,6 +12,7 @@ from pelorus.frames import Kind, Landmark, Stereo
 from pelorus.trajectory import read_tum
 from replay_drive import (
     BIN,
+    EXACT_CAMERA,
     USAGE,
     Record,
     Result,
@@ -56,7 +57,7 @@ def test_with_slots_for_all_the_replay_computes_the_same(
     for program in (TEXTBOOK, "pelorus-replay-f64"):
         way = tmp_path / f"{program}.tum"
         slots = ("--slots", "256", "--trajectory", way)
-        summaries.append(judged(path, *options, *slots, program=program))
+        summaries.append(judged(path, *options, *EXACT_CAMERA, *slots, program=program))
         ways.append(read_tum(way))
     assert summaries[0].keys() == summaries[1].keys()
     for count in ("frames", "matched", "used", "gated", "new", "poor", "evicted"):

@@ -107,6 +107,10 @@ class _Part(NamedTuple):
     path: Path
 
 
+# What an error of the calibration does, it does to both halves.
+SAME_CAMERA = {"focal-sigma": "0", "baseline-sigma": "0"}
+
+
 class Parts:
     """Windows and halves of a recording, written once and replayed with many settings."""
 
@@ -133,7 +137,7 @@ class Parts:
 
     def apart(self, settings: Settings) -> Apart:
         """With these settings. Windows that tell too little are left out."""
-        options = options_of(settings)
+        options = options_of({**settings, **SAME_CAMERA})
         with ThreadPoolExecutor(cpu_count() or 1) as pool:
             ran = pool.map(lambda part: self._estimate(part, options), self._parts)
             estimates = list(progress(ran, "halves of the points", len(self._parts)))
