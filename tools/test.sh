@@ -178,6 +178,9 @@ build_fuzz() {
 # Warnings are errors, and the machine must have OpenBLAS: no test is left out in silence.
 strict=(-DPELORUS_BUILD_TESTS=ON -DPELORUS_WERROR=ON -DPELORUS_REQUIRE_ORACLE=ON
     -DPELORUS_LONG_TESTS=$([ $extent = long ] && echo ON || echo OFF))
+if command -v ld.gold >/dev/null; then # of three hundred programs a build: a third of the usual one's time
+    strict+=(-DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=gold)
+fi
 
 heading 'Set-up'
 [ $extent = long ] && PACKAGES_WANTED+=(libclang-rt-14-dev) # libFuzzer
