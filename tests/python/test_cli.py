@@ -84,6 +84,24 @@ def test_every_command_starts_where_there_is_no_termios() -> None:
         assert f"Usage: pelorus {' '.join(command)} " in done.stdout.decode()
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_name_that_the_output_cannot_encode_is_no_reason_to_fail(
+    tmp_path: Path, encoding: str
+) -> None:
+    drive, lacking = tmp_path / "Zürich – 道.plr", tmp_path / "dürr 道.plr"
+    clean(duration_s=1.0).write(drive)
+    for path, status in ((drive, 0), (lacking, 1)):
+        done = subprocess.run(
+            [sys.executable, "-m", "pelorus", "info", path],
+            capture_output=True,
+            env=os.environ | {"PYTHONIOENCODING": encoding},
+            check=False,
+        )
+        assert done.returncode == status, done.stderr
+        assert b"\\u9053" in (done.stderr if status else done.stdout)
+        assert b"Error:" not in done.stderr
+
+
 def test_the_replay_is_found_beside_the_package_from_any_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -111,6 +111,15 @@ def test_rates_gaps_and_steps_back_are_counted(tmp_path: Path, pelorus: Run) -> 
     assert "TWIST: time does not ascend 1 times" in outcome.out
 
 
+def test_a_huge_file_that_is_no_recording_is_given_up_early(tmp_path: Path, pelorus: Run) -> None:
+    path = tmp_path / "disk.img"
+    with path.open("wb") as image:
+        image.truncate(1 << 40)  # of holes: it takes no room, and hours to read
+    outcome = pelorus("info", path)
+    assert outcome.status == 1
+    assert "holds no frame in its first 1114112 bytes; this is no .plr recording" in outcome.err
+
+
 def test_damage_is_told_by_byte_and_the_rest_is_used(tmp_path: Path, pelorus: Run) -> None:
     path = write(tmp_path / "x.plr", [HEADER, *twists(*range(0, 100, 10))])
     data = bytearray(path.read_bytes())

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from io import TextIOWrapper
 
 COMMANDS = (
     "convert",
@@ -32,10 +33,18 @@ INTERRUPTED = 130  # as a shell tells the signal of Ctrl-C
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; 0, or 1 after an error that was told, or 2 if the call makes no sense."""
     words = sys.argv[1:] if arguments is None else list(arguments)
+    _say_what_cannot_be_encoded()
     try:
         return _run(words)
     except KeyboardInterrupt:  # while importing; later the application takes it
         return INTERRUPTED
+
+
+def _say_what_cannot_be_encoded() -> None:
+    r"""An umlaut in a file's name is no reason to fail where the output is ASCII: it becomes \xfc."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _run(words: list[str]) -> int:

@@ -25,6 +25,7 @@ VERSION_MAJOR = schema.LIMITS["version_major"]
 DELIMITER = b"\0"
 BODY_BYTES_MIN = schema.LIMITS["overhead_bytes"]  # kind, sequence, CRC
 STUFFED_BYTES_MAX = 1 << 20  # ten times this version's longest frame; bounds what is held
+HOPELESS_BYTES = 1 << 20  # where as many hold no good frame, no more will come
 SEQUENCE_MODULUS = 1 << 16
 FAULTS_KEPT = 100  # the first ones are remembered with their place, all are counted
 
@@ -249,6 +250,8 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
         pieces = packed_file.pieces(path, piece_bytes)
         for piece in progress(pieces, f"reading {path.name}", count):
             received.extend(reader.feed(piece))
+            if not received and reader.counts.bytes > HOPELESS_BYTES:
+                break  # a picture, a disk's image: some have terabytes
     except packed_file.PackingDamaged as error:
         reader.lose(str(error))
     except OSError as error:
@@ -262,7 +265,8 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
         raise PelorusError(f"{path}: the file is empty, a recording begins with a HEADER frame")
     if not received:
         raise PelorusError(
-            f"{path}: holds no frame in {reader.counts.bytes} bytes; this is no .plr recording"
+            f"{path}: holds no frame in its first {reader.counts.bytes} bytes; this is no .plr "
+            "recording"
         )
     return received, reader.counts
 
