@@ -140,6 +140,13 @@ def test_a_pipe_that_is_written_to_stays_a_pipe(tmp_path: Path) -> None:
         os.close(reader)
 
 
+def test_standard_output_is_written_to_by_its_name() -> None:
+    words = "from pathlib import Path; from pelorus.errors import write_text; "
+    words += "write_text(Path('/dev/stdout'), 'some text')"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"some text", b"")
+
+
 def test_a_link_that_is_written_to_stays_a_link(tmp_path: Path) -> None:
     there, link = tmp_path / "there.txt", tmp_path / "link.txt"
     there.write_text("old", encoding="utf-8")

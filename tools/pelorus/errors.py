@@ -33,7 +33,7 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
     /dev/null, is written to as it stands: a file that took its name would put an end to it. A link
     keeps pointing at its file.
     """
-    files = tuple(path.resolve() if path.is_symlink() else path for path in paths)
+    files = tuple(_file_of(path) for path in paths)
     parts = tuple(_part(file) for file in files)
     try:
         yield parts
@@ -46,6 +46,12 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
             if part != file:
                 with suppress(OSError):
                     part.unlink(missing_ok=True)
+
+
+def _file_of(path: Path) -> Path:
+    """The file that a link stands for; of /dev/stdout the link is all that has a name."""
+    opens_no_file = path.exists() and not path.is_file()
+    return path.resolve() if path.is_symlink() and not opens_no_file else path
 
 
 def _part(file: Path) -> Path:
