@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _say_what_cannot_be_encoded() -> None:
-    r"""An umlaut in a file's name is no reason to fail where the output is ASCII: it becomes \xfc."""
+    r"""An umlaut in a name is no reason to fail where the output is ASCII: it becomes \xfc."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")
