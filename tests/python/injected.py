@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Everyday faults put into a recording, each at three strengths; as a program it measures how many
-are named rightly, and how often a clean piece of a drive is called faulty:
+are named rightly, and how often a clean piece of a drive is called faulty; FIRST:LAST are seeds of
+tests/python/everyday.py, the last left out:
 
-    python tests/python/injected.py DRIVE.plr...
+    python tests/python/injected.py DRIVE.plr... FIRST:LAST...
+    python tests/python/injected.py --clean DRIVE.plr... FIRST:LAST...
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from everyday import drawn, drive
 from injected_known import Known
 from pelorus import se3, wire
 from pelorus.check.contents import recording_of
@@ -302,30 +305,57 @@ def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
         count, tracks.frame[rows] - first, tracks.id[rows], tracks.pixels[rows]))  # fmt: skip
 
 
-def main(paths: list[str]) -> None:
+def recordings(words: list[str]) -> Iterator[tuple[str, Recording]]:
+    """Files, or simulated drives by their seeds."""
+    for word in words:
+        first, colon, last = word.partition(":")
+        if colon and first.isdigit():
+            for seed in range(int(first), int(last)):
+                settings = drawn(seed)
+                yield f"{seed} ({settings.kind})", drive(settings, seed)
+        else:
+            yield word, recording_of(wire.messages_of(Path(word)))
+
+
+def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:
+    """How many there are, and how many are called faulty."""
+    count, false = 0, 0
+    for first in range(0, max(whole.tracks.frame_count - PIECE // 2, 1), PIECE):
+        said = found_in(piece(whole, first))
+        count, false = count + 1, false + bool(said)
+        if said:
+            print(name, "clean", first, [f"{f.name}: {f.words}" for f in said], flush=True)
+    return count, false
+
+
+def injected(name: str, recording: Recording) -> tuple[int, int, int]:
+    """Of so many faults so many are named rightly, and so many others cannot be told."""
+    right, asked, beyond = 0, 0, 0
+    known = Known.of(recording)
+    own = {fault.name for fault in found_in(recording)}
+    for kind, k, wrong, due in injections(recording):
+        said = faults_in(wrong)
+        named = [fault.name for fault in said if fault.name not in own - set(due)]
+        good = bool(named) and named[0] in due
+        right, asked = right + good, asked + 1
+        if not good:
+            why = known.too_little(kind, k, wrong)
+            beyond += bool(why)
+            words = [f"{f.name}: {f.words}" for f in said]
+            print(name, kind, k, words, f"cannot be told: {why}" if why else "MISSED", flush=True)
+    return right, asked, beyond
+
+
+def main(words: list[str]) -> None:
     """Print what was named wrongly, why the drive may not tell it, and the shares."""
-    right, asked, beyond, false, clean = 0, 0, 0, 0, 0
-    for path in paths:
-        whole = recording_of(wire.messages_of(Path(path)))
-        for first in range(0, max(whole.tracks.frame_count - PIECE // 2, 1), PIECE):
-            said = found_in(piece(whole, first))
-            clean += 1
-            false += bool(said)
-            if said:
-                print(path, "clean", first, [f"{f.name}: {f.words}" for f in said], flush=True)
-        first_piece = piece(whole, 0)
-        known = Known.of(first_piece)
-        own = {fault.name for fault in found_in(first_piece)}
-        for name, k, wrong, due in injections(first_piece):
-            said = faults_in(wrong)
-            named = [fault.name for fault in said if fault.name not in own - set(due)]
-            good = bool(named) and named[0] in due
-            right, asked = right + good, asked + 1
-            if not good:
-                why = known.too_little(name, k, wrong)
-                beyond += bool(why)
-                words = [f"{f.name}: {f.words}" for f in said]
-                print(path, name, k, words, f"cannot be told: {why}" if why else "", flush=True)
+    clean_only = "--clean" in words
+    sums = np.zeros(5, np.int64)
+    for name, whole in recordings([word for word in words if word != "--clean"]):
+        count, false = clean_pieces(name, whole)
+        faults = (0, 0, 0) if clean_only else injected(name, piece(whole, 0))
+        sums += (*faults, count, false)
+        print(f"{name}: {faults[0]} of {faults[1]}, {false} of {count} clean", flush=True)
+    right, asked, beyond, clean, false = sums.tolist()
     print(
         f"{right} of {asked} named rightly, {beyond} of the rest cannot be told; "
         f"{false} of {clean} clean pieces called faulty"

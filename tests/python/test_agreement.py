@@ -16,7 +16,7 @@ from pelorus.faults.amounts import of_clock, of_lever, of_scale
 from pelorus.faults.clocks import TwoClocks
 from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import moving_least
-from pelorus.faults.mounting import best_axes
+from pelorus.faults.mounting import Rates
 from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
 from pelorus.faults.two_views import TwoViews, two_views
@@ -274,8 +274,8 @@ def test_axes_that_hardly_turn_are_told_from_mirrored_ones(seed: int) -> None:
     w = np.stack([np.convolve(chance.normal(0, x, 130), smooth, "valid") for x in spread], axis=1)
     seen = w + chance.normal(0, 0.005, w.shape)
     told = w + chance.normal(0, 0.005, w.shape)
-    assert not best_axes(seen, told).won
-    mirrored = best_axes(seen, told * [-1, -1, 1])
+    assert not Rates(seen, told).alone().won
+    mirrored = Rates(seen, told * [-1, -1, 1]).alone()
     assert mirrored.won
     assert np.array_equal(np.diag(mirrored.F), [-1, -1, 1])
 

@@ -74,7 +74,8 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
     assert float(settings["gyro-sigma"]) == pytest.approx(0.03, rel=0.2)
     assert settings["twist-timing"] == "start"
     assert found["camera_offset_s"] == 0
-    assert found["grade"] == "good", found["remarks"]
+    doubts = [remark["text"] for remark in found["remarks"] if remark["grade"] != "good"]
+    assert all("cannot tell the scale" in text for text in doubts), doubts  # biases of 0.05 m/s
     figures = found["figures"]
     assert float(figures["innovations over their noise"]["after"]) == pytest.approx(1, abs=0.1)
     cost = figures["-2 ln likelihood an observation"]

@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from converted import Converted, Run
+from everyday import drawn
+from everyday import drive as everyday_drive
 from injected import ALIKE, OF_RECORDINGS, found_in, of_times, piece
 from pelorus import wire
 from pelorus.check.contents import recording_of, write
+from pelorus.converters import matlab
 from pelorus.faults.fault import UNTOLD
+from pelorus.faults.identity import Jumps
 from pelorus.faults.named import faults_of
 from pelorus.frames import Header, Kind, Stereo, Twist
 from pelorus.recording import Recording
@@ -70,6 +75,51 @@ def test_a_fault_in_a_real_recording_is_named(of_03: Converted, name: str) -> No
     assert found_in(clean) == []
     change, due = OF_RECORDINGS[name]
     assert found_in(change(clean, 1))[0].name in due
+
+
+@pytest.mark.parametrize(
+    ("name", "strength"), [("mirrored", 0), ("small-pitch", 0), ("ids-slots", 2)]
+)
+def test_a_fault_of_few_points_is_named(
+    real: Callable[[str], Path], name: str, strength: int
+) -> None:
+    """Starry Night, 5 of 20 points in sight: a mirrored x was told as an extrinsic off by 21
+    degrees, a pitch of 6 degrees (5.5 +- 1.0) and slots (4 of 5 points came back elsewhere) not.
+    """
+    whole = matlab.starry_night(real("starry-night/dataset3.mat"))
+    change, due = OF_RECORDINGS[name]
+    assert found_in(change(piece(whole, 0), strength))[0].name in due
+
+
+def test_a_mirrored_axis_is_told_by_ways_and_turns_together() -> None:
+    """Up and down of a car: neither its vertical velocity nor its roll and pitch tell it alone
+    beside the noise of these twists.
+    """
+    car = everyday_drive(drawn(7003), 7003)
+    assert found_in(car) == []
+    change, due = OF_RECORDINGS["mirrored"]
+    assert found_in(change(car, 2))[0].name in due
+
+
+def test_degrees_that_go_round_between_two_frames_are_degrees() -> None:
+    """Of a drone: 46 rad/s. A lever made them a scale of the velocities, and km/h."""
+    change, _ = OF_RECORDINGS["degrees"]
+    said = found_in(change(everyday_drive(drawn(7004), 7004), 0))
+    assert [fault.name for fault in said] == ["unit-degrees"]
+
+
+def test_velocities_that_do_not_vary_have_no_clock_of_their_own() -> None:
+    """What chance made of them was followed step by step, to 168 +- 14 ms."""
+    assert found_in(everyday_drive(drawn(0), 0)) == []
+
+
+@pytest.mark.parametrize(
+    ("again", "elsewhere", "slots"), [(5, 4, True), (3, 3, False), (3, 0, False), (30, 15, False)]
+)
+def test_points_that_come_back_elsewhere_are_slots_beyond_chance(
+    again: int, elsewhere: int, slots: bool
+) -> None:
+    assert Jumps(1, 75, again, elsewhere).are_slots == slots
 
 
 @pytest.mark.parametrize("strength", range(3))

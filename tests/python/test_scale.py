@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,13 +11,16 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from converted import Run
+from everyday import drawn
+from everyday import drive as everyday_drive
 from pelorus.check import clock, scale, search, tuning
 from pelorus.check.biases import WIDE
 from pelorus.check.contents import scaled
 from pelorus.check.options import Settings
 from pelorus.check.outcome import NOTHING, SCALE, Bench
 from pelorus.frames import Twist
-from replay_drive import drive, header
+from replay_drive import BIN, drive, header
 from report_runs import built_programs
 
 TRUE = {"pixel-sigma": "0.5", "velocity-sigma": "0.05", "gyro-sigma": "0.005"}
@@ -67,6 +71,30 @@ def test_what_a_scale_explains_is_no_clock(monkeypatch: pytest.MonkeyPatch) -> N
     assert "no offset of the camera's clock is likelier than yours (known to 4 ms)" in words
 
 
+@pytest.mark.parametrize("one_clock", [True, False])
+def test_two_clocks_are_no_timing(monkeypatch: pytest.MonkeyPatch, one_clock: bool) -> None:
+    """Starry Night's gyro is late beside its velocities; `end` is likelier, and the worse."""
+    found = search.Found({"pixel": 0.5, "velocity": 0.1, "gyro": 0.01}, NOTHING)
+    monkeypatch.setattr(clock, "of_twists", lambda *_: clock.Offset(0.06, 0.001))
+    monkeypatch.setattr(clock, "seconds", lambda _: 0.02)
+    monkeypatch.setattr(scale, "off_by", lambda *_: 0.0)
+    monkeypatch.setattr(tuning, "search_noises", lambda *_: found)
+    monkeypatch.setattr(tuning, "track_noise", lambda _: SimpleNamespace(drifts=False))
+    monkeypatch.setattr(tuning, "difference_of_a_reading", lambda *_: None)
+    monkeypatch.setattr(tuning, "told_by_halves", lambda _, fixed, __: (fixed, "no bias"))
+    monkeypatch.setattr(tuning, "_axes", lambda *_: (found, "one sigma for all axes"))
+    bench = SimpleNamespace(
+        by_imu=False,
+        header=header(),
+        examined=SimpleNamespace(twist_t_ns=[]),
+        run=lambda _: NOTHING,
+    )
+    given = {"camera-offset": "0.01"}
+    tuned = tuning.tune(cast(Any, bench), given, one_clock)
+    assert float(tuned.settings["camera-offset"]) == (0.06 if one_clock else 0.01)
+    assert any("two clocks" in words for words in tuned.said) != one_clock
+
+
 def test_velocities_of_another_scale_keep_their_noise_and_their_turns() -> None:
     chance = np.random.default_rng(4)
     steady = drive(200)
@@ -81,3 +109,44 @@ def test_velocities_of_another_scale_keep_their_noise_and_their_turns() -> None:
     added = np.array([a.v_B_mps - b.v_B_mps for a, b in zip(after, before, strict=True)])
     assert np.mean(added[:, 0]) == pytest.approx(0.1 * np.mean([m.v_B_mps[0] for m in before]), 0.1)
     assert np.std(added, axis=0).max() < 0.1 * 0.2 / 3  # a mean of some twenty readings
+
+
+WALK = replace(
+    drawn(3000), speed_mps=3.0, pixel_px=1.0, velocity_mps=0.05, gyro_radps=0.01, bias_mps=0.05,
+    bias_radps=0.0, pitch_deg=0.0, twist_hz=50, timing="start", points=40, duration_s=20.0, told=1,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("speed_varies", "bias_mps", "error", "grade", "words"),
+    [
+        (0.0, 0.05, 0.02, "care", "cannot tell the scale of the stereo pair from a bias"),
+        (0.3, 0.0, 0.02, "care", "baseline, focal length or wheels' radius"),
+        (0.3, 0.0, 0.0, "good", ""),
+    ],
+    ids=["hidden by a bias", "told", "right"],
+)
+def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
+    speed_varies: float,
+    bias_mps: float,
+    error: float,
+    grade: str,
+    words: str,
+    tmp_path: Path,
+    pelorus: Run,
+) -> None:
+    """At constant speed a bias took all of a baseline that was off by 2 %: NEES/6 was 87, and the
+    verdict "this can be trusted".
+    """
+    settings = replace(WALK, speed_varies=speed_varies, bias_mps=bias_mps, baseline_error=error)
+    path = tmp_path / "drive.plr"
+    everyday_drive(settings, 3000).write(path)
+    said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN, "--json")
+    assert said.status == 0, said.err
+    found = json.loads(said.out)
+    assert found["grade"] == grade, found["remarks"]
+    texts = [remark["text"] for remark in found["remarks"] if remark["grade"] == "care"]
+    assert any(words in text for text in texts) or not words, texts
+    parts = found["verdict"].split(", to ")
+    share = float(parts[1].removesuffix("% of the way")) / 100 if len(parts) > 1 else 0.0
+    assert 0.7 * error < share < max(3 * error, 0.01), found["verdict"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pelorus import wire
-from pelorus.check import verdict
+from pelorus.check import scale, verdict
 from pelorus.check.halves_alike import with_halves_alike
 from pelorus.check.held import held_against
 from pelorus.check.options import Settings, options_of
@@ -38,10 +38,14 @@ class Checked:
     changes: list[str]
     rows: list[tuple[str, str, str]]
     tuned: Tuned | None  # None where a fault must be mended first
+    share: float = 0.0  # of the way, by which positions may be off beyond what the filter says
 
     @property
     def verdict(self) -> str:
-        return verdict.VERDICTS[self.grade]
+        """No better than what the drive can tell."""
+        words = verdict.VERDICTS[self.grade]
+        told = self.share > 0 and self.grade is not Grade.BAD
+        return f"{words}, to {self.share:.1%} of the way" if told else words
 
 
 def check(program: Path, recording: Path, given: Settings, folder: Path) -> Checked:
@@ -52,7 +56,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.words) for f in named]
     if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
-    found = tune(bench, given)
+    found = tune(bench, given, all(fault.name != "clock-turns" for fault in named))
     if any(fault.lasts for fault in named):
         found.lasting.append(NAMED)
     tuned = held_against(bench, given, found)
@@ -64,7 +68,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
     origin = int(run.frames.t_ns[0])
-    remarks = [*faults, *verdict.remarks(run, tuned, origin)]
+    doubt = None if bench.by_imu else scale.doubted(bench.examined, run.messages)
+    remarks = [*faults, *verdict.remarks(run, tuned, origin), *verdict.of_scale(doubt)]
     rows = [(title, figures.get(title, "-"), now) for title, now in _figures(run, truth).items()]
     cost = (
         "-2 ln likelihood an observation",
@@ -75,7 +80,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if len(spells) > SPELLS_SHOWN:
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
     changed = verdict.changes(given, bench.header, tuned, bench.by_imu)
-    return Checked(verdict.overall(remarks), remarks, spells, changed, [cost, *rows], tuned)
+    share = doubt.beyond if doubt is not None else 0.0
+    return Checked(verdict.overall(remarks), remarks, spells, changed, [cost, *rows], tuned, share)
 
 
 def _whole(

@@ -10,14 +10,28 @@ then stays untold.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from pelorus.check import clock
 from pelorus.check.options import Settings
 from pelorus.check.outcome import SCALE, Bench
 from pelorus.check.parameters import PAYS
+from pelorus.consistency import mean, nees_per_dof
+from pelorus.faults.agreement import NO_BIAS_MPS, agreement
+from pelorus.faults.handeye import first_part
+from pelorus.faults.two_views import two_views
+from pelorus.frames import Message
+from pelorus.recording import Recording
+from pelorus.settings import in_force
+from pelorus.trajectory import estimate_in
 
 STEP, STEPS = 0.01, 4
+SURE = 4.0  # sigmas from which a scale is off, and not only untold
+ADDS = 0.5  # to a NEES of 1, a degree of freedom: less does not matter
+BY_BIAS = 1.5  # times as well known without biases: then it is these that hide it
 NEAR = 2.5  # steps
 
 
@@ -39,3 +53,60 @@ def words(off: float) -> str:
         f"the images show about {1 + off:.2f} times the way of the twists: baseline, focal length "
         "or wheels' radius"
     )
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """The images show `scale` +- `sigma` times the twists' way beside biases of `bias_mps`; without
+    these it is known to `unbiased`. `adds`: what a scale that is off by `share` adds to the mean
+    NEES of the run, a degree of freedom.
+    """
+
+    scale: float
+    sigma: float
+    bias_mps: float
+    unbiased: float
+    adds: float
+
+    @property
+    def share(self) -> float:
+        """Of the way, by which positions may be off."""
+        return float(np.hypot(self.scale - 1, self.sigma))
+
+    @property
+    def beyond(self) -> float:
+        """The same where it is more than what the filter says of its positions, else 0."""
+        return self.share if self.adds > ADDS else 0.0
+
+    @property
+    def is_off(self) -> bool:
+        return abs(self.scale - 1) > SURE * self.sigma
+
+    @property
+    def by_bias(self) -> bool:
+        """Is it the bias that hides it?"""
+        return self.sigma > BY_BIAS * self.unbiased
+
+
+def doubted(recording: Recording, messages: Sequence[Message]) -> Doubt | None:
+    """Of a run with its settings' biases; None where too few frames tell."""
+    bias = in_force(messages, "bias-velocity-sigma") if in_force(messages, "bias") else None
+    short = first_part(recording)
+    noise = replace(short.header.noise, bias_velocity_sigma_mps=max(bias or 0.0, NO_BIAS_MPS))
+    short = short.with_header(noise=noise)
+    found = agreement(short, two_views(short.tracks, short.header.camera, 1))
+    if not found.told:
+        return None
+    doubt = Doubt(found.scale, found.scale_sigma, bias or 0.0, found.through_zero_sigma, 0.0)
+    return replace(doubt, adds=_added_nees(doubt.share, messages))
+
+
+def _added_nees(share: float, messages: Sequence[Message]) -> float:
+    """Each pose moves by that share of the way from the start."""
+    found = estimate_in(messages)
+    if found is None:
+        return 0.0
+    (_, poses), P = found
+    way_B = np.einsum("nji,nj->ni", poses.R, poses.p - poses.p[0])
+    off = np.hstack((share * way_B, np.zeros_like(way_B)))
+    return mean(nees_per_dof(off, P)) or 0.0

@@ -37,15 +37,18 @@ from pelorus.converters.twist_noise import Spread, difference_of_a_reading
 
 SPREAD_FRAMES = 20  # tell a spread to a fifth: enough to begin with
 FINE = (1.3, 1.15)
+TWO_CLOCKS = "no timing suits velocities and rates of turn of two clocks: yours stays"
 OF_AXES = (2.0, 1.5)  # from one for all axes to each its own it may be far
 
 
-def tune(bench: Bench, given: Settings) -> Tuned:
-    """`given` are the settings as they are: they hold wherever nothing better is found."""
-    return tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given)
+def tune(bench: Bench, given: Settings, one_clock: bool = True) -> Tuned:
+    """`given` are the settings as they are: they hold wherever nothing better is found.
+    `one_clock`: velocities and rates of turn have the same; else no setting suits both.
+    """
+    return tuning_imu.tune(bench, given) if bench.by_imu else _tune(bench, given, one_clock)
 
 
-def _tune(bench: Bench, given: Settings) -> Tuned:
+def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     before = bench.run(given)
     noise = track_noise(bench.examined)
     start = starting(bench.header, given, TWIST)
@@ -60,7 +63,7 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | fewer_slots(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)
-    offset = clock.of_twists(bench, rough | written(values, TWIST))
+    offset = clock.of_twists(bench, rough | written(values, TWIST)) if one_clock else clock.UNTOLD
     if offset.gain > PAYS:  # what a wrong clock does is no noise
         rough[OFFSET] = f"{offset.best_s:.6f}"
         values = search_noises(bench, rough | {LENGTH: COARSE_FRAMES}, values, TWIST, COARSE).values
@@ -68,7 +71,10 @@ def _tune(bench: Bench, given: Settings) -> Tuned:
     values = search_noises(bench, moved, values, TWIST, (1.5, 1.25)).values
     fixed, of_bias = told_by_halves(bench, moved, values)
     off = scale.off_by(bench, moved | written(values, TWIST))
-    fixed, found, of_clock = clocked(bench, fixed, values, given, off)
+    if one_clock:
+        fixed, found, of_clock = clocked(bench, fixed, values, given, off)
+    else:
+        found, of_clock = search_noises(bench, fixed, values, TWIST, FINE), TWO_CLOCKS
     found, of_axes = _axes(bench, fixed, found)
     offset_s = float(fixed.pop(OFFSET))
     settings = merged(fixed | written(found.values, TWIST)) | offset_settings(offset_s)

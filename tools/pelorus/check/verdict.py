@@ -11,6 +11,7 @@ import numpy as np
 
 from pelorus.arrivals import late_ones
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
+from pelorus.check.scale import Doubt
 from pelorus.frame_table import BIASES, FrameTable, frame_table
 from pelorus.frames import Header, Message, Report
 from pelorus.health import TimeLine, time_line
@@ -27,6 +28,7 @@ NIS_LOW, NIS_HIGH = 0.6, 1.6
 BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
 OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
+SHARE_MANY = 0.01  # of the way, that a bias may hide
 
 
 class Grade(IntEnum):
@@ -235,6 +237,28 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
     if found.after.ratio > found.after.by_chance:
         words += f"; no pixel-sigma brings them together (still {found.after.ratio:.2g} times)"
     yield Remark(Grade.CARE, words)
+
+
+def of_scale(doubt: Doubt | None) -> Iterator[Remark]:
+    """The filter takes the stereo pair's scale for true: how far can the twists confirm it?"""
+    if doubt is None:
+        return
+    shown = f"the images show {doubt.scale:.3f} +- {doubt.sigma:.3f} times the twists' way"
+    if not doubt.beyond:
+        yield Remark(Grade.GOOD, f"{shown}: the filter's own doubt covers that")
+        return
+    off = f"positions may be off by {doubt.share:.1%} of the way, beyond what the filter says"
+    bias = f"a bias of the velocities of {doubt.bias_mps:.2g} m/s"
+    hidden = doubt.by_bias and doubt.share > SHARE_MANY
+    if doubt.is_off:
+        why = f"{shown}: baseline, focal length or wheels' radius are off, or more than {bias}"
+    elif doubt.by_bias:
+        why = f"this drive cannot tell the scale of the stereo pair from {bias}: beside it {shown}"
+        off += ". Drive with changing speed"
+    else:
+        why = f"this drive does not tell the scale of the stereo pair better: {shown}"
+        off += ". A longer drive tells more"
+    yield Remark(Grade.CARE if doubt.is_off or hidden else Grade.GOOD, f"{why}; {off}")
 
 
 def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:

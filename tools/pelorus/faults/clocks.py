@@ -24,7 +24,9 @@ FRAMES_MIN = 50
 OFFSETS_S = np.arange(-20, 21) * 0.02  # where the clock's offset is looked for at first
 ROUNDS, STEP_S, FOUND_S = 10, 0.05, 2e-4
 APART_SIGMAS, APART_S = 6.0, 0.03
-WORTH_SIGMAS = 2.0  # below, a clock of the turns' own is not followed
+# Below, a clock of the turns' own is not followed: it may be chance, and where velocities hardly
+# vary each step finds a little of the same chance again.
+WORTH_SIGMAS = 3.0
 
 
 @dataclass(frozen=True)

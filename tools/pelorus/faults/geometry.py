@@ -47,7 +47,7 @@ MOVES_MPS = 1.0  # a camera that hardly moves need not agree with the twists' no
 TURNED_DEG, ROLLED_DEG, NEAR_DEG, AXES_DEG = 6.0, 50.0, 20.0, 40.0
 PITCH_MOST_DEG = 60.0
 MOSTLY, HEADED_SHARE = 0.85, 0.7  # of a turn, what is about one axis, and what the way tells
-PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 6.0  # where velocities and turns tell it together
+PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 4.0  # where velocities and turns tell it together
 SURE_SIGMAS = 4.0
 UNIT_NEAR = 0.15
 FAR_LAG = 3
@@ -174,6 +174,7 @@ def _units(found: HandEye) -> Iterator[Fault]:
             continue
         if scale > 0 and abs(np.log(scale / unit)) < near:
             yield Fault(f"unit-{name}", f"the images show {scale:.3g} times the {words}")
+            return  # ways of a lever are the turns', too
 
 
 # --- axes and extrinsic ---------------------------------------------------------------------------
@@ -228,9 +229,11 @@ def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
     rates = TwistBody(recording).rates(recording.frame_t_ns, 1, 0.0)
     arm = -recording.T_CB.R.T @ recording.T_CB.p
     own = np.where(seen.usable[:, None], seen.rates, np.nan)
-    of_turn = mounting.best_axes(own[:, 3:], rates[:, 3:])
     turn = own[:, 3:]
-    of_way = mounting.best_axes(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn)
+    of_way, of_turn = mounting.best_of_both(
+        mounting.Rates(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn),
+        mounting.Rates(turn, rates[:, 3:]),
+    )
     both = of_turn.won and of_way.won and np.array_equal(of_turn.F, of_way.F)
     if both or (of_turn.won and not of_way.won):
         whose = "the twists have" if both else "the rates of turn have"

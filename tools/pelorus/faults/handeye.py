@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.faults.two_views import TwoViews
 from pelorus.layout import Floats
+from pelorus.motion import held
 from pelorus.recording import Recording
 
 FRAMES_MOST = 1000
@@ -76,8 +77,21 @@ def hand_eye(recording: Recording, views: TwoViews) -> HandEye:
     tau = np.diff(recording.frame_t_ns) * 1e-9
     # motion maps camera k to k + 1: the body's own motion is its inverse
     of_camera = se3.log(se3.inverse(views.motion)) / tau[:, None]
-    of_body = se3.log(se3.inverse(recording.body_motion(1))) / tau[:, None]
-    return _fit(recording, of_camera, of_body, views.counts >= POINTS_MIN, fit)
+    return _fit(recording, of_camera, _mean_twists(recording), views.counts >= POINTS_MIN, fit)
+
+
+def _mean_twists(recording: Recording) -> Floats:
+    """(k, 6) of the readings from frame to frame: of the motion that they make but for the order of
+    turns, and right for degrees as well, which go round between two frames.
+    """
+    t_ns, frames = recording.twist_t_ns, recording.frame_t_ns
+    readings = np.hstack((recording.v_B_mps, recording.w_B_radps))
+    own = (t_ns - t_ns[0]) * 1e-9
+    between = held(readings, recording.header.twist_timing) * np.diff(own)[:, None]
+    way = np.concatenate((np.zeros((1, 6)), np.cumsum(between, axis=0)))
+    at = (frames - t_ns[0]) * 1e-9
+    reached = np.stack([np.interp(at, own, x) for x in way.T], axis=-1)
+    return np.asarray(np.diff(reached, axis=0) / np.diff(at)[:, None])
 
 
 def share_of_fit(views: TwoViews) -> float:

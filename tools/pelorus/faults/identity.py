@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from pelorus import se3
 from pelorus.faults.two_views import TwoViews, measured, predicted
@@ -25,7 +26,8 @@ ROWS_LEAST = 4
 ROWS_SHARE, WRONG_TOGETHER = 0.9, 0.15
 JUMP_PX, SOUND_D2 = 12.0, 16.0
 JUMPS_LEAST, JUMPS_SHARE = 5, 0.2  # of the tracks that end
-GAPS_LEAST, ELSEWHERE_SHARE = 10, 0.6  # of the points that are seen again
+ELSEWHERE_SHARE = 0.6  # of the points that are seen again
+BY_CHANCE, CHANCE = 0.1, 1e-3  # a share that bad matches make, and how likely they make so many
 POINTS_MIN = 6  # of a pair of frames
 GAP_MOST = 5  # frames over which the images tell where a point must be
 ELSEWHERE = 0.08  # of the picture's width
@@ -72,7 +74,8 @@ class Jumps:
     @property
     def are_slots(self) -> bool:
         goes_on = self.jumps + self.elsewhere
-        if self.again >= GAPS_LEAST and self.elsewhere > ELSEWHERE_SHARE * self.again:
+        most = self.elsewhere > ELSEWHERE_SHARE * self.again
+        if most and bdtrc(self.elsewhere - 1, self.again, BY_CHANCE) < CHANCE:
             return True
         return self.jumps >= JUMPS_LEAST and goes_on > JUMPS_SHARE * (self.jumps + self.ends)
 

@@ -10,7 +10,7 @@ d = b - F b, taken some frames beside, which has no part in the noise of this fr
 
 far from the one, and clearly nearer to the other. Velocities must be the surer of it: what those of
 a road are off by across the way lasts for seconds, and looks like other axes; turns have no such
-errors.
+errors. Where neither is as sure by itself, both may tell the same of a body as a whole.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ BESIDE = (1, 2)
 EXPLAINED_LEAST = 0.3
 SURE, BEYOND = 6.0, 3.0  # standard errors by which T must lie below 0, and below the middle
 SURE_OF_WAYS = 6.0  # the same below the middle, by velocities: whole blocks must agree in it
+NEAR = 0.3  # to -1 must both T be, where they tell it together
 BLOCKS = 40
 ROUNDS = 4
 SAMPLES_MIN = 50
@@ -43,39 +44,86 @@ class Duel:
     z: float  # standard errors by which the blocks of the drive lie below the middle
     by_ways: bool
     explained: float  # of what the images show on the axes in question, by F
+    together: bool = False  # velocities and rates of turn tell the same
+
+    @property
+    def is_far(self) -> bool:
+        """From the given axes, and nearer to F."""
+        return -self.effect > SURE * self.sigma and -0.5 - self.effect > BEYOND * self.sigma
 
     @property
     def won(self) -> bool:
-        below = -0.5 - self.effect
-        sure = -self.effect > SURE * self.sigma and below > BEYOND * self.sigma
+        if self.together:
+            return True
+        sure = self.is_far
         if self.by_ways:
-            sure = below > 0 and self.z > SURE_OF_WAYS
+            sure = self.effect < -0.5 and self.z > SURE_OF_WAYS
         return sure and self.explained > EXPLAINED_LEAST
 
 
 STAYS = Duel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
 
 
-def best_axes(seen: Floats, told: Floats, turns: Floats | None = None) -> Duel:
-    """`seen` (n, 3) by the images in body axes as given, `told` by the twists. Of velocities,
-    `turns` (n, 3) are the images' own: what moves with them, a lever that is wrong, is left out.
+class Rates:
+    """`seen` (n, 3) by the images in body axes as given, `told` by the twists, and how well each of
+    the 48 ways brings them together. Of velocities, `turns` (n, 3) are the images' own: what moves
+    with them, a lever that is wrong, is left out.
     """
-    good = np.isfinite(seen).all(axis=1) & np.isfinite(told).all(axis=1)
-    if good.sum() < SAMPLES_MIN:
-        return STAYS
-    seen, told = seen[good], told[good]
-    turned = None if turns is None else turns[good]
-    candidates = ways()
-    errors = [seen - told @ F.T for F in candidates]
-    besides = [_beside(told @ F.T, turned) for F in candidates]
-    first = [_cost(e, beside) for e, beside in zip(errors, besides, strict=True)]
-    spread = min(first, key=lambda cost: cost[0])[1]
-    costs = [_cost(e, beside, spread)[0] for e, beside in zip(errors, besides, strict=True)]
-    best = int(np.argmin(costs))
-    if best == 0:
-        return STAYS
-    found = _duel(candidates[best], seen, told, besides[0], spread)
-    return replace(found, by_ways=turns is not None)
+
+    def __init__(self, seen: Floats, told: Floats, turns: Floats | None = None) -> None:
+        good = np.isfinite(seen).all(axis=1) & np.isfinite(told).all(axis=1)
+        self.enough = bool(good.sum() >= SAMPLES_MIN)
+        if not self.enough:
+            return
+        self._seen, self._told = seen[good], told[good]
+        self._by_ways = turns is not None
+        turned = None if turns is None else turns[good]
+        errors = [self._seen - self._told @ F.T for F in ways()]
+        besides = [_beside(self._told @ F.T, turned) for F in ways()]
+        first = [_cost(e, beside) for e, beside in zip(errors, besides, strict=True)]
+        self._spread = min(first, key=lambda cost: cost[0])[1]
+        self._nuisance = besides[0]
+        self.costs = [
+            _cost(e, beside, self._spread)[0] for e, beside in zip(errors, besides, strict=True)
+        ]
+
+    def alone(self) -> Duel:
+        """The best of all ways."""
+        return self.beside(int(np.argmin(self.costs))) if self.enough else STAYS
+
+    def beside(self, k: int) -> Duel:
+        """The k-th of the ways beside the given axes."""
+        if k == 0:
+            return STAYS
+        found = _duel(ways()[k], self._seen, self._told, self._nuisance, self._spread)
+        return replace(found, by_ways=self._by_ways)
+
+
+def best_of_both(way: Rates, turn: Rates) -> tuple[Duel, Duel]:
+    """The axes of velocities and of rates of turn, each by itself where it is sure; else those of a
+    whole body, if both tell them: one that mirrors a velocity mirrors the two other turns.
+    """
+    if not (way.enough and turn.enough):
+        return STAYS, STAYS
+    alone = way.alone(), turn.alone()
+    if any(found.won for found in alone):
+        return alone
+    all_ways = ways()
+    of_turn = [_index_of(np.linalg.det(F) * F) for F in all_ways]
+    best = int(np.argmin(np.array(way.costs) + np.array(turn.costs)[of_turn]))
+    both = way.beside(best), turn.beside(of_turn[best])
+    if not all(np.isfinite(found.sigma) for found in both):
+        return STAYS, STAYS
+    weight = np.array([found.sigma**-2 for found in both])
+    effect = float(weight @ [found.effect for found in both]) / weight.sum()
+    together = replace(both[0], effect=effect, sigma=float(weight.sum() ** -0.5))
+    if not (together.is_far and all(abs(found.effect + 1) < NEAR for found in both)):
+        return STAYS, STAYS
+    return replace(both[0], together=True), replace(both[1], together=True)
+
+
+def _index_of(F: Floats) -> int:
+    return next(k for k, other in enumerate(ways()) if np.array_equal(other, F))
 
 
 def _beside(told: Floats, turns: Floats | None) -> Floats:
