@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pelorus import wire
@@ -38,7 +38,7 @@ class Checked:
     changes: list[str]
     rows: list[tuple[str, str, str]]
     tuned: Tuned | None  # None where a fault must be mended first
-    share: float = 0.0  # of the way, by which positions may be off beyond what the filter says
+    share: float = 0.0  # of the way, by which positions may be off, if more than was given
 
     @property
     def verdict(self) -> str:
@@ -67,8 +67,11 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    origin = int(run.frames.t_ns[0])
     doubt = None if bench.by_imu else scale.doubted(bench.examined, run.messages)
+    if doubt is not None and doubt.setting:  # no estimate changes by it, and each covariance
+        tuned = replace(tuned, settings=tuned.settings | doubt.setting)
+        run = _whole(program, recording, tuned.settings, folder, "after") or run
+    origin = int(run.frames.t_ns[0])
     remarks = [*faults, *verdict.remarks(run, tuned, origin), *verdict.of_scale(doubt)]
     rows = [(title, figures.get(title, "-"), now) for title, now in _figures(run, truth).items()]
     cost = (

@@ -32,6 +32,7 @@ STEP, STEPS = 0.01, 4
 SURE = 4.0  # sigmas from which a scale is off, and not only untold
 ADDS = 0.5  # to a NEES of 1, a degree of freedom: less does not matter
 BY_BIAS = 1.5  # times as well known without biases: then it is these that hide it
+BASELINE_MOST = 0.1  # that the setting takes
 NEAR = 2.5  # steps
 
 
@@ -67,6 +68,7 @@ class Doubt:
     bias_mps: float
     unbiased: float
     adds: float
+    given: float = 0.0  # baseline-sigma of the run
 
     @property
     def share(self) -> float:
@@ -77,6 +79,13 @@ class Doubt:
     def beyond(self) -> float:
         """The same where it is more than what the filter says of its positions, else 0."""
         return self.share if self.adds > ADDS else 0.0
+
+    @property
+    def setting(self) -> dict[str, str]:
+        """By which the covariances contain it, where they do not."""
+        if self.beyond <= self.given:
+            return {}
+        return {"baseline-sigma": f"{min(self.share, BASELINE_MOST):.2g}"}
 
     @property
     def is_off(self) -> bool:
@@ -98,7 +107,8 @@ def doubted(recording: Recording, messages: Sequence[Message]) -> Doubt | None:
     if not found.told:
         return None
     doubt = Doubt(found.scale, found.scale_sigma, bias or 0.0, found.through_zero_sigma, 0.0)
-    return replace(doubt, adds=_added_nees(doubt.share, messages))
+    given = in_force(messages, "baseline-sigma") or 0.0
+    return replace(doubt, adds=_added_nees(doubt.share, messages), given=given)
 
 
 def _added_nees(share: float, messages: Sequence[Message]) -> float:

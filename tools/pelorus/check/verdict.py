@@ -240,14 +240,15 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
 
 
 def of_scale(doubt: Doubt | None) -> Iterator[Remark]:
-    """The filter takes the stereo pair's scale for true: how far can the twists confirm it?"""
+    """What is known of the stereo pair's scale is what the twists confirm."""
     if doubt is None:
         return
     shown = f"the images show {doubt.scale:.3f} +- {doubt.sigma:.3f} times the twists' way"
     if not doubt.beyond:
         yield Remark(Grade.GOOD, f"{shown}: the filter's own doubt covers that")
         return
-    off = f"positions may be off by {doubt.share:.1%} of the way, beyond what the filter says"
+    off = f"positions may be off by {doubt.share:.1%} of the way"
+    off += ", for which baseline-sigma stands" if doubt.setting else ""
     bias = f"a bias of the velocities of {doubt.bias_mps:.2g} m/s"
     hidden = doubt.by_bias and doubt.share > SHARE_MANY
     if doubt.is_off:
@@ -276,7 +277,7 @@ def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
         if ratios and max(ratios) > OTHER_SIGMA:
             words = ",".join(f"{x:.3g}" for x in was)
             said.append(f"{parameter.setting} {words} should be {written}")
-    for setting in ("twist-timing", "imu-timing", "bias", "camera-offset"):
+    for setting in ("twist-timing", "imu-timing", "bias", "camera-offset", "baseline-sigma"):
         value = tuned.settings.get(setting)
         if value is not None and value != given.get(setting, _usual(setting, header)):
             said.append(f"{setting} should be {value}")
