@@ -22,7 +22,7 @@ from pelorus.errors import PelorusError
 # observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
 PROCESS = (
-    r"(twist|imu)\.c:(lay_out|check|step|mean|hold|rest|walk|walked|now|bias_covariance|measure)"
+    r"(twist|imu)\.c:(lay_out|check|step|mean|hold|rest|walk|bias_walk|now|bias_covariance|measure)"
 )
 MAP = ("send_evicted", "find_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
@@ -47,7 +47,7 @@ FILTER = (
     r"|gate_each|initialise_new|append_new|adopt_known"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (r"plr_order_sort|sink", (r"\w+_before",)),
+    (r"plr_order_sort|sink", (r"(gain|position|id)_before",)),
     (r"to_frame|send_frame|plr_writer_put", ("write_to_port", "send")),
     (STORE, (DEVICE,)),
     (r"move|pass_\w+|plr_codec_\w+", (r"(from|to)_(payload|frame|source|sink|header)",)),
@@ -59,7 +59,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_correct", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
-    (r"bias_is_off|plr_bias_\w+", (PROCESS,)),
+    (r"bias_is_off|plr_bias_\w+|prior_of_drivers|restore_bias_prior", (PROCESS,)),
     (FILTER, (*MODEL, *MAP, PROCESS)),
 )
 
