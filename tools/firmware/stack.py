@@ -24,6 +24,7 @@ MODEL = (r"body_\w+", r"world_\w+")
 PROCESS = (
     r"(twist|imu)\.c:(lay_out|check|step|mean|hold|rest|walk|bias_walk|now|bias_covariance|measure)"
 )
+BIAS_WALK = (r"(twist|imu)\.c:bias_walk",)
 MAP = ("send_evicted", "find_known")
 PORT = ("receive", "transmit", "now_ns", "idle", "feed_watchdog")
 TELEMETRY = "send_odometry"
@@ -59,7 +60,9 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_correct", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
-    (r"bias_is_off|plr_bias_\w+|prior_of_drivers|restore_bias_prior", (PROCESS,)),
+    (r"bias_is_off|find_reasons|prior_of_drivers|restore_bias_prior", BIAS_WALK),
+    (r"plr_filter_(propagate_recovery|recover)", BIAS_WALK),
+    (r"plr_bias_\w+", (PROCESS,)),
     (FILTER, (*MODEL, *MAP, PROCESS)),
 )
 
