@@ -94,7 +94,7 @@ def test_a_bias_that_the_settings_allow_is_no_scale() -> None:
 
 def test_ways_that_have_nothing_in_common_are_no_scale() -> None:
     recording = driven()
-    found = replace(agreed(recording), scale=0.08, scale_sigma=0.06)
+    found = replace(agreed(recording), scale=0.08, scale_sigma=0.06, through_zero=0.1)
     assert [fault.name for fault in of_scale(found, 0.0)] == ["no-fit"]
     unknown = replace(found, scale=1.27, scale_sigma=0.16, speed_mps=0.01)
     assert list(of_scale(unknown, 0.03)) == [], "at one speed no scale is known, and none is missed"

@@ -108,9 +108,12 @@ def test_degrees_that_go_round_between_two_frames_are_degrees() -> None:
     assert [fault.name for fault in said] == ["unit-degrees"]
 
 
-def test_velocities_that_do_not_vary_have_no_clock_of_their_own() -> None:
-    """What chance made of them was followed step by step, to 168 +- 14 ms."""
-    assert found_in(everyday_drive(drawn(0), 0)) == []
+@pytest.mark.parametrize("seed", [0, 9618], ids=["clock", "scale"])
+def test_velocities_that_do_not_vary_have_no_clock_and_no_scale_of_their_own(seed: int) -> None:
+    """What chance made of them was followed step by step, to 168 +- 14 ms; a speed that is
+    constant but for noise and a bias was 0.04 +- 0.04 times what the images show, and "no fit".
+    """
+    assert found_in(everyday_drive(drawn(seed), seed)) == []
 
 
 @pytest.mark.parametrize(

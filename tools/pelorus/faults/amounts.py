@@ -14,7 +14,8 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
-# Where the HEADER tells no bias: wider than the filter's own default, so that a bias is no scale.
+# Where the HEADER tells no bias: wider than the filter's own default, with which 7 of 38 good drives
+# with biases of 0.01 and 0.03 m/s would be called faulty; with this it is one, for another reason.
 BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0
 SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
@@ -100,11 +101,13 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
     turn, turn_sigma = agreed.turn_scale - 1, agreed.turn_scale_sigma
     through, its_sigma = agreed.through_zero - 1, agreed.through_zero_sigma
     if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_WILD) and agreed.scale < SCALE_KNOWN * sigma:
-        yield Fault(
-            "no-fit",
-            f"camera and twists do not tell the same motion: the images show {agreed.scale:.2f} +- "
-            f"{sigma:.2f} times the twists' way. Extrinsic, axes or units, but which is not told",
-        )
+        if abs(through) > SCALE_WILD:  # else the speed hardly varies, and what it does is chance
+            yield Fault(
+                "no-fit",
+                "camera and twists do not tell the same motion: the images show "
+                f"{agreed.scale:.2f} +- {sigma:.2f} times the twists' way. Extrinsic, axes or "
+                "units, but which is not told",
+            )
         return
     if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
         yield Fault(
