@@ -14,7 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pelorus.faults.clocks import FRAMES_MIN, UNTOLD, TwoClocks, offset_of, two_clocks
-from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TILT, TURN, TURN_SCALE, Body, Fit
+from pelorus.faults.fit import (
+    CLOCK,
+    FOCAL,
+    LEVER,
+    SCALE,
+    TILT,
+    TURN,
+    TURN_SCALE,
+    Body,
+    Fit,
+    varies,
+)
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
@@ -68,13 +79,18 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     body, bias = _body(recording, seen)
     offset = offset_of(recording, body, seen, bias)
     by_imu = len(recording.inertial.t_ns) > 0
+    clock_told = by_imu or varies(body.design(recording, seen, offset, bias), CLOCK)
+    if not clock_told:
+        offset = 0.0
     if by_imu:
         seen = seen.with_focal(recording, views)
-    clocks = UNTOLD if by_imu else two_clocks(recording, seen, offset, bias)
+    clocks = two_clocks(recording, seen, offset, bias) if clock_told and not by_imu else UNTOLD
     at = offset
     if clocks.apart:  # all else is asked of motions that belong together
         body, at = TwistBody(recording, clocks.turns_late_s), clocks.ways_s
-    found = none = place = Fit(body.design(recording, seen, at, bias))
+    design = body.design(recording, seen, at, bias)
+    found = none = place = Fit(design)
+    turns_told = by_imu or varies(design, TURN_SCALE)
     if not by_imu:
         late = clocks.turns_late_s if clocks.apart else None
         place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
@@ -91,10 +107,10 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         place.x[lever],
         place.covariance[lever, lever],
         offset,
-        float(found.sigma[CLOCK]),
+        float(found.sigma[CLOCK]) if clock_told else float("inf"),
         float(np.median(np.linalg.norm(found.g, axis=1))),
         1 + float(found.x[TURN_SCALE]),
-        float(found.sigma[TURN_SCALE]),
+        float(found.sigma[TURN_SCALE]) if turns_told else float("inf"),
         1 - float(found.x[FOCAL]),
         float(found.sigma[FOCAL]) if by_imu else float("inf"),
         tilt_rad=tilt[0],

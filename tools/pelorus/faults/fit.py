@@ -20,6 +20,7 @@ BLOCKS_MOST, BLOCK_FRAMES = 40, 10
 SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
 TURN_CLOCK = 19
 PARAMETERS = 20
+VARIES_SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,16 @@ class Design:
     variance: Floats  # what the images add
     prior: Floats  # (m, m), inverse variances
     g: Floats
+
+
+def varies(design: Design, which: int) -> bool:
+    """Whether an unknown's column and its instrument vary together by more than chance. Else, as on
+    a circle at an even speed, nothing is told of it: what varies is noise, and a weak instrument
+    takes least squares back to what noise makes of the unknown, with a small standard error.
+    """
+    x, z = (c[:, :, which] - c[:, :, which].mean(axis=0) for c in (design.X, design.Z))
+    together = np.sum(x * z, axis=1)
+    return bool(together.sum() > VARIES_SIGMAS * np.sqrt(np.sum(together**2)))
 
 
 class Body(Protocol):
