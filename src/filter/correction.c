@@ -18,7 +18,7 @@
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
-enum { IN_ESTIMATE = PLR_BASELINE }; /* the column of S that fills the second */
+enum { IN_ESTIMATE = PLR_BASELINE }; /* the column of the sensitivity that fills the second */
 
 /* All measurements of a correction, in their order. After those of its arguments come two of the
  * biases. */
@@ -35,7 +35,7 @@ typedef struct plr_batch {
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
                PLR_KERNEL_MARGIN]; /* packed upper triangle */
     plr_real y[PLR_BLOCK_ROWS];
-    plr_real y_of_S[PLR_CALIBRATIONS][PLR_BLOCK_ROWS]; /* the same of the columns of S */
+    plr_real y_of_S[PLR_CALIBRATIONS][PLR_BLOCK_ROWS]; /* the same of the sensitivity's columns */
     plr_real E[WIDE * PLR_BLOCK_ROWS];                 /* rows x 6: H W, then U^-T H W */
 } plr_batch;
 
@@ -88,8 +88,8 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
     }
 }
 
-/* A column of S is corrected as an estimate is of which the residual were -H_s: by how much the
- * error of the calibration changes what is predicted. */
+/* A column of the sensitivity (state/sensitivity.h) is corrected as dx is, with -H_s in the place of
+ * the residual: by how much the error of the calibration changes what is predicted. */
 static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, unsigned i,
                               const plr_rows *H, plr_batch *batch, unsigned first) {
     plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS] = {{0}}, column[PLR_ROWS];
@@ -104,7 +104,7 @@ static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, uns
     }
 }
 
-/* S += V y and eta += E^T y, of each column with its own y. */
+/* f->S += V y and eta += E^T y, of each column with its own y. */
 static void correct_sensitivity(plr_filter *f, plr_batch *batch) {
     plr_noise *noise = &f->work.noise;
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
@@ -158,8 +158,8 @@ static void add_noise_information(plr_noise *noise, const plr_batch *batch) {
     }
 }
 
-/* W -= V E, dx += V y and the same of a column of S, computed as eight rows of one product, [E, -y,
- * -y of S]. */
+/* W -= V E, dx += V y and the same of a column of the sensitivity, computed as eight rows of one
+ * product, [E, -y, -its y]. */
 static void update_estimate(plr_filter *f, plr_batch *batch) {
     plr_workspace *w = &f->work;
     plr_real *Wt = w->noise.Wt;
