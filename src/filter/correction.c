@@ -104,19 +104,26 @@ static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, uns
     }
 }
 
+/* eta += E^T y */
+static void project_on_noise(const plr_batch *batch, const plr_real *y,
+                             plr_real eta[PLR_POSE_DIM]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        for (unsigned r = 0; r < batch->rows; r++)
+            eta[k] = PLR_FMA(batch->E[WIDE * r + k], y[r], eta[k]);
+}
+
 /* f->S += V y and eta += E^T y, of each column with its own y. */
 static void correct_sensitivity(plr_filter *f, plr_batch *batch) {
     plr_noise *noise = &f->work.noise;
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        plr_real *y = batch->y_of_S[k], *eta = noise->eta_of_S[k];
+        plr_real *y = batch->y_of_S[k];
         if (!plr_considers(f, k))
             continue;
         plr_solve_upper_transposed(batch->rows, 1, batch->S, y, 1);
         if (!(noise->open && k == IN_ESTIMATE))
             plr_sensitivity_combine(f, k, batch->rows, y, f->work.Vt, batch->ld);
-        for (unsigned c = 0; noise->open && c < PLR_POSE_DIM; c++)
-            for (unsigned r = 0; r < batch->rows; r++)
-                eta[c] = PLR_FMA(batch->E[WIDE * r + c], y[r], eta[c]);
+        if (noise->open)
+            project_on_noise(batch, y, noise->eta_of_S[k]);
     }
 }
 
@@ -149,13 +156,11 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
  * W and y = U^-T (r - H dx). */
 static void add_noise_information(plr_noise *noise, const plr_batch *batch) {
     plr_real *Lambda = noise->Lambda;
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        for (unsigned r = 0; r < batch->rows; r++)
-            noise->eta[k] = PLR_FMA(batch->E[WIDE * r + k], batch->y[r], noise->eta[k]);
+    project_on_noise(batch, batch->y, noise->eta);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         for (unsigned l = k; l < PLR_POSE_DIM; l++, Lambda++)
             for (unsigned r = 0; r < batch->rows; r++)
                 *Lambda = PLR_FMA(batch->E[WIDE * r + k], batch->E[WIDE * r + l], *Lambda);
-    }
 }
 
 /* W -= V E, dx += V y and the same of a column of the sensitivity, computed as eight rows of one
