@@ -171,9 +171,12 @@ static plr_status reanchor(plr_session *s, plr_time_ns t_ns) {
     return status;
 }
 
+plr_time_ns plr_clock_max_gap_ns(const plr_session *s) {
+    return (plr_time_ns)(plr_filter_config(&s->filter)->max_gap_s * 1e9 + 0.5);
+}
+
 bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status) {
-    const double max_gap_s = plr_filter_config(&s->filter)->max_gap_s;
     return plr_clock_watch_note(&s->watch, t_ns, status, plr_filter_time(&s->filter),
-                                (plr_time_ns)(max_gap_s * 1e9 + 0.5)) &&
+                                plr_clock_max_gap_ns(s)) &&
            reanchor(s, t_ns) == PLR_OK;
 }

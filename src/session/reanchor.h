@@ -37,6 +37,9 @@ void plr_clock_watch_init(plr_clock_watch *watch);
 bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status status,
                           plr_time_ns filter_ns, plr_time_ns max_gap_ns);
 
+/* The setting max-gap: a time farther off is no pause, but another clock. */
+plr_time_ns plr_clock_max_gap_ns(const plr_session *s);
+
 /* After the filter answered data of time t_ns with that status: carries the estimate to t_ns, as
  * described above, if the new time is to be believed now. True if it did: the filter will accept
  * the same data. */

@@ -21,10 +21,6 @@ static plr_kind kind_of_steps(const plr_session *s) {
  * holes nearly everything looks wrong. */
 #define LATE_NS UINT64_C(1000000000)
 
-static plr_time_ns max_gap_ns(const plr_session *s) {
-    return (plr_time_ns)(plr_filter_config(&s->filter)->max_gap_s * 1e9 + 0.5);
-}
-
 /* --- late ones --- */
 
 void plr_steps_note_used(plr_session *s, plr_time_ns t_ns) {
@@ -50,7 +46,7 @@ static void note_late(plr_session *s, plr_time_ns t_ns) {
     const plr_time_ns needed_ns = behind_ns > order->ahead_ns ? behind_ns : order->ahead_ns;
     s->totals.late++;
     order->late_ns = order->used_ns;
-    if (needed_ns < 2 * order->told_ns || needed_ns > max_gap_ns(s))
+    if (needed_ns < 2 * order->told_ns || needed_ns > plr_clock_max_gap_ns(s))
         return;
     order->told_ns = needed_ns;
     plr_line_begin(line, PLR_SEVERITY_WARNING);
@@ -182,7 +178,7 @@ void plr_steps_apply_due(plr_session *s) {
 
 static void delay_step(plr_session *s, const plr_held_step *step) {
     plr_held_step due;
-    if (plr_held_contradicts(&s->held, step->t_ns, max_gap_ns(s)))
+    if (plr_held_contradicts(&s->held, step->t_ns, plr_clock_max_gap_ns(s)))
         plr_steps_apply_held(s, UINT64_MAX);
     if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
         s->totals.held_short++;
@@ -198,7 +194,7 @@ static void delay_step(plr_session *s, const plr_held_step *step) {
 static void note_time(plr_session *s, plr_time_ns t_ns) {
     plr_time_ns *newest_ns = &s->order.newest_ns;
     s->order.came = true;
-    if (t_ns > *newest_ns || *newest_ns - t_ns > max_gap_ns(s))
+    if (t_ns > *newest_ns || *newest_ns - t_ns > plr_clock_max_gap_ns(s))
         *newest_ns = t_ns;
 }
 
