@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Everyday faults put into a recording, each at three strengths; as a program it measures how many
-are named rightly, and how often a clean piece of a drive is called faulty; FIRST:LAST are seeds of
-tests/python/everyday.py, the last left out:
+are named rightly in the whole of it, as `pelorus check` looks at it, and how often a clean piece of
+it is called faulty; FIRST:LAST are seeds of tests/python/everyday.py, the last left out:
 
     python tests/python/injected.py DRIVE.plr... FIRST:LAST...
     python tests/python/injected.py --clean DRIVE.plr... FIRST:LAST...
@@ -20,6 +20,7 @@ from injected_known import Known
 from pelorus import se3, wire
 from pelorus.check.contents import recording_of
 from pelorus.faults.fault import Fault
+from pelorus.faults.handeye import first_part
 from pelorus.faults.named import faults_in, faults_of
 from pelorus.frames import Message, Stereo, Twist
 from pelorus.recording import Recording
@@ -293,11 +294,11 @@ def injections(recording: Recording) -> Iterator[tuple[str, int, Recording, tupl
             yield name, k, change(recording, k), due
 
 
-def piece(recording: Recording, first: int, most: int = PIECE) -> Recording:
+def piece(recording: Recording, first: int) -> Recording:
     """Some of the frames."""
     tracks = recording.tracks
-    rows = (tracks.frame >= first) & (tracks.frame < first + most)
-    t = recording.frame_t_ns[first : first + most]
+    rows = (tracks.frame >= first) & (tracks.frame < first + PIECE)
+    t = recording.frame_t_ns[first : first + PIECE]
     count = len(t)
     own = recording.inertial
     own = own.at((own.t_ns > t[0] - 10**9) & (own.t_ns < t[-1] + 10**9))
@@ -331,8 +332,10 @@ def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:
 def injected(name: str, recording: Recording) -> tuple[int, int, int]:
     """Of so many faults so many are named rightly, and so many others cannot be told."""
     right, asked, beyond = 0, 0, 0
+    recording = first_part(recording)
     known = Known.of(recording)
     own = {fault.name for fault in found_in(recording)}
+    print(name, "as it is:", *(own or ["clean"]), flush=True)
     for kind, k, wrong, due in injections(recording):
         said = faults_in(wrong)
         named = [fault.name for fault in said if fault.name not in own - set(due)]
@@ -352,7 +355,7 @@ def main(words: list[str]) -> None:
     sums = np.zeros(5, np.int64)
     for name, whole in recordings([word for word in words if word != "--clean"]):
         count, false = clean_pieces(name, whole)
-        faults = (0, 0, 0) if clean_only else injected(name, piece(whole, 0))
+        faults = (0, 0, 0) if clean_only else injected(name, whole)
         sums += (*faults, count, false)
         print(f"{name}: {faults[0]} of {faults[1]}, {false} of {count} clean", flush=True)
     right, asked, beyond, clean, false = sums.tolist()

@@ -17,6 +17,7 @@ from pelorus import wire
 from pelorus.check.contents import recording_of, write
 from pelorus.converters import matlab
 from pelorus.faults.fault import UNTOLD
+from pelorus.faults.handeye import SEEN_MOST, first_part
 from pelorus.faults.identity import Jumps
 from pelorus.faults.named import faults_of
 from pelorus.frames import Header, Kind, Stereo, Twist
@@ -99,6 +100,32 @@ def test_a_mirrored_axis_is_told_by_ways_and_turns_together() -> None:
     assert found_in(car) == []
     change, due = OF_RECORDINGS["mirrored"]
     assert found_in(change(car, 2))[0].name in due
+
+
+def test_a_scene_that_moves_is_told_before_no_fit() -> None:
+    """Two fifths of what a drone sees: nothing else fits then, and this is why."""
+    change, _ = OF_RECORDINGS["moving"]
+    said = found_in(change(everyday_drive(drawn(9101), 9101), 2))
+    assert [fault.name for fault in said] == ["moving"]
+    assert said[0].stops
+    assert "do not tell the same motion" in said[0].words
+
+
+def test_of_few_points_a_long_drive_is_looked_at() -> None:
+    """As many observations tell as much: a thousand frames of five are a sixth of the time."""
+    recording = everyday_drive(drawn(9101), 9101)
+    few = recording.tracks.id % 12 == 0
+    tracks = recording.tracks
+    thin = type(tracks)(301, tracks.frame[few], tracks.id[few], tracks.pixels[few])
+    assert first_part(replace(recording, tracks=thin)).tracks.frame_count == 301
+    many = np.repeat(np.arange(len(tracks)), 8)
+    numbers = np.tile(np.arange(8), len(tracks))
+    thick = type(tracks).from_rows(
+        301, tracks.frame[many], 8 * tracks.id[many] + numbers, tracks.pixels[many]
+    )
+    part = first_part(replace(recording, tracks=thick)).tracks
+    assert SEEN_MOST - 8 * 100 < len(part) <= SEEN_MOST
+    assert part.frame_count == part.frame.max() + 1 < 301
 
 
 def test_degrees_that_go_round_between_two_frames_are_degrees() -> None:

@@ -14,7 +14,7 @@ import pytest
 from converted import Run
 from everyday import drawn
 from everyday import drive as everyday_drive
-from pelorus.check import clock, scale, search, tuning
+from pelorus.check import clock, scale, search, tuning, verdict
 from pelorus.check.biases import WIDE
 from pelorus.check.contents import scaled
 from pelorus.check.options import Settings
@@ -153,3 +153,16 @@ def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
     told = found["settings"].get("baseline-sigma")
     assert told == (f"{share:.2g}" if error else None), "the covariances contain it"
     assert float(found["figures"]["NEES/6"]["after"]) < 3
+
+
+def test_what_a_drive_does_not_tell_is_no_figure_of_the_camera() -> None:
+    """Six seconds of a circle at an even speed: positions were off "by 81 % of the way"."""
+    doubt = scale.Doubt(0.9, 0.3, 0.05, 0.2, adds=100.0)
+    assert not doubt.setting
+    assert doubt.beyond == 0
+    (remark,) = verdict.of_scale(doubt)
+    assert remark.grade is verdict.Grade.CARE
+    assert "too short or too even" in remark.text
+    told = replace(doubt, sigma=0.05)
+    assert told.setting == {"baseline-sigma": "0.1"}
+    assert "too short" not in next(verdict.of_scale(told)).text

@@ -76,9 +76,16 @@ class Doubt:
         return float(np.hypot(self.scale - 1, self.sigma))
 
     @property
+    def is_untold(self) -> bool:
+        """Whether the drive tells nothing worth having: a figure of that size would say of the
+        camera what is only true of the drive.
+        """
+        return self.sigma > BASELINE_MOST
+
+    @property
     def beyond(self) -> float:
         """The same where it is more than what the filter says of its positions, else 0."""
-        return self.share if self.adds > ADDS else 0.0
+        return self.share if self.adds > ADDS and not self.is_untold else 0.0
 
     @property
     def setting(self) -> dict[str, str]:

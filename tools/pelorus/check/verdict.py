@@ -243,6 +243,14 @@ def of_scale(doubt: Doubt | None) -> Iterator[Remark]:
     """What is known of the stereo pair's scale is what the twists confirm."""
     if doubt is None:
         return
+    if doubt.is_untold:
+        yield Remark(
+            Grade.CARE,
+            "this drive is too short or too even to tell the scale of the stereo pair: positions "
+            "are as good as its calibration (baseline-sigma, focal-sigma). Drive for a minute, "
+            "with changing speed, and turn both ways",
+        )
+        return
     shown = f"the images show {doubt.scale:.3f} +- {doubt.sigma:.3f} times the twists' way"
     if not doubt.beyond:
         yield Remark(Grade.GOOD, f"{shown}: the filter's own doubt covers that")

@@ -24,7 +24,6 @@ from pelorus.faults.fit import (
     TURN_SCALE,
     Body,
     Fit,
-    varies,
 )
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
@@ -45,7 +44,7 @@ class Agreement:
     """`scale` 1, `lever_m` 0 and `offset_s` 0 are due; sigmas stand beside them."""
 
     frames: int
-    scale: float
+    scale: float  # beside a bias
     scale_sigma: float
     through_zero: float  # the scale if there is no bias
     through_zero_sigma: float
@@ -79,7 +78,7 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     body, bias = _body(recording, seen)
     offset = offset_of(recording, body, seen, bias)
     by_imu = len(recording.inertial.t_ns) > 0
-    clock_told = by_imu or varies(body.design(recording, seen, offset, bias), CLOCK)
+    clock_told = by_imu or Fit(body.design(recording, seen, offset, bias)).tells(CLOCK)
     if not clock_told:
         offset = 0.0
     if by_imu:
@@ -90,25 +89,31 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         body, at = TwistBody(recording, clocks.turns_late_s), clocks.ways_s
     design = body.design(recording, seen, at, bias)
     found = none = place = Fit(design)
-    turns_told = by_imu or varies(design, TURN_SCALE)
+    turns_told = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
         late = clocks.turns_late_s if clocks.apart else None
         place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
         none = Fit(body.design(recording, seen, at, NO_BIAS_MPS))
+    speed = float(np.median(np.linalg.norm(found.g, axis=1)))
+    scale, sigma = float(found.x[SCALE]), _sigma(found, by_imu)
+    if not (by_imu or found.tells(SCALE)):  # then the bias is what is known of it beforehand
+        scale, sigma = float(none.x[SCALE]), float(np.hypot(none.sigma[SCALE], bias / speed))
     doubt = _doubt_by_depth(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS))
+    if not by_imu:
+        doubt = float(np.hypot(doubt, _doubt_by_noise(recording, views, body, at, none)))
     lever = slice(LEVER, LEVER + 3)
     tilt = (None, None) if by_imu else _tilt(found)
     return Agreement(
         found.frames,
-        1 + float(found.x[SCALE]),
-        float(np.hypot(_sigma(found, by_imu), doubt)),
+        1 + scale,
+        float(np.hypot(sigma, doubt)),
         1 + float(none.x[SCALE]),
         float(np.hypot(none.sigma[SCALE], doubt)),
         place.x[lever],
         place.covariance[lever, lever],
         offset,
         float(found.sigma[CLOCK]) if clock_told else float("inf"),
-        float(np.median(np.linalg.norm(found.g, axis=1))),
+        speed,
         1 + float(found.x[TURN_SCALE]),
         float(found.sigma[TURN_SCALE]) if turns_told else float("inf"),
         1 - float(found.x[FOCAL]),
@@ -165,6 +170,26 @@ def _doubt_by_depth(
     (near, near_sigma), (far, far_sigma) = halves
     excess = (near - far) ** 2 - CHANCE**2 * (near_sigma**2 + far_sigma**2)
     return float(np.sqrt(max(excess, 0.0)) / 2)
+
+
+def _doubt_by_noise(
+    recording: Recording, views: TwoViews, body: Body, offset_s: float, fit: Fit
+) -> float:
+    """How much another scale pixels of twice the variance show, beyond what chance makes: about as
+    much the noise that is there has changed it (Cook and Stefanski 1994). Of points whose
+    disparity is hardly more than its noise every way comes out too short. `fit` is as it is,
+    without a bias.
+    """
+    tracks = recording.tracks
+    more = np.random.default_rng(1).normal(0, views.sigma_px, tracks.pixels.shape)
+    noisy = replace(tracks, pixels=tracks.pixels + more)
+    seen = Seen.of(recording, two_views(noisy, recording.header.camera, views.lag))
+    if seen.usable.sum() < FRAMES_MIN:
+        return 0.0
+    other = Fit(body.design(recording, seen, offset_s, NO_BIAS_MPS))
+    change = other.x[SCALE] - fit.x[SCALE]
+    excess = change**2 - CHANCE**2 * other.image_sigma[SCALE] ** 2
+    return float(np.sqrt(max(excess, 0.0)))
 
 
 def by_depth(tracks: Tracks) -> tuple[Tracks, Tracks]:

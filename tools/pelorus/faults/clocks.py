@@ -26,7 +26,7 @@ ROUNDS, STEP_S, FOUND_S = 10, 0.05, 2e-4
 APART_SIGMAS, APART_S = 6.0, 0.03
 # Below, a clock of the turns' own is not followed: it may be chance, and where velocities hardly
 # vary each step finds a little of the same chance again.
-WORTH_SIGMAS = 3.0
+WORTH_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ BLOCKS_MOST, BLOCK_FRAMES = 40, 10
 SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
 TURN_CLOCK = 19
 PARAMETERS = 20
-VARIES_SIGMAS = 3.0
+TELLS_SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
@@ -35,16 +35,6 @@ class Design:
     variance: Floats  # what the images add
     prior: Floats  # (m, m), inverse variances
     g: Floats
-
-
-def varies(design: Design, which: int) -> bool:
-    """Whether an unknown's column and its instrument vary together by more than chance. Else, as on
-    a circle at an even speed, nothing is told of it: what varies is noise, and a weak instrument
-    takes least squares back to what noise makes of the unknown, with a small standard error.
-    """
-    x, z = (c[:, :, which] - c[:, :, which].mean(axis=0) for c in (design.X, design.Z))
-    together = np.sum(x * z, axis=1)
-    return bool(together.sum() > VARIES_SIGMAS * np.sqrt(np.sum(together**2)))
 
 
 class Body(Protocol):
@@ -85,6 +75,7 @@ class Fit:
         np.add.at(sums, np.arange(count) * blocks // count, score)
         meat = sums.T @ sums * blocks / (blocks - 3)
         inverse = np.linalg.inv(A)
+        self._A, self._design, self._trust = A, design, trust
         self.x = np.asarray(x)
         self.cost = float(np.sum(np.log(spread)))
         self.covariance = inverse @ (meat + prior) @ inverse.T
@@ -93,6 +84,25 @@ class Fit:
         middle = np.einsum("nai,naj,na->ij", Z, Z, trust * shared, optimize=True)
         images = inverse @ middle @ inverse.T
         self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
+
+    def tells(self, which: int) -> bool:
+        """Whether an unknown's column and its instrument vary together by more than chance, by
+        themselves and beyond what the other unknowns explain of both. Else, as for the clock on a
+        circle at an even speed, or for the scale beside a bias, nothing is told of it: what varies
+        is noise, and a weak instrument takes least squares back to what noise makes of the unknown,
+        with a small standard error.
+        """
+        A, X, Z = self._A, self._design.X, self._design.Z
+        others = np.arange(len(A)) != which
+        of_x, of_z = -np.ones(len(A)), -np.ones(len(A))
+        of_x[others] = np.linalg.solve(A[np.ix_(others, others)], A[others, which])
+        of_z[others] = np.linalg.solve(A[np.ix_(others, others)].T, A[which, others])
+        x, z = (c[:, :, which] - c[:, :, which].mean(axis=0) for c in (X, Z))
+        alone, beyond = np.sum(x * z, axis=1), np.sum((X @ of_x) * (Z @ of_z) * self._trust, axis=1)
+        return all(
+            float(both.sum()) > TELLS_SIGMAS * float(np.linalg.norm(both))
+            for both in (alone, beyond)
+        )
 
 
 def beside(x: Floats, *lags: int) -> Floats:

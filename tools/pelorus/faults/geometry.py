@@ -51,6 +51,7 @@ PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 4.0  # where velocities and turns tell it tog
 SURE_SIGMAS = 4.0
 UNIT_NEAR = 0.15
 FAR_LAG = 3
+UNEXPLAINED = ("no-fit", "scene")
 MOVING_SHARE = 0.14
 MOVING_USUAL, MOVING_SIGMAS = 0.12, 2.3  # on roads 5 to 12 % drives, or is tracked so badly
 
@@ -71,9 +72,12 @@ def geometry(recording: Recording, views: TwoViews) -> Judged:
     by_imu = len(recording.inertial.t_ns) > 0
     ask = cache(lambda: agreement(recording, views))  # it takes longer than all the rest
     wrong = list(_of_imu(recording, views) if by_imu else _of_twists(recording, views, ask))
-    if wrong:
+    unexplained = [fault for fault in wrong if fault.name in UNEXPLAINED]
+    if wrong and not unexplained:
         return Judged(wrong)
-    moves = list(_moving(recording, views))
+    moves = list(_moving(recording, views, bool(unexplained)))
+    if wrong:  # what moves explains it
+        return Judged(moves or wrong)
     agreed = ask()
     if not agreed.told:
         return Judged(moves)
@@ -313,14 +317,16 @@ def moving_least(found: Moving) -> float:
     return max(MOVING_SHARE, MOVING_USUAL + by_chance)
 
 
-def _moving(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+def _moving(recording: Recording, views: TwoViews, misleads: bool) -> Iterator[Fault]:
+    """`misleads`: nothing else explains why camera and body do not tell one motion."""
     far = two_views(recording.tracks, recording.header.camera, FAR_LAG)
     found = moving(recording.tracks, views, far)
     if found.share > moving_least(found):
+        so = ": camera and body do not tell the same motion" if misleads else ""
         yield Fault(
             "moving",
             f"{found.share:.0%} of what is seen moves beside the rest ({found.tracks} tracks of "
-            "some length)",
-            stops=False,
-            grave=False,
+            f"some length){so}",
+            stops=misleads,
+            grave=misleads,
         )

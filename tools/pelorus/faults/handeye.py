@@ -23,7 +23,7 @@ from pelorus.layout import Floats
 from pelorus.motion import held
 from pelorus.recording import Recording
 
-FRAMES_MOST = 1000
+SEEN_MOST = 60_000  # observations: they take the time, be it many frames or many points
 POINTS_MIN = 6  # of a pair of frames
 ROUNDS = 10
 MOVES_MPS, TURNS_RADPS = 0.05, 0.01  # below, a velocity or a rate has no direction
@@ -61,11 +61,12 @@ class HandEye:
         return self.frames >= FRAMES_ENOUGH
 
 
-def first_part(recording: Recording, most: int = FRAMES_MOST) -> Recording:
-    """The beginning, that has frames enough."""
-    if recording.tracks.frame_count <= most:
-        return recording
+def first_part(recording: Recording) -> Recording:
+    """The beginning, as much as tells in a reasonable time."""
     tracks = recording.tracks
+    most = int(np.searchsorted(tracks.bounds(), SEEN_MOST, side="right")) - 1
+    if tracks.frame_count <= most:
+        return recording
     rows = tracks.frame < most
     short = type(tracks)(most, tracks.frame[rows], tracks.id[rows], tracks.pixels[rows])
     return replace(recording, tracks=short, frame_t_ns=recording.frame_t_ns[:most])

@@ -30,8 +30,9 @@ RIDGE = 1e-3  # keeps frames without observations solvable
 STEP_MAX = 1.0  # m and rad an iteration
 CHI2_3_MEDIAN = 2.366
 FAR_OFF = 50.0  # d^2 beyond which a point stays where the first view has it
-# Of (uL, v, disparity) with v the mean of both rows, for pixels of unit noise.
+# Of (uL, v, disparity) with v the mean of both rows, for pixels of unit noise; and its pivots.
 NOISE = np.array([[1.0, 0.0, 1.0], [0.0, 0.5, 0.0], [1.0, 0.0, 2.0]])
+PIVOTS = (1.0, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
@@ -118,14 +119,24 @@ def _linearised(camera: Camera, x: Floats, R: Floats, p: Floats) -> tuple[Floats
 
 
 def _inverse(S: Floats) -> Floats:
-    """Of symmetric (3, 3, n)."""
+    """Of symmetric (3, 3, n) that are NOISE and more: by L D L^T, whose pivots are no smaller than
+    those of NOISE. A point that is hardly known in depth makes S so large that rounding alone would
+    make them negative, and its d^2.
+    """
     (a, b, c), (_, d, e), (_, _, f) = S
-    C = np.empty_like(S)
-    C[0, 0], C[1, 1], C[2, 2] = d * f - e * e, a * f - c * c, a * d - b * b
-    C[0, 1] = C[1, 0] = c * e - b * f
-    C[0, 2] = C[2, 0] = b * e - c * d
-    C[1, 2] = C[2, 1] = b * c - a * e
-    return np.asarray(C / (a * C[0, 0] + b * C[0, 1] + c * C[0, 2]))
+    l10, l20 = b / a, c / a
+    p1 = np.maximum(d - l10 * b, PIVOTS[1])
+    l21 = (e - l20 * b) / p1
+    p2 = np.maximum(f - l20 * c - l21 * l21 * p1, PIVOTS[2])
+    m20 = l10 * l21 - l20  # of L^-1
+    W = np.empty_like(S)
+    W[2, 2] = 1 / p2
+    W[1, 2] = W[2, 1] = -l21 / p2
+    W[0, 2] = W[2, 0] = m20 / p2
+    W[1, 1] = 1 / p1 + l21 * l21 / p2
+    W[0, 1] = W[1, 0] = -l10 / p1 - l21 * m20 / p2
+    W[0, 0] = 1 / a + l10 * l10 / p1 + m20 * m20 / p2
+    return W
 
 
 def _apply(A: Floats, x: Floats) -> Floats:
@@ -160,7 +171,7 @@ class _Solver:
         noisy = np.einsum("ijn,jk->ikn", Jx, NOISE)
         e = self._second - h - _apply(Jx, self._first - self._x)
         W = _inverse(_product(noisy, Jx.swapaxes(0, 1)) + NOISE[:, :, None])
-        d2 = np.sum(e * _apply(W, e), axis=0)
+        d2 = np.maximum(np.sum(e * _apply(W, e), axis=0), 0.0)
         weight = 1 / (1 + d2 / (3 * (accepts * self.sigma) ** 2)) ** 2
         JW = _product(J.swapaxes(0, 1), W * weight)
         self.H = self._sums(_product(JW, J)) + RIDGE * np.eye(6)
