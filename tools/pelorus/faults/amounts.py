@@ -124,7 +124,8 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
         yield Fault(
             "scale",
             f"stereo and odometry disagree in scale: the images show {agreed.turn_scale:.3f} +- "
-            f"{turn_sigma:.3f} times the twists' turns. Focal length or the gyro's scale",
+            f"{turn_sigma:.3f} times the twists' turns. Focal length, a lens that is bent and not "
+            "known to be, or the gyro's scale",
             stops=abs(turn) > SCALE_WILD,
             grave=abs(turn) > SCALE_WILD,
         )
