@@ -4,40 +4,44 @@
 BLOCK_MAX = 254  # data bytes behind a code byte; the code 0xFF stands for a full block
 
 
+_CODE = [bytes((length,)) for length in range(256)]
+
+
 def encode(body: bytes) -> bytes:
     """Stuff `body`; the result holds no zero byte. The delimiter is not appended.
 
     A full block at the very end gets no empty block behind it; `decode` takes both forms.
     """
-    out = bytearray()
+    out: list[bytes] = []
     runs = body.split(b"\0")
     last = len(runs) - 1
     for number, run in enumerate(runs):
-        start = 0
-        while len(run) - start >= BLOCK_MAX:
-            out.append(0xFF)
-            out += run[start : start + BLOCK_MAX]
-            start += BLOCK_MAX
-        ends_with_full_block = number == last and start > 0 and start == len(run)
-        if not ends_with_full_block:
-            out.append(len(run) - start + 1)
-            out += run[start:]
-    return bytes(out)
+        if len(run) < BLOCK_MAX:
+            out += _CODE[len(run) + 1], run
+            continue
+        for start in range(0, len(run), BLOCK_MAX):
+            block = run[start : start + BLOCK_MAX]
+            out += _CODE[len(block) + 1], block
+        if len(block) == BLOCK_MAX and number < last:
+            out.append(_CODE[1])
+    return b"".join(out)
 
 
 def decode(stuffed: bytes) -> bytes | None:
     """Undo `encode`; None if `stuffed` is not valid COBS (a zero, or a block past the end)."""
     if not stuffed or 0 in stuffed:
         return None
-    out = bytearray()
+    out = bytearray(stuffed)  # each block's code becomes the zero before the block
+    behind_full = []
     at, end = 0, len(stuffed)
     while at < end:
-        code = stuffed[at]
-        behind = at + code
-        if behind > end:
-            return None
-        out += stuffed[at + 1 : behind]
-        at = behind
-        if code != 0xFF and at < end:
-            out.append(0)
-    return bytes(out)
+        code = out[at]
+        out[at] = 0
+        at += code
+        if code == 0xFF and at < end:
+            behind_full.append(at)
+    if at > end:
+        return None
+    for no_zero in reversed(behind_full):
+        del out[no_zero]
+    return bytes(out[1:])

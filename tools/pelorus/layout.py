@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby, islice
+from itertools import accumulate, groupby
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,14 @@ class _Run:
         self._sizes = (4, 8) if fields[0].type == "real" else (0,)  # of a real
         self._structs = {} if self.is_text else {n: _struct(fields, n) for n in self._sizes}
         self._shapes = [_shape(field) for field in fields]
+        ends = accumulate(field.count for field in fields)
+        self._places = [
+            (f, shape, end - f.count, end)
+            for f, shape, end in zip(fields, self._shapes, ends, strict=True)
+        ]
+        self._names = [field.name for field in fields]
+        self._numbers = all(not shape for shape in self._shapes)
+        self._limited = [f for f in fields if _shape(f) == () and (f.values or f.least is not None)]
 
     def pack(self, values: Mapping[str, Any]) -> bytes:
         return self._struct_for(values).pack(*self._flat(values))
@@ -74,15 +82,19 @@ class _Run:
         """Adds to the values; where the fields end."""
         numbers = self._struct_for(values)
         need(payload, at + numbers.size)
-        found = iter(numbers.unpack_from(payload, at))
-        for field, shape in zip(self.fields, self._shapes, strict=True):
-            if not shape:
-                values[field.name] = next(found)
-                _check(field, values[field.name])
-            elif field.type in FLOATS:
-                values[field.name] = np.array(list(islice(found, field.count))).reshape(shape)
-            else:
-                values[field.name] = tuple(islice(found, field.count))
+        found = numbers.unpack_from(payload, at)
+        if self._numbers:
+            values.update(zip(self._names, found, strict=True))
+        else:
+            for field, shape, begin, end in self._places:
+                if not shape:
+                    values[field.name] = found[begin]
+                elif field.type in FLOATS:
+                    values[field.name] = np.array(found[begin:end]).reshape(shape)
+                else:
+                    values[field.name] = found[begin:end]
+        for field in self._limited:
+            _check(field, values[field.name])
         return at + numbers.size
 
 

@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +151,10 @@ class Bench:
             answers = Path(folder) / "answers.plr"
             options = ["--quiet", *options_of(wanted | {"gate-d2": GATE_D2})]
             run_program(self._program, recording, [*options, "--out", str(answers)])
-            return outcome_of(wire.only(answers, (Kind.REPORT, Kind.POSE)), self._outlier_cost)
+            poses = wire.only(answers, Kind.POSE, backwards=True)
+            last = (m for m in poses if isinstance(m, Pose) and m.after_stereo)
+            told = chain(wire.only(answers, Kind.REPORT), islice(last, 1))
+            return outcome_of(told, self._outlier_cost)
 
 
 def _by_offset(settings: Settings) -> Settings:
