@@ -190,24 +190,28 @@ def test_camera_info_of_raw_pictures_rectifies_them(
 
 
 def test_pictures_that_are_rectified_have_the_camera_of_p(tmp_path: Path, pelorus: Run) -> None:
+    """Packed ones, too; and their camera_info may have any name, if it is beside them or named."""
     recorder = with_odometry(Recorder())
     blobs = np.random.default_rng(1).uniform(0, 255, (240, 500)).astype(np.uint8)
     scene = cv2.GaussianBlur(blobs, (0, 0), 2)
     for k, t_ns in enumerate(Scene().t_ns):
-        recorder.image("/cam/left/image_rect", t_ns, scene[:, 50 + k : 370 + k].copy())
-        recorder.image("/cam/right/image_rect", t_ns, scene[:, 60 + k : 380 + k].copy())
+        for side, shift in (("left", 50 + k), ("right", 60 + k)):
+            packed = cv2.imencode(".png", scene[:, shift : shift + 320])[1].tobytes()
+            recorder.compressed(f"/cam/{side}/image_rect/compressed", t_ns, packed)
     P = np.array([[250.0, 0, 160, 0], [0, 250, 120, 0], [0, 0, 1, 0]])
-    for side, shift in (("left", 0.0), ("right", -25.0)):
-        P[0, 3] = shift
+    infos = {"/cam/left/angaben": 0.0, "/others/right": -25.0}
+    for topic, by_baseline in infos.items():
+        P[0, 3] = by_baseline
         matrices = {"K": 9 * np.eye(3), "D": np.ones(5), "R": np.eye(3), "P": P}
-        recorder.camera_info(
-            f"/cam/{side}/camera_info", (320, 240), distortion_model="plumb_bob", **matrices
-        )
+        recorder.camera_info(topic, (320, 240), distortion_model="plumb_bob", **matrices)
     body = tmp_path / "body.json"
     body.write_text('{"R_CB": [[1,0,0],[0,1,0],[0,0,1]], "t_CB_m": [0, 0, 0]}')
     target = tmp_path / "out.plr"
     bag = written(recorder, tmp_path, "mcap")
-    outcome = pelorus("convert", "ros", bag, target, "--extrinsic", body, "--fix", "none")
+    words = ("--extrinsic", body, "--fix", "none")
+    assert "--right-info-topic" in pelorus("convert", "ros", bag, target, *words).err
+    words = (*words, "--right-info-topic", "/others/right")
+    outcome = pelorus("convert", "ros", bag, target, *words)
     assert outcome.status == 0, outcome.err
     camera, stereos = messages_of(target, Header)[0].camera, messages_of(target, Stereo)
     assert (camera.fx_px, camera.cx_px, camera.cy_px) == (250, 160, 120)
@@ -307,7 +311,7 @@ def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
         ((), "which topics are the left and the right camera? --left-topic and --right-topic"),
         (
             ("--left-topic", "/cam0/image_raw", "--right-topic", "/cam1/image_raw"),
-            "has no two topics of sensor_msgs/msg/CameraInfo for its cameras; --calibration FILE",
+            "which topics of sensor_msgs/msg/CameraInfo are the cameras'? --left-info-topic",
         ),
         ((*given, "--truth-topic", "/odom"), "what moves the body? 0 topics hold twists"),
         ((*given, "--pair-within", "0.5"), "0 have one of the 6 of /cam1/image_raw within 0.5"),

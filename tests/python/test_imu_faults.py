@@ -14,7 +14,9 @@ from imu_drives import NOISY, npz_arrays, options, written
 from injected import OF_IMU
 from pelorus.faults.mend import held_to_fit
 from pelorus.faults.named import faults_in
+from pelorus.layout import Floats
 from pelorus.recording import Recording
+from pelorus.simulation import drive as way
 from pelorus.simulation.simulate import Simulation, simulate
 
 
@@ -69,6 +71,28 @@ def test_degrees_are_named_though_they_go_round_between_two_frames() -> None:
     change, due = OF_IMU["degrees"]
     assert faults_in(turning.recording) == []
     assert faults_in(change(turning.recording, 0))[0].name in due
+
+
+def test_a_level_floor_is_no_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gyro's noise is all there is about two axes, and gravity all there is along one. Least
+    squares took the noise for turns that the images do not show, and nothing fitted.
+    """
+
+    rolling, uneven = way.profile_at, way.profile_slope
+
+    def level(t: Floats, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
+        v, w = rolling(t, speed_mps, lap_s)
+        return v * [1, 0, 0], w * [0, 0, 1]
+
+    def slope(t: Floats, speed_mps: float) -> Floats:
+        return uneven(t, speed_mps) * [1, 0, 0]
+
+    monkeypatch.setattr(way, "profile_at", level)
+    monkeypatch.setattr(way, "profile_slope", slope)
+    drive = simulate(options(NOISY, seed=3, duration_s=20.0, pixel_sigma_px=0.1)).recording
+    assert not any(fault.stops for fault in faults_in(drive))
+    change, due = OF_IMU["axes"]
+    assert faults_in(change(drive, 0))[0].name in due
 
 
 def test_forces_that_are_no_motions_fit_nothing(drive: Recording) -> None:

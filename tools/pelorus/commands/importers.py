@@ -151,6 +151,10 @@ def _ros(
     target: Path = own.TARGET,
     left_topic: str = typer.Option("", help="Pictures; else of the calibration, or called left."),
     right_topic: str = typer.Option("", help="Likewise, of the right camera."),
+    left_info_topic: str = typer.Option(
+        "", help="CameraInfo of the left camera; else the one beside its pictures."
+    ),
+    right_info_topic: str = typer.Option("", help="Likewise, of the right camera."),
     pair_within: float = typer.Option(
         2.0, metavar="MS", help="Pictures of a pair may be so far apart in time."
     ),
@@ -179,7 +183,14 @@ def _ros(
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
     topics = ros.Topics(
-        Cameras(left_topic, right_topic, tracks_topic, round(pair_within * 1e6)),
+        Cameras(
+            left_topic,
+            right_topic,
+            tracks_topic,
+            round(pair_within * 1e6),
+            left_info_topic,
+            right_info_topic,
+        ),
         twist_topic,
         gyro_topic,
         imu_topic,

@@ -88,8 +88,9 @@ def _calibrated(bag: Bag, cameras: Cameras, asked: Asked) -> tuple[Calibrated, C
     rig = ros_frames.camera_info_rig(bag, cameras)
     if rig is None:
         raise PelorusError(
-            f"{bag.path}: has no two topics of {CAMERA_INFO} for its cameras; --calibration FILE "
-            f"is due (Kalibr's camchain, OpenCV's stereo YAML, or JSON); {bag.listing()}"
+            f"{bag.path}: which topics of {CAMERA_INFO} are the cameras'? --left-info-topic and "
+            f"--right-info-topic are due, or --calibration FILE (Kalibr's camchain, OpenCV's "
+            f"stereo YAML, or JSON); {bag.listing()}"
         )
     return rig_files.of_rig(rig, name, asked.extrinsic), cameras
 

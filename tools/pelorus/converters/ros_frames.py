@@ -68,6 +68,8 @@ class Cameras:
     right: str = ""
     tracks: str = ""
     apart_ns: int = 2_000_000
+    left_info: str = ""
+    right_info: str = ""
 
 
 def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Cameras:
@@ -271,12 +273,15 @@ def _lenses(calibrated: Calibrated) -> tuple[Lens, Lens]:
 
 
 def camera_info_rig(bag: Bag, cameras: Cameras) -> Rig | None:
-    """Of the first camera_info beside each picture topic; None where there are not two."""
-    beside = [_info_topic(bag, topic) for topic in (cameras.left, cameras.right)]
+    """Of the first camera_info of each picture topic; None where there are not two."""
+    named = (cameras.left, cameras.left_info), (cameras.right, cameras.right_info)
+    beside = [
+        bag.require(info, CAMERA_INFO) if info else _info_topic(bag, topic) for topic, info in named
+    ]
     if not all(beside):
         return None
     infos = [next(bag.messages([topic])).message for topic in beside]
-    rectified = "rect" in cameras.left.rpartition("/")[2]
+    rectified = "rect" in cameras.left.removesuffix("/compressed").rpartition("/")[2]
     left, right = (_lens(bag, *pair, rectified) for pair in zip(beside, infos, strict=True))
     P = np.reshape(_numbers(infos[1], "p"), (3, 4))
     turns = [np.reshape(_numbers(info, "r"), (3, 3)) for info in infos]
@@ -288,11 +293,16 @@ def camera_info_rig(bag: Bag, cameras: Cameras) -> Rig | None:
 
 
 def _info_topic(bag: Bag, topic: str) -> str:
-    """/left/camera_info for /left/image_raw, or for /left/image_raw/compressed."""
-    there = bag.of_type(CAMERA_INFO)
+    """/left/camera_info, or another one alone there, for /left/image_raw(/compressed)."""
     parts = topic.split("/")
-    beside = ("/".join([*parts[:k], "camera_info"]) for k in range(len(parts) - 1, 0, -1))
-    return next((name for name in beside if name in there), "")
+    for k in range(len(parts) - 1, 0, -1):
+        folder = "/".join([*parts[:k], ""])
+        beside = [t for t in bag.of_type(CAMERA_INFO) if t.rpartition("/")[0] + "/" == folder]
+        if folder + "camera_info" in beside:
+            return folder + "camera_info"
+        if len(beside) == 1:
+            return beside[0]
+    return ""
 
 
 def _numbers(info: Any, name: str) -> list[float]:

@@ -69,21 +69,27 @@ class Fit:
             extra = np.maximum(spread - np.median(variance, axis=0), 0) + 1e-10
             d2 = np.sum(left**2 / (variance + extra), axis=1) / y.shape[1]
             weight = 1 / (1 + d2 / 9) ** 2
-        score = np.einsum("nai,na,na->ni", Z, left, trust)
-        blocks = int(np.clip(count // BLOCK_FRAMES, 8, blocks_most))
-        sums = np.zeros((blocks, X.shape[2]))
-        np.add.at(sums, np.arange(count) * blocks // count, score)
-        meat = sums.T @ sums * blocks / (blocks - 3)
         inverse = np.linalg.inv(A)
-        self._A, self._design, self._trust = A, design, trust
+        self._A, self._inverse, self._design, self._trust = A, inverse, design, trust
+        self._blocks_most = blocks_most
         self.x = np.asarray(x)
         self.cost = float(np.sum(np.log(spread)))
-        self.covariance = inverse @ (meat + prior) @ inverse.T
+        self.covariance = self.covariance_of(left) + inverse @ prior @ inverse.T
         self.sigma = np.sqrt(np.diagonal(self.covariance))
         shared = variance / (variance + extra)  # of the variance what the images add
         middle = np.einsum("nai,naj,na->ij", Z, Z, trust * shared, optimize=True)
         images = inverse @ middle @ inverse.T
         self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
+
+    def covariance_of(self, left: Floats) -> Floats:
+        """Of the unknowns, by what residuals (k, a) leave in blocks of the drive."""
+        count = len(left)
+        score = np.einsum("nai,na,na->ni", self._design.Z, left, self._trust)
+        blocks = int(np.clip(count // BLOCK_FRAMES, 8, self._blocks_most))
+        sums = np.zeros((blocks, self._design.Z.shape[2]))
+        np.add.at(sums, np.arange(count) * blocks // count, score)
+        meat = sums.T @ sums * blocks / (blocks - 3)
+        return np.asarray(self._inverse @ meat @ self._inverse.T)
 
     def tells(self, which: int) -> bool:
         """Whether an unknown's column and its instrument vary together by more than chance, by

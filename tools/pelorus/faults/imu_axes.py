@@ -14,15 +14,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus import se3
 from pelorus.faults.axes import ways
 from pelorus.faults.fit import Design, Fit
-from pelorus.faults.force import by_images, force
+from pelorus.faults.force import by_images, force, mean_rates
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
+from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
@@ -32,6 +35,7 @@ DOUBT = 0.03  # by which an entry of a matrix may be off besides, of its scale
 FREE_SCALE = 0.25  # calibrations are off by less; what is off so little is judged elsewhere
 OFFSETS_S = np.arange(-10, 11) * 0.04
 OFFSET_SURE = 0.05  # of the cost, by which another offset must be better than none
+NOISE_MOST = 0.5  # of what the images show: more than that is no measurement
 LEVER_M, BIAS_MPS2, MATRIX = 3.0, 1.0, 1e3
 BLOCKS = 20
 ROUNDS = 8
@@ -74,6 +78,13 @@ class Matrix:
         return float(m @ np.linalg.solve(self.covariance, m)) > LIMIT
 
 
+class Found(NamedTuple):
+    """The fit, and what of it is the matrix."""
+
+    fit: Fit
+    matrix: Matrix
+
+
 @dataclass(frozen=True)
 class Explained:
     """What is due if this is the fault."""
@@ -109,24 +120,39 @@ def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None
     fits = {offset: fit for offset, fit in at_offsets.items() if fit is not None}
     if not fits:
         return None
-    offset = min(fits, key=lambda s: fits[s].cost)
-    if 0.0 in fits and fits[0.0].cost - fits[offset].cost < OFFSET_SURE * 3:
+    offset = min(fits, key=lambda s: fits[s].fit.cost)
+    if 0.0 in fits and fits[0.0].fit.cost - fits[offset].fit.cost < OFFSET_SURE * 3:
         offset = 0.0
-    turn_fit = fits[offset]
-    turn = _matrix(turn_fit)
-    told = body.force(t_ns, offset)
+    turn_fit, turn = fits[offset]
+    frame_s = body.frame_s(t_ns, offset)
     if turn.held_against(np.eye(3)) > 0.5 * LIMIT:
-        frame_s = body.frame_s(t_ns, offset)
         turns = np.where(seen.usable[:, None], seen.rates[:, 3:] * seen.tau_s[:, None], 0.0)
-        told = force(body.readings, by_images(body.readings, frame_s, turns), frame_s)
-    stretches = told.of_stretches()
+        attitudes = by_images(body.readings, frame_s, turns)
+    else:
+        attitudes = body.attitudes
+    told = [
+        force(body.readings.at(half), attitudes[half], frame_s) for half in _halves(body.readings)
+    ]
+    stretches = told[0].of_stretches()
     arm = se3.skew(_turns_without_noise(body.mean_turns(t_ns, offset), turn_fit))
-    nine = told.of_force.reshape(-1, 3, 9)
-    X = np.concatenate((nine, told.of_bias, arm, stretches), axis=2)
-    good = seen.usable & np.isfinite(told.turn).all(axis=1) & np.isfinite(X).all(axis=(1, 2))
+    X = np.stack(
+        [
+            np.concatenate((half.of_force.reshape(-1, 3, 9), half.of_bias, arm, stretches), axis=2)
+            for half in told
+        ]
+    )
+    good = seen.usable & np.isfinite(told[0].turn).all(axis=1) & np.isfinite(X).all(axis=(0, 2, 3))
     beside = [BIAS_MPS2] * 3 + [LEVER_M] * 3 + [100.0] * stretches.shape[2]
-    fit = _fit(seen.rates[good, :3], X[good], seen.variance[good, :3], beside)
-    return Measured(turn, _matrix(fit))
+    fit = _fit(seen.rates[good, :3], X[:, good], seen.variance[good, :3], beside)
+    return Measured(turn, fit.matrix)
+
+
+def _halves(readings: Inertial) -> list[NDArray[np.intp]]:
+    """Every other reading, and the rest, both from the first to the last: they show the same
+    motion, with noises of their own.
+    """
+    ends = 0, len(readings.t_ns) - 1
+    return [np.union1d(ends, np.arange(k, ends[1], 2)) for k in (0, 1)]
 
 
 def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
@@ -134,25 +160,34 @@ def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
     return np.asarray(w @ fit.x[:9].reshape(3, 3).T + fit.x[9:])
 
 
-def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Fit | None:
-    w = body.mean_turns(frame_t_ns, offset_s)
-    good = seen.usable & np.isfinite(w).all(axis=1)
+def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Found | None:
+    frame_s = body.frame_s(frame_t_ns, offset_s)
+    w = np.stack([mean_rates(body.readings.at(half), frame_s) for half in _halves(body.readings)])
+    good = seen.usable & np.isfinite(w).all(axis=(0, 2))
     if good.sum() < 0.5 * seen.usable.sum():
         return None
-    X = np.zeros((int(good.sum()), 3, 12))
+    X = np.zeros((2, int(good.sum()), 3, 12))
     for i in range(3):
-        X[:, i, 3 * i : 3 * i + 3] = w[good]
-        X[:, i, 9 + i] = 1
+        X[:, :, i, 3 * i : 3 * i + 3] = w[:, good]
+        X[:, :, i, 9 + i] = 1
     return _fit(seen.rates[good, 3:], X, seen.variance[good, 3:], [1.0] * 3)
 
 
-def _fit(y: Floats, X: Floats, variance: Floats, beside: list[float]) -> Fit:
+def _fit(y: Floats, of_halves: Floats, variance: Floats, beside: list[float]) -> Found:
+    """The one half of the readings is the other's instrument. By their own noise, where the drive
+    does not move them, least squares would find a matrix of 0, and be sure of it. Readings that are
+    nothing but noise are taken as they are: then 0 is what they show.
+    """
+    X, Z = of_halves
+    noise = np.sqrt(0.5) * (X - Z)[:, :, :9]
+    most = NOISE_MOST**2 * np.median(np.sum(y**2, axis=1))
+    if np.median(np.sum(noise**2, axis=(1, 2))) > most:
+        X = Z = 0.5 * (X + Z)
+        noise = noise[:, :, :0]
     prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
-    return Fit(Design(y, X, X, variance, prior, y), BLOCKS)
-
-
-def _matrix(fit: Fit) -> Matrix:
-    return Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9])
+    fit = Fit(Design(y, X, Z, variance, prior, y), BLOCKS)
+    covariance = sum((fit.covariance_of(part) for part in np.moveaxis(noise, 2, 0)), fit.covariance)
+    return Found(fit, Matrix(fit.x[:9].reshape(3, 3), covariance[:9, :9]))
 
 
 # --- what explains it -----------------------------------------------------------------------------

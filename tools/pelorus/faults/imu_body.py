@@ -46,7 +46,7 @@ class ImuBody:
 
     def __init__(self, recording: Recording, seen: Seen) -> None:
         self.readings = thinned(_until(recording))
-        self._R = by_gyro(self.readings, np.zeros(3))
+        self.attitudes = by_gyro(self.readings, np.zeros(3))
         self._set_bias(recording.frame_t_ns, seen)
 
     def _set_bias(self, frame_t_ns: NDArray[np.int64], seen: Seen) -> None:
@@ -54,18 +54,18 @@ class ImuBody:
         off = self.turns(frame_t_ns, 0.0) - seen.rates[:, 3:]
         bias = np.nanmedian(off[seen.usable], axis=0)
         if np.isfinite(bias).all():
-            self._R = by_gyro(self.readings, bias)
+            self.attitudes = by_gyro(self.readings, bias)
 
     def force(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Force:
         """If the frames were later by so much."""
-        return force(self.readings, self._R, self.frame_s(frame_t_ns, offset_s))
+        return force(self.readings, self.attitudes, self.frame_s(frame_t_ns, offset_s))
 
     def frame_s(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
         return np.asarray((frame_t_ns - self.readings.t_ns[0]) * 1e-9 + offset_s)
 
     def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
         """As fit.Body."""
-        return rates_of_turn(self.readings, self._R, self.frame_s(frame_t_ns, offset_s))
+        return rates_of_turn(self.readings, self.attitudes, self.frame_s(frame_t_ns, offset_s))
 
     def mean_turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
         """(k, 3) the readings' own means from frame to frame: `turns` but for the order of turns,
