@@ -210,8 +210,8 @@ def test_pictures_that_are_rectified_have_the_camera_of_p(tmp_path: Path, peloru
     bag = written(recorder, tmp_path, "mcap")
     words = ("--extrinsic", body, "--fix", "none")
     assert "--right-info-topic" in pelorus("convert", "ros", bag, target, *words).err
-    words = (*words, "--right-info-topic", "/others/right")
-    outcome = pelorus("convert", "ros", bag, target, *words)
+    named = (*words, "--right-info-topic", "/others/right")
+    outcome = pelorus("convert", "ros", bag, target, *named)
     assert outcome.status == 0, outcome.err
     camera, stereos = messages_of(target, Header)[0].camera, messages_of(target, Stereo)
     assert (camera.fx_px, camera.cx_px, camera.cy_px) == (250, 160, 120)
