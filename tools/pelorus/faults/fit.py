@@ -60,10 +60,12 @@ class Fit:
         count = len(y)
         extra: Floats = np.median(y**2, axis=0)
         weight = np.ones(count)
+        X_rows, Z_rows = (c.reshape(-1, c.shape[2]) for c in (X, Z))
         for _ in range(ROUNDS):
             trust = weight[:, None] / (variance + extra)
-            A = np.einsum("nai,naj,na->ij", Z, X, trust, optimize=True) + prior
-            x = np.linalg.solve(A, np.einsum("nai,na,na->i", Z, y, trust))
+            trusted = Z_rows * trust.reshape(-1, 1)
+            A = trusted.T @ X_rows + prior
+            x = np.linalg.solve(A, trusted.T @ y.ravel())
             left = y - X @ x
             spread = 2.198 * np.median(left**2, axis=0)  # of a normal distribution the variance
             extra = np.maximum(spread - np.median(variance, axis=0), 0) + 1e-10
@@ -77,14 +79,14 @@ class Fit:
         self.covariance = self.covariance_of(left) + inverse @ prior @ inverse.T
         self.sigma = np.sqrt(np.diagonal(self.covariance))
         shared = variance / (variance + extra)  # of the variance what the images add
-        middle = np.einsum("nai,naj,na->ij", Z, Z, trust * shared, optimize=True)
+        middle = (trusted * shared.reshape(-1, 1)).T @ Z_rows
         images = inverse @ middle @ inverse.T
         self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
 
     def covariance_of(self, left: Floats) -> Floats:
         """Of the unknowns, by what residuals (k, a) leave in blocks of the drive."""
         count = len(left)
-        score = np.einsum("nai,na,na->ni", self._design.Z, left, self._trust)
+        score = (self._design.Z * (left * self._trust)[..., None]).sum(axis=1)
         blocks = int(np.clip(count // BLOCK_FRAMES, 8, self._blocks_most))
         sums = np.zeros((blocks, self._design.Z.shape[2]))
         np.add.at(sums, np.arange(count) * blocks // count, score)
