@@ -38,13 +38,20 @@ def nearest(t_ns: Times, wanted_t_ns: Times) -> NDArray[np.intp]:
 
 
 def chain(motions: Poses, first: Poses | None = None) -> Poses:
-    """T_0, T_0 D_0, T_0 D_0 D_1, ...: n motions give n + 1 poses. T_0 is identity by default."""
+    """T_0, T_0 D_0, T_0 D_0 D_1, ...: n motions give n + 1 poses. T_0 is identity by default.
+
+    By plain numbers, in a fixed order of operations: numpy takes ten times as long over so few.
+    """
     count = len(motions.p) + 1
     R, p = np.empty((count, 3, 3)), np.empty((count, 3))
     R[0], p[0] = (np.eye(3), np.zeros(3)) if first is None else first
+    rows, place = R[0].tolist(), p[0].tolist()
     for k in range(count - 1):
-        p[k + 1] = p[k] + R[k] @ motions.p[k]
-        R[k + 1] = R[k] @ motions.R[k]
+        u, v, w = motions.p[k].tolist()
+        columns = motions.R[k].T.tolist()
+        place = [at + (a * u + b * v + c * w) for at, (a, b, c) in zip(place, rows, strict=True)]
+        rows = [[a * x + b * y + c * z for x, y, z in columns] for a, b, c in rows]
+        R[k + 1], p[k + 1] = rows, place
     return Poses(R, p)
 
 

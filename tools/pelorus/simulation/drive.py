@@ -18,8 +18,9 @@ from pelorus.simulation.settings import Span
 SERIES_TERMS = 9  # of the exponential map: exact to rounding up to 1 rad a step
 TURN_MAX_RAD = 1.0
 
-FIRST_R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a quarter turn left
-FIRST_P_M = np.array([10.0, -5.0, 1.0])  # not the origin: a mistaken world frame would show
+FIRST = Poses(  # a quarter turn left; not the origin: a mistaken world frame would show
+    np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([10.0, -5.0, 1.0])
+)
 
 
 class Drive(NamedTuple):
@@ -45,14 +46,14 @@ def drive(
         v, w = np.where(rests, 0.0, v), np.where(rests, 0.0, w)
     tau = (np.diff(t_ns) * 1e-9)[:, None]
     steps = exp(tau * motion.held(v, timing), tau * motion.held(w, timing))
-    return Drive(t_ns, v, w, chain(steps))
+    return Drive(t_ns, v, w, motion.chain(steps, FIRST))
 
 
 def stood(t_ns: Times) -> Drive:
     """At the first pose for ever."""
     still: Floats = np.zeros((len(t_ns), 3))
-    R = np.broadcast_to(FIRST_R, (len(t_ns), 3, 3))
-    return Drive(t_ns, still, still, Poses(R, np.broadcast_to(FIRST_P_M, still.shape)))
+    R = np.broadcast_to(FIRST.R, (len(t_ns), 3, 3))
+    return Drive(t_ns, still, still, Poses(R, np.broadcast_to(FIRST.p, still.shape)))
 
 
 def profile(t_ns: Times, speed_mps: float, lap_s: float) -> tuple[Floats, Floats]:
@@ -126,14 +127,3 @@ def rotate(R: Floats, x: Floats) -> Floats:
         + R[..., :, 1] * x[..., None, 1]
         + (R[..., :, 2] * x[..., None, 2])
     )
-
-
-def chain(steps: Poses) -> Poses:
-    """The first pose, and each step after it."""
-    count = len(steps.p) + 1
-    R, p = np.empty((count, 3, 3)), np.empty((count, 3))
-    R[0], p[0] = FIRST_R, FIRST_P_M
-    for k in range(count - 1):
-        p[k + 1] = p[k] + rotate(R[k], steps.p[k])
-        R[k + 1] = rotate(R[k][None], steps.R[k].T).T
-    return Poses(R, p)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.motion import Times, chain
 from pelorus.se3 import Poses
 from pelorus.simulation import drive
 from pelorus.simulation.drive import rotate
@@ -80,7 +80,7 @@ def poses(t_ns: Times, way: Way) -> Poses:
     # the commutator of the twists at the second and at the first evaluation
     rho = half * (v1 + v2) - bracket * (_cross(w2, v1) - _cross(w1, v2))
     theta = half * (w1 + w2) - bracket * _cross(w2, w1)
-    return drive.chain(drive.exp(rho, theta))
+    return chain(drive.exp(rho, theta), drive.FIRST)
 
 
 def specific_force(t_ns: Times, way: Way, R_WB: Floats, gravity: float) -> Floats:
