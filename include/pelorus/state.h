@@ -198,14 +198,15 @@ typedef struct plr_consistency {
         [PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
     plr_real frozen_variance[PLR_POSE_DIM]; /* its variance */
     plr_real matched, gated, nis, nis_dof;  /* sums over frames, older ones weighted less */
-    uint16_t agreeing_frames;               /* successive frames in agreement */
     plr_real excess;                        /* |L^-1 n|^2 of frames that contradicted the twists by
                                               themselves, older ones weighted less */
+    uint16_t agreeing_frames;               /* successive frames in agreement */
     uint16_t contradicting_frames;          /* successive frames with a large contradiction */
     uint16_t small_frames;                  /* successive frames with a small difference */
     uint8_t contradicted;                   /* 1: the twists are given less weight */
     uint8_t drifting;                       /* 1: over many frames the difference exceeds noise */
     uint8_t frozen;                         /* 1: this frame's picture equals the one before */
+    uint8_t biases_kept;                    /* 1: frames teach the biases of twists nothing */
     /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
     uint8_t settling_frames;
 } plr_consistency;

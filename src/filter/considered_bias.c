@@ -16,7 +16,7 @@ static bool may_be_considered(const plr_filter *f) {
 }
 
 void plr_bias_consider(const plr_filter *f, bool outright, plr_considered_bias *before) {
-    before->considered = (f->consistency.contradicted || outright) && may_be_considered(f);
+    before->considered = (f->consistency.biases_kept || outright) && may_be_considered(f);
     if (!before->considered)
         return;
     before->seconds = f->motion.seconds;

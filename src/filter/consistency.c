@@ -16,9 +16,10 @@
 enum {
     FAST_WINDOWS = 2,     /* windows that decide whether the twists get less weight */
     AGREEING_FRAMES = 15, /* successive frames in agreement that end any doubt */
-    FEW = 3,              /* points */
-    FROZEN_SHARE = 2, /* a picture is repeated if at least one match in two has the same pixels */
-    MIN_MATCHES = 10  /* with fewer matches in the sums, the share of rejected ones is not judged */
+    SMALL_FRAMES = 100, /* successive frames with a small difference that may teach biases again */
+    FEW = 3,            /* points */
+    FROZEN_SHARE = 2,   /* a picture is repeated if at least one match in two has the same pixels */
+    MIN_MATCHES = 10 /* with fewer matches in the sums, the share of rejected ones is not judged */
 };
 
 /* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */
@@ -50,8 +51,10 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
  * of its prior's variance. */
 #define BIAS_SIGMAS  PLR_R(3.9)
 #define LEARNT_SHARE PLR_R(0.25)
-/* What the sums of counts keep from frame to frame. */
-#define COUNTS_DECAY PLR_R(0.9)
+/* What sums keep from frame to frame. That of matches looks back three frames: a scene that moves is to be
+ * told before it has carried the pose far. */
+#define MATCHES_DECAY PLR_R(0.6)
+#define NIS_DECAY     PLR_R(0.9)
 /* If a larger share of the matches is rejected, the scene contradicts itself. */
 #define REJECTED_SHARE PLR_R(0.3)
 /* Limits on NIS per degree of freedom, and the degrees of freedom that it takes to judge by
@@ -191,16 +194,23 @@ static void propagate_difference(plr_filter *f, const plr_applied_motion *applie
     plr_mat6_vec(f->consistency.difference, A, d);
 }
 
-/* d <- d + n. nu is n in the twists' own sigmas, and `noise` the expected square of nu if it is
+/* d <- d + n, or + what the frame moved the pose by beside the twists, if that is more: points that
+ * move along carry landmarks and pose further than a frame's own n says. Translation and rotation
+ * each by itself. nu is n in the twists' own sigmas, and `noise` the expected square of nu if it is
  * only noise. */
 static void add_difference(plr_filter *f, const plr_real n[PLR_POSE_DIM],
-                           const plr_real nu[PLR_POSE_DIM], plr_real noise) {
+                           const plr_real moved[PLR_POSE_DIM], const plr_real nu[PLR_POSE_DIM],
+                           plr_real noise) {
     if (plr_health_readings_are_old(f))
         return;
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        f->consistency.difference[k] += n[k];
-        f->consistency.difference_sigmas[k] += nu[k];
+    for (unsigned half = 0; half < PLR_POSE_DIM; half += 3) {
+        const plr_real *a = n + half, *b = moved + half;
+        const plr_real *more = plr_dot3(a, a) > plr_dot3(b, b) ? a : b;
+        for (unsigned k = 0; k < 3; k++)
+            f->consistency.difference[half + k] += more[k];
     }
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        f->consistency.difference_sigmas[k] += nu[k];
     f->consistency.difference_noise += noise;
 }
 
@@ -241,12 +251,13 @@ static void begin_difference(plr_filter *f, const plr_applied_motion *believed,
                              const plr_consistency_window *w) {
     plr_real way[PLR_POSE_DIM];
     plr_mat6_vec(way, believed->L, w->sum);
-    add_difference(f, way, w->sum, trace(w->variance));
+    add_difference(f, way, way, w->sum, trace(w->variance));
 }
 
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
-                         const plr_real Lambda[PLR_POSE_TRIANGLE], bool outright) {
+                         const plr_real Lambda[PLR_POSE_TRIANGLE],
+                         const plr_real moved[PLR_POSE_DIM], bool outright) {
     plr_consistency *c = &f->consistency;
     plr_real J[PLR_POSE_SQUARE], b[PLR_POSE_DIM], own[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE],
         n[PLR_POSE_DIM];
@@ -254,7 +265,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         plr_mat6_vec(n, applied->L, nu);
         in_sigmas(believed->L, n, own);
         propagate_difference(f, applied);
-        add_difference(f, n, own, 0);
+        add_difference(f, n, moved, own, 0);
         contradict(f);
         c->excess = plr_norm2_of_6(own);
         return;
@@ -276,7 +287,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         plr_real way[PLR_POSE_DIM];
         estimate_by_vision(own, V, n);
         plr_mat6_vec(way, believed->L, n);
-        add_difference(f, way, own, trace(V));
+        add_difference(f, way, moved, own, trace(V));
     }
     for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
         if (w < FAST_WINDOWS || !(c->contradicted || plr_health_readings_are_old(f)))
@@ -299,6 +310,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     } else if (c->small_frames >= AGREEING_FRAMES) {
         c->contradicted = 0;
     }
+    if (c->small_frames >= SMALL_FRAMES)
+        c->biases_kept = 0;
 }
 
 /* ---------------------------------------------------------------- frozen pictures */
@@ -389,10 +402,10 @@ static bool bias_is_off(const plr_filter *f) {
 
 static void count(plr_filter *f, const plr_report *report) {
     plr_consistency *c = &f->consistency;
-    c->matched = PLR_FMA(COUNTS_DECAY, c->matched, (plr_real)report->matched);
-    c->gated = PLR_FMA(COUNTS_DECAY, c->gated, (plr_real)report->gated);
-    c->nis = PLR_FMA(COUNTS_DECAY, c->nis, (plr_real)report->nis);
-    c->nis_dof = PLR_FMA(COUNTS_DECAY, c->nis_dof, (plr_real)report->nis_dof);
+    c->matched = PLR_FMA(MATCHES_DECAY, c->matched, (plr_real)report->matched);
+    c->gated = PLR_FMA(MATCHES_DECAY, c->gated, (plr_real)report->gated);
+    c->nis = PLR_FMA(NIS_DECAY, c->nis, (plr_real)report->nis);
+    c->nis_dof = PLR_FMA(NIS_DECAY, c->nis_dof, (plr_real)report->nis_dof);
 }
 
 static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
@@ -441,7 +454,7 @@ static void resolve(plr_filter *f) {
     memset(c->difference_sigmas, 0, sizeof c->difference_sigmas);
     c->difference_noise = 0;
     memset(c->windows, 0, sizeof c->windows);
-    c->contradicted = c->drifting = c->settling_frames = 0;
+    c->contradicted = c->drifting = c->biases_kept = c->settling_frames = 0;
     c->agreeing_frames = 0;
 }
 
@@ -453,9 +466,11 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     plr_consistency *c = &f->consistency;
     count(f, report);
     uint32_t reasons = find_reasons(f, report);
-    if (lost || c->contradicted || c->frozen || (reasons & PLR_REASON_SCENE_DISAGREES))
+    if (lost || c->contradicted || c->frozen || (reasons & PLR_REASON_SCENE_DISAGREES)) {
         plr_consistency_doubt(f);
-    else if (c->drifting && c->settling_frames < AGREEING_FRAMES)
+        c->biases_kept =
+            1; /* until it is settled: a scene may move a little less for some frames */
+    } else if (c->drifting && c->settling_frames < AGREEING_FRAMES)
         c->settling_frames++; /* a drift: as long as it lasted, so that noise is soon forgotten */
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
                         fast_statistic(f) < AGREEING_BELOW &&

@@ -22,12 +22,14 @@ void plr_consistency_clear(plr_filter *f);
 void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed);
 
 /* Adds the result of a frame: nu with prior N(0, I), in units of applied->L, and its information
- * Lambda, 6x6 packed upper triangle, prior included. `outright`: this frame contradicts the twists
+ * Lambda, 6x6 packed upper triangle, prior included. `moved`: by how much the frame moved the pose
+ * from where the twists had put it, m and rad in the body. `outright`: this frame contradicts the twists
  * by itself. Where the last reading is old (plr_health_readings_are_old), vision is followed all the same, but
  * there is no pose by twists that the true one could be. */
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
-                         const plr_real Lambda[PLR_POSE_TRIANGLE], bool outright);
+                         const plr_real Lambda[PLR_POSE_TRIANGLE],
+                         const plr_real moved[PLR_POSE_DIM], bool outright);
 
 /* True if the frame repeats the previous picture: most matched observations have exactly the same
  * pixels, while the twists report a motion of more than their noise. Call it once a frame, after

@@ -28,6 +28,7 @@
 #include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/motion.h"
+#include "state/pose.h"
 #include "state/slots.h"
 
 /* ---------------------------------------------------------------- gate and budget */
@@ -135,6 +136,10 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_motion_first first;
     plr_considered_bias before;
     plr_correction correction = {0};
+    plr_real R_WB[9], moved[PLR_POSE_DIM]; /* the pose by twists */
+    double p_WB[3];
+    memcpy(R_WB, f->R_WB, sizeof R_WB);
+    memcpy(p_WB, f->p_WB, sizeof p_WB);
     if (!find_motion(f, frame, n, report, &believed, &first)) {
         (void)choose(f, frame, n, report);
         return correction;
@@ -149,9 +154,11 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     if (f->diverged)
         return correction;
     plr_bias_restore(f, &before);
-    if (correction.moved)
-        plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda,
+    if (correction.moved) {
+        plr_pose_moved_from(f, R_WB, p_WB, moved);
+        plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda, moved,
                             first.contradicted);
+    }
     return correction;
 }
 

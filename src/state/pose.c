@@ -24,6 +24,16 @@ void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
     plr_pose_move(f, E, p);
 }
 
+void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
+                         plr_real moved[PLR_POSE_DIM]) {
+    plr_real way[3], R[9];
+    for (int i = 0; i < 3; i++)
+        way[i] = (plr_real)(f->p_WB[i] - p_WB[i]);
+    plr_mat3_tvec(moved, R_WB, way);
+    plr_mat3_mul_tn(R, R_WB, f->R_WB);
+    plr_turn_of(moved + 3, R);
+}
+
 void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
     plr_real moved[3];
     memcpy(R_WB, f->R_WB, sizeof f->R_WB);

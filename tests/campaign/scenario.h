@@ -27,6 +27,7 @@ typedef enum mishap {
 /* The limits; 0: none. */
 typedef struct bars {
     double nees;         /* mean of NEES/6 over seeds, less two standard errors */
+    double event_nees;   /* the same during an event, and after it */
     double sigmas;       /* no component of an error is ever beyond so many of its sigmas */
     double forward_bias; /* mean of its error in sigmas over seeds, less two standard errors */
     double good;         /* least share of frames GOOD where nothing is wrong */

@@ -35,6 +35,7 @@ enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
         .twists_per_frame = 5, .bias = true, .before = HALF_MINUTE, .during = HALF_MINUTE,         \
         .after = HALF_MINUTE, .mishap = kind, .strength = how, .bars = {                           \
             .silent = 0.01,                                                                        \
+            .event_nees = 2,                                                                       \
             .told_frames = told,                                                                   \
             .error_m = error,                                                                      \
             .again_s = 10,                                                                         \

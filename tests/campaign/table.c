@@ -132,12 +132,20 @@ static double width(const tally *t) {
     return sqrt(mean_of(&t->later_own2) / (mean_of(&t->later_error2) + mean_of(&t->fresh_own2)));
 }
 
+static double least_nees(const tally *t, unsigned p) {
+    return mean_of(&t->nees[p]) - 2 * error_of(&t->nees[p]);
+}
+
 static verdict judge(const scenario *s, const tally *t) {
     const bars *b = &s->bars;
     const account *before = &t->phase[BEFORE], *during = &t->phase[DURING];
     const account *after = &t->phase[AFTER];
     verdict v = {true, ""};
-    most(&v, "NEES/6 - 2 se", mean_of(&t->nees[BEFORE]) - 2 * error_of(&t->nees[BEFORE]), b->nees);
+    most(&v, "NEES/6 - 2 se", least_nees(t, BEFORE), b->nees);
+    if (during->frames)
+        most(&v, "NEES/6 during", least_nees(t, DURING), b->event_nees);
+    if (after->frames)
+        most(&v, "NEES/6 after", least_nees(t, AFTER), b->event_nees);
     most(&v, "sigmas", before->sigmas, b->sigmas);
     most(&v, "|forward bias| - 2 se", fabs(mean_of(&t->bias[0])) - 2 * error_of(&t->bias[0]),
          b->forward_bias);

@@ -33,11 +33,11 @@ void tearDown(void) {
     twin_drive_end();
 }
 
-/* The twists contradicted or not, by nothing that would change their weight. */
+/* The biases kept or not, as by a contradiction, by nothing that would change the twists' weight. */
 static void contradict(bool so) {
     memset(&twins.filter.consistency, 0, sizeof twins.filter.consistency);
     memset(H, 0, sizeof H);
-    twins.filter.consistency.contradicted = so;
+    twins.filter.consistency.biases_kept = so;
     reseal(&twins.filter);
     twins.book.considered = so ? H : NULL;
 }

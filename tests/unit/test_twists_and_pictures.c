@@ -28,6 +28,7 @@ static plr_filter filter;
 static plr_applied_motion believed, applied;
 static rng chance;
 static double information[6]; /* of a picture on nu, without the prior */
+static plr_real moved[6];     /* the pose by a frame, beside the twists */
 
 void setUp(void) {
     chance = rng_seeded(61);
@@ -42,6 +43,7 @@ void setUp(void) {
         information[k] = 100;
     }
     applied = believed;
+    memset(moved, 0, sizeof moved);
 }
 
 void tearDown(void) {
@@ -55,7 +57,7 @@ static void add(const double mean[6], double noise) {
         nu[k] = (plr_real)(information[k] / (1 + information[k]) * seen);
         Lambda[plr_upper_row(6, k)] = (plr_real)(1 + information[k]);
     }
-    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, false);
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, false);
 }
 
 static void add_noise(void) {
@@ -228,7 +230,7 @@ static void contradict_outright(double way_m) {
         applied.L[7 * k] = PLR_R(0.5);
         Lambda[plr_upper_row(6, k)] = 1000;
     }
-    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, true);
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, true);
     applied = believed;
 }
 
@@ -241,6 +243,19 @@ static void test_a_frame_may_contradict_the_twists_outright(void) {
     TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.4, (double)filter.consistency.difference[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-2, pow(0.4 / SIGMA_M, 2), (double)filter.consistency.excess);
+}
+
+/* A scene of which a part moves carries the landmarks and with them the pose, frame after frame. */
+static void test_what_the_frames_moved_the_pose_by_is_covered_too(void) {
+    moved[0] = PLR_R(-0.9);
+    moved[4] = PLR_R(0.02);
+    contradict_outright(0.4);
+    const plr_real *d = filter.consistency.difference;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, -0.9, (double)d[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.02, (double)d[4]);
+    moved[0] = moved[4] = 0;
+    add_slip(); /* of which the pictures say more */
+    TEST_ASSERT_DOUBLE_WITHIN(0.2 * WAY_M, -0.9 - WAY_M, (double)d[0]);
 }
 
 static void test_an_old_reading_is_no_rival_of_the_picture(void) {
@@ -443,6 +458,7 @@ int main(void) {
     RUN_TEST(test_twists_that_are_contradicted_are_believed_less);
     RUN_TEST(test_the_covariance_covers_both_stories);
     RUN_TEST(test_a_frame_may_contradict_the_twists_outright);
+    RUN_TEST(test_what_the_frames_moved_the_pose_by_is_covered_too);
     RUN_TEST(test_an_old_reading_is_no_rival_of_the_picture);
     RUN_TEST(test_after_fifteen_frames_of_agreement_it_is_settled);
     RUN_TEST(test_a_frame_that_differs_begins_the_settling_anew);
