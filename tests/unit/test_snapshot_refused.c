@@ -20,7 +20,7 @@ enum {
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
     FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 143 * REAL,
     HEALTH_AT =
-        FRAMES_AT + 4 + 16 + 10 + 6 + 4 + 8 + 329 * REAL, /* settling_frames stands before it */
+        FRAMES_AT + 4 + 16 + 10 + 7 + 4 + 8 + 329 * REAL, /* settling_frames stands before it */
     SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
     SLOT_SIZE = 8 * REAL + 35,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,
