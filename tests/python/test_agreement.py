@@ -21,8 +21,9 @@ from pelorus.faults.geometry import moving_least
 from pelorus.faults.mounting import Rates
 from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
-from pelorus.faults.two_views import NOISE, TwoViews, _inverse, two_views
+from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.recording import Recording
+from pelorus.second_view import NOISE, inverse
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.tracks import Tracks
 
@@ -356,7 +357,7 @@ def test_a_point_of_unknown_depth_has_no_negative_d2(size: float) -> None:
     J = u[:, None] * v[None] * size + chance.normal(0, 1, (3, 3, 2000))
     S = np.einsum("ijn,jk,lkn->iln", J, NOISE, J) + NOISE[:, :, None]
     e = chance.normal(0, 1, (3, 2000))
-    W = _inverse((S + S.swapaxes(0, 1)) / 2)
+    W = inverse((S + S.swapaxes(0, 1)) / 2)
     assert np.einsum("in,ijn,jn->n", e, W, e).min() >= 0
     if size <= 1e3:
         assert np.allclose(np.einsum("ijn,jkn->nik", W, S), np.eye(3), atol=1e-6)

@@ -9,6 +9,7 @@ from drives import clean
 from pelorus import motion, se3, visual_motion
 from pelorus.frames import Camera, TwistTiming
 from pelorus.se3 import Poses
+from pelorus.second_view import linearised, measured, predicted
 from pelorus.tracks import Tracks, point_jacobian, project, triangulate
 from scipy.linalg import expm
 
@@ -65,22 +66,33 @@ def test_between_readings_the_latest_one_holds_and_before_the_first_the_body_res
     assert np.allclose(path.p[:, 1], [0, 0, 0, 1.5])
 
 
-def test_triangulation_undoes_projection_and_its_jacobian_is_the_difference() -> None:
+def test_triangulation_undoes_projection_whose_jacobian_is_the_difference() -> None:
     q = np.stack((CHANCE.normal(size=50), CHANCE.normal(size=50), CHANCE.uniform(2, 30, 50)), -1)
     pixels = project(CAMERA, q)
     assert np.allclose(triangulate(CAMERA, pixels), q)
-    J = visual_motion.triangulation_jacobian(CAMERA, pixels, q)
-    for column in range(4):
-        step = np.zeros(4)
-        step[column] = 1e-5
-        slope = (triangulate(CAMERA, pixels + step) - triangulate(CAMERA, pixels - step)) / 2e-5
-        assert np.allclose(J[:, :, column], slope, rtol=1e-5, atol=1e-6)
     D = point_jacobian(CAMERA, q)
     for column in range(3):
         step3 = np.zeros(3)
         step3[column] = 1e-6
         slope = (project(CAMERA, q + step3) - project(CAMERA, q - step3)) / 2e-6
         assert np.allclose(D[:, :, column], slope, rtol=1e-5, atol=1e-4)
+
+
+def test_points_of_one_view_stand_where_the_motion_puts_them_in_the_other() -> None:
+    """And both derivatives are the differences."""
+    q = np.stack((CHANCE.normal(size=50), CHANCE.normal(size=50), CHANCE.uniform(2, 30, 50)), -1)
+    T = se3.exp(CHANCE.normal(0, 0.3, (50, 3)), CHANCE.normal(0, 0.1, (50, 3)))
+    x = measured(CAMERA, project(CAMERA, q))
+    R, p = np.moveaxis(T.R, 0, -1), T.p.T
+    h, by_x, by_motion = linearised(CAMERA, x.T, R, p)
+    assert np.allclose(h.T, measured(CAMERA, project(CAMERA, se3.apply(T, q))))
+    for k, unit in enumerate(1e-4 * np.eye(3)):
+        ends = [predicted(CAMERA, x + side * unit, T.R, T.p) for side in (1, -1)]
+        assert np.allclose(by_x[:, k].T, (ends[0] - ends[1]) / 2e-4, rtol=1e-5, atol=1e-6)
+    for k, unit in enumerate(1e-6 * np.eye(6)):
+        moved = [se3.compose(se3.exp(side * unit[:3], side * unit[3:]), T) for side in (1, -1)]
+        ends = [predicted(CAMERA, x, *motion) for motion in moved]
+        assert np.allclose(by_motion[:, k].T, (ends[0] - ends[1]) / 2e-6, rtol=1e-5, atol=1e-3)
 
 
 def test_pairs_join_the_same_id_in_frames_k_and_k_plus_lag() -> None:

@@ -8,6 +8,7 @@ of Geman and McClure (1987) against bad matches; all frames at once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,8 @@ from pelorus.console import progress
 from pelorus.frames import Camera
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
-from pelorus.tracks import (
-    Indices,
-    Tracks,
-    point_jacobian,
-    project,
-    sum_by_frame,
-    triangulate,
-)
+from pelorus.second_view import NOISE, apply, inverse, linearised, measured, product
+from pelorus.tracks import Indices, Tracks, project, sum_by_frame, triangulate
 
 DISPARITY_MIN_PX = 1.0  # below it a triangulated depth means little
 ROW_GAP_MAX_PX = 2.0  # a rectified pair shows a point in one row; more is a bad match
@@ -104,57 +99,52 @@ def estimate(seen: SeenPairs, camera: Camera) -> Poses:
 def _gauss_newton(
     seen: SeenPairs, camera: Camera, motion: Poses, scale_px: float
 ) -> tuple[Floats, Floats]:
-    """One robust step (rho, theta) on the left of each motion.
-
-    A residual has the noise of the second pixels and of the point, which the first pixels gave:
-    W is its inverse covariance for pixels of unit noise. Without the second part far points, whose
-    depth is hardly known, bend the motion.
-    """
-    R = motion.R[seen.frame]
-    q = np.einsum("nij,nj->ni", R, seen.q_C) + motion.p[seen.frame]
-    ahead = q[:, 2] > DEPTH_MIN_M
-    q[:, 2] = np.maximum(q[:, 2], DEPTH_MIN_M)
-    residual = seen.pixels - project(camera, q)
-    D = point_jacobian(camera, q)
-    from_first = D @ R @ triangulation_jacobian(camera, seen.first_pixels, seen.q_C)
-    W = np.linalg.inv(np.eye(4) + from_first @ np.swapaxes(from_first, 1, 2))
-    weight = ahead / (1 + np.einsum("na,nab,nb->n", residual, W, residual) / scale_px**2) ** 2
-    J = np.concatenate((D, -D @ se3.skew(q)), axis=-1)
-    WJ = (W @ J) * weight[:, None, None]
-    H = sum_by_frame(seen.frame, seen.frame_count, np.swapaxes(J, 1, 2) @ WJ) + RIDGE * np.eye(6)
-    g = sum_by_frame(seen.frame, seen.frame_count, np.einsum("nai,na->ni", WJ, residual))
-    step = np.clip(np.linalg.solve(H, g[..., None])[..., 0], -STEP_MAX, STEP_MAX)
+    """One robust step (rho, theta) on the left of each motion."""
+    pairs = _residuals(seen, camera, motion)
+    weight = pairs.ahead / (1 + pairs.d2 / scale_px**2) ** 2
+    JW = product(pairs.J.swapaxes(0, 1), pairs.W * weight)
+    H, g = (
+        sum_by_frame(seen.frame, seen.frame_count, np.moveaxis(values, -1, 0))
+        for values in (product(JW, pairs.J), apply(JW, pairs.e))
+    )
+    step = np.linalg.solve(H + RIDGE * np.eye(6), g[..., None])[..., 0]
+    step = np.clip(step, -STEP_MAX, STEP_MAX)
     return step[:, :3], step[:, 3:]
 
 
-def triangulation_jacobian(camera: Camera, pixels: Floats, q_C: Floats) -> Floats:
-    """d triangulate / d pixels, (n, 3, 4)."""
-    disparity = pixels[:, 0] - pixels[:, 2]
-    scale = camera.baseline_m / disparity
-    J = np.zeros((len(pixels), 3, 4))
-    J[:, :, 0] = -q_C / disparity[:, None]
-    J[:, :, 2] = q_C / disparity[:, None]
-    J[:, 0, 0] += scale
-    J[:, 1, 1] = J[:, 1, 3] = 0.5 * scale * camera.fx_px / camera.fy_px
-    return J
+class _Residuals(NamedTuple):
+    """Of (uL, v, disparity), with the pairs on the last axis."""
+
+    e: Floats  # (3, n)
+    J: Floats  # (3, 6, n), by a small step on the left of the motion
+    W: Floats  # (3, 3, n), inverse covariance for pixels of unit noise
+    d2: Floats  # of all four pixels: chi-square with as many degrees of freedom
+    ahead: NDArray[np.bool_]  # where it stands before the second camera
+
+
+def _residuals(seen: SeenPairs, camera: Camera, motion: Poses) -> _Residuals:
+    """A residual has the noise of the second pixels and of the point, which the first pixels gave.
+    Without the second part far points, whose depth is hardly known, bend the motion.
+    """
+    R, p = np.moveaxis(motion.R, 0, -1)[..., seen.frame], motion.p.T[:, seen.frame]
+    h, Jx, J = linearised(camera, measured(camera, seen.first_pixels).T, R, p)
+    of_first = product(np.einsum("ijn,jk->ikn", Jx, NOISE), Jx.swapaxes(0, 1))
+    W = inverse(of_first + NOISE[:, :, None])
+    e = measured(camera, seen.pixels).T - h
+    of_rows = 0.5 * (seen.pixels[:, 1] - seen.pixels[:, 3]) ** 2
+    nearest_px = camera.fx_px * camera.baseline_m / DEPTH_MIN_M
+    ahead = (h[2] > 0) & (h[2] < nearest_px)
+    return _Residuals(e, J, W, np.sum(e * apply(W, e), axis=0) + of_rows, ahead)
 
 
 def pixel_sigma(seen: SeenPairs, camera: Camera, motion: Poses) -> float:
     """The pixels' noise as the two views of the points tell it, px; NaN with too few pairs.
 
-    A pair's residual weighted by its covariance for unit noise is chi-square with four degrees of
-    freedom; the median makes it robust. Only frames count whose motion has pairs enough.
+    The median makes it robust. Only frames count whose motion has pairs enough.
     """
     enough = (seen.counts() >= 2 * PAIRS_MIN)[seen.frame]
-    q = np.einsum("nij,nj->ni", motion.R[seen.frame], seen.q_C) + motion.p[seen.frame]
-    good = enough & (q[:, 2] > DEPTH_MIN_M)
+    pairs = _residuals(seen, camera, motion)
+    good = enough & pairs.ahead
     if good.sum() < PAIRS_MIN:
         return float("nan")
-    q, R = q[good], motion.R[seen.frame[good]]
-    residual = seen.pixels[good] - project(camera, q)
-    D = point_jacobian(camera, q)
-    J = triangulation_jacobian(camera, seen.first_pixels[good], seen.q_C[good])
-    from_first = D @ R @ J
-    W = np.linalg.inv(np.eye(4) + from_first @ np.swapaxes(from_first, 1, 2))
-    squared = np.einsum("na,nab,nb->n", residual, W, residual)
-    return float(np.sqrt(np.median(squared) / CHI2_4_MEDIAN))
+    return float(np.sqrt(np.median(pairs.d2[good]) / CHI2_4_MEDIAN))

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.special import bdtrc
 
 from pelorus import se3
-from pelorus.faults.two_views import TwoViews, measured, predicted
+from pelorus.faults.two_views import TwoViews
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
+from pelorus.second_view import measured, predicted
 from pelorus.tracks import Indices, Tracks
 
 Flags = NDArray[np.bool_]
