@@ -62,9 +62,6 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 #define NIS_HIGH PLR_R(1.5)
 #define NIS_LOW  PLR_R(0.3)
 #define NIS_DOF  PLR_R(200)
-/* The picture should have changed if the motion by twists since then exceeds its own noise by this,
- * as a sum of squares in units of sigma. */
-#define MOVED_ABOVE PLR_R(36)
 
 void plr_consistency_clear(plr_filter *f) {
     memset(&f->consistency, 0, sizeof f->consistency);
@@ -312,75 +309,6 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     }
     if (c->small_frames >= SMALL_FRAMES)
         c->biases_kept = 0;
-}
-
-/* ---------------------------------------------------------------- frozen pictures */
-
-/* A hash of an observation's four pixel coordinates. */
-static uint32_t hash_of_pixels(const plr_observation *o) {
-    const float pixels[4] = {o->uL_px, o->vL_px, o->uR_px, o->vR_px};
-    uint32_t print = 2166136261U;
-    for (unsigned i = 0; i < 4; i++) {
-        uint32_t bits;
-        memcpy(&bits, &pixels[i], sizeof bits);
-        print = (print ^ bits) * 16777619U;
-        print ^= print >> 15;
-    }
-    return print;
-}
-
-/* True if the motion by twists since the picture was new is larger than its noise. */
-void plr_consistency_note_motion(plr_filter *f) {
-    plr_consistency *c = &f->consistency;
-    const plr_motion *m = &f->motion;
-    plr_real turn[3];
-    plr_turn_of(turn, m->E);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        c->frozen_motion[k] += k < 3 ? m->p[k] : turn[k - 3];
-        c->frozen_variance[k] += m->Q[(PLR_POSE_DIM + 1) * k];
-    }
-}
-
-static bool has_moved(plr_filter *f) {
-    plr_consistency *c = &f->consistency;
-    const plr_motion *m = &f->motion;
-    plr_real turn[3], sum = 0;
-    plr_turn_of(turn, m->E);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real way = c->frozen_motion[k] + (k < 3 ? m->p[k] : turn[k - 3]);
-        const plr_real variance = c->frozen_variance[k] + m->Q[(PLR_POSE_DIM + 1) * k];
-        if (variance > 0)
-            sum += way * way / variance;
-        else if (way * way > PLR_R(1e-8))
-            sum += PLR_R(2) * MOVED_ABOVE;
-    }
-    return sum > MOVED_ABOVE;
-}
-
-bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n) {
-    plr_consistency *c = &f->consistency;
-    unsigned matched = 0, same = 0;
-    for (unsigned k = 0; k < n; k++) {
-        if (f->work.slot_of[k] == PLR_NO_SLOT)
-            continue;
-        plr_slot *slot = &f->slots[f->work.slot_of[k]];
-        const uint32_t print = hash_of_pixels(&frame->observations[f->work.order[k]]);
-        matched++;
-        same += slot->pixel_hash == print;
-        slot->pixel_hash = print;
-    }
-    c->frozen = 0;
-    if (matched < FEW || FROZEN_SHARE * same < matched) {
-        memset(c->frozen_motion, 0, sizeof c->frozen_motion);
-        memset(c->frozen_variance, 0, sizeof c->frozen_variance);
-        return false;
-    }
-    if (has_moved(f)) {
-        c->frozen = 1;
-        return true;
-    }
-    plr_consistency_note_motion(f); /* this frame is used, and ends what is pending in f->motion */
-    return false;
 }
 
 /* ---------------------------------------------------------------- the verdict */

@@ -31,15 +31,6 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
                          const plr_real moved[PLR_POSE_DIM], bool outright);
 
-/* True if the frame repeats the previous picture: most matched observations have exactly the same
- * pixels, while the twists report a motion of more than their noise. Call it once a frame, after
- * matching. */
-bool plr_consistency_is_frozen(plr_filter *f, const plr_frame *frame, unsigned n);
-
-/* Adds the accumulated motion to what plr_consistency_is_frozen compares with its noise. Call it
- * before the motion is applied without a frame. */
-void plr_consistency_note_motion(plr_filter *f);
-
 /* Adds the counts of a frame; `lost`: the frame lost the pose (plr_health). Returns bits of
  * plr_reason. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);

@@ -8,6 +8,7 @@
 #include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
+#include "filter/frozen.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/mount.h"
@@ -131,7 +132,7 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     bool accepted = true;
     const unsigned parts = kind->of_twist(reading, rows);
     if (f->motion.pending)
-        plr_consistency_note_motion(f);
+        plr_frozen_note_motion(f);
     plr_predict_apply_pending(f);
     memset(m, 0, sizeof m);
     for (unsigned part = 0; part < parts && !f->diverged; part++) {
@@ -166,7 +167,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
         plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
     if (f->motion.pending)
-        plr_consistency_note_motion(f);
+        plr_frozen_note_motion(f);
     plr_predict_apply_pending(f);
     return correct(f, &m, 1);
 }

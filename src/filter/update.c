@@ -11,6 +11,7 @@
 #include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
+#include "filter/frozen.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
 #include "filter/health.h"
@@ -180,7 +181,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_match_slots(f, seen, n);
     plr_match_known(f, seen, n, &events, report);
     const unsigned matched = n;
-    if (f->config.model == PLR_MODEL_BODY && plr_consistency_is_frozen(f, frame, n))
+    if (f->config.model == PLR_MODEL_BODY && plr_frozen_is_seen(f, frame, n))
         n = 0; /* it does not show the present */
     plr_reading still;
     plr_reading_result unused = {0};
