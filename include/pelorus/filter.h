@@ -234,9 +234,10 @@ typedef int (*plr_state_source)(void *context, uint32_t offset, uint8_t *bytes, 
 
 /* Writes the whole state to a sink, as little-endian bytes that do not depend on the compiler:
  * docs/STATE-FORMAT.md. A filter that is restored from them computes the same bits as one that was
- * never interrupted. (With an IMU that has not started yet, what was averaged until then is not
- * saved: the average begins anew.) The bytes contain no checksum; plr_state_store_save adds one. `sink` NULL:
- * only checks whether the state can be saved.
+ * never interrupted, with two exceptions. With an IMU that has not started yet the average begins
+ * anew. Readings of small sensors are not saved: with twists a velocity holds again from its
+ * sensor's second reading. The bytes contain no checksum; plr_state_store_save adds one. `sink`
+ * NULL: only checks whether the state can be saved.
  * PLR_E_DIVERGED, PLR_E_NOT_FINITE the state is not usable; PLR_E_IO the sink failed. After an
  * error discard what the sink has received. */
 plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *context);
@@ -289,7 +290,7 @@ const char *plr_reason_text(plr_reason reason);
 const char *plr_health_text(plr_health health);
 const char *plr_imu_fault_text(plr_imu_fault fault);
 
-/* "1.0.0" and a number that differs between builds whose bits may differ: version, arithmetic
+/* The version as text, "0.1.0", and a number that differs between builds whose bits may differ: version, arithmetic
  * (PLR_ARITHMETIC), precision, capacity, block size. */
 const char *plr_version(void);
 uint32_t plr_build_fingerprint(void);

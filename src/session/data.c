@@ -174,7 +174,7 @@ static void hold(plr_session *s, const plr_frame *frame, plr_time_ns moved_ns) {
         s->totals.held_short++;
         use_oldest(s);
     }
-    plr_held_push_frame(&s->held_frames, frame, moved_ns);
+    plr_held_insert_frame(&s->held_frames, frame, moved_ns);
 }
 
 void plr_data_use_stereo(plr_session *s) {
@@ -182,12 +182,13 @@ void plr_data_use_stereo(plr_session *s) {
     const plr_held_frame *before = plr_held_newest_frame(&s->held_frames);
     plr_time_ns moved_ns;
     if (!move(s, frame->t_ns, &moved_ns) ||
-        (before != NULL && before->frame.t_ns == frame->t_ns)) { /* doubled by a link */
+        plr_held_has_frame(&s->held_frames, frame->t_ns)) { /* doubled by a link */
         plr_data_refuse_frame(s, frame, PLR_E_TIME);
         return;
     }
     const plr_time_ns patience = patience_ns(s, frame->t_ns, moved_ns);
-    if (before != NULL && moved_ns < before->moved_ns)
+    if (before != NULL && moved_ns < before->moved_ns &&
+        before->moved_ns - moved_ns > plr_clock_max_gap_ns(s))
         plr_data_use_waiting(s); /* a clock was set back */
     else if (moved_ns >= patience)
         use_waiting_until(s, moved_ns - patience);

@@ -81,14 +81,32 @@ bool plr_held_pop_due(plr_held_steps *held, plr_time_ns delay_ns, plr_held_step 
 
 /* --- frames --- */
 
-void plr_held_push_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns) {
-    PLR_ASSERT(held->count < PLR_SESSION_HELD_FRAMES && frame->count <= PLR_MAX_OBSERVATIONS);
-    const unsigned behind = held->first + held->count++;
-    plr_held_frame *to = &held->frames[behind % PLR_SESSION_HELD_FRAMES];
+static plr_held_frame *frame_at(plr_held_frames *held, unsigned behind) {
+    return &held->frames[(held->first + behind) % PLR_SESSION_HELD_FRAMES];
+}
+
+static void copy_frame(plr_held_frame *to, const plr_frame *frame, plr_time_ns moved_ns) {
     to->frame = *frame;
     to->moved_ns = moved_ns;
     memcpy(to->observations, frame->observations, frame->count * sizeof *frame->observations);
     to->frame.observations = to->observations;
+}
+
+bool plr_held_has_frame(const plr_held_frames *held, plr_time_ns t_ns) {
+    for (unsigned i = 0; i < held->count; i++)
+        if (held->frames[(held->first + i) % PLR_SESSION_HELD_FRAMES].frame.t_ns == t_ns)
+            return true;
+    return false;
+}
+
+void plr_held_insert_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns) {
+    PLR_ASSERT(held->count < PLR_SESSION_HELD_FRAMES && frame->count <= PLR_MAX_OBSERVATIONS);
+    unsigned at = held->count++;
+    for (; at > 0 && frame_at(held, at - 1U)->moved_ns > moved_ns; at--) {
+        const plr_held_frame *later = frame_at(held, at - 1U);
+        copy_frame(frame_at(held, at), &later->frame, later->moved_ns);
+    }
+    copy_frame(frame_at(held, at), frame, moved_ns);
 }
 
 const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held) {

@@ -39,14 +39,17 @@ bool plr_held_pop(plr_held_steps *held, plr_held_step *step);
 
 /* --- frames --- */
 
-/* Appends a frame, with its observations. There must be room. */
-void plr_held_push_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns);
+/* True if a frame of that time, by its sender's clock, is among them. */
+bool plr_held_has_frame(const plr_held_frames *held, plr_time_ns t_ns);
+
+/* Inserts a frame, with its observations, in the order of moved_ns. There must be room. */
+void plr_held_insert_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns);
 
 /* The oldest and the newest frame; NULL if there is none. */
 const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held);
 const plr_held_frame *plr_held_newest_frame(const plr_held_frames *held);
 
-/* Removes the oldest frame, which is there; it holds until the next one is appended. */
+/* Removes the oldest frame, which is there; it holds until the next one is inserted. */
 const plr_held_frame *plr_held_pop_frame(plr_held_frames *held);
 
 /* --- readings --- */

@@ -140,7 +140,7 @@ static void test_frames_leave_as_they_came_with_their_observations(void) {
     for (unsigned k = 0; k < 4 * PLR_SESSION_HELD_FRAMES; k++) {
         seen[0].id = 100 + k;
         const plr_frame frame = {k, PLR_NO_BUDGET, 2, seen};
-        plr_held_push_frame(&frames, &frame, 1000 + k);
+        plr_held_insert_frame(&frames, &frame, 1000 + k);
         TEST_ASSERT_EQUAL_UINT64(k, plr_held_newest_frame(&frames)->frame.t_ns);
         if (k + 1 < PLR_SESSION_HELD_FRAMES)
             continue;
@@ -152,6 +152,30 @@ static void test_frames_leave_as_they_came_with_their_observations(void) {
         TEST_ASSERT_EQUAL_UINT16(2, held_frame->frame.count);
     }
     TEST_ASSERT_EQUAL_UINT8(PLR_SESSION_HELD_FRAMES - 1, frames.count);
+}
+
+static void test_frames_that_overtake_each_other_leave_in_the_order_of_time(void) {
+    static plr_held_frames frames;
+    const plr_time_ns came[PLR_SESSION_HELD_FRAMES] = {3, 1, 2};
+    for (unsigned turn = 0; turn < PLR_SESSION_HELD_FRAMES;
+         turn++) { /* from each place of the ring */
+        for (unsigned i = 0; i < PLR_SESSION_HELD_FRAMES; i++) {
+            const plr_observation seen = {.id = (uint32_t)came[i]};
+            const plr_frame frame = {came[i], PLR_NO_BUDGET, 1, &seen};
+            TEST_ASSERT_FALSE(plr_held_has_frame(&frames, came[i]));
+            plr_held_insert_frame(&frames, &frame, 10 + came[i]);
+            TEST_ASSERT_TRUE(plr_held_has_frame(&frames, came[i]));
+        }
+        for (unsigned k = 1; k <= PLR_SESSION_HELD_FRAMES; k++) {
+            const plr_held_frame *oldest = plr_held_pop_frame(&frames);
+            TEST_ASSERT_EQUAL_UINT64(10 + k, oldest->moved_ns);
+            TEST_ASSERT_EQUAL_UINT32(k, oldest->frame.observations[0].id);
+        }
+        const plr_observation none = {.id = 9};
+        const plr_frame one = {9, PLR_NO_BUDGET, 1, &none};
+        plr_held_insert_frame(&frames, &one, 9);
+        (void)plr_held_pop_frame(&frames);
+    }
 }
 
 int main(void) {
@@ -166,5 +190,6 @@ int main(void) {
     RUN_TEST(test_a_step_of_a_time_that_is_there_is_not_taken);
     RUN_TEST(test_time_that_goes_back_by_more_than_the_gap_contradicts);
     RUN_TEST(test_frames_leave_as_they_came_with_their_observations);
+    RUN_TEST(test_frames_that_overtake_each_other_leave_in_the_order_of_time);
     return UNITY_END();
 }

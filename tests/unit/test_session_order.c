@@ -18,7 +18,9 @@ typedef struct manner {
     bool twists; /* instead of readings */
     int doubled; /* every so many-th step message comes twice; 0: none does */
     bool doubled_frames;
-    int swapped; /* every so many-th step message comes behind the next one; 0: none does */
+    double frames_again_s; /* after the first time */
+    int swapped;        /* every so many-th step message comes behind the next one; 0: none does */
+    int swapped_frames; /* and of the frames */
 } manner;
 
 typedef struct sending {
@@ -67,9 +69,13 @@ static void plan_drive(const manner *how) {
         if (how->doubled > 0 && message % how->doubled == 0)
             plan_one(at_s + 0.25 * INERTIAL_READING_S, false, n, count);
     }
-    for (int k = 0; k < INERTIAL_FRAMES; k++)
-        for (int again = 0; again < (how->doubled_frames ? 2 : 1); again++)
-            plan_one(INERTIAL_FRAME_S * k + how->frames_late_s, true, k, 1);
+    for (int k = 0; k < INERTIAL_FRAMES; k++) {
+        const bool swapped = how->swapped_frames > 0 && k % how->swapped_frames == 1;
+        const double at_s = INERTIAL_FRAME_S * (swapped ? k + 1.2 : (double)k) + how->frames_late_s;
+        plan_one(at_s, true, k, 1);
+        if (how->doubled_frames)
+            plan_one(at_s + how->frames_again_s, true, k, 1);
+    }
     qsort(plan.all, (size_t)plan.count, sizeof plan.all[0], compare);
 }
 
@@ -134,6 +140,8 @@ static void test_frames_wait_for_late_steps_and_the_bits_are_those_of_the_order_
         {.batch = 1, .steps_late_s = 0.08, .twists = true},
         {.batch = 10, .steps_late_s = 0.05, .frames_late_s = 0.03},
         {.batch = 1, .steps_late_s = 0.08, .doubled_frames = true},
+        {.batch = 1, .steps_late_s = 0.15, .doubled_frames = true, .frames_again_s = 0.11},
+        {.batch = 1, .steps_late_s = 0.18, .swapped_frames = 3},
     };
     for (unsigned i = 0; i < sizeof tried / sizeof tried[0]; i++) {
         const inertial_result expected = run_in_order(tried[i].twists);
