@@ -28,6 +28,7 @@ done
 export PELORUS_DATA=${PELORUS_DATA:-$ROOT/../shared/data}
 export PELORUS_LONG=0
 [ $extent = long ] && PELORUS_LONG=1
+export OPENBLAS_NUM_THREADS=1 # tests run side by side
 cd "$ROOT" || exit 1
 rm -rf "$LOGS"
 mkdir -p "$LOGS"
@@ -208,24 +209,26 @@ if [ $extent != quick ]; then
 fi
 ensure_python # there by now; if not, it says why and ends this
 
-# --- form ----------------------------------------------------------------------------------------
+# --- form, beside the first build -----------------------------------------------------------------
 
+beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
+    tools/pelorus tools/firmware tools/example_robot.py tests/python tests/layering tests/golden tests/fuzz
+beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
+    --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
+beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
+beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
 if command -v clang-format-14 >/dev/null; then
     beside 'C format' check_format
 else
     skip 'C format' 'clang-format-14 is not here'
 fi
-beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
-beside 'Python lint' "$VENV/bin/ruff" check --config tools/pyproject.toml tools tests
-beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tools/firmware tools/example_robot.py tests/python tests/layering tests/golden tests/fuzz
-beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
-    --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
-joined
 
 # --- the desktop ---------------------------------------------------------------------------------
 
-step 'build: gcc' build_preset release "${strict[@]}" && step 'test: gcc' run_ctest build
+step 'build: gcc' build_preset release "${strict[@]}"
+built=$?
+joined
+[ $built -eq 0 ] && step 'test: gcc' run_ctest build
 step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS" --dist worksteal \
     tests/python
 
