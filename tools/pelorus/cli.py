@@ -35,8 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; 0, or 1 after an error that was told, or 2 if the call makes no sense."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     _say_what_cannot_be_encoded()
-    # Before numpy is there: of matrices as small as these threads take more than they give, and wait
-    # for each other at full speed.
+    # Before numpy is there: on matrices as small as these threads take more than they give, and
+    # wait for each other at full speed.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         return _run(words)

@@ -148,9 +148,11 @@ def _cost(error: Floats, nuisance: Floats, spread: Floats | None = None) -> tupl
 
 
 def _solved(error: Floats, nuisance: Floats, trust: Floats) -> Floats:
-    A = np.einsum("nai,naj,na->ij", nuisance, nuisance, trust)
+    rows = nuisance.reshape(-1, nuisance.shape[2])
+    trusted = rows * trust.reshape(-1, 1)
+    A = trusted.T @ rows
     A += np.diag([1e-9] * 3 + [1.0] * 6)  # tilt and lever are of their usual size
-    return np.linalg.solve(A, np.einsum("nai,na,na->i", nuisance, error, trust))
+    return np.linalg.solve(A, trusted.T @ error.ravel())
 
 
 def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Floats) -> Duel:

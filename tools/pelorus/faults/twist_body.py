@@ -56,15 +56,16 @@ class TwistBody:
         self._turns_late_s, self._for_place = turns_late_s, for_place
         self._t_ns, self._v, self._w = recording.twist_t_ns, recording.v_B_mps, recording.w_B_radps
         self._nodes = dead_reckoning(self._t_ns, self._v, self._w, header.twist_timing)
+        before, after = self._nodes.at(slice(None, -1)), self._nodes.at(slice(1, None))
+        self._between = se3.log(se3.compose(se3.inverse(before), after))
         self._held = header.twist_timing.name
 
     def at(self, t_s: Floats) -> Poses:
         """Poses at seconds since the first twist; between two nodes at an even rate."""
         nodes = (self._t_ns - self._t_ns[0]) * 1e-9
         k = np.clip(np.searchsorted(nodes, t_s, side="right") - 1, 0, len(nodes) - 2)
-        whole = se3.compose(se3.inverse(self._nodes.at(k)), self._nodes.at(k + 1))
         share = (t_s - nodes[k]) / (nodes[k + 1] - nodes[k])
-        part = se3.log(whole) * np.clip(share, 0, 1)[:, None]
+        part = self._between[k] * np.clip(share, 0, 1)[:, None]
         return se3.compose(self._nodes.at(k), se3.exp(part[:, :3], part[:, 3:]))
 
     def rates(self, frame_t_ns: NDArray[np.int64], lag: int, offset_s: float) -> Floats:
