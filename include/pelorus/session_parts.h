@@ -65,7 +65,7 @@ typedef struct plr_held_frame {
     plr_observation observations[PLR_MAX_OBSERVATIONS];
 } plr_held_frame;
 
-/* Such frames: a ring, in the order in which they came. */
+/* Such frames: a ring, ascending by moved_ns. */
 typedef struct plr_held_frames {
     uint8_t first, count;
     plr_held_frame frames[PLR_SESSION_HELD_FRAMES];
