@@ -75,8 +75,8 @@ def draw_inputs(axes: Axes) -> None:
     title(axes, 1.15, "what comes in", "any order, any rate")
     for y, text, small in (
         (5.75, "twist (v, w), or IMU (a, w)", "50 to 400 Hz; one of the two"),
-        (4.65, "wheel, standstill", "rows over the twist, beside twists"),
-        (2.15, "position", "over the state; with an IMU wheels too"),
+        (4.65, "wheel, standstill", "with twists: weighed against them"),
+        (2.15, "position", "corrects the state; IMU: wheels, too"),
         (0.55, "stereo frame", "ids and pixels, 10 Hz"),
     ):
         box(axes, 0.1, y, 2.1, 0.7, INPUT)
@@ -86,7 +86,7 @@ def draw_inputs(axes: Axes) -> None:
     say(axes, 4.05, 6.15, "a step of the motion", "process/twist.c, velocity.c, or imu.c")
     axes.text(
         4.05, 5.33, "pose (and velocity) move at once;\nD = D D$_k$,  Q,  B accumulate;\n"
-        "wheels inform\nabout the biases", ha="center", va="center", fontsize=8, color=INK,
+        "wheels measure\nthe biases, too", ha="center", va="center", fontsize=8, color=INK,
         linespacing=1.35,
     )  # fmt: skip
     box(axes, 2.95, 2.75, 2.2, 1.05, PROCESS)
@@ -101,7 +101,7 @@ def draw_inputs(axes: Axes) -> None:
 
 def draw_frame(axes: Axes) -> None:
     """A frame from top to bottom."""
-    title(axes, 7.45, "a frame", "filter/update.c reads in this order")
+    title(axes, 7.45, "a frame", "in the order of filter/update.c")
     for i, (text, small) in enumerate(FRAME_STEPS):
         y = 5.9 - 0.78 * i
         box(axes, 5.95, y, 3.0, 0.6, FRAME)
@@ -137,7 +137,7 @@ def draw_state(axes: Axes) -> None:
     axes.text(left + unit * rows + 0.42, top + 0.1, "W", fontsize=12, ha="center", color=INK)
     axes.text(
         10.9, 3.92, "P: errors of pose, velocity (with an IMU),\nbiases and landmarks. "
-        "W: the motion's\nnoise on each, during a frame alone", ha="center", va="center",
+        "W: the motion's\nnoise on each, only within a frame", ha="center", va="center",
         fontsize=7.5, color=INK, linespacing=1.35,
     )  # fmt: skip
     arrow(axes, (8.95, 2.3), (9.3, 2.3), (9.3, 3.15), (9.55, 3.15))
@@ -147,7 +147,7 @@ def draw_state(axes: Axes) -> None:
         10.9,
         3.125,
         "T$_{WB}$, v, biases, N landmarks",
-        "q in the camera: bearing, 1 / range",
+        "in the camera: bearing, 1 / range",
         8.5,
     )
 
