@@ -203,10 +203,10 @@ typedef struct plr_consistency {
     uint16_t agreeing_frames;               /* successive frames in agreement */
     uint16_t contradicting_frames;          /* successive frames with a large contradiction */
     uint16_t small_frames;                  /* successive frames with a small difference */
-    uint8_t contradicted;                   /* 1: the twists are given less weight */
-    uint8_t drifting;                       /* 1: over many frames the difference exceeds noise */
-    uint8_t frozen;                         /* 1: this frame's picture equals the one before */
-    uint8_t biases_kept;                    /* 1: frames teach the biases of twists nothing */
+    uint16_t doubted_frames; /* frames since the pose came into doubt; 0: it is not */
+    uint8_t contradicted;    /* 1: the twists are given less weight */
+    uint8_t drifting;        /* 1: over many frames the difference exceeds noise */
+    uint8_t frozen;          /* 1: this frame's picture equals the one before */
     /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
     uint8_t settling_frames;
 } plr_consistency;

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "filter/consistency.h"
 #include "process/process.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
@@ -16,7 +17,7 @@ static bool may_be_considered(const plr_filter *f) {
 }
 
 void plr_bias_consider(const plr_filter *f, bool outright, plr_considered_bias *before) {
-    before->considered = (f->consistency.biases_kept || outright) && may_be_considered(f);
+    before->considered = (outright || plr_consistency_keeps_biases(f)) && may_be_considered(f);
     if (!before->considered)
         return;
     before->seconds = f->motion.seconds;

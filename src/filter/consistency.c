@@ -16,10 +16,10 @@
 enum {
     FAST_WINDOWS = 2,     /* windows that decide whether the twists get less weight */
     AGREEING_FRAMES = 15, /* successive frames in agreement that end any doubt */
-    SMALL_FRAMES = 100, /* successive frames with a small difference that may teach biases again */
-    FEW = 3,            /* points */
-    FROZEN_SHARE = 2,   /* a picture is repeated if at least one match in two has the same pixels */
-    MIN_MATCHES = 10 /* with fewer matches in the sums, the share of rejected ones is not judged */
+    KEPT_FRAMES = 600,    /* a doubt that lasts longer is no event: biases are taught again */
+    FEW = 3,              /* points */
+    FROZEN_SHARE = 2, /* a picture is repeated if at least one match in two has the same pixels */
+    MIN_MATCHES = 10  /* with fewer matches in the sums, the share of rejected ones is not judged */
 };
 
 /* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */
@@ -307,8 +307,6 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     } else if (c->small_frames >= AGREEING_FRAMES) {
         c->contradicted = 0;
     }
-    if (c->small_frames >= SMALL_FRAMES)
-        c->biases_kept = 0;
 }
 
 /* ---------------------------------------------------------------- the verdict */
@@ -382,8 +380,8 @@ static void resolve(plr_filter *f) {
     memset(c->difference_sigmas, 0, sizeof c->difference_sigmas);
     c->difference_noise = 0;
     memset(c->windows, 0, sizeof c->windows);
-    c->contradicted = c->drifting = c->biases_kept = c->settling_frames = 0;
-    c->agreeing_frames = 0;
+    c->contradicted = c->drifting = c->settling_frames = 0;
+    c->agreeing_frames = c->doubted_frames = 0;
 }
 
 void plr_consistency_doubt(plr_filter *f) {
@@ -394,12 +392,14 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     plr_consistency *c = &f->consistency;
     count(f, report);
     uint32_t reasons = find_reasons(f, report);
-    if (lost || c->contradicted || c->frozen || (reasons & PLR_REASON_SCENE_DISAGREES)) {
+    const bool doubtful =
+        lost || c->contradicted || c->frozen || (reasons & PLR_REASON_SCENE_DISAGREES);
+    if (doubtful)
         plr_consistency_doubt(f);
-        c->biases_kept =
-            1; /* until it is settled: a scene may move a little less for some frames */
-    } else if (c->drifting && c->settling_frames < AGREEING_FRAMES)
+    else if (c->drifting && c->settling_frames < AGREEING_FRAMES)
         c->settling_frames++; /* a drift: as long as it lasted, so that noise is soon forgotten */
+    if (doubtful || c->doubted_frames > 0)
+        c->doubted_frames = (uint16_t)(c->doubted_frames + (c->doubted_frames < UINT16_MAX));
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
                         fast_statistic(f) < AGREEING_BELOW &&
                         !(reasons & PLR_REASON_SCENE_DISAGREES);
@@ -408,6 +408,11 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     if (c->settling_frames > 0 && c->agreeing_frames >= c->settling_frames)
         resolve(f);
     return c->settling_frames > 0 ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;
+}
+
+bool plr_consistency_keeps_biases(const plr_filter *f) {
+    const plr_consistency *c = &f->consistency;
+    return c->contradicted || (c->doubted_frames > 0 && c->doubted_frames < KEPT_FRAMES);
 }
 
 void plr_consistency_enlarge(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {

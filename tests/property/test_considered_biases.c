@@ -37,7 +37,7 @@ void tearDown(void) {
 static void contradict(bool so) {
     memset(&twins.filter.consistency, 0, sizeof twins.filter.consistency);
     memset(H, 0, sizeof H);
-    twins.filter.consistency.biases_kept = so;
+    twins.filter.consistency.doubted_frames = so;
     reseal(&twins.filter);
     twins.book.considered = so ? H : NULL;
 }

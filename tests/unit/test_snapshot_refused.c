@@ -20,7 +20,7 @@ enum {
     CLOCK_STARTED_AT = INTERVAL_AT + REAL,
     FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 143 * REAL,
     HEALTH_AT =
-        FRAMES_AT + 4 + 16 + 10 + 7 + 4 + 8 + 329 * REAL, /* settling_frames stands before it */
+        FRAMES_AT + 4 + 16 + 10 + 8 + 4 + 8 + 329 * REAL, /* settling_frames stands before it */
     SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
     SLOT_SIZE = 8 * REAL + 35,
     KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,
@@ -128,7 +128,7 @@ static void test_more_landmarks_than_slots_are_refused(void) {
 
 static void test_numbers_that_are_not_finite_are_refused(void) {
     const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
-    const uint32_t places[] = {INTERVAL_AT,     FRAMES_AT + 4,       HEALTH_AT - 9 - REAL,
+    const uint32_t places[] = {INTERVAL_AT,     FRAMES_AT + 4,       HEALTH_AT - 10 - REAL,
                                SLOTS_AT,        SLOTS_AT + 3 * REAL, P_AT,
                                P_AT + 5 * REAL, state.length - REAL};
     for (unsigned i = 0; i < 3; i++)
@@ -151,9 +151,9 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 }
 
 static void test_a_flag_is_0_or_1(void) {
-    const uint32_t flags[] = {CLOCK_STARTED_AT, CLOCK_STARTED_AT + 1, HEALTH_AT - 5,
-                              HEALTH_AT - 4,    HEALTH_AT - 3,        HEALTH_AT - 2,
-                              KNOWN_AT,         KNOWN_AT + SLOT_SIZE};
+    const uint32_t flags[] = {CLOCK_STARTED_AT,    CLOCK_STARTED_AT + 1, HEALTH_AT - 4,
+                              HEALTH_AT - 3,       HEALTH_AT - 2,        KNOWN_AT,
+                              KNOWN_AT + SLOT_SIZE};
     for (unsigned i = 0; i < sizeof flags / sizeof *flags; i++) {
         state_bytes_save(&state, &filter);
         TEST_ASSERT_LESS_OR_EQUAL_UINT8(1, state.bytes[flags[i]]);

@@ -289,6 +289,36 @@ static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.consistency.difference[0]);
 }
 
+/* What is turned away for minutes says that the settings are wrong, not that something happens. */
+static void test_biases_are_kept_from_a_doubt_until_it_is_settled_or_has_become_usual(void) {
+    const plr_report disagrees = {.matched = 10, .gated = 5, .used = 5, .nis = 20, .nis_dof = 20};
+    unsigned kept = 0;
+    TEST_ASSERT_FALSE(plr_consistency_keeps_biases(&filter));
+    for (int k = 0; k < 800; k++) {
+        add_agreement();
+        (void)plr_consistency_judge(&filter, &disagrees, false);
+        TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
+        kept += plr_consistency_keeps_biases(&filter);
+    }
+    TEST_ASSERT_UINT_WITHIN(10, 600, kept);
+    TEST_ASSERT_FALSE(plr_consistency_keeps_biases(&filter));
+    contradict_outright(0.4);
+    (void)judge();
+    TEST_ASSERT_TRUE(plr_consistency_keeps_biases(&filter));
+    for (int k = 0; k < 2 * SETTLED; k++) {
+        add_agreement();
+        (void)judge();
+    }
+    contradict_outright(0.4);
+    for (int k = 0; k < SETTLED; k++) {
+        (void)judge();
+        TEST_ASSERT_TRUE(plr_consistency_keeps_biases(&filter));
+        add_agreement();
+    }
+    (void)judge();
+    TEST_ASSERT_FALSE(plr_consistency_keeps_biases(&filter));
+}
+
 static void test_a_frame_that_differs_begins_the_settling_anew(void) {
     const double nu[6] = {0, 8};
     contradict_outright(0.4);
@@ -461,6 +491,7 @@ int main(void) {
     RUN_TEST(test_what_the_frames_moved_the_pose_by_is_covered_too);
     RUN_TEST(test_an_old_reading_is_no_rival_of_the_picture);
     RUN_TEST(test_after_fifteen_frames_of_agreement_it_is_settled);
+    RUN_TEST(test_biases_are_kept_from_a_doubt_until_it_is_settled_or_has_become_usual);
     RUN_TEST(test_a_frame_that_differs_begins_the_settling_anew);
     RUN_TEST(test_a_drift_is_doubted_as_long_as_it_lasted_and_no_longer_than_a_contradiction);
     RUN_TEST(test_a_bias_is_held_against_what_has_been_learnt_of_it);
