@@ -35,22 +35,18 @@ echo 'build/bin/pelorus-replay, build/bin/pelorus-replay-f64'
 
 cd "$ROOT"
 mkdir -p out
-settings=()
 if [ -z "$recording" ]; then
     heading 'Simulating a drive'
     recording=$ROOT/out/demo.plr
     "$VENV/bin/pelorus" simulate "$recording"
-    # the simulated camera is what it is said to be
-    printf 'focal-sigma = 0\nbaseline-sigma = 0\n' >out/demo.conf
-    settings=(--config out/demo.conf)
 fi
 
 heading 'Replaying it (float32, what the robot runs)'
-build/bin/pelorus-replay "$recording" "${settings[@]+"${settings[@]}"}" --trajectory out/trajectory.tum --out out/log.plr
+build/bin/pelorus-replay "$recording" --trajectory out/trajectory.tum --out out/log.plr
 "$VENV/bin/pelorus" export out/log.plr --map out/map.ply
 
 heading 'Drawing the report'
-"$VENV/bin/pelorus" report "$recording" "${settings[@]+"${settings[@]}"}" --out out
+"$VENV/bin/pelorus" report "$recording" --out out
 
 heading 'Done'
 echo 'Report: out/report.html. Its pictures:'

@@ -111,6 +111,12 @@ def test_a_scene_that_moves_is_told_before_no_fit() -> None:
     assert "do not tell the same motion" in said[0].words
 
 
+def test_what_moves_fast_is_no_slot() -> None:
+    """Of a rover: 342 tracks seemed to go on with another point."""
+    change, due = OF_RECORDINGS["moving"]
+    assert found_in(change(everyday_drive(drawn(9702), 9702), 2))[0].name in due
+
+
 def test_of_few_points_a_long_drive_is_looked_at() -> None:
     """As many observations tell as much: a thousand frames of five are a sixth of the time."""
     recording = everyday_drive(drawn(9101), 9101)

@@ -17,6 +17,7 @@ from pelorus.console import progress
 from pelorus.errors import PelorusError, whole, writing
 from pelorus.frames import (
     IMU_READINGS_MAX,
+    Config,
     Header,
     Landmark,
     Message,
@@ -32,6 +33,7 @@ from pelorus.inertial import NO_READINGS, Inertial
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
+from pelorus.settings import IDS
 from pelorus.tracks import Tracks
 from pelorus.wire import Writer
 
@@ -60,6 +62,7 @@ class Recording:
     inertial: Inertial = NO_READINGS  # in place of twists
     imu_batch: int = IMU_READINGS_MAX  # readings of a message, at most
     start: Start | None = None
+    settings: dict[str, float] = field(default_factory=dict)  # wanted; options win over them
 
     def with_header(self, **changes: Any) -> Recording:
         return replace(self, header=replace(self.header, **changes))
@@ -101,6 +104,8 @@ class Recording:
     def messages(self) -> Iterator[Message]:
         """In the order that docs/REPLAY-FORMAT.md asks for."""
         yield self.header
+        if self.settings:
+            yield Config({IDS[name]: value for name, value in self.settings.items()})
         yield from self.remarks
         yield from self.known
         if self.start is not None:
@@ -112,7 +117,14 @@ class Recording:
     def __len__(self) -> int:
         data = len(self.twist_t_ns) + len(self.truth_t_ns) + len(self.frame_t_ns)
         data += len(self.inertial.t_ns) // self.imu_batch
-        return 1 + len(self.remarks) + len(self.known) + len(self.readings) + data
+        return (
+            1
+            + bool(self.settings)
+            + len(self.remarks)
+            + len(self.known)
+            + len(self.readings)
+            + data
+        )
 
     def _twists(self) -> Iterator[tuple[int, int, Message]]:
         for t, v, w in zip(self.twist_t_ns.tolist(), self.v_B_mps, self.w_B_radps, strict=True):

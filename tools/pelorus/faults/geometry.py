@@ -317,7 +317,12 @@ def moving_least(found: Moving) -> float:
     return max(MOVING_SHARE, MOVING_USUAL + by_chance)
 
 
-def _moving(recording: Recording, views: TwoViews, misleads: bool) -> Iterator[Fault]:
+def scene_moves(recording: Recording, views: TwoViews) -> bool:
+    """Whether more of it moves by itself than is usual."""
+    return any(_moving(recording, views))
+
+
+def _moving(recording: Recording, views: TwoViews, misleads: bool = False) -> Iterator[Fault]:
     """`misleads`: nothing else explains why camera and body do not tell one motion."""
     far = two_views(recording.tracks, recording.header.camera, FAR_LAG)
     found = moving(recording.tracks, views, far)

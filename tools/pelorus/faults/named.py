@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pelorus.faults import identity
 from pelorus.faults.fault import Fault
-from pelorus.faults.geometry import Judged, geometry
+from pelorus.faults.geometry import Judged, geometry, scene_moves
 from pelorus.faults.handeye import first_part
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
@@ -163,7 +163,7 @@ def _ids(recording: Recording, views: TwoViews) -> Iterator[Fault]:
         yield Fault("ids-rows", "the ids are 0, 1, 2, ... in every frame: they are row numbers")
         return
     found = identity.jumps(recording, views)
-    if found.are_slots:
+    if found.are_slots and not scene_moves(recording, views):  # fast ones seem to jump
         yield Fault(
             "ids-slots",
             f"{found.jumps} tracks go on with another point from one frame to the next, "

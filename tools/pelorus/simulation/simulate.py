@@ -229,10 +229,17 @@ def simulate(options: Options) -> Simulation:
         readings=_small_readings(options, way, chances),
         camera_delay_ns=round(options.camera_delay_s * 1e9),
         twist_delay_ns=round(options.mishaps.twist_delay_s * 1e9),
+        settings=_exact_camera(options),
     )
     if sensed is not None:
         recording = by_imu.driven(recording, options.imu_drive, sensed, chances["start"])
     return Simulation(recording, points, bias_v, bias_w, outlier, sensed)
+
+
+def _exact_camera(options: Options) -> dict[str, float]:
+    """No simulated camera is off by what a calibration leaves, unless that is asked for."""
+    off = options.mishaps.focal_error_percent or options.mishaps.baseline_error_percent
+    return {} if off else {"focal-sigma": 0.0, "baseline-sigma": 0.0}
 
 
 def _landmarks(options: Options, chances: _Chances) -> Floats:
