@@ -332,8 +332,7 @@ def clean_pieces(name: str, whole: Recording) -> tuple[int, int]:
 def injected(name: str, recording: Recording) -> tuple[int, int, int]:
     """Of so many faults so many are named rightly, and so many others cannot be told."""
     right, asked, beyond = 0, 0, 0
-    recording = first_part(recording)
-    known = Known.of(recording)
+    known = Known.of(first_part(recording))
     own = {fault.name for fault in found_in(recording)}
     print(name, "as it is:", *(own or ["clean"]), flush=True)
     for kind, k, wrong, due in injections(recording):
@@ -342,7 +341,7 @@ def injected(name: str, recording: Recording) -> tuple[int, int, int]:
         good = bool(named) and named[0] in due
         right, asked = right + good, asked + 1
         if not good:
-            why = known.too_little(kind, k, wrong)
+            why = known.too_little(kind, k, first_part(wrong))
             beyond += bool(why)
             words = [f"{f.name}: {f.words}" for f in said]
             print(name, kind, k, words, f"cannot be told: {why}" if why else "MISSED", flush=True)
