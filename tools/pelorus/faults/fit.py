@@ -106,11 +106,11 @@ class Fit:
         of_x[others] = np.linalg.solve(A[np.ix_(others, others)], A[others, which])
         of_z[others] = np.linalg.solve(A[np.ix_(others, others)].T, A[which, others])
         x, z = (c[:, :, which] - c[:, :, which].mean(axis=0) for c in (X, Z))
-        alone, beyond = np.sum(x * z, axis=1), np.sum((X @ of_x) * (Z @ of_z) * self._trust, axis=1)
-        return all(
-            float(both.sum()) > TELLS_SIGMAS * float(np.linalg.norm(both))
-            for both in (alone, beyond)
-        )
+        for both in (x * z, (X @ of_x) * (Z @ of_z)):
+            together = np.sum(both * self._trust, axis=1)
+            if together.sum() < TELLS_SIGMAS * np.linalg.norm(together):
+                return False
+        return True
 
 
 def beside(x: Floats, *lags: int) -> Floats:
