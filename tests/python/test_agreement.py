@@ -383,3 +383,10 @@ def test_at_an_even_speed_a_scale_is_known_as_well_as_a_bias(seed: int) -> None:
 )
 def test_noise_is_no_fault(seed: int, why: str) -> None:
     assert faults_in(everyday_drive(drawn(seed), seed)) == [], why
+
+
+def test_noisy_ways_do_not_hide_what_turns_tell_of_the_clock() -> None:
+    """A rover at an even speed whose velocities are known to 0.3 m/s: 90 ms were not asked for."""
+    change, _ = OF_RECORDINGS["clock"]
+    late = change(everyday_drive(drawn(9705), 9705), 2)
+    assert [fault.name for fault in faults_in(late)] == ["clock"]
