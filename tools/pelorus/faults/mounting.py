@@ -152,7 +152,7 @@ def _solved(error: Floats, nuisance: Floats, trust: Floats) -> Floats:
     trusted = rows * trust.reshape(-1, 1)
     A = trusted.T @ rows
     A += np.diag([1e-9] * 3 + [1.0] * 6)  # tilt and lever are of their usual size
-    return np.linalg.solve(A, trusted.T @ error.ravel())
+    return np.asarray(np.linalg.solve(A, trusted.T @ error.ravel()))
 
 
 def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Floats) -> Duel:
