@@ -16,20 +16,18 @@
  *     config.process = PLR_PROCESS_IMU;              // and its noises: gyro_noise, accel_noise ...
  *     plr_filter_inertial(&filter, t_ns, &reading);  // at every reading, in place of predict
  *
- * The body stands for a second first, or see the setting imu_start. "Reading" means below what
- * moves the state, a twist or a reading of the IMU, or a reading of a small sensor where it says
- * so.
+ * The body stands still for the first second, or see the setting imu_start. Below, "reading" means
+ * a twist or a reading of the IMU; readings of small sensors are named as such.
  *
  * Time is an argument: the filter has no clock. Every call runs a bounded number of steps,
  * whatever its data; the bounds are in docs/SIZES.md. A program may have several filters. One
  * filter is not thread-safe: calls on it must not overlap.
  *
- * A refused call (status < 0) changes nothing but the counts of refused calls; of an IMU's refused
- * reading the filter also remembers what was wrong, and how many like it came in succession
- * (plr_filter_inertial). A function that takes a const filter changes nothing at all: whether you
- * call it or not, later results have the same bits. Every call first checks that the filter's memory
- * is as the previous call left it; if not, it returns PLR_E_DAMAGED, and so does every later call
- * until plr_filter_init.
+ * A refused call (status < 0) changes only the counts of refused calls. Of refused IMU readings the
+ * filter also remembers what was wrong, and how many came in succession (plr_filter_inertial). A
+ * function that takes a const filter changes nothing: later results have the same bits whether you
+ * call it or not. Every call first checks that the filter's memory is as the previous call left it;
+ * if not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
  *
  * The error of a pose is defined on its right side: with T the true pose and T^ the estimate, T =
  * T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias is
@@ -171,7 +169,7 @@ plr_time_ns plr_filter_time(const plr_filter *f);
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB);
 
 /* The covariances below are symmetric to the bit, and positive as plr_filter_set_pose asks for it.
- * Where rounding in float32 has left a state whose covariance is not, its variances are enlarged until
+ * Where float32 rounding has left a covariance that is not, its variances are enlarged until
  * it is. PLR_E_DIVERGED: a variance is negative, or (velocity and landmark, too) a number not finite. */
 
 /* Covariance of the pose's error (rho, theta), 6x6, m and rad. While vision contradicts the twists,
@@ -290,8 +288,8 @@ const char *plr_reason_text(plr_reason reason);
 const char *plr_health_text(plr_health health);
 const char *plr_imu_fault_text(plr_imu_fault fault);
 
-/* The version as text, "0.1.0", and a number that differs between builds whose bits may differ: version, arithmetic
- * (PLR_ARITHMETIC), precision, capacity, block size. */
+/* The version as text, "0.1.0", and a number that differs between builds whose bits may differ: it
+ * contains version, arithmetic (PLR_ARITHMETIC), precision, capacity and block size. */
 const char *plr_version(void);
 uint32_t plr_build_fingerprint(void);
 

@@ -13,9 +13,9 @@
  * Messages in (docs/REPLAY-FORMAT.md), in this order: HEADER; CONFIG and known LANDMARKs, as
  * needed; START, or instead of it STATE (restore); then TWIST or IMU, STEREO, TRUTH and READING,
  * and at any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a REPORT
- * after each frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END. No input stops the
- * session: a message that it cannot use is counted and answered with a REPORT that says what was
- * refused (subject) and why (status). After END it waits for the next HEADER.
+ * after each frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END. No input
+ * stops the session: a message that it cannot use is counted, and answered with a REPORT that names
+ * what was refused (subject) and why (status). After END it waits for the next HEADER.
  *
  * A setting's value comes from the first of these that has it: the option `overrides`, CONFIG,
  * HEADER, the default. After the first data HEADER and CONFIG cannot change anything: equal ones

@@ -111,16 +111,16 @@ typedef struct plr_config {
     uint16_t slots;
 
     /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
-     * What moves the state. With IMU velocity is estimated, and the biases are those of
-     * accelerometer and gyro; imu-turn and imu-arm say where it is on the body. */
+     * What moves the state. With IMU, velocity is estimated, and the biases are those of
+     * accelerometer and gyro; imu-turn and imu-arm say where the IMU is on the body. */
     uint8_t process;
 
     /* Setting imu-start: one of plr_imu_start, default PLR_IMU_START_AUTO.
-     * After a start in motion position and yaw are misled by some 0.3 m and 2 degrees, and health is
-     * DEGRADED for two seconds (PLR_REASON_POSE_MAY_BE_WRONG). Then the world is defined anew: by the
-     * position and yaw that are estimated, which from there on count as known to start-sigma. A pose
-     * that was set with a covariance, a measured position and a known landmark prevent this, because
-     * they belong to the world as it was given: there the covariance is widened by as much. */
+     * A start in motion leaves position and yaw wrong by some 0.3 m and 2 degrees, and health is
+     * DEGRADED for two seconds (PLR_REASON_POSE_MAY_BE_WRONG). Then the world is defined anew by the
+     * estimated position and yaw, which count as known to start-sigma from there on. If the world is
+     * given, by a pose set with a covariance, a measured position or a known landmark, the covariance
+     * is enlarged by that error instead. */
     uint8_t imu_start;
 
     /* Setting imu-timing: one of plr_twist_timing, default PLR_TWIST_MID.
@@ -223,10 +223,10 @@ typedef struct plr_config {
     double twist_delay_s;
 
     /* Setting standstill-sigma [m/s]: 0 to 1, default 0.
-     * How still a robot is that stands, m/s, and rad/s for its turning; 0: standing is not
-     * detected. Above 0 the filter takes the body for standing where for a second no pixel moved by
-     * more than its noise and twists or IMU do not say otherwise, and measures a velocity of zero
-     * with this sigma. The pixels cannot tell a slower motion from none: choose about pixel-sigma
+     * How still a standing robot is, in m/s, and in rad/s for its turning; 0: standstill is not
+     * detected. Above 0, if for a second no pixel moves by more than its noise, and twists or IMU do
+     * not contradict, the filter measures a velocity of zero with this sigma. Pixels cannot show a
+     * motion slower than that: choose about pixel-sigma
      * times the usual depth over the focal length, per second (2 px, 5 m, 500 px: 0.02 m/s). */
     double standstill_sigma_mps;
 
@@ -240,14 +240,14 @@ typedef struct plr_config {
     double imu_arm_m[3];
 
     /* Setting focal-sigma: 0 to 0.1, default 0.005.
-     * By what share the focal length may be wrong, one sigma. Where speed and turn are constant
-     * nothing shows such an error, and it does not average out: each turn is off by the same share.
-     * What is told of covariances contains it, of pose, velocity, biases and landmarks; estimates
-     * take no notice. 0: the camera is exact, as a simulated one is. */
+     * The relative error of the focal length, one sigma. Such an error does not average out: each
+     * turn is wrong by the same share, and at constant speed and turn nothing shows it. The reported
+     * covariances of pose, velocity, biases and landmarks contain it; estimates do not depend on it.
+     * 0: the camera is exact, as a simulated one is. */
     double focal_sigma;
 
     /* Setting baseline-sigma: 0 to 0.1, default 0.005.
-     * The same of the baseline: each way is off by the same share. */
+     * The same of the baseline: each distance is wrong by the same share. */
     double baseline_sigma;
 
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.

@@ -50,8 +50,8 @@ typedef enum plr_status {
 
 /* How far the estimate may be trusted. */
 typedef enum plr_health {
-    PLR_HEALTH_GOOD = 0,     /* nothing that makes the estimate worse than it should be */
-    PLR_HEALTH_DEGRADED = 1, /* works, with less than it should have: see the reasons */
+    PLR_HEALTH_GOOD = 0,     /* no known problem */
+    PLR_HEALTH_DEGRADED = 1, /* it works, with a problem: see the reasons */
     PLR_HEALTH_LOST = 2,    /* the pose is predicted from twists or IMU alone (no observation and no
                                 position was used for a second or two), vision contradicts it, or
                                 the IMU has not started */
@@ -62,8 +62,8 @@ typedef enum plr_health {
  * leave it GOOD if no other is set, and ask for better settings or more slots: GATE_INERT, NO_ROOM
  * and NIS_LOW. Above each: what it means, what causes it, what to do. */
 typedef enum plr_reason {
-    /* Fewer than 3 observations used in this frame: a bare wall, darkness, a covered camera, or the
-     * gate rejects what is seen. Usually passes; if it stays, check the tracker. */
+    /* Fewer than 3 observations were used in this frame: a bare wall, darkness, a covered camera, or
+     * the gate rejects what is seen. It usually passes; if it stays, check the tracker. */
     PLR_REASON_FEW_OBSERVATIONS = 1 << 0,
     /* None used in the last 10 frames, or for a second: the pose is predicted from twists or IMU
      * alone and drifts, with an IMU within seconds. Causes as above. */
@@ -96,8 +96,8 @@ typedef enum plr_reason {
     /* Observations were left out for want of time. A longer deadline, or fewer features. */
     PLR_REASON_BUDGET = 1 << 11,
     /* Vision contradicts the twists, or the IMU, and the filter followed vision: slipping wheels, a
-     * dead encoder, a push. If it comes again, check the wheels; if it never goes, the odometry's
-     * scale. With an IMU: its noises are set too small (settings gyro-noise, accel-noise), or the
+     * dead encoder, a push. If it repeats, check the wheels; if it stays, the scale of the
+     * odometry. With an IMU: its noises are set too small (settings gyro-noise, accel-noise), or the
      * clocks of camera and IMU differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
@@ -145,9 +145,9 @@ typedef enum plr_reason {
     PLR_REASON_IMU_FAULT = 1 << 24
 } plr_reason;
 
-/* What is wrong with an IMU: plr_filter_imu_fault. While it has not started the filter waits for
- * better readings. After a start from a given state faults 2 to 6 are found within ten seconds, in
- * the readings' mean; the filter goes on. Readings of the last four are refused. */
+/* What is wrong with an IMU: plr_filter_imu_fault. Before its start the filter waits for better
+ * readings. After a start from a given state, faults 2 to 6 are found within ten seconds, from the
+ * mean of the readings, and the filter goes on. Readings with one of the last four are refused. */
 typedef enum plr_imu_fault {
     PLR_IMU_FAULT_NONE = 0,
     PLR_IMU_FAULT_MOVES = 1,       /* at the start: the body does not stand still */
