@@ -397,6 +397,23 @@ static void test_counts_add_up_where_the_map_is_larger_than_the_ring(void) {
     TEST_ASSERT_EQUAL_UINT(0, rig.report.poor);
 }
 
+/* True is easily mistaken for "no error". */
+static bool source_of_nothing(void *context, uint32_t id, plr_landmark *landmark) {
+    (void)context;
+    (void)id;
+    (void)landmark;
+    return true;
+}
+
+static void test_a_source_that_says_yes_and_gives_nothing_gives_no_landmark(void) {
+    rig.config.mode = PLR_MODE_LOCALIZATION;
+    rig.map.source = source_of_nothing;
+    rig_begin();
+    const plr_frame frame = look();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(0, rig.filter.count);
+}
+
 static void test_a_map_entry_that_is_none_is_not_taken(void) {
     known_sigma = (double)NAN;
     begin_with_map(PLR_MODE_LOCALIZATION, false);
@@ -430,6 +447,7 @@ int main(void) {
     RUN_TEST(test_a_map_holds_the_pose_where_it_is);
     RUN_TEST(test_slam_asks_the_map_only_if_told_to);
     RUN_TEST(test_counts_add_up_where_the_map_is_larger_than_the_ring);
+    RUN_TEST(test_a_source_that_says_yes_and_gives_nothing_gives_no_landmark);
     RUN_TEST(test_a_map_entry_that_is_none_is_not_taken);
     return UNITY_END();
 }
