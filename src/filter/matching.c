@@ -85,7 +85,7 @@ void plr_match_known(plr_filter *f, const plr_observation *seen, unsigned n,
     bool moved = false;
     for (unsigned k = 0; k < n; k++) {
         const uint32_t id = seen[f->work.order[k]].id;
-        plr_landmark known = {0}; /* refused if the source says that it has it, and gives nothing */
+        plr_landmark known = {.P_W_m2 = {-1}}; /* refused, if the source fills in nothing */
         plr_new_landmark landmark;
         if (f->work.slot_of[k] != PLR_NO_SLOT || !f->map.source(f->map.context, id, &known))
             continue;
