@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * From when the twists are contradicted, or the scene disagrees with itself, until that is settled a
- * frame does not teach the twists' biases: a wheel that slips or a scene that moves is no bias. Pose, landmarks and all covariances with the biases are corrected as
- * usual, so that what is left is the Schmidt ("consider") update: the biases' own numbers stay
- * (docs/MATH.md 17).
+ * From when the twists are contradicted, or the scene disagrees with itself, until that is settled,
+ * a frame does not teach the twists' biases: a wheel that slips or a scene that moves is no bias.
+ * Pose, landmarks and all covariances with the biases are corrected as usual, so that what is left
+ * is the Schmidt ("consider") update: the biases' own numbers stay (docs/MATH.md 17).
  */
 #ifndef PLR_FILTER_CONSIDERED_BIAS_H
 #define PLR_FILTER_CONSIDERED_BIAS_H

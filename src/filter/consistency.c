@@ -51,8 +51,8 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
  * of its prior's variance. */
 #define BIAS_SIGMAS  PLR_R(3.9)
 #define LEARNT_SHARE PLR_R(0.25)
-/* What sums keep from frame to frame. That of matches looks back three frames: a scene that moves is to be
- * told before it has carried the pose far. */
+/* What sums keep from frame to frame. Those of matches look back three frames: a scene that moves is
+ * to be told before it has carried the pose far. */
 #define MATCHES_DECAY PLR_R(0.6)
 #define NIS_DECAY     PLR_R(0.9)
 /* If a larger share of the matches is rejected, the scene contradicts itself. */

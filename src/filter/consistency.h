@@ -23,9 +23,9 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed);
 
 /* Adds the result of a frame: nu with prior N(0, I), in units of applied->L, and its information
  * Lambda, 6x6 packed upper triangle, prior included. `moved`: by how much the frame moved the pose
- * from where the twists had put it, m and rad in the body. `outright`: this frame contradicts the twists
- * by itself. Where the last reading is old (plr_health_readings_are_old), vision is followed all the same, but
- * there is no pose by twists that the true one could be. */
+ * from where the twists had put it, m and rad in the body. `outright`: this frame contradicts the
+ * twists by itself. Where the last reading is old (plr_health_readings_are_old), vision is followed
+ * all the same, but there is no pose by twists that the true one could be. */
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
@@ -38,9 +38,9 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
 /* The pose may be wrong, until pictures and twists have agreed for as long as after a contradiction. */
 void plr_consistency_doubt(plr_filter *f);
 
-/* True if frames teach the biases of twists nothing: from when the pose came into doubt until that is
- * settled, for a scene may move a little less for some frames; but if it takes long, only while the
- * twists are contradicted. */
+/* True if frames teach the biases of twists nothing: from when the pose came into doubt until that
+ * is settled, for a scene may move a little less for some frames; but if it takes long, only while
+ * the twists are contradicted. */
 bool plr_consistency_keeps_biases(const plr_filter *f);
 
 /* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers
