@@ -14,17 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pelorus.faults.clocks import FRAMES_MIN, UNTOLD, TwoClocks, offset_of, two_clocks
-from pelorus.faults.fit import (
-    CLOCK,
-    FOCAL,
-    LEVER,
-    SCALE,
-    TILT,
-    TURN,
-    TURN_SCALE,
-    Body,
-    Fit,
-)
+from pelorus.faults.fit import CLOCK, FOCAL, LEVER, SCALE, TILT, TURN, TURN_SCALE, Body, Fit
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
@@ -78,17 +68,19 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     body, bias = _body(recording, seen)
     offset = offset_of(recording, body, seen, bias)
     by_imu = len(recording.inertial.t_ns) > 0
-    clock_told = by_imu or Fit(body.design(recording, seen, offset, bias)).tells(CLOCK)
+    found = None if by_imu else Fit(body.design(recording, seen, offset, bias))
+    clock_told = found is None or found.tells(CLOCK)
     if not clock_told:
-        offset = 0.0
+        offset, found = 0.0, None
     if by_imu:
         seen = seen.with_focal(recording, views)
     clocks = two_clocks(recording, seen, offset, bias) if clock_told and not by_imu else UNTOLD
     at = offset
     if clocks.apart:  # all else is asked of motions that belong together
-        body, at = TwistBody(recording, clocks.turns_late_s), clocks.ways_s
-    design = body.design(recording, seen, at, bias)
-    found = none = place = Fit(design)
+        body, at, found = TwistBody(recording, clocks.turns_late_s), clocks.ways_s, None
+    if found is None:
+        found = Fit(body.design(recording, seen, at, bias))
+    none = place = found
     turns_told = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
         late = clocks.turns_late_s if clocks.apart else None

@@ -14,9 +14,8 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 SCALE_SIGMAS, SCALE_OFF, SCALE_WILD = 4.0, 0.015, 0.15
-# Where the HEADER tells no bias: wider than the filter's own default, with which 7 of 38 good
-# drives with biases of 0.01 and 0.03 m/s would be called faulty; with this one was, and for another
-# reason.
+# Where the HEADER tells no bias. With the filter's own default, which is smaller, 7 of 38 good
+# drives with biases of 0.01 and 0.03 m/s would be called faulty.
 BIAS_MPS, BIAS_SIGMAS = 0.03, 3.0
 SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
