@@ -25,9 +25,6 @@ void setUp(void) {
     dice = rng_seeded(2024);
 }
 
-void tearDown(void) {
-}
-
 /* From exactly as much memory as there are bytes. */
 static void run(const input *in) {
     uint8_t *bytes = malloc(in->size ? in->size : 1);
@@ -139,12 +136,4 @@ static void test_what_libfuzzer_found_holds_under_any_change(void) {
     }
     closedir(folder);
     TEST_ASSERT_GREATER_THAN_UINT(10, files);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_payloads_of_every_kind_hold_under_any_change);
-    RUN_TEST(test_streams_of_every_kind_hold_under_any_change);
-    RUN_TEST(test_what_libfuzzer_found_holds_under_any_change);
-    return UNITY_END();
 }

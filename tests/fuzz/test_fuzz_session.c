@@ -20,12 +20,6 @@ typedef struct input {
 
 static rng dice;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static void read_input(const char *name, input *in) {
     char path[1024];
     const int n = snprintf(path, sizeof path, "%s/%s", CORPUS, name);
@@ -110,11 +104,4 @@ static void test_the_first_seed_reaches_the_filter(void) {
         continue;
     TEST_ASSERT_EQUAL_UINT32(7, session.totals.stereos);
     TEST_ASSERT_TRUE(session.last.used > 2);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_corpus_holds_under_any_change);
-    RUN_TEST(test_the_first_seed_reaches_the_filter);
-    return UNITY_END();
 }

@@ -387,15 +387,3 @@ static void test_an_imu_that_starts_in_motion_computes_the_committed_bits(void) 
     check(&scenarios[6]);
     TEST_ASSERT_TRUE(filter.inertial.anchored);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_body_computes_the_committed_bits);
-    RUN_TEST(test_world_computes_the_committed_bits);
-    RUN_TEST(test_localization_computes_the_committed_bits);
-    RUN_TEST(test_mapping_computes_the_committed_bits);
-    RUN_TEST(test_slipping_wheels_compute_the_committed_bits);
-    RUN_TEST(test_an_imu_that_starts_at_rest_computes_the_committed_bits);
-    RUN_TEST(test_an_imu_that_starts_in_motion_computes_the_committed_bits);
-    return UNITY_END();
-}

@@ -18,9 +18,6 @@ void setUp(void) {
     rig.options.range_m = 40;
 }
 
-void tearDown(void) {
-}
-
 /* Rows of P that a filter of so many slots has. */
 static unsigned rows_of(unsigned slots) {
     return (rig.config.bias ? 12U : 6U) + 3 * slots;
@@ -103,12 +100,4 @@ static void test_more_slots_know_more(void) {
         TEST_ASSERT_LESS_THAN_DOUBLE(last, trace);
         last = trace;
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_number_of_slots_works_and_is_kept);
-    RUN_TEST(test_the_build_can_be_filled_to_the_last_slot);
-    RUN_TEST(test_more_slots_know_more);
-    return UNITY_END();
 }

@@ -103,11 +103,3 @@ static void test_uncertain_twists_agree(void) {
     twins.options.pixel_sigma_px = twins.config.pixel_sigma_px = 0.3;
     run(4, 3);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_contradicted_frame_is_schmidts_update);
-    RUN_TEST(test_frames_that_teach_the_biases_in_between_agree_too);
-    RUN_TEST(test_uncertain_twists_agree);
-    return UNITY_END();
-}

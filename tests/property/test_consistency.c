@@ -16,9 +16,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* Mean squared error per degree of freedom at the end of a drive, over seeds. */
 static double mean_squared_error(plr_model_kind model, bool bias) {
     double sum = 0, e[6];
@@ -65,12 +62,4 @@ static void test_world_believes_more_than_it_knows(void) {
         TEST_IGNORE_MESSAGE("world is not for float32: docs/NUMERICS.md");
     chi_square_bounds(RUNS * DOF, &low, &high);
     TEST_ASSERT_GREATER_THAN_DOUBLE(1.2 * high, mean_squared_error(PLR_MODEL_WORLD, false));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_body_knows_how_wrong_it_is);
-    RUN_TEST(test_body_with_biases_knows_how_wrong_it_is);
-    RUN_TEST(test_world_believes_more_than_it_knows);
-    return UNITY_END();
 }

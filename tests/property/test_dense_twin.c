@@ -437,24 +437,3 @@ static void run_new_pose(void) {
 static void test_a_pose_from_outside_drops_the_map_and_keeps_the_bias(void) {
     for_each_model(run_new_pose);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_frames_agree_with_the_textbook_filter);
-    RUN_TEST(test_the_gate_rejects_what_the_textbook_rejects);
-    RUN_TEST(test_eviction_removes_rows_and_columns);
-    RUN_TEST(test_uncertain_twists_beside_sharp_pixels_agree);
-    RUN_TEST(test_no_match_one_and_two_by_turns_agree);
-    RUN_TEST(test_exact_axes_agree);
-    RUN_TEST(test_noise_of_a_step_and_constant_landmarks_agree);
-    RUN_TEST(test_a_prior_independent_of_the_pose_agrees);
-    RUN_TEST(test_frames_between_twists_agree);
-    RUN_TEST(test_pose_covariance_between_frames_agrees);
-    RUN_TEST(test_landmarks_in_the_world_agree);
-    RUN_TEST(test_known_landmarks_enter_as_in_the_textbook);
-    RUN_TEST(test_known_landmarks_enter_between_frames_as_in_the_textbook);
-    RUN_TEST(test_localization_agrees);
-    RUN_TEST(test_mapping_agrees_and_keeps_the_given_pose_exact);
-    RUN_TEST(test_a_pose_from_outside_drops_the_map_and_keeps_the_bias);
-    return UNITY_END();
-}

@@ -26,9 +26,6 @@ void setUp(void) {
     chance = rng_seeded(54);
 }
 
-void tearDown(void) {
-}
-
 /* One number in a dozen is hostile. */
 static double spoil(double x) {
     static const double hostile[] = {0,    -1,    1e-300, -1e-300, 1e-40,  1e20,    -1e20,
@@ -245,10 +242,4 @@ static void test_no_input_breaks_the_filter(void) {
         TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(5, accepted[kind], attacks_of_all_kinds[kind].name);
         TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(5, refused[kind], attacks_of_all_kinds[kind].name);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_no_input_breaks_the_filter);
-    return UNITY_END();
 }

@@ -20,9 +20,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void note(imu_rig_errors *sum) {
     const imu_rig_errors e = imu_rig_errors_now();
     imu_rig_add(sum, &e, 1.0 / RUNS);
@@ -253,15 +250,4 @@ static void test_a_turn_that_ends_in_a_standstill_leaves_the_gyros_bias_alone(vo
             TEST_ASSERT_DOUBLE_WITHIN(4 * sqrt(P[7 * i]), 0, b[i]);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_ten_seconds_of_darkness_are_within_the_covariance_and_so_is_what_follows);
-    RUN_TEST(test_readings_that_get_lost_are_made_up_for_in_the_covariance);
-    RUN_TEST(test_a_wheel_makes_velocity_and_place_better_and_is_believed_as_it_should);
-    RUN_TEST(test_wheels_hold_the_velocity_in_the_dark);
-    RUN_TEST(test_a_standstill_holds_velocity_and_measures_the_gyros_bias);
-    RUN_TEST(test_a_turn_that_ends_in_a_standstill_leaves_the_gyros_bias_alone);
-    return UNITY_END();
 }

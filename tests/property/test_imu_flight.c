@@ -16,9 +16,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void begin_and_settle(imu_rig_start start, uint64_t seed) {
     imu_rig_begin(start, seed);
     if (start == IMU_RIG_AT_REST)
@@ -50,10 +47,4 @@ static void test_errors_stay_within_the_covariance(void) {
         for (unsigned i = 0; i < 5; i++)
             TEST_ASSERT_TRUE_MESSAGE(all[i] / 3 > low && all[i] / 3 < high, names[start]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_errors_stay_within_the_covariance);
-    return UNITY_END();
 }

@@ -16,9 +16,6 @@ void setUp(void) {
     imu_rig.options.rate_hz = 200;
 }
 
-void tearDown(void) {
-}
-
 /* Errors of each minute over all flights, and those at the end. */
 static imu_rig_errors of_minute[MINUTES], at_end;
 
@@ -57,10 +54,4 @@ static void test_ten_minutes_are_as_consistent_as_the_first(void) {
     chi_square_bounds(3 * RUNS, &low, &high);
     TEST_ASSERT_TRUE(at_end.position / 3 > low && at_end.position / 3 < high);
     TEST_ASSERT_TRUE(at_end.orientation / 3 > low && at_end.orientation / 3 < high);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_ten_minutes_are_as_consistent_as_the_first);
-    return UNITY_END();
 }

@@ -32,9 +32,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* ---------------------------------------------------------------- what a frame applied */
 
 typedef struct stretch {
@@ -382,13 +379,4 @@ static void test_uncertainty_of_position_and_yaw_touches_nothing_else_and_never_
         const double size = sqrt(P_other[7 * (i / 6)] * P_other[7 * (i % 6)]);
         TEST_ASSERT_DOUBLE_WITHIN(1e4 * eps * size, P_own[i] + carried[i], P_other[i]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_position_and_yaw_are_not_observed);
-    RUN_TEST(test_all_else_is_observed);
-    RUN_TEST(test_a_world_that_is_turned_about_the_vertical_and_shifted_changes_the_pose_alone);
-    RUN_TEST(test_uncertainty_of_position_and_yaw_touches_nothing_else_and_never_shrinks);
-    return UNITY_END();
 }

@@ -18,9 +18,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* Drives two filters by the same data, one from identity and one from `start`. */
 static void drive(const plr_pose *start) {
     double P[36] = {0};
@@ -89,11 +86,4 @@ static void test_world_is_not(void) {
     rig.config.model = PLR_MODEL_WORLD;
     drive(&start);
     TEST_ASSERT_FALSE(same_covariance());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_body_is_the_same_from_every_start);
-    RUN_TEST(test_world_is_not);
-    return UNITY_END();
 }

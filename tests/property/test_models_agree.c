@@ -16,9 +16,6 @@ void setUp(void) {
     rig.config.start_sigma = 0.02;
 }
 
-void tearDown(void) {
-}
-
 static void begin_both(void) {
     rig_begin();
     for (uint8_t model = 0; model < 2; model++) {
@@ -120,13 +117,4 @@ static void test_by_prediction_with_biases_poses_differ_by_the_share_that_is_cha
     drive_blindly();
     demand_same_poses(0, 2 * REAL_EPSILON, 1e-4 + 100 * REAL_EPSILON);
     demand_same_landmarks(1e-12 + 2000 * REAL_EPSILON, 1e-4 + 1e4 * REAL_EPSILON);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_after_the_first_frame_landmarks_are_the_same);
-    RUN_TEST(test_without_motion_a_second_frame_changes_both_alike);
-    RUN_TEST(test_by_prediction_alone_poses_are_the_same);
-    RUN_TEST(test_by_prediction_with_biases_poses_differ_by_the_share_that_is_charged);
-    return UNITY_END();
 }

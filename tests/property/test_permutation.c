@@ -18,9 +18,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void shuffle(plr_observation *x, unsigned n) {
     for (unsigned i = n; i > 1; i--) {
         const unsigned j = rng_below(&chance, i);
@@ -81,11 +78,4 @@ static void test_shuffled_new_ids_take_the_same_slots(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&shuffled, &frame, NULL));
     TEST_ASSERT_EQUAL_UINT(5, rig.filter.count);
     TEST_ASSERT_TRUE(specimen_same_state(&rig.filter, &shuffled));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_shuffled_observations_give_the_same_bits);
-    RUN_TEST(test_shuffled_new_ids_take_the_same_slots);
-    return UNITY_END();
 }

@@ -16,9 +16,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* A step of 2 to 60 ms, now and then a second. */
 static void drive_some_way(void) {
     const unsigned steps = rng_below(&chance, 12);
@@ -70,11 +67,4 @@ static void test_world_stays_positive_in_double(void) {
         TEST_IGNORE_MESSAGE("world is not for float32: docs/NUMERICS.md");
     rig.config.model = PLR_MODEL_WORLD;
     run();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_body_stays_positive);
-    RUN_TEST(test_world_stays_positive_in_double);
-    return UNITY_END();
 }

@@ -50,9 +50,6 @@ void setUp(void) {
     imu_rig.config.gate_d2 = 0;
 }
 
-void tearDown(void) {
-}
-
 static void look_at(plr_filter *f, outcome *o) {
     plr_pose pose;
     plr_twist u;
@@ -183,13 +180,4 @@ static void test_the_world_model(void) {
 
 static void test_an_imu(void) {
     hold_against_others(fly, 1e-4);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_twists_with_biases);
-    RUN_TEST(test_twists_without_biases);
-    RUN_TEST(test_the_world_model);
-    RUN_TEST(test_an_imu);
-    return UNITY_END();
 }

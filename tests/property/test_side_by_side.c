@@ -21,9 +21,6 @@ void setUp(void) {
     }
 }
 
-void tearDown(void) {
-}
-
 static void begin(plr_filter *f, int which) {
     scene_options options;
     scene_options_default(&options);
@@ -60,10 +57,4 @@ static void test_two_filters_do_not_influence_one_another(void) {
     TEST_ASSERT_TRUE(specimen_same_state(&alone[0], &together[0]));
     TEST_ASSERT_TRUE(specimen_same_state(&alone[1], &together[1]));
     TEST_ASSERT_FALSE(alone[0].count == alone[1].count);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_two_filters_do_not_influence_one_another);
-    return UNITY_END();
 }

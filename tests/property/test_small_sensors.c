@@ -29,9 +29,6 @@ void setUp(void) {
     small_sensors_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* A step of 10 ms: a twist at its start, and what else is read then. */
 static void step(const helpers *with, unsigned k) {
     const plr_twist twist = scene_read(&rig.world);
@@ -192,20 +189,4 @@ static void test_turning_wheels_before_a_still_picture_are_not_standing(void) {
     rig.config.gate_d2 = 13;
     rig.options.bias[0] = 1.5; /* they spin on ice */
     TEST_ASSERT_EQUAL_UINT32(0, readings_after(40));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_wheel_on_three_axes_improves_dead_reckoning);
-    RUN_TEST(test_a_slower_wheel_on_one_axis_too);
-    RUN_TEST(test_a_wheel_beside_a_camera);
-    RUN_TEST(test_in_dead_reckoning_a_wheel_finds_the_biases);
-    RUN_TEST(test_a_standstill_holds_the_pose_and_finds_the_biases);
-    RUN_TEST(test_positions_bound_the_error);
-    RUN_TEST(test_a_height_alone);
-    RUN_TEST(test_positions_without_biases_too);
-    RUN_TEST(test_standing_is_detected_from_the_pixels_and_only_if_asked_for);
-    RUN_TEST(test_creeping_is_not_standing);
-    RUN_TEST(test_turning_wheels_before_a_still_picture_are_not_standing);
-    return UNITY_END();
 }

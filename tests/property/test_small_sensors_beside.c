@@ -14,9 +14,6 @@ void setUp(void) {
     small_sensors_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* ---------------------------------------------------------------- what is refused, and rejected */
 
 static void refuse(plr_reading reading, plr_status expected) {
@@ -288,22 +285,4 @@ static void test_rejected_readings_are_told_without_frames_too(void) {
     }
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_health(&rig.filter, rig.world.t_ns, &health));
     TEST_ASSERT_TRUE(health.reasons & PLR_REASON_READINGS_REJECTED);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_bad_readings_are_refused_and_change_nothing);
-    RUN_TEST(test_what_the_gate_rejects_changes_nothing_but_the_time);
-    RUN_TEST(test_positions_in_the_dark_are_degraded_and_not_lost);
-    RUN_TEST(test_ten_rejected_in_succession_are_a_reason);
-    RUN_TEST(test_a_standstill_does_not_stop_a_robot_that_drives_off);
-    RUN_TEST(test_a_wheel_that_has_ended_is_not_believed_for_seconds);
-    RUN_TEST(test_two_readings_of_one_time_count_as_readings);
-    RUN_TEST(test_an_impossible_velocity_does_not_take_the_pose_along);
-    RUN_TEST(test_wheel_and_standstill_that_disagree_leave_the_biases_finite);
-    RUN_TEST(test_a_position_a_kilometre_off_is_rejected_and_nothing_diverges);
-    RUN_TEST(test_a_frozen_picture_is_seen_between_positions_too);
-    RUN_TEST(test_heights_alone_do_not_keep_a_dark_drive_from_being_lost);
-    RUN_TEST(test_rejected_readings_are_told_without_frames_too);
-    return UNITY_END();
 }

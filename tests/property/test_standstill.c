@@ -20,9 +20,6 @@ void setUp(void) {
     rig.options.most_seen = LANDMARKS;
 }
 
-void tearDown(void) {
-}
-
 static void demand_still_there(void) {
     plr_pose pose;
     double P[36];
@@ -73,12 +70,4 @@ static void test_hours_without_noise_stay_exact(void) {
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&rig.filter));
     TEST_ASSERT_GREATER_THAN_DOUBLE(0, rig_smallest_correlation());
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, rig.filter.p_WB[0]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_hours_of_standing_still_move_nothing);
-    RUN_TEST(test_hours_of_standing_still_with_biases_move_nothing);
-    RUN_TEST(test_hours_without_noise_stay_exact);
-    return UNITY_END();
 }

@@ -192,14 +192,3 @@ static void test_it_takes_no_landmark_more_than_it_has_room_for(void) {
     TEST_ASSERT_FALSE(textbook_create(&book, book.count, frame.t_ns, &frame.observations[0]));
     TEST_ASSERT_EQUAL_UINT(MOST, book.count);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_world_is_the_textbooks_filter);
-    RUN_TEST(test_it_is_so_with_the_courses_hyperparameters);
-    RUN_TEST(test_both_gates_reject_the_same);
-    RUN_TEST(test_a_landmark_replaced_in_its_place_is_a_new_one);
-    RUN_TEST(test_a_known_landmark_tells_the_pose);
-    RUN_TEST(test_it_takes_no_landmark_more_than_it_has_room_for);
-    return UNITY_END();
-}

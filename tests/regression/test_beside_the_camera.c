@@ -25,9 +25,6 @@ void setUp(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
 }
 
-void tearDown(void) {
-}
-
 /* Puts a landmark into the state and shows the filter one observation of it in mid image. */
 static plr_report show(double x, double y, double z, double sigma_m, bool is_known) {
     const plr_observation seen = {.id = 7, .uL_px = 620, .vL_px = 190, .uR_px = 560, .vR_px = 190};
@@ -66,12 +63,4 @@ static void test_a_known_landmark_may_tell_a_pose_that_is_not_known(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, 0, &origin, P_xi));
     const plr_report report = show(0.2, 0.1, 6.4, 0.1, true);
     TEST_ASSERT_EQUAL_UINT16(1, report.used);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_landmark_beside_the_camera_is_rejected_whatever_its_residual);
-    RUN_TEST(test_the_same_uncertainty_ahead_of_the_camera_is_welcome);
-    RUN_TEST(test_a_known_landmark_may_tell_a_pose_that_is_not_known);
-    return UNITY_END();
 }

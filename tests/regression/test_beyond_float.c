@@ -19,9 +19,6 @@ void setUp(void) {
     rig_begin();
 }
 
-void tearDown(void) {
-}
-
 static void demand_sane(void) {
     rig_drive(3);
     TEST_ASSERT_EQUAL_UINT8(0, rig.filter.diverged);
@@ -70,13 +67,4 @@ static void test_a_camera_beyond_float_is_refused(void) {
         TEST_ASSERT_EQUAL_INT(PLR_E_CALIBRATION,
                               plr_filter_init(&rig.filter, &c, &rig.config, NULL));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_bias_or_its_variance_beyond_float_is_refused);
-    RUN_TEST(test_a_pose_covariance_beyond_float_is_refused);
-    RUN_TEST(test_a_known_landmark_beyond_float_is_refused);
-    RUN_TEST(test_a_camera_beyond_float_is_refused);
-    return UNITY_END();
 }

@@ -15,9 +15,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* A robot that turns on the spot in the dark, at 100 Hz. */
 static void turn_for_an_hour(void) {
     const plr_twist turning = {{0}, {0.1, -0.3, 0.5}};
@@ -63,11 +60,4 @@ static void test_landmarks_are_as_far_away_as_before(void) {
     TEST_ASSERT_EQUAL_UINT16(1, rig.report.created);
     TEST_ASSERT_EQUAL_UINT8(0, rig.filter.motion.pending);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4 * before, before, distance_of_first_landmark());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_rotation_is_one_after_an_hour_in_the_dark);
-    RUN_TEST(test_landmarks_are_as_far_away_as_before);
-    return UNITY_END();
 }

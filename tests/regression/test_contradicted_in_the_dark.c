@@ -15,9 +15,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* Wheels that slip: the twists tell half of the way. */
 static void slip(unsigned frames) {
     for (unsigned k = 0; k < frames; k++) {
@@ -48,10 +45,4 @@ static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone
     }
     /* half a minute at 0.05 m/s and 0.01 rad/s, each reading on its own, on a way of 60 m */
     TEST_ASSERT_LESS_THAN_DOUBLE(2 * before + 2, rig_sigma_m());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone);
-    return UNITY_END();
 }

@@ -18,9 +18,6 @@ void setUp(void) {
     rig_drive(40);
 }
 
-void tearDown(void) {
-}
-
 /* A frame of a body that stands, while its wheels turn at `speed`. */
 static void frame_in_place(double speed) {
     const plr_twist twist = {{speed, 0, 0}, {0}};
@@ -78,12 +75,4 @@ static void test_a_contradiction_that_is_over_lets_the_biases_be_found_again(voi
     TEST_ASSERT_EQUAL_UINT8(0, rig.filter.consistency.contradicted);
     biases(b, P_later);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.9 * P[0], P_later[0]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_what_contradicts_the_twists_becomes_no_bias);
-    RUN_TEST(test_until_it_is_settled_no_bias_is_learnt);
-    RUN_TEST(test_a_contradiction_that_is_over_lets_the_biases_be_found_again);
-    return UNITY_END();
 }

@@ -36,9 +36,6 @@ void setUp(void) {
     state_bytes_save(&state, &rig.filter);
 }
 
-void tearDown(void) {
-}
-
 static uint32_t slots_at(void) {
     const unsigned n = plr_filter_landmark_count(&rig.filter), rows = 12 + 3 * n;
     return state.length - (rows * (rows + 1) / 2 + 2 * rows) * REAL - n * SLOT_SIZE;
@@ -135,13 +132,4 @@ static void test_a_landmark_in_the_camera_is_none(void) {
     memcpy(&other, &rig.filter, sizeof other);
     TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, state_bytes_restore(&state, &other));
     TEST_ASSERT_EQUAL_MEMORY(&rig.filter, &other, sizeof other);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_what_a_restore_takes_the_next_call_does_not_find_damaged);
-    RUN_TEST(test_no_question_is_answered_with_a_number_that_is_not_finite);
-    RUN_TEST(test_a_mirror_image_is_no_pose);
-    RUN_TEST(test_a_landmark_in_the_camera_is_none);
-    return UNITY_END();
 }

@@ -19,9 +19,6 @@ void setUp(void) {
     rig.options.most_seen = LANDMARKS;
 }
 
-void tearDown(void) {
-}
-
 /* Where the landmarks stand in the world, in the mean. */
 static void centre(double p[3]) {
     const unsigned count = plr_filter_landmark_count(&rig.filter);
@@ -54,10 +51,4 @@ static void test_landmarks_and_pose_do_not_move_apart(void) {
     centre(after);
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(0.015, before[i], after[i]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_landmarks_and_pose_do_not_move_apart);
-    return UNITY_END();
 }

@@ -13,9 +13,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void drive_on_dead_wheels(unsigned frames) {
     for (unsigned k = 0; k < frames; k++) {
         for (unsigned i = 0; i < RIG_TWISTS; i++) {
@@ -55,11 +52,4 @@ static void test_dead_reckoning_is_good_without_observations(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_health(&rig.filter, rig.world.t_ns, &health));
     TEST_ASSERT_EQUAL_HEX32(0, health.reasons);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, health.health);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_dead_wheels_do_not_shorten_the_way);
-    RUN_TEST(test_dead_reckoning_is_good_without_observations);
-    return UNITY_END();
 }

@@ -21,9 +21,6 @@ void setUp(void) {
     rig_begin();
 }
 
-void tearDown(void) {
-}
-
 /* A direction oblique to all axes. */
 static void draw_direction(rng *chance, double mu[3]) {
     double length2;
@@ -83,11 +80,4 @@ static void test_one_that_is_no_covariance_across_its_ray_is_refused(void) {
         rig_remember();
         rig_demand_untouched(PLR_E_ARGUMENT, plr_filter_insert_known(&rig.filter, &known));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_its_bearing_is_known_as_well_as_it_was);
-    RUN_TEST(test_one_that_is_no_covariance_across_its_ray_is_refused);
-    return UNITY_END();
 }

@@ -27,9 +27,6 @@ void setUp(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
 }
 
-void tearDown(void) {
-}
-
 /* Both bearing variances: (s / f)^2 across, half of it along the rows' mean, less off the axis. */
 static void check_bearing_variances(double sigma_rad) {
     const unsigned row = plr_covariance_row(&filter, 0);
@@ -56,10 +53,4 @@ static void test_a_point_three_kilometres_away_keeps_its_bearing_through_birth_a
     plr_predict_apply_prior(&filter);
     TEST_ASSERT_EQUAL_UINT8(0, filter.diverged);
     TEST_ASSERT_TRUE(plr_covariance_is_positive(&filter));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_point_three_kilometres_away_keeps_its_bearing_through_birth_and_motion);
-    return UNITY_END();
 }

@@ -25,9 +25,6 @@ void setUp(void) {
     rig.config.max_row_gap_px = 0;
 }
 
-void tearDown(void) {
-}
-
 /* A robot that stands, in front of points of half a pixel of disparity. */
 static void stand(void) {
     static const plr_twist none = {{0, 0, 0}, {0, 0, 0}};
@@ -65,10 +62,4 @@ static void test_a_robot_that_stands_knows_far_ranges_no_better_than_their_dispa
             TEST_ASSERT_LESS_THAN_DOUBLE(1.05 * due, sigma);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_robot_that_stands_knows_far_ranges_no_better_than_their_disparities);
-    return UNITY_END();
 }

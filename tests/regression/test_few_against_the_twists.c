@@ -33,9 +33,6 @@ void setUp(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
 }
 
-void tearDown(void) {
-}
-
 /* One frame of a camera that stands; the near points have moved sideways, all of them or none. */
 static void look(unsigned frame, unsigned moving, float moved_px) {
     const plr_time_ns t_ns = 100000000ULL * frame;
@@ -74,11 +71,4 @@ static void test_all_the_points_are(void) {
         look(frame, 0, 0);
     look(6, COUNT, 15);
     TEST_ASSERT_EQUAL_UINT32(1, filter.totals.contradictions);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_seventh_of_the_points_is_no_contradiction_of_the_twists);
-    RUN_TEST(test_all_the_points_are);
-    return UNITY_END();
 }

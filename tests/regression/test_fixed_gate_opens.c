@@ -29,9 +29,6 @@ void setUp(void) {
     rig.map.source = scene_as_map;
 }
 
-void tearDown(void) {
-}
-
 /* The filter believes in a place beside the true one and looks 0.12 rad past it, which moves every
  * point by more than the gate; it knows by how much it may be wrong. */
 static void start_beside_the_place(void) {
@@ -74,11 +71,4 @@ static void test_it_opens_where_few_are_seen(void) {
     rig.options.most_seen = 4;
     check_comes_back(PLR_MODEL_BODY);
     check_comes_back(PLR_MODEL_WORLD);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_locked_gate_of_fixed_pixels_opens_for_known_landmarks);
-    RUN_TEST(test_it_opens_where_few_are_seen);
-    return UNITY_END();
 }

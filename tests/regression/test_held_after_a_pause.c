@@ -21,9 +21,6 @@ void setUp(void) {
     rig_begin();
 }
 
-void tearDown(void) {
-}
-
 /* Twists for so many intervals. */
 static void wait(unsigned intervals) {
     for (plr_time_ns t = 0; t < intervals * interval_ns; t += RIG_STEP_NS)
@@ -99,14 +96,4 @@ static void test_a_sensor_that_becomes_slower_is_held_for_two_of_its_new_interva
     }
     const plr_held_velocity *held = &rig.filter.either.velocities.held[0];
     TEST_ASSERT_EQUAL_UINT64(4 * interval_ns, held->until_ns - plr_filter_time(&rig.filter));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_rejected_reading_does_not_prolong_the_next_one);
-    RUN_TEST(test_nor_does_a_lost_one);
-    RUN_TEST(test_the_first_one_after_a_pause_is_not_held);
-    RUN_TEST(test_of_two_wheels_at_one_time_the_last_is_held);
-    RUN_TEST(test_a_sensor_that_becomes_slower_is_held_for_two_of_its_new_intervals);
-    return UNITY_END();
 }

@@ -43,12 +43,6 @@ static double variance_ahead(void) {
 /* sigma^2 tau^2 of the first reading, sigma^2 h^2 of the one held for h = 1 s. */
 static const double expected = 0.25 * (0.01 + 1.0);
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static void test_a_reading_held_for_a_second_costs_what_a_constant_error_does(void) {
     start(PLR_MODE_SLAM);
     look(1100000000ULL);
@@ -73,13 +67,4 @@ static void test_within_its_interval_a_reading_is_charged_once(void) {
     start(PLR_MODE_SLAM);
     look(150000000ULL);
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.25 * (0.01 + 0.1 * 0.05), variance_ahead());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_reading_held_for_a_second_costs_what_a_constant_error_does);
-    RUN_TEST(test_it_costs_the_same_however_many_frames_cut_it);
-    RUN_TEST(test_frames_a_nanosecond_apart_do_no_harm);
-    RUN_TEST(test_within_its_interval_a_reading_is_charged_once);
-    return UNITY_END();
 }

@@ -19,9 +19,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* A frame of which nothing is seen. */
 static void dark_frame(void) {
     const plr_frame frame = {imu_rig.flight.t_ns, PLR_NO_BUDGET, 0, NULL};
@@ -110,13 +107,4 @@ static void test_points_of_before_that_come_late_do_not_mislead(void) {
                              imu_rig_errors_now().position < 32);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_after_a_long_darkness_the_first_frames_find_the_velocity);
-    RUN_TEST(test_without_an_imu_the_pictures_lead_on);
-    RUN_TEST(test_points_of_before_a_long_darkness_do_not_mislead);
-    RUN_TEST(test_points_of_before_that_come_late_do_not_mislead);
-    return UNITY_END();
 }

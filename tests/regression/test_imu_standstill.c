@@ -14,9 +14,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void measure_standstill(void) {
     const plr_reading still = {.t_ns = imu_rig.flight.t_ns,
                                .sensor = PLR_SENSOR_STANDSTILL,
@@ -44,10 +41,4 @@ static void test_a_second_standstill_of_the_same_time_tells_nothing_new(void) {
     for (unsigned more = 0; more < 5; more++)
         measure_standstill();
     TEST_ASSERT_TRUE(bias_variance() > 0.9 * once);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_second_standstill_of_the_same_time_tells_nothing_new);
-    return UNITY_END();
 }

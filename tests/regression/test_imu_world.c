@@ -20,9 +20,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static plr_pose true_pose(void) {
     double T[16], v[3];
     plr_pose pose;
@@ -165,15 +162,4 @@ static void test_a_jump_of_the_clock_is_no_time_since_the_start(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &next, NULL));
         TEST_ASSERT_EQUAL_UINT8(0, f->inertial.anchored); /* two seconds have not passed */
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_measured_position_is_not_given_up_for_an_anchor);
-    RUN_TEST(test_a_pose_that_was_set_with_a_covariance_stays_in_its_world);
-    RUN_TEST(test_a_known_landmark_keeps_the_anchor_away);
-    RUN_TEST(test_a_known_landmark_has_to_wait_for_the_start);
-    RUN_TEST(test_mapping_with_an_imu_makes_landmarks_at_once);
-    RUN_TEST(test_a_jump_of_the_clock_is_no_time_since_the_start);
-    return UNITY_END();
 }

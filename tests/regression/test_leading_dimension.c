@@ -5,12 +5,6 @@
 
 #include "pelorus/config.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static void test_rows_fit_whatever_the_width_of_the_tile(void) {
     for (unsigned width = 1; width <= 16; width++) {
         if (16 % width != 0 && 6 % width != 0)
@@ -18,10 +12,4 @@ static void test_rows_fit_whatever_the_width_of_the_tile(void) {
         const unsigned ld = (PLR_MAX_STATE + width - 1) / width * width;
         TEST_ASSERT_LESS_OR_EQUAL_UINT(PLR_MAX_LD, ld);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rows_fit_whatever_the_width_of_the_tile);
-    return UNITY_END();
 }

@@ -22,9 +22,6 @@ void setUp(void) {
     rig.options.most_seen = 20;
 }
 
-void tearDown(void) {
-}
-
 /* What the camera sees of p_W, without noise, `off_px` aside. */
 static plr_observation look_at_point(double off_px) {
     const plr_calibration *c = &rig.calibration;
@@ -144,15 +141,4 @@ static void test_a_track_of_outliers_is_given_ever_fewer_chances(void) {
         go(k % 2 ? 120 : -120, 0);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(80, point()->times_gated);
     TEST_ASSERT_LESS_OR_EQUAL_UINT8(3, point()->restarts); /* after 8 frames, 16, 32 */
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_innovations_that_lean_within_the_gate_are_found_out);
-    RUN_TEST(test_white_innovations_are_not);
-    RUN_TEST(test_a_point_that_goes_ahead_of_the_body_is_found_out);
-    RUN_TEST(test_a_point_that_stands_is_not);
-    RUN_TEST(test_a_landmark_born_from_an_outlier_begins_anew);
-    RUN_TEST(test_a_track_of_outliers_is_given_ever_fewer_chances);
-    return UNITY_END();
 }

@@ -17,9 +17,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void test_a_pose_set_after_divergence_is_kept_by_the_next_frame(void) {
     static const plr_pose there = {{0, -1, 0, 1, 0, 0, 0, 0, 1}, {5, -3, 2}};
     double P[36] = {0}, as_set[36], after[36];
@@ -51,10 +48,4 @@ static void test_a_pose_set_after_divergence_is_kept_by_the_next_frame(void) {
         for (int i = 0; i < 36; i++)
             TEST_ASSERT_DOUBLE_WITHIN(16 * (double)PLR_EPSILON * P[i], P[i], after[i]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_pose_set_after_divergence_is_kept_by_the_next_frame);
-    return UNITY_END();
 }

@@ -15,9 +15,6 @@ void setUp(void) {
     rig_begin();
 }
 
-void tearDown(void) {
-}
-
 static const plr_slot *slot_of(uint32_t id) {
     for (unsigned i = 0; i < rig.filter.count; i++)
         if (rig.filter.slots[i].id == id)
@@ -57,10 +54,4 @@ static void test_a_point_that_returns_and_is_rejected_once_stays_as_it_was(void)
     frame_with_one(false, 0);
     TEST_ASSERT_EQUAL_UINT16(0, rig.report.gated);
     TEST_ASSERT_DOUBLE_WITHIN(0.05 * (double)range, (double)range, (double)slot_of(id)->x[2]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_point_that_returns_and_is_rejected_once_stays_as_it_was);
-    return UNITY_END();
 }

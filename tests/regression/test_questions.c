@@ -19,9 +19,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void ask_everything(void) {
     plr_landmark landmark;
     TEST_ASSERT_TRUE(specimen_gives_finite_numbers(&rig.filter)); /* asks for all there is */
@@ -63,10 +60,4 @@ static void test_a_filter_that_is_asked_computes_the_bits_of_one_that_is_not(voi
         rig.config.bias = (uint8_t)(run / 2);
         drive_both();
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_filter_that_is_asked_computes_the_bits_of_one_that_is_not);
-    return UNITY_END();
 }

@@ -28,9 +28,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* The filter believes in a pose that is off by xi, to sigma m and rad. */
 static void start_off_by(const double xi[6], double sigma) {
     double M[16], P[36] = {0};
@@ -67,10 +64,4 @@ static void test_a_map_tells_a_pose_that_was_known_to_radians(void) {
     const double xi[6] = {0.5, -0.3, 0.2, 0.05, -0.04, 0.15};
     check_finds_its_place(xi, 1.5);
     check_finds_its_place(xi, 2);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_map_tells_a_pose_that_was_known_to_radians);
-    return UNITY_END();
 }

@@ -14,9 +14,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void test_a_twist_that_nobody_sends_any_more_is_no_rival_of_vision(void) {
     double e[6];
     rig_begin();
@@ -33,10 +30,4 @@ static void test_a_twist_that_nobody_sends_any_more_is_no_rival_of_vision(void) 
     rig_drive(AGAIN_FRAMES);
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health);
     TEST_ASSERT_LESS_THAN_DOUBLE(1.5, rig_sigma_m());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_twist_that_nobody_sends_any_more_is_no_rival_of_vision);
-    return UNITY_END();
 }

@@ -37,9 +37,6 @@ void setUp(void) {
     config.slots = 4;
 }
 
-void tearDown(void) {
-}
-
 static void test_a_filter_of_another_size_is_refused_and_nothing_is_written(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_SIZE, plr_filter_init(&reserved.filter, &camera, &config, NULL));
     TEST_ASSERT_EQUAL_MEMORY(&untouched, &reserved, sizeof reserved);
@@ -76,12 +73,4 @@ static void test_each_number_must_agree(void) {
     }
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT,
                           plr_filter_init_sized(&reserved.filter, &camera, &config, NULL, NULL));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_filter_of_another_size_is_refused_and_nothing_is_written);
-    RUN_TEST(test_a_session_of_another_size_is_refused_and_nothing_is_written);
-    RUN_TEST(test_each_number_must_agree);
-    return UNITY_END();
 }

@@ -19,9 +19,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void demand_symmetric(const double P[36]) {
     for (unsigned i = 0; i < 6; i++)
         for (unsigned j = 0; j < i; j++)
@@ -117,14 +114,4 @@ static void test_a_landmark_that_is_not_finite_is_not_handed_to_the_map(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_flush_map(&rig.filter));
     TEST_ASSERT_EQUAL_UINT(active - 1, handed);
     TEST_ASSERT_EQUAL_UINT(0, plr_filter_landmark_count(&rig.filter));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_what_a_filter_with_an_imu_tells_is_symmetric_to_the_bit);
-    RUN_TEST(test_what_is_told_of_a_pose_is_taken_back);
-    RUN_TEST(test_variances_are_enlarged_by_no_more_than_it_takes);
-    RUN_TEST(test_a_covariance_that_is_not_finite_is_not_told);
-    RUN_TEST(test_a_landmark_that_is_not_finite_is_not_handed_to_the_map);
-    return UNITY_END();
 }

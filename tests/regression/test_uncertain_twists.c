@@ -25,9 +25,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* xi^T P^-1 xi of the pose's error T_true = T Exp(xi). */
 static double nees(void) {
     plr_pose pose;
@@ -108,13 +105,4 @@ static void test_five_sharp_landmarks(void) {
 
 static void test_uncertain_on_all_axes(void) {
     demand_consistent(0.5, 0.5, 0.3, 20);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_gyro_of_half_a_radian_beside_a_third_of_a_pixel);
-    RUN_TEST(test_a_gyro_of_a_quarter_radian_beside_a_pixel);
-    RUN_TEST(test_five_sharp_landmarks);
-    RUN_TEST(test_uncertain_on_all_axes);
-    return UNITY_END();
 }

@@ -12,9 +12,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void test_a_glitch_is_refused_and_the_drive_goes_on(void) {
     const plr_twist glitch = {{0}, {0, 0, 1e4}};
     rig_drive(5);
@@ -39,12 +36,4 @@ static void test_a_fast_reading_after_a_pause_is_taken(void) {
     rig_drive(3);
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_filter_predict(&rig.filter, rig.world.t_ns + 1900000000, &turning));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_glitch_is_refused_and_the_drive_goes_on);
-    RUN_TEST(test_a_glitch_as_the_first_reading_is_refused_too);
-    RUN_TEST(test_a_fast_reading_after_a_pause_is_taken);
-    return UNITY_END();
 }

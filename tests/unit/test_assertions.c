@@ -19,9 +19,6 @@ void setUp(void) {
     memset(numbers, 0, sizeof numbers);
 }
 
-void tearDown(void) {
-}
-
 static void subtract(unsigned n, unsigned depth) {
     static const plr_real A[8], V[2 * N];
     plr_subtract_four_rows(n, depth, A, 4, V, N, rows);
@@ -72,11 +69,4 @@ static void test_a_broken_assumption_is_found(void) {
     TEST_ASSERT_TRUE(assertion_fails_in(project_a_point_beside_the_camera));
     TEST_ASSERT_TRUE(assertion_fails_in(read_nine_bytes));
     TEST_ASSERT_TRUE(assertion_fails_in(encode_behind_a_full_block));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_call_as_agreed_passes);
-    RUN_TEST(test_a_broken_assumption_is_found);
-    return UNITY_END();
 }

@@ -22,9 +22,6 @@ void setUp(void) {
     rig.config.max_row_gap_px = 0;
 }
 
-void tearDown(void) {
-}
-
 /* A frame of points of that disparity, with noise of 1 px. */
 static void look(plr_time_ns t_ns, double disparity_px) {
     for (unsigned i = 0; i < POINTS; i++) {
@@ -96,12 +93,4 @@ static void test_ranges_have_no_bias_where_poses_are_given(void) {
 static void test_ranges_have_no_bias_in_frames_of_one_time(void) {
     demand_no_bias(PLR_MODE_MAPPING, true, 0);
     demand_no_bias(PLR_MODE_SLAM, true, 0);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_points_are_born_with_the_disparity_that_was_seen);
-    RUN_TEST(test_ranges_have_no_bias_where_poses_are_given);
-    RUN_TEST(test_ranges_have_no_bias_in_frames_of_one_time);
-    return UNITY_END();
 }

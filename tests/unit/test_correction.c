@@ -36,9 +36,6 @@ void setUp(void) {
     chance = rng_seeded(52);
 }
 
-void tearDown(void) {
-}
-
 /* A specimen whose every landmark is seen, a pixel or so beside the prediction. */
 static void take_specimen(plr_model_kind model, bool bias) {
     specimen_filter(&filter, &chance, model, bias, MANY);
@@ -251,17 +248,4 @@ static void test_corrections_at_the_least_range_are_counted(void) {
     TEST_ASSERT_EQUAL_UINT(1, correction.applied);
     TEST_ASSERT_EQUAL_UINT(1, correction.cut);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.01, range_of(0));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_blocks_give_the_correction_of_one_gain);
-    RUN_TEST(test_no_observations_change_nothing);
-    RUN_TEST(test_a_block_that_cannot_be_factorised_leaves_the_estimate);
-    RUN_TEST(test_blocks_beside_a_failed_one_are_applied);
-    RUN_TEST(test_a_variance_that_would_be_lost_stops_the_correction);
-    RUN_TEST(test_a_senseless_correction_marks_the_filter_diverged);
-    RUN_TEST(test_corrections_beyond_the_largest_range_are_kept);
-    RUN_TEST(test_corrections_at_the_least_range_are_counted);
-    return UNITY_END();
 }

@@ -20,9 +20,6 @@ void setUp(void) {
     twin.chance = rng_seeded(43);
 }
 
-void tearDown(void) {
-}
-
 /* ---------------------------------------------------------------- layout and blocks */
 
 static void check_layout(void) {
@@ -221,18 +218,4 @@ static void check_walk(void) {
 
 static void test_the_walk_adds_to_the_bias_variances_alone(void) {
     twin_for_each_size(check_walk);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pose_comes_first_then_bias_then_landmarks);
-    RUN_TEST(test_blocks_are_read_as_they_stand);
-    RUN_TEST(test_pose_and_bias_are_set_without_correlation);
-    RUN_TEST(test_joint_covariance_of_pose_and_landmark_agrees);
-    RUN_TEST(test_trace_is_the_sum_of_the_variances);
-    RUN_TEST(test_each_variance_is_looked_at);
-    RUN_TEST(test_transport_agrees);
-    RUN_TEST(test_motion_of_the_pose_alone_agrees);
-    RUN_TEST(test_the_walk_adds_to_the_bias_variances_alone);
-    return UNITY_END();
 }

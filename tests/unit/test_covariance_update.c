@@ -18,9 +18,6 @@ void setUp(void) {
     twin.chance = rng_seeded(43);
 }
 
-void tearDown(void) {
-}
-
 static void random_rows(plr_rows *rows, bool uses_pose, double *H, unsigned slot) {
     double unused[18];
     memset(rows, 0, sizeof *rows);
@@ -213,16 +210,4 @@ static void check_remove(void) {
 
 static void test_removal_moves_the_last_landmark_bit_for_bit(void) {
     twin_for_each_size(check_remove);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_innovation_covariance_agrees);
-    RUN_TEST(test_projection_on_an_observation_agrees);
-    RUN_TEST(test_subtraction_agrees);
-    RUN_TEST(test_subtraction_that_would_lose_a_variance_changes_nothing);
-    RUN_TEST(test_a_variance_of_zero_may_stay_zero);
-    RUN_TEST(test_a_new_landmark_appends_its_rows);
-    RUN_TEST(test_removal_moves_the_last_landmark_bit_for_bit);
-    return UNITY_END();
 }

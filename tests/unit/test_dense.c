@@ -16,12 +16,6 @@ enum { MOST = 9, STRIDE = 13, BIGGEST = 40, WIDEST = 50 };
 
 static const double eps = REAL_EPSILON;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* A rows x columns matrix with leading dimension ld, its gaps filled with 1e30, and its gapless
  * double twin. */
 static void random_strided(rng *r, unsigned rows, unsigned columns, size_t ld, plr_real *A,
@@ -310,20 +304,4 @@ static void test_four_rows_together_have_the_bits_of_one_after_the_other(void) {
         plr_subtract_four_rows(N, depth, A, 8, V, N, rows);
         TEST_ASSERT_EQUAL_MEMORY(expected, X, sizeof X);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_three_rows_without_loops_have_the_bits_of_the_general_kernels);
-    RUN_TEST(test_three_rows_refuse_what_the_general_kernel_refuses);
-    RUN_TEST(test_four_rows_together_have_the_bits_of_one_after_the_other);
-    RUN_TEST(test_gemm_agrees_with_openblas_and_both_forms_bit_for_bit);
-    RUN_TEST(test_sandwich_agrees_with_openblas_and_is_symmetric_to_the_bit);
-    RUN_TEST(test_cholesky_agrees_with_lapack);
-    RUN_TEST(test_cholesky_refuses_what_is_not_positive_definite);
-    RUN_TEST(test_cholesky_refuses_a_nan_off_the_diagonal);
-    RUN_TEST(test_cholesky_refuses_a_singular_matrix);
-    RUN_TEST(test_cholesky_has_the_bits_of_plain_loops_and_stays_inside);
-    RUN_TEST(test_solve_agrees_with_openblas_and_has_the_bits_of_plain_loops);
-    return UNITY_END();
 }

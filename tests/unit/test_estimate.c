@@ -19,9 +19,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void begin_with_bias(void) {
     rig.config.bias = 1;
     rig_begin();
@@ -245,22 +242,4 @@ static void test_a_diverged_filter_gives_means_and_no_covariance(void) {
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_pose_covariance(&rig.filter, P));
     rig_demand_untouched(PLR_E_DIVERGED, plr_filter_velocity_covariance(&rig.filter, P));
     TEST_ASSERT_EQUAL_DOUBLE(0, plr_filter_trace(&rig.filter));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_time_is_that_of_the_last_twist_or_frame);
-    RUN_TEST(test_the_pose_is_near_the_truth_and_says_how_near);
-    RUN_TEST(test_pose_covariance_grows_from_twist_to_twist_and_shrinks_with_a_frame);
-    RUN_TEST(test_velocity_is_the_reading_without_the_bias);
-    RUN_TEST(test_velocity_covariance_is_the_readings_plus_the_biases);
-    RUN_TEST(test_noise_of_a_step_is_divided_by_the_step);
-    RUN_TEST(test_without_bias_states_the_bias_is_zero);
-    RUN_TEST(test_the_walk_shows_before_it_is_applied);
-    RUN_TEST(test_a_bias_is_found);
-    RUN_TEST(test_trace_is_of_pose_and_biases_now_and_the_landmarks);
-    RUN_TEST(test_getters_refuse_null_pointers);
-    RUN_TEST(test_getters_change_nothing);
-    RUN_TEST(test_a_diverged_filter_gives_means_and_no_covariance);
-    return UNITY_END();
 }

@@ -13,9 +13,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* ---------------------------------------------------------------- init */
 
 static void test_a_new_filter_stands_at_the_origin(void) {
@@ -219,21 +216,4 @@ static void test_reset_heals_a_diverged_filter(void) {
 
 static void test_reset_wants_a_filter(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_filter_reset(NULL));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_new_filter_stands_at_the_origin);
-    RUN_TEST(test_the_bias_prior_is_that_of_the_settings);
-    RUN_TEST(test_init_refuses_null_pointers);
-    RUN_TEST(test_init_refuses_a_config_without_sense);
-    RUN_TEST(test_init_refuses_an_impossible_calibration);
-    RUN_TEST(test_init_refuses_an_extrinsic_that_is_no_rotation);
-    RUN_TEST(test_localization_wants_a_source);
-    RUN_TEST(test_init_refuses_a_processor_that_flushes_subnormals);
-    RUN_TEST(test_init_copies_what_it_is_given);
-    RUN_TEST(test_reset_gives_the_filter_of_the_first_day);
-    RUN_TEST(test_reset_heals_a_diverged_filter);
-    RUN_TEST(test_reset_wants_a_filter);
-    return UNITY_END();
 }

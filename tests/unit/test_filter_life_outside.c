@@ -14,9 +14,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* ---------------------------------------------------------------- pose from outside */
 
 static void test_a_pose_from_outside_is_taken_with_its_covariance(void) {
@@ -208,22 +205,4 @@ static void test_without_bias_states_there_is_no_prior(void) {
     rig_begin_with(PLR_MODE_SLAM, false);
     rig_remember();
     rig_demand_refusal(PLR_E_MODE, plr_filter_set_bias(&rig.filter, mean, variance));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_pose_from_outside_is_taken_with_its_covariance);
-    RUN_TEST(test_a_pose_from_outside_drops_the_landmarks_without_the_sink);
-    RUN_TEST(test_poses_from_outside_are_counted_once_the_clock_runs);
-    RUN_TEST(test_a_pose_from_outside_keeps_the_bias_and_its_covariance);
-    RUN_TEST(test_a_pose_from_outside_heals_a_diverged_filter);
-    RUN_TEST(test_after_a_jump_of_the_clock_the_old_reading_is_forgotten);
-    RUN_TEST(test_set_pose_refuses_what_is_no_pose);
-    RUN_TEST(test_mapping_takes_no_pose_but_by_move_to);
-    RUN_TEST(test_a_bias_prior_is_taken_before_the_first_twist);
-    RUN_TEST(test_set_bias_refuses_what_is_no_prior);
-    RUN_TEST(test_a_bias_prior_comes_too_late_after_a_twist);
-    RUN_TEST(test_a_bias_prior_comes_too_late_after_a_frame);
-    RUN_TEST(test_without_bias_states_there_is_no_prior);
-    return UNITY_END();
 }

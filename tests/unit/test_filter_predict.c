@@ -23,9 +23,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static plr_status predict(plr_time_ns t_ns, const plr_twist *twist) {
     return plr_filter_predict(&rig.filter, t_ns, twist);
 }
@@ -304,29 +301,4 @@ static void test_move_to_refuses_what_is_no_pose_or_no_later(void) {
     bad = rig_identity;
     bad.p[1] = -1e10;
     rig_demand_refusal(PLR_E_RANGE, plr_filter_move_to(&rig.filter, times[1], &bad));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_with_start_a_reading_holds_until_the_next);
-    RUN_TEST(test_with_end_a_reading_holds_since_the_last);
-    RUN_TEST(test_with_mid_the_mean_holds_between_two);
-    RUN_TEST(test_a_frame_between_readings_splits_the_interval);
-    RUN_TEST(test_a_frame_before_the_first_reading_stands_still);
-    RUN_TEST(test_a_reading_at_the_time_of_a_frame_takes_over_from_there);
-    RUN_TEST(test_the_first_reading_holds_since_the_pose_from_outside);
-    RUN_TEST(test_the_bias_is_taken_off_every_reading);
-    RUN_TEST(test_readings_touch_neither_landmarks_nor_covariance);
-    RUN_TEST(test_null_pointers_are_refused);
-    RUN_TEST(test_time_must_ascend_from_reading_to_reading);
-    RUN_TEST(test_a_reading_older_than_the_last_frame_is_refused);
-    RUN_TEST(test_a_gap_is_refused_beyond_its_limit);
-    RUN_TEST(test_the_first_reading_may_come_at_any_time);
-    RUN_TEST(test_numbers_that_are_none_are_refused);
-    RUN_TEST(test_a_step_beyond_pi_or_a_kilometre_is_refused);
-    RUN_TEST(test_a_refused_first_reading_does_not_start_the_clock);
-    RUN_TEST(test_mapping_checks_readings_and_ignores_them);
-    RUN_TEST(test_move_to_belongs_to_mapping);
-    RUN_TEST(test_move_to_refuses_what_is_no_pose_or_no_later);
-    return UNITY_END();
 }

@@ -19,9 +19,6 @@ void setUp(void) {
     rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static plr_status update(const plr_frame *frame) {
     return plr_filter_update(&rig.filter, frame, &rig.report);
 }
@@ -399,29 +396,4 @@ static void test_an_update_that_loses_a_variance_recovers_too(void) {
         rig.filter.P[plr_packed_at(row + i, 0)] = PLR_R(10); /* correlated beyond 1 */
     reseal(&rig.filter);
     demand_recovery(&frame);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_null_pointers_are_refused);
-    RUN_TEST(test_a_frame_without_its_observations_is_refused);
-    RUN_TEST(test_more_observations_than_the_maximum_are_refused);
-    RUN_TEST(test_a_frame_older_than_the_last_twist_is_late);
-    RUN_TEST(test_a_frame_behind_a_gap_is_refused);
-    RUN_TEST(test_a_reading_that_cannot_be_held_until_the_frame_refuses_it);
-    RUN_TEST(test_a_frame_at_the_time_of_the_last_is_taken);
-    RUN_TEST(test_a_report_is_not_needed);
-    RUN_TEST(test_pixels_that_lie_in_no_image_are_left_out);
-    RUN_TEST(test_every_copy_of_a_doubled_id_is_left_out);
-    RUN_TEST(test_a_malformed_copy_does_not_make_its_twin_a_duplicate);
-    RUN_TEST(test_counts_add_up_through_a_drive);
-    RUN_TEST(test_a_landmark_counts_how_often_it_was_seen_and_rejected);
-    RUN_TEST(test_a_gated_observation_moves_nothing);
-    RUN_TEST(test_dead_reckoning_looks_at_nothing);
-    RUN_TEST(test_mapping_wants_the_pose_of_the_frames_own_time);
-    RUN_TEST(test_a_budget_is_kept_and_the_rest_counted);
-    RUN_TEST(test_a_budget_takes_the_largest_gains);
-    RUN_TEST(test_a_diverged_filter_recovers_in_the_same_frame_and_goes_on);
-    RUN_TEST(test_an_update_that_loses_a_variance_recovers_too);
-    return UNITY_END();
 }

@@ -45,9 +45,6 @@ void setUp(void) {
     rig_begin();
 }
 
-void tearDown(void) {
-}
-
 static plr_frame look(void) {
     plr_frame frame = scene_look(&rig.world);
     memcpy(seen, frame.observations, frame.count * sizeof *seen);
@@ -428,26 +425,4 @@ static void test_a_map_entry_that_is_none_is_not_taken(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(frame.count, rig.report.created);
     TEST_ASSERT_EQUAL_UINT(0, rig.report.poor);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_noise_alone_does_not_keep_a_far_point_out);
-    RUN_TEST(test_with_a_limit_of_depth_or_in_the_world_there_is_no_landmark_without_disparity);
-    RUN_TEST(test_each_limit_of_a_new_landmark_holds);
-    RUN_TEST(test_a_new_landmark_lies_where_its_pixels_say);
-    RUN_TEST(test_new_ids_beyond_the_slots_are_taken_from_the_lowest);
-    RUN_TEST(test_a_full_ring_hands_the_oldest_to_the_sink);
-    RUN_TEST(test_a_sink_that_fails_keeps_the_landmark_and_is_reported);
-    RUN_TEST(test_an_id_that_returns_is_a_new_landmark);
-    RUN_TEST(test_a_locked_gate_drops_what_it_rejects_and_keeps_the_pose);
-    RUN_TEST(test_a_locked_gate_keeps_what_the_budget_left_out);
-    RUN_TEST(test_an_open_gate_is_reported_as_inert_after_a_thousand_matches);
-    RUN_TEST(test_localization_takes_its_landmarks_from_the_map_alone);
-    RUN_TEST(test_a_map_holds_the_pose_where_it_is);
-    RUN_TEST(test_slam_asks_the_map_only_if_told_to);
-    RUN_TEST(test_counts_add_up_where_the_map_is_larger_than_the_ring);
-    RUN_TEST(test_a_source_that_says_yes_and_gives_nothing_gives_no_landmark);
-    RUN_TEST(test_a_map_entry_that_is_none_is_not_taken);
-    return UNITY_END();
 }

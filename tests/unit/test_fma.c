@@ -8,12 +8,6 @@
 #include "math/fma.h"
 #include "support/random.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static float from_bits(uint32_t bits) {
     float x;
     memcpy(&x, &bits, sizeof x);
@@ -110,16 +104,4 @@ static void test_zeros_infinities_and_the_largest_numbers(void) {
         for (int j = 0; j < N; j++)
             for (int k = 0; k < N; k++)
                 assert_same(from_bits(special[i]), from_bits(special[j]), from_bits(special[k]));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_any_three_bit_patterns);
-    RUN_TEST(test_sums_near_a_tie);
-    RUN_TEST(test_cancellation);
-    RUN_TEST(test_subnormal_results);
-    RUN_TEST(test_double_rounding_is_avoided);
-    RUN_TEST(test_sums_just_beside_a_tie);
-    RUN_TEST(test_zeros_infinities_and_the_largest_numbers);
-    return UNITY_END();
 }

@@ -12,9 +12,6 @@ void setUp(void) {
     rig_drive(20);
 }
 
-void tearDown(void) {
-}
-
 /* The picture of the last look, at another time. */
 static void show_again(plr_frame frame) {
     frame.t_ns = rig.world.t_ns;
@@ -53,11 +50,4 @@ static void test_a_body_that_stands_may_see_the_same_picture(void) {
         TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
         TEST_ASSERT_GREATER_THAN_UINT(3, rig.report.used);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_picture_that_is_sent_again_does_not_hold_a_moving_body);
-    RUN_TEST(test_a_body_that_stands_may_see_the_same_picture);
-    return UNITY_END();
 }

@@ -25,9 +25,6 @@ void setUp(void) {
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
 }
 
-void tearDown(void) {
-}
-
 static void test_innovation_is_seen_minus_predicted(void) {
     const float shift[4] = {3.5F, 1.0F, -1.75F, 4.0F};
     const plr_observation seen = specimen_observation(&filter, 2, shift);
@@ -176,20 +173,4 @@ static void test_judging_changes_nothing_but_workspace(void) {
     before = filter;
     (void)specimen_judge(&filter, 3, &seen);
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_innovation_is_seen_minus_predicted);
-    RUN_TEST(test_the_vertical_row_is_a_mean_of_two);
-    RUN_TEST(test_distance_and_gain_agree_with_the_dense_ones);
-    RUN_TEST(test_the_threshold_itself_is_accepted);
-    RUN_TEST(test_a_row_gap_counts_even_where_the_three_rows_fit);
-    RUN_TEST(test_the_course_gate_looks_at_the_norm_of_four_residuals);
-    RUN_TEST(test_the_course_gate_when_open_looks_at_the_covariance_too);
-    RUN_TEST(test_a_point_too_near_is_rejected_even_by_an_open_gate);
-    RUN_TEST(test_a_prediction_off_by_a_radian_is_rejected_but_for_known_landmarks);
-    RUN_TEST(test_an_innovation_covariance_that_is_not_positive_is_rejected);
-    RUN_TEST(test_judging_changes_nothing_but_workspace);
-    return UNITY_END();
 }

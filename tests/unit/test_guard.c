@@ -33,9 +33,6 @@ void setUp(void) {
     state_bytes_save(&state, &rig.filter);
 }
 
-void tearDown(void) {
-}
-
 static void flip(size_t byte, unsigned bit) {
     ((unsigned char *)&rig.filter)[byte] ^= (unsigned char)(1U << bit);
 }
@@ -182,17 +179,4 @@ static void test_numbers_that_no_pose_has_are_damage_even_under_a_right_sum(void
     rig.filter.p_WB[0] = (double)INFINITY;
     plr_guard_seal_whole(&rig.filter);
     demand_refusals();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_flipped_bit_of_what_outlives_a_call_is_found);
-    RUN_TEST(test_what_no_call_looks_at_may_be_changed);
-    RUN_TEST(test_words_that_change_places_are_found);
-    RUN_TEST(test_a_damaged_pose_is_not_given_and_a_reset_mends_it);
-    RUN_TEST(test_a_count_beyond_the_slots_leads_no_call_out_of_bounds);
-    RUN_TEST(test_damaged_settings_are_mended_by_init_alone);
-    RUN_TEST(test_a_sink_that_points_elsewhere_is_not_called);
-    RUN_TEST(test_numbers_that_no_pose_has_are_damage_even_under_a_right_sum);
-    return UNITY_END();
 }

@@ -24,9 +24,6 @@ void setUp(void) {
     memset(&events, 0, sizeof events);
 }
 
-void tearDown(void) {
-}
-
 /* A frame of `matched` matches of which `gated` were rejected, the rest used, with NIS at its mean. */
 static void frame(unsigned matched, unsigned gated) {
     memset(&report, 0, sizeof report);
@@ -408,32 +405,4 @@ static void test_totals_are_the_sums_of_the_reports(void) {
     TEST_ASSERT_EQUAL_UINT64(before.created + 6, filter.totals.created);
     TEST_ASSERT_EQUAL_UINT64(before.evicted + 10, filter.totals.evicted);
     TEST_ASSERT_EQUAL_UINT32(before.blocks_failed + 2, filter.totals.blocks_failed);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_frame_with_enough_of_everything_is_good);
-    RUN_TEST(test_fewer_than_three_used_degrade);
-    RUN_TEST(test_ten_frames_without_one_used_are_lost);
-    RUN_TEST(test_a_second_without_one_used_is_lost);
-    RUN_TEST(test_a_bad_frame_begins_the_settling_anew);
-    RUN_TEST(test_each_event_has_its_reason);
-    RUN_TEST(test_missing_and_refused_twists_degrade);
-    RUN_TEST(test_innovations_above_what_noise_explains_degrade);
-    RUN_TEST(test_innovations_far_below_their_noise_are_said_and_do_no_harm);
-    RUN_TEST(test_few_degrees_of_freedom_say_nothing_of_the_noise);
-    RUN_TEST(test_a_scene_that_disagrees_with_itself_is_said);
-    RUN_TEST(test_a_bias_beyond_its_prior_is_said);
-    RUN_TEST(test_a_gate_that_rejects_none_of_a_thousand_is_inert);
-    RUN_TEST(test_a_gate_that_is_off_is_not_inert);
-    RUN_TEST(test_the_count_of_matches_cannot_overflow);
-    RUN_TEST(test_ten_frames_of_four_fifths_rejected_lock);
-    RUN_TEST(test_after_a_lock_ten_more_lock_again);
-    RUN_TEST(test_a_fixed_gate_is_open_from_a_lock_until_a_frame_is_seen);
-    RUN_TEST(test_a_fixed_gate_is_open_after_ten_frames_without_use);
-    RUN_TEST(test_a_frame_below_the_limits_breaks_the_row);
-    RUN_TEST(test_a_refused_frame_says_how_it_stood_and_is_never_good);
-    RUN_TEST(test_damaged_memory_is_the_end);
-    RUN_TEST(test_totals_are_the_sums_of_the_reports);
-    return UNITY_END();
 }

@@ -17,9 +17,6 @@ void setUp(void) {
     memset(&state, 0x5A, sizeof state);
 }
 
-void tearDown(void) {
-}
-
 static void ask(plr_time_ns t_ns) {
     static plr_filter before;
     memcpy(&before, &rig.filter, sizeof before);
@@ -178,20 +175,4 @@ static void test_damaged_memory_and_null_pointers(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_DAMAGED, plr_filter_health(&rig.filter, 0, &state));
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_DIVERGED, state.health);
     TEST_ASSERT_EQUAL_HEX32(PLR_REASON_STATE_DAMAGED, state.reasons);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_before_anything_has_come_it_is_lost_and_times_are_infinite);
-    RUN_TEST(test_on_a_drive_it_is_that_of_the_last_frame);
-    RUN_TEST(test_a_camera_that_falls_silent_is_told_after_a_second);
-    RUN_TEST(test_a_camera_that_sees_nothing_is_told_too);
-    RUN_TEST(test_an_odometry_that_falls_silent_is_told);
-    RUN_TEST(test_a_refused_reading_is_told_at_once);
-    RUN_TEST(test_in_dead_reckoning_a_refused_reading_is_forgotten_as_readings_come_again);
-    RUN_TEST(test_on_another_clock_no_frame_has_come_yet);
-    RUN_TEST(test_on_the_same_clock_a_pose_from_outside_forgets_no_frame);
-    RUN_TEST(test_what_a_mode_does_without_is_not_missed);
-    RUN_TEST(test_damaged_memory_and_null_pointers);
-    return UNITY_END();
 }

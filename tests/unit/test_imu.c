@@ -32,9 +32,6 @@ static plr_filter filter;
 static flight real;
 static rng chance;
 
-void tearDown(void) {
-}
-
 static void round_all(flight *x) {
     round_to_real(x->v, 3);
     round_to_real(x->bias, 6);
@@ -359,16 +356,4 @@ static void test_parts_of_an_interval_add_up_to_the_whole(void) {
         const double once = (double)whole.motion.Q[7 * i];
         TEST_ASSERT_DOUBLE_WITHIN(1e-4 * once, once, (double)filter.motion.Q[7 * i]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pose_and_velocity_are_those_of_an_integrator);
-    RUN_TEST(test_the_accumulated_motion_is_what_moved_the_pose);
-    RUN_TEST(test_derivatives_by_tilt_velocity_and_biases_are_those_of_the_motion);
-    RUN_TEST(test_a_shift_and_a_turn_about_the_vertical_drive_nothing);
-    RUN_TEST(test_noise_is_that_of_each_reading_and_of_the_walks);
-    RUN_TEST(test_noise_is_symmetric_to_the_bit);
-    RUN_TEST(test_parts_of_an_interval_add_up_to_the_whole);
-    return UNITY_END();
 }

@@ -26,9 +26,6 @@ void setUp(void) {
     chance = rng_seeded(301);
 }
 
-void tearDown(void) {
-}
-
 /* A specimen that has flown through some readings since its last frame. */
 static void take_specimen(unsigned landmarks, bool noiseless) {
     specimen_imu(&filter, &chance, landmarks);
@@ -245,13 +242,4 @@ static void test_a_pose_that_is_set_keeps_what_is_known_of_velocity_and_biases(v
         }
     free(got);
     free(expected);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_stretch_of_readings_moves_the_joint_covariance);
-    RUN_TEST(test_so_it_does_where_nothing_but_the_state_drives_it);
-    RUN_TEST(test_the_estimate_between_frames_has_the_covariance_that_the_frame_will_apply);
-    RUN_TEST(test_a_pose_that_is_set_keeps_what_is_known_of_velocity_and_biases);
-    return UNITY_END();
 }

@@ -13,9 +13,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 static void start(void) {
     static const plr_pose pose = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 2, 3}};
     static const double still[3] = {0}, variance[3] = {0.01, 0.01, 0.01};
@@ -82,15 +79,4 @@ static void test_thrust_and_a_fall_and_a_spin_are_no_faults(void) {
     demand(PLR_IMU_FAULT_NONE, (const double[]){3, 2, 9.81}, slow);
     demand(PLR_IMU_FAULT_NONE, (const double[]){0, 0, 0.1}, slow);
     demand(PLR_IMU_FAULT_NONE, (const double[]){0, 0, 9.81}, (const double[]){0, 0, 5});
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_an_accelerometer_in_g_is_told);
-    RUN_TEST(test_a_force_that_is_not_gravity_is_told);
-    RUN_TEST(test_a_wrong_sign_is_told);
-    RUN_TEST(test_swapped_axes_are_told);
-    RUN_TEST(test_a_gyro_in_degrees_is_told);
-    RUN_TEST(test_thrust_and_a_fall_and_a_spin_are_no_faults);
-    return UNITY_END();
 }

@@ -14,9 +14,6 @@ void setUp(void) {
     imu_rig_set_up();
 }
 
-void tearDown(void) {
-}
-
 /* A filter in flight, and the next reading, which it has not seen. */
 static plr_imu in_flight(void) {
     imu_rig_begin(IMU_RIG_GIVEN, 7);
@@ -289,25 +286,4 @@ static void test_a_given_velocity_and_its_covariance_are_the_estimate(void) {
         TEST_ASSERT_EQUAL_DOUBLE(v[i], got.v_B_mps[i]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-8, variance[i], P_u[7 * i]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_null_pointers_and_a_filter_that_is_none);
-    RUN_TEST(test_each_process_refuses_the_others_readings);
-    RUN_TEST(test_numbers_that_are_none);
-    RUN_TEST(test_numbers_that_no_body_survives);
-    RUN_TEST(test_readings_at_the_sensors_limit);
-    RUN_TEST(test_the_same_numbers_ten_times);
-    RUN_TEST(test_a_single_spike_is_refused_and_a_shock_is_not);
-    RUN_TEST(test_a_rough_ride_is_no_fault);
-    RUN_TEST(test_time_that_repeats_or_goes_back_and_a_gap);
-    RUN_TEST(test_a_reading_before_the_last_frame_is_too_late);
-    RUN_TEST(test_a_refused_reading_changes_nothing_that_follows);
-    RUN_TEST(test_mapping_takes_readings_and_does_not_use_them);
-    RUN_TEST(test_a_measured_velocity_has_to_wait_for_the_start);
-    RUN_TEST(test_a_velocity_is_refused_where_it_makes_no_sense);
-    RUN_TEST(test_a_velocity_is_refused_where_there_are_landmarks_or_twists);
-    RUN_TEST(test_a_given_velocity_and_its_covariance_are_the_estimate);
-    return UNITY_END();
 }

@@ -19,9 +19,6 @@ void setUp(void) {
     chance = rng_seeded(401);
 }
 
-void tearDown(void) {
-}
-
 /* A new filter whose clock has not begun. */
 static void make_filter(void) {
     plr_calibration calibration;
@@ -436,33 +433,4 @@ static void test_pictures_that_move_keep_the_filter_from_a_start_at_rest(void) {
         (void)look(450);
     }
     demand_started();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_body_that_stands_for_a_second_starts);
-    RUN_TEST(test_until_the_start_the_pose_stays);
-    RUN_TEST(test_at_rest_tilt_and_gyro_bias_are_measured);
-    RUN_TEST(test_the_tilts_covariance_is_that_of_the_accelerometers_bias);
-    RUN_TEST(test_starts_at_rest_are_as_wrong_as_they_believe);
-    RUN_TEST(test_a_pause_between_readings_begins_the_second_anew);
-    RUN_TEST(test_on_another_clock_the_start_begins_anew);
-    RUN_TEST(test_a_body_that_is_shaken_does_not_start_at_rest);
-    RUN_TEST(test_auto_starts_in_motion_where_the_body_never_stands);
-    RUN_TEST(test_a_gyro_in_degrees_turns_while_the_body_stands);
-    RUN_TEST(test_after_a_turn_at_rest_moving_does_not_start_and_resting_does);
-    RUN_TEST(test_an_accelerometer_in_g_is_told);
-    RUN_TEST(test_a_force_at_rest_that_is_not_gravity_is_told);
-    RUN_TEST(test_no_force_at_all_does_not_start_at_rest);
-    RUN_TEST(test_gravity_that_points_down_in_the_given_pose_is_told);
-    RUN_TEST(test_without_a_pose_upside_down_is_a_tilt);
-    RUN_TEST(test_another_tilt_than_the_given_poses_is_told_and_taken);
-    RUN_TEST(test_a_given_pose_keeps_its_place_and_heading);
-    RUN_TEST(test_a_start_in_motion_takes_a_tenth_of_a_second);
-    RUN_TEST(test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start_in_motion);
-    RUN_TEST(test_a_given_start_waits_for_nothing_but_its_pose);
-    RUN_TEST(test_frames_before_the_start_are_taken_and_make_no_landmarks);
-    RUN_TEST(test_in_dead_reckoning_too_the_start_ends_the_waiting);
-    RUN_TEST(test_pictures_that_move_keep_the_filter_from_a_start_at_rest);
-    return UNITY_END();
 }

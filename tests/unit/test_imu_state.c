@@ -20,9 +20,6 @@ void setUp(void) {
     ahead_ns = 0;
 }
 
-void tearDown(void) {
-}
-
 /* Both filters get the same readings and frames, and make the same of each frame. */
 static void fly_both(unsigned frames, bool same) {
     for (unsigned k = 1; k <= frames * IMU_RIG_EVERY; k++) {
@@ -162,15 +159,4 @@ static void test_after_a_power_cut_in_flight_velocity_and_tilt_are_found_again(v
     TEST_ASSERT_TRUE(e.mps < 0.1);
     TEST_ASSERT_TRUE(e.velocity < 20);
     TEST_ASSERT_TRUE(e.position < 40);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_in_flight_it_goes_on_with_the_same_bits);
-    RUN_TEST(test_before_its_start_it_averages_anew_and_starts_later);
-    RUN_TEST(test_between_a_start_in_motion_and_its_anchor_too);
-    RUN_TEST(test_what_it_knows_of_a_faulty_sensor_is_kept);
-    RUN_TEST(test_after_a_power_cut_at_rest_it_flies_on);
-    RUN_TEST(test_after_a_power_cut_in_flight_velocity_and_tilt_are_found_again);
-    return UNITY_END();
 }

@@ -30,9 +30,6 @@ void setUp(void) {
     rig_begin();
 }
 
-void tearDown(void) {
-}
-
 static plr_landmark known_landmark(void) {
     plr_landmark known = {
         .id = 5, .p_W_m = {8, 1, 0.5}, .P_W_m2 = {0.04, 0.01, 0, 0.01, 0.03, 0, 0, 0, 0.02}};
@@ -237,21 +234,4 @@ static void test_flush_wants_a_sink(void) {
 static void test_an_empty_map_is_flushed_at_once(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_flush_map(&rig.filter));
     TEST_ASSERT_EQUAL_UINT(0, handed_over);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_landmarks_are_where_the_world_has_them);
-    RUN_TEST(test_a_slot_beyond_the_last_is_refused);
-    RUN_TEST(test_reading_a_landmark_brings_it_up_to_the_pose);
-    RUN_TEST(test_a_diverged_filter_shows_no_landmark);
-    RUN_TEST(test_a_known_landmark_comes_out_as_it_went_in);
-    RUN_TEST(test_insert_refuses_and_changes_nothing);
-    RUN_TEST(test_a_full_ring_takes_no_known_landmark);
-    RUN_TEST(test_a_known_landmark_pulls_the_pose_to_the_world);
-    RUN_TEST(test_flush_hands_every_landmark_to_the_sink);
-    RUN_TEST(test_flush_keeps_what_the_sink_refuses);
-    RUN_TEST(test_flush_wants_a_sink);
-    RUN_TEST(test_an_empty_map_is_flushed_at_once);
-    return UNITY_END();
 }

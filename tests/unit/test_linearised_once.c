@@ -61,9 +61,6 @@ void setUp(void) {
     rig.options.outliers = 0.1; /* some are rejected */
 }
 
-void tearDown(void) {
-}
-
 static void move_on(void) {
     if (rig.config.mode != PLR_MODE_MAPPING) {
         for (unsigned i = 0; i < RIG_TWISTS; i++)
@@ -120,13 +117,4 @@ static void test_in_localization_each_observation_is_linearised_once(void) {
 static void test_in_mapping_each_observation_is_linearised_once(void) {
     check_drive(PLR_MODEL_BODY, PLR_MODE_MAPPING, false);
     check_drive(PLR_MODEL_WORLD, PLR_MODE_MAPPING, false);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_after_the_search_for_the_motion_what_is_used_is_linearised_once);
-    RUN_TEST(test_in_the_world_each_observation_is_linearised_once);
-    RUN_TEST(test_in_localization_each_observation_is_linearised_once);
-    RUN_TEST(test_in_mapping_each_observation_is_linearised_once);
-    return UNITY_END();
 }

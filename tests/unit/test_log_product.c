@@ -5,12 +5,6 @@
 #include "math/log_product.h"
 #include "support/matrices.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static double value_of(const double *factors, unsigned count) {
     plr_log_product p = plr_log_product_one();
     for (unsigned i = 0; i < count; i++)
@@ -45,13 +39,4 @@ static void test_a_product_beyond_every_exponent_is_kept(void) {
 static void test_what_is_no_positive_number_changes_nothing(void) {
     const double with[] = {2, 0, -3, (double)NAN, (double)INFINITY, 5}, without[] = {2, 5};
     TEST_ASSERT_EQUAL_DOUBLE(value_of(without, 2), value_of(with, 6));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_nothing_multiplied_is_one);
-    RUN_TEST(test_the_logarithm_of_one_factor_is_that_of_the_library);
-    RUN_TEST(test_a_product_beyond_every_exponent_is_kept);
-    RUN_TEST(test_what_is_no_positive_number_changes_nothing);
-    return UNITY_END();
 }

@@ -28,9 +28,6 @@ void setUp(void) {
     chance = rng_seeded(46);
 }
 
-void tearDown(void) {
-}
-
 /* A, from (xi, db, w) to (xi, db, dm): dm = J (xi, w). n x n; to be freed. */
 static double *errors_to_world(void) {
     const unsigned n = plr_covariance_dim(&body);
@@ -131,12 +128,4 @@ static void test_how_the_pose_moves_a_point_agrees_with_differences(void) {
                                           (double)J[6 * i + j]);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_observations_are_linearly_equivalent_at_one_point);
-    RUN_TEST(test_the_gate_judges_alike);
-    RUN_TEST(test_how_the_pose_moves_a_point_agrees_with_differences);
-    return UNITY_END();
 }

@@ -24,9 +24,6 @@ void setUp(void) {
     chance = rng_seeded(44);
 }
 
-void tearDown(void) {
-}
-
 static void take_specimen(bool bias, unsigned landmarks) {
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, bias, landmarks);
     twin_of_specimen(&truth, &filter);
@@ -225,15 +222,4 @@ static void test_place_in_the_world_agrees_with_differences(void) {
                 TEST_ASSERT_DOUBLE_WITHIN(1e4 * eps, J[i], (double)point.J.term[0].H[i]);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_observation_agrees_with_differences);
-    RUN_TEST(test_a_point_nearer_than_min_depth_is_not_linearised);
-    RUN_TEST(test_a_new_landmark_takes_its_covariance_through_the_chart);
-    RUN_TEST(test_a_known_landmark_hangs_on_the_pose_as_differences_say);
-    RUN_TEST(test_a_known_landmark_on_the_camera_or_out_of_range_is_refused);
-    RUN_TEST(test_place_in_the_world_agrees_with_differences);
-    return UNITY_END();
 }

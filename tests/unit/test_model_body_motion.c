@@ -32,9 +32,6 @@ void setUp(void) {
     chance = rng_seeded(44);
 }
 
-void tearDown(void) {
-}
-
 static void take_specimen(bool bias, unsigned landmarks) {
     specimen_filter(&filter, &chance, PLR_MODEL_BODY, bias, landmarks);
     twin_of_specimen(&truth, &filter);
@@ -472,17 +469,4 @@ static void test_far_points_keep_the_variance_of_their_bearing(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, (P[6 * 9 + 6] + P[7 * 9 + 7]) / (2 * bearing));
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1, P[8 * 9 + 8] / inverse_range);
     free(P);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_propagation_agrees_with_differences);
-    RUN_TEST(test_propagation_moves_the_points_rigidly);
-    RUN_TEST(test_a_landmark_that_the_camera_meets_is_kept_off_it);
-    RUN_TEST(test_retraction_and_its_transport_agree);
-    RUN_TEST(test_a_rigid_correction_moves_no_landmark_in_the_world);
-    RUN_TEST(test_a_correction_beyond_infinity_is_kept_and_comes_back);
-    RUN_TEST(test_corrections_that_are_cut_are_counted);
-    RUN_TEST(test_far_points_keep_the_variance_of_their_bearing);
-    return UNITY_END();
 }

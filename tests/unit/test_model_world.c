@@ -28,9 +28,6 @@ void setUp(void) {
     chance = rng_seeded(45);
 }
 
-void tearDown(void) {
-}
-
 static void take_specimen(bool bias, unsigned landmarks) {
     specimen_filter(&filter, &chance, PLR_MODEL_WORLD, bias, landmarks);
     twin_of_specimen(&truth, &filter);
@@ -236,17 +233,4 @@ static void test_place_in_the_world_is_the_landmark_itself(void) {
         for (int i = 0; i < 9; i++)
             TEST_ASSERT_DOUBLE_WITHIN(0, i % 4 == 0, (double)point.J.term[0].H[i]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_observation_agrees_with_differences);
-    RUN_TEST(test_a_point_nearer_than_min_depth_is_not_linearised);
-    RUN_TEST(test_a_new_landmark_copies_the_pose_through_its_jacobian);
-    RUN_TEST(test_an_independent_landmark_shares_nothing_with_the_pose);
-    RUN_TEST(test_a_known_landmark_enters_as_it_is);
-    RUN_TEST(test_motion_moves_no_landmark_and_no_landmark_block);
-    RUN_TEST(test_retraction_adds_to_landmarks_and_leaves_P_alone);
-    RUN_TEST(test_place_in_the_world_is_the_landmark_itself);
-    return UNITY_END();
 }

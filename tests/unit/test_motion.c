@@ -32,9 +32,6 @@ void setUp(void) {
     twin_of_specimen(&truth, &filter);
 }
 
-void tearDown(void) {
-}
-
 static void pose_of(double M[16]) {
     plr_pose pose;
     reseal(&filter); /* moved from inside */
@@ -398,28 +395,4 @@ static void test_divergence_keeps_its_first_time(void) {
     filter.t_ns += 1000;
     plr_filter_diverge(&filter);
     TEST_ASSERT_EQUAL_UINT64(first, filter.totals.diverged_ns);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_cleared_motion_is_none);
-    RUN_TEST(test_a_step_holds_up_to_pi_and_a_kilometre);
-    RUN_TEST(test_the_bias_is_taken_off_before_the_limit);
-    RUN_TEST(test_steps_move_the_pose_by_exponentials);
-    RUN_TEST(test_far_from_the_origin_small_steps_are_not_lost);
-    RUN_TEST(test_the_motion_accumulates_as_a_product);
-    RUN_TEST(test_noise_and_bias_jacobian_follow_their_recursions);
-    RUN_TEST(test_bias_jacobian_agrees_with_differences);
-    RUN_TEST(test_a_reading_is_charged_once_however_it_is_cut);
-    RUN_TEST(test_a_jump_is_exact_and_free_of_noise);
-    RUN_TEST(test_a_correction_is_an_exponential_on_the_right);
-    RUN_TEST(test_a_correction_makes_the_rotation_one_again);
-    RUN_TEST(test_the_rotation_stays_one_through_an_hour_of_steps);
-    RUN_TEST(test_pose_covariance_on_the_side_is_the_settled_one);
-    RUN_TEST(test_settling_clears_the_motion_and_is_done_once);
-    RUN_TEST(test_settling_charges_the_walk_of_the_bias);
-    RUN_TEST(test_a_variance_that_is_lost_marks_the_filter_diverged);
-    RUN_TEST(test_a_diverged_filter_is_not_settled);
-    RUN_TEST(test_divergence_keeps_its_first_time);
-    return UNITY_END();
 }

@@ -30,9 +30,6 @@ void setUp(void) {
     rigid_inverse(T_IB, T_BI);
 }
 
-void tearDown(void) {
-}
-
 static void begin(void) {
     static const double variance[3] = {1e-4, 1e-4, 1e-4};
     plr_config config;
@@ -164,13 +161,4 @@ static void test_twists_know_no_mount(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&plain, 1, &before, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&plain, &pose));
     TEST_ASSERT_EQUAL_MEMORY(&before, &pose, sizeof pose);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pose_and_covariance_are_those_of_the_body);
-    RUN_TEST(test_velocity_is_that_of_the_body);
-    RUN_TEST(test_a_sensor_has_its_place_on_the_body);
-    RUN_TEST(test_twists_know_no_mount);
-    return UNITY_END();
 }

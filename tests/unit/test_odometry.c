@@ -9,12 +9,6 @@
 /* Part of the firmware, not of the library: it is tested where it stands. */
 #include "mavlink/odometry.c"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static plr_pose_message level(void) {
     plr_pose_message pose;
     memset(&pose, 0, sizeof pose);
@@ -150,17 +144,4 @@ static void test_unknown_axes_and_null_pointers_are_refused(void) {
                       plr_odometry_from_pose(NULL, &pose, PLR_AXES_FRD, PLR_HEALTH_GOOD));
     TEST_ASSERT_EQUAL(PLR_E_ARGUMENT,
                       plr_odometry_from_pose(&o, NULL, PLR_AXES_FRD, PLR_HEALTH_GOOD));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_quaternion_gives_the_rotation_back_for_every_largest_component);
-    RUN_TEST(test_level_body_has_its_own_covariance_as_that_of_roll_pitch_and_yaw);
-    RUN_TEST(test_velocity_comes_with_its_covariance_in_the_axes_of_the_autopilot);
-    RUN_TEST(test_covariance_is_unknown_where_euler_angles_have_no_meaning);
-    RUN_TEST(test_covariances_are_unknown_once_the_filter_has_diverged);
-    RUN_TEST(test_health_becomes_quality);
-    RUN_TEST(test_reset_count_wraps_as_a_byte);
-    RUN_TEST(test_unknown_axes_and_null_pointers_are_refused);
-    return UNITY_END();
 }

@@ -37,9 +37,6 @@ void setUp(void) {
     chance = rng_seeded(71);
 }
 
-void tearDown(void) {
-}
-
 /* Noise that is a thousand times what a pixel tells, none along some axes, or none at all. */
 static void set_noise(noise_kind kind, plr_motion *m) {
     static const double huge[6] = {4, 2, 3, 1, 2, 0.5};
@@ -306,12 +303,4 @@ static void check_update(noise_kind kind, bool bias, bool shifted) {
 
 static void test_blocks_and_the_open_noise_come_to_one_gain(void) {
     for_each_noise(check_update);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_factor_of_the_noise_is_one_even_where_it_is_singular);
-    RUN_TEST(test_without_observations_the_noise_comes_back_into_P);
-    RUN_TEST(test_blocks_and_the_open_noise_come_to_one_gain);
-    return UNITY_END();
 }

@@ -18,9 +18,6 @@ void setUp(void) {
     comparisons = 0;
 }
 
-void tearDown(void) {
-}
-
 static bool key_before(const void *context, uint16_t a, uint16_t b) {
     const uint32_t *key = context;
     comparisons++;
@@ -92,13 +89,4 @@ static void test_nothing_beyond_the_end_is_touched(void) {
     plr_order_sort(indices, 3, key_before, keys);
     const uint16_t expected[6] = {0, 2, 4, 77, 78, 79};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(expected, indices, 6);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_length_is_sorted);
-    RUN_TEST(test_equal_keys_follow_the_order_of_ties);
-    RUN_TEST(test_sorted_and_reversed_arrays_are_no_worse);
-    RUN_TEST(test_nothing_beyond_the_end_is_touched);
-    return UNITY_END();
 }

@@ -12,12 +12,6 @@
 
 enum { MOST = 70, DEEPEST = PLR_BLOCK_ROWS, FRAME = PLR_KERNEL_MARGIN };
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* Normal numbers, depth x n with leading dimension ld, and behind them as many NaN as the kernel may
  * read. Gaps between rows are NaN too. */
 static plr_real *operand(rng *r, unsigned depth, unsigned n, size_t ld) {
@@ -132,15 +126,4 @@ static void test_subtracting_nothing_changes_nothing(void) {
     plr_packed_subtract(9, 0, Ut, Ut, 9, after);
     TEST_ASSERT_TRUE(same_bits(before, after, 45 + FRAME));
     free(Ut);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rows_follow_one_another_without_gaps);
-    RUN_TEST(test_tiled_subtract_has_the_bits_of_its_plain_twin);
-    RUN_TEST(test_tiled_subtract_writes_nothing_behind_the_triangle);
-    RUN_TEST(test_subtract_agrees_with_openblas);
-    RUN_TEST(test_foretold_diagonal_has_the_bits_of_the_subtraction);
-    RUN_TEST(test_subtracting_nothing_changes_nothing);
-    return UNITY_END();
 }

@@ -16,9 +16,6 @@ void setUp(void) {
     chance = rng_seeded(81);
 }
 
-void tearDown(void) {
-}
-
 static void test_products_are_the_oracles(void) {
     for (int which = 0; which < 4; which++)
         for (unsigned m = 1; m < MOST; m += 3) {
@@ -120,15 +117,4 @@ static void test_a_downdate_is_the_oracles(void) {
                 TEST_ASSERT_DOUBLE_WITHIN(1e-13, due, oracles[i * LD + j]);
             }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_products_are_the_oracles);
-    RUN_TEST(test_a_product_by_hand);
-    RUN_TEST(test_a_cholesky_factor_gives_the_matrix_back);
-    RUN_TEST(test_solutions_fulfil_their_equations);
-    RUN_TEST(test_eigenvalues_are_the_oracles_and_add_up_to_the_trace);
-    RUN_TEST(test_a_downdate_is_the_oracles);
-    return UNITY_END();
 }

@@ -20,9 +20,6 @@ void setUp(void) {
     chance = rng_seeded(42);
 }
 
-void tearDown(void) {
-}
-
 static double norm(const double x[3]) {
     return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
 }
@@ -425,26 +422,4 @@ static void test_far_points_keep_their_bearing(void) {
         (void)retract_from(q, &moved, M, &chart, turned);
         TEST_ASSERT_DOUBLE_WITHIN(4 * eps, 5e-5, angle_between(&chart, &moved));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_bearing_and_basis_are_orthonormal);
-    RUN_TEST(test_basis_is_a_function_of_the_bearing_alone);
-    RUN_TEST(test_from_point_and_to_point_are_inverse);
-    RUN_TEST(test_from_point_agrees_with_differences_of_the_coordinates);
-    RUN_TEST(test_retracting_nothing_moves_nothing);
-    RUN_TEST(test_retraction_follows_its_equations);
-    RUN_TEST(test_transport_is_a_rotation_of_the_plane);
-    RUN_TEST(test_retraction_starts_along_the_chart);
-    RUN_TEST(test_what_lies_beyond_the_farthest_range_is_kept);
-    RUN_TEST(test_a_range_that_can_be_had_leaves_nothing_beyond);
-    RUN_TEST(test_steps_through_infinity_and_back_lose_nothing);
-    RUN_TEST(test_a_range_below_a_centimetre_is_cut_there);
-    RUN_TEST(test_a_bearing_turns_by_one_radian_at_most);
-    RUN_TEST(test_corrections_within_the_limits_are_not_cut);
-    RUN_TEST(test_an_inverse_range_that_is_no_number_is_cut);
-    RUN_TEST(test_small_steps_are_rounded_once);
-    RUN_TEST(test_far_points_keep_their_bearing);
-    return UNITY_END();
 }

@@ -57,11 +57,3 @@ static void test_a_single_sample_is_every_quantile_and_none_is_no_number(void) {
     TEST_ASSERT_EQUAL_DOUBLE(7, samples_quantile(&list, 0.5));
     TEST_ASSERT_EQUAL_DOUBLE(7, samples_quantile(&list, 1));
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_what_is_added_is_kept_in_order_over_many_growths);
-    RUN_TEST(test_quantiles_are_the_nearest_rank);
-    RUN_TEST(test_a_single_sample_is_every_quantile_and_none_is_no_number);
-    return UNITY_END();
-}

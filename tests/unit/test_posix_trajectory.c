@@ -6,12 +6,6 @@
 #include "support/matrices.h"
 #include "support/random.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* Of a unit quaternion (x, y, z, w). */
 static void rotation(double R[9], const double q[4]) {
     const double x = q[0], y = q[1], z = q[2], w = q[3];
@@ -36,10 +30,4 @@ static void test_quaternions_give_their_rotation_back(void) {
         TEST_ASSERT_TRUE(q[3] >= 0);
         TEST_ASSERT_TRUE(largest_difference(R, back, 9) < 1e-14);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_quaternions_give_their_rotation_back);
-    return UNITY_END();
 }

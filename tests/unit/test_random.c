@@ -5,12 +5,6 @@
 
 #include "support/random.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static void test_same_seed_gives_same_numbers(void) {
     rng a = rng_seeded(7), b = rng_seeded(7), c = rng_seeded(8);
     const uint64_t first = rng_bits(&a);
@@ -60,14 +54,4 @@ static void test_normals_have_the_moments_of_a_normal(void) {
     TEST_ASSERT_DOUBLE_WITHIN(0.03, 0, mean);
     TEST_ASSERT_DOUBLE_WITHIN(0.08, 4, variance);
     TEST_ASSERT_DOUBLE_WITHIN(2, 48, fourth);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_same_seed_gives_same_numbers);
-    RUN_TEST(test_bits_are_splitmix64);
-    RUN_TEST(test_uniform_fills_its_interval_and_no_more);
-    RUN_TEST(test_below_reaches_every_number);
-    RUN_TEST(test_normals_have_the_moments_of_a_normal);
-    return UNITY_END();
 }

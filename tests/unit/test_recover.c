@@ -28,9 +28,6 @@ void setUp(void) {
     rig_drive(10);
 }
 
-void tearDown(void) {
-}
-
 static void break_covariance(void) {
     rig.filter.P[plr_packed_at(1, 1)] = PLR_R(-1);
     reseal(&rig.filter);
@@ -180,16 +177,4 @@ static void test_the_prior_is_the_one_that_was_set(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&rig.filter, rig.world.t_ns, &origin, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(&rig.filter, b, NULL));
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, prior_mean[0], b[0]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_frame_that_diverges_makes_landmarks_again);
-    RUN_TEST(test_the_pose_stays_where_the_twists_have_brought_it);
-    RUN_TEST(test_the_covariance_is_the_last_good_one_and_that_of_the_motion_since);
-    RUN_TEST(test_a_contradiction_that_was_open_stays_covered);
-    RUN_TEST(test_the_biases_go_back_to_their_prior);
-    RUN_TEST(test_a_bias_that_is_no_number_goes_back_too);
-    RUN_TEST(test_the_prior_is_the_one_that_was_set);
-    return UNITY_END();
 }

@@ -23,9 +23,6 @@ void setUp(void) {
     each_axis(config.velocity_sigma, 0.05);
 }
 
-void tearDown(void) {
-}
-
 static void start(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &world.calibration, &config, NULL));
 }
@@ -250,22 +247,4 @@ static void test_mapping_resumes_its_clock_and_takes_no_allowance(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_TIME, plr_filter_move_to(&filter, 100, &pose));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 50, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_move_to(&filter, 100, &pose));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_clock_that_begins_anew_is_followed);
-    RUN_TEST(test_a_long_pause_is_bridged);
-    RUN_TEST(test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks);
-    RUN_TEST(test_without_an_allowance_landmarks_that_agree_are_believed_and_it_is_said);
-    RUN_TEST(test_the_pose_gains_what_was_allowed_and_nothing_else_changes);
-    RUN_TEST(test_a_body_that_stood_before_goes_on_undamaged);
-    RUN_TEST(test_allowances_add_up_and_outlast_their_application);
-    RUN_TEST(test_a_body_that_was_moved_leaves_the_map_as_it_was);
-    RUN_TEST(test_a_reading_of_before_says_nothing_afterwards);
-    RUN_TEST(test_a_frame_that_comes_before_any_twist_finds_the_body_where_it_stood);
-    RUN_TEST(test_an_impossible_allowance_is_refused);
-    RUN_TEST(test_a_filter_that_has_not_begun_has_nothing_to_go_on_with);
-    RUN_TEST(test_mapping_resumes_its_clock_and_takes_no_allowance);
-    return UNITY_END();
 }

@@ -23,9 +23,6 @@ void setUp(void) {
     chance = rng_seeded(61);
 }
 
-void tearDown(void) {
-}
-
 static void draw(plr_real *x, double *same, size_t n, double sigma) {
     rng_normals(&chance, sigma, same, n);
     to_reals(x, same, n);
@@ -201,15 +198,4 @@ static void test_without_landmarks_and_after_an_accident_it_is_the_pose(void) {
     plr_rigid_fit_add(&fit, J, nothing, W);
     plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
     TEST_ASSERT_TRUE(same_bits(xi, eta, 6));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_it_solves_the_normal_equations);
-    RUN_TEST(test_what_all_have_in_common_with_the_pose_is_found_exactly);
-    RUN_TEST(test_it_is_found_where_this_frames_motion_alone_cannot_explain_it);
-    RUN_TEST(test_landmarks_that_stay_outvote_the_pose);
-    RUN_TEST(test_far_points_do_not_move_further_together_than_the_body_may_have_moved);
-    RUN_TEST(test_without_landmarks_and_after_an_accident_it_is_the_pose);
-    return UNITY_END();
 }

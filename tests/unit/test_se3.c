@@ -21,12 +21,6 @@ typedef struct motion {
     double M[16];
 } motion;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* The 4x4 matrix of (R, p). */
 static void to_matrix(double M[16], const plr_real R[9], const plr_real p[3]) {
     memset(M, 0, 16 * sizeof *M);
@@ -273,19 +267,4 @@ static void test_inverse_point_undoes_the_motion(void) {
         to_doubles(back, output, 3);
         TEST_ASSERT_DOUBLE_WITHIN(200 * eps, 0, largest_difference(x, back, 3));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_exp_agrees_with_the_matrix_exponential);
-    RUN_TEST(test_adjoint_carries_tangents_through_a_motion);
-    RUN_TEST(test_adjoint_inverse_undoes_the_adjoint);
-    RUN_TEST(test_right_jacobian_agrees_with_its_series);
-    RUN_TEST(test_right_jacobian_agrees_with_differences);
-    RUN_TEST(test_append_multiplies_motions);
-    RUN_TEST(test_a_small_exponential_is_right_to_its_own_size);
-    RUN_TEST(test_small_motions_add_up);
-    RUN_TEST(test_moving_back_undoes_the_motion);
-    RUN_TEST(test_inverse_point_undoes_the_motion);
-    return UNITY_END();
 }

@@ -20,9 +20,6 @@ void setUp(void) {
     chance = rng_seeded(3);
 }
 
-void tearDown(void) {
-}
-
 static plr_reading reading_of(unsigned sensor, unsigned axes) {
     plr_reading reading = {.t_ns = 1000000000, .sensor = (uint8_t)sensor, .axes = (uint8_t)axes};
     for (int i = 0; i < 3; i++) {
@@ -154,12 +151,4 @@ static void test_a_sensor_is_of_the_state_or_of_the_twist(void) {
         TEST_ASSERT_NOT_NULL(kind);
         TEST_ASSERT_TRUE((kind->of_state != NULL) != (kind->of_twist != NULL));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_H_of_a_sensor_of_the_pose_is_the_derivative_of_its_prediction);
-    RUN_TEST(test_a_number_that_was_not_measured_says_nothing);
-    RUN_TEST(test_a_sensor_is_of_the_state_or_of_the_twist);
-    return UNITY_END();
 }

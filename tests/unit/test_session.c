@@ -18,9 +18,6 @@ void setUp(void) {
     plr_session_options_default(&options);
 }
 
-void tearDown(void) {
-}
-
 static void begin(plr_session *s, faulty_port *p) {
     const plr_port functions = faulty_port_functions(p);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(s, &functions, &options));
@@ -273,23 +270,4 @@ static void test_two_sessions_side_by_side_do_not_disturb_each_other(void) {
     run(&second);
     TEST_ASSERT_EQUAL_size_t(port.answer_count, other.answer_count);
     TEST_ASSERT_EQUAL_MEMORY(port.answers, other.answers, port.answer_count);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_drive_is_answered_with_poses_near_the_truth);
-    RUN_TEST(test_pieces_of_any_size_give_the_same_answers);
-    RUN_TEST(test_a_flight_log_replays_to_the_same_bits);
-    RUN_TEST(test_what_is_sent_is_an_option);
-    RUN_TEST(test_a_port_without_output_is_a_port);
-    RUN_TEST(test_end_sends_what_is_left_and_counts);
-    RUN_TEST(test_after_end_a_header_starts_anew);
-    RUN_TEST(test_a_stream_that_is_cut_can_be_finished);
-    RUN_TEST(test_an_end_that_counts_more_than_arrived_is_told);
-    RUN_TEST(test_each_step_feeds_the_watchdog_and_an_empty_one_idles);
-    RUN_TEST(test_a_port_that_fails_is_told_and_may_come_back);
-    RUN_TEST(test_a_port_that_claims_more_than_was_asked_is_not_believed);
-    RUN_TEST(test_impossible_arguments_are_refused);
-    RUN_TEST(test_two_sessions_side_by_side_do_not_disturb_each_other);
-    return UNITY_END();
 }

@@ -10,9 +10,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 /* --- settings --- */
 
 static void test_option_wins_over_config_over_header(void) {
@@ -141,16 +138,4 @@ static void test_overrides_that_no_setting_allows_are_refused_at_init(void) {
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_session_init(&session, &functions, &options));
     override = (plr_wire_setting){222, 1};
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_session_init(&session, &functions, &options));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_option_wins_over_config_over_header);
-    RUN_TEST(test_the_config_in_force_is_sent_with_the_build);
-    RUN_TEST(test_a_config_value_out_of_limits_is_refused_by_name_and_the_rest_taken);
-    RUN_TEST(test_settings_that_contradict_refuse_the_data_until_they_are_mended);
-    RUN_TEST(test_a_calibration_without_sense_is_refused_and_a_better_one_taken);
-    RUN_TEST(test_world_in_float32_is_warned_of_and_in_float64_not);
-    RUN_TEST(test_overrides_that_no_setting_allows_are_refused_at_init);
-    return UNITY_END();
 }

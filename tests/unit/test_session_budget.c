@@ -6,12 +6,6 @@
 
 static plr_budget budget;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* A frame on a machine that needs fixed_us + each_us n; returns what it took. */
 static unsigned run_frame(unsigned fixed_us, unsigned each_us, unsigned seen) {
     const unsigned allowed = plr_budget_next(&budget);
@@ -83,17 +77,4 @@ static void test_the_budget_never_reads_as_no_limit(void) {
     plr_budget_init(&budget, UINT32_MAX);
     plr_budget_learn(&budget, 1, 1000);
     TEST_ASSERT_EQUAL_UINT16(PLR_NO_BUDGET - 1, plr_budget_next(&budget));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_without_a_deadline_there_is_no_limit);
-    RUN_TEST(test_the_first_frame_may_use_one_block);
-    RUN_TEST(test_the_budget_settles_where_the_deadline_is_just_kept);
-    RUN_TEST(test_the_second_dearer_frame_lowers_the_budget_at_once);
-    RUN_TEST(test_a_single_interruption_changes_nothing);
-    RUN_TEST(test_frames_that_all_miss_the_deadline_leave_one_observation_and_recover);
-    RUN_TEST(test_a_stalled_clock_and_an_unused_frame_teach_nothing);
-    RUN_TEST(test_the_budget_never_reads_as_no_limit);
-    return UNITY_END();
 }

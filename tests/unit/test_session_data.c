@@ -10,9 +10,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 /* --- data that is refused --- */
 
 static void test_numbers_that_are_not_finite_are_refused_and_change_nothing(void) {
@@ -203,19 +200,4 @@ static void test_frames_over_the_deadline_are_counted(void) {
     desk_run();
     TEST_ASSERT_EQUAL_UINT32(7, session.totals.over_deadline);
     desk_assert_nothing_refused();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_numbers_that_are_not_finite_are_refused_and_change_nothing);
-    RUN_TEST(test_a_frame_older_than_the_last_twist_is_refused_as_late);
-    RUN_TEST(test_time_that_repeats_or_goes_back_is_refused);
-    RUN_TEST(test_frames_of_a_late_camera_are_refused_without_a_delay_and_used_with_one);
-    RUN_TEST(test_positions_wait_with_the_twists_for_a_late_camera);
-    RUN_TEST(test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted);
-    RUN_TEST(test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back);
-    RUN_TEST(test_the_budget_in_force_is_in_the_echo_and_in_the_report);
-    RUN_TEST(test_a_frames_own_budget_is_kept_where_it_is_less);
-    RUN_TEST(test_frames_over_the_deadline_are_counted);
-    return UNITY_END();
 }

@@ -11,9 +11,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 static void run_frames(int first, int end) {
     desk_send_frames(first, end);
     desk_run();
@@ -140,15 +137,4 @@ static void test_a_start_makes_the_covariance_known_again(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, session.last.status);
     TEST_ASSERT_TRUE(session.last.used > 3);
     TEST_ASSERT_FALSE(session.last.reasons & (PLR_REASON_RECOVERED | PLR_REASON_POSE_MAY_BE_WRONG));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_next_frame_recovers_and_its_pose_has_a_covariance_again);
-    RUN_TEST(test_poses_after_each_twist_say_so_too);
-    RUN_TEST(test_a_sound_filter_never_says_so);
-    RUN_TEST(test_a_human_is_told_once);
-    RUN_TEST(test_a_human_is_told_each_time);
-    RUN_TEST(test_a_start_makes_the_covariance_known_again);
-    return UNITY_END();
 }

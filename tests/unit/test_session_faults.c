@@ -13,9 +13,6 @@ void setUp(void) {
     plr_session_options_default(&options);
 }
 
-void tearDown(void) {
-}
-
 static void begin(uint64_t seed) {
     faulty_port_init(&port, seed);
     desk_begin();
@@ -218,17 +215,4 @@ static void test_a_cut_at_any_byte_is_no_more_than_a_cut(void) {
         check_poses();
     }
     TEST_ASSERT_TRUE(session.totals.stereos >= 2);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_lost_doubled_and_damaged_bytes_cost_frames_and_nothing_else);
-    RUN_TEST(test_the_drive_after_a_bad_one_has_the_bits_of_any_other);
-    RUN_TEST(test_a_header_lost_in_noise_is_waited_for);
-    RUN_TEST(test_noise_alone_is_survived_and_hardly_answered);
-    RUN_TEST(test_writes_that_fail_lose_messages_and_change_no_estimate);
-    RUN_TEST(test_a_clock_that_stalls_or_jumps_changes_no_estimate);
-    RUN_TEST(test_a_deadline_on_a_clock_that_stalls_or_jumps_still_lets_vision_through);
-    RUN_TEST(test_a_cut_at_any_byte_is_no_more_than_a_cut);
-    return UNITY_END();
 }

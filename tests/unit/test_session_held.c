@@ -10,9 +10,6 @@ void setUp(void) {
     plr_held_init(&held);
 }
 
-void tearDown(void) {
-}
-
 static void push(plr_time_ns t_ns) {
     const plr_held_step step = {.t_ns = t_ns};
     TEST_ASSERT_TRUE(plr_held_insert(&held, &step));
@@ -176,20 +173,4 @@ static void test_frames_that_overtake_each_other_leave_in_the_order_of_time(void
         plr_held_insert_frame(&frames, &one, 9);
         (void)plr_held_pop_frame(&frames);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_twists_come_out_in_the_order_they_went_in);
-    RUN_TEST(test_the_ring_goes_round_many_times);
-    RUN_TEST(test_each_is_given_back_as_it_was);
-    RUN_TEST(test_it_is_full_at_its_capacity_and_not_before);
-    RUN_TEST(test_a_twist_is_due_when_the_newest_is_the_delay_ahead);
-    RUN_TEST(test_a_frame_takes_the_twists_up_to_its_time);
-    RUN_TEST(test_steps_that_come_in_any_order_leave_in_that_of_time);
-    RUN_TEST(test_a_step_of_a_time_that_is_there_is_not_taken);
-    RUN_TEST(test_time_that_goes_back_by_more_than_the_gap_contradicts);
-    RUN_TEST(test_frames_leave_as_they_came_with_their_observations);
-    RUN_TEST(test_frames_that_overtake_each_other_leave_in_the_order_of_time);
-    return UNITY_END();
 }

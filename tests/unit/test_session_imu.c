@@ -11,9 +11,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 static void test_readings_of_an_imu_move_the_body(void) {
     const inertial_result found = inertial_result_of(&inertial_plain);
     const plr_pose truth = drive_pose(INERTIAL_FRAME_S * (INERTIAL_FRAMES - 1));
@@ -247,25 +244,4 @@ static void test_an_end_compares_the_imu_messages(void) {
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_END, &answer));
     TEST_ASSERT_EQUAL_UINT8(1U << PLR_COUNTED_IMU, answer.as.end.differs);
     TEST_ASSERT_EQUAL_UINT32(49, answer.as.end.arrived[PLR_COUNTED_IMU]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_readings_of_an_imu_move_the_body);
-    RUN_TEST(test_a_batch_is_its_readings_one_by_one);
-    RUN_TEST(test_an_estimate_follows_each_reading_where_it_is_asked_for);
-    RUN_TEST(test_twists_among_the_readings_are_refused_once_and_spoil_nothing);
-    RUN_TEST(test_readings_among_twists_are_refused_once_and_spoil_nothing);
-    RUN_TEST(test_a_setting_overrides_the_process_of_the_header);
-    RUN_TEST(test_a_header_of_another_process_is_another_header);
-    RUN_TEST(test_an_absurd_reading_costs_itself_and_not_its_batch);
-    RUN_TEST(test_a_batch_beyond_the_end_of_time_is_refused_from_there_on);
-    RUN_TEST(test_a_run_of_refusals_is_answered_once_and_told_once);
-    RUN_TEST(test_faults_are_told_anew_in_the_next_drive);
-    RUN_TEST(test_the_velocity_of_a_start_is_that_of_the_filter);
-    RUN_TEST(test_a_velocity_without_three_variances_is_not_given);
-    RUN_TEST(test_an_absurd_velocity_is_refused_and_the_pose_is_set);
-    RUN_TEST(test_a_velocity_means_nothing_to_a_filter_moved_by_twists);
-    RUN_TEST(test_an_end_compares_the_imu_messages);
-    return UNITY_END();
 }

@@ -11,9 +11,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 /* Nothing was refused, and the last POSE is that of `expected`. */
 static void demand_result(const inertial_result *expected) {
     desk_assert_nothing_refused();
@@ -237,18 +234,4 @@ static void test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was(v
         TEST_ASSERT_TRUE(P_now[7 * i] > 0.9 * P_then[7 * i]);
     TEST_ASSERT_EQUAL_UINT16(before.pose.reset_count + 1, after.pose.reset_count);
     TEST_ASSERT_TRUE(session.last.used > 3);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_readings_wait_for_a_late_camera_as_twists_do);
-    RUN_TEST(test_what_does_not_fit_the_delay_is_used_early_and_counted);
-    RUN_TEST(test_a_frame_is_used_at_the_time_that_camera_offset_gives_it);
-    RUN_TEST(test_in_the_order_of_stamps_camera_offset_costs_no_reading);
-    RUN_TEST(test_without_steps_a_frame_waits_until_the_next_one_or_the_end);
-    RUN_TEST(test_a_report_has_the_time_that_the_frame_was_sent_with);
-    RUN_TEST(test_a_frame_whose_moved_time_no_clock_has_is_refused);
-    RUN_TEST(test_a_single_batch_of_another_time_changes_nothing);
-    RUN_TEST(test_after_a_jump_of_the_clock_the_filter_starts_anew_where_it_was);
-    return UNITY_END();
 }

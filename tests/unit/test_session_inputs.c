@@ -17,9 +17,6 @@ void setUp(void) {
     options.known_capacity = KNOWN;
 }
 
-void tearDown(void) {
-}
-
 /* --- before and among the data --- */
 
 static void test_whatever_comes_before_a_header_is_refused(void) {
@@ -235,21 +232,4 @@ static void test_a_header_of_a_later_version_is_refused_and_the_loop_goes_on(voi
     TEST_ASSERT_EQUAL_UINT(1, futures);
     desk_assert_refused(PLR_KIND_HEADER, PLR_E_FOREIGN);
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_whatever_comes_before_a_header_is_refused);
-    RUN_TEST(test_the_same_header_again_is_ignored_and_another_refused);
-    RUN_TEST(test_settings_do_not_change_in_mid_flight);
-    RUN_TEST(test_what_other_filters_computed_is_passed_over);
-    RUN_TEST(test_localization_uses_the_known_landmarks_and_no_others);
-    RUN_TEST(test_slam_ignores_known_landmarks_unless_asked);
-    RUN_TEST(test_localization_without_a_map_is_warned_of);
-    RUN_TEST(test_a_known_landmark_twice_is_refused);
-    RUN_TEST(test_mapping_takes_each_pose_and_leaves_out_frames_without);
-    RUN_TEST(test_an_unknown_kind_a_short_payload_and_noise_are_answered_once_a_run);
-    RUN_TEST(test_a_frame_too_long_for_the_buffer_is_answered_and_the_next_one_taken);
-    RUN_TEST(test_a_header_of_a_later_version_is_refused_and_the_loop_goes_on);
-    return UNITY_END();
 }

@@ -16,9 +16,6 @@ void setUp(void) {
     plr_known_map_init(&map, memory, CAPACITY);
 }
 
-void tearDown(void) {
-}
-
 static plr_landmark landmark(uint32_t id) {
     plr_landmark l;
     memset(&l, 0, sizeof l);
@@ -83,14 +80,4 @@ static void test_the_source_answers_as_the_filter_expects(void) {
     TEST_ASSERT_TRUE(plr_known_map_source(&map, 5, &found));
     TEST_ASSERT_EQUAL_UINT32(5, found.id);
     TEST_ASSERT_TRUE(found.known);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_landmarks_in_any_order_are_all_found_and_no_others);
-    RUN_TEST(test_a_full_map_refuses_new_ids_and_stays_as_it_is);
-    RUN_TEST(test_a_map_without_memory_is_full);
-    RUN_TEST(test_numbers_that_are_not_finite_are_refused);
-    RUN_TEST(test_the_source_answers_as_the_filter_expects);
-    return UNITY_END();
 }

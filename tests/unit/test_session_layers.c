@@ -20,9 +20,6 @@ void setUp(void) {
     override_count = 0;
 }
 
-void tearDown(void) {
-}
-
 static plr_status compose(void) {
     const plr_layers layers = {&header, &wanted, overrides, override_count};
     return plr_layers_compose(&config, &layers, &culprit);
@@ -232,23 +229,4 @@ static void test_what_is_described_is_what_is_in_force(void) {
     override_count = 0;
     TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
     TEST_ASSERT_TRUE(plr_layers_agree(&described, &config));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_with_nothing_said_everything_is_at_its_default);
-    RUN_TEST(test_each_layer_wins_over_those_below);
-    RUN_TEST(test_the_header_says_twist_timing_and_all_seven_noises);
-    RUN_TEST(test_the_header_says_the_process_and_what_an_imu_needs);
-    RUN_TEST(test_a_header_without_biases_of_twists_leaves_those_of_an_imu);
-    RUN_TEST(test_the_header_may_tell_the_sigmas_of_single_axes);
-    RUN_TEST(test_what_is_wanted_for_all_axes_last_takes_the_place_of_single_ones);
-    RUN_TEST(test_a_bias_is_estimated_unless_the_header_tells_that_there_is_none);
-    RUN_TEST(test_suggestions_that_make_no_sense_are_left_out);
-    RUN_TEST(test_with_noise_per_step_the_sigmas_of_a_reading_are_left_out);
-    RUN_TEST(test_an_impossible_override_names_its_setting);
-    RUN_TEST(test_settings_that_contradict_each_other_name_the_one_to_change);
-    RUN_TEST(test_wanted_values_replace_each_other_and_bad_ones_change_nothing);
-    RUN_TEST(test_what_is_described_is_what_is_in_force);
-    return UNITY_END();
 }

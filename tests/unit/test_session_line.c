@@ -15,9 +15,6 @@ void setUp(void) {
     plr_line_begin(&line, PLR_SEVERITY_WARNING);
 }
 
-void tearDown(void) {
-}
-
 static const char *number(double x) {
     plr_line_begin(&line, PLR_SEVERITY_INFO);
     plr_line_number(&line, x);
@@ -75,15 +72,4 @@ static void test_any_number_reads_back_to_six_digits(void) {
         TEST_ASSERT_DOUBLE_WITHIN(6e-6 * fabs(y), y, strtod(number(y), NULL));
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-320, 5e-324, strtod(number(5e-324), NULL));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_words_are_joined_and_the_severity_kept);
-    RUN_TEST(test_counts_are_printed_in_full);
-    RUN_TEST(test_what_does_not_fit_is_cut_at_a_whole_character);
-    RUN_TEST(test_times_are_seconds_with_three_decimals);
-    RUN_TEST(test_known_numbers_read_as_a_human_writes_them);
-    RUN_TEST(test_any_number_reads_back_to_six_digits);
-    return UNITY_END();
 }

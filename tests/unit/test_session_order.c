@@ -38,9 +38,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 /* By arrival; of what arrives at once frames are first, which is the harder case. */
 static int compare(const void *a, const void *b) {
     const sending *x = a, *y = b;
@@ -387,21 +384,4 @@ static void test_what_is_twice_or_before_a_start_is_not_called_late(void) {
     TEST_ASSERT_EQUAL_UINT32(3, session.totals.imu_refused);
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.late);
     TEST_ASSERT_EQUAL_UINT(0, desk_texts_with("come late"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_frames_wait_for_late_steps_and_the_bits_are_those_of_the_order_of_time);
-    RUN_TEST(test_a_replay_of_the_flight_log_of_late_steps_computes_the_same);
-    RUN_TEST(test_a_step_that_comes_twice_is_refused_and_hurries_nothing);
-    RUN_TEST(test_steps_that_overtake_each_other_are_put_in_order);
-    RUN_TEST(test_frames_that_wait_in_vain_are_used_when_the_delay_is_over);
-    RUN_TEST(test_more_frames_than_fit_are_used_early_and_counted);
-    RUN_TEST(test_a_clock_that_is_set_back_keeps_no_frame_waiting);
-    RUN_TEST(test_a_start_behind_frames_that_wait_is_no_start_for_them);
-    RUN_TEST(test_in_mapping_no_frame_waits);
-    RUN_TEST(test_late_steps_are_told_with_the_delay_that_puts_them_in_order);
-    RUN_TEST(test_of_an_imu_that_comes_late_no_fault_is_told_but_that);
-    RUN_TEST(test_what_is_twice_or_before_a_start_is_not_called_late);
-    return UNITY_END();
 }

@@ -15,9 +15,6 @@ void setUp(void) {
     cut_clear();
 }
 
-void tearDown(void) {
-}
-
 /* --- the way into each phase --- */
 
 static plr_message other_header(void) {
@@ -263,14 +260,4 @@ static void test_a_message_is_echoed_whether_it_is_used_or_refused(void) {
             TEST_ASSERT_EQUAL_UINT_MESSAGE(before + tried[i].echoes, answers_of(tried[i].kind),
                                            expected[tried[i].row].what);
         }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_each_kind_in_each_phase_is_answered_as_the_table_says);
-    RUN_TEST(test_a_start_sets_the_pose_once_its_time_has_come);
-    RUN_TEST(test_a_restore_that_fails_leads_back_to_ready);
-    RUN_TEST(test_an_event_that_leads_nowhere_changes_nothing);
-    RUN_TEST(test_a_message_is_echoed_whether_it_is_used_or_refused);
-    return UNITY_END();
 }

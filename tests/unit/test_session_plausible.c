@@ -7,12 +7,6 @@
 #include "session/plausible.h"
 #include "support/session_desk.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static bool plausible_twist(const plr_twist *twist) {
     const plr_message message = {.kind = PLR_KIND_TWIST, .as.twist.twist = *twist};
     return plr_plausible_message(&message);
@@ -90,14 +84,4 @@ static void test_an_absurd_reading_costs_itself_alone(void) {
         TEST_ASSERT_EQUAL_UINT32(1, session.totals.refused);
         TEST_ASSERT_TRUE(session.last.used > 3);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_limit_is_included_and_what_is_beyond_is_not);
-    RUN_TEST(test_a_covariance_counts_only_where_it_is_given);
-    RUN_TEST(test_each_number_of_a_bias_and_a_landmark_is_looked_at);
-    RUN_TEST(test_what_is_not_finite_is_left_to_the_filter);
-    RUN_TEST(test_an_absurd_reading_costs_itself_alone);
-    return UNITY_END();
 }

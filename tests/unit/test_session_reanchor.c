@@ -15,9 +15,6 @@ void setUp(void) {
     plr_clock_watch_init(&watch);
 }
 
-void tearDown(void) {
-}
-
 /* The estimate is at 100 s, the largest gap 2 s. */
 static bool note(double t_s, plr_status status) {
     return plr_clock_watch_note(&watch, (plr_time_ns)(t_s * 1e9), status, 100 * SECOND, 2 * SECOND);
@@ -190,21 +187,4 @@ static void test_in_mapping_a_jump_back_begins_a_new_map(void) {
     TEST_ASSERT_EQUAL_UINT32(1, session.totals.reanchored);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(1.9), plr_filter_time(&session.filter));
     TEST_ASSERT_TRUE(plr_filter_landmark_count(&session.filter) > 5);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_third_that_agrees_is_believed);
-    RUN_TEST(test_back_is_followed_like_ahead);
-    RUN_TEST(test_time_stamps_that_disagree_are_never_believed);
-    RUN_TEST(test_one_message_received_many_times_is_not_believed);
-    RUN_TEST(test_an_accepted_message_in_between_starts_the_count_again);
-    RUN_TEST(test_late_frames_within_the_gap_are_late_and_no_jump);
-    RUN_TEST(test_refusals_for_other_reasons_neither_count_nor_break_the_count);
-    RUN_TEST(test_one_damaged_time_stamp_changes_nothing);
-    RUN_TEST(test_a_jump_ahead_is_followed_with_what_is_then_known);
-    RUN_TEST(test_a_jump_back_is_followed);
-    RUN_TEST(test_after_a_jump_of_days_nothing_is_claimed_but_the_pose);
-    RUN_TEST(test_in_mapping_a_jump_back_begins_a_new_map);
-    return UNITY_END();
 }

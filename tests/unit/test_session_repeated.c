@@ -27,9 +27,6 @@ void setUp(void) {
     observed = observed_refused = 0;
 }
 
-void tearDown(void) {
-}
-
 /* Five frames, each sent so many times. */
 static void drive(plr_session *s, faulty_port *p, int times) {
     const plr_port functions = faulty_port_functions(p);
@@ -107,13 +104,4 @@ static void test_the_same_drive_after_its_end_repeats_nothing(void) {
         continue;
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0.4), session.last.t_ns);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_it_is_refused_and_changes_no_bit);
-    RUN_TEST(test_each_is_answered_with_a_report_that_says_why_and_no_pose);
-    RUN_TEST(test_a_first_frame_at_time_zero_is_taken);
-    RUN_TEST(test_the_same_drive_after_its_end_repeats_nothing);
-    return UNITY_END();
 }

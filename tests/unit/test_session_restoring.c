@@ -313,28 +313,3 @@ static void test_of_two_states_the_damaged_one_is_told(void) {
     assert_told_damage(false);
     assert_told_damage(true);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_with_nothing_between_the_poses_are_those_of_a_drive_without_a_cut);
-    RUN_TEST(test_the_same_holds_of_a_drive_by_an_imu);
-    RUN_TEST(test_the_settings_in_force_are_told_before_the_answer);
-    RUN_TEST(test_on_another_clock_the_body_stands_where_it_stood);
-    RUN_TEST(test_what_may_have_moved_widens_the_covariance);
-    RUN_TEST(test_the_first_frame_is_new_at_whatever_time);
-    RUN_TEST(test_mapping_goes_on_where_the_map_was);
-    RUN_TEST(test_no_other_start_overrides_it);
-    RUN_TEST(test_a_start_among_the_data_sets_the_pose_anew_as_ever);
-    RUN_TEST(test_said_twice_it_is_done_twice);
-    RUN_TEST(test_in_the_midst_of_a_drive_it_is_refused);
-    RUN_TEST(test_before_a_header_it_is_refused);
-    RUN_TEST(test_a_device_that_was_never_used_is_refused);
-    RUN_TEST(test_a_state_of_another_setting_is_refused);
-    RUN_TEST(test_a_damaged_state_is_refused);
-    RUN_TEST(test_a_device_that_cannot_be_read_is_refused);
-    RUN_TEST(test_variances_without_sense_are_refused);
-    RUN_TEST(test_a_second_attempt_that_fails_takes_the_first_one_back);
-    RUN_TEST(test_settings_that_make_no_filter_are_refused);
-    RUN_TEST(test_of_two_states_the_damaged_one_is_told);
-    return UNITY_END();
-}

@@ -211,21 +211,3 @@ static void test_the_log_of_a_restored_drive_gives_its_bits_where_the_state_is(v
     replay.filter.map = after_restart.filter.map;
     TEST_ASSERT_TRUE(state_bytes_same_filter(&replay.filter, &after_restart.filter));
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_save_is_answered_with_its_own_time_and_told_to_a_human);
-    RUN_TEST(test_a_save_changes_no_bit_of_the_drive);
-    RUN_TEST(test_before_the_first_data_there_is_nothing_to_save);
-    RUN_TEST(test_data_that_was_refused_leaves_nothing_to_save);
-    RUN_TEST(test_without_storage_both_are_refused_and_the_drive_goes_on);
-    RUN_TEST(test_a_device_that_fails_is_told_and_the_drive_goes_on);
-    RUN_TEST(test_a_device_that_is_too_small_is_told_with_both_sizes);
-    RUN_TEST(test_an_option_saves_at_the_end_of_every_drive);
-    RUN_TEST(test_who_asks_for_the_saved_state_gets_it_at_the_first_data);
-    RUN_TEST(test_who_asks_for_the_saved_state_on_another_clock_goes_on_there);
-    RUN_TEST(test_who_asks_for_the_saved_state_and_has_none_needs_a_start);
-    RUN_TEST(test_a_log_holds_both_requests);
-    RUN_TEST(test_the_log_of_a_restored_drive_gives_its_bits_where_the_state_is);
-    return UNITY_END();
-}

@@ -11,9 +11,6 @@ void setUp(void) {
     desk_clear(1);
 }
 
-void tearDown(void) {
-}
-
 static plr_pose pose_now(void) {
     plr_pose pose;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &pose));
@@ -248,23 +245,4 @@ static void test_a_widened_covariance_counts_as_a_reset_too(void) {
     TEST_ASSERT_EQUAL_UINT16(0, answer.as.pose.reset_count);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
     TEST_ASSERT_EQUAL_UINT16(1, answer.as.pose.reset_count);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_start_wins_over_truth);
-    RUN_TEST(test_the_first_truth_counts_where_there_is_no_start);
-    RUN_TEST(test_twists_may_precede_the_truth);
-    RUN_TEST(test_twists_may_precede_the_start);
-    RUN_TEST(test_without_either_it_is_identity);
-    RUN_TEST(test_identity_can_be_asked_for);
-    RUN_TEST(test_who_asks_for_truth_gets_no_frame_before_it);
-    RUN_TEST(test_who_asks_for_a_start_gets_no_frame_before_it);
-    RUN_TEST(test_a_start_behind_the_first_frame_is_refused_and_identity_taken);
-    RUN_TEST(test_a_start_that_is_no_pose_is_refused_and_truth_taken);
-    RUN_TEST(test_the_start_covariance_is_taken_packed_row_by_row);
-    RUN_TEST(test_a_bias_prior_is_taken_whatever_the_pose_starts_from);
-    RUN_TEST(test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted);
-    RUN_TEST(test_a_widened_covariance_counts_as_a_reset_too);
-    return UNITY_END();
 }

@@ -13,9 +13,6 @@ void setUp(void) {
     plr_config_default(&config);
 }
 
-void tearDown(void) {
-}
-
 static const plr_setting *by_name(const char *name) {
     const plr_setting *setting = plr_setting_by_name(name);
     TEST_ASSERT_NOT_NULL_MESSAGE(setting, name);
@@ -307,26 +304,4 @@ static void test_the_course_preset_has_the_numbers_of_the_report(void) {
     TEST_ASSERT_EQUAL_DOUBLE(PLR_PRIOR_INDEPENDENT, get("landmark-prior"));
     TEST_ASSERT_EQUAL_DOUBLE(20, get("gate-residual"));
     TEST_ASSERT_EQUAL_DOUBLE(30, get("max-depth"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_row_is_found_by_its_id_and_its_name);
-    RUN_TEST(test_beyond_the_table_there_is_nothing);
-    RUN_TEST(test_ids_are_those_of_the_frame_format);
-    RUN_TEST(test_words_of_choices_have_their_numbers);
-    RUN_TEST(test_default_is_the_standard_of_every_row_and_passes_the_check);
-    RUN_TEST(test_defaults_are_those_that_the_documentation_gives);
-    RUN_TEST(test_every_setting_takes_its_limits_and_gives_them_back);
-    RUN_TEST(test_values_outside_the_limits_are_refused_and_change_nothing);
-    RUN_TEST(test_whole_numbers_take_no_fractions);
-    RUN_TEST(test_setting_one_value_leaves_all_others);
-    RUN_TEST(test_a_sigma_is_of_all_axes_or_of_each);
-    RUN_TEST(test_null_pointers_and_foreign_rows_are_refused);
-    RUN_TEST(test_the_check_names_the_field_that_is_wrong);
-    RUN_TEST(test_combinations_without_sense_are_refused);
-    RUN_TEST(test_an_independent_prior_needs_world_and_a_sigma_of_its_own);
-    RUN_TEST(test_the_check_wants_a_config);
-    RUN_TEST(test_the_course_preset_has_the_numbers_of_the_report);
-    return UNITY_END();
 }

@@ -9,12 +9,6 @@
 #include "posix/settings_text.h"
 #include "support/random.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static const plr_setting *row(const char *name) {
     const plr_setting *setting = plr_setting_by_name(name);
     TEST_ASSERT_NOT_NULL(setting);
@@ -122,18 +116,4 @@ static void test_the_gate_solves_its_equation_from_near_0_to_near_1(void) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 - p), 1 - p, (1 + x / 2) * exp(-x / 2));
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 - p), 1 - p, gate_excess(x));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_setting_reads_back_what_is_written);
-    RUN_TEST(test_numbers_are_written_as_short_as_they_can_be);
-    RUN_TEST(test_words_are_taken_as_they_stand_in_the_table);
-    RUN_TEST(test_text_that_is_no_finite_number_is_refused);
-    RUN_TEST(test_limits_are_included_and_what_is_beyond_refused);
-    RUN_TEST(test_a_count_is_a_whole_number);
-    RUN_TEST(test_what_is_allowed_is_said_in_words);
-    RUN_TEST(test_the_gate_is_the_chi_square_quantile);
-    RUN_TEST(test_the_gate_solves_its_equation_from_near_0_to_near_1);
-    return UNITY_END();
 }

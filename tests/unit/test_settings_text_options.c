@@ -198,19 +198,3 @@ static void test_a_file_that_is_not_there_is_named(void) {
     TEST_ASSERT_FALSE(PARSE("in.plr", "--config", "no/such.conf"));
     assert_problem("no/such.conf: No such file");
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_both_ways_of_giving_a_value_are_the_same);
-    RUN_TEST(test_every_row_of_the_table_is_an_option);
-    RUN_TEST(test_paths_flags_and_start_are_taken);
-    RUN_TEST(test_behind_two_dashes_everything_is_a_path);
-    RUN_TEST(test_what_is_wrong_is_named_with_what_would_be_right);
-    RUN_TEST(test_very_long_words_are_refused_and_overflow_nothing);
-    RUN_TEST(test_the_gate_by_probability_switches_the_courses_off);
-    RUN_TEST(test_the_preset_is_under_the_options_wherever_it_stands);
-    RUN_TEST(test_options_win_over_the_file_and_the_files_preset_over_nothing_of_them);
-    RUN_TEST(test_a_bad_line_is_named_by_file_and_number);
-    RUN_TEST(test_a_file_that_is_not_there_is_named);
-    return UNITY_END();
-}

@@ -36,9 +36,6 @@ void setUp(void) {
     answer = 0;
 }
 
-void tearDown(void) {
-}
-
 static void seen_in(const uint32_t frames[LANDMARKS]) {
     for (unsigned slot = 0; slot < LANDMARKS; slot++)
         filter.slots[slot].last_frame = frames[slot];
@@ -197,21 +194,4 @@ static void test_export_is_symmetric_and_holds_the_counts(void) {
         for (int j = 0; j < 3; j++)
             TEST_ASSERT_DOUBLE_WITHIN(0, landmark.P_W_m2[3 * i + j], landmark.P_W_m2[3 * j + i]);
     TEST_ASSERT_GREATER_THAN_DOUBLE(0, oracle_smallest_eigenvalue(3, landmark.P_W_m2));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_landmark_is_found_by_its_id);
-    RUN_TEST(test_a_free_slot_costs_no_landmark);
-    RUN_TEST(test_the_landmark_longest_unseen_goes);
-    RUN_TEST(test_of_equals_the_lowest_slot_goes);
-    RUN_TEST(test_what_was_seen_in_this_frame_never_goes);
-    RUN_TEST(test_ages_are_right_when_the_frame_number_wraps);
-    RUN_TEST(test_a_sink_that_fails_keeps_the_landmark);
-    RUN_TEST(test_without_a_sink_the_landmark_is_dropped);
-    RUN_TEST(test_removal_leaves_the_marginal_of_the_others);
-    RUN_TEST(test_an_appended_landmark_is_new_and_seen_now);
-    RUN_TEST(test_a_known_landmark_is_not_seen_by_being_known);
-    RUN_TEST(test_export_is_symmetric_and_holds_the_counts);
-    return UNITY_END();
 }

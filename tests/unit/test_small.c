@@ -12,12 +12,6 @@ enum { RUNS = 300 };
 
 static const double eps = REAL_EPSILON;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* n normal numbers in the filter's precision, and the same in double. */
 static void random_pair(rng *r, plr_real *x, double *twin, size_t n) {
     rng_normals(r, 1, twin, n);
@@ -121,16 +115,4 @@ static void test_abs_and_finite(void) {
     TEST_ASSERT_FALSE(plr_is_finite((plr_real)NAN));
     TEST_ASSERT_FALSE(plr_is_finite((plr_real)INFINITY));
     TEST_ASSERT_FALSE(plr_is_finite(-(plr_real)INFINITY));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_products_agree_with_openblas);
-    RUN_TEST(test_products_with_a_vector_agree_with_openblas);
-    RUN_TEST(test_cross_is_skew_times_vector_and_orthogonal_to_both);
-    RUN_TEST(test_cross_follows_the_right_hand);
-    RUN_TEST(test_skew_is_antisymmetric_to_the_bit);
-    RUN_TEST(test_transpose_and_identity);
-    RUN_TEST(test_abs_and_finite);
-    return UNITY_END();
 }

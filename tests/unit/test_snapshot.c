@@ -43,9 +43,6 @@ void setUp(void) {
     memset(&restored, 0, sizeof restored);
 }
 
-void tearDown(void) {
-}
-
 /* Both filters get the same; `b` may be NULL. */
 static void twist(plr_filter *a, plr_filter *b) {
     const plr_twist reading = scene_read(&world);
@@ -321,23 +318,4 @@ static void test_the_size_is_known_beforehand(void) {
     TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(NULL, 0));
     driven.magic = 0;
     TEST_ASSERT_EQUAL_UINT32(0, plr_filter_saved_size(&driven, 0));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_restored_filter_goes_on_with_the_same_bits);
-    RUN_TEST(test_motion_that_is_not_applied_yet_is_carried_too);
-    RUN_TEST(test_the_world_model_and_a_filter_without_bias_go_on_with_the_same_bits);
-    RUN_TEST(test_known_landmarks_stay_known);
-    RUN_TEST(test_a_map_in_the_making_goes_on_with_the_same_bits);
-    RUN_TEST(test_twists_alone_go_on_with_the_same_bits);
-    RUN_TEST(test_a_filter_that_has_seen_nothing_can_be_saved);
-    RUN_TEST(test_every_field_is_carried);
-    RUN_TEST(test_negative_zeros_and_subnormals_keep_their_bits);
-    RUN_TEST(test_saving_changes_nothing);
-    RUN_TEST(test_what_is_restored_is_saved_as_the_same_bytes);
-    RUN_TEST(test_bytes_are_handed_over_in_order_and_in_small_pieces);
-    RUN_TEST(test_the_layout_is_the_documented_one);
-    RUN_TEST(test_the_size_is_known_beforehand);
-    return UNITY_END();
 }

@@ -39,9 +39,6 @@ void setUp(void) {
     state_bytes_save(&state, &filter);
 }
 
-void tearDown(void) {
-}
-
 static void refuses(plr_status expected) {
     memcpy(&untouched, &other, sizeof untouched);
     TEST_ASSERT_EQUAL_INT(expected, state_bytes_restore(&state, &other));
@@ -263,25 +260,4 @@ static void test_without_init_nothing_is_saved_or_restored(void) {
     other.magic = 0;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, plr_filter_save(&other, state_bytes_take, &state));
     refuses(PLR_E_NOT_READY);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_another_build_or_version_is_foreign);
-    RUN_TEST(test_each_setting_that_differs_makes_it_foreign);
-    RUN_TEST(test_each_number_of_another_camera_makes_it_foreign);
-    RUN_TEST(test_any_length_but_the_right_one_is_refused);
-    RUN_TEST(test_more_landmarks_than_slots_are_refused);
-    RUN_TEST(test_numbers_that_are_not_finite_are_refused);
-    RUN_TEST(test_a_negative_variance_is_refused_and_a_negative_covariance_is_not);
-    RUN_TEST(test_a_flag_is_0_or_1);
-    RUN_TEST(test_a_doubt_takes_at_most_fifteen_frames_to_settle);
-    RUN_TEST(test_whatever_bit_flips_a_refusal_changes_nothing);
-    RUN_TEST(test_a_sink_that_fails_ends_the_save);
-    RUN_TEST(test_a_source_that_fails_changes_nothing_or_resets_the_filter);
-    RUN_TEST(test_a_source_that_tells_another_story_the_second_time_resets_the_filter);
-    RUN_TEST(test_a_broken_state_is_not_saved);
-    RUN_TEST(test_a_diverged_filter_is_sound_again_after_a_restore);
-    RUN_TEST(test_without_init_nothing_is_saved_or_restored);
-    return UNITY_END();
 }

@@ -16,12 +16,6 @@ enum { RUNS = 500 };
 static const double eps = REAL_EPSILON;
 static const double pi = 3.14159265358979323846;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* A rotation vector of the given length, rounded, and the same in the filter's precision. */
 static void random_theta(rng *r, double length, double twin[3], plr_real theta[3]) {
     rng_normals(r, 1, twin, 3);
@@ -204,18 +198,4 @@ static void test_a_million_steps_stay_a_rotation(void) {
         plr_so3_orthonormalise(R);
     }
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(8 * eps, distance_to_orthonormal(R));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_series_agree_with_closed_forms);
-    RUN_TEST(test_series_begin_at_their_limits);
-    RUN_TEST(test_exp_agrees_with_the_matrix_exponential);
-    RUN_TEST(test_exp_of_zero_is_exactly_identity);
-    RUN_TEST(test_exp_of_minus_theta_is_the_transpose);
-    RUN_TEST(test_orthonormalise_squares_the_error_away);
-    RUN_TEST(test_orthonormalise_leaves_a_rotation_alone);
-    RUN_TEST(test_orthonormalise_of_a_small_turn_is_the_same);
-    RUN_TEST(test_a_million_steps_stay_a_rotation);
-    return UNITY_END();
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* When a file of saved states asks for what was written to be on the disk, and what it makes of a
  * disk that fails. The rest of it: tests/python/test_replay_state.py. */
-#define _POSIX_C_SOURCE 200809L
-
 #include <errno.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -122,14 +120,4 @@ static void test_no_file_reads_as_blank_and_takes_nothing(void) {
     TEST_ASSERT_EACH_EQUAL_UINT8(0, bytes, 4);
     TEST_ASSERT_EQUAL_INT(-1, writes(0));
     TEST_ASSERT_EQUAL_INT(EBADF, file.error);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_name_of_a_new_file_is_on_the_disk_too);
-    RUN_TEST(test_what_was_written_or_erased_is_on_the_disk_before_it_is_read_back);
-    RUN_TEST(test_a_disk_that_has_failed_once_is_not_believed_the_second_time);
-    RUN_TEST(test_a_slot_has_room_for_what_was_asked_in_whole_blocks);
-    RUN_TEST(test_no_file_reads_as_blank_and_takes_nothing);
-    return UNITY_END();
 }

@@ -220,21 +220,3 @@ static void test_cut_after_cut_the_last_whole_state_stays(void) {
     restart_finds(2);
     TEST_ASSERT_EQUAL_UINT64(2, found.generation);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_newest_state_comes_back);
-    RUN_TEST(test_a_new_device_holds_nothing);
-    RUN_TEST(test_the_slots_are_worn_alike);
-    RUN_TEST(test_any_program_and_erase_size_will_do);
-    RUN_TEST(test_the_erased_value_does_not_matter);
-    RUN_TEST(test_what_fills_the_last_units_is_zero);
-    RUN_TEST(test_saving_changes_no_bit_of_the_filter);
-    RUN_TEST(test_a_cut_in_the_first_save_leaves_nothing_or_the_whole);
-    RUN_TEST(test_a_cut_in_the_second_save_leaves_the_first_or_the_second);
-    RUN_TEST(test_a_cut_in_the_third_save_leaves_the_second_or_the_third);
-    RUN_TEST(test_a_cut_that_leaves_the_byte_as_it_was_does_no_harm_either);
-    RUN_TEST(test_a_cut_that_leaves_noise_in_the_whole_unit_does_no_harm_either);
-    RUN_TEST(test_cut_after_cut_the_last_whole_state_stays);
-    return UNITY_END();
-}

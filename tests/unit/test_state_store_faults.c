@@ -390,29 +390,3 @@ static void test_null_pointers_are_refused(void) {
     restored.magic = 0;
     TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, restore());
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_flipped_bit_anywhere_is_found);
-    RUN_TEST(test_a_refusal_of_damage_changes_nothing);
-    RUN_TEST(test_a_flipped_bit_in_the_newest_state_leaves_the_one_before);
-    RUN_TEST(test_damage_in_both_slots_is_refused_and_the_next_save_mends_it);
-    RUN_TEST(test_bits_that_do_not_program_fail_the_save_and_leave_the_old_state);
-    RUN_TEST(test_bits_that_flip_while_they_are_taken_over_reset_the_filter);
-    RUN_TEST(test_a_state_of_another_build_is_refused);
-    RUN_TEST(test_a_state_of_another_version_is_refused);
-    RUN_TEST(test_a_slot_of_another_version_is_refused);
-    RUN_TEST(test_a_state_of_other_settings_is_refused);
-    RUN_TEST(test_an_old_state_of_ours_is_not_taken_for_a_newer_foreign_one);
-    RUN_TEST(test_an_old_state_of_ours_is_not_taken_for_a_newer_slot_of_another_version);
-    RUN_TEST(test_a_length_that_leaves_the_slot_is_damage);
-    RUN_TEST(test_a_device_that_does_not_read_is_said_to_fail);
-    RUN_TEST(test_a_device_that_does_not_write_fails_the_save_alone);
-    RUN_TEST(test_damage_in_one_slot_does_not_hide_that_the_other_cannot_be_read);
-    RUN_TEST(test_if_slot_0_cannot_be_read_slot_1_is_used);
-    RUN_TEST(test_a_device_that_contradicts_itself_is_refused);
-    RUN_TEST(test_a_device_that_could_not_hold_a_full_map_is_refused_at_the_first_save);
-    RUN_TEST(test_a_broken_filter_is_not_saved_over_a_good_one);
-    RUN_TEST(test_null_pointers_are_refused);
-    return UNITY_END();
-}

@@ -113,11 +113,3 @@ static void test_without_a_saved_state_the_session_begins_as_ever(void) {
     before_cut.filter.map = after_restart.filter.map;
     TEST_ASSERT_TRUE(state_bytes_same_filter(&before_cut.filter, &after_restart.filter));
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_session_goes_on_with_the_bits_of_the_one_before_it);
-    RUN_TEST(test_on_a_clock_that_began_anew_the_drive_is_the_same_to_two_centimetres);
-    RUN_TEST(test_without_a_saved_state_the_session_begins_as_ever);
-    return UNITY_END();
-}

@@ -10,12 +10,6 @@
 
 enum { LAST_STATUS = PLR_E_SIZE, REASONS = 25 };
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* Texts are there, say something, and each says something else. */
 static void demand_distinct(const char *const *texts, unsigned count) {
     for (unsigned i = 0; i < count; i++) {
@@ -88,15 +82,4 @@ static void test_fingerprint_tells_builds_apart(void) {
                                         PLR_BLOCK_OBSERVATIONS));
     TEST_ASSERT_TRUE(own != fingerprint(PLR_REAL, PLR_MAX_LANDMARKS + 1, PLR_MAX_OBSERVATIONS,
                                         PLR_BLOCK_OBSERVATIONS));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_status_has_a_sentence_of_its_own);
-    RUN_TEST(test_every_reason_has_a_phrase_of_its_own);
-    RUN_TEST(test_every_health_has_a_phrase_of_its_own);
-    RUN_TEST(test_every_fault_of_an_imu_has_a_phrase_of_its_own);
-    RUN_TEST(test_version_is_the_number_of_the_header_as_text);
-    RUN_TEST(test_fingerprint_tells_builds_apart);
-    return UNITY_END();
 }

@@ -28,9 +28,6 @@ void setUp(void) {
     to_reals(camera.R_CB, R, 9);
 }
 
-void tearDown(void) {
-}
-
 /* A point in view, z_m away; as the filter stores it. */
 static void random_point(double z_m, plr_real q[3], double exact[3]) {
     exact[0] = z_m * rng_uniform(&chance, -0.8, 0.8);
@@ -191,16 +188,4 @@ static void test_body_and_camera_are_one_motion_apart(void) {
         to_doubles(got, back, 3);
         TEST_ASSERT_DOUBLE_WITHIN(400 * REAL_EPSILON, 0, largest_difference(s, got, 3));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_projection_follows_its_equations);
-    RUN_TEST(test_rows_are_left_right_and_vertical);
-    RUN_TEST(test_jacobian_agrees_with_differences);
-    RUN_TEST(test_back_projection_undoes_projection);
-    RUN_TEST(test_back_projection_jacobian_agrees_with_differences);
-    RUN_TEST(test_jacobians_of_projection_and_back_projection_are_inverse);
-    RUN_TEST(test_body_and_camera_are_one_motion_apart);
-    return UNITY_END();
 }

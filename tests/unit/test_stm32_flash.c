@@ -327,20 +327,3 @@ static void test_nothing_outside_or_out_of_step_is_touched(void) {
     TEST_ASSERT_EQUAL_INT(-1, program(0, bytes, 2));
     assert_all(0x55, 0, STORAGE);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_it_is_two_sectors_of_128_kilobytes);
-    RUN_TEST(test_an_erase_clears_its_sector_and_no_other);
-    RUN_TEST(test_what_is_programmed_reads_back);
-    RUN_TEST(test_what_was_not_erased_does_not_take);
-    RUN_TEST(test_a_cell_that_does_not_program_is_found_at_once);
-    RUN_TEST(test_every_error_flag_ends_it_and_is_cleared_for_the_next);
-    RUN_TEST(test_a_controller_that_stays_busy_is_given_up_before_the_watchdog_bites);
-    RUN_TEST(test_a_word_that_never_ends_is_given_up_soon);
-    RUN_TEST(test_reading_and_programming_feed_the_watchdog);
-    RUN_TEST(test_the_longest_erase_is_waited_for_and_the_watchdog_fed_around_it);
-    RUN_TEST(test_a_controller_that_is_not_there_fails_at_once);
-    RUN_TEST(test_nothing_outside_or_out_of_step_is_touched);
-    return UNITY_END();
-}

@@ -46,9 +46,6 @@ void setUp(void) {
     memset(moved, 0, sizeof moved);
 }
 
-void tearDown(void) {
-}
-
 /* A frame whose picture puts nu at `mean`, give or take its own noise. */
 static void add(const double mean[6], double noise) {
     plr_real nu[6], Lambda[21] = {0};
@@ -440,26 +437,4 @@ static void test_wheels_that_slip_do_not_carry_the_pose_away(void) {
         rig_frame();
     }
     TEST_ASSERT_FALSE(rig.report.reasons & (CONTRADICTED | MAY_BE_WRONG));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_under_noise_each_window_is_chi_square_of_six);
-    RUN_TEST(test_noise_is_not_told);
-    RUN_TEST(test_a_slip_is_told_within_five_frames);
-    RUN_TEST(test_a_second_slip_adds_to_what_the_first_left_unsettled);
-    RUN_TEST(test_a_small_difference_is_said_and_widens_nothing);
-    RUN_TEST(test_twists_that_are_contradicted_are_believed_less);
-    RUN_TEST(test_the_covariance_covers_both_stories);
-    RUN_TEST(test_a_frame_may_contradict_the_twists_outright);
-    RUN_TEST(test_what_the_frames_moved_the_pose_by_is_covered_too);
-    RUN_TEST(test_an_old_reading_is_no_rival_of_the_picture);
-    RUN_TEST(test_after_fifteen_frames_of_agreement_it_is_settled);
-    RUN_TEST(test_biases_are_kept_from_a_doubt_until_it_is_settled_or_has_become_usual);
-    RUN_TEST(test_a_frame_that_differs_begins_the_settling_anew);
-    RUN_TEST(test_a_drift_is_doubted_as_long_as_it_lasted_and_no_longer_than_a_contradiction);
-    RUN_TEST(test_a_bias_is_held_against_what_has_been_learnt_of_it);
-    RUN_TEST(test_a_bias_of_which_little_is_known_is_not_judged);
-    RUN_TEST(test_wheels_that_slip_do_not_carry_the_pose_away);
-    return UNITY_END();
 }

@@ -15,9 +15,6 @@ void setUp(void) {
     chance = rng_seeded(48);
 }
 
-void tearDown(void) {
-}
-
 static void test_nan_and_infinity_are_found_at_every_place(void) {
     const double bad[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     double x[5] = {0, -1e308, 1e308, 5e-324, -0.0};
@@ -129,18 +126,4 @@ static void test_a_landmark_needs_a_place_and_a_covariance(void) {
     landmark.p_W_m[1] = 2;
     landmark.P_W_m2[4] = -1;
     TEST_ASSERT_FALSE(plr_landmark_is_valid(&landmark));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_nan_and_infinity_are_found_at_every_place);
-    RUN_TEST(test_rotations_pass_and_so_do_rounded_ones);
-    RUN_TEST(test_what_is_no_rotation_is_refused);
-    RUN_TEST(test_covariances_pass_from_tiny_to_huge);
-    RUN_TEST(test_exact_directions_are_allowed);
-    RUN_TEST(test_what_is_no_covariance_is_refused);
-    RUN_TEST(test_random_matrices_are_judged_by_their_eigenvalues);
-    RUN_TEST(test_more_than_six_rows_are_refused);
-    RUN_TEST(test_a_landmark_needs_a_place_and_a_covariance);
-    return UNITY_END();
 }

@@ -32,9 +32,6 @@ void setUp(void) {
     chance = rng_seeded(83);
 }
 
-void tearDown(void) {
-}
-
 /* A landmark straight ahead of an inverse range that may be negative. */
 static void put(double inverse_range, double sigma) {
     const unsigned slot = filter.count++;
@@ -101,13 +98,4 @@ static void test_a_landmark_goes_to_the_usual_place_but_not_further_than_two_sig
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.002, (double)rounded);
     const plr_real nearer = plr_vantage_offset(slot, PLR_R(0.1), change, PLR_R(1e-4));
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.022, (double)nearer);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_well_known_inverse_ranges_have_their_mean);
-    RUN_TEST(test_noise_averages_out_and_what_is_well_known_counts_more);
-    RUN_TEST(test_it_is_positive_and_not_below_what_is_certain);
-    RUN_TEST(test_a_landmark_goes_to_the_usual_place_but_not_further_than_two_sigmas);
-    return UNITY_END();
 }

@@ -9,12 +9,6 @@
 
 enum { MOST_DATA = 1100, MOST_STUFFED = MOST_DATA + MOST_DATA / 254 + 2 };
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* Stuffs n bytes; returns the length with the delimiter. */
 static size_t stuff(const uint8_t *data, size_t n, uint8_t *stuffed) {
     plr_cobs_encoder e;
@@ -136,15 +130,4 @@ static void test_data_of_every_length_come_back(void) {
         TEST_ASSERT_EQUAL_size_t(n, n_back);
         TEST_ASSERT_EQUAL_INT(0, memcmp(data, back, n));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_short_data_stuff_as_the_paper_says);
-    RUN_TEST(test_a_full_block_at_the_end_has_no_empty_one_behind_it);
-    RUN_TEST(test_an_empty_block_behind_a_full_one_is_taken_too);
-    RUN_TEST(test_a_delimiter_alone_is_an_empty_frame);
-    RUN_TEST(test_a_delimiter_within_a_block_is_broken_and_the_next_frame_is_whole);
-    RUN_TEST(test_data_of_every_length_come_back);
-    return UNITY_END();
 }

@@ -4,12 +4,6 @@
 
 #include "pelorus/wire.h"
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static const uint8_t digits[] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
 static void test_nine_digits_give_the_published_check_value(void) {
@@ -53,14 +47,4 @@ static void test_any_two_flipped_bits_change_it(void) {
             TEST_ASSERT_NOT_EQUAL_HEX32(0xCBF43926, plr_crc32(0, copy, sizeof copy));
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_nine_digits_give_the_published_check_value);
-    RUN_TEST(test_no_bytes_leave_it_as_it_is);
-    RUN_TEST(test_parts_give_the_same_as_the_whole);
-    RUN_TEST(test_every_byte_goes_by_the_polynomial);
-    RUN_TEST(test_any_two_flipped_bits_change_it);
-    return UNITY_END();
 }

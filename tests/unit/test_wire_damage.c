@@ -32,9 +32,6 @@ void setUp(void) {
     length = sink.length;
 }
 
-void tearDown(void) {
-}
-
 static void assert_was_sent(void *context, const plr_message *message) {
     (void)context;
     TEST_ASSERT_LESS_THAN_UINT16(FRAMES, message->sequence);
@@ -181,17 +178,4 @@ static void test_noise_between_frames_costs_at_most_the_one_behind_it(void) {
         read += wire_read_all(&r, stream + start, end_of[i] - start, NULL, NULL);
     }
     TEST_ASSERT_EQUAL_UINT(FRAMES, read);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_each_byte_damaged_costs_its_frame_alone);
-    RUN_TEST(test_each_byte_made_a_delimiter_costs_its_frame_alone);
-    RUN_TEST(test_each_byte_lost_costs_its_frame_alone);
-    RUN_TEST(test_each_byte_doubled_costs_its_frame_alone);
-    RUN_TEST(test_a_stream_cut_at_any_byte_gives_what_is_whole);
-    RUN_TEST(test_a_stream_begun_at_any_byte_gives_what_is_whole);
-    RUN_TEST(test_a_million_random_bytes_hold_no_message_and_the_next_frame_is_read);
-    RUN_TEST(test_noise_between_frames_costs_at_most_the_one_behind_it);
-    return UNITY_END();
 }

@@ -9,12 +9,6 @@
 static uint8_t payload[WIRE_BUFFER_SIZE + 4096];
 static size_t length;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 /* --- the place of each field --- */
 
 static plr_message encode(plr_kind kind) {
@@ -278,24 +272,4 @@ static void test_imu_readings_lie_where_the_page_says(void) {
         assert_f32s(13 + 24 * i, m.readings[i].a_B_mps2, 3);
         assert_f32s(25 + 24 * i, m.readings[i].w_B_radps, 3);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_header_fields_lie_where_the_page_says);
-    RUN_TEST(test_config_fields_lie_where_the_page_says);
-    RUN_TEST(test_start_fields_lie_where_the_page_says);
-    RUN_TEST(test_twist_fields_lie_where_the_page_says);
-    RUN_TEST(test_stereo_fields_lie_where_the_page_says);
-    RUN_TEST(test_truth_fields_lie_where_the_page_says);
-    RUN_TEST(test_landmark_fields_lie_where_the_page_says);
-    RUN_TEST(test_pose_fields_of_float64_lie_where_the_page_says);
-    RUN_TEST(test_pose_fields_of_float32_lie_where_the_page_says);
-    RUN_TEST(test_report_fields_lie_where_the_page_says);
-    RUN_TEST(test_text_fills_the_payload_to_its_end);
-    RUN_TEST(test_end_counts_lie_where_the_page_says);
-    RUN_TEST(test_state_fields_lie_where_the_page_says);
-    RUN_TEST(test_reading_fields_lie_where_the_page_says);
-    RUN_TEST(test_imu_readings_lie_where_the_page_says);
-    return UNITY_END();
 }

@@ -16,9 +16,6 @@ void setUp(void) {
     reader = wire_reader();
 }
 
-void tearDown(void) {
-}
-
 /* Appends a frame to the stream; returns its place. */
 static size_t add(unsigned kind, unsigned sequence, const uint8_t *payload, size_t n) {
     size_t at = length;
@@ -330,29 +327,4 @@ static void test_a_text_that_is_too_long_is_cut_between_characters(void) {
 static void test_a_text_that_is_not_utf_8_is_cut_all_the_same(void) {
     read_long_text(0, "\x80");
     TEST_ASSERT_EQUAL_size_t(PLR_WIRE_MAX_TEXT - 3, strlen(message.as.text.text));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_reader_without_room_is_refused);
-    RUN_TEST(test_no_bytes_are_no_frame);
-    RUN_TEST(test_a_frame_is_in_the_middle_until_its_delimiter);
-    RUN_TEST(test_every_unknown_kind_is_skipped_and_counted);
-    RUN_TEST(test_a_malformed_frame_is_skipped_and_counted);
-    RUN_TEST(test_a_body_without_room_for_a_checksum_is_damaged);
-    RUN_TEST(test_the_place_of_a_skipped_frame_is_behind_the_empty_ones);
-    RUN_TEST(test_a_header_of_a_later_minor_version_is_read);
-    RUN_TEST(test_a_header_of_a_later_major_version_ends_the_reading);
-    RUN_TEST(test_gaps_of_the_sequence_are_counted);
-    RUN_TEST(test_the_sequence_goes_on_over_its_wrap);
-    RUN_TEST(test_a_sender_that_begins_anew_misses_nothing);
-    RUN_TEST(test_a_damaged_frame_is_missing_too);
-    RUN_TEST(test_the_least_buffer_holds_every_other_kind);
-    RUN_TEST(test_a_buffer_of_stereo_body_holds_just_so_many_observations);
-    RUN_TEST(test_a_frame_too_long_for_the_observation_array_is_skipped_and_counted);
-    RUN_TEST(test_a_reader_without_observations_reads_empty_stereos_only);
-    RUN_TEST(test_a_long_frame_that_is_damaged_counts_as_damaged);
-    RUN_TEST(test_a_text_that_is_too_long_is_cut_between_characters);
-    RUN_TEST(test_a_text_that_is_not_utf_8_is_cut_all_the_same);
-    return UNITY_END();
 }

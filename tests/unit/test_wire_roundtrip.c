@@ -16,9 +16,6 @@ void setUp(void) {
     sent_count = 0;
 }
 
-void tearDown(void) {
-}
-
 static void send(plr_writer *w, plr_kind kind, unsigned variant) {
     sent[sent_count] = wire_sample(kind, variant);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_put(w, &sent[sent_count]));
@@ -144,15 +141,4 @@ static void test_a_pose_of_float32_is_rounded_to_nearest_and_its_position_is_not
     TEST_ASSERT_TRUE(back.as.pose.bias[0] == (double)0.1F);
     TEST_ASSERT_DOUBLE_IS_INF(back.as.pose.bias[1]);
     TEST_ASSERT_DOUBLE_IS_NEG_INF(back.as.pose.bias[2]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_kind_comes_back_bit_by_bit_at_the_ends_of_its_ranges);
-    RUN_TEST(test_bytes_may_come_one_at_a_time);
-    RUN_TEST(test_the_stream_may_be_cut_in_two_at_every_byte);
-    RUN_TEST(test_doubled_delimiters_mean_nothing);
-    RUN_TEST(test_what_was_read_is_written_with_the_same_bytes);
-    RUN_TEST(test_a_pose_of_float32_is_rounded_to_nearest_and_its_position_is_not);
-    return UNITY_END();
 }

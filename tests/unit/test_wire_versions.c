@@ -13,12 +13,6 @@
 static uint8_t payload[WIRE_BUFFER_SIZE + 4096];
 static size_t length;
 
-void setUp(void) {
-}
-
-void tearDown(void) {
-}
-
 static plr_message encode(plr_kind kind) {
     plr_message m = wire_sample(kind, WIRE_SAMPLE_COMMON);
     length = wire_payload(&m, payload, sizeof payload);
@@ -237,19 +231,4 @@ static void test_a_text_s_length_ends_at_its_zero_or_at_its_size(void) {
     TEST_ASSERT_EQUAL_size_t(7, plr_text_length(text, sizeof text));
     TEST_ASSERT_EQUAL_size_t(4, plr_text_length(text, 4));
     TEST_ASSERT_EQUAL_size_t(0, plr_text_length(text, 0));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_shorter_payload_is_malformed);
-    RUN_TEST(test_a_report_of_format_1_1_has_the_lower_reasons_alone);
-    RUN_TEST(test_what_came_with_format_1_4_is_absent_in_a_payload_of_1_3);
-    RUN_TEST(test_a_header_of_format_1_1_tells_nothing_of_single_axes);
-    RUN_TEST(test_what_came_with_format_1_3_is_unknown_in_a_payload_of_1_2);
-    RUN_TEST(test_bytes_behind_the_payload_are_a_later_version_s_and_are_ignored);
-    RUN_TEST(test_values_that_the_page_does_not_list_are_malformed);
-    RUN_TEST(test_a_status_of_a_later_version_is_let_through);
-    RUN_TEST(test_bits_and_bytes_without_a_meaning_are_ignored);
-    RUN_TEST(test_a_text_s_length_ends_at_its_zero_or_at_its_size);
-    return UNITY_END();
 }

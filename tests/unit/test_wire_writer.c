@@ -15,9 +15,6 @@ void setUp(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_init(&writer, byte_sink_write, &sink));
 }
 
-void tearDown(void) {
-}
-
 static plr_status put(const plr_message *message) {
     return plr_writer_put(&writer, message);
 }
@@ -233,24 +230,4 @@ static void test_a_function_that_always_fails_is_tried_once_a_message(void) {
     }
     TEST_ASSERT_EQUAL_UINT32(0, writer.counts.frames);
     TEST_ASSERT_EQUAL_UINT16(5, writer.sequence);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_null_pointers_are_refused);
-    RUN_TEST(test_a_kind_that_is_none_is_refused);
-    RUN_TEST(test_a_header_that_contradicts_itself_is_refused_and_nothing_is_written);
-    RUN_TEST(test_a_config_of_too_many_settings_is_refused);
-    RUN_TEST(test_a_stereo_of_too_many_or_no_observations_is_refused);
-    RUN_TEST(test_an_imu_of_no_reading_or_too_many_is_refused);
-    RUN_TEST(test_results_that_contradict_themselves_are_refused);
-    RUN_TEST(test_a_text_without_an_end_or_of_no_severity_is_refused);
-    RUN_TEST(test_a_header_is_of_the_writer_s_version_whatever_it_says);
-    RUN_TEST(test_the_sequence_goes_from_0_and_wraps);
-    RUN_TEST(test_an_end_tells_what_was_written_whatever_it_says);
-    RUN_TEST(test_a_call_of_the_function_is_of_1_to_255_bytes);
-    RUN_TEST(test_a_failure_at_any_byte_costs_one_message_and_no_more);
-    RUN_TEST(test_nothing_is_sent_of_a_frame_after_its_failure);
-    RUN_TEST(test_a_function_that_always_fails_is_tried_once_a_message);
-    return UNITY_END();
 }
