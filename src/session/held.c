@@ -81,8 +81,9 @@ bool plr_held_pop_due(plr_held_steps *held, plr_time_ns delay_ns, plr_held_step 
 
 /* --- frames --- */
 
-static plr_held_frame *frame_at(plr_held_frames *held, unsigned behind) {
-    return &held->frames[(held->first + behind) % PLR_SESSION_HELD_FRAMES];
+/* As `place`, of frames. */
+static unsigned frame_place(const plr_held_frames *held, unsigned behind) {
+    return (held->first + behind) % PLR_SESSION_HELD_FRAMES;
 }
 
 static void copy_frame(plr_held_frame *to, const plr_frame *frame, plr_time_ns moved_ns) {
@@ -94,19 +95,22 @@ static void copy_frame(plr_held_frame *to, const plr_frame *frame, plr_time_ns m
 
 bool plr_held_has_frame(const plr_held_frames *held, plr_time_ns t_ns) {
     for (unsigned i = 0; i < held->count; i++)
-        if (held->frames[(held->first + i) % PLR_SESSION_HELD_FRAMES].frame.t_ns == t_ns)
+        if (held->frames[frame_place(held, i)].frame.t_ns == t_ns)
             return true;
     return false;
 }
 
 void plr_held_insert_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns) {
     PLR_ASSERT(held->count < PLR_SESSION_HELD_FRAMES && frame->count <= PLR_MAX_OBSERVATIONS);
-    unsigned at = held->count++;
-    for (; at > 0 && frame_at(held, at - 1U)->moved_ns > moved_ns; at--) {
-        const plr_held_frame *later = frame_at(held, at - 1U);
-        copy_frame(frame_at(held, at), &later->frame, later->moved_ns);
+    plr_held_frame *to = &held->frames[frame_place(held, held->count)];
+    for (unsigned at = held->count++; at > 0; at--) {
+        plr_held_frame *before = &held->frames[frame_place(held, at - 1U)];
+        if (before->moved_ns <= moved_ns)
+            break;
+        copy_frame(to, &before->frame, before->moved_ns);
+        to = before;
     }
-    copy_frame(frame_at(held, at), frame, moved_ns);
+    copy_frame(to, frame, moved_ns);
 }
 
 const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held) {
@@ -114,14 +118,13 @@ const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held) {
 }
 
 const plr_held_frame *plr_held_newest_frame(const plr_held_frames *held) {
-    const unsigned behind = held->first + held->count - 1U;
-    return held->count > 0 ? &held->frames[behind % PLR_SESSION_HELD_FRAMES] : NULL;
+    return held->count > 0 ? &held->frames[frame_place(held, held->count - 1U)] : NULL;
 }
 
 const plr_held_frame *plr_held_pop_frame(plr_held_frames *held) {
     PLR_ASSERT(held->count > 0);
     const plr_held_frame *oldest = &held->frames[held->first];
-    held->first = (uint8_t)((held->first + 1U) % PLR_SESSION_HELD_FRAMES);
+    held->first = (uint8_t)frame_place(held, 1);
     held->count--;
     return oldest;
 }
