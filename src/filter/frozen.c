@@ -28,29 +28,31 @@ static uint32_t hash_of_pixels(const plr_observation *o) {
     return print;
 }
 
-void plr_frozen_note_motion(plr_filter *f) {
-    plr_consistency *c = &f->consistency;
+/* The motion by twists since the picture was new, and its variance. */
+static void motion_since(const plr_filter *f, plr_real way[PLR_POSE_DIM],
+                         plr_real variance[PLR_POSE_DIM]) {
+    const plr_consistency *c = &f->consistency;
     const plr_motion *m = &f->motion;
     plr_real turn[3];
     plr_turn_of(turn, m->E);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        c->frozen_motion[k] += k < 3 ? m->p[k] : turn[k - 3];
-        c->frozen_variance[k] += m->Q[(PLR_POSE_DIM + 1) * k];
+        way[k] = c->frozen_motion[k] + (k < 3 ? m->p[k] : turn[k - 3]);
+        variance[k] = c->frozen_variance[k] + m->Q[(PLR_POSE_DIM + 1) * k];
     }
+}
+
+void plr_frozen_note_motion(plr_filter *f) {
+    motion_since(f, f->consistency.frozen_motion, f->consistency.frozen_variance);
 }
 
 /* True if the motion by twists since the picture was new is larger than its noise. */
 static bool has_moved(const plr_filter *f) {
-    const plr_consistency *c = &f->consistency;
-    const plr_motion *m = &f->motion;
-    plr_real turn[3], sum = 0;
-    plr_turn_of(turn, m->E);
+    plr_real way[PLR_POSE_DIM], variance[PLR_POSE_DIM], sum = 0;
+    motion_since(f, way, variance);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        const plr_real way = c->frozen_motion[k] + (k < 3 ? m->p[k] : turn[k - 3]);
-        const plr_real variance = c->frozen_variance[k] + m->Q[(PLR_POSE_DIM + 1) * k];
-        if (variance > 0)
-            sum += way * way / variance;
-        else if (way * way > PLR_R(1e-8))
+        if (variance[k] > 0)
+            sum += way[k] * way[k] / variance[k];
+        else if (way[k] * way[k] > PLR_R(1e-8))
             sum += PLR_R(2) * MOVED_ABOVE;
     }
     return sum > MOVED_ABOVE;
