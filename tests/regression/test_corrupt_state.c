@@ -13,16 +13,9 @@
 #include "support/rig.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
+#include "support/state_places.h"
 
-enum {
-    REAL = sizeof(plr_real),
-    /* Where fields stand (docs/STATE-FORMAT.md). */
-    COUNT_AT = 13 + 9 * 52 + 17 * REAL,
-    POSE_AT = COUNT_AT + 4 + 16 + REAL + 2,
-    POSITION_AT = POSE_AT + 9 * REAL,
-    REST_AT = POSITION_AT + 24,
-    SLOT_SIZE = 8 * REAL + 35
-};
+enum { REAL = sizeof(plr_real) };
 
 static plr_filter other;
 static state_bytes state;
@@ -34,11 +27,6 @@ void setUp(void) {
     rig_drive(5);
     rig_twist();
     state_bytes_save(&state, &rig.filter);
-}
-
-static uint32_t slots_at(void) {
-    const unsigned n = plr_filter_landmark_count(&rig.filter), rows = 12 + 3 * n;
-    return state.length - (rows * (rows + 1) / 2 + 2 * rows) * REAL - n * SLOT_SIZE;
 }
 
 static bool is_finite(const double *x, unsigned n) {
@@ -101,17 +89,18 @@ static unsigned refused_from(uint32_t from, uint32_t to, unsigned stride) {
 }
 
 static void test_what_a_restore_takes_the_next_call_does_not_find_damaged(void) {
-    TEST_ASSERT_GREATER_THAN_UINT(9 * 8, refused_from(POSE_AT, POSITION_AT, 1));
-    TEST_ASSERT_EQUAL_UINT(0, refused_from(POSITION_AT, REST_AT - 2, 64)); /* the lowest bits */
-    (void)refused_from(COUNT_AT, POSE_AT, 1);
-    (void)refused_from(POSITION_AT, slots_at(), 13);
+    const uint32_t pose = state_place("pose", "R_WB"), position = state_place("pose", "p_WB");
+    TEST_ASSERT_GREATER_THAN_UINT(9 * 8, refused_from(pose, position, 1));
+    TEST_ASSERT_EQUAL_UINT(0, refused_from(position, position + 24 - 2, 64)); /* the lowest bits */
+    (void)refused_from(state_place("count", "landmarks"), pose, 1);
+    (void)refused_from(position, state_place("slot", "x"), 13);
 }
 
 static void test_no_question_is_answered_with_a_number_that_is_not_finite(void) {
-    const uint32_t first = slots_at();
+    const uint32_t first = state_place("slot", "x");
     TEST_ASSERT_GREATER_THAN_UINT(4, plr_filter_landmark_count(&rig.filter));
     TEST_ASSERT_GREATER_THAN_UINT(2, refused_from(first, first + 3 * REAL, 1));
-    (void)refused_from(first, first + SLOT_SIZE, 1);
+    (void)refused_from(first, state_place("slot", "end"), 1);
     (void)refused_from(state.length - 10 * REAL, state.length, 1); /* of S, the end */
     (void)refused_from(first, state.length, 211);
 }
@@ -121,14 +110,15 @@ static void test_a_mirror_image_is_no_pose(void) {
     memcpy(R, rig.filter.R_WB, sizeof R);
     for (unsigned i = 0; i < 9; i += 3)
         R[i] = -R[i];
-    memcpy(state.bytes + POSE_AT, R, sizeof R); /* the tests run on little-endian machines */
+    /* the tests run on little-endian machines */
+    memcpy(state.bytes + state_place("pose", "R_WB"), R, sizeof R);
     memcpy(&other, &rig.filter, sizeof other);
     TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, state_bytes_restore(&state, &other));
     TEST_ASSERT_EQUAL_MEMORY(&rig.filter, &other, sizeof other);
 }
 
 static void test_a_landmark_in_the_camera_is_none(void) {
-    memset(state.bytes + slots_at(), 0, 3 * REAL);
+    memset(state.bytes + state_place("slot", "x"), 0, 3 * REAL);
     memcpy(&other, &rig.filter, sizeof other);
     TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, state_bytes_restore(&state, &other));
     TEST_ASSERT_EQUAL_MEMORY(&rig.filter, &other, sizeof other);

@@ -7,25 +7,9 @@
 #include "support/reseal.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
+#include "support/state_places.h"
 
-enum {
-    LANDMARKS = 3,
-    REAL = sizeof(plr_real),
-    /* Where fields stand (docs/STATE-FORMAT.md). */
-    FINGERPRINT_AT = 8,
-    SETTINGS_AT = 13,
-    CAMERA_AT = SETTINGS_AT + 9 * 52,
-    COUNT_AT = CAMERA_AT + 17 * REAL,
-    INTERVAL_AT = COUNT_AT + 4 + 16,
-    CLOCK_STARTED_AT = INTERVAL_AT + REAL,
-    FRAMES_AT = COUNT_AT + 4 + 16 + 2 + 24 + 2 + 143 * REAL,
-    HEALTH_AT =
-        FRAMES_AT + 4 + 16 + 10 + 8 + 4 + 8 + 329 * REAL, /* settling_frames stands before it */
-    SLOTS_AT = HEALTH_AT + 5 + 16 + 4 + 8 + 68 + 56,
-    SLOT_SIZE = 8 * REAL + 35,
-    KNOWN_AT = SLOTS_AT + SLOT_SIZE - 7,
-    P_AT = SLOTS_AT + LANDMARKS * SLOT_SIZE
-};
+enum { LANDMARKS = 3, REAL = sizeof(plr_real) };
 
 static plr_filter filter, other, untouched;
 static state_bytes state;
@@ -45,6 +29,11 @@ static void refuses(plr_status expected) {
     TEST_ASSERT_EQUAL_MEMORY(&untouched, &other, sizeof other);
 }
 
+/* Of P, behind the landmarks. */
+static uint32_t place_of_P(void) {
+    return state_place_of_landmark(LANDMARKS, "x");
+}
+
 static void put_real(uint32_t at, double value) {
     const plr_real real = (plr_real)value;
     memcpy(state.bytes + at, &real, sizeof real); /* the tests run on little-endian machines */
@@ -53,7 +42,7 @@ static void put_real(uint32_t at, double value) {
 /* ---------------------------------------------------------------- foreign */
 
 static void test_another_build_or_version_is_foreign(void) {
-    for (unsigned at = 0; at < FINGERPRINT_AT + 4; at++) {
+    for (unsigned at = 0; at < state_place("origin", "settings"); at++) {
         state.bytes[at] ^= 0x40;
         refuses(PLR_E_FOREIGN);
         state.bytes[at] ^= 0x40;
@@ -118,16 +107,22 @@ static void test_more_landmarks_than_slots_are_refused(void) {
     reseal(&filter);
     const uint32_t counts[] = {LANDMARKS - 1, LANDMARKS + 1, LANDMARKS + 2, 0x7FFFFFFF, 0xFFFFFFFF};
     for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++) {
-        memcpy(state.bytes + COUNT_AT, &counts[i], 4);
+        memcpy(state.bytes + state_place("count", "landmarks"), &counts[i], 4);
         refuses(PLR_E_CORRUPT);
     }
 }
 
 static void test_numbers_that_are_not_finite_are_refused(void) {
     const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
-    const uint32_t places[] = {INTERVAL_AT,     FRAMES_AT + 4,       HEALTH_AT - 10 - REAL,
-                               SLOTS_AT,        SLOTS_AT + 3 * REAL, P_AT,
-                               P_AT + 5 * REAL, state.length - REAL};
+    const uint32_t P_at = place_of_P();
+    const uint32_t places[] = {state_place("time", "interval_s"),
+                               state_place("filter", "core_motion.V"),
+                               state_place("filter", "consistency.excess"),
+                               state_place("slot", "x"),
+                               state_place("slot", "beyond"),
+                               P_at,
+                               P_at + 5 * REAL,
+                               state.length - REAL};
     for (unsigned i = 0; i < 3; i++)
         for (unsigned k = 0; k < sizeof places / sizeof *places; k++) {
             state_bytes_save(&state, &filter);
@@ -139,18 +134,22 @@ static void test_numbers_that_are_not_finite_are_refused(void) {
 static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not(void) {
     for (unsigned row = 0, at = 0; row < 12 + 3 * LANDMARKS; row++, at += row + 1) {
         state_bytes_save(&state, &filter);
-        put_real(P_AT + at * REAL, -1e-9);
+        put_real(place_of_P() + at * REAL, -1e-9);
         refuses(PLR_E_CORRUPT);
     }
     state_bytes_save(&state, &filter);
-    put_real(P_AT + REAL, -1e-9);
+    put_real(place_of_P() + REAL, -1e-9);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
 
 static void test_a_flag_is_0_or_1(void) {
-    const uint32_t flags[] = {CLOCK_STARTED_AT,    CLOCK_STARTED_AT + 1, HEALTH_AT - 4,
-                              HEALTH_AT - 3,       HEALTH_AT - 2,        KNOWN_AT,
-                              KNOWN_AT + SLOT_SIZE};
+    const uint32_t flags[] = {state_place("time", "clock_started"),
+                              state_place("time", "reading_valid"),
+                              state_place("filter", "consistency.contradicted"),
+                              state_place("filter", "consistency.drifting"),
+                              state_place("filter", "consistency.frozen"),
+                              state_place("slot", "known"),
+                              state_place_of_landmark(1, "known")};
     for (unsigned i = 0; i < sizeof flags / sizeof *flags; i++) {
         state_bytes_save(&state, &filter);
         TEST_ASSERT_LESS_OR_EQUAL_UINT8(1, state.bytes[flags[i]]);
@@ -160,9 +159,10 @@ static void test_a_flag_is_0_or_1(void) {
 }
 
 static void test_a_doubt_takes_at_most_fifteen_frames_to_settle(void) {
-    state.bytes[HEALTH_AT - 1] = 16;
+    const uint32_t at = state_place("filter", "consistency.settling_frames");
+    state.bytes[at] = 16;
     refuses(PLR_E_CORRUPT);
-    state.bytes[HEALTH_AT - 1] = 15;
+    state.bytes[at] = 15;
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
 
@@ -179,7 +179,7 @@ static void test_whatever_bit_flips_a_refusal_changes_nothing(void) {
         }
         state.bytes[bit / 8] ^= (uint8_t)(1U << bit % 8);
     }
-    TEST_ASSERT_GREATER_THAN_UINT(COUNT_AT * 8 / 13, refused);
+    TEST_ASSERT_GREATER_THAN_UINT(state_place("count", "landmarks") * 8 / 13, refused);
 }
 
 /* ---------------------------------------------------------------- sinks and sources that fail */
