@@ -285,12 +285,16 @@ def header_of_messages(messages: Iterable[Message]) -> Header:
     return next(m for m in messages if isinstance(m, Header))
 
 
-def only(path: Path, kind: Kind, backwards: bool = False) -> Iterator[Message]:
-    """The messages of that kind of a sound file that a program of ours has just written: the others
-    are passed over unread, which takes a tenth of the time.
+def stuffed_of(path: Path) -> list[bytes]:
+    """The frames, still to be read, of a sound file that a program of ours has just written."""
+    return path.read_bytes().split(DELIMITER)
+
+
+def only(frames: Iterable[bytes], kind: Kind) -> Iterator[Message]:
+    """The messages of that kind of what `stuffed_of` gave: the others are passed over unread, which
+    takes a tenth of the time.
     """
-    frames = path.read_bytes().split(DELIMITER)
-    for stuffed in reversed(frames) if backwards else frames:
+    for stuffed in frames:
         if len(stuffed) > 1 and stuffed[1] == kind:  # stuffed[0] is COBS's: no kind is zero
             body = cobs.decode(stuffed)
             if body is not None:

@@ -164,7 +164,7 @@ class Parts:
             run_program(self._program, part.path, ["--quiet", *options, "--out", str(answers)])
         except PelorusError:  # not a frame of so short a part could be used
             return None
-        return estimate_in(list(wire.only(answers, Kind.POSE)))
+        return estimate_in(list(wire.only(wire.stuffed_of(answers), Kind.POSE)))
 
 
 def _typical(values: Sequence[float]) -> float:

@@ -151,9 +151,10 @@ class Bench:
             answers = Path(folder) / "answers.plr"
             options = ["--quiet", *options_of(wanted | {"gate-d2": GATE_D2})]
             run_program(self._program, recording, [*options, "--out", str(answers)])
-            poses = wire.only(answers, Kind.POSE, backwards=True)
+            frames = wire.stuffed_of(answers)
+            poses = wire.only(reversed(frames), Kind.POSE)
             last = (m for m in poses if isinstance(m, Pose) and m.after_stereo)
-            told = chain(wire.only(answers, Kind.REPORT), islice(last, 1))
+            told = chain(wire.only(frames, Kind.REPORT), islice(last, 1))
             return outcome_of(told, self._outlier_cost)
 
 
