@@ -17,7 +17,7 @@ from pelorus.faults.amounts import (
     SCALE_SIGMAS,
     place_covariance,
 )
-from pelorus.faults.geometry import FAR_LAG, PITCH_OFF_DEG, PITCH_SIGMAS, moving_least
+from pelorus.faults.geometry import PITCH_OFF_DEG, PITCH_SIGMAS
 from pelorus.faults.mounting import SURE, Rates
 from pelorus.faults.moving import moving
 from pelorus.faults.seen import Seen
@@ -119,11 +119,10 @@ def _turns(wrong: Recording) -> str:
 
 def _moves(wrong: Recording) -> str:
     camera = wrong.header.camera
-    near, far = (two_views(wrong.tracks, camera, lag) for lag in (1, FAR_LAG))
-    found = moving(wrong.tracks, near, far)
-    if found.share > moving_least(found):
+    found = moving(wrong.tracks, camera, two_views(wrong.tracks, camera, 1))
+    if found.more_than_usual:
         return ""
     return (
         f"{found.share:.0%} of {found.tracks} tracks are seen to move; as much as "
-        f"{moving_least(found):.0%} is usual"
+        f"{found.least:.0%} is usual"
     )

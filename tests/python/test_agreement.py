@@ -17,7 +17,6 @@ from pelorus.faults.agreement import Agreement, agreement
 from pelorus.faults.amounts import of_clock, of_lever, of_scale
 from pelorus.faults.clocks import TwoClocks
 from pelorus.faults.fault import Fault
-from pelorus.faults.geometry import moving_least
 from pelorus.faults.mounting import Rates
 from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
@@ -336,8 +335,8 @@ def test_axes_that_hardly_turn_are_told_from_mirrored_ones(seed: int) -> None:
 
 
 def test_a_moving_scene_of_few_tracks_must_move_more_than_chance_has_it() -> None:
-    assert moving_least(Moving(1000, 0.0)) == pytest.approx(0.145, abs=0.005)
-    assert moving_least(Moving(19, 0.0)) == pytest.approx(0.30, abs=0.01)
+    assert Moving(1000, 0.0).least == pytest.approx(0.145, abs=0.005)
+    assert Moving(19, 0.0).least == pytest.approx(0.30, abs=0.01)
 
 
 def test_the_cameras_place_is_found_from_turns() -> None:

@@ -34,10 +34,10 @@ from pelorus.faults.handeye import (
     share_of_fit,
 )
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.moving import Moving, moving
+from pelorus.faults.moving import Moving
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
-from pelorus.faults.two_views import TwoViews, two_views
+from pelorus.faults.two_views import TwoViews
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
@@ -50,10 +50,7 @@ MOSTLY, HEADED_SHARE = 0.85, 0.7  # of a turn, what is about one axis, and what 
 PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 4.0  # where velocities and turns tell it together
 SURE_SIGMAS = 4.0
 UNIT_NEAR = 0.15
-FAR_LAG = 3
 UNEXPLAINED = ("no-fit", "scene")
-MOVING_SHARE = 0.14
-MOVING_USUAL, MOVING_SIGMAS = 0.12, 2.3  # on roads 5 to 12 % drives, or is tracked so badly
 
 
 Ask = Callable[[], Agreement]
@@ -67,7 +64,7 @@ class Judged:
     agreed: Agreement | None = None
 
 
-def geometry(recording: Recording, views: TwoViews) -> Judged:
+def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Judged:
     """`views` of neighbouring frames. Nothing where all is well."""
     by_imu = len(recording.inertial.t_ns) > 0
     ask = cache(lambda: agreement(recording, views))  # it takes longer than all the rest
@@ -75,7 +72,7 @@ def geometry(recording: Recording, views: TwoViews) -> Judged:
     unexplained = [fault for fault in wrong if fault.name in UNEXPLAINED]
     if wrong and not unexplained:
         return Judged(wrong)
-    moves = list(_moving(recording, views, bool(unexplained)))
+    moves = list(_moving(moved(), bool(unexplained)))
     if wrong:  # what moves explains it
         return Judged(moves or wrong)
     agreed = ask()
@@ -311,22 +308,9 @@ def _axis_of(R: Floats) -> Floats:
 # --- the scene ------------------------------------------------------------------------------------
 
 
-def moving_least(found: Moving) -> float:
-    """The share above which it is more than usual; of few tracks chance makes up some."""
-    by_chance = MOVING_SIGMAS * float(np.sqrt(MOVING_USUAL / max(found.tracks, 1)))
-    return max(MOVING_SHARE, MOVING_USUAL + by_chance)
-
-
-def scene_moves(recording: Recording, views: TwoViews) -> bool:
-    """Whether more of it moves by itself than is usual."""
-    return any(_moving(recording, views))
-
-
-def _moving(recording: Recording, views: TwoViews, misleads: bool = False) -> Iterator[Fault]:
+def _moving(found: Moving, misleads: bool) -> Iterator[Fault]:
     """`misleads`: nothing else explains why camera and body do not tell one motion."""
-    far = two_views(recording.tracks, recording.header.camera, FAR_LAG)
-    found = moving(recording.tracks, views, far)
-    if found.share > moving_least(found):
+    if found.more_than_usual:
         so = ": camera and body do not tell the same motion" if misleads else ""
         yield Fault(
             "moving",

@@ -12,15 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pelorus.faults.two_views import TwoViews
+from pelorus.faults.two_views import TwoViews, two_views
+from pelorus.frames import Camera
 from pelorus.tracks import Tracks
 
+FAR_LAG = 3  # frames
 OFF_D2 = 25.0  # of three degrees of freedom: one in 70,000 sound pairs
 DRIFT_PX = 1.5  # a tracker may lose its point by so much between the views
 VIEWS_LEAST = 4  # pairs of a track that tell
 MOST_OF_THEM = 0.5
 TRACKS_LEAST = 10
 MAD_TO_SIGMA, NOISE_LEAST, DRIFTS_ABOVE = 1.4826, 0.5, 1.5
+SHARE_LEAST = 0.14
+USUAL, USUAL_SIGMAS = 0.12, 2.3  # on roads 5 to 12 % drives, or is tracked so badly
 
 
 @dataclass(frozen=True)
@@ -30,9 +34,20 @@ class Moving:
     tracks: int
     share: float
 
+    @property
+    def least(self) -> float:
+        """The share above which it is more than usual; of few tracks chance makes up some."""
+        by_chance = USUAL_SIGMAS * float(np.sqrt(USUAL / max(self.tracks, 1)))
+        return max(SHARE_LEAST, USUAL + by_chance)
 
-def moving(tracks: Tracks, near: TwoViews, far: TwoViews) -> Moving:
-    """`near` of neighbouring frames, `far` of some frames apart."""
+    @property
+    def more_than_usual(self) -> bool:
+        return self.share > self.least
+
+
+def moving(tracks: Tracks, camera: Camera, near: TwoViews) -> Moving:
+    """`near` of neighbouring frames."""
+    far = two_views(tracks, camera, FAR_LAG)
     _, number = np.unique(tracks.id, return_inverse=True)
     count = int(number.max()) + 1 if len(number) else 0
     whose = number[far.first]

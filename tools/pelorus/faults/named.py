@@ -8,15 +8,17 @@ where no known fault explains it, that is said instead of a guess. Nothing is ch
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.faults import identity
 from pelorus.faults.fault import Fault
-from pelorus.faults.geometry import Judged, geometry, scene_moves
+from pelorus.faults.geometry import Judged, geometry
 from pelorus.faults.handeye import first_part
+from pelorus.faults.moving import Moving, moving
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
 from pelorus.inertial_survey import longest_run, readings_of
@@ -69,10 +71,11 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     if pixels or any(fault.name in ("time-unit", "time-apart") for fault in times):
         return Judged([*pixels, *times])  # what follows would be built on sand
     views = two_views(short.tracks, short.header.camera, 1)
-    ids = list(_ids(short, views))
+    moved = cache(lambda: moving(short.tracks, short.header.camera, views))
+    ids = list(_ids(short, views, moved))
     if ids:
         return Judged([*ids, *times])
-    found = geometry(short, views)
+    found = geometry(short, views, moved)
     faults = [*found.faults, *_frozen(recording), *times]
     return Judged(sorted(faults, key=lambda fault: not fault.grave), found.agreed)
 
@@ -153,7 +156,7 @@ def _row_offset(recording: Recording) -> float:
     return float(np.sqrt(np.mean(np.square(medians)))) if medians else 0.0
 
 
-def _ids(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+def _ids(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Iterator[Fault]:
     """Ids that are a frame's row numbers, or slots, or never seen again."""
     tracks = recording.tracks
     if not len(tracks.pairs(1).first):
@@ -163,7 +166,7 @@ def _ids(recording: Recording, views: TwoViews) -> Iterator[Fault]:
         yield Fault("ids-rows", "the ids are 0, 1, 2, ... in every frame: they are row numbers")
         return
     found = identity.jumps(recording, views)
-    if found.are_slots and not scene_moves(recording, views):  # fast ones seem to jump
+    if found.are_slots and not moved().more_than_usual:  # fast ones seem to jump
         yield Fault(
             "ids-slots",
             f"{found.jumps} tracks go on with another point from one frame to the next, "
