@@ -21,7 +21,7 @@ from pelorus import se3, wire
 from pelorus.check.contents import recording_of
 from pelorus.faults.fault import Fault
 from pelorus.faults.handeye import first_part
-from pelorus.faults.named import faults_in, faults_of
+from pelorus.faults.named import faults_in, judged_of
 from pelorus.frames import Message, Stereo, Twist
 from pelorus.recording import Recording
 from pelorus.tracks import project, triangulate
@@ -283,7 +283,7 @@ def of_times(messages: list[Message], k: int, name: str) -> list[Message]:
 
 def found_in(recording: Recording) -> list[Fault]:
     """What is named, of tracks and twists alone."""
-    return faults_of([recording.header], recording)
+    return judged_of([recording.header], recording).faults
 
 
 def injections(recording: Recording) -> Iterator[tuple[str, int, Recording, tuple[str, ...]]]:

@@ -19,7 +19,7 @@ from pelorus.converters import matlab
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.handeye import SEEN_MOST, first_part
 from pelorus.faults.identity import Jumps
-from pelorus.faults.named import faults_of
+from pelorus.faults.named import judged_of
 from pelorus.frames import Header, Kind, Stereo, Twist
 from pelorus.recording import Recording
 from replay_drive import BIN, drive
@@ -162,9 +162,9 @@ def test_points_that_come_back_elsewhere_are_slots_beyond_chance(
 @pytest.mark.parametrize("name", ["time-unit", "time-order", "time-gap"])
 def test_a_fault_of_the_clock_is_named(name: str, strength: int) -> None:
     messages = of_times(drive(60), strength, name)
-    found = faults_of(messages, recording_of(messages))
+    found = judged_of(messages, recording_of(messages)).faults
     assert name in [fault.name for fault in found], found
-    assert faults_of(drive(60), recording_of(drive(60))) == []
+    assert judged_of(drive(60), recording_of(drive(60))).faults == []
 
 
 def test_what_no_known_fault_explains_is_not_guessed_at(simulated: Recording) -> None:
@@ -195,7 +195,7 @@ def test_messages_without_ids_in_common_say_so() -> None:
         replace(m, ids=(m.ids + 1000 * k).astype(np.uint32)) if isinstance(m, Stereo) else m
         for k, m in enumerate(messages)
     ]
-    found = faults_of(anew, recording_of(anew))
+    found = judged_of(anew, recording_of(anew)).faults
     assert [fault.name for fault in found] == ["ids-new"]
     assert Kind.STEREO in {m.kind for m in anew}
 

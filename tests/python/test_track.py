@@ -20,7 +20,7 @@ from pelorus.check.contents import recording_of
 from pelorus.converters import matlab
 from pelorus.evaluation import assess
 from pelorus.faults.fault import UNTOLD
-from pelorus.faults.named import faults_of
+from pelorus.faults.named import judged_of
 from pelorus.faults.two_views import two_views
 from pelorus.frames import Camera, TwistTiming
 from pelorus.recording import Recording
@@ -346,7 +346,7 @@ def test_on_kitti_06_the_tracks_hold_noisy_twists_to_the_road(
     for drive, alone_m in draws(poses, klt, first):
         drive.write(tmp_path / "drive.plr")
         messages = wire.messages_of(tmp_path / "drive.plr")
-        named = faults_of(messages, recording_of(messages))
+        named = judged_of(messages, recording_of(messages)).faults
         assert not [fault for fault in named if fault.name != UNTOLD]  # its turns are noise
         mine = judged(
             tmp_path / "drive.plr", "--config", BIN.parents[1] / "tools" / "config" / "track.conf"

@@ -19,7 +19,7 @@ from pelorus.check.verdict import Grade, Remark, Run
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
-from pelorus.faults.named import faults_of
+from pelorus.faults.named import judged_of
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
@@ -52,7 +52,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     """Tune in the folder, then replay the whole recording with both settings."""
     bench = Bench(program, recording, folder, given.get("process", ""))
     messages = wire.messages_of(recording)
-    named = faults_of(messages, bench.examined)
+    judged = judged_of(messages, bench.examined)
+    named = judged.faults
     faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.words) for f in named]
     if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
@@ -67,7 +68,9 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    doubt = None if bench.by_imu else scale.doubted(bench.examined, run.messages)
+    doubt = None
+    if judged.views is not None and not bench.by_imu:  # where there are none, a fault stops
+        doubt = scale.doubted(bench.examined, judged.views, run.messages)
     if doubt is not None and doubt.setting:  # no estimate changes by it, and each covariance
         tuned = replace(tuned, settings=tuned.settings | doubt.setting)
         run = _whole(program, recording, tuned.settings, folder, "after") or run

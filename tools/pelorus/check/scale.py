@@ -22,7 +22,7 @@ from pelorus.check.parameters import PAYS
 from pelorus.consistency import mean, nees_per_dof
 from pelorus.faults.agreement import NO_BIAS_MPS, agreement
 from pelorus.faults.handeye import first_part
-from pelorus.faults.two_views import two_views
+from pelorus.faults.two_views import TwoViews
 from pelorus.frames import Message
 from pelorus.recording import Recording
 from pelorus.settings import in_force
@@ -104,13 +104,15 @@ class Doubt:
         return self.sigma > BY_BIAS * self.unbiased
 
 
-def doubted(recording: Recording, messages: Sequence[Message]) -> Doubt | None:
-    """Of a run with its settings' biases; None where too few frames tell."""
+def doubted(recording: Recording, views: TwoViews, messages: Sequence[Message]) -> Doubt | None:
+    """Of a run with its settings' biases; None where too few frames tell. `views` of
+    neighbouring frames of the first part.
+    """
     bias = in_force(messages, "bias-velocity-sigma") if in_force(messages, "bias") else None
     short = first_part(recording)
     noise = replace(short.header.noise, bias_velocity_sigma_mps=max(bias or 0.0, NO_BIAS_MPS))
     short = short.with_header(noise=noise)
-    found = agreement(short, two_views(short.tracks, short.header.camera, 1))
+    found = agreement(short, views)
     if not found.told:
         return None
     doubt = Doubt(found.scale, found.scale_sigma, bias or 0.0, found.through_zero_sigma, 0.0)

@@ -58,10 +58,13 @@ Ask = Callable[[], Agreement]
 
 @dataclass(frozen=True)
 class Judged:
-    """What is wrong, and where it came to that, how far camera and body agree."""
+    """What is wrong, and where it came to that, how far camera and body agree and the views that
+    told it, of neighbouring frames of the first part.
+    """
 
     faults: list[Fault]
     agreed: Agreement | None = None
+    views: TwoViews | None = None
 
 
 def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Judged:

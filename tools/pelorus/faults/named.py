@@ -38,15 +38,15 @@ TWISTS, READINGS, FRAMES = "twists", "readings", "frames"
 USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, READINGS: 2e4, FRAMES: 5e5}
 
 
-def faults_of(messages: Sequence[Message], recording: Recording) -> list[Fault]:
+def judged_of(messages: Sequence[Message], recording: Recording) -> Judged:
     """Of a file's messages, times as they stand, and of what a filter would take of them."""
     frames = np.array([m.t_ns for m in messages if isinstance(m, Stereo)], np.int64)
     if len(recording.inertial.t_ns):
         imu = [m for m in messages if isinstance(m, Imu)]
         readings = readings_of(imu).t_ns if imu else frames[:0]
-        return _judged({READINGS: readings, FRAMES: frames}, recording).faults
+        return _judged({READINGS: readings, FRAMES: frames}, recording)
     twists = np.array([m.t_ns for m in messages if isinstance(m, Twist)], np.int64)
-    return _judged({TWISTS: twists, FRAMES: frames}, recording).faults
+    return _judged({TWISTS: twists, FRAMES: frames}, recording)
 
 
 def faults_in(recording: Recording) -> list[Fault]:
@@ -77,7 +77,8 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
         return Judged([*ids, *times])
     found = geometry(short, views, moved)
     faults = [*found.faults, *_frozen(recording), *times]
-    return Judged(sorted(faults, key=lambda fault: not fault.grave), found.agreed)
+    faults = sorted(faults, key=lambda fault: not fault.grave)
+    return Judged(faults, found.agreed, views)
 
 
 # --- time -----------------------------------------------------------------------------------------
