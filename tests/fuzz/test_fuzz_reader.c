@@ -2,36 +2,16 @@
 /* The fuzz harness without libFuzzer: over what libFuzzer found before (tests/fuzz/corpus), over a
  * stream and payloads of every kind, and over seeded changes to all of them. The harness aborts
  * where something does not hold. */
-#include <dirent.h>
-#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
 #include "fuzz/fuzz_reader.c"
-#include "support/random.h"
+#include "fuzz/inputs.h"
 #include "support/wire_frames.h"
 #include "support/wire_samples.h"
 
-enum { INPUT_SIZE = 8192, CHANGES = 400 };
-
-typedef struct input {
-    uint8_t bytes[INPUT_SIZE];
-    size_t size;
-} input;
-
-static rng dice;
-
 void setUp(void) {
     dice = rng_seeded(2024);
-}
-
-/* From exactly as much memory as there are bytes. */
-static void run(const input *in) {
-    uint8_t *bytes = malloc(in->size ? in->size : 1);
-    TEST_ASSERT_NOT_NULL(bytes);
-    memcpy(bytes, in->bytes, in->size);
-    TEST_ASSERT_EQUAL_INT(0, LLVMFuzzerTestOneInput(bytes, in->size));
-    free(bytes);
 }
 
 /* One of: a bit flipped, a byte replaced, a byte put in, a byte taken out, the end cut off. */
@@ -62,15 +42,8 @@ static void change(input *in) {
     }
 }
 
-static void run_with_changes(const input *seed) {
-    static input changed;
-    run(seed);
-    for (unsigned i = 0; i < CHANGES; i++) {
-        changed = *seed;
-        for (unsigned k = 1 + rng_below(&dice, 3); k > 0; k--)
-            change(&changed);
-        run(&changed);
-    }
+static void hold(const input *seed) {
+    run_with_changes(seed, 400, 3, change);
 }
 
 /* A sample small enough for an input. */
@@ -89,7 +62,7 @@ static void test_payloads_of_every_kind_hold_under_any_change(void) {
             seed.bytes[0] = AS_PAYLOAD | ROOM_BITS;
             seed.bytes[1] = (uint8_t)kind;
             seed.size = 2 + wire_payload(&m, seed.bytes + 2, INPUT_SIZE - 2);
-            run_with_changes(&seed);
+            hold(&seed);
         }
     }
 }
@@ -107,33 +80,10 @@ static void test_streams_of_every_kind_hold_under_any_change(void) {
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_put(&w, &m));
         }
         seed.size = 2 + sink.length;
-        run_with_changes(&seed);
+        hold(&seed);
     }
-}
-
-static void read_input(const char *name, input *in) {
-    char path[1024];
-    int n = snprintf(path, sizeof path, "%s/tests/fuzz/corpus/%s", PELORUS_SOURCE_DIR, name);
-    TEST_ASSERT_TRUE(n > 0 && (size_t)n < sizeof path);
-    FILE *file = fopen(path, "rb");
-    TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
-    in->size = fread(in->bytes, 1, INPUT_SIZE, file);
-    fclose(file);
 }
 
 static void test_what_libfuzzer_found_holds_under_any_change(void) {
-    static input seed;
-    unsigned files = 0;
-    DIR *folder = opendir(PELORUS_SOURCE_DIR "/tests/fuzz/corpus");
-    TEST_ASSERT_NOT_NULL(folder);
-    for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
-        if (entry->d_name[0] == '.')
-            continue;
-        read_input(entry->d_name, &seed);
-        dice = rng_seeded(seed.size); /* whatever the order of the folder */
-        run_with_changes(&seed);
-        files++;
-    }
-    closedir(folder);
-    TEST_ASSERT_GREATER_THAN_UINT(10, files);
+    TEST_ASSERT_GREATER_THAN_UINT(10, run_corpus(PELORUS_SOURCE_DIR "/tests/fuzz/corpus", hold));
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Does the filter know how wrong it is? Normalised squared errors of the pose over simulated drives,
  * against chi-square: `body` within the bounds, `world` (which believes more than it knows) not. */
-#include <math.h>
-#include <stdio.h>
 #include <unity.h>
 
 #include "support/axes.h"
@@ -39,21 +37,12 @@ static double mean_squared_error(plr_model_kind model, bool bias) {
     return sum / (DOF * RUNS);
 }
 
-static void demand_consistent(double mean) {
-    char message[80];
-    double low, high;
-    chi_square_bounds(RUNS * DOF, &low, &high);
-    snprintf(message, sizeof message, "NEES %.3f per degree of freedom, %.3f to %.3f is due", mean,
-             low, high);
-    TEST_ASSERT_TRUE_MESSAGE(mean > low && mean < high, message);
-}
-
 static void test_body_knows_how_wrong_it_is(void) {
-    demand_consistent(mean_squared_error(PLR_MODEL_BODY, false));
+    chi_square_demand("body", mean_squared_error(PLR_MODEL_BODY, false), RUNS * DOF);
 }
 
 static void test_body_with_biases_knows_how_wrong_it_is(void) {
-    demand_consistent(mean_squared_error(PLR_MODEL_BODY, true));
+    chi_square_demand("body", mean_squared_error(PLR_MODEL_BODY, true), RUNS * DOF);
 }
 
 static void test_world_believes_more_than_it_knows(void) {

@@ -137,8 +137,7 @@ static plr_status call_set_bias(void) {
 
 static plr_status call_insert(void) {
     const uint32_t id = 100 + rng_below(&chance, world.is.landmarks);
-    plr_landmark known = {.id = id, .P_W_m2 = {0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01}};
-    memcpy(known.p_W_m, scene_landmark(&world, id), sizeof known.p_W_m);
+    plr_landmark known = scene_known(&world, id, 0.1);
     if (attacks())
         spoil_all(known.p_W_m, 3);
     if (attacks())
@@ -149,10 +148,7 @@ static plr_status call_insert(void) {
 /* A map that holds every landmark, some of them spoilt; and a sink that fails at times. */
 static bool source(void *context, uint32_t id, plr_landmark *landmark) {
     (void)context;
-    memset(landmark, 0, sizeof *landmark);
-    landmark->id = id;
-    memcpy(landmark->p_W_m, scene_landmark(&world, id), sizeof landmark->p_W_m);
-    landmark->P_W_m2[0] = landmark->P_W_m2[4] = landmark->P_W_m2[8] = 0.01;
+    *landmark = scene_known(&world, id, 0.1);
     if (attacks()) {
         spoil_all(landmark->p_W_m, 3);
         spoil_all(landmark->P_W_m2, 9);

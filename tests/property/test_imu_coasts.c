@@ -3,11 +3,9 @@
  * measures velocity: errors stay within the covariance. Simulated flights, normalised squared errors
  * against chi-square. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
-#include "support/chi_square.h"
 #include "support/imu_rig.h"
 #include "support/rigid.h"
 
@@ -23,26 +21,6 @@ void setUp(void) {
 static void note(imu_rig_errors *sum) {
     const imu_rig_errors e = imu_rig_errors_now();
     imu_rig_add(sum, &e, 1.0 / RUNS);
-}
-
-static void tell(const char *what, const imu_rig_errors *sum) {
-    printf("%s: NEES orientation %.3f, position %.3f, velocity %.3f, b_a %.3f, b_g %.3f; "
-           "%.4f m, %.4f rad, %.4f m/s\n",
-           what, sum->orientation / 3, sum->position / 3, sum->velocity / 3, sum->accel_bias / 3,
-           sum->gyro_bias / 3, sqrt(sum->metres), sqrt(sum->rad), sqrt(sum->mps));
-}
-
-/* All within the bounds of chi-square; where the filter may be too careful, below the upper one. */
-static void demand_consistency(const char *what, const imu_rig_errors *sum, bool may_be_careful) {
-    double low, high;
-    const double all[5] = {sum->orientation, sum->position, sum->velocity, sum->accel_bias,
-                           sum->gyro_bias};
-    chi_square_bounds(3 * RUNS, &low, &high);
-    tell(what, sum);
-    for (unsigned i = 0; i < 5; i++) {
-        TEST_ASSERT_TRUE_MESSAGE(all[i] / 3 < high, what);
-        TEST_ASSERT_TRUE_MESSAGE(may_be_careful || all[i] / 3 > low, what);
-    }
 }
 
 /* ---------------------------------------------------------------- darkness */
@@ -77,8 +55,8 @@ static void test_ten_seconds_of_darkness_are_within_the_covariance_and_so_is_wha
         imu_rig_fly(5 * SECOND);
         note(&after);
     }
-    demand_consistency("in the dark", &dark, false);
-    demand_consistency("after it", &after, false);
+    imu_rig_demand_consistent("in the dark", &dark, RUNS, false);
+    imu_rig_demand_consistent("after it", &after, RUNS, false);
     TEST_ASSERT_TRUE(sigmas > 0.3 && sigmas < 6); /* it says that it does not know better */
 }
 
@@ -107,7 +85,7 @@ static void test_readings_that_get_lost_are_made_up_for_in_the_covariance(void) 
         note(&sum);
         TEST_ASSERT_EQUAL_UINT32(0, f->totals.recoveries);
     }
-    demand_consistency("with gaps", &sum, true);
+    imu_rig_demand_consistent("with gaps", &sum, RUNS, true);
     TEST_ASSERT_TRUE(sqrt(sum.metres) < 0.1);
 }
 
@@ -160,8 +138,8 @@ static imu_rig_errors fly_with_wheels(bool wheels) {
 
 static void test_a_wheel_makes_velocity_and_place_better_and_is_believed_as_it_should(void) {
     const imu_rig_errors without = fly_with_wheels(false), with = fly_with_wheels(true);
-    demand_consistency("without wheels", &without, false);
-    demand_consistency("with wheels", &with, false);
+    imu_rig_demand_consistent("without wheels", &without, RUNS, false);
+    imu_rig_demand_consistent("with wheels", &with, RUNS, false);
     TEST_ASSERT_TRUE(with.mps < 0.7 * without.mps);
     TEST_ASSERT_TRUE(with.metres < without.metres);
 }
@@ -178,7 +156,7 @@ static void test_wheels_hold_the_velocity_in_the_dark(void) {
         }
         note(&sum);
     }
-    demand_consistency("wheels in the dark", &sum, false);
+    imu_rig_demand_consistent("wheels in the dark", &sum, RUNS, false);
     TEST_ASSERT_TRUE(sqrt(sum.mps) < 0.03);
     TEST_ASSERT_TRUE(sqrt(sum.metres) < 0.3);
 }
@@ -211,9 +189,9 @@ static void test_a_standstill_holds_velocity_and_measures_the_gyros_bias(void) {
             stand(8 * SECOND, measured);
             note(&sums[measured]);
         }
-    demand_consistency("standing", &sums[0], false);
-    demand_consistency("standstill measured", &sums[1],
-                       true); /* it stands better than it is told */
+    imu_rig_demand_consistent("standing", &sums[0], RUNS, false);
+    imu_rig_demand_consistent("standstill measured", &sums[1], RUNS,
+                              true); /* it stands better than it is told */
     TEST_ASSERT_TRUE(sums[1].mps < 0.01 * sums[0].mps);
     TEST_ASSERT_TRUE(sums[1].metres < 0.01 * sums[0].metres);
     TEST_ASSERT_TRUE(sums[1].rad < 0.1 * sums[0].rad);

@@ -2,7 +2,6 @@
 /* Wheel, standstill and position: with noise as it is told, errors stay within the covariance, and
  * each makes the estimate better. Simulated drives, normalised squared errors against chi-square. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
@@ -81,20 +80,11 @@ static outcome drive(const helpers *with, unsigned steps) {
     return sum;
 }
 
-static void demand_consistent(double mean, const char *what) {
-    char message[96];
-    double low, high;
-    chi_square_bounds(RUNS * DOF, &low, &high);
-    snprintf(message, sizeof message, "%s: NEES %.3f per degree of freedom, %.3f to %.3f is due",
-             what, mean, low, high);
-    TEST_ASSERT_TRUE_MESSAGE(mean > low && mean < high, message);
-}
-
 static void check(const helpers *with, unsigned steps, double better_by) {
     const helpers without = {.camera = with->camera};
     const outcome got = drive(with, steps), before = drive(&without, steps);
-    demand_consistent(got.nees_pose, "pose");
-    demand_consistent(got.nees_bias, "biases");
+    chi_square_demand("pose", got.nees_pose, RUNS * DOF);
+    chi_square_demand("biases", got.nees_bias, RUNS * DOF);
     TEST_ASSERT_LESS_THAN_DOUBLE(before.metres / better_by, got.metres);
 }
 
@@ -153,7 +143,7 @@ static void test_positions_without_biases_too(void) {
             step(&with, k);
         nees += rig_squared_error(e) / (DOF * RUNS);
     }
-    demand_consistent(nees, "pose");
+    chi_square_demand("pose", nees, RUNS * DOF);
 }
 
 /* ---------------------------------------------------------------- standing is detected */

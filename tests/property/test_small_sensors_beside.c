@@ -96,8 +96,7 @@ static void test_positions_in_the_dark_are_degraded_and_not_lost(void) {
     rig_drive(10);
     rig.options.most_seen = rig.world.is.most_seen = 0; /* the lamp goes out */
     for (int k = 0; k < 40; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         if (k % 10 == 0 && k < 20)
             measure(position(7, 0.05));
         rig_frame();
@@ -252,8 +251,7 @@ static void test_a_frozen_picture_is_seen_between_positions_too(void) {
     plr_frame frozen = scene_look(&rig.world);
     unsigned told = 0;
     for (int k = 0; k < 20; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         measure(position(7, 0.5));
         frozen.t_ns = rig.world.t_ns;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frozen, &rig.report));
@@ -266,8 +264,7 @@ static void test_heights_alone_do_not_keep_a_dark_drive_from_being_lost(void) {
     rig_drive(10);
     rig.options.most_seen = rig.world.is.most_seen = 0;
     for (int k = 0; k < 30; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         measure(position(4, 0.05));
         rig_frame();
     }

@@ -10,16 +10,12 @@
 
 #include "pelorus/pelorus.h"
 #include "support/reseal.h"
+#include "support/scene.h"
 
 static plr_filter filter;
 
 void setUp(void) {
-    const plr_calibration camera = {.fx_px = 707,
-                                    .fy_px = 707,
-                                    .cx_px = 602,
-                                    .cy_px = 183,
-                                    .baseline_m = 0.54,
-                                    .T_CB.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const plr_calibration camera = scene_bare_camera(707, 602, 183, 0.54);
     plr_config config;
     plr_config_default(&config);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));

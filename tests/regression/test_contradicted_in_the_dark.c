@@ -15,30 +15,15 @@ void setUp(void) {
     rig_set_up();
 }
 
-/* Wheels that slip: the twists tell half of the way. */
-static void slip(unsigned frames) {
-    for (unsigned k = 0; k < frames; k++) {
-        for (unsigned i = 0; i < RIG_TWISTS; i++) {
-            plr_twist twist = scene_read(&rig.world);
-            for (int axis = 0; axis < 3; axis++)
-                twist.v_B_mps[axis] *= 0.5;
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
-            scene_move(&rig.world, RIG_STEP_NS);
-        }
-        rig_frame();
-    }
-}
-
 static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone(void) {
     rig.config.bias = 0;
     rig_begin();
     rig_drive(20);
-    slip(10);
+    rig_drive_told(10, 0.5); /* the wheels slip */
     TEST_ASSERT_EQUAL_UINT8(1, rig.filter.consistency.contradicted);
     const double before = rig_sigma_m();
     for (unsigned k = 0; k < DARK_FRAMES; k++) {
-        for (unsigned i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         const plr_frame dark = {.t_ns = rig.world.t_ns, .budget = 1};
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &dark, &rig.report));
         TEST_ASSERT_EQUAL_UINT32(0, rig.filter.totals.recoveries);

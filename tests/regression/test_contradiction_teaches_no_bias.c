@@ -20,11 +20,7 @@ void setUp(void) {
 
 /* A frame of a body that stands, while its wheels turn at `speed`. */
 static void frame_in_place(double speed) {
-    const plr_twist twist = {{speed, 0, 0}, {0}};
-    for (int k = 0; k < RIG_TWISTS; k++) {
-        rig.world.t_ns += RIG_STEP_NS;
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
-    }
+    rig_twists_in_place(speed);
     rig_frame();
 }
 

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/matrices.h"
 #include "support/rig.h"
 #include "support/specimens.h"
 #include "support/state_bytes.h"
@@ -29,13 +30,6 @@ void setUp(void) {
     state_bytes_save(&state, &rig.filter);
 }
 
-static bool is_finite(const double *x, unsigned n) {
-    for (unsigned i = 0; i < n; i++)
-        if (!isfinite(x[i]))
-            return false;
-    return true;
-}
-
 /* Every question is refused or answered with finite numbers. */
 static void ask_everything(const char *at) {
     plr_pose pose;
@@ -43,20 +37,21 @@ static void ask_everything(const char *at) {
     plr_landmark landmark;
     double x[6], P[36];
     if (plr_filter_pose(&other, &pose) == PLR_OK)
-        TEST_ASSERT_TRUE_MESSAGE(is_finite(pose.R, 9) && is_finite(pose.p, 3), at);
+        TEST_ASSERT_TRUE_MESSAGE(all_finite(pose.R, 9) && all_finite(pose.p, 3), at);
     if (plr_filter_velocity(&other, &twist) == PLR_OK)
-        TEST_ASSERT_TRUE_MESSAGE(is_finite(twist.v_B_mps, 3) && is_finite(twist.w_B_radps, 3), at);
+        TEST_ASSERT_TRUE_MESSAGE(all_finite(twist.v_B_mps, 3) && all_finite(twist.w_B_radps, 3),
+                                 at);
     if (plr_filter_pose_covariance(&other, P) == PLR_OK)
-        TEST_ASSERT_TRUE_MESSAGE(is_finite(P, 36), at);
+        TEST_ASSERT_TRUE_MESSAGE(all_finite(P, 36), at);
     if (plr_filter_velocity_covariance(&other, P) == PLR_OK)
-        TEST_ASSERT_TRUE_MESSAGE(is_finite(P, 36), at);
+        TEST_ASSERT_TRUE_MESSAGE(all_finite(P, 36), at);
     if (plr_filter_bias(&other, x, P) == PLR_OK)
-        TEST_ASSERT_TRUE_MESSAGE(is_finite(x, 6) && is_finite(P, 36), at);
+        TEST_ASSERT_TRUE_MESSAGE(all_finite(x, 6) && all_finite(P, 36), at);
     TEST_ASSERT_TRUE_MESSAGE(isfinite(plr_filter_trace(&other)), at);
     for (unsigned slot = 0; slot < plr_filter_landmark_count(&other); slot++)
         if (plr_filter_landmark(&other, slot, &landmark) == PLR_OK)
-            TEST_ASSERT_TRUE_MESSAGE(is_finite(landmark.p_W_m, 3) && is_finite(landmark.P_W_m2, 9),
-                                     at);
+            TEST_ASSERT_TRUE_MESSAGE(
+                all_finite(landmark.p_W_m, 3) && all_finite(landmark.P_W_m2, 9), at);
 }
 
 /* Restores with one bit flipped. */

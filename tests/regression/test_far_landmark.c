@@ -11,16 +11,12 @@
 #include "pelorus/pelorus.h"
 #include "state/covariance.h"
 #include "state/motion.h"
+#include "support/scene.h"
 
 static plr_filter filter;
 
 void setUp(void) {
-    const plr_calibration camera = {.fx_px = 552,
-                                    .fy_px = 552,
-                                    .cx_px = 682,
-                                    .cy_px = 239,
-                                    .baseline_m = 0.6,
-                                    .T_CB.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const plr_calibration camera = scene_bare_camera(552, 682, 239, 0.6);
     plr_config config;
     plr_config_default(&config);
     config.bias = 1;

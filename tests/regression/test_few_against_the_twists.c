@@ -8,6 +8,7 @@
 #include <unity.h>
 
 #include "pelorus/pelorus.h"
+#include "support/scene.h"
 
 enum { NEAR = 4, FAR = 24, COUNT = NEAR + FAR };
 
@@ -15,12 +16,7 @@ static plr_filter filter;
 static plr_observation seen[COUNT];
 
 void setUp(void) {
-    const plr_calibration camera = {.fx_px = 500,
-                                    .fy_px = 500,
-                                    .cx_px = 320,
-                                    .cy_px = 240,
-                                    .baseline_m = 0.2,
-                                    .T_CB.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const plr_calibration camera = scene_bare_camera(500, 320, 240, 0.2);
     plr_config config;
     plr_config_default(&config);
     config.bias = 0;

@@ -5,7 +5,6 @@
  * the growing covariance. On Starry Night the filter was blind from 8.7 s on, to the end.
  */
 #include <math.h>
-#include <string.h>
 #include <unity.h>
 
 #include "support/rig.h"
@@ -14,11 +13,7 @@ enum { LOCK_FRAMES = 10 };
 
 static bool scene_as_map(void *context, uint32_t id, plr_landmark *landmark) {
     (void)context;
-    memset(landmark, 0, sizeof *landmark);
-    landmark->id = id;
-    memcpy(landmark->p_W_m, scene_landmark(&rig.world, id), sizeof landmark->p_W_m);
-    for (int i = 0; i < 9; i += 4)
-        landmark->P_W_m2[i] = 0.1 * 0.1;
+    *landmark = scene_known(&rig.world, id, 0.1);
     return true;
 }
 

@@ -7,17 +7,13 @@
 
 #include "pelorus/pelorus.h"
 #include "support/axes.h"
+#include "support/scene.h"
 
 static plr_filter filter;
 static const double sigma_mps = 0.5;
 
 static void start(plr_mode mode) {
-    const plr_calibration camera = {.fx_px = 500,
-                                    .fy_px = 500,
-                                    .cx_px = 320,
-                                    .cy_px = 240,
-                                    .baseline_m = 0.2,
-                                    .T_CB.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const plr_calibration camera = scene_bare_camera(500, 320, 240, 0.2);
     const plr_twist ahead = {.v_B_mps = {1, 0, 0}};
     plr_config config;
     plr_config_default(&config);

@@ -52,8 +52,7 @@ static void put_point(double ahead_m, double left_m) {
 
 /* Ten readings, and a frame in which the point stands among the others. */
 static void go(double off_px, double point_mps) {
-    for (unsigned i = 0; i < RIG_TWISTS; i++)
-        rig_twist();
+    rig_twists();
     for (int i = 0; i < 3; i++)
         p_W[i] += 0.1 * point_mps * rig.world.T_WB[4 * i];
     plr_frame frame = scene_look(&rig.world);

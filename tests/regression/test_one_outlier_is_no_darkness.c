@@ -24,11 +24,7 @@ static const plr_slot *slot_of(uint32_t id) {
 
 /* A frame of a body that stands, in which the first observation is missing, or off by `wrong_px`. */
 static void frame_with_one(bool missing, float wrong_px) {
-    const plr_twist still = {{0}, {0}};
-    for (int k = 0; k < RIG_TWISTS; k++) {
-        rig.world.t_ns += RIG_STEP_NS;
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &still));
-    }
+    rig_twists_in_place(0);
     plr_frame frame = scene_look(&rig.world);
     plr_observation *first = &rig.world.seen[0];
     first->uL_px += wrong_px;

@@ -4,7 +4,6 @@
  * had a sigma beyond a focal length, the gate took them for no basis of a linearisation, and nothing
  * was left that could have told the pose.
  */
-#include <string.h>
 #include <unity.h>
 
 #include "support/rig.h"
@@ -16,11 +15,7 @@
 
 static bool scene_as_map(void *context, uint32_t id, plr_landmark *landmark) {
     (void)context;
-    memset(landmark, 0, sizeof *landmark);
-    landmark->id = id;
-    memcpy(landmark->p_W_m, scene_landmark(&rig.world, id), sizeof landmark->p_W_m);
-    for (int i = 0; i < 9; i += 4)
-        landmark->P_W_m2[i] = MAP_SIGMA_M * MAP_SIGMA_M;
+    *landmark = scene_known(&rig.world, id, MAP_SIGMA_M);
     return true;
 }
 

@@ -2,9 +2,11 @@
 #include "support/imu_rig.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
+#include "support/chi_square.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
@@ -167,6 +169,26 @@ void imu_rig_add(imu_rig_errors *sum, const imu_rig_errors *e, double share) {
     sum->metres += share * e->metres * e->metres;
     sum->rad += share * e->rad * e->rad;
     sum->mps += share * e->mps * e->mps;
+}
+
+void imu_rig_tell(const char *what, const imu_rig_errors *sum) {
+    printf("%s: NEES orientation %.3f, position %.3f, velocity %.3f, b_a %.3f, b_g %.3f; "
+           "%.4f m, %.4f rad, %.4f m/s\n",
+           what, sum->orientation / 3, sum->position / 3, sum->velocity / 3, sum->accel_bias / 3,
+           sum->gyro_bias / 3, sqrt(sum->metres), sqrt(sum->rad), sqrt(sum->mps));
+}
+
+void imu_rig_demand_consistent(const char *what, const imu_rig_errors *sum, unsigned flights,
+                               bool may_be_careful) {
+    const double all[5] = {sum->orientation, sum->position, sum->velocity, sum->accel_bias,
+                           sum->gyro_bias};
+    double low, high;
+    chi_square_bounds(3 * flights, &low, &high);
+    imu_rig_tell(what, sum);
+    for (unsigned i = 0; i < 5; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(all[i] / 3 < high, what);
+        TEST_ASSERT_TRUE_MESSAGE(may_be_careful || all[i] / 3 > low, what);
+    }
 }
 
 void imu_rig_remember(void) {

@@ -58,6 +58,14 @@ imu_rig_errors imu_rig_errors_now(void);
 /* sum += share * e; of metres, rad and mps the squares. */
 void imu_rig_add(imu_rig_errors *sum, const imu_rig_errors *e, double share);
 
+/* Prints such a sum whose shares are 1 together. */
+void imu_rig_tell(const char *what, const imu_rig_errors *sum);
+
+/* The same, and demands all within the bounds of a chi-square over so many flights; where the filter may
+ * be too careful, below the upper one. */
+void imu_rig_demand_consistent(const char *what, const imu_rig_errors *sum, unsigned flights,
+                               bool may_be_careful);
+
 /* Keeps the state, against which imu_rig_demand_refusal compares. */
 void imu_rig_remember(void);
 

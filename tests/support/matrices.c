@@ -19,14 +19,22 @@ void random_spd(rng *r, unsigned n, double floor, double *A) {
 
 void random_rotation(rng *r, double R[9]) {
     double q[4];
-    rng_normals(r, 1, q, 4);
-    const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
+    random_direction(r, 1, q, 4);
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
     const double rotation[9] = {
         1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
         2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
         2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
     memcpy(R, rotation, sizeof rotation);
+}
+
+void random_direction(rng *r, double length, double *v, size_t n) {
+    double sum = 0;
+    rng_normals(r, 1, v, n);
+    for (size_t i = 0; i < n; i++)
+        sum += v[i] * v[i];
+    for (size_t i = 0; i < n; i++)
+        v[i] *= length / sqrt(sum);
 }
 
 void to_reals(plr_real *out, const double *in, size_t n) {
@@ -75,6 +83,10 @@ double largest(const double *a, size_t n) {
     for (size_t i = 0; i < n && !isnan(most); i++)
         most = larger(most, fabs(a[i]));
     return most;
+}
+
+bool all_finite(const double *x, size_t n) {
+    return isfinite(largest(x, n));
 }
 
 bool same_bits(const plr_real *a, const plr_real *b, size_t n) {

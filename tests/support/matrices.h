@@ -24,6 +24,9 @@ void random_spd(rng *r, unsigned n, double floor, double *A);
 /* A rotation, evenly distributed (from a normal quaternion). */
 void random_rotation(rng *r, double R[9]);
 
+/* A vector of that length, n numbers, in any direction. */
+void random_direction(rng *r, double length, double *v, size_t n);
+
 /* --- between precisions and packings --- */
 
 void to_reals(plr_real *out, const double *in, size_t n);
@@ -45,6 +48,9 @@ double largest_difference(const double *a, const double *b, size_t n);
 
 /* max |a_i|; NaN if any of the numbers is. */
 double largest(const double *a, size_t n);
+
+/* True if all n numbers are finite. */
+bool all_finite(const double *x, size_t n);
 
 /* True if a and b agree in every bit (so that 0 and -0 differ). */
 bool same_bits(const plr_real *a, const plr_real *b, size_t n);

@@ -36,10 +36,27 @@ void rig_begin_with(plr_mode mode, bool bias) {
     rig_begin();
 }
 
+static void predict(const plr_twist *twist) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, twist));
+}
+
 void rig_twist(void) {
     const plr_twist twist = scene_read(&rig.world);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+    predict(&twist);
     scene_move(&rig.world, RIG_STEP_NS);
+}
+
+void rig_twists(void) {
+    for (unsigned i = 0; i < RIG_TWISTS; i++)
+        rig_twist();
+}
+
+void rig_twists_in_place(double speed_mps) {
+    const plr_twist twist = {{speed_mps, 0, 0}, {0}};
+    for (unsigned i = 0; i < RIG_TWISTS; i++) {
+        rig.world.t_ns += RIG_STEP_NS;
+        predict(&twist);
+    }
 }
 
 void rig_frame(void) {
@@ -49,8 +66,20 @@ void rig_frame(void) {
 
 void rig_drive(unsigned frames) {
     for (unsigned k = 0; k < frames; k++) {
-        for (unsigned i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
+        rig_frame();
+    }
+}
+
+void rig_drive_told(unsigned frames, double share) {
+    for (unsigned k = 0; k < frames; k++) {
+        for (unsigned i = 0; i < RIG_TWISTS; i++) {
+            plr_twist twist = scene_read(&rig.world);
+            for (int axis = 0; axis < 3; axis++)
+                twist.v_B_mps[axis] *= share;
+            predict(&twist);
+            scene_move(&rig.world, RIG_STEP_NS);
+        }
         rig_frame();
     }
 }
@@ -59,7 +88,7 @@ void rig_stand(unsigned frames) {
     for (unsigned k = 0; k < frames; k++) {
         for (unsigned i = 0; i < RIG_TWISTS; i++) {
             const plr_twist twist = scene_read(&rig.world);
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
+            predict(&twist);
             rig.world.t_ns += RIG_STEP_NS; /* and nothing moves */
         }
         rig_frame();

@@ -36,8 +36,17 @@ void rig_twist(void);
 /* A frame now. Demands PLR_OK. */
 void rig_frame(void);
 
+/* Ten readings, from one frame to the next. */
+void rig_twists(void);
+
+/* The same of a body that stands while its wheels turn at `speed_mps`. */
+void rig_twists_in_place(double speed_mps);
+
 /* So many frames, each after ten readings. */
 void rig_drive(unsigned frames);
+
+/* The same with wheels that tell `share` of the way. */
+void rig_drive_told(unsigned frames, double share);
 
 /* So many frames of a body that stands, each after ten readings of the twist that the scene has. */
 void rig_stand(unsigned frames);

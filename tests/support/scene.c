@@ -165,3 +165,18 @@ void scene_pose(const scene *s, plr_pose *T_WB) {
 const double *scene_landmark(const scene *s, uint32_t id) {
     return s->p_W[id - FIRST_ID];
 }
+
+plr_landmark scene_known(const scene *s, uint32_t id, double sigma_m) {
+    const double *p = scene_landmark(s, id), P = sigma_m * sigma_m;
+    return (plr_landmark){
+        .id = id, .p_W_m = {p[0], p[1], p[2]}, .P_W_m2 = {P, 0, 0, 0, P, 0, 0, 0, P}};
+}
+
+plr_calibration scene_bare_camera(double f_px, double cx_px, double cy_px, double baseline_m) {
+    return (plr_calibration){.fx_px = f_px,
+                             .fy_px = f_px,
+                             .cx_px = cx_px,
+                             .cy_px = cy_px,
+                             .baseline_m = baseline_m,
+                             .T_CB.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+}

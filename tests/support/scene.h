@@ -66,4 +66,10 @@ void scene_pose(const scene *s, plr_pose *T_WB);
 /* Position of the landmark of that id. */
 const double *scene_landmark(const scene *s, uint32_t id);
 
+/* The landmark as a map knows it: where it is, to `sigma_m` along each axis. */
+plr_landmark scene_known(const scene *s, uint32_t id, double sigma_m);
+
+/* A camera at the body's origin with its axes: it looks along z. */
+plr_calibration scene_bare_camera(double f_px, double cx_px, double cy_px, double baseline_m);
+
 #endif

@@ -36,6 +36,11 @@ void desk_begin(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_session_init(&session, &functions, &options));
 }
 
+void desk_begin_drive(void) {
+    desk_begin();
+    desk_send(drive_header());
+}
+
 void desk_send(plr_message message) {
     faulty_port_send(&port, &message);
 }
@@ -50,6 +55,12 @@ void desk_send_frames(int first, int end) {
 void desk_run(void) {
     while (plr_session_step(&session) != PLR_STEP_CLOSED)
         continue;
+}
+
+plr_message desk_answer(plr_kind kind) {
+    plr_message answer;
+    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, kind, &answer));
+    return answer;
 }
 
 bool desk_next_refusal(plr_report_message *report) {

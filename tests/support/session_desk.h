@@ -27,6 +27,9 @@ void desk_clear(uint64_t seed);
 /* Initialises the session with `options`, which must be accepted. */
 void desk_begin(void);
 
+/* The same, and sends the drive's HEADER. */
+void desk_begin_drive(void);
+
 void desk_send(plr_message message);
 
 /* A TWIST and a STEREO of the drive every 0.1 s, first .. end-1. */
@@ -34,6 +37,9 @@ void desk_send_frames(int first, int end);
 
 /* Steps until the port has nothing more. */
 void desk_run(void);
+
+/* The next answer of a kind, which must be there. */
+plr_message desk_answer(plr_kind kind);
 
 /* The next REPORT that refuses something; false if there is none. */
 bool desk_next_refusal(plr_report_message *report);

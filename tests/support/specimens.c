@@ -229,13 +229,6 @@ bool specimen_same_state(const plr_filter *a, const plr_filter *b) {
     return memcmp(&copy, b, sizeof copy) == 0 && a->totals.diverged_ns == b->totals.diverged_ns;
 }
 
-static bool all_finite(const double *x, unsigned n) {
-    for (unsigned i = 0; i < n; i++)
-        if (!isfinite(x[i]))
-            return false;
-    return true;
-}
-
 /* A result that was given is finite; one that was not says why. */
 static bool given(const plr_filter *f, plr_status status, const double *x, unsigned n) {
     return status == PLR_OK ? all_finite(x, n) : status == PLR_E_DIVERGED && f->diverged;

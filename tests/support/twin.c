@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unity.h>
 
 #include "support/matrices.h"
 #include "support/oracle.h"
@@ -128,6 +129,19 @@ bool twin_compare(const textbook *t, const plr_filter *f, twin_gap *gap) {
     gap->covariance = covariance_gap(t, P);
     free(P);
     return true;
+}
+
+void twin_demand_same(const textbook *t, const plr_filter *f, double floor, double rounding,
+                      const char *at) {
+    twin_gap gap;
+    TEST_ASSERT_TRUE_MESSAGE(twin_compare(t, f, &gap), at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(floor + 500 * rounding, 0, gap.position_m, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(floor + 50 * rounding, 0, gap.rotation_rad, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(floor + 100 * rounding, 0, gap.bias, at);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(5e-9 + 4000 * rounding, 0, gap.landmark, at);
+    /* P -= V V^T leaves the rounding of the variance before in the one after, and a landmark's first
+     * frames make it a thousand times smaller */
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8 + 8e4 * rounding, 0, gap.covariance, at);
 }
 
 void twin_of_specimen(textbook *t, const plr_filter *f) {

@@ -19,6 +19,11 @@ typedef struct twin_gap {
  * the other has not. */
 bool twin_compare(const textbook *t, const plr_filter *f, twin_gap *gap);
 
+/* Demands that, and that they differ by no more than so many roundings, and by `floor` where a number may be
+ * zero. */
+void twin_demand_same(const textbook *t, const plr_filter *f, double floor, double rounding,
+                      const char *at);
+
 /* What the filter adds to the landmarks' variances at the end of a frame (docs/NUMERICS.md 1): a rounding of
  * each, eight of those that it saw, in its own charts. */
 void twin_make_up_for_rounding(textbook *t, const plr_frame *frame, double rounding);

@@ -24,15 +24,10 @@ static int sink(void *context, const plr_landmark *landmark) {
 
 /* A map of every landmark with an even id. */
 static bool source(void *context, uint32_t id, plr_landmark *landmark) {
-    const scene *world = context;
     asked++;
     if (id % 2)
         return false;
-    memset(landmark, 0, sizeof *landmark);
-    landmark->id = id;
-    memcpy(landmark->p_W_m, scene_landmark(world, id), sizeof landmark->p_W_m);
-    for (int i = 0; i < 3; i++)
-        landmark->P_W_m2[4 * i] = known_sigma * known_sigma;
+    *landmark = scene_known(context, id, known_sigma);
     return true;
 }
 

@@ -23,8 +23,7 @@ static void test_a_picture_that_is_sent_again_does_not_hold_a_moving_body(void) 
     const plr_frame frozen = scene_look(&rig.world);
     show_again(frozen);
     for (int k = 0; k < 10; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         show_again(frozen);
         if (k >= 1) {
             TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
@@ -39,13 +38,9 @@ static void test_a_picture_that_is_sent_again_does_not_hold_a_moving_body(void) 
 }
 
 static void test_a_body_that_stands_may_see_the_same_picture(void) {
-    const plr_twist still = {{0}, {0}};
     const plr_frame same = scene_look(&rig.world);
     for (int k = 0; k < 10; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++) {
-            rig.world.t_ns += RIG_STEP_NS;
-            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &still));
-        }
+        rig_twists_in_place(0);
         show_again(same);
         TEST_ASSERT_FALSE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
         TEST_ASSERT_GREATER_THAN_UINT(3, rig.report.used);

@@ -70,8 +70,7 @@ static void test_a_camera_that_sees_nothing_is_told_too(void) {
     rig_drive(5);
     const plr_time_ns last = rig.world.t_ns;
     for (int k = 0; k < 11; k++) {
-        for (int i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         const plr_frame dark = {.t_ns = rig.world.t_ns, .budget = PLR_NO_BUDGET};
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &dark, &rig.report));
     }

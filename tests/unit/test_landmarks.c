@@ -179,8 +179,7 @@ static void test_a_known_landmark_pulls_the_pose_to_the_world(void) {
         rig.config.start_sigma = 0.5;
         rig_begin();
         for (uint32_t id = 100; with && id < 250; id++) {
-            plr_landmark known = {.id = id, .P_W_m2 = {1e-4, 0, 0, 0, 1e-4, 0, 0, 0, 1e-4}};
-            memcpy(known.p_W_m, scene_landmark(&rig.world, id), sizeof known.p_W_m);
+            const plr_landmark known = scene_known(&rig.world, id, 0.01);
             const plr_status status = plr_filter_insert_known(&rig.filter, &known);
             TEST_ASSERT_TRUE(status == PLR_OK || status == PLR_E_FULL);
         }

@@ -43,11 +43,7 @@ static void derive_world(const plr_filter *f, unsigned slot, const plr_view *vie
 }
 
 static bool source(void *context, uint32_t id, plr_landmark *landmark) {
-    memset(landmark, 0, sizeof *landmark);
-    landmark->id = id;
-    memcpy(landmark->p_W_m, scene_landmark(context, id), sizeof landmark->p_W_m);
-    for (int i = 0; i < 3; i++)
-        landmark->P_W_m2[4 * i] = 0.0025;
+    *landmark = scene_known(context, id, 0.05);
     return true;
 }
 
@@ -63,8 +59,7 @@ void setUp(void) {
 
 static void move_on(void) {
     if (rig.config.mode != PLR_MODE_MAPPING) {
-        for (unsigned i = 0; i < RIG_TWISTS; i++)
-            rig_twist();
+        rig_twists();
         return;
     }
     plr_pose pose;

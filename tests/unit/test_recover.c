@@ -34,8 +34,7 @@ static void break_covariance(void) {
 }
 
 static void ten_twists(void) {
-    for (int k = 0; k < RIG_TWISTS; k++)
-        rig_twist();
+    rig_twists();
 }
 
 static void demand_positive(void) {

@@ -45,10 +45,8 @@ static motion random_motion(rng *r) {
 
 /* A tangent vector with |theta| = angle and |rho| about 2 m, rounded, and in both precisions. */
 static void random_tangent(rng *r, double angle, double twin[6], plr_real xi[6]) {
-    rng_normals(r, 1, twin, 6);
-    const double norm = sqrt(twin[3] * twin[3] + twin[4] * twin[4] + twin[5] * twin[5]);
-    for (int i = 3; i < 6; i++)
-        twin[i] *= angle / norm;
+    rng_normals(r, 1, twin, 3);
+    random_direction(r, angle, twin + 3, 3);
     round_to_real(twin, 6);
     to_reals(xi, twin, 6);
 }

@@ -32,8 +32,7 @@ static void test_option_wins_over_config_over_header(void) {
 
 static void test_the_config_in_force_is_sent_with_the_build(void) {
     plr_message answer;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("slots", 4));
     desk_send(drive_twist(0));
     desk_run();
@@ -57,8 +56,7 @@ static void test_a_config_value_out_of_limits_is_refused_by_name_and_the_rest_ta
     config.as.config.settings[1] =
         (plr_wire_setting){plr_setting_by_name("slots")->id, PLR_MAX_LANDMARKS + 1.0};
     config.as.config.settings[2] = (plr_wire_setting){201, 1};
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(config);
     desk_send(drive_twist(0));
     desk_run();
@@ -74,8 +72,7 @@ static void test_a_config_value_out_of_limits_is_refused_by_name_and_the_rest_ta
 }
 
 static void test_settings_that_contradict_refuse_the_data_until_they_are_mended(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("landmark-sigma", 1)); /* body takes it from the pixels */
     desk_send(drive_twist(0));
     desk_run();
@@ -119,8 +116,7 @@ static void test_a_calibration_without_sense_is_refused_and_a_better_one_taken(v
 
 static void test_world_in_float32_is_warned_of_and_in_float64_not(void) {
     plr_message answer;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("model", PLR_MODEL_WORLD));
     desk_send(drive_twist(0));
     desk_run();

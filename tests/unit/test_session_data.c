@@ -15,8 +15,7 @@ void setUp(void) {
 static void test_numbers_that_are_not_finite_are_refused_and_change_nothing(void) {
     plr_message twist = drive_twist(0.1), truth = drive_truth(0);
     plr_pose before, after;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("twist-timing", PLR_TWIST_END));
     desk_send(drive_twist(0));
     desk_send(drive_stereo(0));
@@ -40,8 +39,7 @@ static void test_numbers_that_are_not_finite_are_refused_and_change_nothing(void
 }
 
 static void test_a_frame_older_than_the_last_twist_is_refused_as_late(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_stereo(0));
     desk_send(drive_twist(0));
     desk_send(drive_twist(0.1));
@@ -54,8 +52,7 @@ static void test_a_frame_older_than_the_last_twist_is_refused_as_late(void) {
 }
 
 static void test_time_that_repeats_or_goes_back_is_refused(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(1));
     desk_send(drive_twist(1));
     desk_send(drive_twist(0.9));
@@ -81,8 +78,7 @@ static unsigned late_frames(double delay_s, bool positions, unsigned *used) {
     unsigned late = 0;
     options.overrides = &override;
     options.override_count = 1;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(0));
     for (int k = 0; k < 100; k++) {
         desk_send(drive_twist(0.05 * k));
@@ -127,8 +123,7 @@ static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void
     plr_wire_setting override = {plr_setting_by_name("twist-delay")->id, 5};
     options.overrides = &override;
     options.override_count = 1;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     for (int k = 0; k < PLR_SESSION_HELD_TWISTS + 10; k++)
         desk_send(drive_twist(0.01 * k));
     desk_run();
@@ -141,8 +136,7 @@ static void test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back(void)
     plr_wire_setting override = {plr_setting_by_name("twist-delay")->id, 0.2};
     options.overrides = &override;
     options.override_count = 1;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(100));
     desk_send(drive_twist(50));
     desk_run();
@@ -153,7 +147,6 @@ static void test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back(void)
 /* --- a deadline --- */
 
 static void test_the_budget_in_force_is_in_the_echo_and_in_the_report(void) {
-    plr_message answer;
     bool limited = false;
     options.deadline_us = 5;
     options.output |= PLR_OUTPUT_ECHO;
@@ -162,11 +155,11 @@ static void test_the_budget_in_force_is_in_the_echo_and_in_the_report(void) {
     for (int k = 0; k < 20; k++)
         desk_send(drive_stereo(0.1 * k));
     desk_run();
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_STEREO, &answer));
+    plr_message answer = desk_answer(PLR_KIND_STEREO);
     TEST_ASSERT_EQUAL_UINT16(PLR_BLOCK_OBSERVATIONS, answer.as.stereo.budget);
     while (faulty_port_answer_of(&port, PLR_KIND_STEREO, &answer)) {
         const uint16_t budget = answer.as.stereo.budget;
-        TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer));
+        answer = desk_answer(PLR_KIND_REPORT);
         TEST_ASSERT_EQUAL_UINT16(budget, answer.as.report.report.budget);
         TEST_ASSERT_TRUE(answer.as.report.report.used <= budget);
         limited = limited || budget != PLR_BLOCK_OBSERVATIONS;
@@ -176,8 +169,7 @@ static void test_the_budget_in_force_is_in_the_echo_and_in_the_report(void) {
 
 static void test_a_frames_own_budget_is_kept_where_it_is_less(void) {
     plr_message stereo, answer;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_stereo(0));
     stereo = drive_stereo(0.05);
     stereo.as.stereo.budget = 3;
@@ -193,8 +185,7 @@ static void test_a_frames_own_budget_is_kept_where_it_is_less(void) {
 static void test_frames_over_the_deadline_are_counted(void) {
     options.deadline_us = 5;
     port.clock_step_ns = 6000;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     for (int k = 0; k < 7; k++)
         desk_send(drive_stereo(0.1 * k));
     desk_run();

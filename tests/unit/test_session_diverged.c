@@ -19,8 +19,7 @@ static void run_frames(int first, int end) {
 /* Five good frames; then it has diverged. Answers up to here are read. */
 static void begin_and_diverge(void) {
     plr_message answer;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("bias", 1));
     desk_send(drive_truth(0));
     run_frames(0, 5);
@@ -70,12 +69,11 @@ static void test_the_next_frame_recovers_and_its_pose_has_a_covariance_again(voi
 }
 
 static void test_poses_after_each_twist_say_so_too(void) {
-    plr_message answer;
     options.output |= PLR_OUTPUT_TWIST_POSE;
     begin_and_diverge();
     desk_send(drive_twist(0.5));
     desk_run();
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
+    const plr_message answer = desk_answer(PLR_KIND_POSE);
     TEST_ASSERT_FALSE(answer.as.pose.after_update);
     TEST_ASSERT_TRUE(is_unknown(answer.as.pose.P_xi));
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "support/matrices.h"
 #include "support/session_desk.h"
 
 enum { SEEDS = PELORUS_SHORT_FORM ? 5 : 20, FRAMES = 60 };
@@ -16,13 +17,6 @@ void setUp(void) {
 static void begin(uint64_t seed) {
     faulty_port_init(&port, seed);
     desk_begin();
-}
-
-static bool all_finite(const double *x, int n) {
-    for (int i = 0; i < n; i++)
-        if (!isfinite(x[i]))
-            return false;
-    return true;
 }
 
 /* Every POSE that was sent is made of numbers; returns how many there were. */

@@ -57,14 +57,12 @@ static void test_twists_among_the_readings_are_refused_once_and_spoil_nothing(vo
 }
 
 static void test_readings_among_twists_are_refused_once_and_spoil_nothing(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send_frames(0, 20);
     desk_run();
     const inertial_result alone = inertial_read();
     desk_clear(1);
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     for (int k = 0; k < 20; k++) {
         desk_send(drive_imu(0.1 * k, INERTIAL_PER_FRAME, INERTIAL_READING_S));
         desk_send_frames(k, k + 1);
@@ -222,8 +220,7 @@ static void test_an_absurd_velocity_is_refused_and_the_pose_is_set(void) {
 }
 
 static void test_a_velocity_means_nothing_to_a_filter_moved_by_twists(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(0));
     desk_send_frames(0, 3);
     desk_run();

@@ -42,8 +42,7 @@ static void test_whatever_comes_before_a_header_is_refused(void) {
 static void test_the_same_header_again_is_ignored_and_another_refused(void) {
     plr_message changed = drive_header();
     changed.as.header.calibration.fx_px += 1;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("slots", 3));
     desk_send(drive_header()); /* keeps the CONFIG */
     desk_send(drive_twist(0));
@@ -61,8 +60,7 @@ static void test_the_same_header_again_is_ignored_and_another_refused(void) {
 }
 
 static void test_settings_do_not_change_in_mid_flight(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("slots", 3));
     desk_send(drive_twist(0));
     desk_send(drive_config("slots", 3));
@@ -78,8 +76,7 @@ static void test_what_other_filters_computed_is_passed_over(void) {
     pose.as.pose.real_bytes = 8;
     landmark.as.landmark.role = PLR_LANDMARK_EVICTED;
     options.output |= PLR_OUTPUT_ECHO;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(pose);
     desk_send(landmark);
     desk_run();
@@ -91,8 +88,7 @@ static void test_what_other_filters_computed_is_passed_over(void) {
 /* --- known landmarks --- */
 
 static void send_known_drive(const char *setting, double value) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config(setting, value));
     for (uint32_t id = 0; id < KNOWN; id++)
         desk_send(drive_known(id, 0.01));
@@ -131,22 +127,19 @@ static void test_slam_ignores_known_landmarks_unless_asked(void) {
 }
 
 static void test_localization_without_a_map_is_warned_of(void) {
-    plr_message answer;
     options.known_capacity = 0;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_known(1, 0.1));
     desk_send(drive_config("mode", PLR_MODE_LOCALIZATION));
     desk_send(drive_stereo(0));
     desk_run();
     desk_assert_refused(PLR_KIND_LANDMARK, PLR_E_FULL);
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer));
+    const plr_message answer = desk_answer(PLR_KIND_TEXT);
     TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_WARNING, answer.as.text.severity);
 }
 
 static void test_a_known_landmark_twice_is_refused(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_known(1, 0.1));
     desk_send(drive_known(1, 0.2));
     desk_run();
@@ -157,8 +150,7 @@ static void test_a_known_landmark_twice_is_refused(void) {
 
 static void test_mapping_takes_each_pose_and_leaves_out_frames_without(void) {
     plr_pose pose;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("mode", PLR_MODE_MAPPING));
     for (int k = 0; k < 10; k++) {
         desk_send(drive_twist(0.1 * k));
@@ -185,8 +177,7 @@ static void send_frame(unsigned kind, const uint8_t *payload, size_t n) {
 
 static void test_an_unknown_kind_a_short_payload_and_noise_are_answered_once_a_run(void) {
     static const uint8_t payload[4] = {1, 2, 3, 4}, noise[] = {5, 1, 2, 0, 9, 9, 0, 3, 3, 0};
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     for (int i = 0; i < 5; i++)
         send_frame(77, payload, sizeof payload);
     for (int i = 0; i < 5; i++)
@@ -208,8 +199,7 @@ static void test_a_frame_too_long_for_the_buffer_is_answered_and_the_next_one_ta
     static uint8_t payload[12 + 20 * (PLR_MAX_OBSERVATIONS + 1)];
     payload[10] = (uint8_t)((PLR_MAX_OBSERVATIONS + 1) & 0xff);
     payload[11] = (uint8_t)((PLR_MAX_OBSERVATIONS + 1) >> 8);
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     send_frame(PLR_KIND_STEREO, payload, sizeof payload);
     desk_send(drive_stereo(0));
     desk_run();

@@ -305,8 +305,7 @@ static void test_a_start_behind_frames_that_wait_is_no_start_for_them(void) {
 static void test_in_mapping_no_frame_waits(void) {
     desk_use_setting("twist-delay", 0.3);
     desk_use_setting("mode", PLR_MODE_MAPPING);
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     for (int k = 0; k < 4; k++) {
         desk_send(drive_truth(INERTIAL_FRAME_S * k));
         desk_send(drive_stereo(INERTIAL_FRAME_S * k));

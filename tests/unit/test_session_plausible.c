@@ -71,8 +71,7 @@ static void test_an_absurd_reading_costs_itself_alone(void) {
         plr_message twist = drive_twist(0.3);
         twist.as.twist.twist.v_B_mps[0] = speeds[n];
         desk_clear(1);
-        desk_begin();
-        desk_send(drive_header());
+        desk_begin_drive();
         for (int k = 0; k < 10; k++) {
             if (k == 3)
                 desk_send(twist);

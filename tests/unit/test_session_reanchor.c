@@ -72,8 +72,7 @@ static void begin(const plr_wire_setting *overrides, unsigned count) {
     desk_clear(1);
     options.overrides = overrides;
     options.override_count = count;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
 }
 
 static void send_drive(double from_s, double to_s) {
@@ -113,7 +112,6 @@ static void test_one_damaged_time_stamp_changes_nothing(void) {
 static void check_jump(double to_s) {
     double before[6], after[6];
     plr_pose pose, last;
-    plr_message answer;
     begin(NULL, 0);
     send_drive(20, 22);
     desk_run();
@@ -146,9 +144,9 @@ static void check_jump(double to_s) {
         /* it goes by its own speed, which is right to 2 mm/s of 1.1 m/s */
         TEST_ASSERT_DOUBLE_WITHIN(4e-3 * expected, expected, after[i]);
     }
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_LANDMARK, &answer));
+    plr_message answer = desk_answer(PLR_KIND_LANDMARK);
     TEST_ASSERT_EQUAL_UINT8(PLR_LANDMARK_EVICTED, answer.as.landmark.role);
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer));
+    answer = desk_answer(PLR_KIND_TEXT);
     TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_WARNING, answer.as.text.severity);
 
     send_drive(to_s + 0.3, to_s + 3);

@@ -35,8 +35,7 @@ static const plr_pose IDENTITY = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 /* --- where the pose starts --- */
 
 static void test_start_wins_over_truth(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(2)); /* says that the body stands where it will be at 2 s */
     desk_send(drive_twist(2));
     plr_message truth = drive_truth(2);
@@ -48,8 +47,7 @@ static void test_start_wins_over_truth(void) {
 }
 
 static void test_the_first_truth_counts_where_there_is_no_start(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(3));
     desk_send(drive_truth(3));
     desk_send(drive_stereo(3));
@@ -64,9 +62,7 @@ static void test_the_first_truth_counts_where_there_is_no_start(void) {
 
 /* The twist of 3.0 s carries the body from the TRUTH at 3.05 s on. */
 static void test_twists_may_precede_the_truth(void) {
-    plr_message answer;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(2.9));
     desk_send(drive_twist(3));
     desk_send(drive_truth(3.05));
@@ -74,13 +70,12 @@ static void test_twists_may_precede_the_truth(void) {
     desk_run();
     assert_pose_is_that_of(3.1);
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.refused);
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
+    const plr_message answer = desk_answer(PLR_KIND_POSE);
     TEST_ASSERT_EQUAL_UINT16(0, answer.as.pose.reset_count); /* a start is no reset */
 }
 
 static void test_twists_may_precede_the_start(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(3.05));
     desk_send(drive_twist(2.9));
     desk_send(drive_twist(3));
@@ -91,8 +86,7 @@ static void test_twists_may_precede_the_start(void) {
 }
 
 static void test_without_either_it_is_identity(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(5));
     desk_send(drive_stereo(5));
     desk_send(drive_truth(5.1)); /* behind the first frame: for evaluation alone */
@@ -102,8 +96,7 @@ static void test_without_either_it_is_identity(void) {
 
 static void test_identity_can_be_asked_for(void) {
     options.start = PLR_START_IDENTITY;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(5));
     desk_send(drive_truth(5));
     desk_send(drive_twist(5));
@@ -114,8 +107,7 @@ static void test_identity_can_be_asked_for(void) {
 
 static void test_who_asks_for_truth_gets_no_frame_before_it(void) {
     options.start = PLR_START_TRUTH;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(5));
     desk_send(drive_twist(5));
     desk_send(drive_stereo(5));
@@ -130,8 +122,7 @@ static void test_who_asks_for_truth_gets_no_frame_before_it(void) {
 
 static void test_who_asks_for_a_start_gets_no_frame_before_it(void) {
     options.start = PLR_START_RECORDED;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(5));
     desk_send(drive_truth(5));
     desk_send(drive_stereo(5));
@@ -144,8 +135,7 @@ static void test_who_asks_for_a_start_gets_no_frame_before_it(void) {
 }
 
 static void test_a_start_behind_the_first_frame_is_refused_and_identity_taken(void) {
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_start(7));
     desk_send(drive_twist(5));
     desk_send(drive_stereo(5));
@@ -158,8 +148,7 @@ static void test_a_start_behind_the_first_frame_is_refused_and_identity_taken(vo
 static void test_a_start_that_is_no_pose_is_refused_and_truth_taken(void) {
     plr_message start = drive_start(5);
     start.as.start.T_WB.R[4] = 3;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(start);
     desk_send(drive_twist(5));
     desk_send(drive_truth(5));
@@ -177,8 +166,7 @@ static void test_the_start_covariance_is_taken_packed_row_by_row(void) {
     for (int i = 0, k = 0; i < 6; i++)
         for (int j = 0; j <= i; j++, k++)
             start.as.start.P_xi[k] = i == j ? 1.0 + i : 0.03125 * (i + 2 * j);
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(start);
     plr_message stereo = drive_stereo(5);
     stereo.as.stereo.count = 0;
@@ -200,8 +188,7 @@ static void test_a_bias_prior_is_taken_whatever_the_pose_starts_from(void) {
         start.as.start.bias_variance[i] = 1e-4 * (1 + i);
     }
     options.start = PLR_START_IDENTITY;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_config("bias", 1));
     desk_send(start);
     desk_send(drive_twist(5));
@@ -216,8 +203,7 @@ static void test_a_bias_prior_is_taken_whatever_the_pose_starts_from(void) {
 static void test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted(void) {
     plr_message answer, start = drive_start(6);
     start.as.start.T_WB.p[2] = 40;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(5));
     desk_send(drive_stereo(5));
     desk_send(start);
@@ -231,9 +217,7 @@ static void test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted(void) {
 }
 
 static void test_a_widened_covariance_counts_as_a_reset_too(void) {
-    plr_message answer;
-    desk_begin();
-    desk_send(drive_header());
+    desk_begin_drive();
     desk_send(drive_twist(5));
     desk_send(drive_stereo(5));
     desk_run();
@@ -241,8 +225,8 @@ static void test_a_widened_covariance_counts_as_a_reset_too(void) {
     reseal(&session.filter);
     desk_send(drive_stereo(6));
     desk_run();
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
+    plr_message answer = desk_answer(PLR_KIND_POSE);
     TEST_ASSERT_EQUAL_UINT16(0, answer.as.pose.reset_count);
-    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
+    answer = desk_answer(PLR_KIND_POSE);
     TEST_ASSERT_EQUAL_UINT16(1, answer.as.pose.reset_count);
 }

@@ -16,12 +16,7 @@ static scene world;
 static plr_config config;
 
 static bool know_all(void *context, uint32_t id, plr_landmark *landmark) {
-    memset(landmark, 0, sizeof *landmark);
-    landmark->id = id;
-    for (unsigned i = 0; i < 3; i++) {
-        landmark->p_W_m[i] = scene_landmark(context, id)[i];
-        landmark->P_W_m2[4 * i] = 1e-4;
-    }
+    *landmark = scene_known(context, id, 0.01);
     return true;
 }
 

@@ -18,10 +18,7 @@ static const double pi = 3.14159265358979323846;
 
 /* A rotation vector of the given length, rounded, and the same in the filter's precision. */
 static void random_theta(rng *r, double length, double twin[3], plr_real theta[3]) {
-    rng_normals(r, 1, twin, 3);
-    const double norm = sqrt(twin[0] * twin[0] + twin[1] * twin[1] + twin[2] * twin[2]);
-    for (int i = 0; i < 3; i++)
-        twin[i] *= length / norm;
+    random_direction(r, length, twin, 3);
     round_to_real(twin, 3);
     to_reals(theta, twin, 3);
 }

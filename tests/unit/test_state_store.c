@@ -3,59 +3,19 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/state_store.h"
-#include "support/faulty_flash.h"
-#include "support/reseal.h"
-#include "support/specimens.h"
-#include "support/state_bytes.h"
+#include "support/shelf.h"
 
 /* In the short form the power is cut at every seventh byte: at each place of a program unit in turn. */
-enum { STATES = 4, LANDMARKS = 2, ERASE = 512, PROGRAM = 8, STRIDE = PELORUS_SHORT_FORM ? 7 : 1 };
+enum { STRIDE = PELORUS_SHORT_FORM ? 7 : 1 };
 
-static plr_filter filter, restored;
-static plr_state_store store;
-static faulty_flash flash, worn;
-static state_bytes states[STATES], back;
-static plr_stored_state found;
-
-/* The filter a moment later: state k of the test. */
-static void become(unsigned k) {
-    filter.t_ns = 1000000000u * (k + 1);
-    filter.p_WB[0] = k;
-    filter.slots[0].times_seen = 10 * k;
-    filter.P[0] = PLR_R(0.5) + (plr_real)k;
-    reseal(&filter);
-}
-
-static void start_store(uint32_t size, uint32_t erase_size, uint32_t program_size) {
-    faulty_flash_init(&flash, 11, size, erase_size, program_size);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_init(&store, &flash.device));
-}
+static faulty_flash worn;
 
 void setUp(void) {
-    rng chance = rng_seeded(3);
-    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
-    filter.config.slots = LANDMARKS;
-    reseal(&filter);
-    memcpy(&restored, &filter, sizeof restored);
-    for (unsigned k = 0; k < STATES; k++) {
-        become(k);
-        state_bytes_save(&states[k], &filter);
-    }
-    start_store(FAULTY_FLASH_BYTES, ERASE, PROGRAM);
+    shelf_set_up();
 }
 
 void tearDown(void) {
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, flash.violations, "the device was used against port.h");
-}
-
-static plr_status save(unsigned k) {
-    become(k);
-    return plr_state_store_save(&store, &filter, NULL);
-}
-
-static void saves(unsigned k) {
-    TEST_ASSERT_EQUAL_INT(PLR_OK, save(k));
+    shelf_tear_down();
 }
 
 /* What a restart finds. */
@@ -63,28 +23,19 @@ static plr_status restart(void) {
     faulty_flash_restart(&flash);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_init(&store, &flash.device));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&restored));
-    return plr_state_store_restore(&store, &restored, &found);
-}
-
-/* The number of the state that the restored filter is, to the byte; STATES if it is none. */
-static unsigned restored_state(void) {
-    state_bytes_save(&back, &restored);
-    for (unsigned k = 0; k < STATES; k++)
-        if (state_bytes_same(&back, &states[k]))
-            return k;
-    return STATES;
+    return shelf_restore();
 }
 
 static void restart_finds(unsigned k) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, restart());
-    TEST_ASSERT_EQUAL_UINT(k, restored_state());
+    TEST_ASSERT_EQUAL_UINT(k, shelf_restored());
 }
 
 /* ---------------------------------------------------------------- without faults */
 
 static void test_the_newest_state_comes_back(void) {
     for (unsigned k = 0; k < STATES; k++) {
-        saves(k);
+        shelf_saves(k);
         restart_finds(k);
         TEST_ASSERT_EQUAL_UINT64(k + 1, found.generation);
         TEST_ASSERT_EQUAL_UINT(k % 2, found.slot);
@@ -101,7 +52,7 @@ static void test_the_slots_are_worn_alike(void) {
     const unsigned second = store.slot_size / ERASE;
     const unsigned before = flash.erases[0] + flash.erases[second];
     for (unsigned i = 0; i < 10; i++)
-        saves(i % STATES);
+        shelf_saves(i % STATES);
     TEST_ASSERT_EQUAL_UINT(0, before);
     TEST_ASSERT_EQUAL_UINT(5, flash.erases[0]);
     TEST_ASSERT_EQUAL_UINT(5, flash.erases[second]);
@@ -112,9 +63,9 @@ static void test_any_program_and_erase_size_will_do(void) {
     for (unsigned i = 0; i < sizeof programs / sizeof *programs; i++)
         for (unsigned blocks = 1; blocks <= 2; blocks++) {
             const uint32_t erase_size = programs[i] * (blocks == 1 ? 1 : 32);
-            start_store(FAULTY_FLASH_BYTES / erase_size * erase_size, erase_size, programs[i]);
+            shelf_begin(FAULTY_FLASH_BYTES / erase_size * erase_size, erase_size, programs[i]);
             for (unsigned k = 0; k < STATES; k++)
-                saves(k);
+                shelf_saves(k);
             restart_finds(STATES - 1);
             TEST_ASSERT_EQUAL_UINT(0, flash.violations);
         }
@@ -123,14 +74,14 @@ static void test_any_program_and_erase_size_will_do(void) {
 static void test_the_erased_value_does_not_matter(void) {
     flash.erased_value = 0;
     for (unsigned k = 0; k < STATES; k++) {
-        saves(k);
+        shelf_saves(k);
         restart_finds(k);
     }
 }
 
 static void test_what_fills_the_last_units_is_zero(void) {
-    start_store(2 * 6800, 6800, 100);
-    saves(0);
+    shelf_begin(2 * 6800, 6800, 100);
+    shelf_saves(0);
     for (uint32_t at = PLR_STORE_HEADER; at < 100; at++)
         TEST_ASSERT_EQUAL_UINT8(0, flash.bytes[at]);
     for (uint32_t at = 100 + states[0].length; at % 100 != 0; at++)
@@ -138,7 +89,7 @@ static void test_what_fills_the_last_units_is_zero(void) {
 }
 
 static void test_saving_changes_no_bit_of_the_filter(void) {
-    become(1);
+    shelf_become(1);
     static plr_filter before;
     memcpy(&before, &filter, sizeof before);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_save(&store, &filter, NULL));
@@ -152,16 +103,16 @@ static void test_saving_changes_no_bit_of_the_filter(void) {
 static void cut_everywhere(unsigned saved, faulty_flash_tear tear) {
     unsigned olds = 0, news = 0;
     for (unsigned k = 0; k < saved; k++)
-        saves(k);
+        shelf_saves(k);
     memcpy(&worn, &flash, sizeof worn);
-    saves(saved);
+    shelf_saves(saved);
     const uint64_t work = flash.work - worn.work;
     for (uint64_t cut = work % STRIDE; cut <= work; cut += STRIDE) {
         memcpy(&flash, &worn, sizeof flash);
         flash.random = rng_seeded(cut);
         flash.tear = tear;
         flash.power_left = (long)cut;
-        const plr_status status = save(saved);
+        const plr_status status = shelf_save(saved);
         TEST_ASSERT_EQUAL_INT(cut < work ? PLR_E_IO : PLR_OK, status);
         const plr_status after = restart();
         if (saved == 0 && after != PLR_OK) {
@@ -170,14 +121,14 @@ static void cut_everywhere(unsigned saved, faulty_flash_tear tear) {
             continue;
         }
         TEST_ASSERT_EQUAL_INT(PLR_OK, after);
-        const unsigned state = restored_state();
+        const unsigned state = shelf_restored();
         TEST_ASSERT_TRUE(state == saved || (saved > 0 && state + 1 == saved));
         TEST_ASSERT_TRUE(status != PLR_OK || state == saved);
         olds += state != saved;
         news += state == saved;
         /* and the next save is as good as any */
         if (cut % 64 == 0) {
-            saves(STATES - 1);
+            shelf_saves(STATES - 1);
             restart_finds(STATES - 1);
         }
     }
@@ -208,15 +159,15 @@ static void test_a_cut_that_leaves_noise_in_the_whole_unit_does_no_harm_either(v
 
 static void test_cut_after_cut_the_last_whole_state_stays(void) {
     rng chance = rng_seeded(5);
-    saves(0);
+    shelf_saves(0);
     for (unsigned i = 0; i < 300; i++) {
         flash.tear = (faulty_flash_tear)rng_below(&chance, 3);
         flash.power_left = (long)rng_below(&chance, 3 * ERASE);
-        TEST_ASSERT_EQUAL_INT(PLR_E_IO, save(1));
+        TEST_ASSERT_EQUAL_INT(PLR_E_IO, shelf_save(1));
         restart_finds(0);
         TEST_ASSERT_EQUAL_UINT64(1, found.generation);
     }
-    saves(2);
+    shelf_saves(2);
     restart_finds(2);
     TEST_ASSERT_EQUAL_UINT64(2, found.generation);
 }

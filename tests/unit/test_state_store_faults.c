@@ -3,76 +3,35 @@
 #include <string.h>
 #include <unity.h>
 
-#include "pelorus/state_store.h"
 #include "pelorus/wire.h"
-#include "support/faulty_flash.h"
 #include "support/reseal.h"
-#include "support/specimens.h"
-#include "support/state_bytes.h"
+#include "support/shelf.h"
 
-enum { STATES = 3, LANDMARKS = 2, ERASE = 512, PROGRAM = 8, STATE_AT = 32 /* in a slot */ };
+enum { STATE_AT = 32 /* in a slot */ };
 
 /* Where the state's fields stand (docs/STATE-FORMAT.md). */
 enum { STATE_VERSION_AT = 4, FINGERPRINT_AT = 8, FIRST_SETTING_AT = 14 };
 
-static plr_filter filter, restored, untouched;
-static plr_state_store store;
-static faulty_flash flash, good;
-static state_bytes states[STATES], back;
-static plr_stored_state found;
-
-/* The filter a moment later. */
-static void become(unsigned k) {
-    filter.t_ns = 1000000000u * (k + 1);
-    filter.P[0] = PLR_R(0.5) + (plr_real)k;
-    reseal(&filter);
-}
-
-static void start_store(void) {
-    faulty_flash_init(&flash, 12, FAULTY_FLASH_BYTES, ERASE, PROGRAM);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_init(&store, &flash.device));
-}
+static plr_filter untouched;
+static faulty_flash good;
 
 void setUp(void) {
-    rng chance = rng_seeded(4);
-    specimen_filter(&filter, &chance, PLR_MODEL_BODY, true, LANDMARKS);
-    filter.config.slots = LANDMARKS;
-    reseal(&filter);
-    memcpy(&restored, &filter, sizeof restored);
-    for (unsigned k = 0; k < STATES; k++) {
-        become(k);
-        state_bytes_save(&states[k], &filter);
-    }
-    start_store();
+    shelf_set_up();
 }
 
 void tearDown(void) {
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, flash.violations, "the device was used against port.h");
-}
-
-static plr_status save(unsigned k) {
-    become(k);
-    return plr_state_store_save(&store, &filter, NULL);
-}
-
-static void saves(unsigned k) {
-    TEST_ASSERT_EQUAL_INT(PLR_OK, save(k));
-}
-
-static plr_status restore(void) {
-    return plr_state_store_restore(&store, &restored, &found);
+    shelf_tear_down();
 }
 
 static void restores(unsigned k) {
     faulty_flash_restart(&flash);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, restore());
-    state_bytes_save(&back, &restored);
-    TEST_ASSERT_TRUE(state_bytes_same(&back, &states[k]));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, shelf_restore());
+    TEST_ASSERT_EQUAL_UINT(k, shelf_restored());
 }
 
 static void refuses(plr_status expected) {
     memcpy(&untouched, &restored, sizeof untouched);
-    TEST_ASSERT_EQUAL_INT(expected, restore());
+    TEST_ASSERT_EQUAL_INT(expected, shelf_restore());
     TEST_ASSERT_EQUAL_MEMORY(&untouched, &restored, sizeof restored);
     TEST_ASSERT_EQUAL_UINT64(0, found.generation);
 }
@@ -100,14 +59,14 @@ static void make_whole(unsigned k) {
 /* ---------------------------------------------------------------- damage */
 
 static void test_a_flipped_bit_anywhere_is_found(void) {
-    saves(0);
+    shelf_saves(0);
     const uint32_t length = STATE_AT + states[0].length;
     for (uint32_t bit = 0; bit < 8 * length; bit++) {
         const uint32_t at = bit / 8;
         if (at >= PLR_STORE_HEADER && at < STATE_AT)
             continue; /* padding */
         flash.bytes[at] ^= (uint8_t)(1U << bit % 8);
-        const plr_status status = restore();
+        const plr_status status = shelf_restore();
         TEST_ASSERT_EQUAL_INT(at < 4 ? PLR_E_NOT_READY : PLR_E_CORRUPT, status);
         TEST_ASSERT_EQUAL_UINT(at < 4 ? 0 : 1, found.damaged);
         flash.bytes[at] ^= (uint8_t)(1U << bit % 8);
@@ -116,14 +75,14 @@ static void test_a_flipped_bit_anywhere_is_found(void) {
 }
 
 static void test_a_refusal_of_damage_changes_nothing(void) {
-    saves(0);
+    shelf_saves(0);
     slot(0)[STATE_AT + 200] ^= 4;
     refuses(PLR_E_CORRUPT);
 }
 
 static void test_a_flipped_bit_in_the_newest_state_leaves_the_one_before(void) {
-    saves(0);
-    saves(1);
+    shelf_saves(0);
+    shelf_saves(1);
     for (uint32_t at = 0; at < STATE_AT + states[1].length; at += 3) {
         if (at >= PLR_STORE_HEADER && at < STATE_AT)
             continue;
@@ -137,19 +96,19 @@ static void test_a_flipped_bit_in_the_newest_state_leaves_the_one_before(void) {
 }
 
 static void test_damage_in_both_slots_is_refused_and_the_next_save_mends_it(void) {
-    saves(0);
-    saves(1);
+    shelf_saves(0);
+    shelf_saves(1);
     slot(0)[STATE_AT] ^= 1;
     slot(1)[STATE_AT] ^= 1;
     refuses(PLR_E_CORRUPT);
     TEST_ASSERT_EQUAL_UINT(2, found.damaged);
-    saves(2);
+    shelf_saves(2);
     restores(2);
     TEST_ASSERT_EQUAL_UINT(1, found.damaged);
 }
 
 static void test_bits_that_do_not_program_fail_the_save_and_leave_the_old_state(void) {
-    saves(0);
+    shelf_saves(0);
     memcpy(&good, &flash, sizeof good);
     const uint32_t length = STATE_AT + states[1].length;
     unsigned failed = 0, harmless = 0;
@@ -157,7 +116,7 @@ static void test_bits_that_do_not_program_fail_the_save_and_leave_the_old_state(
         memcpy(&flash, &good, sizeof flash);
         flash.stuck_at = store.slot_size + at;
         flash.stuck_mask = 0x24;
-        const plr_status status = save(1);
+        const plr_status status = shelf_save(1);
         failed += status != PLR_OK;
         harmless += status == PLR_OK; /* padding, or bits that should be as they are */
         TEST_ASSERT_TRUE(status == PLR_OK || status == PLR_E_IO);
@@ -168,9 +127,9 @@ static void test_bits_that_do_not_program_fail_the_save_and_leave_the_old_state(
 }
 
 static void test_bits_that_flip_while_they_are_taken_over_reset_the_filter(void) {
-    saves(0);
+    shelf_saves(0);
     faulty_flash_restart(&flash);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, restore());
+    TEST_ASSERT_EQUAL_INT(PLR_OK, shelf_restore());
     const unsigned reads = flash.reads;
     unsigned reset = 0;
     for (unsigned call = 1; call <= reads; call++) {
@@ -178,9 +137,8 @@ static void test_bits_that_flip_while_they_are_taken_over_reset_the_filter(void)
         memcpy(&untouched, &filter, sizeof untouched);
         memcpy(&restored, &filter, sizeof restored);
         flash.read_flips_at = call;
-        if (restore() == PLR_OK) { /* it was in bytes that were only looked at */
-            state_bytes_save(&back, &restored);
-            TEST_ASSERT_TRUE(state_bytes_same(&back, &states[0]));
+        if (shelf_restore() == PLR_OK) { /* it was in bytes that were only looked at */
+            TEST_ASSERT_EQUAL_UINT(0, shelf_restored());
             continue;
         }
         if (memcmp(&untouched, &restored, sizeof restored) == 0)
@@ -195,7 +153,7 @@ static void test_bits_that_flip_while_they_are_taken_over_reset_the_filter(void)
 /* ---------------------------------------------------------------- foreign */
 
 static void test_a_state_of_another_build_is_refused(void) {
-    saves(0);
+    shelf_saves(0);
     for (unsigned byte = 0; byte < 4; byte++) {
         slot(0)[STATE_AT + FINGERPRINT_AT + byte] ^= 1;
         make_whole(0);
@@ -207,46 +165,46 @@ static void test_a_state_of_another_build_is_refused(void) {
 }
 
 static void test_a_state_of_another_version_is_refused(void) {
-    saves(0);
+    shelf_saves(0);
     slot(0)[STATE_AT + STATE_VERSION_AT]++;
     make_whole(0);
     refuses(PLR_E_FOREIGN);
 }
 
 static void test_a_slot_of_another_version_is_refused(void) {
-    saves(0);
+    shelf_saves(0);
     slot(0)[4]++;
     make_whole(0);
     refuses(PLR_E_FOREIGN);
 }
 
 static void test_a_state_of_other_settings_is_refused(void) {
-    saves(0);
+    shelf_saves(0);
     slot(0)[STATE_AT + FIRST_SETTING_AT + 9] ^= 1;
     make_whole(0);
     refuses(PLR_E_FOREIGN);
 }
 
 static void test_an_old_state_of_ours_is_not_taken_for_a_newer_foreign_one(void) {
-    saves(0);
-    saves(1);
+    shelf_saves(0);
+    shelf_saves(1);
     slot(1)[STATE_AT + FINGERPRINT_AT] ^= 1;
     make_whole(1);
     refuses(PLR_E_FOREIGN);
-    saves(2);
+    shelf_saves(2);
     restores(2);
     TEST_ASSERT_EQUAL_UINT64(3, found.generation);
     TEST_ASSERT_EQUAL_UINT(0, found.slot);
 }
 
 static void test_an_old_state_of_ours_is_not_taken_for_a_newer_slot_of_another_version(void) {
-    saves(0);
-    saves(1);
+    shelf_saves(0);
+    shelf_saves(1);
     slot(1)[4]++;
     make_whole(1);
     refuses(PLR_E_FOREIGN);
     TEST_ASSERT_EQUAL_UINT(0, found.damaged);
-    saves(2);
+    shelf_saves(2);
     restores(2);
     TEST_ASSERT_EQUAL_UINT64(3, found.generation);
 }
@@ -254,8 +212,8 @@ static void test_an_old_state_of_ours_is_not_taken_for_a_newer_slot_of_another_v
 static void test_a_length_that_leaves_the_slot_is_damage(void) {
     const uint32_t lengths[] = {0, store.slot_size - STATE_AT + 1, store.slot_size, 0x7FFFFFFF,
                                 0xFFFFFFFF};
-    saves(0);
-    saves(1);
+    shelf_saves(0);
+    shelf_saves(1);
     for (unsigned i = 0; i < sizeof lengths / sizeof *lengths; i++) {
         put(slot(1) + 16, lengths[i]);
         if (lengths[i] == 0)
@@ -273,16 +231,16 @@ static void test_a_length_that_leaves_the_slot_is_damage(void) {
 /* ---------------------------------------------------------------- a device that fails */
 
 static void test_a_device_that_does_not_read_is_said_to_fail(void) {
-    saves(0);
-    saves(1);
+    shelf_saves(0);
+    shelf_saves(1);
     faulty_flash_restart(&flash);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, restore());
+    TEST_ASSERT_EQUAL_INT(PLR_OK, shelf_restore());
     const unsigned reads = flash.reads;
     unsigned refused = 0;
     for (unsigned call = 1; call <= reads; call++) {
         faulty_flash_restart(&flash);
         flash.read_fails_at = call;
-        const plr_status status = restore();
+        const plr_status status = shelf_restore();
         TEST_ASSERT_TRUE(status == PLR_E_IO || (status == PLR_OK && found.damaged == 1));
         refused += status != PLR_OK;
     }
@@ -292,22 +250,22 @@ static void test_a_device_that_does_not_read_is_said_to_fail(void) {
 }
 
 static void test_a_device_that_does_not_write_fails_the_save_alone(void) {
-    saves(0);
+    shelf_saves(0);
     flash.erase_fails = true;
-    TEST_ASSERT_EQUAL_INT(PLR_E_IO, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_IO, shelf_save(1));
     restores(0);
     flash.program_fails = true;
-    TEST_ASSERT_EQUAL_INT(PLR_E_IO, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_IO, shelf_save(1));
     restores(0);
-    saves(1);
+    shelf_saves(1);
     restores(1);
 }
 
 static void test_damage_in_one_slot_does_not_hide_that_the_other_cannot_be_read(void) {
-    saves(0);
+    shelf_saves(0);
     slot(0)[STATE_AT] ^= 1;
     faulty_flash_restart(&flash);
-    TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, restore());
+    TEST_ASSERT_EQUAL_INT(PLR_E_CORRUPT, shelf_restore());
     const unsigned reads = flash.reads; /* the last one was of slot 1 */
     faulty_flash_restart(&flash);
     flash.read_fails_at = reads;
@@ -317,7 +275,7 @@ static void test_damage_in_one_slot_does_not_hide_that_the_other_cannot_be_read(
 
 static void test_if_slot_0_cannot_be_read_slot_1_is_used(void) {
     flash.read_fails_at = 1;
-    saves(0);
+    shelf_saves(0);
     restores(0);
     TEST_ASSERT_EQUAL_UINT(1, found.slot);
 }
@@ -351,36 +309,36 @@ static void test_a_device_that_could_not_hold_a_full_map_is_refused_at_the_first
     const uint32_t needs = plr_state_store_needs(&store, &filter);
     TEST_ASSERT_EQUAL_UINT32(0, needs % ERASE);
     TEST_ASSERT_EQUAL_INT(PLR_OK, init_with(needs, ERASE, PROGRAM));
-    saves(0);
+    shelf_saves(0);
     TEST_ASSERT_EQUAL_INT(PLR_OK, init_with(needs - ERASE, ERASE, PROGRAM));
     const uint64_t work = flash.work;
-    TEST_ASSERT_EQUAL_INT(PLR_E_FULL, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_FULL, shelf_save(1));
     TEST_ASSERT_EQUAL_UINT64(work, flash.work);
     TEST_ASSERT_EQUAL_INT(PLR_OK, init_with(needs, ERASE, PROGRAM));
     filter.config.slots = 3 * LANDMARKS; /* two of six are there: they would fit */
-    TEST_ASSERT_EQUAL_INT(PLR_E_FULL, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_FULL, shelf_save(1));
 }
 
 static void test_a_broken_filter_is_not_saved_over_a_good_one(void) {
-    saves(0);
+    shelf_saves(0);
     const uint64_t work = flash.work;
     filter.diverged = 1;
     reseal(&filter);
-    TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_DIVERGED, shelf_save(1));
     filter.diverged = 0;
     reseal(&filter);
     filter.bias[1] = (plr_real)NAN;
     reseal(&filter);
-    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_FINITE, shelf_save(1));
     filter.magic = 0;
-    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, save(1));
+    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, shelf_save(1));
     TEST_ASSERT_EQUAL_UINT32(0, plr_state_store_needs(&store, &filter));
     TEST_ASSERT_EQUAL_UINT64(work, flash.work);
     restores(0);
 }
 
 static void test_null_pointers_are_refused(void) {
-    saves(0);
+    shelf_saves(0);
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_save(NULL, &filter, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_save(&store, NULL, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_E_ARGUMENT, plr_state_store_restore(NULL, &filter, &found));
@@ -388,5 +346,5 @@ static void test_null_pointers_are_refused(void) {
     TEST_ASSERT_EQUAL_UINT64(0, found.generation);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_state_store_restore(&store, &restored, NULL));
     restored.magic = 0;
-    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, restore());
+    TEST_ASSERT_EQUAL_INT(PLR_E_NOT_READY, shelf_restore());
 }

@@ -409,31 +409,22 @@ static void begin_drive(void) {
     TEST_ASSERT_FALSE(rig.report.reasons & CONTRADICTED);
 }
 
-/* Ten readings of `speed`, in which the body stands. */
-static void readings_in_place(double speed) {
-    const plr_twist twist = {{speed, 0, 0}, {0}};
-    for (int k = 0; k < RIG_TWISTS; k++) {
-        rig.world.t_ns += RIG_STEP_NS;
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, rig.world.t_ns, &twist));
-    }
-}
-
 static void test_wheels_that_slip_do_not_carry_the_pose_away(void) {
     int frames = 0;
     begin_drive();
     do {
-        readings_in_place(2);
+        rig_twists_in_place(2);
         rig_frame();
     } while (!(rig.report.reasons & CONTRADICTED) && ++frames < 20);
     TEST_ASSERT_LESS_OR_EQUAL_INT(4, frames); /* told in the fifth at the latest */
     for (int k = 0; k < 10; k++) {
-        readings_in_place(2);
+        rig_twists_in_place(2);
         rig_frame();
     }
     TEST_ASSERT_TRUE(error_m() < 0.1); /* the readings have gone 2 m */
     TEST_ASSERT_TRUE(rig.report.reasons & MAY_BE_WRONG);
     for (int k = 0; k < 60; k++) {
-        readings_in_place(0);
+        rig_twists_in_place(0);
         rig_frame();
     }
     TEST_ASSERT_FALSE(rig.report.reasons & (CONTRADICTED | MAY_BE_WRONG));
