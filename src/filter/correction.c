@@ -19,6 +19,7 @@
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
 enum { IN_ESTIMATE = PLR_BASELINE }; /* the column of the sensitivity that fills the second */
+enum { OF_DX, OF_S, RESIDUALS = OF_S + PLR_CALIBRATIONS }; /* the columns of Y */
 
 /* All measurements of a correction, in their order. After those of its arguments come two of the
  * biases. */
@@ -27,16 +28,15 @@ typedef struct plr_sensed {
     const plr_measurement *given;
 } plr_sensed;
 
-/* Measurements that are applied together, stacked: S = H P H^T + R and y = r - H dx, then S = U^T U
- * and U^-T y. V^T is in the workspace. */
+/* Measurements that are applied together, stacked: S = H P H^T + R and Y = [r - H dx, the same of the
+ * sensitivity's columns], then S = U^T U and U^-T Y. V^T is in the workspace. */
 typedef struct plr_batch {
     unsigned rows;
     unsigned n, ld; /* dimension of the state; between rows of V^T */
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
                PLR_KERNEL_MARGIN]; /* packed upper triangle */
-    plr_real y[PLR_BLOCK_ROWS];
-    plr_real y_of_S[PLR_CALIBRATIONS][PLR_BLOCK_ROWS]; /* the same of the sensitivity's columns */
-    plr_real E[WIDE * PLR_BLOCK_ROWS];                 /* rows x 6: H W, then U^-T H W */
+    plr_real Y[RESIDUALS * PLR_BLOCK_ROWS];
+    plr_real E[WIDE * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
 } plr_batch;
 
 /* The sums behind a plr_innovation. */
@@ -51,7 +51,8 @@ typedef struct plr_evidence {
  * beside P. */
 static void add_evidence(plr_evidence *e, const plr_batch *batch) {
     for (unsigned r = 0; r < batch->rows; r++) {
-        e->d2 = PLR_FMA(batch->y[r], batch->y[r], e->d2);
+        const plr_real y = batch->Y[RESIDUALS * r + OF_DX];
+        e->d2 = PLR_FMA(y, y, e->d2);
         plr_log_product_multiply(&e->det_root, batch->S[plr_upper_row(batch->rows, r)]);
     }
     e->rows += batch->rows;
@@ -96,34 +97,36 @@ static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, uns
     if (i < sensed->seen)
         plr_stereo_by_calibration(f, f->work.slot_of[f->work.used[i]], H_s);
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        if (!plr_considers(f, k))
-            continue;
-        plr_rows_apply(H, f->S[k], column);
+        const bool considers = plr_considers(f, k);
+        if (considers)
+            plr_rows_apply(H, f->S[k], column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
-            batch->y_of_S[k][first + r] = -H_s[k][r] - column[r];
+            batch->Y[RESIDUALS * (first + r) + OF_S + k] =
+                considers ? -H_s[k][r] - column[r] : PLR_R(0);
     }
 }
 
-/* eta += E^T y */
-static void project_on_noise(const plr_batch *batch, const plr_real *y,
-                             plr_real eta[PLR_POSE_DIM]) {
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        for (unsigned r = 0; r < batch->rows; r++)
-            eta[k] = PLR_FMA(batch->E[WIDE * r + k], y[r], eta[k]);
+/* eta += E^T y, y a column of Y */
+static void project_on_noise(const plr_batch *batch, unsigned column, plr_real eta[PLR_POSE_DIM]) {
+    plr_real sum[PLR_POSE_DIM]; /* in registers */
+    memcpy(sum, eta, sizeof sum);
+    for (unsigned r = 0; r < batch->rows; r++)
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            sum[k] = PLR_FMA(batch->E[WIDE * r + k], batch->Y[RESIDUALS * r + column], sum[k]);
+    memcpy(eta, sum, sizeof sum);
 }
 
 /* f->S += V y and eta += E^T y, of each column with its own y. */
-static void correct_sensitivity(plr_filter *f, plr_batch *batch) {
+static void correct_sensitivity(plr_filter *f, const plr_batch *batch) {
     plr_noise *noise = &f->work.noise;
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        plr_real *y = batch->y_of_S[k];
         if (!plr_considers(f, k))
             continue;
-        plr_solve_upper_transposed(batch->rows, 1, batch->S, y, 1);
         if (!(noise->open && k == IN_ESTIMATE))
-            plr_sensitivity_combine(f, k, batch->rows, y, f->work.Vt, batch->ld);
+            plr_sensitivity_combine(f, k, batch->rows, batch->Y + OF_S + k, RESIDUALS, f->work.Vt,
+                                    batch->ld);
         if (noise->open)
-            project_on_noise(batch, y, noise->eta_of_S[k]);
+            project_on_noise(batch, OF_S + k, noise->eta_of_S[k]);
     }
 }
 
@@ -134,17 +137,20 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
     plr_real column[PLR_ROWS];
     plr_covariance_project(f, &m->H, w->Vt + first * batch->ld, batch->ld);
     plr_real *S = batch->S + first; /* element (i, first) */
-    for (unsigned i = 0; i < first + PLR_ROWS; i++) {
-        plr_rows_apply(&m->H, w->Vt + i * batch->ld, column);
-        if (i >= first)
-            column[i - first] += m->R[i - first];
-        for (unsigned r = i < first ? 0 : i - first; r < PLR_ROWS; r++)
-            S[r] = column[r];
+    for (unsigned i = 0; i < first; i++) {
+        plr_rows_apply(&m->H, w->Vt + i * batch->ld, S);
         S += batch->rows - i - 1;
+    }
+    for (unsigned i = 0; i < PLR_ROWS; i++) {
+        plr_rows_apply(&m->H, w->Vt + (first + i) * batch->ld, column);
+        column[i] += m->R[i];
+        for (unsigned r = i; r < PLR_ROWS; r++)
+            S[r] = column[r];
+        S += batch->rows - first - i - 1;
     }
     plr_rows_apply(&m->H, w->dx, column);
     for (unsigned r = 0; r < PLR_ROWS; r++)
-        batch->y[first + r] = m->r[r] - column[r];
+        batch->Y[RESIDUALS * (first + r) + OF_DX] = m->r[r] - column[r];
     for (unsigned k = 0; w->noise.open && k < PLR_POSE_DIM; k++) {
         plr_rows_apply(&m->H, w->noise.Wt + k * batch->ld, column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
@@ -155,12 +161,12 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
 /* The batch's information about the motion's noise: Lambda += E^T E, eta += E^T y, with E = U^-T H
  * W and y = U^-T (r - H dx). */
 static void add_noise_information(plr_noise *noise, const plr_batch *batch) {
-    plr_real *Lambda = noise->Lambda;
-    project_on_noise(batch, batch->y, noise->eta);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        for (unsigned l = k; l < PLR_POSE_DIM; l++, Lambda++)
-            for (unsigned r = 0; r < batch->rows; r++)
-                *Lambda = PLR_FMA(batch->E[WIDE * r + k], batch->E[WIDE * r + l], *Lambda);
+    plr_real sum[PLR_POSE_TRIANGLE]; /* in registers */
+    memcpy(sum, noise->Lambda, sizeof sum);
+    for (unsigned r = 0; r < batch->rows; r++)
+        plr_upper6_add(sum, batch->E + WIDE * r, batch->E + WIDE * r);
+    memcpy(noise->Lambda, sum, sizeof sum);
+    project_on_noise(batch, OF_DX, noise->eta);
 }
 
 /* W -= V E, dx += V y and the same of a column of the sensitivity, computed as eight rows of one
@@ -171,8 +177,9 @@ static void update_estimate(plr_filter *f, plr_batch *batch) {
     const bool considers = plr_considers(f, IN_ESTIMATE);
     const size_t ld = batch->ld;
     for (unsigned r = 0; r < batch->rows; r++) {
-        batch->E[WIDE * r + 6] = -batch->y[r];
-        batch->E[WIDE * r + 7] = considers ? -batch->y_of_S[IN_ESTIMATE][r] : PLR_R(0);
+        const plr_real *y = batch->Y + RESIDUALS * r;
+        batch->E[WIDE * r + 6] = -y[OF_DX];
+        batch->E[WIDE * r + 7] = considers ? -y[OF_S + IN_ESTIMATE] : PLR_R(0);
     }
     plr_real *const first[4] = {Wt, Wt + ld, Wt + 2 * ld, Wt + 3 * ld};
     plr_real *const last[4] = {Wt + 4 * ld, Wt + 5 * ld, w->dx, f->S[IN_ESTIMATE]};
@@ -189,14 +196,15 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     if (!*factorised)
         return false;
     plr_solve_upper_transposed(batch->rows, batch->ld, batch->S, w->Vt, batch->ld);
-    plr_solve_upper_transposed(batch->rows, 1, batch->S, batch->y, 1);
+    plr_solve_upper_transposed(batch->rows, RESIDUALS, batch->S, batch->Y, RESIDUALS);
     if (!plr_covariance_subtract(f, batch->rows))
         return false;
     if (w->noise.open)
         plr_solve_upper_transposed(batch->rows, PLR_POSE_DIM, batch->S, batch->E, WIDE);
     correct_sensitivity(f, batch);
     if (!w->noise.open) {
-        plr_combine_rows(batch->n, batch->rows, batch->y, w->Vt, batch->ld, w->dx);
+        plr_combine_rows(batch->n, batch->rows, batch->Y + OF_DX, RESIDUALS, w->Vt, batch->ld,
+                         w->dx);
         return true;
     }
     add_noise_information(&w->noise, batch);

@@ -41,7 +41,7 @@ void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_rea
         sandwich(S, m, B, P);
 }
 
-enum { STRIP = PLR_TILE_COLUMNS };
+enum { STRIP = PLR_TILE_COLUMNS, FEW = 3 };
 
 /* x[c] = from[c] - sum_l U(l, i) y_l[c] for a strip of columns, l = 0 .. i-1, y_l = y + sum of the
  * steps before: STRIP numbers that stay in registers. The first step reads `from`, for a copy would
@@ -132,16 +132,23 @@ static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) 
         solve_four_rows(k, U, i, X, ldx);
 }
 
-/* The same for a single column. */
-static void solve_column(unsigned k, const plr_real *restrict U, plr_real *X, size_t ldx) {
+/* The same for columns that make no strip, FEW or one. Inlined for each number. */
+static inline void solve_columns(unsigned columns, unsigned k, const plr_real *restrict U,
+                                 plr_real *X, size_t ldx) {
     for (unsigned i = 0; i < k; i++) {
-        plr_real x = X[i * ldx];
-        const plr_real *u = U + i;
+        const plr_real *u = U + i, *above = X;
+        plr_real x[FEW];
+        for (unsigned c = 0; c < columns; c++)
+            x[c] = X[i * ldx + c];
         for (unsigned l = 0; l < i; l++) {
-            x = PLR_FMA(-*u, X[l * ldx], x);
+            for (unsigned c = 0; c < columns; c++)
+                x[c] = PLR_FMA(-*u, above[c], x[c]);
             u += k - l - 1;
+            above += ldx;
         }
-        X[i * ldx] = x * (PLR_R(1) / *u);
+        const plr_real inverse = PLR_R(1) / *u;
+        for (unsigned c = 0; c < columns; c++)
+            X[i * ldx + c] = x[c] * inverse;
     }
 }
 
@@ -151,8 +158,10 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
     unsigned j = 0;
     for (; j + STRIP <= n; j += STRIP)
         solve_strip(k, U, X + j, ldx);
+    for (; j + FEW <= n; j += FEW)
+        solve_columns(FEW, k, U, X + j, ldx);
     for (; j < n; j++)
-        solve_column(k, U, X + j, ldx);
+        solve_columns(1, k, U, X + j, ldx);
 }
 
 void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x) {
@@ -164,7 +173,7 @@ void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x) {
     }
 }
 
-void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
+void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a, size_t lda,
                       const plr_real *restrict X, size_t ldx, plr_real *restrict x) {
     PLR_ASSERT(ldx >= n || depth < 2);
     unsigned j = 0;
@@ -172,17 +181,19 @@ void plr_combine_rows(unsigned n, unsigned depth, const plr_real *restrict a,
         const plr_real *restrict row = X + j;
         plr_real *restrict to = x + j;
         plr_real sum[STRIP];
-        plr_tile_add(sum, a[0], row, to);
+        const plr_real *restrict factor = a;
+        plr_tile_add(sum, *factor, row, to);
         for (unsigned k = 1; k < depth; k++) {
+            factor += lda;
             row += ldx;
-            plr_tile_accumulate(sum, a[k], row);
+            plr_tile_accumulate(sum, *factor, row);
         }
         for (int c = 0; c < STRIP; c++)
             to[c] = sum[c];
     }
     for (; j < n; j++)
         for (unsigned k = 0; k < depth; k++)
-            x[j] = PLR_FMA(a[k], X[k * ldx + j], x[j]);
+            x[j] = PLR_FMA(a[k * lda], X[k * ldx + j], x[j]);
 }
 
 void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,

@@ -82,6 +82,25 @@ static inline size_t plr_upper_row(unsigned n, unsigned i) {
     return (size_t)i * n - (size_t)i * (i - 1U) / 2;
 }
 
+/* Row k of plr_upper6_add. Inlined for each k: with no loop left, S can stay in registers. */
+static inline void plr_upper6_add_row(unsigned k, plr_real *S, const plr_real *a,
+                                      const plr_real *b) {
+    plr_real *row = S + plr_upper_row(PLR_POSE_DIM, k) - k;
+    for (unsigned l = k; l < PLR_POSE_DIM; l++)
+        row[l] = PLR_FMA(a[k], b[l], row[l]);
+}
+
+/* S += a b^T, upper triangle of a 6x6, packed row by row. */
+static inline void plr_upper6_add(plr_real S[PLR_POSE_TRIANGLE], const plr_real a[PLR_POSE_DIM],
+                                  const plr_real b[PLR_POSE_DIM]) {
+    plr_upper6_add_row(0, S, a, b);
+    plr_upper6_add_row(1, S, a, b);
+    plr_upper6_add_row(2, S, a, b);
+    plr_upper6_add_row(3, S, a, b);
+    plr_upper6_add_row(4, S, a, b);
+    plr_upper6_add_row(5, S, a, b);
+}
+
 /* Cholesky: replaces the upper triangle of S, n x n, packed row by row, by U with U^T U = S. False
  * if a pivot is not a positive finite number; S is then destroyed. PLR_KERNEL_MARGIN elements after
  * the end of S must be readable. */
@@ -93,9 +112,10 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
 /* x <- U^-1 x, k long: U is k x k, packed upper. */
 void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x);
 
-/* x += sum_k a_k X_k: X is depth x n with leading dimension ldx, x is n long. */
-void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, const plr_real *X, size_t ldx,
-                      plr_real *x);
+/* x += sum_k a_k X_k: a is a column with leading dimension lda, X is depth x n with leading
+ * dimension ldx, x is n long. */
+void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, size_t lda, const plr_real *X,
+                      size_t ldx, plr_real *x);
 
 /* X_r -= sum_k A(k, r) V_k for four rows X_r of n elements, r = 0 .. 3: V is depth x n with leading
  * dimension ldv, A is depth x 4 with leading dimension lda, depth >= 2, n a multiple of

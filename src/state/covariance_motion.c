@@ -244,7 +244,7 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     plr_real *Xt = noise->Wt, *minus = f->work.Vt;
     plr_solve_upper_transposed(PLR_POSE_DIM, ld, noise->Lambda, Xt, ld);
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta, 1);
-    plr_combine_rows(n, PLR_POSE_DIM, noise->eta, Xt, ld, f->work.dx);
+    plr_combine_rows(n, PLR_POSE_DIM, noise->eta, 1, Xt, ld, f->work.dx);
     plr_sensitivity_close_noise(f, Xt, ld);
     for (unsigned i = 0; i < PLR_POSE_DIM * ld; i++)
         minus[i] = -Xt[i];

@@ -24,16 +24,14 @@ void plr_rigid_fit_clear(plr_rigid_fit *fit) {
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
                        const plr_real w[3], const plr_real W[3]) {
     fit->landmarks++;
-    for (unsigned row = 0; row < 3; row++) {
-        const plr_real *j = J + PLR_POSE_DIM * row;
-        plr_real *A = fit->A;
+    for (unsigned row = 0; row < 3; row++, J += PLR_POSE_DIM) {
+        plr_real weighted[PLR_POSE_DIM];
         fit->w2 = PLR_FMA(W[row] * w[row], w[row], fit->w2);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-            const plr_real weighted = W[row] * j[k];
-            fit->b[k] = PLR_FMA(weighted, w[row], fit->b[k]);
-            for (unsigned l = k; l < PLR_POSE_DIM; l++, A++)
-                *A = PLR_FMA(weighted, j[l], *A);
+            weighted[k] = W[row] * J[k];
+            fit->b[k] = PLR_FMA(weighted[k], w[row], fit->b[k]);
         }
+        plr_upper6_add(fit->A, weighted, J);
     }
 }
 

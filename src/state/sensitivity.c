@@ -85,7 +85,7 @@ void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const 
             continue;
         by_drivers(f, k, PLR_POSE_DIM, K, nu);
         by_drivers(f, k, V ? PLR_VELOCITY_DIM : 0, V, v);
-        plr_sensitivity_combine(f, k, PLR_POSE_DIM, nu, Wt, ld);
+        plr_sensitivity_combine(f, k, PLR_POSE_DIM, nu, 1, Wt, ld);
         if (V)
             set_velocity(f, k, v);
     }
@@ -97,7 +97,7 @@ void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld) {
         if (!plr_considers(f, k))
             continue;
         plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta_of_S[k], 1);
-        plr_sensitivity_combine(f, k, PLR_POSE_DIM, noise->eta_of_S[k], Xt, ld);
+        plr_sensitivity_combine(f, k, PLR_POSE_DIM, noise->eta_of_S[k], 1, Xt, ld);
     }
 }
 
@@ -111,8 +111,8 @@ void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]) {
 }
 
 void plr_sensitivity_combine(plr_filter *f, unsigned parameter, unsigned depth, const plr_real *a,
-                             const plr_real *X, size_t ld) {
-    plr_combine_rows(plr_covariance_dim(f), depth, a, X, ld, f->S[parameter]);
+                             size_t lda, const plr_real *X, size_t ld) {
+    plr_combine_rows(plr_covariance_dim(f), depth, a, lda, X, ld, f->S[parameter]);
 }
 
 /* ---------------------------------------------------------------- what is told */

@@ -11,7 +11,7 @@
  * covariances contains S diag(...) S^T: a consider covariance analysis (Tapley, Schutz and Born,
  * Statistical Orbit Determination, chapter 6; docs/MATH.md 20).
  *
- * A parameter whose sigma is zero costs nothing.
+ * A parameter whose sigma is zero costs next to nothing.
  */
 #ifndef PLR_STATE_SENSITIVITY_H
 #define PLR_STATE_SENSITIVITY_H
@@ -58,9 +58,9 @@ void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld);
 /* S_xi += B S_d, where the drivers move the pose alone. */
 void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]);
 
-/* S_k += sum over r of a_r X_r: X is depth x dim, ld between rows. */
+/* S_k += sum over r of a_r X_r: a has lda between its elements, X is depth x dim, ld between rows. */
 void plr_sensitivity_combine(plr_filter *f, unsigned parameter, unsigned depth, const plr_real *a,
-                             const plr_real *X, size_t ld);
+                             size_t lda, const plr_real *X, size_t ld);
 
 /* ---------------------------------------------------------------- what is told */
 

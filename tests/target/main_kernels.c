@@ -49,9 +49,9 @@ static void subtract_both_ways(tally *t, unsigned n, unsigned depth) {
     compare(t, fast, plain, sizeof fast / sizeof *fast);
 }
 
-/* A strip of columns is solved in tiles, a single column is not. */
+/* Strips of columns are solved in tiles, a few beside them together, a single column alone. */
 static void solve_both_ways(tally *t, unsigned k) {
-    enum { COLUMNS = STRIPS * PLR_TILE_COLUMNS };
+    enum { COLUMNS = STRIPS * PLR_TILE_COLUMNS + 4 };
     static plr_real factor[DEEPEST * (DEEPEST + 1) / 2 + PLR_KERNEL_MARGIN];
     fill(factor, sizeof factor / sizeof *factor);
     for (unsigned i = 0; i < k; i++) {

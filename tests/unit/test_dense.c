@@ -283,6 +283,43 @@ static void test_three_rows_refuse_what_the_general_kernel_refuses(void) {
         }
 }
 
+/* Widths beside the strips, and factors that lie apart. */
+static void test_combined_rows_have_the_bits_of_plain_loops(void) {
+    enum { DEPTH = 7, APART = 3, LD = WIDEST + 1 };
+    static plr_real a[DEPTH * APART], X[DEPTH * LD], x[WIDEST], plain[WIDEST];
+    rng r = rng_seeded(34);
+    for (unsigned i = 0; i < DEPTH * APART; i++)
+        a[i] = (plr_real)rng_normal(&r);
+    for (unsigned i = 0; i < DEPTH * LD; i++)
+        X[i] = (plr_real)rng_normal(&r);
+    for (unsigned n = 1; n <= WIDEST; n++)
+        for (unsigned depth = 0; depth <= DEPTH; depth++) {
+            for (unsigned j = 0; j < WIDEST; j++)
+                x[j] = plain[j] = (plr_real)rng_normal(&r);
+            for (unsigned j = 0; j < n; j++)
+                for (unsigned k = 0; k < depth; k++)
+                    plain[j] = PLR_FMA(a[APART * k], X[LD * k + j], plain[j]);
+            plr_combine_rows(n, depth, a, APART, X, LD, x);
+            TEST_ASSERT_EQUAL_MEMORY(plain, x, sizeof x);
+        }
+}
+
+static void test_a_product_added_to_a_6x6_has_the_bits_of_plain_loops(void) {
+    plr_real S[PLR_POSE_TRIANGLE + 1], plain[PLR_POSE_TRIANGLE + 1], a[6], b[6];
+    rng r = rng_seeded(35);
+    for (unsigned i = 0; i < PLR_POSE_TRIANGLE + 1; i++)
+        S[i] = plain[i] = (plr_real)rng_normal(&r);
+    for (unsigned i = 0; i < 6; i++) {
+        a[i] = (plr_real)rng_normal(&r);
+        b[i] = (plr_real)rng_normal(&r);
+    }
+    plr_upper6_add(S, a, b);
+    for (unsigned i = 0, at = 0; i < 6; i++)
+        for (unsigned j = i; j < 6; j++, at++)
+            plain[at] = PLR_FMA(a[i], b[j], plain[at]);
+    TEST_ASSERT_EQUAL_MEMORY(plain, S, sizeof S);
+}
+
 static void test_four_rows_together_have_the_bits_of_one_after_the_other(void) {
     enum { ROWS = 30, TILES = 3, N = TILES * PLR_TILE_COLUMNS };
     static plr_real A[8 * ROWS], V[ROWS * N], X[4][N], expected[4][N];
@@ -298,7 +335,7 @@ static void test_four_rows_together_have_the_bits_of_one_after_the_other(void) {
                 X[row][j] = expected[row][j] = (plr_real)rng_normal(&r);
             for (unsigned k = 0; k < depth; k++)
                 minus[k] = -A[8 * k + row];
-            plr_combine_rows(N, depth, minus, V, N, expected[row]);
+            plr_combine_rows(N, depth, minus, 1, V, N, expected[row]);
         }
         plr_real *const rows[4] = {X[0], X[1], X[2], X[3]};
         plr_subtract_four_rows(N, depth, A, 8, V, N, rows);
