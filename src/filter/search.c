@@ -30,7 +30,7 @@ static void prepare(plr_search *s, unsigned i, const plr_real Kt[PLR_MOTION_BY])
     plr_filter *f = s->f;
     plr_sighting *at = &s->sightings[i];
     const unsigned slot = f->work.slot_of[f->work.used[i]];
-    plr_covariance_motion_share(f, plr_covariance_row(f, slot), 3, Kt, at->V);
+    plr_covariance_motion_share(f, plr_covariance_row(f, slot), Kt, at->V);
     plr_covariance_landmark(f, slot, at->P);
     for (unsigned r = 0; r < 3; r++)
         for (unsigned c = 0; c < 3; c++)

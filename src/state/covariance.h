@@ -92,10 +92,11 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
  * if plr_covariance_open_noise was not called. */
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
 
-/* V = C L^-T = P_(:,d) Kt, Kt of plr_motion_transpose, for `rows` rows of the state from `row` on, rows x 6: their covariance
- * with nu. */
-void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real Kt[PLR_MOTION_BY], plr_real *V);
+/* V = C L^-T = P_(:,d) Kt, Kt of plr_motion_transpose, for three rows of the state from `row` on, 3 x 6:
+ * their covariance with nu. Every block has three or six rows */
+void plr_covariance_motion_share(const plr_filter *f, unsigned row,
+                                 const plr_real Kt[PLR_MOTION_BY],
+                                 plr_real V[PLR_ROWS * PLR_POSE_DIM]);
 
 /* The pose's rows alone, for drivers behind the pose: xi <- A xi + n, n = B x_d + N(0, Q), with
  * M = B P_dd B^T + Q. */

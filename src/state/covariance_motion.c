@@ -11,12 +11,28 @@
 
 enum { POSE_ROW = 0 }; /* the pose comes first in every layout */
 
-/* row[0..5] <- row[0..5] A^T, with At = A^T. */
-static inline void turn_pose_columns(plr_real *row, const plr_real At[PLR_POSE_SQUARE]) {
-    plr_real turned[PLR_POSE_DIM] = {0};
-    plr_gemm_nn(1, PLR_POSE_DIM, PLR_POSE_DIM, row, PLR_POSE_DIM, At, PLR_POSE_DIM, turned,
-                PLR_POSE_DIM);
-    memcpy(row, turned, sizeof turned);
+/* out_r = X_r B, r = 0 .. 2: three rows X_r of m numbers, B m x 6; out_r may be X_r. Every block of the
+ * state has three or six rows. Inlined: the sums stay in registers. */
+static inline void three_rows_by_six(unsigned m, const plr_real *const X[PLR_ROWS],
+                                     const plr_real *B, plr_real *const out[PLR_ROWS]) {
+    plr_real sum0[PLR_POSE_DIM] = {0}, sum1[PLR_POSE_DIM] = {0}, sum2[PLR_POSE_DIM] = {0};
+    for (unsigned l = 0; l < m; l++, B += PLR_POSE_DIM)
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+            sum0[k] = PLR_FMA(X[0][l], B[k], sum0[k]);
+            sum1[k] = PLR_FMA(X[1][l], B[k], sum1[k]);
+            sum2[k] = PLR_FMA(X[2][l], B[k], sum2[k]);
+        }
+    memcpy(out[0], sum0, sizeof sum0);
+    memcpy(out[1], sum1, sizeof sum1);
+    memcpy(out[2], sum2, sizeof sum2);
+}
+
+/* The pose's columns of three rows of P, from row i on: X <- X A^T, with At = A^T. */
+static void turn_pose_columns(plr_filter *f, unsigned i, const plr_real At[PLR_POSE_SQUARE]) {
+    plr_real *const row[PLR_ROWS] = {f->P + plr_packed_row(i), f->P + plr_packed_row(i + 1),
+                                     f->P + plr_packed_row(i + 2)};
+    const plr_real *const X[PLR_ROWS] = {row[0], row[1], row[2]};
+    three_rows_by_six(PLR_POSE_DIM, X, At, row);
 }
 
 static void transpose6(plr_real At[PLR_POSE_SQUARE], const plr_real A[PLR_POSE_SQUARE]) {
@@ -63,9 +79,7 @@ static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[P
     const plr_real *own = F + 9 * slot;
 
     turn_rows(first, own, r0, r1, r2);
-    turn_pose_columns(r0, At);
-    turn_pose_columns(r1, At);
-    turn_pose_columns(r2, At);
+    turn_pose_columns(f, s, At);
     for (unsigned j = first; j < s; j += 3, F += 9)
         transport_block(own, F, r0 + j, r1 + j, r2 + j);
 
@@ -84,8 +98,8 @@ static void turn_pose(plr_filter *f, unsigned end, const plr_real A[PLR_POSE_SQU
     plr_sandwich6(turned, A, P_xi);
     plr_set_block(f, POSE_ROW, PLR_POSE_DIM, POSE_ROW, PLR_POSE_DIM, turned);
     transpose6(At, A);
-    for (unsigned i = PLR_POSE_DIM; i < end; i++)
-        turn_pose_columns(f->P + plr_packed_row(i), At);
+    for (unsigned i = PLR_POSE_DIM; i < end; i += PLR_ROWS)
+        turn_pose_columns(f, i, At);
     plr_sensitivity_turn_pose(f, A);
 }
 
@@ -102,22 +116,21 @@ void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], 
     plr_sensitivity_turn_landmarks(f, F);
 }
 
-void plr_covariance_motion_share(const plr_filter *f, unsigned row, unsigned rows,
-                                 const plr_real Kt[PLR_MOTION_BY], plr_real *V) {
+void plr_covariance_motion_share(const plr_filter *f, unsigned row,
+                                 const plr_real Kt[PLR_MOTION_BY],
+                                 plr_real V[PLR_ROWS * PLR_POSE_DIM]) {
     const unsigned first = f->layout.driver, drivers = f->layout.drivers;
-    for (unsigned i = row; i < row + rows; i++) {
-        plr_real before[PLR_DRIVERS];
-        const plr_real *P_id = f->P + plr_packed_row(i) + first;
-        if (i < first + drivers) { /* a part of it is above the diagonal */
-            plr_covariance_with_drivers(f, i, 1, before);
-            P_id = before;
-        }
-        plr_real sum[PLR_POSE_DIM] = {0}; /* in registers */
-        for (unsigned d = 0; d < drivers; d++)
-            for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-                sum[k] = PLR_FMA(P_id[d], Kt[PLR_POSE_DIM * d + k], sum[k]);
-        memcpy(V + PLR_POSE_DIM * (i - row), sum, sizeof sum);
+    plr_real before[PLR_ROWS * PLR_DRIVERS];
+    const plr_real *X[PLR_ROWS];
+    plr_real *const out[PLR_ROWS] = {V, V + PLR_POSE_DIM, V + 2 * PLR_POSE_DIM};
+    for (unsigned r = 0; r < PLR_ROWS; r++)
+        X[r] = f->P + plr_packed_row(row + r) + first;
+    if (row < first + drivers) { /* a part of it is above the diagonal */
+        plr_covariance_with_drivers(f, row, PLR_ROWS, before);
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            X[r] = before + drivers * r;
     }
+    three_rows_by_six(drivers, X, Kt, out);
 }
 
 /* X, rows x drivers with leading dimension PLR_DRIVERS, is a derivative by the drivers before a
@@ -214,11 +227,12 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
         drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, V);
     }
     plr_sensitivity_move(f, K, carries ? V : NULL, noise->Wt, ld);
-    for (unsigned i = 0; i < n; i++) {
-        plr_real v[PLR_POSE_DIM];
-        plr_covariance_motion_share(f, i, 1, Kt, v);
+    for (unsigned i = 0; i < n; i += PLR_ROWS) {
+        plr_real v[PLR_ROWS * PLR_POSE_DIM];
+        plr_covariance_motion_share(f, i, Kt, v);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            Vt[k * ld + i] = v[k];
+            for (unsigned r = 0; r < PLR_ROWS; r++)
+                Vt[k * ld + i + r] = v[PLR_POSE_DIM * r + k];
     }
     if (carries)
         carry_core(f, motion, V, Vt, ld);
@@ -292,11 +306,12 @@ void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE
     /* the other rows begin with their pose columns, and the bias columns follow */
     plr_real At[PLR_POSE_SQUARE];
     transpose6(At, A);
-    for (unsigned i = PLR_POSE_DIM; i < n; i++) {
-        plr_real *row = f->P + plr_packed_row(i);
-        plr_real P_id[PLR_DRIVERS] = {0};
-        plr_covariance_with_drivers(f, i, 1, P_id);
-        turn_pose_columns(row, At);
-        plr_gemm_nt(1, PLR_POSE_DIM, drivers, P_id, PLR_DRIVERS, B, PLR_DRIVERS, row, PLR_POSE_DIM);
+    for (unsigned i = PLR_POSE_DIM; i < n; i += PLR_ROWS) {
+        plr_real P_id[PLR_ROWS * PLR_DRIVERS] = {0};
+        plr_covariance_with_drivers(f, i, PLR_ROWS, P_id);
+        turn_pose_columns(f, i, At);
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            plr_gemm_nt(1, PLR_POSE_DIM, drivers, P_id + drivers * r, PLR_DRIVERS, B, PLR_DRIVERS,
+                        f->P + plr_packed_row(i + r), PLR_POSE_DIM);
     }
 }

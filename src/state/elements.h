@@ -11,10 +11,10 @@ static inline void plr_get_block(const plr_filter *f, unsigned row, unsigned row
                                  unsigned columns, plr_real *B) {
     for (unsigned i = 0; i < rows; i++) {
         const unsigned r = row + i;
-        const plr_real *line = f->P + plr_packed_row(r);
-        for (unsigned j = 0; j < columns; j++) {
-            const unsigned c = column + j;
-            B[i * columns + j] = c <= r ? line[c] : f->P[plr_packed_row(c) + r];
+        const plr_real *at = f->P + plr_packed_at(r, column);
+        for (unsigned c = column; c < column + columns; c++) {
+            *B++ = *at;
+            at += c < r ? 1 : c + 1; /* along row r, then down column r */
         }
     }
 }
