@@ -143,15 +143,22 @@ class Result:
         return loaded
 
 
-def run(*arguments: str | Path, program: str = "pelorus-replay", stdin: bytes = b"") -> Result:
-    """Run the program; a crash fails the test."""
+def run(
+    *arguments: str | Path,
+    program: str = "pelorus-replay",
+    stdin: bytes = b"",
+    status: int | None = OK,
+) -> Result:
+    """Run the program, which must end with that status; None: with any, but no crash."""
     path = BIN / program
     if not path.exists():
         pytest.skip(f"{path} is not built")
     command = [str(path), *map(str, arguments)]
     done = subprocess.run(command, input=stdin, capture_output=True, check=False, timeout=1800)
     assert done.returncode >= 0, f"killed by signal {-done.returncode}"
-    return Result(done.returncode, done.stdout.decode(), done.stderr.decode())
+    result = Result(done.returncode, done.stdout.decode(), done.stderr.decode())
+    assert status is None or result.status == status, result.stderr
+    return result
 
 
 def err0_m(log: Path) -> float:
@@ -172,7 +179,6 @@ def judged(
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.plr"
         result = run(recording, *options, "--json", "--out", log, program=program)
-        assert result.status == OK, result.stderr
         return result.summary | judge(log_of(log))
 
 

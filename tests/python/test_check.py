@@ -66,7 +66,6 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
 ) -> None:
     conf = tmp_path / "tuned.conf"
     said = pelorus("check", simulated, "--out", conf, "--bin", BIN, "--json", *said_wrong())
-    assert said.status == 0, said.err
     found = json.loads(said.out)
     settings = found["settings"]
     assert float(settings["pixel-sigma"]) == pytest.approx(1.5, rel=0.2)
@@ -82,7 +81,7 @@ def test_sigmas_of_a_simulated_drive_are_found_within_20_percent(
     assert float(cost["after"]) < float(cost["before"])
     text = conf.read_text(encoding="utf-8")
     assert "# pixel-sigma 0.8 should be 1." in text
-    again = pelorus("evaluate", simulated, "--config", conf, "--bin", BIN)
+    again = pelorus("evaluate", simulated, "--config", conf, "--bin", BIN, status=None)
     assert again.status in (0, 1)  # it is a settings file that the replay takes
     assert "unknown" not in again.err
 
@@ -127,7 +126,6 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
     conf = tmp_path / "tuned.conf"
     said = pelorus("check", early, "--out", conf, "--bin", BIN, "--json", *sets)
-    assert said.status == 0, said.err
     found = json.loads(said.out)
     settings = found["settings"]
     assert float(settings["pixel-sigma"]) == pytest.approx(0.8, rel=0.2)
@@ -399,15 +397,13 @@ def test_a_recording_with_nothing_to_check_says_what_it_lacks(
 ) -> None:
     path = tmp_path / "x.plr"
     write(path, [m for m in drive(5) if not isinstance(m, kind)])
-    said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN)
-    assert said.status == 1
+    said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN, status=1)
     assert ("no twists" if kind is Twist else "no stereo frames") in said.err
     assert not (tmp_path / "t.conf").exists()
 
 
 def test_a_folder_is_refused_with_what_would_be_right(tmp_path: Path, pelorus: Run) -> None:
-    said = pelorus("check", tmp_path, "--out", tmp_path / "t.conf", "--bin", BIN)
-    assert said.status == 1
+    said = pelorus("check", tmp_path, "--out", tmp_path / "t.conf", "--bin", BIN, status=1)
     words = " ".join(said.err.split())
     assert "is a folder, a recording is a .plr file: `pelorus convert` makes one" in words
     assert not (tmp_path / "t.conf").exists()
@@ -417,8 +413,9 @@ def test_a_settings_file_that_is_none_is_refused_by_line(tmp_path: Path, pelorus
     path, conf = tmp_path / "x.plr", tmp_path / "bad.conf"
     write(path, drive(5))
     conf.write_text("# mine\npixel-sigma 2\n", encoding="utf-8")
-    said = pelorus("check", path, "--config", conf, "--out", tmp_path / "t.conf", "--bin", BIN)
-    assert said.status == 1
+    said = pelorus(
+        "check", path, "--config", conf, "--out", tmp_path / "t.conf", "--bin", BIN, status=1
+    )
     assert "bad.conf: line 2: 'pixel-sigma 2' is not name = value" in said.err
     with pytest.raises(PelorusError, match="no stereo frames"):
         recording_of([header(), Twist(0)])

@@ -43,7 +43,6 @@ SUBCOMMANDS = [
 @pytest.mark.parametrize("command", SUBCOMMANDS, ids=" ".join)
 def test_every_help_shows_an_example(pelorus: Run, command: tuple[str, ...]) -> None:
     outcome = pelorus(*command, "--help")
-    assert outcome.status == 0
     assert f"Example:  pelorus {' '.join(command)}" in outcome.out
 
 
@@ -52,8 +51,8 @@ def test_the_commands_and_the_version_are_there(pelorus: Run) -> None:
     for command in COMMANDS:
         assert command in text
     assert pelorus("--version").out.strip() == f"pelorus {__version__}"
-    assert pelorus("no-such-command").status == 2
-    assert pelorus("info").status == 2
+    pelorus("no-such-command", status=2)
+    pelorus("info", status=2)
 
 
 def test_the_package_runs_as_a_module_and_errors_go_to_stderr(tmp_path: Path) -> None:

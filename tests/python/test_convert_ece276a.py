@@ -48,7 +48,6 @@ def test_everything_of_an_npz_arrives(tmp_path: Path, pelorus: Run, edition: int
     drive = clean(**SHORT)
     source, target = save_npz(tmp_path / "drive.npz", drive, edition), tmp_path / "drive.plr"
     said = pelorus("convert", "ece276a", source, target)
-    assert said.status == 0, said.err
     assert said.out.count("good") == 4
     assert "twist noise: cannot tell" in said.out, "61 frames are too few"
     header = messages_of(target, Header)[0]
@@ -93,7 +92,6 @@ def test_each_fault_is_mended_whatever_the_keys_are_called(tmp_path: Path, pelor
     for edition in (2019, 2021):
         source, target = save_npz(tmp_path / "b.npz", broken, edition), tmp_path / "b.plr"
         said = pelorus("convert", "ece276a", source, target)
-        assert said.status == 0, said.err
         assert said.out.count("FOUND") >= 3
         header = messages_of(target, Header)[0]
         assert np.allclose(header.R_CB, drive.T_CB.R, atol=1e-9)
@@ -110,7 +108,7 @@ def test_fix_none_leaves_the_file_as_it_is(tmp_path: Path, pelorus: Run) -> None
     broken = with_turned_axes(with_camera_position(stale))
     source, target = save_npz(tmp_path / "b.npz", broken), tmp_path / "b.plr"
     arguments = ("--fix", "none", "--twist-timing", "mid")
-    assert pelorus("convert", "ece276a", source, target, *arguments).status == 0
+    pelorus("convert", "ece276a", source, target, *arguments)
     header = messages_of(target, Header)[0]
     assert np.allclose(header.R_CB, broken.T_CB.R)
     assert np.allclose(header.t_CB_m, broken.T_CB.p)
@@ -165,7 +163,6 @@ def test_the_header_suggests_the_noise_and_convert_says_so(tmp_path: Path, pelor
     source = save_npz(tmp_path / "n.npz", with_camera_position(clean(3, **NOISY)))
     target = tmp_path / "n.plr"
     said = pelorus("convert", "ece276a", source, target)
-    assert said.status == 0, said.err
     assert "the HEADER suggests velocity-sigma 0." in " ".join(said.out.split())
     noise = messages_of(target, Header)[0].noise
     assert noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
@@ -183,7 +180,7 @@ def test_kitti_truth_comes_to_the_body_through_the_mended_extrinsic(
     truth = save_kitti(tmp_path / "poses.txt", poses.at(slice(0, 500)))  # fewer than frames
     source = save_npz(tmp_path / "a.npz", with_camera_position(drive))
     target = tmp_path / "a.plr"
-    assert pelorus("convert", "ece276a", source, target, "--truth", truth).status == 0
+    pelorus("convert", "ece276a", source, target, "--truth", truth)
     written, frames = messages_of(target, Truth), messages_of(target, Stereo)
     assert [m.t_ns for m in written] == [m.t_ns for m in frames[:500]]
     expected = se3.compose(se3.inverse(drive.truth.at(0)), drive.truth)
@@ -231,8 +228,7 @@ def test_a_misshapen_npz_is_refused_with_its_name_and_the_cause(
     tmp_path: Path, pelorus: Run, changes: dict[str, Any], said: str
 ) -> None:
     source = save_npz(tmp_path / "bad.npz", clean(**SHORT), **changes)
-    outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr", status=1)
     assert "bad.npz" in outcome.err
     assert re.search(said, outcome.err), outcome.err
     assert list(tmp_path.glob("out*")) == []
@@ -245,10 +241,9 @@ def test_a_file_that_is_none_is_refused(
 ) -> None:
     source = tmp_path / "bad.file"
     source.write_bytes(content)
-    outcome = pelorus("convert", command, source, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", command, source, tmp_path / "out.plr", status=1)
     assert "bad.file" in outcome.err
-    assert pelorus("convert", command, tmp_path / "no.file", tmp_path / "out.plr").status == 1
+    pelorus("convert", command, tmp_path / "no.file", tmp_path / "out.plr", status=1)
 
 
 def test_a_recording_is_no_npz_and_nobody_is_told_to_unpickle_it(
@@ -256,8 +251,7 @@ def test_a_recording_is_no_npz_and_nobody_is_told_to_unpickle_it(
 ) -> None:
     source = tmp_path / "drive.plr"
     source.write_bytes(b"\x00\x12 something else")
-    outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr", status=1)
     assert "drive.plr: is no .npz file" in outcome.err
 
 
@@ -284,8 +278,9 @@ def test_truth_that_does_not_fit_is_refused(tmp_path: Path, pelorus: Run) -> Non
         (skewed, "line 1: holds no rotation"),
         (tmp_path / "absent.txt", "cannot be read"),
     ):
-        outcome = pelorus("convert", "ece276a", source, tmp_path / "out.plr", "--truth", path)
-        assert outcome.status == 1
+        outcome = pelorus(
+            "convert", "ece276a", source, tmp_path / "out.plr", "--truth", path, status=1
+        )
         assert path.name in outcome.err
         assert said in outcome.err
 
@@ -296,8 +291,7 @@ def test_an_output_that_cannot_be_written_is_told_and_leaves_nothing(
     source = save_npz(tmp_path / "d.npz", clean(**SHORT))
     (tmp_path / "folder.plr").mkdir()
     for target in (tmp_path / "no" / "such" / "place.plr", tmp_path / "folder.plr"):
-        outcome = pelorus("convert", "ece276a", source, target)
-        assert outcome.status == 1
+        outcome = pelorus("convert", "ece276a", source, target, status=1)
         assert target.name in outcome.err
         assert "cannot be written" in outcome.err
     assert not list(tmp_path.glob("*.part"))

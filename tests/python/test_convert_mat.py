@@ -20,7 +20,7 @@ def test_everything_of_a_klt_drive_arrives(tmp_path: Path, pelorus: Run, time_fi
     drive = clean(**SHORT)
     source, target = tmp_path / "klt.mat", tmp_path / "klt.plr"
     savemat(source, mat_arrays(drive, time_first))
-    assert pelorus("convert", "klt", source, target).status == 0
+    pelorus("convert", "klt", source, target)
     header = messages_of(target, Header)[0]
     assert np.allclose(header.R_CB, drive.T_CB.R)
     assert np.allclose(header.t_CB_m, drive.T_CB.p)
@@ -44,8 +44,7 @@ def test_starry_night_brings_its_landmarks_and_its_noise(tmp_path: Path, pelorus
     }
     source, target = tmp_path / "starry.mat", tmp_path / "starry.plr"
     savemat(source, mat_arrays(drive) | noise | {"rho_i_pj_i": points})
-    outcome = pelorus("convert", "starry-night", source, target, "--landmark-sigma", "0.1")
-    assert outcome.status == 0, outcome.err
+    pelorus("convert", "starry-night", source, target, "--landmark-sigma", "0.1")
     header, known = messages_of(target, Header)[0], messages_of(target, Landmark)
     assert header.twist_timing is TwistTiming.START
     assert np.isclose(header.noise.pixel_sigma_px, np.sqrt(10))
@@ -78,8 +77,7 @@ def test_a_misshapen_mat_is_refused(
 ) -> None:
     source = tmp_path / "bad.mat"
     savemat(source, mat_arrays(clean(**SHORT)) | changes)
-    outcome = pelorus("convert", "klt", source, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "klt", source, tmp_path / "out.plr", status=1)
     assert "bad.mat" in outcome.err
     assert said in outcome.err
 
@@ -88,13 +86,14 @@ def test_starry_night_without_landmarks_is_refused(tmp_path: Path, pelorus: Run)
     source = tmp_path / "klt.mat"
     arrays = mat_arrays(clean(**SHORT))
     savemat(source, arrays)
-    outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr", status=1)
     assert "lacks the array rho_i_pj_i" in outcome.err
     savemat(source, arrays | {"rho_i_pj_i": np.zeros((3, 2))})
-    outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr")
+    outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr", status=1)
     assert "rho_i_pj_i has 2" in outcome.err
-    outcome = pelorus("convert", "starry-night", source, tmp_path / "o.plr", "--landmark-sigma", 0)
+    outcome = pelorus(
+        "convert", "starry-night", source, tmp_path / "o.plr", "--landmark-sigma", 0, status=1
+    )
     assert "must be positive" in outcome.err
 
 
@@ -105,5 +104,4 @@ def test_what_is_wrong_with_a_drive_is_named(tmp_path: Path, pelorus: Run) -> No
     source, target = tmp_path / "klt.mat", tmp_path / "klt.plr"
     savemat(source, arrays)
     said = pelorus("convert", "klt", source, target)
-    assert said.status == 0, said.err
     assert "unit-degrees: FOUND" in said.out

@@ -56,7 +56,7 @@ def test_a_replay_writes_through_a_link_and_onto_standard_output(
     log, link, piped = (tmp_path / name for name in ("log.plr", "link.plr", "piped.plr"))
     log.write_bytes(b"old")
     link.symlink_to(log.name)
-    assert run(source, "--out", link, "--quiet").status == OK
+    run(source, "--out", link, "--quiet")
     assert link.is_symlink()
     with piped.open("wb") as stream:
         command = [str(program), str(source), "--out", "/dev/stdout", "--quiet"]
@@ -71,6 +71,6 @@ def test_a_recording_that_is_refused_leaves_an_earlier_result_alone(
 ) -> None:
     log = tmp_path / "log.plr"
     log.write_bytes(YESTERDAY)
-    assert run(record(b"P6 640 480 255 " * 200), "--out", log).status != OK
+    assert run(record(b"P6 640 480 255 " * 200), "--out", log, status=None).status != OK
     assert log.read_bytes() == YESTERDAY
     assert not list(tmp_path.glob("*.part"))

@@ -84,8 +84,7 @@ def test_an_npz_that_is_none_is_refused_with_what_would_be_right(
     ):
         path = tmp_path / name
         path.write_bytes(content)
-        outcome = pelorus("convert", "ece276a", path, tmp_path / "out.plr")
-        assert outcome.status == 1
+        outcome = pelorus("convert", "ece276a", path, tmp_path / "out.plr", status=1)
         assert f"{path}: {said}" in outcome.err
         assert outcome.out == ""
     assert not list(tmp_path.glob("out.plr*"))
@@ -103,8 +102,7 @@ def test_an_archive_that_would_fill_the_memory_is_not_unpacked(
         ("bomb.mat", "klt", r"more than 1000000 bytes, which are due at most"),
     ):
         assert (tmp_path / name).stat().st_size < 100_000
-        outcome = pelorus("convert", form, tmp_path / name, tmp_path / "out.plr")
-        assert outcome.status == 1
+        outcome = pelorus("convert", form, tmp_path / name, tmp_path / "out.plr", status=1)
         assert re.search(rf"{name}: .*{said}", outcome.err)
 
 
@@ -198,8 +196,7 @@ def test_variances_that_are_none_are_refused(tmp_path: Path, pelorus: Run) -> No
     arrays = mat_arrays(drive) | {"rho_i_pj_i": np.zeros((3, int(drive.tracks.id.max()) + 1))}
     source = tmp_path / "starry.mat"
     savemat(source, arrays | {"y_var": -1.0, "v_var": 1.0, "w_var": 1.0})
-    outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "starry-night", source, tmp_path / "out.plr", status=1)
     assert "y_var is [-1.]; variances that are not negative are due" in outcome.err
 
 
@@ -258,11 +255,10 @@ def test_a_file_whose_name_is_no_text_is_converted_and_said_visibly(
     source, target = tmp_path / "dri\udcffve.npz", tmp_path / "out\udcff.plr"
     np.savez_compressed(source, **npz_arrays(drive))
     outcome = pelorus("convert", "ece276a", source, target)
-    assert outcome.status == 0, outcome.err
     assert r"out\udcff.plr: " in outcome.out
     assert messages_of(target, Header)[0].name == "dri?ve"
     assert r"out\udcff.plr" in pelorus("info", target).out
-    assert r"x\udcff: cannot be read" in pelorus("info", tmp_path / "x\udcff").err
+    assert r"x\udcff: cannot be read" in pelorus("info", tmp_path / "x\udcff", status=1).err
 
 
 def test_a_long_name_is_cut_between_characters() -> None:

@@ -72,7 +72,6 @@ def test_imu_conf_leaves_the_noises_to_the_recording(recording: Path) -> None:
 
 def figures(pelorus: Run, recording: Path, *options: object) -> dict[str, float]:
     said = pelorus("evaluate", recording, "--bin", BIN, "--json", *options)
-    assert said.status == 0, said.err
     found: dict[str, float] = json.loads(said.out)
     return found
 

@@ -118,6 +118,5 @@ def test_the_converter_says_what_is_wrong(tmp_path: Path, pelorus: Run) -> None:
     arrays = npz_arrays(simulated)
     arrays["imu"] = arrays["imu"] * np.array([1, 1, 1, -1, -1, -1])
     said = pelorus("convert", "imu-npz", written(tmp_path / "x.npz", arrays), tmp_path / "x.plr")
-    assert said.status == 0, said.err
     assert "gravity-sign: FOUND" in said.out
     assert "wrong sign" in said.out

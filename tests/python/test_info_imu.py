@@ -29,7 +29,6 @@ def test_rates_gaps_and_ranges_are_those_of_the_readings(tmp_path: Path, pelorus
     faults = ImuFaults(imu_missing=Span(2.0, 0.5), accel_range_mps2=10.0)
     path = written(tmp_path / "gap.plr", faults)
     said = pelorus("info", path)
-    assert said.status == 0
     words = " ".join(said.out.split())
     assert "moved by an IMU" in words
     assert "IMU 0.000 6.000 200.00 1 0.505" in words

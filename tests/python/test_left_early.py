@@ -78,7 +78,7 @@ def test_a_report_that_is_interrupted_leaves_nothing(
             patch.setattr(report_command, "carry_out", interrupted)
         else:
             patch.setattr(page, "write", interrupted)
-        assert pelorus("report", source, "--out", folder).status != 0
+        assert pelorus("report", source, "--out", folder, status=None).status != 0
     assert [path.name for path in tmp_path.iterdir()] == [source.name]
 
 
@@ -87,10 +87,12 @@ def test_a_report_that_is_interrupted_leaves_the_earlier_one(
 ) -> None:
     built_programs()
     source, folder = recorded(tmp_path, drive()), tmp_path / "report"
-    assert pelorus("report", source, "--out", folder).status == 0
+    pelorus("report", source, "--out", folder)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert folder / "runs" / "yours.plr" in before
     with monkeypatch.context() as patch:
         patch.setattr(page, "write", interrupted)
-        assert pelorus("report", source, "--out", folder, "--set", "bias=off").status != 0
+        assert (
+            pelorus("report", source, "--out", folder, "--set", "bias=off", status=None).status != 0
+        )
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before

@@ -183,7 +183,6 @@ def test_check_names_the_fault_and_writes_no_settings(tmp_path: Path, pelorus: R
     ]
     write(path, swapped)
     said = pelorus("check", path, "--out", conf, "--bin", BIN)
-    assert said.status == 0, said.err
     assert said.out.startswith("do not trust this")
     assert "left and right are swapped" in said.out
     assert not conf.exists()

@@ -26,8 +26,7 @@ def test_a_folder_and_a_kalibr_file_find_the_way_to_centimetres(
     folder = once(f"room-{cameras.model}", Room(cameras).write)
     target = tmp_path / "out.plr"
     words = ("--calibration", folder / "camchain.yaml", "--calibration", folder / "imu.yaml")
-    outcome = pelorus("convert", "euroc", folder, target, *words)
-    assert outcome.status == 0, outcome.err
+    pelorus("convert", "euroc", folder, target, *words)
     assert messages_of(target, Header)[0].process is Process.IMU
     found = judged(target)
     assert found["err0_m"] < 0.03

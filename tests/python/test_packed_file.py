@@ -74,8 +74,7 @@ def test_behind_damage_nothing_can_be_unpacked_and_that_is_told(
     assert counts.damaged >= 1
     assert "zstd packing is damaged" in pelorus("info", path).out
     path.write_bytes(packed_file.MAGIC + b"nonsense")
-    said = pelorus("info", path)
-    assert said.status == 1
+    said = pelorus("info", path, status=1)
     assert "damaged: the zstd packing is damaged here" in said.err
 
 
@@ -95,8 +94,8 @@ def test_a_killed_recorder_leaves_all_but_the_last_block(tmp_path: Path) -> None
 def test_a_simulated_drive_is_packed_by_its_name(pelorus: Run, tmp_path: Path) -> None:
     plain, small = tmp_path / "drive.plr", tmp_path / "drive.plr.zst"
     options = ("--seed", 3, "--duration", 5)
-    assert pelorus("simulate", plain, *options).status == 0
-    assert pelorus("simulate", small, *options).status == 0
+    pelorus("simulate", plain, *options)
+    pelorus("simulate", small, *options)
     assert small.stat().st_size < 0.9 * plain.stat().st_size
     assert b"".join(packed_file.pieces(small)) == plain.read_bytes()
     assert not list(tmp_path.glob("*.part"))
@@ -109,18 +108,19 @@ def test_a_command_takes_a_packed_recording(pelorus: Run, tmp_path: Path, comman
     frames = 1 if command == "report" else FRAMES  # of one it draws one picture, of more many
     path, out = packed(tmp_path, encode(drive(frames))), tmp_path / "out"
     options: dict[str, tuple[object, ...]] = {"info": (), "evaluate": ("--bin", BIN)}
-    said = pelorus(command, path, *options.get(command, ("--out", out, "--bin", BIN)))
-    assert said.status == 0, said.err
+    pelorus(command, path, *options.get(command, ("--out", out, "--bin", BIN)))
 
 
 def test_a_robots_log_is_packed_and_compared(pelorus: Run, tmp_path: Path) -> None:
     path, log = packed(tmp_path, encode(drive(12))), tmp_path / "flight.plr.zst"
     with TcpBoard(FakeBoard()) as board:
-        said = pelorus("stream", path, "--to", board.target, "--record", log)
-    assert said.status == 0, said.err
+        pelorus("stream", path, "--to", board.target, "--record", log)
     assert log.read_bytes().startswith(packed_file.MAGIC)
     assert wire.read_file(log)[1].ended
-    assert pelorus("compare", log, "--bin", BIN).status in (0, 1)  # the fake board's own bits
+    assert pelorus("compare", log, "--bin", BIN, status=None).status in (
+        0,
+        1,
+    )  # the fake board's own bits
 
 
 def test_0027_takes_no_more_than_15_bytes_an_observation(

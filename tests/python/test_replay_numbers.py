@@ -63,7 +63,6 @@ def test_strange_numbers_in_twists(
         messages[i] = poisoned(messages[i], 8 + 8 * field, value)
     options = ("--twist-timing", timing, "--json", "--out", out)
     result = run(record(messages), *options, program=program)
-    assert result.status == OK
     assert result.summary["messages_refused"] == 6, result.stderr
     assert assert_healthy(out) == FRAMES
     assert err0_m(out) < 0.3
@@ -82,7 +81,6 @@ def test_strange_numbers_in_observations(
                 pixels[n, n] = value
             messages[i] = replace(m, pixels=pixels)
     result = run(record(messages), "--json", "--out", out, program=program)
-    assert result.status == OK
     assert result.summary["refused_observations"] == 4 * FRAMES
     assert "4 left out (not finite, or beyond any image)" in result.stderr
     assert assert_healthy(out) == FRAMES
@@ -99,7 +97,6 @@ def test_strange_numbers_in_truth(record: Record, tmp_path: Path, value: float, 
             i = 2 + 3 * k
             messages[i] = poisoned(messages[i], 8 + 8 * field, value)
         result = run(record(messages), "--mode", mode, "--json", "--out", out)
-        assert result.status == OK
         poses = poses_of(out)
         assert all(np.isfinite(pose.p_WB_m).all() for pose in poses)
         assert all(np.isfinite(pose.covariance).all() for pose in poses)
@@ -115,7 +112,6 @@ def test_strange_numbers_in_a_start(record: Record, tmp_path: Path, value: float
     for at in offsets:
         messages = [header(), poisoned(whole, at, value), *drive(6)[1:]]
         result = run(record(messages), "--bias", "on", "--json", "--out", out)
-        assert result.status == OK, result.stderr
         assert assert_healthy(out) == 6
         assert result.summary["messages_refused"] == 1
         assert "START: refused" in result.stderr
@@ -126,7 +122,7 @@ def test_strange_numbers_in_a_header(record: Record, tmp_path: Path, value: floa
     out = tmp_path / "out.plr"
     for at in range(10, 202, 8):
         path = record([poisoned(header(), at, value), *drive(6)[1:]])
-        result = run(path, "--json", "--out", out)
+        result = run(path, "--json", "--out", out, status=None)
         assert result.status in (OK, RECORDING)
         if at < 146 and not math.isfinite(value):
             assert result.status == RECORDING
@@ -141,7 +137,6 @@ def test_strange_settings_are_left_out_and_named(record: Record) -> None:
     for value in STRANGE:
         wanted = Config(dict.fromkeys(settings.SETTINGS, value) | {200: 1.0})
         result = run(record([header(), wanted, *drive(6)[1:]]), "--json")
-        assert result.status == OK
         assert result.summary["messages_refused"] == len(settings.SETTINGS) + 1
         assert "CONFIG: pixel-sigma = " in result.stderr
         assert "setting 200 is not known" in result.stderr
@@ -154,7 +149,6 @@ def test_strange_numbers_in_known_landmarks(record: Record, tmp_path: Path, valu
     for field in range(9):
         landmarks[field] = poisoned(landmarks[field], 18 + 8 * field, value)
     path = record([header(), *landmarks, *drive()[1:]])
-    result = run(path, "--mode", "localization", "--json", "--out", out)
-    assert result.status == OK
+    run(path, "--mode", "localization", "--json", "--out", out)
     assert assert_healthy(out) == FRAMES
     assert err0_m(out) < 0.2

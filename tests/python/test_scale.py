@@ -142,7 +142,6 @@ def test_a_verdict_is_no_better_than_what_the_drive_tells_of_the_scale(
     path = tmp_path / "drive.plr"
     everyday_drive(settings, 3000).write(path)
     said = pelorus("check", path, "--out", tmp_path / "t.conf", "--bin", BIN, "--json")
-    assert said.status == 0, said.err
     found = json.loads(said.out)
     assert found["grade"] == grade, found["remarks"]
     texts = [remark["text"] for remark in found["remarks"] if remark["grade"] == "care"]

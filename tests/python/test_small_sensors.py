@@ -120,8 +120,7 @@ def test_a_standstill_is_told_while_the_body_rests_and_ends_before_it_drives_off
 def test_options_of_a_sensor_that_make_no_sense_are_refused_by_name(
     tmp_path: Path, pelorus: Run, options: tuple[object, ...], said: str
 ) -> None:
-    outcome = pelorus("simulate", tmp_path / "x.plr", *options)
-    assert outcome.status == 1
+    outcome = pelorus("simulate", tmp_path / "x.plr", *options, status=1)
     assert said in outcome.err
     assert not (tmp_path / "x.plr").exists()
 
@@ -130,7 +129,7 @@ def test_info_shows_readings_by_sensor(tmp_path: Path, pelorus: Run) -> None:
     target = tmp_path / "x.plr"
     options = ("--duration", 10, "--wheel-rate", 50, "--wheel-axes", "xy", "--wheel-sigma", 0.03)
     stops = ("--stop-from", 2, "--stop-for", 3, "--standstill-rate", 10)
-    assert pelorus("simulate", target, *options, *stops).status == 0
+    pelorus("simulate", target, *options, *stops)
     found = messages_of(target, Reading)
     assert [m.t_ns for m in found] == sorted(m.t_ns for m in found)
     said = " ".join(pelorus("info", target).out.split())
@@ -192,7 +191,6 @@ def test_readings_from_csv_arrive_whole(tmp_path: Path, pelorus: Run) -> None:
     options = [*csv_files(tmp_path, clean(**SHORT)), *sensor_files(tmp_path)]
     target = tmp_path / "mine.plr"
     outcome = pelorus("convert", "csv", *options, target)
-    assert outcome.status == 0, outcome.err
     assert "9 readings" in " ".join(outcome.out.split())
     found = messages_of(target, Reading)
     assert [m.sensor for m in found] == [WHEEL, STANDSTILL, POSITION] * 3
@@ -215,7 +213,7 @@ def test_two_sensors_of_a_kind_are_two_files(tmp_path: Path, pelorus: Run) -> No
     second = {"t_ns": [1000, 1500], "pz_m": [3, 4], "sigma_m": [1, 1]}
     paths = write_csv(tmp_path / "a.csv", first), write_csv(tmp_path / "b.csv", second)
     options = ("--position", paths[0], "--position", paths[1])
-    assert pelorus("convert", "csv", *files, *options, tmp_path / "x.plr").status == 0
+    pelorus("convert", "csv", *files, *options, tmp_path / "x.plr")
     found = [(m.t_ns, m.axes) for m in messages_of(tmp_path / "x.plr", Reading)]
     assert found == [(1000, 1), (1000, 4), (1500, 4), (2000, 1)]
     assert "does not ascend" not in pelorus("info", tmp_path / "x.plr").out
@@ -244,8 +242,7 @@ def test_a_mistake_in_a_sensors_file_is_told_by_file_row_and_name(
     text = (tmp_path / name).read_bytes().decode()
     assert old in text
     (tmp_path / name).write_text(text.replace(old, new, 1))
-    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr", status=1)
     assert name in outcome.err
     assert said in outcome.err, outcome.err
     assert not (tmp_path / "out.plr").exists()
@@ -257,8 +254,7 @@ def test_readings_of_another_clock_are_refused_and_early_ones_left_out(
     options = [*csv_files(tmp_path, clean(**SHORT)), *sensor_files(tmp_path)]
     wheel = options[options.index("--wheel") + 1]
     wheel.write_text("t_s,vx_mps,sigma_mps\n100,1,1\n101,1,1\n")
-    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr")
-    assert outcome.status == 1
+    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr", status=1)
     assert "wheel.csv" in outcome.err
     assert "do not overlap" in outcome.err
 
