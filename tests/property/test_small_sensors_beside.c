@@ -120,9 +120,8 @@ static void plain_twists(unsigned steps, double v) {
 }
 
 static double x_now(double *sigma) {
-    plr_pose pose;
     double P[36];
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    const plr_pose pose = pose_of(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
     *sigma = sqrt(P[0]);
     return pose.p[0];

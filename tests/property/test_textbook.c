@@ -78,11 +78,11 @@ static void compare(unsigned frame) {
     const double own = REAL_EPSILON * (FRAGILE ? 50 : 1);
     const unsigned n = textbook_dim(&book);
     double T[16], worst = 0;
-    plr_pose pose, expected;
+    plr_pose expected;
     char at[32];
     snprintf(at, sizeof at, "frame %u", frame);
     TEST_ASSERT_EQUAL_UINT(book.count, rig.filter.count);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    const plr_pose pose = pose_of(&rig.filter);
     memcpy(T, book.T_WB, sizeof T);
     rigid_to_pose(&expected, T);
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-10 + 500 * own, 0,

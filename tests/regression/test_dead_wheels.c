@@ -15,8 +15,7 @@ void setUp(void) {
 
 static double error_m(void) {
     double sum = 0;
-    plr_pose pose;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    const plr_pose pose = pose_of(&rig.filter);
     for (int i = 0; i < 3; i++)
         sum += pow(pose.p[i] - rig.world.T_WB[4 * i + 3], 2);
     return sqrt(sum);

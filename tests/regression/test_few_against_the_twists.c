@@ -8,6 +8,7 @@
 #include <unity.h>
 
 #include "pelorus/pelorus.h"
+#include "support/pose_of.h"
 #include "support/scene.h"
 
 enum { NEAR = 4, FAR = 24, COUNT = NEAR + FAR };
@@ -48,8 +49,7 @@ static void look(unsigned frame, unsigned moving, float moved_px) {
 }
 
 static double sideways(void) {
-    plr_pose pose;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
+    const plr_pose pose = pose_of(&filter);
     return fabs(pose.p[0]);
 }
 

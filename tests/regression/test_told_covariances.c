@@ -57,9 +57,8 @@ static void test_what_is_told_of_a_pose_is_taken_back(void) {
     rig_drive(10);
     for (unsigned i = 0; i < sizeof beyond / sizeof *beyond; i++) {
         double P[36];
-        plr_pose pose;
         correlate(beyond[i]);
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+        const plr_pose pose = pose_of(&rig.filter);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
         TEST_ASSERT_TRUE(plr_is_covariance(P, 6));
         plr_filter other = rig.filter;

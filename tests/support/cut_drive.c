@@ -123,7 +123,6 @@ void cut_assert_same_poses(void) {
 }
 
 void cut_assert_pose_x(double expected_m, double tolerance_m) {
-    plr_pose pose;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&after_restart.filter, &pose));
+    const plr_pose pose = pose_of(&after_restart.filter);
     TEST_ASSERT_DOUBLE_WITHIN(tolerance_m, expected_m, pose.p[0]);
 }

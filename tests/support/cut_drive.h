@@ -10,6 +10,7 @@
 #include "pelorus/state_store.h"
 #include "support/faulty_flash.h"
 #include "support/faulty_port.h"
+#include "support/pose_of.h"
 #include "support/session_drive.h"
 
 /* Landmark slots; frames up to the cut, and up to the end. */

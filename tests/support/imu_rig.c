@@ -94,9 +94,8 @@ void imu_rig_fly(unsigned frames) {
 void imu_rig_adopt_world(void) {
     double T[16], true_pose[16], back[16], relative[16], v[3], moved[3];
     double *world = imu_rig.world;
-    plr_pose pose;
     imu_flight_truth(&imu_rig.flight, true_pose, v);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&imu_rig.filter, &pose));
+    const plr_pose pose = pose_of(&imu_rig.filter);
     rigid_from_pose(T, &pose);
     rigid_inverse(back, true_pose);
     square_multiply(4, T, back, relative); /* brings the true world to the filter's */
@@ -131,12 +130,11 @@ static double length(const double x[3]) {
 imu_rig_errors imu_rig_errors_now(void) {
     const plr_filter *f = &imu_rig.filter;
     imu_rig_errors e;
-    plr_pose pose;
     plr_twist twist;
     double truth[16], v[3], T[16], back[16], there[16], off[16], xi[6], P[36], b[6];
     imu_flight_truth(&imu_rig.flight, there, v);
     square_multiply(4, imu_rig.world, there, truth);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     rigid_from_pose(T, &pose);
     rigid_inverse(back, T);
     square_multiply(4, back, truth, off);

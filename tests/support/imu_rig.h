@@ -5,6 +5,7 @@
 
 #include "pelorus/filter.h"
 #include "support/imu_flight.h"
+#include "support/pose_of.h"
 
 enum { IMU_RIG_EVERY = 40 }; /* readings in a frame: 10 Hz with 400 Hz */
 

@@ -4,6 +4,7 @@
 #define PELORUS_TEST_RIG_H
 
 #include "pelorus/filter.h"
+#include "support/pose_of.h"
 #include "support/scene.h"
 
 enum { RIG_STEP_NS = 10000000, RIG_TWISTS = 10 }; /* twists at 100 Hz, frames at 10 Hz */

@@ -10,6 +10,7 @@
 
 #include "pelorus/session.h"
 #include "support/faulty_port.h"
+#include "support/pose_of.h"
 #include "support/session_drive.h"
 
 extern plr_session session;

@@ -34,12 +34,11 @@ static void test_time_is_that_of_the_last_twist_or_frame(void) {
 
 static void test_the_pose_is_near_the_truth_and_says_how_near(void) {
     for (uint64_t seed = 1; seed <= 5; seed++) {
-        plr_pose pose;
         double P[36];
         rig.options.seed = seed;
         rig_begin();
         rig_drive(40);
-        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+        const plr_pose pose = pose_of(&rig.filter);
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
         const double sigma = sqrt(P[0] + P[7] + P[14]);
         for (int i = 0; i < 3; i++)

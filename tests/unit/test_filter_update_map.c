@@ -344,9 +344,8 @@ static void test_localization_takes_its_landmarks_from_the_map_alone(void) {
 static void test_a_map_holds_the_pose_where_it_is(void) {
     begin_with_map(PLR_MODE_LOCALIZATION, false);
     rig_drive(100);
-    plr_pose pose;
     double P[36];
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&rig.filter, &pose));
+    const plr_pose pose = pose_of(&rig.filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(0.2, rig.world.T_WB[4 * i + 3], pose.p[i]);

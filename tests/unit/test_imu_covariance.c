@@ -11,6 +11,7 @@
 #include "state/covariance.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
+#include "support/pose_of.h"
 #include "support/reseal.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
@@ -227,11 +228,10 @@ static void test_the_estimate_between_frames_has_the_covariance_that_the_frame_w
 
 /* A pose that is set drops the motion; velocity and biases are as after it. */
 static void test_a_pose_that_is_set_keeps_what_is_known_of_velocity_and_biases(void) {
-    plr_pose pose;
     take_specimen(5, false);
     const unsigned n = plr_covariance_dim(&filter);
     double *expected = expected_covariance();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
+    const plr_pose pose = pose_of(&filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, filter.t_ns, &pose, NULL));
     double *got = specimen_covariance(&filter);
     TEST_ASSERT_EQUAL_UINT(CORE, plr_covariance_dim(&filter));

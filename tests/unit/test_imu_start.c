@@ -91,10 +91,9 @@ static void test_a_body_that_stands_for_a_second_starts(void) {
 }
 
 static void test_until_the_start_the_pose_stays(void) {
-    plr_pose pose;
     make_filter_at(0);
     feed_up(SECOND / 2, 0.5, 0, g);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     TEST_ASSERT_EQUAL_DOUBLE(1, pose.p[0]);
     TEST_ASSERT_EQUAL_DOUBLE(1, pose.R[0]);
 }
@@ -105,11 +104,10 @@ static void test_at_rest_tilt_and_gyro_bias_are_measured(void) {
     const double a[3] = {-g * sin(pitch), g * cos(pitch) * sin(roll), g * cos(pitch) * cos(roll)};
     const double w[3] = {0.004, -0.003, 0.006};
     double b[6];
-    plr_pose pose;
     make_filter();
     TEST_ASSERT_EQUAL_INT(PLR_OK, feed(SECOND + 1, a, w));
     demand_started();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     for (int i = 0; i < 3; i++) /* noise of a second: 1 mm/s^2 in 9.8 m/s^2, 0.06 deg/s */
         TEST_ASSERT_DOUBLE_WITHIN(5e-3, a[i] / g, pose.R[6 + i]);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_bias(f, b, NULL));
@@ -279,11 +277,10 @@ static void test_gravity_that_points_down_in_the_given_pose_is_told(void) {
 
 /* Without a pose any tilt is believed, an IMU upside down too. */
 static void test_without_a_pose_upside_down_is_a_tilt(void) {
-    plr_pose pose;
     make_filter();
     feed_up(SECOND + 1, 0, 0, -g);
     demand_started();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, -1, pose.R[8]);
     double RtR[9] = {0};
     for (int i = 0; i < 9; i++)
@@ -294,25 +291,23 @@ static void test_without_a_pose_upside_down_is_a_tilt(void) {
 }
 
 static void test_another_tilt_than_the_given_poses_is_told_and_taken(void) {
-    plr_pose pose;
     make_filter_at(0);
     feed_up(SECOND + 1, 0, g * sin(0.6), g * cos(0.6));
     demand_started();
     TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_TILT, plr_filter_imu_fault(f));
     TEST_ASSERT_TRUE(reasons() & PLR_REASON_IMU_FAULT);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, sin(0.6), pose.R[7]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1, pose.p[0]);
 }
 
 static void test_a_given_pose_keeps_its_place_and_heading(void) {
     double P[36];
-    plr_pose pose;
     make_filter_at(0.1);
     feed_up(SECOND + 1, 0, g * sin(0.12), g * cos(0.12));
     demand_started();
     TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, pose.R[0]);
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, sin(0.12), pose.R[7]);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
@@ -334,7 +329,6 @@ static void test_a_start_in_motion_takes_a_tenth_of_a_second(void) {
  * they are. */
 static void test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start_in_motion(void) {
     double P[36];
-    plr_pose pose;
     imu_rig_begin(IMU_RIG_IN_MOTION, 3);
     imu_rig_fly(18);
     TEST_ASSERT_EQUAL_UINT8(0, f->inertial.anchored);
@@ -347,7 +341,7 @@ static void test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start
         imu_rig_readings(IMU_RIG_EVERY);
         imu_rig_frame();
     }
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(f, &pose));
+    const plr_pose pose = pose_of(f);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(f, P));
     double along = 0;
     for (int i = 0; i < 3; i++) {

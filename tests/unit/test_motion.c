@@ -14,6 +14,7 @@
 #include "state/pose.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
+#include "support/pose_of.h"
 #include "support/reseal.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
@@ -32,10 +33,9 @@ void setUp(void) {
     twin_of_specimen(&truth, &filter);
 }
 
-static void pose_of(double M[16]) {
-    plr_pose pose;
+static void pose_now(double M[16]) {
     reseal(&filter); /* moved from inside */
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
+    const plr_pose pose = pose_of(&filter);
     rigid_from_pose(M, &pose);
 }
 
@@ -103,7 +103,7 @@ static void test_the_bias_is_taken_off_before_the_limit(void) {
 
 static void test_steps_move_the_pose_by_exponentials(void) {
     double T[16], got[16];
-    pose_of(T);
+    pose_now(T);
     for (int k = 0; k < STEPS; k++) {
         plr_real reading[6];
         double same[6], xi[6], D[16], next[16];
@@ -115,7 +115,7 @@ static void test_steps_move_the_pose_by_exponentials(void) {
         memcpy(T, next, sizeof T);
         plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
-    pose_of(got);
+    pose_now(got);
     TEST_ASSERT_DOUBLE_WITHIN(30 * STEPS * eps, 0, largest_difference(T, got, 16));
     TEST_ASSERT_EQUAL_UINT64(1000000000 + 50000000ULL * STEPS, filter.t_ns);
     TEST_ASSERT_DOUBLE_WITHIN(10 * eps, 0.05 * STEPS, (double)filter.motion.seconds);
@@ -135,14 +135,14 @@ static void test_far_from_the_origin_small_steps_are_not_lost(void) {
 
 static void test_the_motion_accumulates_as_a_product(void) {
     double start[16], end[16], inverse[16], expected[16], got[16];
-    pose_of(start);
+    pose_now(start);
     for (int k = 0; k < STEPS; k++) {
         plr_real reading[6];
         double same[6];
         random_reading(reading, same);
         plr_process_twist.step(&filter, filter.t_ns + 50000000, reading, PLR_R(0.05), PLR_R(0.05));
     }
-    pose_of(end);
+    pose_now(end);
     rigid_inverse(inverse, start);
     square_multiply(4, inverse, end, expected);
     to_small_motion(got, filter.motion.E, filter.motion.p);
@@ -245,7 +245,7 @@ static void test_a_reading_is_charged_once_however_it_is_cut(void) {
 static void test_a_jump_is_exact_and_free_of_noise(void) {
     double there[16], start[16], inverse[16], expected[16], got[16], xi[6];
     plr_real R[9];
-    pose_of(start);
+    pose_now(start);
     rng_normals(&chance, 0.5, xi, 6);
     rigid_exp(expected, xi);
     square_multiply(4, start, expected, there);
@@ -277,14 +277,14 @@ static double distance_from_rotation(void) {
 static void test_a_correction_is_an_exponential_on_the_right(void) {
     double start[16], D[16], expected[16], got[16], same[6];
     plr_real xi[6];
-    pose_of(start);
+    pose_now(start);
     rng_normals(&chance, 0.3, same, 6);
     to_reals(xi, same, 6);
     to_doubles(same, xi, 6);
     rigid_exp(D, same);
     square_multiply(4, start, D, expected);
     plr_pose_correct(&filter, xi);
-    pose_of(got);
+    pose_now(got);
     TEST_ASSERT_DOUBLE_WITHIN(50 * eps, 0, largest_difference(expected, got, 16));
 }
 

@@ -5,6 +5,7 @@
 #include <unity.h>
 
 #include "support/axes.h"
+#include "support/pose_of.h"
 #include "support/reseal.h"
 #include "support/scene.h"
 #include "support/specimens.h"
@@ -43,9 +44,9 @@ static void drive(unsigned frames, plr_time_ns ahead_ns) {
 }
 
 static double error_m(void) {
-    plr_pose estimate, truth;
+    plr_pose truth;
     scene_pose(&world, &truth);
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &estimate));
+    const plr_pose estimate = pose_of(&filter);
     return hypot(hypot(estimate.p[0] - truth.p[0], estimate.p[1] - truth.p[1]),
                  estimate.p[2] - truth.p[2]);
 }
@@ -182,25 +183,23 @@ static void test_a_body_that_was_moved_leaves_the_map_as_it_was(void) {
 
 static void test_a_reading_of_before_says_nothing_afterwards(void) {
     const plr_twist still = {{0}, {0}}, fast = {{5, 0, 0}, {0}};
-    plr_pose pose;
     config.twist_timing = PLR_TWIST_START;
     start();
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 1000000000, &fast));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 500000000, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, 600000000, &still));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &pose));
+    const plr_pose pose = pose_of(&filter);
     TEST_ASSERT_EQUAL_DOUBLE(0, pose.p[0]);
 }
 
 static void test_a_frame_that_comes_before_any_twist_finds_the_body_where_it_stood(void) {
-    plr_pose here, later;
     start();
     drive(5, 0);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 1000, NULL));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &here));
+    const plr_pose here = pose_of(&filter);
     const plr_frame nothing = {.t_ns = 500001000, .budget = PLR_NO_BUDGET};
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &nothing, NULL));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&filter, &later));
+    const plr_pose later = pose_of(&filter);
     for (unsigned i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(1e-6, here.p[i], later.p[i]);
 }

@@ -11,14 +11,8 @@ void setUp(void) {
     desk_clear(1);
 }
 
-static plr_pose pose_now(void) {
-    plr_pose pose;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose(&session.filter, &pose));
-    return pose;
-}
-
 static void assert_pose_near(const plr_pose *expected, double tolerance_m) {
-    const plr_pose pose = pose_now();
+    const plr_pose pose = pose_of(&session.filter);
     for (int i = 0; i < 3; i++)
         TEST_ASSERT_DOUBLE_WITHIN(tolerance_m, expected->p[i], pose.p[i]);
     for (int i = 0; i < 9; i++)
@@ -209,7 +203,7 @@ static void test_a_start_in_mid_flight_sets_the_pose_anew_and_is_counted(void) {
     desk_send(start);
     desk_send(drive_stereo(6));
     desk_run();
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 40, pose_now().p[2]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 40, pose_of(&session.filter).p[2]);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
     TEST_ASSERT_EQUAL_UINT16(0, answer.as.pose.reset_count);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_POSE, &answer));
