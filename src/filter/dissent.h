@@ -24,7 +24,9 @@ typedef struct plr_dissent {
 /* Takes n from the windows of consistency.h. */
 void plr_dissent_begin(const plr_filter *f, plr_dissent *d);
 
-/* Adds a point: its track so far, and a, 3x6, the derivative of its whitened innovation by n. */
+/* Adds a point: its track so far; a, 3x6, the derivative of its whitened innovation by n; and M,
+ * packed upper triangle, with M^T M the covariance of that innovation as the others predict it: of a
+ * point that they cannot predict nothing is expected. */
 void plr_dissent_add(plr_dissent *d, const plr_slot *slot,
                      const plr_real a[PLR_ROWS * PLR_POSE_DIM], const plr_real M[6]);
 
