@@ -116,7 +116,7 @@ static void test_a_point_without_innovations_counts_for_nothing(void) {
 
 /* Among points that do not agree, a point moves by less evidence. */
 static void test_a_doubted_track_moves_earlier(void) {
-    plr_slot slot = {.innovation_sum = {5, 0, 0}, .innovation_variance = 1.6F};
+    plr_slot slot = {.innovation_sum = {5, 0, 0}, .innovation_variance = PLR_R(1.6)};
     const plr_real none[3] = {0};
     plr_slot same = slot;
     plr_track_add(&same, none);
