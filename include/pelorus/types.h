@@ -118,9 +118,8 @@ typedef enum plr_reason {
     /* The same pixels in successive frames while twists or IMU report motion: a camera or tracker
      * that sends the same image again. Restart it. */
     PLR_REASON_FROZEN_IMAGE = 1 << 16,
-    /* The matched points do not agree on one motion: more than 30 % are rejected, or a part of them
-     * leans away from twists or IMU where the rest does not. Much of the scene moves, or tracks are
-     * stale. The pose leans on twists or IMU until they agree. */
+    /* The matched points do not agree on one motion: more than 30 % are rejected. Much of the scene
+     * moves, or tracks are stale. The pose leans on twists or IMU until they agree. */
     PLR_REASON_SCENE_DISAGREES = 1 << 17,
     /* After a divergence the landmarks were dropped and the pose's covariance was enlarged, so that
      * the filter can continue. Reported once; the reset counter of POSE and ODOMETRY counts it. */

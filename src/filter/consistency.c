@@ -16,7 +16,6 @@
 enum {
     FAST_WINDOWS = 2,     /* windows that decide whether the twists get less weight */
     AGREEING_FRAMES = 15, /* successive frames in agreement that end any doubt */
-    MAX_DISSENT = 50,     /* frames that the points may agree before the twists are in question */
     KEPT_FRAMES = 600,    /* a doubt that lasts longer is no event: biases are taught again */
     FEW = 3,              /* points */
     FROZEN_SHARE = 2, /* a picture is repeated if at least one match in two has the same pixels */
@@ -26,10 +25,9 @@ enum {
 /* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */
 static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), PLR_R(0.985)};
 
-/* Chi-square with 6 degrees of freedom: white noise exceeds these once in 60,000, in 70 and in 16. */
-#define DRIFTING_ABOVE  PLR_R(32)
-#define AGREEING_BELOW  PLR_R(16)
-#define DIFFERING_ABOVE PLR_R(12)
+/* Chi-square with 6 degrees of freedom: white noise exceeds these once in 60,000 and once in 70. */
+#define DRIFTING_ABOVE PLR_R(32)
+#define AGREEING_BELOW PLR_R(16)
 /* Noise settings are never quite true. The twists get less weight only where the difference exceeds
  * its noise by far, and is a good part of the motion itself: a filter that doubted them earlier
  * would lose the information that they have. */
@@ -177,12 +175,6 @@ static void add_to_window(plr_consistency_window *w, plr_real keep, const plr_re
 
 /* ---------------------------------------------------------------- the contradiction */
 
-bool plr_consistency_difference(const plr_filter *f, plr_real n[PLR_POSE_DIM]) {
-    const plr_consistency_window *w = &f->consistency.windows[1];
-    estimate_by_vision(w->sum, w->variance, n);
-    return fast_statistic(f) > DIFFERING_ABOVE;
-}
-
 static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
     plr_real sum = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
@@ -259,24 +251,14 @@ static void begin_difference(plr_filter *f, const plr_applied_motion *believed,
     add_difference(f, way, way, w->sum, trace(w->variance));
 }
 
-/* Where only points that move are in sight for a while they agree with each other, and are no news. */
-static void count_dissent(plr_consistency *c, bool dissent, plr_real fast) {
-    if (dissent)
-        c->dissenting_frames =
-            (uint8_t)(c->dissenting_frames + (c->dissenting_frames < MAX_DISSENT));
-    else if (fast > DIFFERING_ABOVE && c->dissenting_frames > 0)
-        c->dissenting_frames--;
-}
-
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
-                         const plr_motion_first *first, const plr_real nu[PLR_POSE_DIM],
+                         const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
-                         const plr_real moved[PLR_POSE_DIM]) {
+                         const plr_real moved[PLR_POSE_DIM], bool outright) {
     plr_consistency *c = &f->consistency;
-    const plr_applied_motion *applied = &first->motion;
     plr_real J[PLR_POSE_SQUARE], b[PLR_POSE_DIM], own[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE],
         n[PLR_POSE_DIM];
-    if (first->contradicted) {
+    if (outright) {
         plr_mat6_vec(n, applied->L, nu);
         in_sigmas(believed->L, n, own);
         propagate_difference(f, applied);
@@ -312,12 +294,11 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
         begin_difference(f, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
     c->drifting = most > DRIFTING_ABOVE || (c->drifting && most > AGREEING_BELOW);
-    count_dissent(c, first->dissent, fast);
     const bool much = is_material(&c->windows[0], believed->L, applied);
     c->small_frames = much ? 0 : (uint16_t)(c->small_frames + (c->small_frames < UINT16_MAX));
     c->contradicting_frames =
-        much && c->dissenting_frames == 0 && fast > CONTRADICTED_ABOVE
-            ? (uint8_t)(c->contradicting_frames + (c->contradicting_frames < UINT8_MAX))
+        much && fast > CONTRADICTED_ABOVE
+            ? (uint16_t)(c->contradicting_frames + (c->contradicting_frames < UINT16_MAX))
             : 0;
     if (!c->contradicted && c->contradicting_frames >= FEW) {
         const plr_consistency_window fastest = c->windows[0];
@@ -355,7 +336,7 @@ static void count(plr_filter *f, const plr_report *report) {
 
 static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
     const plr_consistency *c = &f->consistency;
-    uint32_t reasons = report->reasons & PLR_REASON_SCENE_DISAGREES;
+    uint32_t reasons = 0;
     if (c->contradicted || c->drifting)
         reasons |= PLR_REASON_TWIST_CONTRADICTED;
     if (c->frozen)
@@ -399,7 +380,7 @@ static void resolve(plr_filter *f) {
     memset(c->difference_sigmas, 0, sizeof c->difference_sigmas);
     c->difference_noise = 0;
     memset(c->windows, 0, sizeof c->windows);
-    c->contradicted = c->drifting = c->settling_frames = c->dissenting_frames = 0;
+    c->contradicted = c->drifting = c->settling_frames = 0;
     c->agreeing_frames = c->doubted_frames = 0;
 }
 

@@ -11,30 +11,25 @@
 
 #include <stdbool.h>
 
-#include "filter/motion_first.h"
 #include "pelorus/types.h"
 #include "state/motion.h"
 
 /* Start: no frame seen, no disagreement. */
 void plr_consistency_clear(plr_filter *f);
 
-/* n, 6, in the twists' own sigmas: what the pictures of the last 19 frames say of the motion beside
- * the twists, older ones counting less. False if that is within noise. */
-bool plr_consistency_difference(const plr_filter *f, plr_real n[PLR_POSE_DIM]);
-
 /* Enlarges the twists' noise Q of this frame as long as they are contradicted. Call it before
  * plr_motion_prior. `believed` receives the prior with the original Q. */
 void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed);
 
-/* Adds the result of a frame: nu with prior N(0, I), in units of first->motion.L, and its
- * information Lambda, 6x6 packed upper triangle, prior included. `moved`: by how much the frame
- * moved the pose from where the twists had put it, m and rad in the body. Where the last reading is
- * old (plr_health_readings_are_old), vision is followed all the same, but there is no pose by
- * twists that the true one could be. */
+/* Adds the result of a frame: nu with prior N(0, I), in units of applied->L, and its information
+ * Lambda, 6x6 packed upper triangle, prior included. `moved`: by how much the frame moved the pose
+ * from where the twists had put it, m and rad in the body. `outright`: this frame contradicts the
+ * twists by itself. Where the last reading is old (plr_health_readings_are_old), vision is followed
+ * all the same, but there is no pose by twists that the true one could be. */
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
-                         const plr_motion_first *first, const plr_real nu[PLR_POSE_DIM],
+                         const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
-                         const plr_real moved[PLR_POSE_DIM]);
+                         const plr_real moved[PLR_POSE_DIM], bool outright);
 
 /* Adds the counts of a frame; `lost`: the frame lost the pose (plr_health). Returns bits of
  * plr_reason. */

@@ -37,24 +37,9 @@ enum {
     (PLR_REASON_NO_OBSERVATIONS | PLR_REASON_GATE_LOCKED | PLR_REASON_NO_FRAMES |                  \
      PLR_REASON_NOT_STARTED)
 
-/* Rejected because their points move: no sign of a gate that rejects what is right. */
-static unsigned rejected_as_moving(const plr_filter *f) {
-    unsigned moving = 0;
-    for (const plr_slot *s = f->slots; s < f->slots + f->count; s++)
-        moving += s->moving && s->rejected > 0 && s->last_frame == f->frame_number;
-    return moving;
-}
-
-static bool rejects_nearly_all(unsigned gated, unsigned matched) {
-    return 5 * gated >= 4 * matched;
-}
-
 bool plr_health_gate_is_locked(plr_filter *f, const plr_report *report) {
-    const unsigned matched = report->matched, gated = report->gated, moving = rejected_as_moving(f);
-    const bool others_agree =
-        matched >= moving + FEW_USED && !rejects_nearly_all(gated - moving, matched - moving);
     const bool rejects =
-        matched >= LOCK_MATCHES && rejects_nearly_all(gated, matched) && !others_agree;
+        report->matched >= LOCK_MATCHES && 5 * report->gated >= 4 * report->matched;
     f->frames_mostly_gated = rejects ? (uint16_t)(f->frames_mostly_gated + 1) : 0;
     if (f->frames_mostly_gated >= 2 * LOCK_FRAMES) /* locked again */
         f->frames_mostly_gated = LOCK_FRAMES;
@@ -157,8 +142,6 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_REFUSED_INPUT;
     if (events->cut)
         reasons |= PLR_REASON_RANGE_LIMITED;
-    if (events->dissent)
-        reasons |= PLR_REASON_SCENE_DISAGREES;
     if (report->left_out)
         reasons |= PLR_REASON_BUDGET;
     if (events->recovered)

@@ -12,7 +12,6 @@ typedef struct plr_frame_events {
     bool sink_failed;
     bool locked;
     bool recovered;
-    bool dissent; /* plr_motion_first */
     unsigned cut;
 } plr_frame_events;
 

@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "filter/dissent.h"
 #include "filter/gate.h"
 #include "filter/search.h"
 #include "filter/tracks.h"
@@ -18,8 +17,6 @@
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
     MIN_AGAINST_TWISTS = 6, /* fewer points never outweigh the twists */
-    STALE = 5,              /* after so many successive rejections a landmark is not where its
-                               point was in the last frame: it tells nothing of this motion */
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 
@@ -120,9 +117,8 @@ static void judge_by_prior(plr_search *s, unsigned i) {
  * weight w of the observation in J it is e^T [(I - w h)(I + (1 - w) h)]^-1 e. `share` receives the
  * smallest pivot of the matrix in brackets, about the share that the others contribute. */
 static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
-                              const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real M[6],
-                              plr_real *share) {
-    plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9];
+                              const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
+    plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9], M[6];
     const plr_real w = at->weight;
     for (unsigned r = 0; r < 3; r++) {
         e[r] = at->e[r];
@@ -163,16 +159,16 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
     return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
-/* True if the gate accepts an observation. Adds its d^2 to *nis, its innovation to its track, and
- * its track to *dissent. */
+/* True if the gate accepts an observation. Adds its d^2 to *nis, and its innovation to its
+ * track. */
 static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
-                  const plr_real dz[PLR_POSE_DIM], plr_dissent *dissent, float *nis) {
+                  const plr_real dz[PLR_POSE_DIM], float *nis) {
     const plr_sighting *at = &s->sightings[i];
-    plr_real d2 = at->prior_d2, e[3], M[6], share = 0;
+    plr_real d2 = at->prior_d2, e[3], share = 0;
     if (!(d2 >= 0) || at->behind)
         return false;
     if (found) {
-        const plr_real without_it = leave_one_out(at, U, dz, e, M, &share);
+        const plr_real without_it = leave_one_out(at, U, dz, e, &share);
         d2 = share >= LEAST_SHARE ? without_it : d2;
     }
     d2 += plr_stereo_row_gap_d2(s->f, plr_search_observation(s, i));
@@ -180,8 +176,6 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
         plr_track_add(slot, e);
-    if (share >= LEAST_SHARE && (accepted || slot->moving))
-        plr_dissent_add(dissent, slot, at->a, M);
     if (!accepted || slot->moving)
         return false;
     *nis += (float)d2;
@@ -225,7 +219,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open) {
     for (unsigned i = 0; i < s->count; i++) {
         const plr_sighting *at = &s->sightings[i];
         const plr_real d2 = plr_dot3(at->e, at->e);
-        if (!(at->active > 0) || plr_search_slot(s, i)->rejected >= STALE)
+        if (!(at->active > 0))
             continue;
         active++;
         agree += d2 < AGREES_BELOW;
@@ -311,9 +305,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     plr_motion_prior(f, &s.prior);
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
-            const plr_slot *slot = &f->slots[f->work.slot_of[k]];
             f->work.used[s.count] = (uint16_t)k;
-            plr_search_add(&s, slot->known || slot->moving ? 0 : 1);
+            plr_search_add(&s, f->slots[f->work.slot_of[k]].known ? 0 : 1);
         }
     plr_search_from_zero(&s, &best);
     const unsigned active = judge_all_by_prior(&s, &best);
@@ -329,10 +322,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         (void)plr_search_step(&best, U, dz);
     plr_motion_at(f, &s.prior, best.z, &first->motion);
     const plr_real usual = plr_vantage_usual(f);
-    plr_dissent dissent;
-    plr_dissent_begin(f, &dissent);
     for (unsigned i = 0; i < s.count; i++) {
-        const bool accepted = judge(&s, i, first->found, U, dz, &dissent, nis);
+        const bool accepted = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
         const bool lost = !accepted && went_astray(&s, i);
         f->work.gain[slot - f->slots] = accepted ? s.sightings[i].gain
@@ -344,7 +335,4 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
             f->work.noise.range_shift[slot - f->slots] = plr_vantage_offset(
                 slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);
     }
-    first->dissent = plr_dissent_is_found(&dissent);
-    for (unsigned i = 0; first->dissent && i < s.count; i++)
-        plr_track_doubt(plr_search_slot(&s, i));
 }

@@ -17,8 +17,6 @@ typedef struct plr_motion_first {
     bool found;                /* false: too few observations; `motion` is the twists' */
     bool contradicted;         /* the observations agree on a motion that the twists exclude, and
                                   `motion` is that one, with a prior wide enough for it */
-    bool dissent;              /* what the observations say beside the twists over many frames
-                                  differs from one to the other: a part of the scene moves */
 } plr_motion_first;
 
 /* Finds nu and gates every matched observation: work.gain >= 0 if accepted, else as in gate.h.

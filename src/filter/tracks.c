@@ -16,29 +16,14 @@ enum {
 /* Chi-square with 3 degrees of freedom. White noise exceeds it once in 13 million; the limit is
  * wide because real pixels have heavier tails and lasting errors. */
 #define MOVING_ABOVE PLR_R(36)
-/* Among points that do not agree with each other: once in 1,000. */
-#define MOVING_AMONG_OTHERS PLR_R(16)
-
-static void judge(plr_slot *slot, plr_real limit) {
-    const plr_real *l = slot->innovation_sum;
-    if (plr_dot3(l, l) > limit * slot->innovation_variance)
-        slot->moving = 1;
-}
 
 void plr_track_add(plr_slot *slot, const plr_real e[3]) {
     for (unsigned r = 0; r < 3; r++)
         slot->innovation_sum[r] = PLR_FMA(DECAY, slot->innovation_sum[r], e[r]);
     slot->innovation_variance = PLR_FMA(DECAY * DECAY, slot->innovation_variance, PLR_R(1));
-    judge(slot, MOVING_ABOVE);
-}
-
-void plr_track_doubt(plr_slot *slot) {
-    judge(slot, MOVING_AMONG_OTHERS);
-}
-
-plr_real plr_track_share(const plr_slot *slot) {
-    const plr_real left = PLR_R(1) - (PLR_R(1) - DECAY * DECAY) * slot->innovation_variance;
-    return PLR_R(1) - (left > 0 ? PLR_SQRT(left) : PLR_R(0));
+    if (plr_dot3(slot->innovation_sum, slot->innovation_sum) >
+        MOVING_ABOVE * slot->innovation_variance)
+        slot->moving = 1;
 }
 
 void plr_track_count(plr_slot *slot, bool rejected) {

@@ -17,12 +17,6 @@
  * point moves. */
 void plr_track_add(plr_slot *slot, const plr_real e[3]);
 
-/* The same with a narrower limit, for a frame whose points do not agree with each other. */
-void plr_track_doubt(plr_slot *slot);
-
-/* The part of the sums of an old track that this one has gathered: 0 to 1. */
-plr_real plr_track_share(const plr_slot *slot);
-
 /* Counts a frame that matched the landmark, and whether the gate rejected it. */
 void plr_track_count(plr_slot *slot, bool rejected);
 

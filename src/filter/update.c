@@ -132,7 +132,7 @@ static bool find_motion(plr_filter *f, const plr_frame *frame, unsigned n, plr_r
 
 /* Finds the motion, judges the observations by it, and corrects. */
 static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsigned n,
-                                   plr_frame_events *events, plr_report *report) {
+                                   plr_report *report) {
     plr_applied_motion believed;
     plr_motion_first first;
     plr_considered_bias before;
@@ -145,7 +145,6 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
         (void)choose(f, frame, n, report);
         return correction;
     }
-    events->dissent = first.dissent;
     plr_bias_consider(f, first.contradicted, &before);
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
@@ -158,7 +157,8 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_bias_restore(f, &before);
     if (correction.moved) {
         plr_pose_moved_from(f, R_WB, p_WB, moved);
-        plr_consistency_add(f, &believed, &first, correction.nu, correction.Lambda, moved);
+        plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda, moved,
+                            first.contradicted);
     }
     return correction;
 }
@@ -192,7 +192,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
                        f->config.mode == PLR_MODE_SLAM;
     const plr_correction correction =
-        finds ? motion_first(f, frame, n, &events, report) : motion_as_given(f, frame, n, report);
+        finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
     plr_match_count(f, matched);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_batches;

@@ -317,22 +317,6 @@ static void test_ten_frames_of_four_fifths_rejected_lock(void) {
     TEST_ASSERT_EQUAL_UINT32(1, filter.totals.locks);
 }
 
-/* Four points move, and the gate knows it: if the others are used, it does not reject what is right. */
-static void test_points_that_move_do_not_lock(void) {
-    filter.count = 20;
-    for (unsigned k = 0; k < 20; k++) {
-        filter.slots[k].moving = k < 17;
-        filter.slots[k].rejected = k < 17;
-        filter.slots[k].last_frame = filter.frame_number;
-    }
-    for (int k = 0; k < 30; k++)
-        TEST_ASSERT_FALSE(is_locked(20, 17));
-    for (int k = 0; k < 9; k++)
-        TEST_ASSERT_FALSE(is_locked(20, 20)); /* but here nothing is left */
-    TEST_ASSERT_TRUE(is_locked(20, 20));
-    filter.count = 4;
-}
-
 static void test_after_a_lock_ten_more_lock_again(void) {
     for (int k = 0; k < 50; k++)
         TEST_ASSERT_EQUAL(k % 10 == 9, is_locked(20, 20));

@@ -25,8 +25,7 @@
 #define MAY_BE_WRONG PLR_REASON_POSE_MAY_BE_WRONG
 
 static plr_filter filter;
-static plr_applied_motion believed;
-static plr_motion_first first;
+static plr_applied_motion believed, applied;
 static rng chance;
 static double information[6]; /* of a picture on nu, without the prior */
 static plr_real moved[6];     /* the pose by a frame, beside the twists */
@@ -43,8 +42,7 @@ void setUp(void) {
         believed.L[7 * k] = (plr_real)(k < 3 ? SIGMA_M : SIGMA_RAD);
         information[k] = 100;
     }
-    memset(&first, 0, sizeof first);
-    first.motion = believed;
+    applied = believed;
     memset(moved, 0, sizeof moved);
 }
 
@@ -56,7 +54,7 @@ static void add(const double mean[6], double noise) {
         nu[k] = (plr_real)(information[k] / (1 + information[k]) * seen);
         Lambda[plr_upper_row(6, k)] = (plr_real)(1 + information[k]);
     }
-    plr_consistency_add(&filter, &believed, &first, nu, Lambda, moved);
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, false);
 }
 
 static void add_noise(void) {
@@ -204,26 +202,6 @@ static void test_twists_that_are_contradicted_are_believed_less(void) {
     TEST_ASSERT_EQUAL_MEMORY(before.B, filter.motion.B, sizeof before.B);
 }
 
-/* Where a part of the points agrees with the twists, the others are what moves: the difference is told, and
- * the twists are believed. */
-static void test_twists_are_believed_where_the_points_do_not_agree(void) {
-    first.dissent = true;
-    for (int k = 0; k < 20; k++) {
-        add_slip();
-        const uint32_t told = k < 5 ? 0 : CONTRADICTED;
-        TEST_ASSERT_EQUAL_HEX32(told, judge() & told);
-        TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
-    }
-    first.dissent = false; /* only points that move are in sight: for as long again it is no news */
-    for (int k = 0; k < 15; k++) {
-        add_slip();
-        TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
-    }
-    for (int k = 0; k < 10; k++)
-        add_slip();
-    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
-}
-
 /* As long as it lasts the pose's covariance reaches from one story to the other. */
 static void test_the_covariance_covers_both_stories(void) {
     plr_real C[36] = {0};
@@ -246,13 +224,11 @@ static void test_the_covariance_covers_both_stories(void) {
 static void contradict_outright(double way_m) {
     plr_real nu[6] = {(plr_real)(way_m / 0.5)}, Lambda[21] = {0};
     for (unsigned k = 0; k < 6; k++) {
-        first.motion.L[7 * k] = PLR_R(0.5);
+        applied.L[7 * k] = PLR_R(0.5);
         Lambda[plr_upper_row(6, k)] = 1000;
     }
-    first.contradicted = true;
-    plr_consistency_add(&filter, &believed, &first, nu, Lambda, moved);
-    first.contradicted = false;
-    first.motion = believed;
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, true);
+    applied = believed;
 }
 
 static void test_a_frame_may_contradict_the_twists_outright(void) {
