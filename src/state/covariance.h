@@ -92,8 +92,8 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
  * if plr_covariance_open_noise was not called. */
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
 
-/* V = C L^-T = P_(:,d) Kt, Kt of plr_motion_transpose, for three rows of the state from `row` on, 3 x 6:
- * their covariance with nu. Every block has three or six rows */
+/* V = C L^-T = P_(:,d) Kt, Kt of plr_motion_transpose: the covariance of three rows of the state,
+ * from `row` on, with nu. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row,
                                  const plr_real Kt[PLR_MOTION_BY],
                                  plr_real V[PLR_ROWS * PLR_POSE_DIM]);
