@@ -44,6 +44,21 @@ enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
         }                                                                                          \
     }
 
+/* The same among distant points, which say little about the way: their pose errors are larger, and are
+ * to be told. */
+#define FAR_EVENT(title, text, kind, how, speed)                                                   \
+    {                                                                                              \
+        .name = title, .about = text, DEFAULT, .near_m = 30, .far_m = 100, .baseline_m = 0.2,      \
+        .landmarks = 20, .speed_mps = speed, .turn = 1, .twists_per_frame = 5, .bias = true,       \
+        .before = HALF_MINUTE, .during = HALF_MINUTE, .after = HALF_MINUTE, .mishap = kind,        \
+        .strength = how, .bars = {                                                                 \
+            .silent = 0.01,                                                                        \
+            .event_nees = 2,                                                                       \
+            .good = 0.995,                                                                         \
+            .no_divergence = true                                                                  \
+        }                                                                                          \
+    }
+
 /* What no filter can follow, and good data after it. */
 #define WAYOUT(title, text, kind, how, frames)                                                     \
     {                                                                                              \
@@ -116,6 +131,12 @@ const scenario scenarios[] = {
     EVENT("slip-0.5", "readings x 0.5", SLIP, 0.5, 0.8, 5, 0.5),
     EVENT("slip-0.75", "readings x 0.75", SLIP, 0.75, 0.8, 0, 0.5),
     EVENT("slip-2", "readings x 2", SLIP, 2, 0.8, 5, 0.5),
+    FAR_EVENT("slip-0.5-far", "readings x 0.5 among points at 30 to 100 m", SLIP, 0.5, 0.8),
+    FAR_EVENT("slip-0.75-far", "readings x 0.75 among the same", SLIP, 0.75, 0.8),
+    FAR_EVENT("slip-1.5-far", "readings x 1.5 among the same", SLIP, 1.5, 0.8),
+    FAR_EVENT("dead-wheels-far", "the velocity reads 0 among the same, 1 m/s", DEAD_WHEELS, 0, 1),
+    EVENT("slip-1.05-3mps", "readings x 1.05, 3 m/s", SLIP, 1.05, 3, 0, 0),
+    FAR_EVENT("slip-1.05-3mps-far", "the same among points at 30 to 100 m", SLIP, 1.05, 3),
     EVENT("dead-wheels", "the velocity reads 0, 2 m/s", DEAD_WHEELS, 0, 2, 5, 1),
     EVENT("dead-wheels-slow", "the velocity reads 0, 1 m/s", DEAD_WHEELS, 0, 1, 5, 1),
     EVENT("dead-wheels-fast", "the velocity reads 0, 4 m/s", DEAD_WHEELS, 0, 4, 5, 2),
