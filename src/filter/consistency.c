@@ -44,8 +44,12 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 /* The difference between the poses by twists and by pictures is known to about this part of its
  * size. */
 #define SIDEWAYS_SHARE PLR_R(0.2)
-/* Added to variances, so that directions that were hardly observed do not count. */
-#define UNOBSERVED PLR_R(0.05)
+/* Added to variances, so that directions in which the pictures say little do not count. What is told
+ * looks at all that they say; UNOBSERVED is above the rounding of the sums alone. Distant points say
+ * little about the way, and what that little says is worth telling. Taking weight from the twists
+ * asks for more: real pixels have small lasting errors, which add up in weak directions. */
+#define UNOBSERVED PLR_R(0.001)
+#define WEAK       PLR_R(0.05)
 /* A bias is off if it differs from its prior by more than this many sigmas: of six that are as
  * stated one does so in about one drive of 300. A bias is not judged before it has lost this share
  * of its prior's variance. */
@@ -69,22 +73,22 @@ void plr_consistency_clear(plr_filter *f) {
 
 /* ---------------------------------------------------------------- the windows */
 
-/* s^T (V + UNOBSERVED I)^-1 s */
-static plr_real statistic(const plr_consistency_window *w) {
+/* s^T (V + floor I)^-1 s */
+static plr_real statistic(const plr_consistency_window *w, plr_real floor) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM];
     memcpy(U, w->variance, sizeof w->variance);
     memcpy(s, w->sum, sizeof s);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        U[plr_upper_row(PLR_POSE_DIM, k)] += UNOBSERVED;
+        U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return 0;
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, s, 1);
     return plr_dot3(s, s) + plr_dot3(s + 3, s + 3);
 }
 
-static plr_real fast_statistic(const plr_filter *f) {
-    const plr_real a = statistic(&f->consistency.windows[0]);
-    const plr_real b = statistic(&f->consistency.windows[1]);
+static plr_real fast_statistic(const plr_filter *f, plr_real floor) {
+    const plr_real a = statistic(&f->consistency.windows[0], floor);
+    const plr_real b = statistic(&f->consistency.windows[1], floor);
     return a > b ? a : b;
 }
 
@@ -92,7 +96,7 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
     plr_motion_prior(f, believed);
     if (!f->consistency.contradicted)
         return;
-    const plr_real fast = fast_statistic(f), excess = f->consistency.excess;
+    const plr_real fast = fast_statistic(f, WEAK), excess = f->consistency.excess;
     const plr_real factor = PLR_R(1) + (fast > excess ? fast : excess) * WIDENING;
     f->consistency.excess *= EXCESS_DECAY;
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
@@ -150,15 +154,14 @@ static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POS
     return true;
 }
 
-/* n = (V + UNOBSERVED I)^-1 nu: the estimate by the observations alone, without the twists'
- * prior. */
+/* n = (V + floor I)^-1 nu: the estimate by the observations alone, without the twists' prior. */
 static void estimate_by_vision(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
-                               plr_real n[PLR_POSE_DIM]) {
+                               plr_real floor, plr_real n[PLR_POSE_DIM]) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
     memcpy(U, V, PLR_POSE_TRIANGLE * sizeof *V);
     memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        U[plr_upper_row(PLR_POSE_DIM, k)] += UNOBSERVED;
+        U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return;
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
@@ -215,7 +218,7 @@ static void add_difference(plr_filter *f, const plr_real n[PLR_POSE_DIM],
 static bool is_material(const plr_consistency_window *w, const plr_real L[PLR_POSE_SQUARE],
                         const plr_applied_motion *applied) {
     plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    estimate_by_vision(w->sum, w->variance, mean);
+    estimate_by_vision(w->sum, w->variance, WEAK, mean);
     plr_mat6_vec(n, L, mean);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         n[k] /= PLR_R(1) + decay[0]; /* from the sum over frames to one frame's mean */
@@ -282,14 +285,15 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         propagate_difference(f, applied);
     if (c->contradicted || c->drifting) {
         plr_real way[PLR_POSE_DIM];
-        estimate_by_vision(own, V, n);
+        estimate_by_vision(own, V, UNOBSERVED, n);
         plr_mat6_vec(way, believed->L, n);
         add_difference(f, way, moved, own, trace(V));
     }
     for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
         if (w < FAST_WINDOWS || !(c->contradicted || plr_health_readings_are_old(f)))
             add_to_window(&c->windows[w], decay[w], own, V);
-    const plr_real fast = fast_statistic(f), slow = statistic(&c->windows[FAST_WINDOWS]);
+    const plr_real fast = fast_statistic(f, UNOBSERVED);
+    const plr_real slow = statistic(&c->windows[FAST_WINDOWS], UNOBSERVED);
     const plr_real most = fast > slow ? fast : slow;
     if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
         begin_difference(f, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
@@ -297,7 +301,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     const bool much = is_material(&c->windows[0], believed->L, applied);
     c->small_frames = much ? 0 : (uint16_t)(c->small_frames + (c->small_frames < UINT16_MAX));
     c->contradicting_frames =
-        much && fast > CONTRADICTED_ABOVE
+        much && fast_statistic(f, WEAK) > CONTRADICTED_ABOVE
             ? (uint16_t)(c->contradicting_frames + (c->contradicting_frames < UINT16_MAX))
             : 0;
     if (!c->contradicted && c->contradicting_frames >= FEW) {
@@ -311,8 +315,9 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
 
 /* ---------------------------------------------------------------- the verdict */
 
-/* If prior and noise are as stated, an estimate differs from the mean of its prior by
- * N(0, P_0 - P), with P_0 the prior's variance and the walk's since: by less than the prior's sigma as long as little has been learnt. */
+/* If prior and noise are as stated, an estimate differs from the mean of its prior by N(0, P_0 - P),
+ * with P_0 the prior's variance and the walk's since: by less than the prior's sigma as long as
+ * little has been learnt. */
 static bool bias_is_off(const plr_filter *f) {
     plr_real P[PLR_POSE_SQUARE];
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P);
@@ -401,7 +406,7 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     if (doubtful || c->doubted_frames > 0)
         c->doubted_frames = (uint16_t)(c->doubted_frames + (c->doubted_frames < UINT16_MAX));
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
-                        fast_statistic(f) < AGREEING_BELOW &&
+                        fast_statistic(f, UNOBSERVED) < AGREEING_BELOW &&
                         !(reasons & PLR_REASON_SCENE_DISAGREES);
     c->agreeing_frames =
         agrees ? (uint16_t)(c->agreeing_frames + (c->agreeing_frames < UINT16_MAX)) : 0;

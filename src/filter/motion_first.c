@@ -20,6 +20,10 @@ enum {
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 
+/* A search has failed if the observations keep less than this share of their weight, or if |nu|^2
+ * is beyond FAR_FROM_TWISTS. */
+#define LARGE_SHARE     PLR_R(0.7)
+#define FAR_FROM_TWISTS PLR_R(36)
 /* An observation supports one of two motions if its squared residual is smaller there by more than
  * this. */
 #define CLEAR_DIFFERENCE PLR_R(9)
@@ -182,14 +186,33 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
     return true;
 }
 
-/* True if so many observations have a small weight that another motion may fit them better. */
-static bool may_contradict(const plr_search *s, const plr_search_point *best) {
-    plr_real active = 0, weight = 0;
+/* How much an observation tells about the translation, 1/sigma: of a distant point little. */
+static plr_real telling(const plr_sighting *at) {
+    plr_real sum = 0;
+    for (unsigned r = 0; r < PLR_ROWS && !at->behind; r++)
+        sum += plr_dot3(at->a + PLR_POSE_DIM * r, at->a + PLR_POSE_DIM * r);
+    return PLR_SQRT(sum);
+}
+
+/* Which observations have a small weight, so that another motion may fit them better. */
+typedef enum plr_misfit {
+    PLR_MISFIT_NONE,
+    PLR_MISFIT_FEW, /* but they tell much about the translation: all others may be distant */
+    PLR_MISFIT_MANY
+} plr_misfit;
+
+static plr_misfit find_misfit(const plr_search *s, const plr_search_point *best) {
+    plr_real active = 0, weight = 0, told = 0, believed = 0;
     for (unsigned i = 0; i < s->count; i++) {
-        active += s->sightings[i].active;
-        weight += s->sightings[i].weight;
+        const plr_sighting *at = &s->sightings[i];
+        active += at->active;
+        weight += at->weight;
+        told = PLR_FMA(at->active, telling(at), told);
+        believed = PLR_FMA(at->weight, telling(at), believed);
     }
-    return weight < PLR_R(0.7) * active || plr_norm2_of_6(best->z) > PLR_R(36);
+    if (weight < LARGE_SHARE * active || plr_norm2_of_6(best->z) > FAR_FROM_TWISTS)
+        return PLR_MISFIT_MANY;
+    return believed < LARGE_SHARE * told ? PLR_MISFIT_FEW : PLR_MISFIT_NONE;
 }
 
 /* True if the observations determine the motion in all six directions. */
@@ -211,11 +234,13 @@ static bool is_well_spread(const plr_search_point *point) {
 }
 
 /* True if enough observations support the motion found without the twists: at least three, a fifth
- * of all, and four times as many as support the twists. Of at least six, well spread, three fifths
- * must agree with it. Fewer may lie on one moving object: a car that fills a third of the picture
- * pulls the estimate of all others with it. */
-static bool has_support(const plr_search *s, const plr_search_point *open) {
+ * of all, and four times as many as support the twists. If few misfit, those three tell more about
+ * the translation than all others do. Of at least six, well spread, three fifths must agree with
+ * it. Fewer may lie on one moving object: a car that fills a third of the picture pulls the
+ * estimate of all others with it. */
+static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
     unsigned with = 0, against = 0, agree = 0, active = 0;
+    plr_real told = 0, told_against = 0;
     for (unsigned i = 0; i < s->count; i++) {
         const plr_sighting *at = &s->sightings[i];
         const plr_real d2 = plr_dot3(at->e, at->e);
@@ -223,17 +248,23 @@ static bool has_support(const plr_search *s, const plr_search_point *open) {
             continue;
         active++;
         agree += d2 < AGREES_BELOW;
-        against += at->twist_d2 > d2 + CLEAR_DIFFERENCE;
+        told += telling(at);
+        if (at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
+            against++;
+            told_against += telling(at);
+        }
         with += d2 > at->twist_d2 + CLEAR_DIFFERENCE;
     }
-    return against >= MIN_POINTS && 5 * against >= active && 4 * with <= against &&
-           5 * agree >= 3 * active && active >= MIN_AGAINST_TWISTS && is_well_spread(open);
+    const bool enough =
+        misfit == PLR_MISFIT_MANY ? 5 * against >= active : PLR_R(2) * told_against > told;
+    return against >= MIN_POINTS && enough && 4 * with <= against && 5 * agree >= 3 * active &&
+           active >= MIN_AGAINST_TWISTS && is_well_spread(open);
 }
 
 /* Searches again with a prior so wide that the twists hardly count. True, with `best` and s->prior
  * at the result, if enough observations support it; otherwise the search is put back to where it
  * was. */
-static bool search_without_twists(plr_search *s, plr_search_point *best) {
+static bool search_without_twists(plr_search *s, plr_search_point *best, plr_misfit misfit) {
     const plr_applied_motion believed = s->prior;
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
@@ -242,7 +273,7 @@ static bool search_without_twists(plr_search *s, plr_search_point *best) {
     plr_search_from_zero(s, &open);
     for (unsigned i = 0; i < 2; i++)
         plr_search_descend(s, &open);
-    if (has_support(s, &open)) {
+    if (has_support(s, &open, misfit)) {
         *best = open;
         return true;
     }
@@ -315,8 +346,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && is_astray(&s); again++)
         plr_search_descend(&s, &best);
-    first->contradicted =
-        first->found && may_contradict(&s, &best) && search_without_twists(&s, &best);
+    const plr_misfit misfit = first->found ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
+    first->contradicted = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
     first->found = first->found && plr_search_factorise(&best, 0, U);
     if (first->found)
         (void)plr_search_step(&best, U, dz);

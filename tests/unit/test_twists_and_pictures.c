@@ -186,6 +186,19 @@ static void test_a_small_difference_is_said_and_widens_nothing(void) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &filter.motion, sizeof before);
 }
 
+/* Distant points say next to nothing about the way in one frame, and enough in a hundred. That is told; the
+ * twists are believed all the same, for real pixels are not as white. */
+static void test_what_is_hardly_seen_is_told_and_takes_no_weight_from_the_twists(void) {
+    const double nu[6] = {10}; /* 10 cm in a frame of 20 */
+    information[0] = 0.003;
+    for (int k = 0; k < 200; k++) {
+        add(nu, 0);
+        (void)judge();
+    }
+    TEST_ASSERT_EQUAL_HEX32(CONTRADICTED | MAY_BE_WRONG, judge() & (CONTRADICTED | MAY_BE_WRONG));
+    TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
+}
+
 static void test_twists_that_are_contradicted_are_believed_less(void) {
     plr_motion before;
     for (int k = 0; k < 5; k++)
