@@ -197,22 +197,30 @@ static plr_real telling(const plr_sighting *at) {
 /* Which observations have a small weight, so that another motion may fit them better. */
 typedef enum plr_misfit {
     PLR_MISFIT_NONE,
-    PLR_MISFIT_FEW, /* but they tell much about the translation: all others may be distant */
+    PLR_MISFIT_FEW, /* but they tell most of the translation: all others are distant */
     PLR_MISFIT_MANY
 } plr_misfit;
 
 static plr_misfit find_misfit(const plr_search *s, const plr_search_point *best) {
-    plr_real active = 0, weight = 0, told = 0, believed = 0;
+    plr_real active = 0, weight = 0, told = 0, told_by_misfits = 0;
+    unsigned misfits = 0; /* only these can come to support another motion */
     for (unsigned i = 0; i < s->count; i++) {
         const plr_sighting *at = &s->sightings[i];
         active += at->active;
         weight += at->weight;
-        told = PLR_FMA(at->active, telling(at), told);
-        believed = PLR_FMA(at->weight, telling(at), believed);
+        if (!(at->active > 0))
+            continue;
+        told += telling(at);
+        if (plr_dot3(at->e, at->e) > CLEAR_DIFFERENCE) {
+            misfits++;
+            told_by_misfits += telling(at);
+        }
     }
+    if (misfits < MIN_POINTS)
+        return PLR_MISFIT_NONE;
     if (weight < LARGE_SHARE * active || plr_norm2_of_6(best->z) > FAR_FROM_TWISTS)
         return PLR_MISFIT_MANY;
-    return believed < LARGE_SHARE * told ? PLR_MISFIT_FEW : PLR_MISFIT_NONE;
+    return PLR_R(2) * told_by_misfits > told ? PLR_MISFIT_FEW : PLR_MISFIT_NONE;
 }
 
 /* True if the observations determine the motion in all six directions. */
