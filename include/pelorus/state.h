@@ -211,6 +211,30 @@ typedef struct plr_consistency {
     uint8_t settling_frames;
 } plr_consistency;
 
+/* A point that is asked whether it stands, by twists or by pictures: src/filter/votes.c. */
+typedef struct plr_trial {
+    plr_real y[3][3]; /* where it is after each motion, (x/z, y/z, 1/z), 1/m, in the left camera */
+    plr_real covariance[6]; /* of each, 3x3, packed upper triangle */
+    plr_real cost[3];       /* the squared innovations under each motion */
+    plr_real frames;        /* that it was seen in; 0: no point */
+    plr_real id[2];         /* high and low 16 bits */
+} plr_trial;
+
+enum { PLR_TRIALS = 7, PLR_VOTERS = 3 };
+
+/* What single points say where twists and pictures disagree. All are plr_real: they stand where an
+ * IMU has its plr_core_motion, and are saved as that. */
+typedef struct plr_votes {
+    plr_trial trials[PLR_TRIALS];
+    plr_real counts[3];             /* by plr_vote, older ones weighted less */
+    plr_real voters[PLR_VOTERS][2]; /* the ids that voted for the twists, the first of them */
+    plr_real voter_count;
+    plr_real difference[PLR_POSE_DIM]; /* from the pose by twists to the pose by vision since the
+                                          contradiction: rho m, theta rad */
+    plr_real ways2, frames;            /* sum of the squared steps of rho, m^2, and their number */
+    plr_real trusted_frames;           /* so many frames more the twists are believed */
+} plr_votes;
+
 /* Relative errors of the camera's calibration that covariances take into account:
  * src/state/sensitivity.h. */
 typedef enum plr_calibration_error {
@@ -332,10 +356,12 @@ typedef struct plr_filter {
         plr_velocities velocities;
         plr_alignment alignment;
     } either;
-    plr_core_motion
-        core_motion; /* with an IMU, and then part of the "small" checksum, as the next */
-    plr_inertial inertial;
-    uint32_t frame_number;                  /* from here on part of the "small" checksum */
+    union {                          /* from here on part of the "small" checksum */
+        plr_core_motion core_motion; /* with an IMU */
+        plr_votes votes;             /* with twists */
+    } own;
+    plr_inertial inertial; /* with an IMU */
+    uint32_t frame_number;
     uint32_t reasons;                       /* of health, at the last frame */
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "filter/health.h"
+#include "filter/votes.h"
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
@@ -69,6 +70,7 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 
 void plr_consistency_clear(plr_filter *f) {
     memset(&f->consistency, 0, sizeof f->consistency);
+    plr_votes_clear(f);
 }
 
 /* ---------------------------------------------------------------- the windows */
@@ -304,7 +306,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         much && fast_statistic(f, WEAK) > CONTRADICTED_ABOVE
             ? (uint16_t)(c->contradicting_frames + (c->contradicting_frames < UINT16_MAX))
             : 0;
-    if (!c->contradicted && c->contradicting_frames >= FEW) {
+    if (!c->contradicted && c->contradicting_frames >= FEW && !plr_votes_trust_twists(f)) {
         const plr_consistency_window fastest = c->windows[0];
         contradict(f);
         c->windows[0] = fastest;
@@ -387,6 +389,14 @@ static void resolve(plr_filter *f) {
     memset(c->windows, 0, sizeof c->windows);
     c->contradicted = c->drifting = c->settling_frames = 0;
     c->agreeing_frames = c->doubted_frames = 0;
+}
+
+void plr_consistency_trust_twists(plr_filter *f) {
+    plr_consistency *c = &f->consistency;
+    memset(c->windows, 0, sizeof c->windows);
+    c->contradicted = 0;
+    c->contradicting_frames = 0;
+    c->excess = 0;
 }
 
 void plr_consistency_doubt(plr_filter *f) {

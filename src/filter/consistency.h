@@ -31,6 +31,10 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
                          const plr_real moved[PLR_POSE_DIM], bool outright);
 
+/* Ends a contradiction, because the points have said that the twists are right (filter/votes.h). The
+ * difference stays: until pictures and twists agree the covariance covers both poses. */
+void plr_consistency_trust_twists(plr_filter *f);
+
 /* Adds the counts of a frame; `lost`: the frame lost the pose (plr_health). Returns bits of
  * plr_reason. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);

@@ -188,7 +188,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(f->p_WB, 0, sizeof f->p_WB);
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->R_WB);
-    memset(&f->core_motion, 0, sizeof f->core_motion);
+    memset(&f->own.core_motion, 0, sizeof f->own.core_motion);
     plr_motion_clear(f);
     plr_velocity_forget(f);
     plr_alignment_clear(f);

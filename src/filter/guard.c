@@ -80,12 +80,9 @@ static uint64_t small_sum(const plr_filter *f) {
     plr_sum sum = {{0}};
     add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
     add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
-    add_between(&sum, f, offsetof(plr_filter, frame_number), offsetof(plr_filter, guard));
-    if (f->config.process == PLR_PROCESS_IMU) {
-        add_between(&sum, f, offsetof(plr_filter, core_motion), offsetof(plr_filter, frame_number));
-        if (!f->inertial.started)
-            add(&sum, &f->either.alignment, sizeof f->either.alignment);
-    }
+    add_between(&sum, f, offsetof(plr_filter, own), offsetof(plr_filter, guard));
+    if (f->config.process == PLR_PROCESS_IMU && !f->inertial.started)
+        add(&sum, &f->either.alignment, sizeof f->either.alignment);
     if (f->velocities_known)
         add(&sum, &f->either.velocities, sizeof f->either.velocities);
     return mixed(&sum);

@@ -13,6 +13,7 @@
 #include "filter/guard.h"
 #include "filter/mount.h"
 #include "filter/predict.h"
+#include "filter/votes.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
@@ -193,8 +194,10 @@ static bool measure(plr_filter *f, const plr_reading *reading, plr_reading_resul
     result->used = apply(f, kind, reading, result);
     count(f, result);
     const uint8_t bounding = kind->bounds_position;
-    if (result->used)
+    if (result->used) {
         plr_alignment_keep_world(f);
+        plr_votes_keep_pose(f);
+    }
     if (result->used && bounding != 0 && (reading->axes & bounding) == bounding)
         f->last_position_ns = f->t_ns;
     return result->used;

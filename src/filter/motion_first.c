@@ -7,6 +7,7 @@
 #include "filter/search.h"
 #include "filter/tracks.h"
 #include "filter/vantage.h"
+#include "filter/votes.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "sensor/stereo.h"
@@ -354,7 +355,8 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && is_astray(&s); again++)
         plr_search_descend(&s, &best);
-    const plr_misfit misfit = first->found ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
+    const bool in_doubt = first->found && !plr_votes_trust_twists(f);
+    const plr_misfit misfit = in_doubt ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
     first->contradicted = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
     first->found = first->found && plr_search_factorise(&best, 0, U);
     if (first->found)

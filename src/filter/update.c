@@ -21,6 +21,7 @@
 #include "filter/motion_first.h"
 #include "filter/predict.h"
 #include "filter/tracks.h"
+#include "filter/votes.h"
 #include "math/order.h"
 #include "math/small.h"
 #include "process/process.h"
@@ -159,6 +160,8 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
         plr_pose_moved_from(f, R_WB, p_WB, moved);
         plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda, moved,
                             first.contradicted);
+        if (plr_votes_add(f, frame, n, &believed, &first.motion, &correction, moved))
+            plr_consistency_trust_twists(f);
     }
     return correction;
 }

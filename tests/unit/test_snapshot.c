@@ -176,8 +176,8 @@ static void test_every_field_is_carried(void) {
     for (unsigned i = 0; i < sizeof sums / sizeof *sums; i++)
         *sums[i] = rng_bits(&chance);
     fill_reals(&chance, driven.motion.B, PLR_MOTION_BY);
-    fill_reals(&chance, (plr_real *)(void *)&driven.core_motion,
-               sizeof driven.core_motion / sizeof(plr_real));
+    fill_reals(&chance, (plr_real *)(void *)&driven.own.core_motion,
+               sizeof driven.own.core_motion / sizeof(plr_real));
     fill_reals(&chance, driven.inertial.velocity, PLR_VELOCITY_DIM);
     fill_reals(&chance, driven.inertial.slow, PLR_POSE_DIM);
     fill_reals(&chance, driven.inertial.change2, 2);
