@@ -96,7 +96,8 @@ typedef enum plr_reason {
     /* Observations were left out for want of time. A longer deadline, or fewer features. */
     PLR_REASON_BUDGET = 1 << 11,
     /* Vision contradicts the twists, or the IMU, and the filter followed vision: slipping wheels, a
-     * dead encoder, a push. If it repeats, check the wheels; if it stays, the scale of the
+     * dead encoder, a push. Where single points show that most of the scene moves instead, it went
+     * back to the twists, and the reset counter counts the jump. If it repeats, check the wheels; if it stays, the scale of the
      * odometry. With an IMU: its noises are set too small (settings gyro-noise, accel-noise), or the
      * clocks of camera and IMU differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,

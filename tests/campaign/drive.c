@@ -19,6 +19,8 @@ typedef struct run {
     unsigned before, during, frames;
     unsigned k; /* frame, from 0 */
     plr_time_ns start_ns, frame_ns;
+    plr_pose reckoned[2]; /* by the event's readings alone: as they are, less known_bias */
+    double known_bias[6];
     int last_beyond; /* frame; -1: never */
     outcome *result;
 } run;
@@ -60,6 +62,32 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     r->result->told_frames = r->result->again_s = r->result->first_diverged = -1;
 }
 
+/* Dead reckoning begins where the filter is. */
+static void begin_reckoning(run *r) {
+    double P_b[36];
+    (void)plr_filter_pose(&filter, &r->reckoned[0]);
+    r->reckoned[1] = r->reckoned[0];
+    if (plr_filter_bias(&filter, r->known_bias, P_b) != PLR_OK)
+        memset(r->known_bias, 0, sizeof r->known_bias);
+}
+
+static void reckon(run *r, const plr_twist *u) {
+    for (int less_bias = 0; less_bias < 2; less_bias++) {
+        double xi[6];
+        for (int i = 0; i < 3; i++) {
+            xi[i] = r->world.step_s * (u->v_B_mps[i] - less_bias * r->known_bias[i]);
+            xi[3 + i] = r->world.step_s * (u->w_B_radps[i] - less_bias * r->known_bias[3 + i]);
+        }
+        r->reckoned[less_bias] = pose_moved(&r->reckoned[less_bias], xi);
+    }
+}
+
+static double distance_to(const run *r, const plr_pose *pose) {
+    double xi[6];
+    pose_error(pose, &r->world.T_WB, xi);
+    return sqrt(xi[0] * xi[0] + xi[1] * xi[1] + xi[2] * xi[2]);
+}
+
 /* Readings between two frames. Late ones come after the frame that they belong to, see
  * LATE_TWISTS; the filter may well refuse them. */
 static void hear_twists(run *r, bool event) {
@@ -72,6 +100,8 @@ static void hear_twists(run *r, bool event) {
         const plr_twist u = sensors_read(&r->sensors, &r->world, event);
         if (plr_filter_predict(&filter, t_ns + i * r->frame_ns / n - back_ns, &u) != PLR_OK)
             r->result->refused++;
+        if (event)
+            reckon(r, &u);
         world_step(&r->world, event);
     }
 }
@@ -169,6 +199,8 @@ void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *re
     begin(&r, seed, parked_frames);
     for (r.k = 0; r.k < r.frames; r.k++) {
         const bool event = phase_of(&r, r.k) == DURING;
+        if (r.k == r.before && r.during > 0)
+            begin_reckoning(&r);
         hear_twists(&r, event);
         if (r.k == r.before && r.during > 0)
             world_strike(&r.world);
@@ -179,6 +211,10 @@ void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *re
         plr_report report;
         (void)plr_filter_update(&filter, &frame, &report);
         judge(&r, &report);
+        if (r.k + 1 == r.before + r.during) {
+            result->reckoned_m = distance_to(&r, &r.reckoned[0]);
+            result->reckoned_unbiased_m = distance_to(&r, &r.reckoned[1]);
+        }
     }
     finish(&r);
 }

@@ -34,6 +34,9 @@ typedef struct outcome {
     double told_frames;    /* from the beginning of the event to the first frame not GOOD; -1 */
     double again_s;        /* from true again to GOOD again; -1: never */
     double first_diverged; /* frame; -1: never */
+    /* How far off dead reckoning is at the end of the event, from where the filter was when it began,
+     * m: with the readings as they are, and less the biases known by then. */
+    double reckoned_m, reckoned_unbiased_m;
     /* One second after the event: the error in sigmas and in m, and the filter's own sigma; and its
      * sigma one second after it was started. */
     double later_sigmas, later_error_m, later_own_m, fresh_own_m;

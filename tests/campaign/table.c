@@ -40,6 +40,7 @@ typedef struct tally {
     double *told, *again; /* sorted; those never told or good again at the end, as infinity */
     double first_diverged, later_sigmas;
     mean later_error2, later_own2, fresh_own2; /* m^2 */
+    mean reckoned_m, reckoned_unbiased_m;
 } tally;
 
 static void add_phase(tally *t, phase p, const account *a) {
@@ -83,6 +84,8 @@ static void add(tally *t, const outcome *o) {
     mean_add(&t->later_error2, o->later_error_m * o->later_error_m);
     mean_add(&t->later_own2, o->later_own_m * o->later_own_m);
     mean_add(&t->fresh_own2, o->fresh_own_m * o->fresh_own_m);
+    mean_add(&t->reckoned_m, o->reckoned_m);
+    mean_add(&t->reckoned_unbiased_m, o->reckoned_unbiased_m);
     if (o->first_diverged >= 0) {
         t->diverged_seeds++;
         if (!(t->first_diverged <= o->first_diverged))
@@ -157,6 +160,9 @@ static verdict judge(const scenario *s, const tally *t) {
         most(&v, "after", share(after->silent, after->frames), b->silent);
     most(&v, "told", quantile(t->told, t->seeds, 0.95), b->told_frames);
     most(&v, "error m", mean_of(&t->end_m[DURING]), b->error_m);
+    if (s->mishap == CONVOY) /* the pose is to be no worse than without a camera */
+        most(&v, "error m beside dead reckoning's", mean_of(&t->end_m[DURING]),
+             mean_of(&t->reckoned_m));
     most(&v, "again s", quantile(t->again, t->seeds, 0.95), b->again_s);
     most(&v, "later sigmas", t->later_sigmas, b->later_sigmas);
     most(&v, "width", width(t), b->later_width);
@@ -242,6 +248,9 @@ static void print_details(const scenario *s, const tally *t) {
                quantile(t->again, t->seeds, 0.5), quantile(t->again, t->seeds, 0.95),
                t->later_sigmas, sqrt(mean_of(&t->later_error2)), sqrt(mean_of(&t->later_own2)),
                sqrt(mean_of(&t->fresh_own2)), width(t));
+    if (s->during)
+        printf(", dead reckoning %.3g m at the event's end, %.3g m less the biases",
+               mean_of(&t->reckoned_m), mean_of(&t->reckoned_unbiased_m));
     if (t->refused > 0)
         printf(", %.0f readings refused", t->refused);
     if (t->resets > 0)
