@@ -5,6 +5,7 @@
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
 #include "filter/mount.h"
+#include "filter/votes.h"
 #include "math/finite.h"
 #include "process/alignment.h"
 #include "state/blocks.h"
@@ -33,6 +34,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
     f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
+    plr_votes_clear(f);                         /* the body may have been carried */
     if (plr_has_block(f, PLR_BLOCK_VELOCITY)) { /* it is not what it was then */
         const plr_real v = f->par.start_velocity_variance, variance[3] = {v, v, v};
         memset(f->inertial.velocity, 0, sizeof f->inertial.velocity);

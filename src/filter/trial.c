@@ -88,17 +88,17 @@ static void add_motion_noise(plr_real S[9], const plr_real y[3], const plr_candi
         S[i] += PLR_FMA(k, way[i], c->turn_variance * turn[i]);
 }
 
-/* The covariance is that under the twists for all. */
+/* One covariance serves all motions: that under the twists'. */
 bool plr_trial_follow(const plr_filter *f, plr_trial *t, const plr_observation *seen,
                       const plr_candidates *c) {
     plr_real F[9], FS[9], S[9], N[9], U[6], X[9], K[9], z[3];
-    for (unsigned h = MOTIONS; h-- > 0;) /* the twists' last: F is that one's */
+    for (unsigned h = PLR_MOTIONS; h-- > 0;) /* the twists' last: F is that one's */
         if (!move(t->y[h], F, c->motion[h].R, c->motion[h].p))
             return false;
     unpack(t->covariance, S);
     plr_mat3_mul(FS, F, S);
     plr_mat3_mul_nt(S, FS, F);
-    add_motion_noise(S, t->y[BY_TWISTS], c);
+    add_motion_noise(S, t->y[PLR_BY_TWISTS], c);
     measurement_noise(f, N);
     for (unsigned i = 0; i < 9; i++)
         N[i] += S[i];
@@ -107,7 +107,7 @@ bool plr_trial_follow(const plr_filter *f, plr_trial *t, const plr_observation *
     memcpy(X, S, sizeof X);
     plr_solve3_transposed(3, U, X); /* U^-T S */
     measure(f, seen, z);
-    for (unsigned h = 0; h < MOTIONS; h++) {
+    for (unsigned h = 0; h < PLR_MOTIONS; h++) {
         plr_real e[3], d[3];
         for (unsigned i = 0; i < 3; i++)
             e[i] = z[i] - t->y[h][i];
@@ -130,7 +130,7 @@ bool plr_trial_follow(const plr_filter *f, plr_trial *t, const plr_observation *
 /* True if its range is known. Points that are too far for it say nothing of the way; what they dislike
  * about the pictures' motion is the noise of its steps. */
 static bool is_near(const plr_trial *t) {
-    const plr_real inverse_range = t->y[BY_TWISTS][2];
+    const plr_real inverse_range = t->y[PLR_BY_TWISTS][2];
     return inverse_range > 0 &&
            inverse_range * inverse_range > RANGE_SIGMAS * RANGE_SIGMAS * t->covariance[5];
 }
@@ -138,10 +138,10 @@ static bool is_near(const plr_trial *t) {
 plr_vote plr_trial_vote(const plr_trial *t) {
     const plr_real dof = PLR_ROWS * (t->frames - PLR_R(1));
     const plr_real fits = dof + FITTING_SIGMAS * PLR_SQRT(PLR_R(2) * dof);
-    const plr_real twists = t->cost[BY_TWISTS];
-    const plr_real pictures = t->cost[BY_PICTURES] < t->cost[BY_PICTURES_WAY]
-                                  ? t->cost[BY_PICTURES]
-                                  : t->cost[BY_PICTURES_WAY];
+    const plr_real twists = t->cost[PLR_BY_TWISTS];
+    const plr_real pictures = t->cost[PLR_BY_PICTURES] < t->cost[PLR_BY_PICTURES_WAY]
+                                  ? t->cost[PLR_BY_PICTURES]
+                                  : t->cost[PLR_BY_PICTURES_WAY];
     if (twists < fits && pictures > twists + CLEAR_DIFFERENCE)
         return is_near(t) ? PLR_VOTE_TWISTS : PLR_VOTE_OPEN;
     if (pictures < fits && twists > pictures + CLEAR_DIFFERENCE)
@@ -169,7 +169,7 @@ void plr_trial_begin(const plr_filter *f, plr_trial *t, const plr_observation *s
     memset(t, 0, sizeof *t);
     plr_trial_set_id(t->id, seen->id);
     t->frames = 1;
-    for (unsigned h = 0; h < MOTIONS; h++)
+    for (unsigned h = 0; h < PLR_MOTIONS; h++)
         measure(f, seen, t->y[h]);
     measurement_noise(f, N);
     pack(N, t->covariance);

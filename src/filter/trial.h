@@ -18,13 +18,13 @@ typedef enum plr_vote {
 
 /* The motions that a point is followed under. The third is the pictures' way with the twists' turn:
  * distant points, which tell the turn alone, fit it as well as the twists' and stay undecided. */
-enum { BY_TWISTS, BY_PICTURES, BY_PICTURES_WAY, MOTIONS };
+enum { PLR_BY_TWISTS, PLR_BY_PICTURES, PLR_BY_PICTURES_WAY, PLR_MOTIONS };
 
 /* Motions of the left camera, and the variances of their noise, m^2 and rad^2. */
 typedef struct plr_candidates {
     struct {
         plr_real R[9], p[3];
-    } motion[MOTIONS];
+    } motion[PLR_MOTIONS];
     plr_real way_variance, turn_variance;
 } plr_candidates;
 

@@ -43,8 +43,11 @@ static void forget_difference(plr_votes *v) {
 }
 
 void plr_votes_keep_pose(plr_filter *f) {
-    if (f->config.process == PLR_PROCESS_TWIST)
-        forget_difference(&f->own.votes);
+    if (f->config.process != PLR_PROCESS_TWIST)
+        return;
+    forget_difference(&f->own.votes);
+    for (unsigned t = 0; t < PLR_TRIALS; t++)
+        f->own.votes.trials[t].frames = 0;
 }
 
 bool plr_votes_trust_twists(const plr_filter *f) {
@@ -100,9 +103,9 @@ static void find_candidates(const plr_filter *f, const plr_applied_motion *belie
     memcpy(p, believed->p, sizeof p);
     plr_se3_expm1(dE, dp, moved);
     plr_se3_append(E, p, dE, dp);
-    set_motion(f, c, BY_TWISTS, believed->E, believed->p);
-    set_motion(f, c, BY_PICTURES, E, p);
-    set_motion(f, c, BY_PICTURES_WAY, believed->E, p);
+    set_motion(f, c, PLR_BY_TWISTS, believed->E, believed->p);
+    set_motion(f, c, PLR_BY_PICTURES, E, p);
+    set_motion(f, c, PLR_BY_PICTURES_WAY, believed->E, p);
     add_noise(c, TWISTS_SHARE, believed->L, NULL);
     add_noise(c, PICTURES_SHARE, applied->JL, correction->Lambda);
 }
@@ -162,8 +165,8 @@ static void ask(plr_filter *f, plr_trial *t, const plr_frame *frame, unsigned n,
     }
 }
 
-/* Gives each free trial a point. Where the frames have gone through, so have the points: it begins at
- * another one in each frame. */
+/* Gives each free trial a point. It begins at another one in each frame, so that all have their
+ * turn. */
 static void ask_others(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_votes *v = &f->own.votes;
     unsigned next = 0;
@@ -256,6 +259,6 @@ bool plr_votes_add(plr_filter *f, const plr_frame *frame, unsigned n,
     ask_others(f, frame, n);
     for (unsigned k = 0; k < n; k++) /* a known map says where the body is */
         if (f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known)
-            plr_votes_keep_pose(f);
+            forget_difference(v);
     return decide(f);
 }

@@ -17,7 +17,8 @@
 /* No point asked, nothing counted. */
 void plr_votes_clear(plr_filter *f);
 
-/* The pose has become known from elsewhere: what the pictures moved it by before is no error. */
+/* The pose has become known from elsewhere: what the pictures moved it by before is no error. Points
+ * are followed from frame to frame, and begin anew, for the motion up to now has been applied. */
 void plr_votes_keep_pose(plr_filter *f);
 
 /* Asks the points of a frame that has been applied; after plr_consistency_add, whose arguments

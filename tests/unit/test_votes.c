@@ -171,6 +171,8 @@ static void test_a_pose_that_is_known_from_elsewhere_is_kept(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE(-0.5, (double)filter.own.votes.difference[2]);
     plr_votes_keep_pose(&filter);
     TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.difference[2]);
+    for (unsigned t = 0; t < PLR_TRIALS; t++) /* the motion so far has been applied without them */
+        TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.trials[t].frames);
     filter.slots[3].known = 1;
     look();
     TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.difference[2]);
@@ -185,6 +187,18 @@ static void test_setting_the_pose_forgets_the_votes(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, 0, &here, NULL));
     TEST_ASSERT_FALSE(plr_votes_trust_twists(&filter));
     TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.difference[0]);
+}
+
+/* A robot that was switched off may have been carried. */
+static void test_resuming_forgets_the_votes(void) {
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_reset(&filter));
+    filter.clock_started = 1;
+    filter.own.votes.difference[0] = 7;
+    filter.own.votes.trials[2].frames = 5;
+    reseal(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, 1000, NULL));
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.difference[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.trials[2].frames);
 }
 
 /* An IMU has its motion where the votes are. */
