@@ -12,7 +12,8 @@
 #include "state/slots.h"
 
 enum {
-    LONGEST_TRIAL = 40,  /* frames; then another point is asked */
+    LONGEST_TRIAL = 43,  /* frames; then another point is asked. A prime, so that it is another one
+                         * whatever their number: ask_others begins at the frame's number */
     TRUSTED_FRAMES = 100 /* for which the twists are believed after a verdict */
 };
 
@@ -135,9 +136,9 @@ static bool may_be_asked(const plr_filter *f, unsigned k) {
     return f->work.slot_of[k] != PLR_NO_SLOT && !f->slots[f->work.slot_of[k]].known;
 }
 
-/* Follows a point that is asked, and counts its vote if it has decided. A point that moves by itself
- * or with others is left out as long as the twists are trusted. */
-static void ask(plr_filter *f, plr_trial *t, const plr_frame *frame, unsigned n,
+/* Follows a point that is asked, and counts its vote: true if it has decided. A point that moves by
+ * itself or with others is left out as long as the twists are trusted. */
+static bool ask(plr_filter *f, plr_trial *t, const plr_frame *frame, unsigned n,
                 const plr_candidates *c) {
     plr_votes *v = &f->own.votes;
     unsigned k = 0;
@@ -146,13 +147,13 @@ static void ask(plr_filter *f, plr_trial *t, const plr_frame *frame, unsigned n,
         k++;
     if (k == n || !plr_trial_follow(f, t, &frame->observations[f->work.order[k]], c)) {
         t->frames = 0;
-        return;
+        return false;
     }
     const plr_vote vote = plr_trial_vote(t);
     if (vote == PLR_VOTE_OPEN) {
         if (t->frames > LONGEST_TRIAL)
             t->frames = 0;
-        return;
+        return false;
     }
     t->frames = 0;
     v->counts[vote] += PLR_R(1);
@@ -163,6 +164,7 @@ static void ask(plr_filter *f, plr_trial *t, const plr_frame *frame, unsigned n,
     } else if (v->trusted_frames > 0) {
         slot->moving = 1;
     }
+    return true;
 }
 
 /* Gives each free trial a point. It begins at another one in each frame, so that all have their
@@ -216,14 +218,16 @@ static void take_back(plr_filter *f) {
     f->totals.widened++;
 }
 
-static bool decide(plr_filter *f) {
+/* Old votes keep their share for ever: only a new one, of any kind, prolongs the trust. */
+static bool decide(plr_filter *f, bool voted) {
     plr_votes *v = &f->own.votes;
     const plr_real twists = v->counts[PLR_VOTE_TWISTS], pictures = v->counts[PLR_VOTE_PICTURES];
     const plr_real neither = v->counts[PLR_VOTE_NEITHER], all = twists + pictures + neither;
     const bool share = twists >= SHARE_FOR_TWISTS * all;
     if (share && v->voter_count >= PLR_VOTERS && neither <= MOST_FOR_NEITHER * all &&
         (v->trusted_frames > 0 || is_steady(v))) {
-        v->trusted_frames = TRUSTED_FRAMES;
+        if (voted || !(v->trusted_frames > 0))
+            v->trusted_frames = TRUSTED_FRAMES;
         if (!f->consistency.contradicted)
             return false;
         take_back(f);
@@ -242,6 +246,7 @@ bool plr_votes_add(plr_filter *f, const plr_frame *frame, unsigned n,
     const plr_consistency *c = &f->consistency;
     plr_votes *v = &f->own.votes;
     plr_candidates candidates;
+    bool voted = false;
     if (f->config.process != PLR_PROCESS_TWIST)
         return false;
     v->trusted_frames -= v->trusted_frames > 0 ? PLR_R(1) : PLR_R(0);
@@ -254,11 +259,11 @@ bool plr_votes_add(plr_filter *f, const plr_frame *frame, unsigned n,
     for (unsigned i = 0; i < PLR_VOTE_OPEN; i++)
         v->counts[i] *= COUNTS_DECAY;
     for (unsigned t = 0; t < PLR_TRIALS; t++)
-        if (v->trials[t].frames > 0)
-            ask(f, &v->trials[t], frame, n, &candidates);
+        if (v->trials[t].frames > 0 && ask(f, &v->trials[t], frame, n, &candidates))
+            voted = true;
     ask_others(f, frame, n);
     for (unsigned k = 0; k < n; k++) /* a known map says where the body is */
         if (f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known)
             forget_difference(v);
-    return decide(f);
+    return decide(f, voted);
 }

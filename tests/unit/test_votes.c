@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "filter/trial.h"
 #include "filter/votes.h"
 #include "math/dense.h"
 #include "pelorus/pelorus.h"
@@ -85,6 +86,21 @@ static bool look(void) {
     return plr_votes_add(&filter, &frame, COUNT, &believed, &applied, &correction, moved);
 }
 
+/* One frame without a match. */
+static bool look_at_nothing(void) {
+    const plr_frame frame = {0, PLR_NO_BUDGET, 0, NULL};
+    filter.frame_number++;
+    return plr_votes_add(&filter, &frame, 0, &believed, &applied, &correction, moved);
+}
+
+static void demand_that_each_is_asked_once(void) {
+    for (unsigned t = 0; t < PLR_TRIALS; t++)
+        for (unsigned i = 0; i < COUNT && filter.own.votes.trials[t].frames > 0; i++)
+            for (unsigned other = 0; other < t; other++)
+                TEST_ASSERT_FALSE(plr_trial_is_of(&filter.own.votes.trials[t], seen[i].id) &&
+                                  plr_trial_is_of(&filter.own.votes.trials[other], seen[i].id));
+}
+
 /* Frames until the verdict, 0: none among so many. */
 static unsigned until_verdict(unsigned frames) {
     for (unsigned k = 1; k <= frames; k++)
@@ -117,6 +133,132 @@ static void test_wheels_that_slip_find_no_support_in_other_traffic(void) {
     for (unsigned i = 0; i < 6; i++)
         spots[i].step_m = -0.1;
     TEST_ASSERT_EQUAL_UINT(0, until_verdict(60));
+}
+
+/* Where most points go a third way, the pictures are wrong for sure, and the twists not right for it. */
+static void test_nothing_is_decided_while_most_fit_neither(void) {
+    filter.own.votes.voter_count = PLR_VOTERS;
+    filter.own.votes.counts[PLR_VOTE_TWISTS] = 4;
+    filter.own.votes.counts[PLR_VOTE_NEITHER] = 6;
+    TEST_ASSERT_FALSE(look_at_nothing());
+    TEST_ASSERT_FALSE(plr_votes_trust_twists(&filter));
+    filter.own.votes.counts[PLR_VOTE_NEITHER] = 3;
+    TEST_ASSERT_TRUE(look_at_nothing());
+}
+
+/* Pictures that toss the pose to and fro lead nowhere: points that stand contradict each step. */
+static void test_nothing_is_decided_while_the_pictures_lead_nowhere(void) {
+    place(COUNT, 0, 12);
+    for (unsigned k = 0; k < 40; k++) {
+        moved[2] = PLR_R(k % 2 ? 0.3 : -0.3);
+        TEST_ASSERT_EQUAL(k < 3 ? false : plr_votes_trust_twists(&filter), look());
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(2.5, (double)filter.own.votes.voter_count);
+    TEST_ASSERT_FALSE(plr_votes_trust_twists(&filter));
+}
+
+/* While the twists are trusted a contradiction is taken back at once, however the pictures toss. */
+static void test_while_trusted_a_contradiction_is_taken_back_at_once(void) {
+    filter.consistency.contradicted = 0;
+    filter.own.votes.trusted_frames = 50;
+    filter.own.votes.voter_count = PLR_VOTERS;
+    filter.own.votes.counts[PLR_VOTE_TWISTS] = 1;
+    for (unsigned k = 0; k < 10; k++) {
+        moved[2] = PLR_R(k % 2 ? 0.3 : -0.3);
+        TEST_ASSERT_FALSE(look_at_nothing());
+    }
+    filter.consistency.contradicted = 1;
+    TEST_ASSERT_TRUE(look_at_nothing());
+}
+
+/* A tenth of the votes keeps the pictures' six from ending it. */
+static void test_a_share_for_the_twists_keeps_them_trusted(void) {
+    filter.consistency.contradicted = 0;
+    filter.own.votes.trusted_frames = 50;
+    filter.own.votes.voter_count = 2;
+    filter.own.votes.counts[PLR_VOTE_TWISTS] = 2;
+    filter.own.votes.counts[PLR_VOTE_PICTURES] = 10;
+    look_at_nothing();
+    TEST_ASSERT_TRUE(plr_votes_trust_twists(&filter));
+    filter.own.votes.counts[PLR_VOTE_PICTURES] = 30;
+    look_at_nothing();
+    TEST_ASSERT_FALSE(plr_votes_trust_twists(&filter));
+}
+
+/* Votes of long ago keep their share as they fade: they trusted the twists for ever once. */
+static void test_trust_ends_a_hundred_frames_after_the_last_vote(void) {
+    place(5, PICTURES_M, 12);
+    TEST_ASSERT_GREATER_THAN_UINT(0, until_verdict(40));
+    filter.consistency.contradicted = 0;
+    for (unsigned k = 0; k < 99; k++) {
+        look_at_nothing();
+        TEST_ASSERT_TRUE(plr_votes_trust_twists(&filter));
+    }
+    look_at_nothing();
+    TEST_ASSERT_FALSE(plr_votes_trust_twists(&filter));
+}
+
+static void test_votes_fade(void) {
+    filter.own.votes.counts[PLR_VOTE_PICTURES] = 4;
+    for (unsigned k = 0; k < 50; k++)
+        look_at_nothing();
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 4 * pow(0.98, 50),
+                              (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
+}
+
+/* Points that cannot decide make room for others. */
+static void test_all_points_have_their_turn(void) {
+    bool asked[COUNT] = {false};
+    place(COUNT, 0, 400);
+    memset(moved, 0, sizeof moved);
+    for (unsigned k = 0; k < 200; k++) {
+        TEST_ASSERT_FALSE(look());
+        demand_that_each_is_asked_once();
+        for (unsigned i = 0; i < COUNT; i++)
+            for (unsigned t = 0; t < PLR_TRIALS; t++)
+                asked[i] = asked[i] || plr_trial_is_of(&filter.own.votes.trials[t], seen[i].id);
+    }
+    for (unsigned i = 0; i < COUNT; i++)
+        TEST_ASSERT_TRUE(asked[i]);
+}
+
+static void test_a_point_out_of_sight_makes_room(void) {
+    place(COUNT, 0, 12);
+    look();
+    look_at_nothing();
+    for (unsigned t = 0; t < PLR_TRIALS; t++)
+        TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.trials[t].frames);
+}
+
+static void test_points_of_a_map_are_not_asked(void) {
+    place(COUNT, 0, 12);
+    for (unsigned i = 0; i < COUNT; i++)
+        filter.slots[i].known = 1;
+    look();
+    for (unsigned t = 0; t < PLR_TRIALS; t++)
+        TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.trials[t].frames);
+}
+
+/* Nobody is left out before the verdict. After it those who vote otherwise are, until one votes for the
+ * twists again. */
+static void test_who_moves_is_left_out_while_the_twists_are_trusted(void) {
+    unsigned left_out = 0;
+    place(5, PICTURES_M, 14);
+    while (!look()) {
+        demand_that_each_is_asked_once();
+        for (unsigned i = 0; i < COUNT; i++)
+            TEST_ASSERT_EQUAL_UINT8(0, filter.slots[i].moving);
+    }
+    for (unsigned i = 0; i < 5; i++)
+        filter.slots[i].moving = 1;
+    for (unsigned k = 0; k < 25; k++)
+        look();
+    for (unsigned i = 0; i < COUNT; i++)
+        left_out += filter.slots[i].moving;
+    TEST_ASSERT_LESS_THAN_UINT(5, filter.slots[0].moving + filter.slots[1].moving +
+                                      filter.slots[2].moving + filter.slots[3].moving +
+                                      filter.slots[4].moving);
+    TEST_ASSERT_GREATER_THAN_UINT(5, left_out);
 }
 
 /* Two points may be one wrong track and a reflection. */
