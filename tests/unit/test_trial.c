@@ -75,11 +75,30 @@ static void test_the_pictures_way_alone_is_enough(void) {
     TEST_ASSERT_EQUAL_INT(PLR_VOTE_PICTURES, ask(8, PICTURES_M, 30, 0));
 }
 
-/* A car that overtakes is nearer to the twists' motion than to the pictures', and one that comes towards
- * the robot the other way round: neither says anything of the robot. */
 static void test_a_point_that_goes_its_own_way_votes_for_neither(void) {
     TEST_ASSERT_EQUAL_INT(PLR_VOTE_NEITHER, ask(8, -0.4, 30, 0));
     TEST_ASSERT_EQUAL_INT(PLR_VOTE_NEITHER, ask(14, 0.7, 15, 0));
+}
+
+/* To be the better one is not enough: after 10 frames 27 is expected, and 56 is four sigmas above. */
+static void test_the_better_motion_must_fit_too(void) {
+    static const struct {
+        plr_real cost[PLR_MOTIONS]; /* by twists, by pictures, by their way alone */
+        plr_vote vote;
+    } cases[] = {
+        {{50, 200, 200}, PLR_VOTE_TWISTS},   {{70, 200, 200}, PLR_VOTE_OPEN},
+        {{200, 50, 200}, PLR_VOTE_PICTURES}, {{200, 70, 200}, PLR_VOTE_OPEN},
+        {{200, 200, 50}, PLR_VOTE_PICTURES}, {{50, 60, 200}, PLR_VOTE_OPEN},
+        {{90, 200, 200}, PLR_VOTE_NEITHER},
+    };
+    memset(&trial, 0, sizeof trial);
+    trial.frames = 10;
+    trial.y[PLR_BY_TWISTS][2] = PLR_R(0.1);
+    trial.covariance[5] = PLR_R(1e-6);
+    for (unsigned i = 0; i < sizeof cases / sizeof *cases; i++) {
+        memcpy(trial.cost, cases[i].cost, sizeof trial.cost);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cases[i].vote, plr_trial_vote(&trial), "case of the table");
+    }
 }
 
 /* A wrong match costs all motions the same, and does not draw the point away. */

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "filter/consistency.h"
 #include "filter/trial.h"
 #include "filter/votes.h"
 #include "math/dense.h"
@@ -259,6 +260,57 @@ static void test_who_moves_is_left_out_while_the_twists_are_trusted(void) {
                                       filter.slots[2].moving + filter.slots[3].moving +
                                       filter.slots[4].moving);
     TEST_ASSERT_GREATER_THAN_UINT(5, left_out);
+}
+
+/* The pictures' turn may be noise while their way is right. */
+static void test_the_pictures_way_counts_with_the_twists_turn(void) {
+    place(0, PICTURES_M, 12);
+    for (unsigned k = 0; k < 40; k++) {
+        moved[4] = PLR_R(k % 2 ? 0.02 : -0.02);
+        look();
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(2, (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
+}
+
+/* Noise of either motion that explains the difference: nobody votes. */
+static void test_noise_of_either_motion_leaves_it_open(void) {
+    plr_real *const noise[2] = {believed.L, applied.JL};
+    for (unsigned which = 0; which < 2; which++) {
+        setUp();
+        place(5, PICTURES_M, 12);
+        noise[which][14] = PLR_R(2); /* m */
+        TEST_ASSERT_EQUAL_UINT(0, until_verdict(10));
+        for (unsigned i = 0; i < PLR_VOTE_OPEN; i++)
+            TEST_ASSERT_EQUAL_DOUBLE(0, (double)filter.own.votes.counts[i]);
+    }
+}
+
+/* The difference is a twist of the body, and turns with it. */
+static void test_the_difference_turns_with_the_body(void) {
+    const plr_real quarter[9] = {-1, 0, 1, 0, 0, 0, -1, 0, -1}; /* about y, less the identity */
+    look_at_nothing();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, PICTURES_M - WAY_M, (double)filter.own.votes.difference[2]);
+    memcpy(applied.E, quarter, sizeof quarter);
+    memset(applied.p, 0, sizeof applied.p);
+    memset(moved, 0, sizeof moved);
+    look_at_nothing();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, WAY_M - PICTURES_M, (double)filter.own.votes.difference[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, (double)filter.own.votes.difference[2]);
+}
+
+/* The windows speak of a contradiction after three frames, but not against trusted twists. */
+static void test_no_majority_contradicts_trusted_twists(void) {
+    const plr_real nu[6] = {0, 0, -50, 0, 0, 0};
+    plr_real Lambda[PLR_POSE_TRIANGLE] = {0};
+    for (unsigned k = 0; k < 6; k++)
+        Lambda[plr_upper_row(6, k)] = 1000;
+    for (unsigned trusted = 0; trusted < 2; trusted++) {
+        plr_consistency_clear(&filter);
+        filter.own.votes.trusted_frames = (plr_real)(50 * trusted);
+        for (unsigned k = 0; k < 5; k++)
+            plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, false);
+        TEST_ASSERT_EQUAL(!trusted, filter.consistency.contradicted);
+    }
 }
 
 /* Two points may be one wrong track and a reflection. */
