@@ -197,9 +197,9 @@ typedef struct plr_consistency {
     plr_real frozen_motion
         [PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
     plr_real frozen_variance[PLR_POSE_DIM]; /* its variance */
-    plr_real matched, gated, nis, nis_dof;  /* sums over frames, older ones weighted less */
-    plr_real excess;                        /* |L^-1 n|^2 of frames that contradicted the twists by
-                                              themselves, older ones weighted less */
+    plr_real excess, excess_turn;           /* |L^-1 n|^2 of frames that contradicted the twists by
+                                              themselves, and the part of the turns in it; older ones
+                                              weighted less */
     uint16_t agreeing_frames;               /* successive frames in agreement */
     uint16_t contradicting_frames;          /* successive frames with a large contradiction */
     uint16_t small_frames;                  /* successive frames with a small difference */
@@ -210,6 +210,12 @@ typedef struct plr_consistency {
     /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
     uint8_t settling_frames;
 } plr_consistency;
+
+/* Whether what is seen agrees with itself: src/filter/scene.h. */
+typedef struct plr_scene {
+    plr_real matched, rejected, nis;   /* sums over frames, older ones weighted less */
+    plr_real usual_mean, usual_square; /* of a frame's mean square, over many frames */
+} plr_scene;
 
 /* A point that is asked whether it stands, by twists or by pictures: src/filter/votes.c. */
 typedef struct plr_trial {
@@ -330,6 +336,7 @@ typedef struct plr_filter {
     uint8_t diverged;
 
     plr_real R_WB[9];
+    uint32_t frame_number; /* here no processor needs padding before p_WB; likewise health below */
     double p_WB[3]; /* double in both builds: adding a small step to a float32 would lose it */
     plr_real bias[PLR_BIAS_DIM];
     plr_real bias_prior[PLR_BIAS_DIM], bias_prior_sigma[PLR_BIAS_DIM];
@@ -340,6 +347,7 @@ typedef struct plr_filter {
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_motion motion;
     uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
+    uint8_t health;                          /* plr_health of the last frame */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];
@@ -350,6 +358,7 @@ typedef struct plr_filter {
     plr_workspace work;
 
     plr_consistency consistency;
+    plr_scene scene;
     /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
      * twists, while any is known; alignment with an IMU, until it has started. */
     union {
@@ -360,15 +369,13 @@ typedef struct plr_filter {
         plr_core_motion core_motion; /* with an IMU */
         plr_votes votes;             /* with twists */
     } own;
-    plr_inertial inertial; /* with an IMU */
-    uint32_t frame_number;
-    uint32_t reasons;                       /* of health, at the last frame */
+    plr_inertial inertial;                  /* with an IMU */
     plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
     plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */
+    uint32_t reasons;                       /* of health, at the last frame */
     uint32_t refused_before;                /* readings refused until the last frame */
     uint32_t matches_since_gated;
     uint16_t frames_without_use, frames_mostly_gated;
-    uint8_t health; /* plr_health of the last frame */
     plr_totals totals;
     plr_guard guard;
 } plr_filter;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "filter/health.h"
+#include "filter/scene.h"
 #include "filter/votes.h"
 #include "math/dense.h"
 #include "math/se3.h"
@@ -19,8 +20,7 @@ enum {
     AGREEING_FRAMES = 15, /* successive frames in agreement that end any doubt */
     KEPT_FRAMES = 600,    /* a doubt that lasts longer is no event: biases are taught again */
     FEW = 3,              /* points */
-    FROZEN_SHARE = 2, /* a picture is repeated if at least one match in two has the same pixels */
-    MIN_MATCHES = 10  /* with fewer matches in the sums, the share of rejected ones is not judged */
+    FROZEN_SHARE = 2 /* a picture is repeated if at least one match in two has the same pixels */
 };
 
 /* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */
@@ -39,6 +39,9 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 /* Q grows by this much of the statistic. With a third of it, stopped wheels still shorten the way
  * by 3 %; with four times as much, the filter follows a moving scene completely. */
 #define WIDENING PLR_R(0.5)
+/* Wheels that slip leave the gyro as good as it was: the turns keep their weight unless they are
+ * contradicted themselves. White noise exceeds this once in 100 (chi-square, 3 degrees of freedom). */
+#define TURNS_BELOW PLR_R(11.3)
 /* The excess of a frame that contradicted the twists by itself counts in the next frames too, less
  * in each. */
 #define EXCESS_DECAY PLR_R(0.8)
@@ -56,53 +59,69 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
  * of its prior's variance. */
 #define BIAS_SIGMAS  PLR_R(3.9)
 #define LEARNT_SHARE PLR_R(0.25)
-/* What sums keep from frame to frame. Those of matches look back three frames: a scene that moves is
- * to be told before it has carried the pose far. */
-#define MATCHES_DECAY PLR_R(0.6)
-#define NIS_DECAY     PLR_R(0.9)
-/* If a larger share of the matches is rejected, the scene contradicts itself. */
-#define REJECTED_SHARE PLR_R(0.3)
-/* Limits on NIS per degree of freedom, and the degrees of freedom that it takes to judge by
- * them. */
-#define NIS_HIGH PLR_R(1.5)
-#define NIS_LOW  PLR_R(0.3)
-#define NIS_DOF  PLR_R(200)
 
 void plr_consistency_clear(plr_filter *f) {
     memset(&f->consistency, 0, sizeof f->consistency);
+    plr_scene_clear(f);
     plr_votes_clear(f);
 }
 
 /* ---------------------------------------------------------------- the windows */
 
-/* s^T (V + floor I)^-1 s */
-static plr_real statistic(const plr_consistency_window *w, plr_real floor) {
+/* A difference in sigmas, squared: s^T (V + floor I)^-1 s. `turns` is the part that no translation
+ * explains. The three numbers of the translation come first, so the last three of U^-T s are those of
+ * the turns about whatever translation fits best. */
+typedef struct plr_statistic {
+    plr_real all, turns;
+} plr_statistic;
+
+static plr_statistic statistic(const plr_consistency_window *w, plr_real floor) {
+    plr_statistic none = {0, 0};
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM];
     memcpy(U, w->variance, sizeof w->variance);
     memcpy(s, w->sum, sizeof s);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
-        return 0;
+        return none;
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, s, 1);
-    return plr_dot3(s, s) + plr_dot3(s + 3, s + 3);
+    const plr_real turns = plr_dot3(s + 3, s + 3);
+    return (plr_statistic){plr_dot3(s, s) + turns, turns};
 }
 
-static plr_real fast_statistic(const plr_filter *f, plr_real floor) {
-    const plr_real a = statistic(&f->consistency.windows[0], floor);
-    const plr_real b = statistic(&f->consistency.windows[1], floor);
+static plr_real larger(plr_real a, plr_real b) {
     return a > b ? a : b;
 }
 
+static plr_statistic fast_statistics(const plr_filter *f, plr_real floor) {
+    const plr_statistic a = statistic(&f->consistency.windows[0], floor);
+    const plr_statistic b = statistic(&f->consistency.windows[1], floor);
+    return (plr_statistic){larger(a.all, b.all), larger(a.turns, b.turns)};
+}
+
+static plr_real fast_statistic(const plr_filter *f, plr_real floor) {
+    return fast_statistics(f, floor).all;
+}
+
+/* By how much a standard deviation of Q grows. */
+static plr_real widening(plr_real statistic) {
+    return PLR_SQRT(PLR_FMA(WIDENING, statistic, PLR_R(1)));
+}
+
 void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
+    plr_consistency *c = &f->consistency;
     plr_motion_prior(f, believed);
-    if (!f->consistency.contradicted)
+    if (!c->contradicted)
         return;
-    const plr_real fast = fast_statistic(f, WEAK), excess = f->consistency.excess;
-    const plr_real factor = PLR_R(1) + (fast > excess ? fast : excess) * WIDENING;
-    f->consistency.excess *= EXCESS_DECAY;
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
-        f->motion.Q[i] *= factor;
+    const plr_statistic fast = fast_statistics(f, WEAK);
+    const plr_real turns = larger(fast.turns, c->excess_turn);
+    const plr_real way = widening(larger(fast.all, c->excess));
+    const plr_real turn = turns > TURNS_BELOW ? widening(turns) : PLR_R(1);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++)
+            f->motion.Q[PLR_POSE_DIM * i + j] *= (i < 3 ? way : turn) * (j < 3 ? way : turn);
+    c->excess *= EXCESS_DECAY;
+    c->excess_turn *= EXCESS_DECAY;
 }
 
 /* Converts a frame's information J, b about nu from units of L, the widened noise, to units of
@@ -270,6 +289,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         add_difference(f, n, moved, own, 0);
         contradict(f);
         c->excess = plr_norm2_of_6(own);
+        c->excess_turn = plr_dot3(own + 3, own + 3);
         return;
     }
     for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
@@ -295,7 +315,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         if (w < FAST_WINDOWS || !(c->contradicted || plr_health_readings_are_old(f)))
             add_to_window(&c->windows[w], decay[w], own, V);
     const plr_real fast = fast_statistic(f, UNOBSERVED);
-    const plr_real slow = statistic(&c->windows[FAST_WINDOWS], UNOBSERVED);
+    const plr_real slow = statistic(&c->windows[FAST_WINDOWS], UNOBSERVED).all;
     const plr_real most = fast > slow ? fast : slow;
     if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
         begin_difference(f, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
@@ -333,29 +353,17 @@ static bool bias_is_off(const plr_filter *f) {
     return false;
 }
 
-static void count(plr_filter *f, const plr_report *report) {
-    plr_consistency *c = &f->consistency;
-    c->matched = PLR_FMA(MATCHES_DECAY, c->matched, (plr_real)report->matched);
-    c->gated = PLR_FMA(MATCHES_DECAY, c->gated, (plr_real)report->gated);
-    c->nis = PLR_FMA(NIS_DECAY, c->nis, (plr_real)report->nis);
-    c->nis_dof = PLR_FMA(NIS_DECAY, c->nis_dof, (plr_real)report->nis_dof);
-}
-
-static uint32_t find_reasons(const plr_filter *f, const plr_report *report) {
+static uint32_t find_reasons(const plr_filter *f, plr_scene_verdict scene) {
     const plr_consistency *c = &f->consistency;
-    uint32_t reasons = 0;
+    uint32_t reasons = plr_scene_noise_reasons(f);
     if (c->contradicted || c->drifting)
         reasons |= PLR_REASON_TWIST_CONTRADICTED;
     if (c->frozen)
         reasons |= PLR_REASON_FROZEN_IMAGE;
     if (plr_has_block(f, PLR_BLOCK_BIAS) && bias_is_off(f))
         reasons |= PLR_REASON_BIAS_OFF_PRIOR;
-    if (report->matched > 0 && c->matched > MIN_MATCHES && c->gated > REJECTED_SHARE * c->matched)
+    if (scene != PLR_SCENE_AGREES)
         reasons |= PLR_REASON_SCENE_DISAGREES;
-    if (c->nis_dof > NIS_DOF && c->nis > NIS_HIGH * c->nis_dof)
-        reasons |= PLR_REASON_NIS_HIGH;
-    if (c->nis_dof > NIS_DOF && c->nis < NIS_LOW * c->nis_dof)
-        reasons |= PLR_REASON_NIS_LOW;
     return reasons;
 }
 
@@ -396,7 +404,7 @@ void plr_consistency_trust_twists(plr_filter *f) {
     memset(c->windows, 0, sizeof c->windows);
     c->contradicted = 0;
     c->contradicting_frames = 0;
-    c->excess = 0;
+    c->excess = c->excess_turn = 0;
 }
 
 void plr_consistency_doubt(plr_filter *f) {
@@ -405,19 +413,17 @@ void plr_consistency_doubt(plr_filter *f) {
 
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost) {
     plr_consistency *c = &f->consistency;
-    count(f, report);
-    uint32_t reasons = find_reasons(f, report);
-    const bool doubtful =
-        lost || c->contradicted || c->frozen || (reasons & PLR_REASON_SCENE_DISAGREES);
+    const plr_scene_verdict scene = plr_scene_add(f, report);
+    const uint32_t reasons = find_reasons(f, scene);
+    const bool doubtful = lost || c->contradicted || c->frozen || scene == PLR_SCENE_SPLIT;
     if (doubtful)
         plr_consistency_doubt(f);
-    else if (c->drifting && c->settling_frames < AGREEING_FRAMES)
-        c->settling_frames++; /* a drift: as long as it lasted, so that noise is soon forgotten */
+    else if ((c->drifting || scene == PLR_SCENE_WORSE) && c->settling_frames < AGREEING_FRAMES)
+        c->settling_frames++; /* as long as it lasted, so that noise is soon forgotten */
     if (doubtful || c->doubted_frames > 0)
         c->doubted_frames = (uint16_t)(c->doubted_frames + (c->doubted_frames < UINT16_MAX));
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
-                        fast_statistic(f, UNOBSERVED) < AGREEING_BELOW &&
-                        !(reasons & PLR_REASON_SCENE_DISAGREES);
+                        fast_statistic(f, UNOBSERVED) < AGREEING_BELOW && scene == PLR_SCENE_AGREES;
     c->agreeing_frames =
         agrees ? (uint16_t)(c->agreeing_frames + (c->agreeing_frames < UINT16_MAX)) : 0;
     if (c->settling_frames > 0 && c->agreeing_frames >= c->settling_frames)

@@ -91,7 +91,7 @@ static uint64_t small_sum(const plr_filter *f) {
 static uint64_t large_sum(const plr_filter *f) {
     plr_sum sum = {{0}};
     add(&sum, f->slots, f->count * sizeof *f->slots);
-    add(&sum, &f->consistency, sizeof f->consistency);
+    add_between(&sum, f, offsetof(plr_filter, consistency), offsetof(plr_filter, either));
     add(&sum, plr_covariance_elements(f), plr_covariance_size(f, f->count) * sizeof(plr_real));
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
         add(&sum, f->S[k], plr_covariance_dim(f) * sizeof *f->S[k]);

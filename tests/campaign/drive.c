@@ -204,6 +204,8 @@ void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *re
         hear_twists(&r, event);
         if (r.k == r.before && r.during > 0)
             world_strike(&r.world);
+        if (r.k == r.before + r.during && r.during > 0)
+            world_mend(&r.world);
         world_renew(&r.world);
         sensors_look(&r.sensors, &r.world, event);
         const plr_frame frame = {r.start_ns + (r.k + 1) * r.frame_ns, PLR_NO_BUDGET,

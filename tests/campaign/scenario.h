@@ -11,9 +11,13 @@ typedef enum mishap {
     SLIP,        /* all six numbers of a reading are multiplied by the strength */
     DEAD_WHEELS, /* the velocity reads zero, exactly */
     DEAD_TWISTS, /* velocity and rate read zero, exactly */
+    DEAD_GYRO,   /* the rate does */
+    GYRO_SCALE,  /* the rate is multiplied by the strength */
     FROZEN,      /* the camera repeats its last frame under new times */
     JUMP_BODY,   /* the body is set aside by the strength, m, at the first frame */
     JUMP_CAMERA, /* the camera is, and stays there */
+    CAMERA_BACK, /* the camera is, and is put back at the end of the event */
+    TURN_CAMERA, /* the camera is turned about its vertical axis by the strength, rad, and likewise */
     SCENE_MOVES, /* every point moves sideways at the strength, m/s */
     CONVOY,      /* points move with the body at 0.8 of its speed; the strength: share of them */
     LATE_TWISTS, /* readings come after the frame and are stamped so many seconds back */

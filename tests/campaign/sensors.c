@@ -25,16 +25,17 @@ void sensors_begin(sensors *e, const scenario *s, const plr_config *config, uint
 plr_twist sensors_read(sensors *e, const world *w, bool event) {
     const mishap what = event ? e->s->mishap : NOTHING;
     const double factor = what == SLIP ? e->s->strength : 1;
+    const double rate_factor = what == GYRO_SCALE ? e->s->strength : factor;
     plr_twist u;
     for (int i = 0; i < 3; i++) {
         double *bias_w = e->bias + 3 + i, *bias_v = e->bias + i;
         u.v_B_mps[i] = factor * w->twist.v_B_mps[i] + *bias_v +
                        e->s->velocity_mps * chance_normal(&e->twist_chance);
-        u.w_B_radps[i] = factor * w->twist.w_B_radps[i] + *bias_w +
+        u.w_B_radps[i] = rate_factor * w->twist.w_B_radps[i] + *bias_w +
                          e->s->gyro_radps * chance_normal(&e->twist_chance);
         if (what == DEAD_WHEELS || what == DEAD_TWISTS)
             u.v_B_mps[i] = 0;
-        if (what == DEAD_TWISTS)
+        if (what == DEAD_TWISTS || what == DEAD_GYRO)
             u.w_B_radps[i] = 0;
         if (what == BLIND) {
             u.v_B_mps[i] = GARBAGE_MPS * chance_normal(&e->twist_chance);

@@ -120,8 +120,10 @@ void world_strike(world *w) {
     } else if (w->s->mishap == THROWN) {
         const double thrown[6] = {3 * a, 4 * a, 0, 0, 0, a};
         w->T_WB = pose_moved(&w->T_WB, thrown);
-    } else if (w->s->mishap == JUMP_CAMERA) {
+    } else if (w->s->mishap == JUMP_CAMERA || w->s->mishap == CAMERA_BACK) {
         w->camera_shift_m = a;
+    } else if (w->s->mishap == TURN_CAMERA) {
+        w->camera_turn_rad = a;
     } else if (w->s->mishap == SWAPPED) {
         for (unsigned k = 0; k < w->s->landmarks; k++) {
             const uint32_t id = w->points[k].id;
@@ -131,12 +133,20 @@ void world_strike(world *w) {
     }
 }
 
+void world_mend(world *w) {
+    if (w->s->mishap == CAMERA_BACK || w->s->mishap == TURN_CAMERA)
+        w->camera_shift_m = w->camera_turn_rad = 0;
+}
+
 bool world_project(const world *w, const point *p, double z[4]) {
     const plr_calibration *c = &w->calibration;
-    double x_B[3], q[3];
+    const double cosine = cos(w->camera_turn_rad), sine = sin(w->camera_turn_rad);
+    double x_B[3], ahead[3], q[3];
     pose_inwards(&w->T_WB, p->m, x_B);
-    pose_outwards(&c->T_CB, x_B, q);
-    q[0] += w->camera_shift_m;
+    pose_outwards(&c->T_CB, x_B, ahead);
+    q[0] = cosine * ahead[0] - sine * ahead[2] + w->camera_shift_m;
+    q[1] = ahead[1];
+    q[2] = sine * ahead[0] + cosine * ahead[2];
     if (!(q[2] >= 0.3 * w->s->near_m && q[2] <= 3 * w->s->far_m))
         return false;
     z[0] = c->fx_px * q[0] / q[2] + c->cx_px;

@@ -21,6 +21,7 @@ typedef struct world {
     const scenario *s;
     plr_calibration calibration; /* the true one */
     double camera_shift_m;       /* how far the camera was knocked to the left */
+    double camera_turn_rad;      /* and how far it was turned about its vertical axis */
     double phase[6];
     plr_pose T_WB;
     plr_twist twist; /* of the current step */
@@ -44,6 +45,9 @@ void world_step(world *w, bool event);
 
 /* What happens at once at the first frame of an event. */
 void world_strike(world *w);
+
+/* What happens at once at the first frame after it. */
+void world_mend(world *w);
 
 /* (uL, vL, uR, vR) without noise; false if the point is not in sight of both cameras. */
 bool world_project(const world *w, const point *p, double z[4]);

@@ -147,15 +147,20 @@ static void fill_consistency(rng *chance, plr_consistency *c) {
     fill_reals(chance, &c->difference_noise, 1);
     fill_reals(chance, c->frozen_motion, 6);
     fill_reals(chance, c->frozen_variance, 6);
-    plr_real *const counts[] = {&c->matched, &c->gated, &c->nis, &c->nis_dof, &c->excess};
-    for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
-        fill_reals(chance, counts[i], 1);
+    fill_reals(chance, &c->excess, 1);
+    fill_reals(chance, &c->excess_turn, 1);
     c->agreeing_frames = 0x1122;
     c->contradicting_frames = 0x3344;
     c->small_frames = 0x5566;
     c->doubted_frames = 0x7788;
     c->contradicted = c->drifting = c->frozen = 1;
     c->settling_frames = 15;
+}
+
+static void fill_scene(rng *chance, plr_scene *s) {
+    plr_real *const sums[] = {&s->matched, &s->rejected, &s->nis, &s->usual_mean, &s->usual_square};
+    for (unsigned i = 0; i < sizeof sums / sizeof *sums; i++)
+        fill_reals(chance, sums[i], 1);
 }
 
 /* A field that a later version adds to the filter, and forgets here, is found by this. */
@@ -196,6 +201,7 @@ static void test_every_field_is_carried(void) {
     driven.bias_walked_s = 12345.678;
     fill_reals(&chance, driven.recovery_P, 21);
     fill_consistency(&chance, &driven.consistency);
+    fill_scene(&chance, &driven.scene);
     driven.health = PLR_HEALTH_LOST;
     driven.reasons = 0x12345678;
     driven.last_frame_ns = rng_bits(&chance);
@@ -273,7 +279,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
     const uint32_t count_at = 13 + 9 * 52 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 143 * real;
-    const uint32_t health_at = frames_at + 4 + 16 + 10 + 8 + 4 + 8 + 329 * real;
+    const uint32_t health_at = frames_at + 4 + 16 + 10 + 8 + 4 + 8 + 331 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
     const uint32_t slots_at = totals_at + 68 + 56;
     const uint32_t id_at = slots_at + 4 * real, slot = 8 * real + 35;
@@ -282,7 +288,7 @@ static void test_the_layout_is_the_documented_one(void) {
     const uint32_t dim = 12 + 3 * driven.count;
     state_bytes_save(&state, &driven);
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
-    TEST_ASSERT_EQUAL_UINT32(5, number_at(4, 4));
+    TEST_ASSERT_EQUAL_UINT32(6, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
     TEST_ASSERT_EQUAL_UINT(52, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
@@ -296,7 +302,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(736 + 489 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(736 + 491 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(
         slots_at + driven.count * slot + (dim * (dim + 1) / 2 + 2 * dim) * real, state.length);
 }

@@ -199,6 +199,28 @@ static void test_what_is_hardly_seen_is_told_and_takes_no_weight_from_the_twists
     TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
 }
 
+static void contradict_outright(double way_m) {
+    plr_real nu[6] = {(plr_real)(way_m / 0.5)}, Lambda[21] = {0};
+    for (unsigned k = 0; k < 6; k++) {
+        applied.L[7 * k] = PLR_R(0.5);
+        Lambda[plr_upper_row(6, k)] = 1000;
+    }
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, true);
+    applied = believed;
+}
+
+/* Q is `before`, with the variances of the translation times `way`, of the turns times `turn`. */
+static void demand_widened(const plr_motion *before, double way, double turn) {
+    for (unsigned i = 0; i < 6; i++)
+        for (unsigned j = 0; j < 6; j++) {
+            const double q =
+                (double)before->Q[6 * i + j] * sqrt(i < 3 ? way : turn) * sqrt(j < 3 ? way : turn);
+            TEST_ASSERT_DOUBLE_WITHIN(8 * REAL_EPSILON * fabs(q), q,
+                                      (double)filter.motion.Q[6 * i + j]);
+        }
+    TEST_ASSERT_EQUAL_MEMORY(before->B, filter.motion.B, sizeof before->B);
+}
+
 static void test_twists_that_are_contradicted_are_believed_less(void) {
     plr_motion before;
     for (int k = 0; k < 5; k++)
@@ -209,10 +231,32 @@ static void test_twists_that_are_contradicted_are_believed_less(void) {
     plr_consistency_widen(&filter, &believed);
     const double factor = (double)filter.motion.Q[0] / (double)before.Q[0];
     TEST_ASSERT_GREATER_THAN_DOUBLE(40.0 / 6, factor); /* they are not, before a window says 40 */
-    for (unsigned i = 0; i < 36; i++)
-        TEST_ASSERT_DOUBLE_WITHIN(4 * REAL_EPSILON * fabs(factor * (double)before.Q[i]),
-                                  factor * (double)before.Q[i], (double)filter.motion.Q[i]);
-    TEST_ASSERT_EQUAL_MEMORY(before.B, filter.motion.B, sizeof before.B);
+    demand_widened(&before, factor, 1); /* wheels that slip say nothing against the gyro */
+}
+
+/* A turn shows in the rate alone; how much of it is translation, no one knows. */
+static void test_a_gyro_that_is_contradicted_is_believed_less_and_so_are_the_wheels(void) {
+    const double nu[6] = {0, 0, 0, 0, 0, 30};
+    plr_motion before;
+    for (int k = 0; k < 5; k++)
+        add(nu, 0);
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
+    specimen_motion(&filter, &chance, &filter.motion);
+    memcpy(&before, &filter.motion, sizeof before);
+    plr_consistency_widen(&filter, &believed);
+    const double factor = (double)filter.motion.Q[35] / (double)before.Q[35];
+    TEST_ASSERT_GREATER_THAN_DOUBLE(40.0 / 6, factor);
+    demand_widened(&before, factor, factor);
+}
+
+/* What one frame says outright counts for each by itself, too. */
+static void test_a_slip_that_is_outright_leaves_the_turns_their_weight(void) {
+    plr_motion before;
+    contradict_outright(0.4);
+    specimen_motion(&filter, &chance, &filter.motion);
+    memcpy(&before, &filter.motion, sizeof before);
+    plr_consistency_widen(&filter, &believed);
+    demand_widened(&before, 1 + 0.5 * pow(0.4 / SIGMA_M, 2), 1);
 }
 
 /* As long as it lasts the pose's covariance reaches from one story to the other. */
@@ -233,16 +277,6 @@ static void test_the_covariance_covers_both_stories(void) {
 }
 
 /* ---------------------------------------------------------------- outright */
-
-static void contradict_outright(double way_m) {
-    plr_real nu[6] = {(plr_real)(way_m / 0.5)}, Lambda[21] = {0};
-    for (unsigned k = 0; k < 6; k++) {
-        applied.L[7 * k] = PLR_R(0.5);
-        Lambda[plr_upper_row(6, k)] = 1000;
-    }
-    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, true);
-    applied = believed;
-}
 
 static void test_a_frame_may_contradict_the_twists_outright(void) {
     add_noise();

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "filter/scene.h"
+
+#include <string.h>
+
+#include "math/small.h"
+
+enum {
+    ROWS = 4,        /* numbers of an observation, as report->nis_dof counts them */
+    MIN_MATCHES = 10 /* with fewer matches in the sums, they are not judged */
+};
+
+/* What the sums keep from frame to frame. They look back three frames: a scene that moves is to be told
+ * before it has carried the pose far. */
+#define DECAY PLR_R(0.7)
+/* If a larger share of the matches is rejected, the scene contradicts itself. */
+#define REJECTED_SHARE PLR_R(0.3)
+/* A rejected observation counts as if it were off by five sigma: how far off it is in fact says nothing. */
+#define REJECTED_SQUARE PLR_R(25)
+/* What is usual is the mean square of about 100 frames. Bad tracks that last become usual, and so do
+ * those that come in bursts, because the limit goes by the deviation in the same frames. As long as little
+ * has been seen, the deviation is taken to be large. */
+#define USUAL_WEIGHT PLR_R(0.01)
+#define RISE_SIGMAS  PLR_R(3.4)
+#define FIRST_MEAN   PLR_R(1)
+#define FIRST_SQUARE PLR_R(1.1)
+/* Limits on NIS per degree of freedom, and the degrees of freedom that it takes to judge by
+ * them. */
+#define NIS_HIGH PLR_R(1.5)
+#define NIS_LOW  PLR_R(0.3)
+#define NIS_DOF  PLR_R(80)
+
+void plr_scene_clear(plr_filter *f) {
+    memset(&f->scene, 0, sizeof f->scene);
+    f->scene.usual_mean = FIRST_MEAN;
+    f->scene.usual_square = FIRST_SQUARE;
+}
+
+/* The mean square of an observation's numbers, in their sigmas. */
+static plr_real mean_square(const plr_scene *s) {
+    return PLR_FMA(REJECTED_SQUARE, s->rejected, s->nis) / (ROWS * s->matched);
+}
+
+static bool is_worse_than_usual(const plr_scene *s) {
+    const plr_real variance = s->usual_square - s->usual_mean * s->usual_mean;
+    const plr_real sigma = variance > 0 ? PLR_SQRT(variance) : PLR_R(0);
+    return mean_square(s) > s->usual_mean + RISE_SIGMAS * sigma;
+}
+
+static void learn_usual(plr_scene *s) {
+    const plr_real now = mean_square(s);
+    s->usual_mean = PLR_FMA(USUAL_WEIGHT, now - s->usual_mean, s->usual_mean);
+    s->usual_square = PLR_FMA(USUAL_WEIGHT, now * now - s->usual_square, s->usual_square);
+}
+
+plr_scene_verdict plr_scene_add(plr_filter *f, const plr_report *report) {
+    plr_scene *s = &f->scene;
+    s->matched = PLR_FMA(DECAY, s->matched, (plr_real)report->matched);
+    s->rejected = PLR_FMA(DECAY, s->rejected, (plr_real)report->gated);
+    s->nis = PLR_FMA(DECAY, s->nis, (plr_real)report->nis);
+    if (report->matched == 0 || !(s->matched > MIN_MATCHES))
+        return PLR_SCENE_AGREES;
+    const bool worse = is_worse_than_usual(s);
+    learn_usual(s);
+    return s->rejected > REJECTED_SHARE * s->matched ? PLR_SCENE_SPLIT
+           : worse                                   ? PLR_SCENE_WORSE
+                                                     : PLR_SCENE_AGREES;
+}
+
+uint32_t plr_scene_noise_reasons(const plr_filter *f) {
+    const plr_scene *s = &f->scene;
+    const plr_real dof = ROWS * (s->matched - s->rejected);
+    if (!(dof > NIS_DOF))
+        return 0;
+    return s->nis > NIS_HIGH * dof  ? PLR_REASON_NIS_HIGH
+           : s->nis < NIS_LOW * dof ? PLR_REASON_NIS_LOW
+                                    : 0;
+}
