@@ -97,8 +97,8 @@ typedef enum plr_reason {
     PLR_REASON_BUDGET = 1 << 11,
     /* Vision contradicts the twists, or the IMU, and the filter followed vision: slipping wheels, a
      * dead encoder, a push. Where single points show that most of the scene moves instead, it went
-     * back to the twists, and the reset counter counts the jump. If it repeats, check the wheels; if it stays, the scale of the
-     * odometry. With an IMU: its noises are set too small (settings gyro-noise, accel-noise), or the
+     * back to the twists, and the reset counter counts the jump. If it repeats, check the wheels; if
+     * it stays, the scale of the odometry, and in bends the camera's place on the body. With an IMU: its noises are set too small (settings gyro-noise, accel-noise), or the
      * clocks of camera and IMU differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
@@ -119,8 +119,9 @@ typedef enum plr_reason {
     /* The same pixels in successive frames while twists or IMU report motion: a camera or tracker
      * that sends the same image again. Restart it. */
     PLR_REASON_FROZEN_IMAGE = 1 << 16,
-    /* The matched points do not agree on one motion: more than 30 % are rejected. Much of the scene
-     * moves, or tracks are stale. The pose leans on twists or IMU until they agree. */
+    /* The matched points do not agree on one motion: more than 30 % are rejected, or all of them fit
+     * suddenly worse than usual on this drive. Much of the scene moves, or tracks are stale. The
+     * pose leans on twists or IMU until they agree. */
     PLR_REASON_SCENE_DISAGREES = 1 << 17,
     /* After a divergence the landmarks were dropped and the pose's covariance was enlarged, so that
      * the filter can continue. Reported once; the reset counter of POSE and ODOMETRY counts it. */
