@@ -83,7 +83,17 @@ def test_mapping_is_as_good_as_a_fit_of_each_landmark_by_itself(
     oracle_rms, oracle_median = float(np.sqrt(np.mean(np.square(error)))), float(np.median(error))
     config = ROOT / "tools" / "config" / "starry-night.conf"
     log = tmp_path / "mapped.plr"
-    options = ("--config", config, "--mode", "mapping", "--gate", "off", "--quiet")
+    options = (
+        "--config",
+        config,
+        "--pixel-sigma",
+        "5",
+        "--mode",
+        "mapping",
+        "--gate",
+        "off",
+        "--quiet",
+    )
     run_replay(starry, *options, "--out", log)
     said = pelorus("evaluate", log, "--truth", starry, "--json")
     found = json.loads(said.out)

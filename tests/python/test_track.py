@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -350,7 +350,7 @@ def test_on_kitti_06_the_tracks_hold_noisy_twists_to_the_road(
         figures.append((mine["err0_m"], alone_m, mine["nees_per_dof"]))
     err0_m, alone_m, nees = np.median(figures, axis=0)
     assert err0_m <= 0.4 * alone_m
-    assert nees <= (10 if first < MEASURED else 1.5)
+    assert nees <= 1.5
 
 
 def test_on_kitti_06_the_noise_that_check_finds_is_that_of_the_twists_and_the_calibration(
@@ -376,25 +376,12 @@ def test_on_kitti_06_the_noise_that_check_finds_is_that_of_the_twists_and_the_ca
     assert mine["nees_per_dof"] <= 5
 
 
-def with_turns(truth: se3.Poses, T_CB: se3.Poses, turns: NDArray[np.float64]) -> se3.Poses:
-    """The bodies' way with other turns of the camera in its first steps."""
-    cameras = se3.compose(truth, se3.inverse(T_CB))
-    steps = se3.compose(se3.inverse(cameras.at(slice(1, None))), cameras.at(slice(None, -1)))
-    steps.R[: len(turns)] = turns
-    R, p = cameras.R.copy(), cameras.p.copy()
-    for k in range(len(steps.p)):
-        R[k + 1], p[k + 1] = se3.compose(se3.Poses(R[k], p[k]), se3.inverse(steps.at(k)))
-    return se3.compose(se3.Poses(R, p), T_CB)
-
-
-def test_on_kitti_06_what_check_finds_is_held_to_a_truth_that_follows_the_camera(
-    real: Callable[[str], Path], tmp_path: Path
+def test_on_kitti_06_the_truth_begins_with_turns_that_the_pictures_do_not_show(
+    real: Callable[[str], Path],
 ) -> None:
-    """Its truth turns evenly for twelve steps, where pictures show turns of +-2 mrad, known to
-    0.1; from then on both agree. Against it NEES/6 is 25 after check.
+    """It turns evenly for twelve steps, where pictures show turns of +-2 mrad, known to 0.1; from
+    then on both agree. So its first attitude is not better known than start-sigma of track.conf.
     """
-    if not (BIN / "pelorus-replay").exists():
-        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
     poses = real("images/kitti-06-start/poses.txt")
     klt = real("klt/2011_09_30_drive_0020_sync_KLT.mat")
     drive, _ = next(draws(poses, klt, 0))
@@ -405,15 +392,28 @@ def test_on_kitti_06_what_check_finds_is_held_to_a_truth_that_follows_the_camera
     assert np.ptp(1e3 * true[: MEASURED - 2, 3:], axis=0).max() < 0.1
     assert np.sqrt(np.mean(mrad[:MEASURED, 1] ** 2)) > 1
     assert np.sqrt(np.mean(mrad[MEASURED:, 1] ** 2)) < 0.3
-    truth = with_turns(drive.truth, drive.T_CB, views.motion.R[:MEASURED])
-    replace(drive, truth=truth).write(tmp_path / "drive.plr")
-    config = BIN.parents[1] / "tools" / "config" / "track.conf"
-    found = checked.check(
-        BIN / "pelorus-replay", tmp_path / "drive.plr", settings_in(config.read_text()), tmp_path
-    )
-    (tmp_path / "tuned.conf").write_text(checked.config_text(found, tmp_path / "drive.plr"))
-    mine = judged(tmp_path / "drive.plr", "--config", tmp_path / "tuned.conf")
-    assert mine["nees_per_dof"] <= 3
+    assert 5 < abs(mrad[:MEASURED, 1].sum()) < 15
+
+
+def test_on_kitti_06_what_check_finds_covers_the_error(
+    real: Callable[[str], Path], tmp_path: Path
+) -> None:
+    if not (BIN / "pelorus-replay").exists():
+        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
+    poses = real("images/kitti-06-start/poses.txt")
+    klt = real("klt/2011_09_30_drive_0020_sync_KLT.mat")
+    given = settings_in((BIN.parents[1] / "tools" / "config" / "track.conf").read_text())
+    plr, tuned = tmp_path / "drive.plr", tmp_path / "tuned.conf"
+    figures = []
+    for drive, alone_m in itertools.islice(draws(poses, klt, 0), 3):
+        drive.write(plr)
+        found = checked.check(BIN / "pelorus-replay", plr, given, tmp_path)
+        tuned.write_text(checked.config_text(found, plr))
+        mine = judged(plr, "--config", tuned)
+        figures.append((mine["err0_m"] / alone_m, mine["nees_per_dof"]))
+    share, nees = np.median(figures, axis=0)
+    assert share < 1
+    assert nees <= 3
 
 
 def settings_in(text: str) -> dict[str, str]:
