@@ -26,7 +26,8 @@ void clock_start(uint32_t core_hz) {
 }
 
 /* The counter runs from period - 1 down to 0; its interrupt is requested as it gets to 0. */
-uint64_t clock_ticks(void) {
+/* Core clocks since clock_start. */
+static uint64_t clock_ticks(void) {
     const uint32_t primask = core_irq_save();
     uint32_t left = SYST_CVR;
     const bool requested = (SCB_ICSR & ICSR_PENDSTSET) != 0;

@@ -11,7 +11,4 @@ void clock_start(uint32_t core_hz);
 /* Nanoseconds since clock_start; resolution: one core clock. Ascends. */
 uint64_t clock_ns(void);
 
-/* Core clocks since clock_start. */
-uint64_t clock_ticks(void);
-
 #endif

@@ -100,7 +100,8 @@ static uint64_t large_sum(const plr_filter *f) {
 
 /* ---------------------------------------------------------------- ranges */
 
-bool plr_guard_is_in_range(const plr_filter *f) {
+/* Counts and choices are in their ranges: no index can leave its array. */
+static bool is_in_range(const plr_filter *f) {
     const plr_config *c = &f->config;
     return c->model <= PLR_MODEL_WORLD && f->model == c->model &&
            c->mode <= PLR_MODE_DEAD_RECKONING && c->twist_timing <= PLR_TWIST_MID &&
@@ -155,7 +156,7 @@ plr_status plr_guard_check(const plr_filter *f) {
         return PLR_E_ARGUMENT;
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
-    return sound(plr_guard_is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&
+    return sound(is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&
                  constant_sum(f) == f->guard.constant && small_sum(f) == f->guard.small);
 }
 

@@ -31,9 +31,6 @@ plr_status plr_guard_check_whole(const plr_filter *f);
 /* For a reset: settings, map, parameters, model. */
 plr_status plr_guard_check_constant(const plr_filter *f);
 
-/* Counts and choices are in their ranges: no index can leave its array. */
-bool plr_guard_is_in_range(const plr_filter *f);
-
 /* R^T R = I, but for rounding and more, no mirror image, and p finite. */
 bool plr_guard_is_pose(const plr_real R_WB[9], const double p_WB[3]);
 

@@ -31,7 +31,8 @@ static phase phase_of(const run *r, unsigned k) {
     return k < r->before ? BEFORE : k < r->before + r->during ? DURING : AFTER;
 }
 
-unsigned drive_frames(const scenario *s, unsigned parked_frames) {
+/* Frames of a phase in this run. */
+static unsigned drive_frames(const scenario *s, unsigned parked_frames) {
     return s->is_long ? parked_frames : s->before + s->during + s->after;
 }
 

@@ -42,9 +42,6 @@ typedef struct outcome {
     double later_sigmas, later_error_m, later_own_m, fresh_own_m;
 } outcome;
 
-/* Frames of a phase in this run. */
-unsigned drive_frames(const scenario *s, unsigned parked_frames);
-
 /* `parked_frames` replaces the length of a scenario that is_long. */
 void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *result);
 

@@ -14,7 +14,8 @@
 #include "support/rigid.h"
 #include "support/scene.h"
 
-void specimen_config(plr_config *config, plr_model_kind model, bool bias) {
+/* Settings of a specimen: default, with that model and bias, and no gate. */
+static void default_config(plr_config *config, plr_model_kind model, bool bias) {
     plr_config_default(config);
     config->model = (uint8_t)model;
     config->bias = bias;
@@ -118,7 +119,7 @@ static void place(plr_filter *f, rng *r, const plr_config *config) {
 
 void specimen_filter(plr_filter *f, rng *r, plr_model_kind model, bool bias, unsigned landmarks) {
     plr_config config;
-    specimen_config(&config, model, bias);
+    default_config(&config, model, bias);
     place(f, r, &config);
     for (int i = 0; bias && i < 6; i++)
         f->bias[i] = (plr_real)(0.01 * rng_normal(r));
@@ -129,7 +130,7 @@ void specimen_imu(plr_filter *f, rng *r, unsigned landmarks) {
     static const double variance[3] = {1, 1, 1};
     double v[3];
     plr_config config;
-    specimen_config(&config, PLR_MODEL_BODY, true);
+    default_config(&config, PLR_MODEL_BODY, true);
     config.process = PLR_PROCESS_IMU;
     place(f, r, &config);
     rng_normals(r, 2, v, 3);

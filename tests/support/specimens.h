@@ -11,9 +11,6 @@
 #include "sensor/measurement.h"
 #include "support/random.h"
 
-/* Settings of a specimen: default, with that model and bias, and no gate. */
-void specimen_config(plr_config *config, plr_model_kind model, bool bias);
-
 /* A filter at a random pose a few metres from the origin, 1 s on its clock, with landmarks of ids 1,
  * 2, ... 2 to 30 m in front of the camera, and a positive covariance in which all is correlated.
  * Camera: support/scene.h's. */

@@ -67,7 +67,8 @@ size_t wire_frame(unsigned kind, unsigned sequence, const uint8_t *payload, size
     return stuff(body, n + PLR_WIRE_OVERHEAD, stuffed);
 }
 
-size_t wire_unstuff(const uint8_t *stuffed, size_t n, uint8_t *body) {
+/* The body of the one frame in `stuffed`; returns its length. */
+static size_t wire_unstuff(const uint8_t *stuffed, size_t n, uint8_t *body) {
     size_t length = 0, at = 0;
     while (stuffed[at] != 0) {
         unsigned code = stuffed[at];

@@ -28,9 +28,6 @@ int byte_sink_write(void *sink, const uint8_t *bytes, size_t n);
 size_t wire_frame(unsigned kind, unsigned sequence, const uint8_t *payload, size_t n,
                   uint8_t *stuffed);
 
-/* The body of the one frame in `stuffed`; returns its length. */
-size_t wire_unstuff(const uint8_t *stuffed, size_t n, uint8_t *body);
-
 /* The payload that plr_writer_put makes of a message; returns its length. */
 size_t wire_payload(const plr_message *message, uint8_t *payload, size_t capacity);
 

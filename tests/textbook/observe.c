@@ -14,8 +14,9 @@ static void circle_dot(const double s[3], double C[18]) {
     memcpy(C, rows, sizeof rows);
 }
 
-void observe_project(const plr_calibration *c, const double q[3], double z[TEXTBOOK_ROWS],
-                     double D[12]) {
+/* z = (uL, vL, uR, vR) of a point q of the camera, and D = dz/dq, 4x3; D may be NULL. */
+static void observe_project(const plr_calibration *c, const double q[3], double z[TEXTBOOK_ROWS],
+                            double D[12]) {
     const double x = q[0] / q[2], y = q[1] / q[2], base = c->baseline_m / q[2];
     z[0] = c->fx_px * q[0] / q[2] + c->cx_px;
     z[1] = z[3] = c->fy_px * q[1] / q[2] + c->cy_px;

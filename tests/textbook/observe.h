@@ -23,11 +23,8 @@ bool observe_accepts(const textbook *t, double d2, double norm2);
 /* What the rows of both images differ by, squared, in pixel variances: its part in d2. */
 double observe_row_gap2(const textbook *t, const plr_observation *seen);
 
-/* z = (uL, vL, uR, vR) of a point q of the camera, and D = dz/dq, 4x3; D may be NULL. */
-void observe_project(const plr_calibration *c, const double q[3], double z[TEXTBOOK_ROWS],
-                     double D[12]);
-
-/* The same as three rows, (uL, uR, v): v is the mean of vL and vR, of half the variance. */
+/* The pixels of a point q of the camera as three rows, z = (uL, uR, v), where v is the mean of vL and vR,
+ * of half the variance, and D = dz/dq, 3x3; D may be NULL. */
 void observe_project3(const plr_calibration *c, const double q[3], double z[3], double D[9]);
 
 /* q of pixels, and a factor with S S^T = cov(q), 3x3: the pixels' noise. */
