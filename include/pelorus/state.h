@@ -197,16 +197,16 @@ typedef struct plr_consistency {
     plr_real frozen_motion
         [PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
     plr_real frozen_variance[PLR_POSE_DIM]; /* its variance */
-    plr_real excess, excess_turn;           /* |L^-1 n|^2 of frames that contradicted the twists by
-                                              themselves, and the part of the turns in it; older ones
-                                              weighted less */
-    uint16_t agreeing_frames;               /* successive frames in agreement */
-    uint16_t contradicting_frames;          /* successive frames with a large contradiction */
-    uint16_t small_frames;                  /* successive frames with a small difference */
-    uint16_t doubted_frames; /* frames since the pose came into doubt; 0: it is not */
-    uint8_t contradicted;    /* 1: the twists are given less weight */
-    uint8_t drifting;        /* 1: over many frames the difference exceeds noise */
-    uint8_t frozen;          /* 1: this frame's picture equals the one before */
+    /* |L^-1 n|^2 of frames that contradicted the twists by themselves, and, if the turns are a good
+     * part of that, their part of it; older ones weighted less */
+    plr_real excess, excess_turn;
+    uint16_t agreeing_frames;      /* successive frames in agreement */
+    uint16_t contradicting_frames; /* successive frames with a large contradiction */
+    uint16_t small_frames;         /* successive frames with a small difference */
+    uint16_t doubted_frames;       /* frames since the pose came into doubt; 0: it is not */
+    uint8_t contradicted;          /* 1: the twists are given less weight */
+    uint8_t drifting;              /* 1: over many frames the difference exceeds noise */
+    uint8_t frozen;                /* 1: this frame's picture equals the one before */
     /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
     uint8_t settling_frames;
 } plr_consistency;

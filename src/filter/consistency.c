@@ -40,7 +40,8 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
  * by 3 %; with four times as much, the filter follows a moving scene completely. */
 #define WIDENING PLR_R(0.5)
 /* Wheels that slip leave the gyro as good as it was: the turns keep their weight unless they are
- * contradicted themselves. White noise exceeds this once in 100 (chi-square, 3 degrees of freedom). */
+ * contradicted themselves, and lose as much as the way if that is a good part of the turn. White noise
+ * exceeds this once in 100 (chi-square, 3 degrees of freedom). */
 #define TURNS_BELOW PLR_R(11.3)
 /* The excess of a frame that contradicted the twists by itself counts in the next frames too, less
  * in each. */
@@ -103,6 +104,47 @@ static plr_real fast_statistic(const plr_filter *f, plr_real floor) {
     return fast_statistics(f, floor).all;
 }
 
+/* n = (V + floor I)^-1 nu: the estimate by the observations alone, without the twists' prior. */
+static void estimate_by_vision(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
+                               plr_real floor, plr_real n[PLR_POSE_DIM]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
+    memcpy(U, V, PLR_POSE_TRIANGLE * sizeof *V);
+    memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return;
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, n);
+}
+
+/* Which parts of a difference n of a frame's motion are a good part of that motion. */
+typedef struct plr_material {
+    bool way, turn;
+} plr_material;
+
+static plr_material material(const plr_real n[PLR_POSE_DIM], const plr_applied_motion *motion) {
+    plr_real turn[3];
+    plr_turn_of(turn, motion->E);
+    const plr_real way = SHARE_OF_MOTION * PLR_SQRT(plr_dot3(motion->p, motion->p)) + MIN_WAY;
+    const plr_real angle = SHARE_OF_MOTION * PLR_SQRT(plr_dot3(turn, turn)) + MIN_TURN;
+    return (plr_material){plr_dot3(n, n) > way * way, plr_dot3(n + 3, n + 3) > angle * angle};
+}
+
+/* The same of the mean difference of the last frames, which is in units of L. */
+static plr_material lately_material(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE],
+                                    const plr_applied_motion *motion) {
+    const plr_consistency_window *w = &f->consistency.windows[0];
+    plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
+    estimate_by_vision(w->sum, w->variance, WEAK, mean);
+    plr_mat6_vec(n, L, mean);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        n[k] /= PLR_R(1) + decay[0]; /* from the sum over frames to one frame's mean */
+    return material(n, motion);
+}
+
+/* ---------------------------------------------------------------- the twists' weight */
+
 /* By how much a standard deviation of Q grows. */
 static plr_real widening(plr_real statistic) {
     return PLR_SQRT(PLR_FMA(WIDENING, statistic, PLR_R(1)));
@@ -116,7 +158,9 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
     const plr_statistic fast = fast_statistics(f, WEAK);
     const plr_real turns = larger(fast.turns, c->excess_turn);
     const plr_real way = widening(larger(fast.all, c->excess));
-    const plr_real turn = turns > TURNS_BELOW ? widening(turns) : PLR_R(1);
+    const bool fails =
+        c->excess_turn > TURNS_BELOW || lately_material(f, believed->L, believed).turn;
+    const plr_real turn = !(turns > TURNS_BELOW) ? PLR_R(1) : fails ? way : widening(turns);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j < PLR_POSE_DIM; j++)
             f->motion.Q[PLR_POSE_DIM * i + j] *= (i < 3 ? way : turn) * (j < 3 ? way : turn);
@@ -175,20 +219,6 @@ static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POS
     return true;
 }
 
-/* n = (V + floor I)^-1 nu: the estimate by the observations alone, without the twists' prior. */
-static void estimate_by_vision(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
-                               plr_real floor, plr_real n[PLR_POSE_DIM]) {
-    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
-    memcpy(U, V, PLR_POSE_TRIANGLE * sizeof *V);
-    memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
-    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
-        return;
-    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
-    plr_solve_upper(PLR_POSE_DIM, U, n);
-}
-
 static void add_to_window(plr_consistency_window *w, plr_real keep, const plr_real nu[PLR_POSE_DIM],
                           const plr_real V[PLR_POSE_TRIANGLE]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
@@ -235,21 +265,6 @@ static void add_difference(plr_filter *f, const plr_real n[PLR_POSE_DIM],
     f->consistency.difference_noise += noise;
 }
 
-/* True if the mean difference of the last frames is a good part of the motion. */
-static bool is_material(const plr_consistency_window *w, const plr_real L[PLR_POSE_SQUARE],
-                        const plr_applied_motion *applied) {
-    plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    estimate_by_vision(w->sum, w->variance, WEAK, mean);
-    plr_mat6_vec(n, L, mean);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        n[k] /= PLR_R(1) + decay[0]; /* from the sum over frames to one frame's mean */
-    plr_real turn[3];
-    plr_turn_of(turn, applied->E);
-    const plr_real way = SHARE_OF_MOTION * PLR_SQRT(plr_dot3(applied->p, applied->p)) + MIN_WAY;
-    const plr_real angle = SHARE_OF_MOTION * PLR_SQRT(plr_dot3(turn, turn)) + MIN_TURN;
-    return plr_dot3(n, n) > way * way || plr_dot3(n + 3, n + 3) > angle * angle;
-}
-
 /* v = L^-1 n */
 static void in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
                       plr_real v[PLR_POSE_DIM]) {
@@ -289,7 +304,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         add_difference(f, n, moved, own, 0);
         contradict(f);
         c->excess = plr_norm2_of_6(own);
-        c->excess_turn = plr_dot3(own + 3, own + 3);
+        c->excess_turn = material(n, applied).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
         return;
     }
     for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
@@ -320,7 +335,8 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
     if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
         begin_difference(f, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
     c->drifting = most > DRIFTING_ABOVE || (c->drifting && most > AGREEING_BELOW);
-    const bool much = is_material(&c->windows[0], believed->L, applied);
+    const plr_material part = lately_material(f, believed->L, applied);
+    const bool much = part.way || part.turn;
     c->small_frames = much ? 0 : (uint16_t)(c->small_frames + (c->small_frames < UINT16_MAX));
     c->contradicting_frames =
         much && fast_statistic(f, WEAK) > CONTRADICTED_ABOVE

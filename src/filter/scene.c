@@ -6,8 +6,9 @@
 #include "math/small.h"
 
 enum {
-    ROWS = 4,        /* numbers of an observation, as report->nis_dof counts them */
-    MIN_MATCHES = 10 /* with fewer matches in the sums, they are not judged */
+    ROWS = 4,         /* numbers of an observation, as report->nis_dof counts them */
+    MIN_MATCHES = 10, /* with fewer matches in the sums, nothing is said */
+    MIN_USUAL = 30    /* with fewer, they are not held against what is usual */
 };
 
 /* What the sums keep from frame to frame. They look back three frames: a scene that moves is to be told
@@ -26,7 +27,7 @@ enum {
 #define FIRST_SQUARE PLR_R(1.1)
 /* Limits on NIS per degree of freedom, and the degrees of freedom that it takes to judge by
  * them. */
-#define NIS_HIGH PLR_R(1.5)
+#define NIS_HIGH PLR_R(1.6)
 #define NIS_LOW  PLR_R(0.3)
 #define NIS_DOF  PLR_R(80)
 
@@ -60,8 +61,9 @@ plr_scene_verdict plr_scene_add(plr_filter *f, const plr_report *report) {
     s->nis = PLR_FMA(DECAY, s->nis, (plr_real)report->nis);
     if (report->matched == 0 || !(s->matched > MIN_MATCHES))
         return PLR_SCENE_AGREES;
-    const bool worse = is_worse_than_usual(s);
-    learn_usual(s);
+    const bool worse = s->matched > MIN_USUAL && is_worse_than_usual(s);
+    if (s->matched > MIN_USUAL)
+        learn_usual(s);
     return s->rejected > REJECTED_SHARE * s->matched ? PLR_SCENE_SPLIT
            : worse                                   ? PLR_SCENE_WORSE
                                                      : PLR_SCENE_AGREES;

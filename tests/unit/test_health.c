@@ -179,12 +179,12 @@ static void frame_of_nis(double per_degree) {
 /* Two such frames are 68 degrees of freedom, three are 88. */
 static void test_innovations_above_what_noise_explains_degrade(void) {
     for (int k = 0; k < 2; k++) {
-        frame_of_nis(1.51);
+        frame_of_nis(1.61);
         judge(0, PLR_HEALTH_GOOD);
     }
-    frame_of_nis(1.51);
+    frame_of_nis(1.61);
     judge(PLR_REASON_NIS_HIGH, PLR_HEALTH_DEGRADED);
-    frame_of_nis(1.3); /* which brings the mean below 1.5 */
+    frame_of_nis(1.3); /* which brings the mean below 1.6 */
     judge(0, PLR_HEALTH_GOOD);
 }
 

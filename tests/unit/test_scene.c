@@ -91,15 +91,22 @@ static void test_few_matches_are_not_judged(void) {
     TEST_ASSERT_EQUAL_INT(PLR_SCENE_SPLIT, add(4, 4, 0));
 }
 
+/* Of few points noise alone does much: only the share of three tenths counts. */
+static void test_few_matches_are_not_held_against_what_is_usual(void) {
+    for (unsigned k = 0; k < 300; k++)
+        TEST_ASSERT_EQUAL_INT(PLR_SCENE_AGREES, add(8, 0, 8 * 3));
+    TEST_ASSERT_EQUAL_INT(PLR_SCENE_AGREES, add(8, 1, 8 * 12));
+}
+
 static void test_of_a_frame_without_matches_nothing_is_said(void) {
     TEST_ASSERT_EQUAL_INT(PLR_SCENE_SPLIT, add(100, 100, 0));
     TEST_ASSERT_EQUAL_INT(PLR_SCENE_AGREES, add(0, 0, 0));
 }
 
 static void test_the_noise_settings_are_judged_by_eighty_degrees_of_freedom(void) {
-    (void)add(20, 0, 1.51 * 80);
+    (void)add(20, 0, 1.61 * 80);
     TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter)); /* 80, and not more */
-    (void)add(20, 0, 1.51 * 80);
+    (void)add(20, 0, 1.61 * 80);
     TEST_ASSERT_EQUAL_HEX32(PLR_REASON_NIS_HIGH, plr_scene_noise_reasons(&filter));
     (void)add(20, 0, 1.4 * 80);
     TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter));
@@ -114,6 +121,6 @@ static void test_the_noise_settings_are_judged_by_eighty_degrees_of_freedom(void
 static void test_what_is_rejected_says_nothing_of_the_noise(void) {
     (void)add(100, 79, 84);
     TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter));
-    (void)add(100, 79, 2 * 84);
+    (void)add(100, 79, 3 * 84);
     TEST_ASSERT_EQUAL_HEX32(PLR_REASON_NIS_HIGH, plr_scene_noise_reasons(&filter));
 }

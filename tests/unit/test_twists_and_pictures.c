@@ -249,6 +249,27 @@ static void test_a_gyro_that_is_contradicted_is_believed_less_and_so_are_the_whe
     demand_widened(&before, factor, factor);
 }
 
+/* Real pixels have small lasting errors, which a good gyro shows: what is no good part of the turn takes
+ * as much weight as it says by itself, whatever the wheels do. */
+static void test_turns_that_are_off_by_little_keep_most_of_their_weight(void) {
+    const double nu[6] = {-WAY_M / SIGMA_M, 0, 0, 0, 0, 0.0038 / SIGMA_RAD};
+    plr_motion before;
+    for (int k = 0; k < 5; k++)
+        add(nu, 0);
+    TEST_ASSERT_EQUAL_UINT8(1, filter.consistency.contradicted);
+    plr_motion_clear(&filter);
+    for (unsigned k = 0; k < 6; k++)
+        filter.motion.Q[7 * k] = believed.L[7 * k] * believed.L[7 * k];
+    memcpy(&before, &filter.motion, sizeof before);
+    plr_consistency_widen(&filter, &believed);
+    const double way = (double)filter.motion.Q[0] / (double)before.Q[0];
+    const double turn = (double)filter.motion.Q[35] / (double)before.Q[35];
+    TEST_ASSERT_GREATER_THAN_DOUBLE(1 + 11.3 / 2, turn);
+    TEST_ASSERT_LESS_THAN_DOUBLE(12, turn);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(100, way);
+    demand_widened(&before, way, turn);
+}
+
 /* What one frame says outright counts for each by itself, too. */
 static void test_a_slip_that_is_outright_leaves_the_turns_their_weight(void) {
     plr_motion before;
