@@ -239,12 +239,10 @@ static void correct_by_batch(plr_filter *f, const plr_sensed *sensed, unsigned a
 
 /* True if the correction is finite and small enough for a retraction. */
 static bool is_applicable(const plr_filter *f, unsigned n) {
-    static const plr_real max_way2 = 1e6;
-    const plr_real *dx = f->work.dx;
     for (unsigned i = 0; i < n; i++)
-        if (!plr_is_finite(dx[i]))
+        if (!plr_is_finite(f->work.dx[i]))
             return false;
-    return plr_dot3(dx, dx) < max_way2 && plr_dot3(dx + 3, dx + 3) < PLR_MAX_CORRECTION_TURN2;
+    return plr_pose_is_correction(f->work.dx);
 }
 
 plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *given,

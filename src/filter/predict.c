@@ -34,6 +34,12 @@ void plr_predict_apply(plr_filter *f, const plr_applied_motion *applied) {
     if (plr_norm2_of_6(applied->z) > 0) {
         plr_real n[PLR_POSE_DIM];
         plr_mat6_vec(n, applied->L, applied->z);
+        if (!plr_pose_is_correction(n)) {
+            plr_filter_propagate_recovery(f);
+            plr_predict_drop(f);
+            plr_filter_diverge(f);
+            return;
+        }
         plr_pose_correct(f, n);
     }
     plr_model_of(f)->propagate(f, applied);

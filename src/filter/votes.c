@@ -213,7 +213,8 @@ static void take_back(plr_filter *f) {
     plr_real back[PLR_POSE_DIM];
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         back[i] = -v->difference[i];
-    plr_pose_correct(f, back);
+    if (plr_pose_is_correction(back))
+        plr_pose_correct(f, back);
     forget_difference(v);
     f->totals.widened++;
 }

@@ -4,6 +4,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "state/rigid_fit.h"
 
 /* Without the orthonormalisation, an hour of steps in float32 makes R deviate from a rotation by
  * 0.01. */
@@ -16,6 +17,11 @@ void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     for (int i = 0; i < 9; i++)
         f->R_WB[i] += change[i];
     plr_so3_orthonormalise(f->R_WB);
+}
+
+bool plr_pose_is_correction(const plr_real xi[PLR_POSE_DIM]) {
+    static const plr_real max_way2 = 1e6;
+    return plr_dot3(xi, xi) < max_way2 && plr_dot3(xi + 3, xi + 3) < PLR_MAX_CORRECTION_TURN2;
 }
 
 void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {

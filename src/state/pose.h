@@ -3,10 +3,16 @@
 #ifndef PLR_STATE_POSE_H
 #define PLR_STATE_POSE_H
 
+#include <stdbool.h>
+
 #include "pelorus/state.h"
 
 /* T <- T (I + E, d): p <- p + R d in double, and R is made orthonormal. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]);
+
+/* True if xi, m and rad, is finite and small enough for T Exp(xi): beyond it nothing that was
+ * linearised is worth anything, and the series of Exp leaves the rotations. */
+bool plr_pose_is_correction(const plr_real xi[PLR_POSE_DIM]);
 
 /* T <- T Exp(xi): the correction of the pose by a frame. */
 void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
