@@ -16,7 +16,8 @@ enum {
 #define DECAY PLR_R(0.7)
 /* If a larger share of the matches is rejected, the scene contradicts itself. */
 #define REJECTED_SHARE PLR_R(0.3)
-/* A rejected observation counts as if it were off by five sigma: how far off it is in fact says nothing. */
+/* A rejected observation counts as if it were off by five sigma: how far off it is in fact says nothing.
+ * Where there is no gate, the others count for no more on average. */
 #define REJECTED_SQUARE PLR_R(25)
 /* What is usual is the mean square of about 100 frames. Bad tracks that last become usual, and so do
  * those that come in bursts, because the limit goes by the deviation in the same frames. As long as little
@@ -56,9 +57,11 @@ static void learn_usual(plr_scene *s) {
 
 plr_scene_verdict plr_scene_add(plr_filter *f, const plr_report *report) {
     plr_scene *s = &f->scene;
+    const plr_real most = REJECTED_SQUARE * (plr_real)(report->matched - report->gated);
+    const plr_real nis = (plr_real)report->nis < most ? (plr_real)report->nis : most;
     s->matched = PLR_FMA(DECAY, s->matched, (plr_real)report->matched);
     s->rejected = PLR_FMA(DECAY, s->rejected, (plr_real)report->gated);
-    s->nis = PLR_FMA(DECAY, s->nis, (plr_real)report->nis);
+    s->nis = PLR_FMA(DECAY, s->nis, nis);
     if (report->matched == 0 || !(s->matched > MIN_MATCHES))
         return PLR_SCENE_AGREES;
     const bool worse = s->matched > MIN_USUAL && is_worse_than_usual(s);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Whether what is seen agrees with itself (MATH 17): noise does, and so does what is usual on a drive. */
+#include <math.h>
 #include <string.h>
 #include <unity.h>
 
@@ -118,6 +119,17 @@ static void test_the_noise_settings_are_judged_by_eighty_degrees_of_freedom(void
 }
 
 /* Rejected ones have no part in it: neither their innovations nor their degrees of freedom. */
+/* Without a gate an innovation may be anything. */
+static void test_an_innovation_without_measure_is_forgotten_as_others_are(void) {
+    (void)add(20, 0, HUGE_VAL);
+    TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter)); /* of 80 degrees of freedom */
+    (void)add(20, 0, 1e38);
+    TEST_ASSERT_EQUAL_HEX32(PLR_REASON_NIS_HIGH, plr_scene_noise_reasons(&filter));
+    told_of_noise(300, 0);
+    TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter));
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(2, told_of_noise(1000, 0));
+}
+
 static void test_what_is_rejected_says_nothing_of_the_noise(void) {
     (void)add(100, 79, 84);
     TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter));
