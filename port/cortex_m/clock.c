@@ -25,8 +25,8 @@ void clock_start(uint32_t core_hz) {
     SYST_CSR = SYST_CSR_ENABLE | SYST_CSR_TICKINT | SYST_CSR_CORE_CLOCK;
 }
 
-/* The counter runs from period - 1 down to 0; its interrupt is requested as it gets to 0. */
-/* Core clocks since clock_start. */
+/* Core clocks since clock_start. The counter runs from period - 1 down to 0; its interrupt is requested
+ * as it gets to 0. */
 static uint64_t clock_ticks(void) {
     const uint32_t primask = core_irq_save();
     uint32_t left = SYST_CVR;

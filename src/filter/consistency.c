@@ -77,7 +77,7 @@ typedef struct plr_statistic {
 } plr_statistic;
 
 static plr_statistic statistic(const plr_consistency_window *w, plr_real floor) {
-    plr_statistic none = {0, 0};
+    const plr_statistic none = {0, 0};
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM];
     memcpy(U, w->variance, sizeof w->variance);
     memcpy(s, w->sum, sizeof s);

@@ -43,14 +43,13 @@ static plr_real mean_square(const plr_scene *s) {
     return PLR_FMA(REJECTED_SQUARE, s->rejected, s->nis) / (ROWS * s->matched);
 }
 
-static bool is_worse_than_usual(const plr_scene *s) {
+static bool is_worse_than_usual(const plr_scene *s, plr_real now) {
     const plr_real variance = s->usual_square - s->usual_mean * s->usual_mean;
     const plr_real sigma = variance > 0 ? PLR_SQRT(variance) : PLR_R(0);
-    return mean_square(s) > s->usual_mean + RISE_SIGMAS * sigma;
+    return now > s->usual_mean + RISE_SIGMAS * sigma;
 }
 
-static void learn_usual(plr_scene *s) {
-    const plr_real now = mean_square(s);
+static void learn_usual(plr_scene *s, plr_real now) {
     s->usual_mean = PLR_FMA(USUAL_WEIGHT, now - s->usual_mean, s->usual_mean);
     s->usual_square = PLR_FMA(USUAL_WEIGHT, now * now - s->usual_square, s->usual_square);
 }
@@ -64,9 +63,12 @@ plr_scene_verdict plr_scene_add(plr_filter *f, const plr_report *report) {
     s->nis = PLR_FMA(DECAY, s->nis, nis);
     if (report->matched == 0 || !(s->matched > MIN_MATCHES))
         return PLR_SCENE_AGREES;
-    const bool worse = s->matched > MIN_USUAL && is_worse_than_usual(s);
-    if (s->matched > MIN_USUAL)
-        learn_usual(s);
+    bool worse = false;
+    if (s->matched > MIN_USUAL) {
+        const plr_real now = mean_square(s);
+        worse = is_worse_than_usual(s, now);
+        learn_usual(s, now);
+    }
     return s->rejected > REJECTED_SHARE * s->matched ? PLR_SCENE_SPLIT
            : worse                                   ? PLR_SCENE_WORSE
                                                      : PLR_SCENE_AGREES;

@@ -15,7 +15,7 @@ import pytest
 from converted import Run
 from numpy.typing import NDArray
 from pelorus import se3, trajectory, wire
-from pelorus.check import checked
+from pelorus.check.checked import Checked, check, config_text
 from pelorus.check.contents import recording_of
 from pelorus.converters import matlab
 from pelorus.evaluation import assess
@@ -307,6 +307,32 @@ def test_calls_that_make_no_sense_are_refused_with_what_would_be_right(
 MEASURED = 13  # KITTI's truth and twists of the frames before are interpolated, and off
 
 
+TRACK_CONF = BIN.parents[1] / "tools" / "config" / "track.conf"
+
+
+def demand_replay() -> None:
+    if not (BIN / "pelorus-replay").exists():
+        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
+
+
+def kitti_06(real: Callable[[str], Path]) -> tuple[Path, Path]:
+    """The poses, and the tracks and twists of the same drive."""
+    return (
+        real("images/kitti-06-start/poses.txt"),
+        real("klt/2011_09_30_drive_0020_sync_KLT.mat"),
+    )
+
+
+def checked_at(folder: Path, drive: Recording, given: dict[str, str]) -> tuple[Checked, str]:
+    """What check finds of a drive, and the settings that it writes, as text."""
+    plr = folder / "drive.plr"
+    drive.write(plr)
+    found = check(BIN / "pelorus-replay", plr, given, folder)
+    text = config_text(found, plr)
+    (folder / "tuned.conf").write_text(text)
+    return found, text
+
+
 def draws(poses: Path, klt: Path, first: int) -> Iterator[tuple[Recording, float]]:
     """The drive from a frame on with noise in its twists, and dead reckoning's err0."""
     source = matlab.klt(klt, TwistTiming.END)
@@ -334,19 +360,15 @@ def draws(poses: Path, klt: Path, first: int) -> Iterator[tuple[Recording, float
 def test_on_kitti_06_the_tracks_hold_noisy_twists_to_the_road(
     real: Callable[[str], Path], tmp_path: Path, first: int
 ) -> None:
-    if not (BIN / "pelorus-replay").exists():
-        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
-    poses = real("images/kitti-06-start/poses.txt")
-    klt = real("klt/2011_09_30_drive_0020_sync_KLT.mat")
+    demand_replay()
+    poses, klt = kitti_06(real)
     figures = []
     for drive, alone_m in draws(poses, klt, first):
         drive.write(tmp_path / "drive.plr")
         messages = wire.messages_of(tmp_path / "drive.plr")
         named = judged_of(messages, recording_of(messages)).faults
         assert not [fault for fault in named if fault.name != UNTOLD]  # its turns are noise
-        mine = judged(
-            tmp_path / "drive.plr", "--config", BIN.parents[1] / "tools" / "config" / "track.conf"
-        )
+        mine = judged(tmp_path / "drive.plr", "--config", TRACK_CONF)
         figures.append((mine["err0_m"], alone_m, mine["nees_per_dof"]))
     err0_m, alone_m, nees = np.median(figures, axis=0)
     assert err0_m <= 0.4 * alone_m
@@ -356,22 +378,17 @@ def test_on_kitti_06_the_tracks_hold_noisy_twists_to_the_road(
 def test_on_kitti_06_the_noise_that_check_finds_is_that_of_the_twists_and_the_calibration(
     real: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    if not (BIN / "pelorus-replay").exists():
-        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
-    poses = real("images/kitti-06-start/poses.txt")
-    klt = real("klt/2011_09_30_drive_0020_sync_KLT.mat")
+    demand_replay()
+    poses, klt = kitti_06(real)
     drive, alone_m = next(draws(poses, klt, MEASURED))
-    plr, tuned = tmp_path / "drive.plr", tmp_path / "tuned.conf"
-    drive.write(plr)
     given = {"velocity-sigma": "0.3", "gyro-sigma": "0.03"}
-    found = checked.check(BIN / "pelorus-replay", plr, given, tmp_path)
+    found, text = checked_at(tmp_path, drive, given)
     assert any("the rectification is off" in remark.text for remark in found.remarks)
-    tuned.write_text(checked.config_text(found, plr))
-    settings = settings_in(tuned.read_text())
+    settings = settings_in(text)
     assert 0.4 < float(settings["velocity-sigma"]) < 0.6
     assert 0.04 < float(settings["gyro-sigma"]) < 0.06
     assert 1.8 < float(settings["pixel-sigma"]) < 2.8
-    mine = judged(plr, "--config", tuned)
+    mine = judged(tmp_path / "drive.plr", "--config", tmp_path / "tuned.conf")
     assert mine["err0_m"] < alone_m
     assert mine["nees_per_dof"] <= 5
 
@@ -382,8 +399,7 @@ def test_on_kitti_06_the_truth_begins_with_turns_that_the_pictures_do_not_show(
     """It turns evenly for twelve steps, where pictures show turns of +-2 mrad, known to 0.1; from
     then on both agree. So its first attitude is not better known than start-sigma of track.conf.
     """
-    poses = real("images/kitti-06-start/poses.txt")
-    klt = real("klt/2011_09_30_drive_0020_sync_KLT.mat")
+    poses, klt = kitti_06(real)
     drive, _ = next(draws(poses, klt, 0))
     cameras = trajectory.read_kitti(poses)
     true = se3.log(se3.compose(se3.inverse(cameras.at(slice(1, 51))), cameras.at(slice(0, 50))))
@@ -398,18 +414,13 @@ def test_on_kitti_06_the_truth_begins_with_turns_that_the_pictures_do_not_show(
 def test_on_kitti_06_what_check_finds_covers_the_error(
     real: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    if not (BIN / "pelorus-replay").exists():
-        pytest.skip(f"{BIN / 'pelorus-replay'} is not built")
-    poses = real("images/kitti-06-start/poses.txt")
-    klt = real("klt/2011_09_30_drive_0020_sync_KLT.mat")
-    given = settings_in((BIN.parents[1] / "tools" / "config" / "track.conf").read_text())
-    plr, tuned = tmp_path / "drive.plr", tmp_path / "tuned.conf"
+    demand_replay()
+    poses, klt = kitti_06(real)
+    given = settings_in(TRACK_CONF.read_text())
     figures = []
     for drive, alone_m in itertools.islice(draws(poses, klt, 0), 3):
-        drive.write(plr)
-        found = checked.check(BIN / "pelorus-replay", plr, given, tmp_path)
-        tuned.write_text(checked.config_text(found, plr))
-        mine = judged(plr, "--config", tuned)
+        checked_at(tmp_path, drive, given)
+        mine = judged(tmp_path / "drive.plr", "--config", tmp_path / "tuned.conf")
         figures.append((mine["err0_m"] / alone_m, mine["nees_per_dof"]))
     share, nees = np.median(figures, axis=0)
     assert share < 1

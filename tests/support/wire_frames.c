@@ -68,7 +68,7 @@ size_t wire_frame(unsigned kind, unsigned sequence, const uint8_t *payload, size
 }
 
 /* The body of the one frame in `stuffed`; returns its length. */
-static size_t wire_unstuff(const uint8_t *stuffed, size_t n, uint8_t *body) {
+static size_t unstuff(const uint8_t *stuffed, size_t n, uint8_t *body) {
     size_t length = 0, at = 0;
     while (stuffed[at] != 0) {
         unsigned code = stuffed[at];
@@ -88,7 +88,7 @@ size_t wire_payload(const plr_message *message, uint8_t *payload, size_t capacit
     plr_writer w;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_init(&w, byte_sink_write, &sink));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_writer_put(&w, message));
-    size_t length = wire_unstuff(stuffed, sink.length, body) - PLR_WIRE_OVERHEAD;
+    size_t length = unstuff(stuffed, sink.length, body) - PLR_WIRE_OVERHEAD;
     TEST_ASSERT_LESS_OR_EQUAL_size_t(capacity, length);
     memcpy(payload, body + 3, length);
     return length;

@@ -24,7 +24,7 @@ static plr_scene_verdict add(unsigned matched, unsigned rejected, double nis) {
     return plr_scene_add(&filter, &report);
 }
 
-/* A frame of 20 points with noise as it is stated, and as many more rejected. */
+/* A frame of 20 points with noise as it is stated, of which one in 100 is rejected, and `rejected` more. */
 static plr_scene_verdict add_noise(unsigned rejected) {
     double nis = 0;
     for (unsigned i = 0; i < 20; i++) {
@@ -118,7 +118,6 @@ static void test_the_noise_settings_are_judged_by_eighty_degrees_of_freedom(void
     TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter));
 }
 
-/* Rejected ones have no part in it: neither their innovations nor their degrees of freedom. */
 /* Without a gate an innovation may be anything. */
 static void test_an_innovation_without_measure_is_forgotten_as_others_are(void) {
     (void)add(20, 0, HUGE_VAL);
@@ -130,6 +129,7 @@ static void test_an_innovation_without_measure_is_forgotten_as_others_are(void) 
     TEST_ASSERT_LESS_OR_EQUAL_UINT(2, told_of_noise(1000, 0));
 }
 
+/* Rejected ones have no part in it: neither their innovations nor their degrees of freedom. */
 static void test_what_is_rejected_says_nothing_of_the_noise(void) {
     (void)add(100, 79, 84);
     TEST_ASSERT_EQUAL_HEX32(0, plr_scene_noise_reasons(&filter));
