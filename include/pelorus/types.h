@@ -107,7 +107,7 @@ typedef enum plr_reason {
      * set. Also for two seconds after an IMU's start in motion (setting imu-start). Drive with care
      * until then. */
     PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,
-    /* A bias estimate lies further from its prior's mean than the prior allows: 3.9 sigma of the
+    /* A bias estimate lies further from its prior's mean than the prior allows: 4.2 sigma of the
      * difference that is to be expected of an estimate as certain as this one. With twists: stereo
      * and odometry disagree in scale (baseline, focal length, wheel radius; which of them cannot be
      * known), or bias-*-sigma is too small. With an IMU: bias-accel-sigma or bias-gyro-sigma is too

@@ -56,9 +56,9 @@ static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), 
 #define UNOBSERVED PLR_R(0.001)
 #define WEAK       PLR_R(0.05)
 /* A bias is off if it differs from its prior by more than this many sigmas: of six that are as
- * stated one does so in about one drive of 300. A bias is not judged before it has lost this share
+ * stated one does so in about one drive of 1000. A bias is not judged before it has lost this share
  * of its prior's variance. */
-#define BIAS_SIGMAS  PLR_R(3.9)
+#define BIAS_SIGMAS  PLR_R(4.2)
 #define LEARNT_SHARE PLR_R(0.25)
 
 void plr_consistency_clear(plr_filter *f) {

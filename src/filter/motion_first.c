@@ -17,7 +17,7 @@
 
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
-    MIN_AGAINST_TWISTS = 6, /* fewer points never outweigh the twists */
+    MIN_AGAINST_TWISTS = 6, /* fewer points outweigh the twists only if all of them agree */
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 
@@ -244,9 +244,10 @@ static bool is_well_spread(const plr_search_point *point) {
 
 /* True if enough observations support the motion found without the twists: at least three, a fifth
  * of all, and four times as many as support the twists. If few misfit, those three tell more about
- * the translation than all others do. Of at least six, well spread, three fifths must agree with
- * it. Fewer may lie on one moving object: a car that fills a third of the picture pulls the
- * estimate of all others with it. */
+ * the translation than all others do. Well spread, three fifths must agree with it, and of fewer than
+ * six all: some of so few may lie on one moving object, and a car that fills a third of the picture
+ * pulls the estimate of all others with it. But where all agree, wheels that slip are likelier than a
+ * scene that moves, and whichever of the two it is, the covariance covers both (filter/consistency.h). */
 static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
     unsigned with = 0, against = 0, agree = 0, active = 0;
     plr_real told = 0, told_against = 0;
@@ -266,8 +267,9 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
     }
     const bool enough =
         misfit == PLR_MISFIT_MANY ? 5 * against >= active : PLR_R(2) * told_against > told;
-    return against >= MIN_POINTS && enough && 4 * with <= against && 5 * agree >= 3 * active &&
-           active >= MIN_AGAINST_TWISTS && is_well_spread(open);
+    return against >= MIN_POINTS && enough && 4 * with <= against &&
+           (active < MIN_AGAINST_TWISTS ? agree == active : 5 * agree >= 3 * active) &&
+           is_well_spread(open);
 }
 
 /* Searches again with a prior so wide that the twists hardly count. True, with `best` and s->prior

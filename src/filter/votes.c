@@ -32,6 +32,9 @@ enum {
  * variances by twists and by pictures leave them comparable. */
 #define TWISTS_SHARE   PLR_R(0.3)
 #define PICTURES_SHARE PLR_R(0.1)
+/* Distant points toss the pictures' way to and fro, by more in a frame than wheels slip. A step forward and
+ * the next one back cancel in a mean with these weights. */
+#define WAY_WEIGHT PLR_R(0.5)
 
 void plr_votes_clear(plr_filter *f) {
     if (f->config.process == PLR_PROCESS_TWIST)
@@ -95,14 +98,21 @@ static void add_noise(plr_candidates *c, plr_real share, const plr_real L[PLR_PO
     raise_to(&c->turn_variance, share, X, 3);
 }
 
+static void add_to_way(plr_votes *v, const plr_real moved[PLR_POSE_DIM]) {
+    for (unsigned i = 0; i < 3; i++)
+        v->way[i] = PLR_FMA(WAY_WEIGHT, moved[i] - v->way[i], v->way[i]);
+}
+
 static void find_candidates(const plr_filter *f, const plr_applied_motion *believed,
                             const plr_applied_motion *applied, const plr_correction *correction,
                             const plr_real moved[PLR_POSE_DIM], plr_candidates *c) {
-    plr_real E[9], p[3], dE[9], dp[3];
+    plr_real E[9], p[3], dE[9], dp[3], steadied[PLR_POSE_DIM];
     memset(c, 0, sizeof *c);
     memcpy(E, believed->E, sizeof E);
     memcpy(p, believed->p, sizeof p);
-    plr_se3_expm1(dE, dp, moved);
+    memcpy(steadied, moved, sizeof steadied);
+    memcpy(steadied, f->own.votes.way, sizeof f->own.votes.way);
+    plr_se3_expm1(dE, dp, steadied);
     plr_se3_append(E, p, dE, dp);
     set_motion(f, c, PLR_BY_TWISTS, believed->E, believed->p);
     set_motion(f, c, PLR_BY_PICTURES, E, p);
@@ -256,6 +266,7 @@ bool plr_votes_add(plr_filter *f, const plr_frame *frame, unsigned n,
         return false;
     }
     propagate_difference(v, applied, moved);
+    add_to_way(v, moved);
     find_candidates(f, believed, applied, correction, moved, &candidates);
     for (unsigned i = 0; i < PLR_VOTE_OPEN; i++)
         v->counts[i] *= COUNTS_DECAY;

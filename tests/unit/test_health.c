@@ -233,21 +233,21 @@ static void test_a_bias_beyond_its_prior_is_said(void) {
     }
     for (int k = 0; k < 6; k++) {
         for (int sign = -1; sign <= 1; sign += 2) {
-            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0389) * (plr_real)sign;
+            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0419) * (plr_real)sign;
             frame(10, 1);
             judge(0, PLR_HEALTH_GOOD);
-            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0391) * (plr_real)sign;
+            filter.bias[k] = PLR_R(0.2) + PLR_R(0.0421) * (plr_real)sign;
             frame(10, 1);
             judge(PLR_REASON_BIAS_OFF_PRIOR, PLR_HEALTH_DEGRADED);
         }
         filter.bias[k] = PLR_R(0.2);
     }
-    filter.bias[1] = PLR_R(0.2) + PLR_R(0.0391); /* no wonder after three hours of its walk */
+    filter.bias[1] = PLR_R(0.2) + PLR_R(0.0421); /* no wonder after three hours of its walk */
     filter.par.bias_velocity_walk = PLR_R(1e-8);
     filter.bias_walked_s = 10000;
     frame(10, 1);
     judge(0, PLR_HEALTH_GOOD);
-    filter.bias[1] = PLR_R(0.2) + PLR_R(0.056);
+    filter.bias[1] = PLR_R(0.2) + PLR_R(0.060);
     frame(10, 1);
     judge(PLR_REASON_BIAS_OFF_PRIOR, PLR_HEALTH_DEGRADED);
     filter.bias[1] = PLR_R(0.2);

@@ -445,10 +445,10 @@ static bool is_told(unsigned axis, double sigmas, double share) {
 static void test_a_bias_is_held_against_what_has_been_learnt_of_it(void) {
     for (unsigned axis = 0; axis < 6; axis++)
         for (int sign = -1; sign <= 1; sign += 2) {
-            TEST_ASSERT_TRUE(is_told(axis, sign * 4.0, 0.99));
-            TEST_ASSERT_FALSE(is_told(axis, sign * 3.8, 0.99));
-            TEST_ASSERT_TRUE(is_told(axis, sign * 2.85, 0.5));
-            TEST_ASSERT_FALSE(is_told(axis, sign * 2.65, 0.5));
+            TEST_ASSERT_TRUE(is_told(axis, sign * 4.3, 0.99));
+            TEST_ASSERT_FALSE(is_told(axis, sign * 4.1, 0.99));
+            TEST_ASSERT_TRUE(is_told(axis, sign * 3.05, 0.5));
+            TEST_ASSERT_FALSE(is_told(axis, sign * 2.9, 0.5));
         }
 }
 

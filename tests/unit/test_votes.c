@@ -272,6 +272,17 @@ static void test_the_pictures_way_counts_with_the_twists_turn(void) {
     TEST_ASSERT_GREATER_THAN_DOUBLE(2, (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
 }
 
+/* Where distant points toss the pictures' way to and fro, nobody takes that for the twists' being right. */
+static void test_steps_to_and_fro_are_no_votes_for_the_twists(void) {
+    place(0, PICTURES_M, 6);
+    for (unsigned k = 0; k < 60; k++) {
+        moved[0] = PLR_R(k % 2 ? 0.05 : -0.05);
+        look();
+    }
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.5, (double)filter.own.votes.counts[PLR_VOTE_TWISTS]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(2, (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
+}
+
 /* Noise of either motion that explains the difference: nobody votes. */
 static void test_noise_of_either_motion_leaves_it_open(void) {
     plr_real *const noise[2] = {believed.L, applied.JL};
