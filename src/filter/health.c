@@ -10,7 +10,7 @@
 
 enum {
     LOCK_FRAMES = 10,       /* successive frames of a gate that rejects nearly all */
-    LOCK_MATCHES = 5,       /* with fewer matches the gate is not judged */
+    LOCK_MATCHES = 3,       /* with fewer matches the gate is not judged */
     LOST_FRAMES = 10,       /* frames without one used observation */
     FEW_USED = 3,           /* fewer do not fix a pose */
     REJECTED_READINGS = 10, /* of a small sensor, in succession */

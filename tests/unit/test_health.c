@@ -310,6 +310,12 @@ static void test_ten_frames_of_four_fifths_rejected_lock(void) {
     TEST_ASSERT_EQUAL_UINT32(1, filter.totals.locks);
 }
 
+static void test_three_points_lock(void) {
+    for (int k = 0; k < 9; k++)
+        TEST_ASSERT_FALSE(is_locked(3, 3));
+    TEST_ASSERT_TRUE(is_locked(3, 3));
+}
+
 static void test_after_a_lock_ten_more_lock_again(void) {
     for (int k = 0; k < 50; k++)
         TEST_ASSERT_EQUAL(k % 10 == 9, is_locked(20, 20));
@@ -328,16 +334,16 @@ static void test_a_fixed_gate_is_open_from_a_lock_until_a_frame_is_seen(void) {
 static void test_a_fixed_gate_is_open_after_ten_frames_without_use(void) {
     for (int k = 0; k < 12; k++) {
         TEST_ASSERT_EQUAL(k >= 10, plr_health_fixed_gate_is_open(&filter));
-        frame(4, 4); /* too few to lock */
+        frame(2, 2); /* too few to lock */
         plr_health_judge(&filter, &events, &report);
     }
-    frame(4, 3);
+    frame(2, 1);
     plr_health_judge(&filter, &events, &report);
     TEST_ASSERT_FALSE(plr_health_fixed_gate_is_open(&filter));
 }
 
 static void test_a_frame_below_the_limits_breaks_the_row(void) {
-    static const unsigned harmless[3][2] = {{4, 4}, {10, 7}, {0, 0}};
+    static const unsigned harmless[3][2] = {{2, 2}, {10, 7}, {0, 0}};
     for (int which = 0; which < 3; which++) {
         for (int k = 0; k < 9; k++)
             TEST_ASSERT_FALSE(is_locked(10, 8));
