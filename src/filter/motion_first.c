@@ -18,6 +18,7 @@
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
     MIN_AGAINST_TWISTS = 6, /* fewer points outweigh the twists only if all of them agree */
+    MIN_ASTRAY = 6,         /* of fewer points a quarter is one */
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 
@@ -244,10 +245,11 @@ static bool is_well_spread(const plr_search_point *point) {
 
 /* True if enough observations support the motion found without the twists: at least three, a fifth
  * of all, and four times as many as support the twists. If few misfit, those three tell more about
- * the translation than all others do. Well spread, three fifths must agree with it, and of fewer than
- * six all: some of so few may lie on one moving object, and a car that fills a third of the picture
- * pulls the estimate of all others with it. But where all agree, wheels that slip are likelier than a
- * scene that moves, and whichever of the two it is, the covariance covers both (filter/consistency.h). */
+ * the translation than all others do. They must be well spread. Of six and more, three fifths must
+ * agree with the motion. Of three to five all must, whether they took part in the search or not: three
+ * of five may lie on one car, which pulls the estimate of the others with it. If all agree, wheels
+ * that slip are likelier than a scene that moves as one, and the covariance covers both
+ * (filter/consistency.h). */
 static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
     unsigned with = 0, against = 0, agree = 0, active = 0;
     plr_real told = 0, told_against = 0;
@@ -257,7 +259,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
         if (!(at->active > 0))
             continue;
         active++;
-        agree += d2 < AGREES_BELOW;
+        agree += !at->behind && d2 < AGREES_BELOW;
         told += telling(at);
         if (at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
             against++;
@@ -268,7 +270,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
     const bool enough =
         misfit == PLR_MISFIT_MANY ? 5 * against >= active : PLR_R(2) * told_against > told;
     return against >= MIN_POINTS && enough && 4 * with <= against &&
-           (active < MIN_AGAINST_TWISTS ? agree == active : 5 * agree >= 3 * active) &&
+           (active < MIN_AGAINST_TWISTS ? agree == s->count : 5 * agree >= 3 * active) &&
            is_well_spread(open);
 }
 
@@ -336,7 +338,7 @@ static bool is_astray(const plr_search *s) {
         const bool allowed = plr_gate_accepts(s->f, at->prior_d2 * ASTRAY_SHARE, 0);
         astray += allowed && (at->behind || !plr_gate_accepts(s->f, plr_dot3(at->e, at->e), 0));
     }
-    return active >= MIN_AGAINST_TWISTS && 4 * astray >= active;
+    return active >= MIN_ASTRAY && 4 * astray >= active;
 }
 
 void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,

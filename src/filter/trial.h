@@ -16,7 +16,7 @@ typedef enum plr_vote {
     PLR_VOTE_OPEN
 } plr_vote;
 
-/* The motions that a point is followed under. The third is the pictures' way with the twists' turn:
+/* The motions that a point is followed under. The third is the pictures' way, steadied, with the twists' turn:
  * distant points, which tell the turn alone, fit it as well as the twists' and stay undecided. */
 enum { PLR_BY_TWISTS, PLR_BY_PICTURES, PLR_BY_PICTURES_WAY, PLR_MOTIONS };
 

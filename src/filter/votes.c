@@ -32,8 +32,9 @@ enum {
  * variances by twists and by pictures leave them comparable. */
 #define TWISTS_SHARE   PLR_R(0.3)
 #define PICTURES_SHARE PLR_R(0.1)
-/* Distant points toss the pictures' way to and fro, by more in a frame than wheels slip. A step forward and
- * the next one back cancel in a mean with these weights. */
+/* Beside a good gyro, distant points toss the pictures' way to and fro by more in a frame than wheels
+ * slip, and a point that fits no such zigzag would vote for any smooth way. So one candidate has a mean
+ * of the way, in which a frame counts half as much as the next. It is a frame late. */
 #define WAY_WEIGHT PLR_R(0.5)
 
 void plr_votes_clear(plr_filter *f) {
@@ -65,6 +66,18 @@ static void set_motion(const plr_filter *f, plr_candidates *c, unsigned which, c
     plr_real E_C[9];
     plr_camera_motion(E_C, c->motion[which].p, &f->par.camera, E, p);
     plr_se3_rotation(c->motion[which].R, E_C);
+}
+
+/* The twists' motion and `moved` after it, with the twists' turn if `way_only`. */
+static void set_moved(const plr_filter *f, plr_candidates *c, unsigned which,
+                      const plr_applied_motion *believed, const plr_real moved[PLR_POSE_DIM],
+                      bool way_only) {
+    plr_real E[9], p[3], dE[9], dp[3];
+    memcpy(E, believed->E, sizeof E);
+    memcpy(p, believed->p, sizeof p);
+    plr_se3_expm1(dE, dp, moved);
+    plr_se3_append(E, p, dE, dp);
+    set_motion(f, c, which, way_only ? believed->E : E, p);
 }
 
 /* Raises *largest to `share` of the largest of three diagonal elements of X^T X; X: 6x6, of which the
@@ -106,17 +119,13 @@ static void add_to_way(plr_votes *v, const plr_real moved[PLR_POSE_DIM]) {
 static void find_candidates(const plr_filter *f, const plr_applied_motion *believed,
                             const plr_applied_motion *applied, const plr_correction *correction,
                             const plr_real moved[PLR_POSE_DIM], plr_candidates *c) {
-    plr_real E[9], p[3], dE[9], dp[3], steadied[PLR_POSE_DIM];
+    plr_real steadied[PLR_POSE_DIM];
     memset(c, 0, sizeof *c);
-    memcpy(E, believed->E, sizeof E);
-    memcpy(p, believed->p, sizeof p);
     memcpy(steadied, moved, sizeof steadied);
     memcpy(steadied, f->own.votes.way, sizeof f->own.votes.way);
-    plr_se3_expm1(dE, dp, steadied);
-    plr_se3_append(E, p, dE, dp);
     set_motion(f, c, PLR_BY_TWISTS, believed->E, believed->p);
-    set_motion(f, c, PLR_BY_PICTURES, E, p);
-    set_motion(f, c, PLR_BY_PICTURES_WAY, believed->E, p);
+    set_moved(f, c, PLR_BY_PICTURES, believed, moved, false);
+    set_moved(f, c, PLR_BY_PICTURES_WAY, believed, steadied, true);
     add_noise(c, TWISTS_SHARE, believed->L, NULL);
     add_noise(c, PICTURES_SHARE, applied->JL, correction->Lambda);
 }

@@ -63,6 +63,17 @@ enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
                                                }                                                   \
     }
 
+/* Five points in sight: often fewer than three are used, so GOOD is no limit, nor is the error. */
+#define FEW_EVENT(title, text, kind, how, speed)                                                   \
+    {                                                                                              \
+        MISHAP(title, text, kind, how, speed), .near_m = 3, .far_m = 25, .baseline_m = 0.2,        \
+                                               .landmarks = 5, .bars = {                           \
+                                                   .silent = 0.01,                                 \
+                                                   .event_nees = 2,                                \
+                                                   .no_divergence = true                           \
+                                               }                                                   \
+    }
+
 /* What no filter can follow, and good data after it. */
 #define WAYOUT(title, text, kind, how, frames)                                                     \
     {                                                                                              \
@@ -150,6 +161,11 @@ const scenario scenarios[] = {
     EVENT("dead-gyro", "the rate reads 0, 1 m/s", DEAD_GYRO, 0, 1, 0, 0),
     EVENT("gyro-0.5", "the rate is half of the true one", GYRO_SCALE, 0.5, 1, 0, 0),
     EVENT("gyro-2", "the rate is twice the true one", GYRO_SCALE, 2, 1, 0, 0),
+    FEW_EVENT("slip-0.5-few", "readings x 0.5, five points in sight", SLIP, 0.5, 0.8),
+    FEW_EVENT("slip-2-few", "readings x 2, five points in sight", SLIP, 2, 0.8),
+    FEW_EVENT("dead-wheels-few", "the velocity reads 0, 1 m/s, five points in sight", DEAD_WHEELS, 0, 1),
+    FEW_EVENT("dead-gyro-few", "the rate reads 0, 1 m/s, five points in sight", DEAD_GYRO, 0, 1),
+    FEW_EVENT("gyro-2-few", "the rate is twice the true one, five points in sight", GYRO_SCALE, 2, 1),
     EVENT("frozen-0.1", "the same picture again and again, at 0.1 m/s", FROZEN, 1, 0.1, 5, 0),
     EVENT("frozen-0.2", "the same, at 0.2 m/s", FROZEN, 1, 0.2, 5, 0),
     EVENT("frozen-0.4", "the same, at 0.4 m/s", FROZEN, 1, 0.4, 5, 0),

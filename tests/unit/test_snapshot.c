@@ -86,6 +86,11 @@ static void save_restore_and_go_on(unsigned twists_behind) {
     TEST_ASSERT_TRUE(state_bytes_same_filter(&driven, &restored));
 }
 
+/* With twists they are saved as the numbers of an IMU's motion, which stand in the same place. */
+static void test_votes_fit_where_they_are_saved(void) {
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(sizeof(plr_core_motion), sizeof(plr_votes));
+}
+
 static void test_a_restored_filter_goes_on_with_the_same_bits(void) {
     save_restore_and_go_on(0);
     TEST_ASSERT_GREATER_THAN_UINT64(0, driven.totals.evicted);

@@ -272,6 +272,21 @@ static void test_the_pictures_way_counts_with_the_twists_turn(void) {
     TEST_ASSERT_GREATER_THAN_DOUBLE(2, (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
 }
 
+/* When wheels grip again the pictures' way changes at once, and its mean does not. */
+static void test_the_end_of_a_slip_is_no_vote_for_the_twists(void) {
+    for (unsigned frames = 4; frames <= 12; frames++) {
+        setUp();
+        place(0, PICTURES_M, 6);
+        for (unsigned k = 0; k < frames; k++)
+            TEST_ASSERT_FALSE(look());
+        for (unsigned i = 0; i < COUNT; i++)
+            spots[i].step_m = WAY_M;
+        memset(moved, 0, sizeof moved);
+        TEST_ASSERT_EQUAL_UINT(0, until_verdict(15));
+        TEST_ASSERT_LESS_THAN_DOUBLE(0.5, (double)filter.own.votes.counts[PLR_VOTE_TWISTS]);
+    }
+}
+
 /* Where distant points toss the pictures' way to and fro, nobody takes that for the twists' being right. */
 static void test_steps_to_and_fro_are_no_votes_for_the_twists(void) {
     place(0, PICTURES_M, 6);
