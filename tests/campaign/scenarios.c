@@ -63,7 +63,8 @@ enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
                                                }                                                   \
     }
 
-/* Five points in sight: often fewer than three are used, so GOOD is no limit, nor is the error. */
+/* Five points in sight: often fewer than three are used, so neither GOOD frames nor a small error are
+ * demanded. */
 #define FEW_EVENT(title, text, kind, how, speed)                                                   \
     {                                                                                              \
         MISHAP(title, text, kind, how, speed), .near_m = 3, .far_m = 25, .baseline_m = 0.2,        \

@@ -108,7 +108,7 @@ static void test_five_points_are_if_all_of_them_agree(void) {
     TEST_ASSERT_EQUAL_UINT32(0, contradictions_of_five(4)); /* they may lie on one car */
 }
 
-/* Frames after the first five: it takes some to tell. */
+/* Never GOOD and far off. The first five frames of each phase do not count, it takes some to tell. */
 static void demand_no_false_health(unsigned frames, double told_share) {
     for (unsigned k = 0; k < frames; k++) {
         double e[6];
