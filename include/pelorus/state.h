@@ -239,9 +239,9 @@ typedef struct plr_votes {
                                           contradiction: rho m, theta rad */
     plr_real ways2, frames;            /* sum of the squared steps of rho, m^2, and their number */
     plr_real trusted_frames;           /* so many frames more the twists are believed */
-    plr_real
-        way[3]; /* by how much the pictures move the body in a frame beside the twists, m: a mean in
-                        which a frame counts half as much as the next */
+    /* By how much the pictures move the body in a frame beside the twists, m: a mean in which a frame
+     * counts half as much as the next. */
+    plr_real way[3];
 } plr_votes;
 
 /* Relative errors of the camera's calibration that covariances take into account:

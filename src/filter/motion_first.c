@@ -18,7 +18,7 @@
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
     MIN_AGAINST_TWISTS = 6, /* fewer points outweigh the twists only if all of them agree */
-    MIN_ASTRAY = 6,         /* of fewer points a quarter is one */
+    MIN_ASTRAY = 6,         /* fewer points do not show that a search went astray */
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 

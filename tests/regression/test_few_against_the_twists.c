@@ -103,7 +103,7 @@ static uint32_t contradictions_of_five(unsigned moving) {
     return filter.totals.contradictions;
 }
 
-static void test_five_points_are_if_all_of_them_agree(void) {
+static void test_five_points_contradict_the_twists_if_all_of_them_agree(void) {
     TEST_ASSERT_EQUAL_UINT32(1, contradictions_of_five(5));
     TEST_ASSERT_EQUAL_UINT32(0, contradictions_of_five(4)); /* they may lie on one car */
 }

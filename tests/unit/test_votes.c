@@ -87,6 +87,14 @@ static bool look(void) {
     return plr_votes_add(&filter, &frame, COUNT, &believed, &applied, &correction, moved);
 }
 
+/* Frames in which the pictures' motion goes to and fro along an axis, by so many m or rad. */
+static void toss(unsigned axis, double by, unsigned frames) {
+    for (unsigned k = 0; k < frames; k++) {
+        moved[axis] = (plr_real)(k % 2 ? by : -by);
+        look();
+    }
+}
+
 /* One frame without a match. */
 static bool look_at_nothing(void) {
     const plr_frame frame = {0, PLR_NO_BUDGET, 0, NULL};
@@ -265,10 +273,7 @@ static void test_who_moves_is_left_out_while_the_twists_are_trusted(void) {
 /* The pictures' turn may be noise while their way is right. */
 static void test_the_pictures_way_counts_with_the_twists_turn(void) {
     place(0, PICTURES_M, 12);
-    for (unsigned k = 0; k < 40; k++) {
-        moved[4] = PLR_R(k % 2 ? 0.02 : -0.02);
-        look();
-    }
+    toss(4, 0.02, 40);
     TEST_ASSERT_GREATER_THAN_DOUBLE(2, (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
 }
 
@@ -290,10 +295,7 @@ static void test_the_end_of_a_slip_is_no_vote_for_the_twists(void) {
 /* Where distant points toss the pictures' way to and fro, nobody takes that for the twists' being right. */
 static void test_steps_to_and_fro_are_no_votes_for_the_twists(void) {
     place(0, PICTURES_M, 6);
-    for (unsigned k = 0; k < 60; k++) {
-        moved[0] = PLR_R(k % 2 ? 0.05 : -0.05);
-        look();
-    }
+    toss(0, 0.05, 60);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.5, (double)filter.own.votes.counts[PLR_VOTE_TWISTS]);
     TEST_ASSERT_GREATER_THAN_DOUBLE(2, (double)filter.own.votes.counts[PLR_VOTE_PICTURES]);
 }
