@@ -2,6 +2,7 @@
 /* The covariance in a motion of the body, and the motion's noise, which is kept beside it. */
 #include "state/covariance.h"
 
+#include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "state/blocks.h"
@@ -9,7 +10,10 @@
 #include "state/pose.h"
 #include "state/sensitivity.h"
 
-enum { POSE_ROW = 0 }; /* the pose comes first in every layout */
+enum {
+    POSE_ROW = 0, /* the pose comes first in every layout */
+    WIDE_REGISTERS = PLR_TILE_COLUMNS > 6
+};
 
 /* out_r = X_r B, r = 0 .. 2: three rows X_r of m numbers, B m x 6; out_r may be X_r. Every block of the
  * state has three or six rows. Inlined: the sums stay in registers. */
@@ -41,21 +45,6 @@ static void transpose6(plr_real At[PLR_POSE_SQUARE], const plr_real A[PLR_POSE_S
             At[PLR_POSE_DIM * i + j] = A[PLR_POSE_DIM * j + i];
 }
 
-/* X <- F X G^T, 3x3, in three rows of P. */
-static inline void transport_block(const plr_real *restrict F, const plr_real *restrict G,
-                                   plr_real *restrict r0, plr_real *restrict r1,
-                                   plr_real *restrict r2) {
-    const plr_real X[9] = {r0[0], r0[1], r0[2], r1[0], r1[1], r1[2], r2[0], r2[1], r2[2]};
-    const plr_real g[9] = {G[0], G[1], G[2], G[3], G[4], G[5], G[6], G[7], G[8]};
-    plr_real FX[3]; /* a row at a time: X, G and this fit into the registers of a small FPU */
-    plr_mat3_tvec(FX, X, F);
-    plr_mat3_vec(r0, g, FX);
-    plr_mat3_tvec(FX, X, F + 3);
-    plr_mat3_vec(r1, g, FX);
-    plr_mat3_tvec(FX, X, F + 6);
-    plr_mat3_vec(r2, g, FX);
-}
-
 /* X <- F X, 3xn, in three rows of P. F is copied to locals, because the compiler would otherwise
  * load it for each column. */
 static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *restrict r0,
@@ -69,22 +58,31 @@ static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *r
     }
 }
 
+/* The factors of a transport, by slot. Only a processor that calculates several numbers at a time
+ * uses Gt and Y (math/blocks3.h). */
+typedef struct plr_landmark_factors {
+    const plr_real *F;
+    plr_real *Gt, *Y;
+} plr_landmark_factors;
+
 /* The three rows of one landmark: its F from the left, the factor of each column from the right. */
 static void transport_landmark(plr_filter *f, unsigned slot, const plr_real At[PLR_POSE_SQUARE],
-                               const plr_real *F) {
+                               const plr_landmark_factors *by) {
     const unsigned s = plr_covariance_row(f, slot), first = plr_core_dim(f);
     plr_real *r0 = f->P + plr_packed_row(s);
     plr_real *r1 = f->P + plr_packed_row(s + 1);
     plr_real *r2 = f->P + plr_packed_row(s + 2);
-    const plr_real *own = F + 9 * slot;
-
-    turn_rows(first, own, r0, r1, r2);
-    turn_pose_columns(f, s, At);
-    for (unsigned j = first; j < s; j += 3, F += 9)
-        transport_block(own, F, r0 + j, r1 + j, r2 + j);
+    plr_real *const others[PLR_ROWS] = {r0 + first, r1 + first, r2 + first};
+    const plr_real *own = by->F + 9 * slot;
 
     plr_real D[9], FD[9], FDFt[9];
     plr_get_block(f, s, 3, s, 3, D);
+    turn_rows(first, own, r0, r1, r2);
+    turn_pose_columns(f, s, At);
+    if (WIDE_REGISTERS)
+        plr_blocks3_transport_wide(slot, own, by->Gt, by->Y, others);
+    else
+        plr_blocks3_transport(slot, own, by->F, others);
     plr_mat3_mul(FD, own, D);
     plr_mat3_mul_nt(FDFt, FD, own);
     plr_set_block(f, s, 3, s, 3, FDFt);
@@ -111,8 +109,12 @@ void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]) 
 void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F) {
     plr_real At[PLR_POSE_SQUARE];
     turn_pose(f, plr_core_dim(f), A, At);
+    const plr_landmark_factors by = {F, f->work.Vt + 9 * f->count,
+                                     f->work.Vt + (9 + PLR_WIDE_FACTOR) * f->count};
+    if (WIDE_REGISTERS)
+        plr_blocks3_widen(f->count, F, by.Gt);
     for (unsigned slot = 0; slot < f->count; slot++)
-        transport_landmark(f, slot, At, F);
+        transport_landmark(f, slot, At, &by);
     plr_sensitivity_turn_landmarks(f, F);
 }
 
