@@ -19,6 +19,7 @@ enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
     MIN_AGAINST_TWISTS = 6, /* fewer points outweigh the twists only if all of them agree */
     MIN_ASTRAY = 6,         /* fewer points do not show that a search went astray */
+    MIN_AGREEING = 6,       /* fewer points do not tell a motion of which nothing else is known */
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
 
@@ -68,13 +69,19 @@ static bool went_astray(const plr_search *s, unsigned i) {
     return may_be && s->sightings[i].adrift && is_unseen(s, i);
 }
 
+/* What makes a prediction too uncertain to linearise at. */
+typedef enum plr_uncertainty {
+    PLR_OF_POINT_AND_MOTION,
+    PLR_OF_POINT /* the motion is found by the points together, however little is known of it */
+} plr_uncertainty;
+
 /* Compares an observation with the twists' prediction: prior_d2 with the whole uncertainty of nu in
  * S, and gain = det S. If the prediction is too uncertain to linearise at, prior_d2 is negative and
  * the observation takes no part in the search. */
-static void judge_by_prior(plr_search *s, unsigned i) {
+static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
-    const bool dark = is_dark(s), lost = is_lost(s, i);
+    const bool dark = is_dark(s) && by == PLR_OF_POINT_AND_MOTION, lost = is_lost(s, i);
     at->adrift = dark || lost; /* unless the prediction below says otherwise */
     if (at->behind || lost) {
         at->active = 0;
@@ -104,7 +111,7 @@ static void judge_by_prior(plr_search *s, unsigned i) {
                 sum += u[k] * u[l] *
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
         const plr_real noise = plr_stereo_variance(s->f, r);
-        basis = basis && sum - noise <= limit;
+        basis = basis && (by == PLR_OF_POINT ? own : sum) - noise <= limit;
         within = within && (dark ? sum : own) - noise <= adrift;
     }
     at->adrift = !within;
@@ -307,7 +314,7 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
     for (unsigned i = 0; i < s->count; i++) {
         plr_sighting *at = &s->sightings[i];
         const bool was_active = at->active > 0;
-        judge_by_prior(s, i);
+        judge_by_prior(s, i, PLR_OF_POINT_AND_MOTION);
         active += at->active > 0;
         changed = changed || (was_active && !(at->active > 0));
     }
@@ -319,6 +326,37 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
     if (changed)
         plr_search_from_zero(s, best);
     return active;
+}
+
+/* The twists' prediction of most points is too uncertain to linearise at, but the points themselves
+ * may be well known: after frames that were lost in a fast turn, or a darkness. True if the motion at
+ * which they agree with each other can be found; all of them take part in the search then. Otherwise
+ * the search is put back to where it was. */
+static bool search_by_agreement(plr_search *s, plr_search_point *best) {
+    unsigned active = 0, agree = 0;
+    if (s->count < MIN_AGREEING)
+        return false;
+    for (unsigned i = 0; i < s->count; i++) {
+        plr_sighting *at = &s->sightings[i];
+        at->active = plr_search_slot(s, i)->known ? 0 : 1;
+        judge_by_prior(s, i, PLR_OF_POINT);
+        active += at->active > 0;
+    }
+    if (active >= MIN_AGREEING) {
+        plr_search_from_zero(s, best);
+        for (unsigned again = 0; again <= MORE_SEARCHES; again++)
+            plr_search_descend(s, best);
+        for (unsigned i = 0; i < s->count; i++) {
+            const plr_sighting *at = &s->sightings[i];
+            agree += at->active > 0 && !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
+        }
+        if (agree >= MIN_AGREEING && 5 * agree >= 3 * active && is_well_spread(best))
+            return true;
+    }
+    for (unsigned i = 0; i < s->count; i++)
+        s->sightings[i].active = plr_search_slot(s, i)->known ? 0 : 1;
+    plr_search_from_zero(s, best);
+    return false;
 }
 
 /* What a prediction over metres says of its own uncertainty is right to first order only: of its d^2 this
@@ -353,7 +391,13 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
             plr_search_add(&s, f->slots[f->work.slot_of[k]].known ? 0 : 1);
         }
     plr_search_from_zero(&s, &best);
-    const unsigned active = judge_all_by_prior(&s, &best);
+    unsigned active = judge_all_by_prior(&s, &best);
+    if (2 * active < s.count) {
+        if (search_by_agreement(&s, &best))
+            active = s.count;
+        else
+            active = judge_all_by_prior(&s, &best);
+    }
     first->found = active >= MIN_POINTS;
     if (active > 0)
         plr_search_descend(&s, &best);
