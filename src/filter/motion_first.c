@@ -334,8 +334,6 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
  * the search is put back to where it was. */
 static bool search_by_agreement(plr_search *s, plr_search_point *best) {
     unsigned active = 0, agree = 0;
-    if (s->count < MIN_AGREEING)
-        return false;
     for (unsigned i = 0; i < s->count; i++) {
         plr_sighting *at = &s->sightings[i];
         at->active = plr_search_slot(s, i)->known ? 0 : 1;
@@ -385,19 +383,18 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
     plr_motion_prior(f, &s.prior);
+    unsigned unknown = 0; /* the others are of a given map, and take no part */
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
+            const bool known = f->slots[f->work.slot_of[k]].known;
             f->work.used[s.count] = (uint16_t)k;
-            plr_search_add(&s, f->slots[f->work.slot_of[k]].known ? 0 : 1);
+            unknown += !known;
+            plr_search_add(&s, known ? 0 : 1);
         }
     plr_search_from_zero(&s, &best);
     unsigned active = judge_all_by_prior(&s, &best);
-    if (2 * active < s.count) {
-        if (search_by_agreement(&s, &best))
-            active = s.count;
-        else
-            active = judge_all_by_prior(&s, &best);
-    }
+    if (unknown >= MIN_AGREEING && 2 * active < unknown)
+        active = search_by_agreement(&s, &best) ? unknown : judge_all_by_prior(&s, &best);
     first->found = active >= MIN_POINTS;
     if (active > 0)
         plr_search_descend(&s, &best);
