@@ -330,7 +330,8 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
 
 /* The twists' prediction of most points is too uncertain to linearise at, but the points themselves
  * may be well known: after frames that were lost in a fast turn, or a darkness. True if the motion at
- * which they agree with each other can be found; all of them take part in the search then. Otherwise
+ * which they agree with each other can be found; all of them take part in the search then. They need
+ * not be well spread: a direction in which they say little keeps what the twists say of it. Otherwise
  * the search is put back to where it was. */
 static bool search_by_agreement(plr_search *s, plr_search_point *best) {
     unsigned active = 0, agree = 0;
@@ -348,7 +349,7 @@ static bool search_by_agreement(plr_search *s, plr_search_point *best) {
             const plr_sighting *at = &s->sightings[i];
             agree += at->active > 0 && !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
         }
-        if (agree >= MIN_AGREEING && 5 * agree >= 3 * active && is_well_spread(best))
+        if (agree >= MIN_AGREEING && 5 * agree >= 3 * active)
             return true;
     }
     for (unsigned i = 0; i < s->count; i++)

@@ -23,16 +23,20 @@ static rng pixels;
 static double points[COUNT][3];
 static unsigned count;
 
-void setUp(void) {
-    pixels = rng_seeded(8);
-    count = COUNT;
-    /* to the right, so that they are in sight before the camera turns there and after */
+/* To the right, so that they are in sight before the camera turns there and after. */
+static void place_points(double nearest_m, double farthest_m) {
     for (unsigned i = 0; i < COUNT; i++) {
-        const double depth = 3 + 0.25 * i;
+        const double depth = nearest_m + (farthest_m - nearest_m) * i / COUNT;
         points[i][0] = depth * (0.05 + 0.45 * ((i * 7) % COUNT) / COUNT);
         points[i][1] = depth * (-0.4 + 0.8 * ((i * 11) % COUNT) / COUNT);
         points[i][2] = depth;
     }
+}
+
+void setUp(void) {
+    pixels = rng_seeded(8);
+    count = COUNT;
+    place_points(3, 8);
     const plr_calibration camera = scene_bare_camera(FOCAL_PX, 320, 240, 0.2);
     plr_config config;
     plr_config_default(&config);
@@ -77,6 +81,13 @@ static double turned_by(void) {
 }
 
 static void test_points_that_agree_tell_a_turn_of_which_nothing_was_known(void) {
+    look(see_the_points_well() + 750000000U, TURN, 0);
+    TEST_ASSERT_GREATER_THAN_UINT16(COUNT * 3 / 4, report.used);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, TURN, turned_by());
+}
+
+static void test_distant_points_tell_it_too(void) {
+    place_points(60, 160);
     look(see_the_points_well() + 750000000U, TURN, 0);
     TEST_ASSERT_GREATER_THAN_UINT16(COUNT * 3 / 4, report.used);
     TEST_ASSERT_DOUBLE_WITHIN(0.02, TURN, turned_by());
