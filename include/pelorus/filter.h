@@ -26,8 +26,9 @@
  * A refused call (status < 0) changes only the counts of refused calls. Of refused IMU readings the
  * filter also remembers what was wrong, and how many came in succession (plr_filter_inertial). A
  * function that takes a const filter changes nothing: later results have the same bits whether you
- * call it or not. Every call first checks that the filter's memory is as the previous call left it;
- * if not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
+ * call it or not. Every call first checks that configuration, pose and the small rest of the filter's
+ * memory are as the previous call left them; an update checks landmarks and covariance as well. If
+ * not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
  *
  * The error of a pose is defined on its right side: with T the true pose and T^ the estimate, T =
  * T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias is

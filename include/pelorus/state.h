@@ -18,6 +18,9 @@
 extern "C" {
 #endif
 
+/* The time of what has not been yet. */
+#define PLR_NEVER_NS UINT64_MAX
+
 /* The caller's store of landmarks outside the filter. Both functions may be NULL. They must not
  * call the filter. */
 typedef struct plr_map {
@@ -373,8 +376,8 @@ typedef struct plr_filter {
         plr_votes votes;             /* with twists */
     } own;
     plr_inertial inertial;                  /* with an IMU */
-    plr_time_ns last_frame_ns, last_use_ns; /* 0: none yet */
-    plr_time_ns last_position_ns;           /* of a position that was used; 0: none yet */
+    plr_time_ns last_frame_ns, last_use_ns; /* PLR_NEVER_NS: none yet */
+    plr_time_ns last_position_ns;           /* of a position that was used; likewise */
     uint32_t reasons;                       /* of health, at the last frame */
     uint32_t refused_before;                /* readings refused until the last frame */
     uint32_t matches_since_gated;

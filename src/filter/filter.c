@@ -199,7 +199,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     f->matches_since_gated = 0;
     f->health = PLR_HEALTH_DEGRADED; /* nothing has been seen yet */
     f->reasons = PLR_REASON_FEW_OBSERVATIONS;
-    f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
+    f->last_frame_ns = f->last_use_ns = f->last_position_ns = PLR_NEVER_NS;
     f->refused_before = 0;
     memset(f->bias_prior, 0, sizeof f->bias_prior);
     f->bias_walked_s = 0;
@@ -298,7 +298,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
     if (f->last_frame_ns > t_ns || t_ns - f->last_frame_ns > f->par.max_gap_ns)
-        f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
+        f->last_frame_ns = f->last_use_ns = f->last_position_ns = PLR_NEVER_NS;
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

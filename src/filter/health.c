@@ -61,7 +61,7 @@ static void count_up(uint16_t *count, bool more) {
 }
 
 static double seconds_since(plr_time_ns then, plr_time_ns now) {
-    return then == 0 || now < then ? 0 : (double)(now - then) * 1e-9;
+    return now < then ? 0 : (double)(now - then) * 1e-9; /* PLR_NEVER_NS is later than any time */
 }
 
 static bool readings_are_old(const plr_filter *f, plr_time_ns now) {
@@ -153,8 +153,8 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
 /* The reasons by which the pose is lost at a time. A position that was used not long ago does for
  * the pose what the camera does not. */
 static uint32_t lost_by(const plr_filter *f, plr_time_ns now) {
-    const bool positioned =
-        f->last_position_ns != 0 && seconds_since(f->last_position_ns, now) <= POSITION_S;
+    const bool positioned = f->last_position_ns != PLR_NEVER_NS &&
+                            seconds_since(f->last_position_ns, now) <= POSITION_S;
     return positioned ? PLR_REASON_GATE_LOCKED | PLR_REASON_NOT_STARTED : LOST;
 }
 
@@ -225,8 +225,9 @@ plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_s
     const bool looks = f->config.mode != PLR_MODE_DEAD_RECKONING;
     health->reasons =
         f->reasons & ~(uint32_t)(looks ? IMU_REASONS : OBSERVATION_REASONS | IMU_REASONS);
-    health->seconds_without_frame = seconds_if(f->last_frame_ns != 0, f->last_frame_ns, now);
-    health->seconds_without_use = seconds_if(f->last_use_ns != 0, f->last_use_ns, now);
+    health->seconds_without_frame =
+        seconds_if(f->last_frame_ns != PLR_NEVER_NS, f->last_frame_ns, now);
+    health->seconds_without_use = seconds_if(f->last_use_ns != PLR_NEVER_NS, f->last_use_ns, now);
     health->seconds_without_twist = seconds_if(f->reading_valid, f->reading_ns, now);
     health->resets = f->totals.resets + f->totals.widened;
     if (looks && health->seconds_without_frame > LOST_S)

@@ -33,7 +33,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     plr_alignment_follow_clock(f, t_ns);
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
-    f->last_frame_ns = f->last_use_ns = f->last_position_ns = 0;
+    f->last_frame_ns = f->last_use_ns = f->last_position_ns = PLR_NEVER_NS;
     plr_votes_clear(f);                         /* the body may have been carried */
     if (plr_has_block(f, PLR_BLOCK_VELOCITY)) { /* it is not what it was then */
         const plr_real v = f->par.start_velocity_variance, variance[3] = {v, v, v};

@@ -247,7 +247,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         plr_velocity_forget(f); /* their clock is not the one that goes on */
         memset(f->slots, 0, sizeof f->slots);
         memset(f->readings_rejected, 0, sizeof f->readings_rejected);
-        f->last_position_ns = 0;
+        f->last_position_ns = PLR_NEVER_NS;
     }
     for (unsigned slot = 0; slot < count.landmarks && status == PLR_OK; slot++)
         status = read_slot(c, f, like, slot);

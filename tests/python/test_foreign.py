@@ -19,6 +19,7 @@ from converted import SHORT, Run, messages_of
 from drives import clean, mat_arrays, npz_arrays
 from pelorus import foreign
 from pelorus.arrays import read_mat
+from pelorus.errors import write_text
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import NAME_BYTES_MAX, Header, header_name
 from scipy.io import loadmat, savemat
@@ -258,6 +259,8 @@ def test_a_file_whose_name_is_no_text_is_converted_and_said_visibly(
     assert r"out\udcff.plr: " in outcome.out
     assert messages_of(target, Header)[0].name == "dri?ve"
     assert r"out\udcff.plr" in pelorus("info", target).out
+    write_text(tmp_path / "tuned.conf", f"# found in {target.name}\n")
+    assert (tmp_path / "tuned.conf").read_text() == "# found in out\\udcff.plr\n"
     assert r"x\udcff: cannot be read" in pelorus("info", tmp_path / "x\udcff", status=1).err
 
 

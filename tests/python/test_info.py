@@ -62,7 +62,7 @@ def test_a_whole_recording_is_shown(tmp_path: Path, pelorus: Run) -> None:
 
 def test_settings_texts_and_landmarks_are_shown_by_name(tmp_path: Path, pelorus: Run) -> None:
     config = Config({1: 1.0, 3: 0.0, 8: 2.5, 99: 7.0}, 0x1234ABCD, 256, 512, 8, 4)
-    messages = [HEADER, config, Landmark(1), Landmark(2), Text("gyro [red] replaced", 1)]
+    messages = [HEADER, config, Landmark(1), Landmark(2), Text("gyro [red]\nreplaced", 1)]
     path = write(tmp_path / "x.plr", [*messages, *twists(0, 10)])
     text = " ".join(pelorus("info", path).out.split())
     for said in (
@@ -74,7 +74,7 @@ def test_settings_texts_and_landmarks_are_shown_by_name(tmp_path: Path, pelorus:
         "pixel-sigma 2.5 px",
         "setting 99 7",
         "LANDMARK 2 2 known",
-        "warning: gyro [red] replaced",
+        r"warning: gyro [red]\nreplaced",
     ):
         assert said in text, said
 

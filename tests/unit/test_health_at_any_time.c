@@ -49,6 +49,22 @@ static void test_on_a_drive_it_is_that_of_the_last_frame(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0, state.seconds_without_frame);
 }
 
+/* 0 was taken for "never": a twist at time 0 stayed new for ever, and a frame had not been. */
+static void test_what_came_at_time_zero_has_come(void) {
+    static const plr_frame frame = {.t_ns = 0, .budget = PLR_NO_BUDGET};
+    static const plr_twist twist = {{1, 0, 0}, {0, 0, 0}};
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&rig.filter, 0, &twist));
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
+    ask(0);
+    TEST_ASSERT_EQUAL_DOUBLE(0, state.seconds_without_frame);
+    TEST_ASSERT_EQUAL_DOUBLE(0, state.seconds_without_twist);
+    TEST_ASSERT_TRUE(isinf(state.seconds_without_use));
+    ask(6000000000);
+    TEST_ASSERT_EQUAL_DOUBLE(6, state.seconds_without_frame);
+    TEST_ASSERT_EQUAL_DOUBLE(6, state.seconds_without_twist);
+    TEST_ASSERT_TRUE(state.reasons & PLR_REASON_NO_TWISTS);
+}
+
 static void test_a_camera_that_falls_silent_is_told_after_a_second(void) {
     rig_drive(5);
     const plr_time_ns last = rig.world.t_ns;

@@ -368,8 +368,9 @@ none is above; *its bound* is the formula at m = {busy}, beside the busiest fram
 Every loop has a count that N and m bound, and a library function that is not of constant time for
 such a count does not exist in it; so the worst case is no other than that of these counts.
 While twists and pictures contradict each other, points are asked which are right: some 40,000
-instructions more, for seven points at most (`src/filter/votes.c`). After frames that were lost in a fast turn the motion is searched for once more, in at most 17 evaluations of all points
-(`search_by_agreement`); neither is in these frames.
+instructions more, for seven points at most (`src/filter/votes.c`). After frames that were lost in
+a fast turn the motion is searched for once more, in at most 17 evaluations of all points
+(`search_by_agreement`). Neither is in these frames.
 
 ### With twists
 

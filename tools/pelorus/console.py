@@ -30,6 +30,11 @@ def shown(words: str) -> str:
     return "".join(c if _harmless(c) else _escape(ord(c)) for c in words)
 
 
+def one_line(words: str) -> str:
+    r"""What another program says, in a line of ours: it cannot begin one itself."""
+    return shown(words).replace("\n", "\\n")
+
+
 def _harmless(character: str) -> bool:
     return character in LAYOUT or unicodedata.category(character) not in UNPRINTABLE
 

@@ -61,9 +61,9 @@ def _part(file: Path) -> Path:
 
 
 def write_text(path: Path, text: str) -> None:
-    """The whole file, or nothing of it."""
+    """The whole file, or nothing of it. What is no UTF-8, as in a file's name, is escaped."""
     with whole(path) as (part,), writing(path):
-        part.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def made(folder: Path) -> Path:

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus import survey_json
-from pelorus.console import out
+from pelorus.console import one_line, out
 from pelorus.frames import Config, Header, Kind, Process
 from pelorus.inertial_survey import ImuSurvey
 from pelorus.settings import describe
@@ -56,7 +56,7 @@ def info(
         _show_tracks(found.tracks)
     for text in found.texts:
         severity = SEVERITIES[text.severity] if text.severity < len(SEVERITIES) else "?"
-        out.print(f"{severity}: {escape(text.text)}")
+        out.print(f"{severity}: {escape(one_line(text.text))}")
     _show_health(found)
     _show_damage(found)
     require_useful(found)

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from pelorus import packed_file
 from pelorus.commands.choices import PROGRAMS
 from pelorus.commands.compare import compare_log
-from pelorus.console import err, out
+from pelorus.console import err, one_line, out
 from pelorus.errors import PelorusError, writing
 from pelorus.flight.judge import Verdict
 from pelorus.frames import Kind, Message, Pose
@@ -205,7 +205,7 @@ def _tell(outcome: Outcome, record: Path | None) -> None:
 
 def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]:
     for remark in outcome.texts[:TEXTS_SHOWN]:
-        yield "board", remark.text
+        yield "board", one_line(remark.text)
     if len(outcome.texts) > TEXTS_SHOWN:
         yield "board", f"and {len(outcome.texts) - TEXTS_SHOWN} remarks more"
     if outcome.config is not None:
