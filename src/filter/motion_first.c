@@ -203,6 +203,11 @@ static plr_real telling(const plr_sighting *at) {
     return PLR_SQRT(sum);
 }
 
+/* True if an observation agrees with the motion at the point evaluated last. */
+static bool agrees(const plr_sighting *at) {
+    return !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
+}
+
 /* Which observations have a small weight, so that another motion may fit them better. */
 typedef enum plr_misfit {
     PLR_MISFIT_NONE,
@@ -266,7 +271,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
         if (!(at->active > 0))
             continue;
         active++;
-        agree += !at->behind && d2 < AGREES_BELOW;
+        agree += agrees(at);
         told += telling(at);
         if (at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
             against++;
@@ -304,6 +309,12 @@ static bool search_without_twists(plr_search *s, plr_search_point *best, plr_mis
     return false;
 }
 
+/* All landmarks but those of a given map. */
+static void let_unknown_take_part(plr_search *s) {
+    for (unsigned i = 0; i < s->count; i++)
+        s->sightings[i].active = plr_search_slot(s, i)->known ? 0 : 1;
+}
+
 /* Compares all observations with the twists' prediction, and excludes from the search those whose
  * prediction is too uncertain to linearise at. If fewer than three remain, none can be checked by
  * the others; then those that the gate rejects here are excluded too. Returns how many were left
@@ -329,33 +340,29 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
 }
 
 /* The twists' prediction of most points is too uncertain to linearise at, but the points themselves
- * may be well known: after frames that were lost in a fast turn, or a darkness. True if the motion at
- * which they agree with each other can be found; all of them take part in the search then. They need
- * not be well spread: a direction in which they say little keeps what the twists say of it. Otherwise
- * the search is put back to where it was. */
-static bool search_by_agreement(plr_search *s, plr_search_point *best) {
+ * may be well known: after frames that were lost in a fast turn, or a darkness. If the motion at which
+ * they agree with each other can be found, all of them take part in the search. They need not be well
+ * spread: a direction in which they say little keeps what the twists say of it. Otherwise the search
+ * goes on with those whose prediction is good enough. Returns how many take part. */
+static unsigned search_by_agreement(plr_search *s, plr_search_point *best) {
     unsigned active = 0, agree = 0;
+    let_unknown_take_part(s);
     for (unsigned i = 0; i < s->count; i++) {
-        plr_sighting *at = &s->sightings[i];
-        at->active = plr_search_slot(s, i)->known ? 0 : 1;
         judge_by_prior(s, i, PLR_OF_POINT);
-        active += at->active > 0;
+        active += s->sightings[i].active > 0;
     }
     if (active >= MIN_AGREEING) {
         plr_search_from_zero(s, best);
         for (unsigned again = 0; again <= MORE_SEARCHES; again++)
             plr_search_descend(s, best);
-        for (unsigned i = 0; i < s->count; i++) {
-            const plr_sighting *at = &s->sightings[i];
-            agree += at->active > 0 && !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
-        }
+        for (unsigned i = 0; i < s->count; i++)
+            agree += s->sightings[i].active > 0 && agrees(&s->sightings[i]);
         if (agree >= MIN_AGREEING && 5 * agree >= 3 * active)
-            return true;
+            return active;
     }
-    for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].active = plr_search_slot(s, i)->known ? 0 : 1;
+    let_unknown_take_part(s);
     plr_search_from_zero(s, best);
-    return false;
+    return judge_all_by_prior(s, best);
 }
 
 /* What a prediction over metres says of its own uncertainty is right to first order only: of its d^2 this
@@ -395,7 +402,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     plr_search_from_zero(&s, &best);
     unsigned active = judge_all_by_prior(&s, &best);
     if (unknown >= MIN_AGREEING && 2 * active < unknown)
-        active = search_by_agreement(&s, &best) ? unknown : judge_all_by_prior(&s, &best);
+        active = search_by_agreement(&s, &best);
     first->found = active >= MIN_POINTS;
     if (active > 0)
         plr_search_descend(&s, &best);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "math/blocks3.h"
 
-#include "math/small.h"
-
 static inline void transport_block(const plr_real *restrict F, const plr_real *restrict G,
                                    plr_real *restrict r0, plr_real *restrict r1,
                                    plr_real *restrict r2) {
@@ -24,20 +22,6 @@ void plr_blocks3_transport(unsigned n, const plr_real F[9], const plr_real *G,
         transport_block(F, G, r0, r1, r2);
 }
 
-/* Y <- F X, 3 x n, all rows apart from each other. */
-static inline void rows_from_left(unsigned n, const plr_real *restrict F,
-                                  const plr_real *restrict x0, const plr_real *restrict x1,
-                                  const plr_real *restrict x2, plr_real *restrict y0,
-                                  plr_real *restrict y1, plr_real *restrict y2) {
-    const plr_real f[9] = {F[0], F[1], F[2], F[3], F[4], F[5], F[6], F[7], F[8]};
-    for (unsigned c = 0; c < n; c++) {
-        const plr_real x[3] = {x0[c], x1[c], x2[c]};
-        y0[c] = plr_dot3(f, x);
-        y1[c] = plr_dot3(f + 3, x);
-        y2[c] = plr_dot3(f + 6, x);
-    }
-}
-
 /* x <- G y: the fourth element is of no use. It is there because four numbers are calculated as
  * fast as one. */
 static inline void wide_row(plr_real *restrict x, const plr_real *restrict Gt,
@@ -51,7 +35,7 @@ void plr_blocks3_transport_wide(unsigned n, const plr_real F[9], const plr_real 
                                 plr_real *const row[3]) {
     plr_real *r0 = row[0], *r1 = row[1], *r2 = row[2];
     const plr_real *y0 = Y, *y1 = Y + 3 * n, *y2 = Y + 6 * n;
-    rows_from_left(3 * n, F, r0, r1, r2, Y, Y + 3 * n, Y + 6 * n);
+    plr_rows3_from_left(3 * n, F, r0, r1, r2, Y, Y + 3 * n, Y + 6 * n);
     for (unsigned j = 0; j < n; j++, Gt += PLR_WIDE_FACTOR) {
         wide_row(r0 + 3 * j, Gt, y0 + 3 * j);
         wide_row(r1 + 3 * j, Gt, y1 + 3 * j);

@@ -2,6 +2,7 @@
 /* The covariance in a correction. Most of the filter's time is spent here. */
 #include "state/covariance.h"
 
+#include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "state/blocks.h"
@@ -42,22 +43,8 @@ void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_r
     }
 }
 
-/* out_r[i] = H_r x(i), r = 0 .. 2, i = 0 .. n-1: x(i) is column i of three rows. H is copied to
- * locals, because the compiler would otherwise load it for each i. */
-static inline void project_rows(unsigned n, const plr_real H[9], const plr_real *restrict x0,
-                                const plr_real *restrict x1, const plr_real *restrict x2,
-                                plr_real *restrict out0, plr_real *restrict out1,
-                                plr_real *restrict out2) {
-    const plr_real h[9] = {H[0], H[1], H[2], H[3], H[4], H[5], H[6], H[7], H[8]};
-    for (unsigned i = 0; i < n; i++) {
-        const plr_real x[3] = {x0[i], x1[i], x2[i]};
-        out0[i] = plr_dot3(h, x);
-        out1[i] = plr_dot3(h + 3, x);
-        out2[i] = plr_dot3(h + 6, x);
-    }
-}
-
-/* The same for i = first .. n-1, where x(i) is in row i of P, from column s on. */
+/* out_r[i] = H_r x(i), r = 0 .. 2, i = first .. n-1, where x(i) is in row i of P, from column s on. H is
+ * copied to locals, because the compiler would otherwise load it for each i. */
 static inline void project_columns(unsigned first, unsigned n, const plr_real H[9],
                                    const plr_real *restrict P, unsigned s, plr_real *restrict out0,
                                    plr_real *restrict out1, plr_real *restrict out2) {
@@ -78,10 +65,10 @@ static void project_landmark(const plr_filter *f, unsigned n, unsigned s, const 
     const plr_real *P = f->P;
     plr_real *out0 = rows, *out1 = rows + ld, *out2 = rows + 2 * ld;
     plr_real own[9];
-    project_rows(s, H, P + plr_packed_row(s), P + plr_packed_row(s + 1), P + plr_packed_row(s + 2),
-                 out0, out1, out2);
+    plr_rows3_from_left(s, H, P + plr_packed_row(s), P + plr_packed_row(s + 1),
+                        P + plr_packed_row(s + 2), out0, out1, out2);
     plr_get_block(f, s, 3, s, 3, own);
-    project_rows(3, H, own, own + 3, own + 6, out0 + s, out1 + s, out2 + s);
+    plr_rows3_from_left(3, H, own, own + 3, own + 6, out0 + s, out1 + s, out2 + s);
     project_columns(s + 3, n, H, P, s, out0, out1, out2);
 }
 

@@ -14,6 +14,7 @@
 #include <unity.h>
 
 #include "pelorus/pelorus.h"
+#include "support/axes.h"
 #include "support/random.h"
 #include "support/rig.h"
 
@@ -36,10 +37,8 @@ void setUp(void) {
     config.bias = 0;
     config.slots = COUNT;
     config.pixel_sigma_px = 1;
-    for (int i = 0; i < 3; i++) {
-        config.velocity_sigma[i] = 0.1;
-        config.gyro_sigma[i] = 0.002;
-    }
+    each_axis(config.velocity_sigma, 0.1);
+    each_axis(config.gyro_sigma, 0.002);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
 }
 

@@ -9,6 +9,7 @@
 #include <unity.h>
 
 #include "pelorus/pelorus.h"
+#include "support/axes.h"
 #include "support/pose_of.h"
 #include "support/random.h"
 #include "support/scene.h"
@@ -43,10 +44,8 @@ void setUp(void) {
     config.bias = 0;
     config.slots = COUNT;
     config.pixel_sigma_px = 1;
-    for (int i = 0; i < 3; i++) {
-        config.velocity_sigma[i] = 0.05;
-        config.gyro_sigma[i] = 2; /* 1.5 rad in 0.75 s */
-    }
+    each_axis(config.velocity_sigma, 0.05);
+    each_axis(config.gyro_sigma, 2); /* 1.5 rad in 0.75 s */
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
 }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 /* Rows of 3x3 blocks: both ways of multiplying them from both sides, and the formula in double. */
-#include <math.h>
-#include <string.h>
 #include <unity.h>
 
 #include "math/blocks3.h"
@@ -10,13 +8,12 @@
 
 enum { MOST = 40, WIDTH = 3 * MOST + 2 };
 
-typedef struct case_of_n {
-    unsigned n;
+typedef struct operands {
     plr_real F[9], G[9 * MOST], X[3][WIDTH];
-} case_of_n;
+} operands;
 
-static case_of_n random_case(rng *r, unsigned n) {
-    case_of_n c = {.n = n};
+static operands random_case(rng *r) {
+    operands c;
     for (unsigned i = 0; i < 9; i++)
         c.F[i] = (plr_real)rng_normal(r);
     for (unsigned i = 0; i < 9 * MOST; i++)
@@ -29,8 +26,8 @@ static case_of_n random_case(rng *r, unsigned n) {
 
 static void test_blocks_are_multiplied_from_both_sides(void) {
     rng r = rng_seeded(3);
-    const case_of_n before = random_case(&r, MOST);
-    case_of_n after = before;
+    const operands before = random_case(&r);
+    operands after = before;
     plr_real *const rows[3] = {after.X[0], after.X[1], after.X[2]};
     plr_blocks3_transport(MOST, after.F, after.G, rows);
     for (unsigned j = 0; j < MOST; j++)
@@ -46,8 +43,8 @@ static void test_blocks_are_multiplied_from_both_sides(void) {
 }
 
 static void transport_both_ways(rng *r, unsigned n) {
-    const case_of_n before = random_case(r, n);
-    case_of_n plain = before, wide = before;
+    const operands before = random_case(r);
+    operands plain = before, wide = before;
     plr_real Gt[PLR_WIDE_FACTOR * MOST + 1], Y[9 * MOST + 1];
     plr_real *const plain_rows[3] = {plain.X[0], plain.X[1], plain.X[2]};
     plr_real *const wide_rows[3] = {wide.X[0], wide.X[1], wide.X[2]};
