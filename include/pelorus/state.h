@@ -203,6 +203,7 @@ typedef struct plr_consistency {
     /* |L^-1 n|^2 of frames that contradicted the twists by themselves, and, if the turns are a good
      * part of that, their part of it; older ones weighted less */
     plr_real excess, excess_turn;
+    plr_real fast; /* the last frame's statistic of the two windows that look back least */
     uint16_t agreeing_frames;      /* successive frames in agreement */
     uint16_t contradicting_frames; /* successive frames with a large contradiction */
     uint16_t small_frames;         /* successive frames with a small difference */
@@ -216,8 +217,8 @@ typedef struct plr_consistency {
 
 /* Whether what is seen agrees with itself: src/filter/scene.h. */
 typedef struct plr_scene {
-    plr_real matched, rejected, nis;   /* sums over frames, older ones weighted less */
-    plr_real usual_mean, usual_square; /* of a frame's mean square, over many frames */
+    plr_real matched, rejected, again, nis; /* sums over frames, older ones weighted less */
+    plr_real usual_mean, usual_square;      /* of a frame's mean square, over many frames */
 } plr_scene;
 
 /* A point that is asked whether it stands, by twists or by pictures: src/filter/votes.c. */

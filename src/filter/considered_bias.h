@@ -15,13 +15,15 @@
 typedef struct plr_considered_bias {
     plr_real bias[PLR_BIAS_DIM], P_bb[PLR_BIAS_DIM * PLR_BIAS_DIM];
     plr_real S_b[PLR_CALIBRATIONS][PLR_BIAS_DIM];
-    plr_real seconds; /* of the motion that is pending */
+    plr_real of_nu[PLR_POSE_SQUARE]; /* L^-1 B P_bb B^T L^-T: their part of nu's covariance */
+    plr_real seconds;                /* of the motion that is pending */
     bool considered;
 } plr_considered_bias;
 
-/* Notes the biases before a frame's motion is applied, if this frame may not change them.
- * `outright`: it contradicts the twists by itself. */
-void plr_bias_consider(const plr_filter *f, bool outright, plr_considered_bias *before);
+/* Notes the biases before a frame's motion is applied, if this frame may not change them. L: the
+ * twists' own, of plr_consistency_widen. `outright`: the frame contradicts the twists by itself. */
+void plr_bias_consider(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE], bool outright,
+                       plr_considered_bias *before);
 
 /* After the correction: puts them back as they were, and lets them walk. */
 void plr_bias_restore(plr_filter *f, const plr_considered_bias *before);

@@ -6,6 +6,7 @@
 #include "filter/health.h"
 #include "filter/scene.h"
 #include "filter/votes.h"
+#include "filter/windows.h"
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
@@ -16,15 +17,11 @@
 #include "state/slots.h"
 
 enum {
-    FAST_WINDOWS = 2,     /* windows that decide whether the twists get less weight */
     AGREEING_FRAMES = 15, /* successive frames in agreement that end any doubt */
     KEPT_FRAMES = 600,    /* a doubt that lasts longer is no event: biases are taught again */
     FEW = 3,              /* points */
     FROZEN_SHARE = 2 /* a picture is repeated if at least one match in two has the same pixels */
 };
-
-/* What a window keeps of its sums from frame to frame: they cover about 4, 19 and 130 frames. */
-static const plr_real decay[PLR_CONSISTENCY_WINDOWS] = {PLR_R(0.6), PLR_R(0.9), PLR_R(0.985)};
 
 /* Chi-square with 6 degrees of freedom: white noise exceeds these once in 60,000 and once in 70. */
 #define DRIFTING_ABOVE PLR_R(32)
@@ -67,55 +64,10 @@ void plr_consistency_clear(plr_filter *f) {
     plr_votes_clear(f);
 }
 
-/* ---------------------------------------------------------------- the windows */
-
-/* A difference in sigmas, squared: s^T (V + floor I)^-1 s. `turns` is the part that no translation
- * explains. The three numbers of the translation come first, so the last three of U^-T s are those of
- * the turns about whatever translation fits best. */
-typedef struct plr_statistic {
-    plr_real all, turns;
-} plr_statistic;
-
-static plr_statistic statistic(const plr_consistency_window *w, plr_real floor) {
-    const plr_statistic none = {0, 0};
-    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM];
-    memcpy(U, w->variance, sizeof w->variance);
-    memcpy(s, w->sum, sizeof s);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
-    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
-        return none;
-    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, s, 1);
-    const plr_real turns = plr_dot3(s + 3, s + 3);
-    return (plr_statistic){plr_dot3(s, s) + turns, turns};
-}
+/* ---------------------------------------------------------------- what is material */
 
 static plr_real larger(plr_real a, plr_real b) {
     return a > b ? a : b;
-}
-
-static plr_statistic fast_statistics(const plr_filter *f, plr_real floor) {
-    const plr_statistic a = statistic(&f->consistency.windows[0], floor);
-    const plr_statistic b = statistic(&f->consistency.windows[1], floor);
-    return (plr_statistic){larger(a.all, b.all), larger(a.turns, b.turns)};
-}
-
-static plr_real fast_statistic(const plr_filter *f, plr_real floor) {
-    return fast_statistics(f, floor).all;
-}
-
-/* n = (V + floor I)^-1 nu: the estimate by the observations alone, without the twists' prior. */
-static void estimate_by_vision(const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
-                               plr_real floor, plr_real n[PLR_POSE_DIM]) {
-    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
-    memcpy(U, V, PLR_POSE_TRIANGLE * sizeof *V);
-    memcpy(n, nu, PLR_POSE_DIM * sizeof *nu);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        U[plr_upper_row(PLR_POSE_DIM, k)] += floor;
-    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
-        return;
-    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
-    plr_solve_upper(PLR_POSE_DIM, U, n);
 }
 
 /* Which parts of a difference n of a frame's motion are a good part of that motion. */
@@ -134,12 +86,9 @@ static plr_material material(const plr_real n[PLR_POSE_DIM], const plr_applied_m
 /* The same of the mean difference of the last frames, which is in units of L. */
 static plr_material lately_material(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE],
                                     const plr_applied_motion *motion) {
-    const plr_consistency_window *w = &f->consistency.windows[0];
     plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    estimate_by_vision(w->sum, w->variance, WEAK, mean);
+    plr_windows_mean(f, WEAK, mean);
     plr_mat6_vec(n, L, mean);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        n[k] /= PLR_R(1) + decay[0]; /* from the sum over frames to one frame's mean */
     return material(n, motion);
 }
 
@@ -155,7 +104,7 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed) {
     plr_motion_prior(f, believed);
     if (!c->contradicted)
         return;
-    const plr_statistic fast = fast_statistics(f, WEAK);
+    const plr_statistic fast = plr_windows_fast(f, WEAK, NULL);
     const plr_real turns = larger(fast.turns, c->excess_turn);
     const plr_real way = widening(larger(fast.all, c->excess));
     const bool fails =
@@ -219,14 +168,6 @@ static bool estimate(const plr_real J[PLR_POSE_SQUARE], const plr_real b[PLR_POS
     return true;
 }
 
-static void add_to_window(plr_consistency_window *w, plr_real keep, const plr_real nu[PLR_POSE_DIM],
-                          const plr_real V[PLR_POSE_TRIANGLE]) {
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        w->sum[k] = PLR_FMA(keep, w->sum[k], nu[k]);
-    for (unsigned k = 0; k < PLR_POSE_TRIANGLE; k++)
-        w->variance[k] = PLR_FMA(keep * keep, w->variance[k], V[k]);
-}
-
 /* ---------------------------------------------------------------- the contradiction */
 
 static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
@@ -279,7 +220,7 @@ static void in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_PO
 static void contradict(plr_filter *f) {
     f->totals.contradictions++;
     f->consistency.contradicted = f->consistency.drifting = 1;
-    memset(f->consistency.windows, 0, sizeof f->consistency.windows);
+    plr_windows_clear(f);
 }
 
 /* A drift has been found: the difference begins with what has accumulated in a window. */
@@ -290,21 +231,66 @@ static void begin_difference(plr_filter *f, const plr_applied_motion *believed,
     add_difference(f, way, way, w->sum, trace(w->variance));
 }
 
+/* A frame that contradicts the twists by itself. */
+static void contradict_outright(plr_filter *f, const plr_applied_motion *believed,
+                                const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
+                                const plr_real moved[PLR_POSE_DIM]) {
+    plr_consistency *c = &f->consistency;
+    plr_real n[PLR_POSE_DIM], own[PLR_POSE_DIM];
+    plr_mat6_vec(n, applied->L, nu);
+    in_sigmas(believed->L, n, own);
+    propagate_difference(f, applied);
+    add_difference(f, n, moved, own, 0);
+    contradict(f);
+    c->excess = plr_norm2_of_6(own);
+    c->excess_turn = material(n, applied).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
+}
+
+/* Whether what has accumulated in the windows is more than noise. */
+static void look_for_drift(plr_filter *f, const plr_applied_motion *believed,
+                           const plr_kept_bias *kept) {
+    plr_consistency *c = &f->consistency;
+    c->fast = plr_windows_fast(f, UNOBSERVED, kept).all;
+    const plr_real slow = plr_windows_slow(f, UNOBSERVED, kept).all;
+    const plr_real most = larger(c->fast, slow);
+    if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
+        begin_difference(f, believed,
+                         &c->windows[slow > c->fast ? PLR_SLOW_WINDOW : PLR_FAST_WINDOW]);
+    c->drifting = most > DRIFTING_ABOVE || (c->drifting && most > AGREEING_BELOW);
+}
+
+static uint16_t one_more(uint16_t frames) {
+    return (uint16_t)(frames + (frames < UINT16_MAX));
+}
+
+/* Whether it is so much, and material for so long, that the twists get less weight. */
+static void weigh_twists(plr_filter *f, const plr_applied_motion *believed,
+                         const plr_applied_motion *applied, const plr_kept_bias *kept) {
+    plr_consistency *c = &f->consistency;
+    const plr_material part = lately_material(f, believed->L, applied);
+    const bool much = part.way || part.turn;
+    const bool contradicts = much && plr_windows_fast(f, WEAK, kept).all > CONTRADICTED_ABOVE;
+    c->small_frames = much ? 0 : one_more(c->small_frames);
+    c->contradicting_frames = contradicts ? one_more(c->contradicting_frames) : 0;
+    if (!c->contradicted && c->contradicting_frames >= FEW && !plr_votes_trust_twists(f)) {
+        const plr_consistency_window fastest = c->windows[PLR_FASTEST_WINDOW];
+        contradict(f);
+        c->windows[PLR_FASTEST_WINDOW] = fastest;
+    } else if (c->small_frames >= AGREEING_FRAMES) {
+        c->contradicted = 0;
+    }
+}
+
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
-                         const plr_real moved[PLR_POSE_DIM], bool outright) {
+                         const plr_real moved[PLR_POSE_DIM], const plr_real *kept_bias,
+                         bool outright) {
     plr_consistency *c = &f->consistency;
-    plr_real J[PLR_POSE_SQUARE], b[PLR_POSE_DIM], own[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE],
-        n[PLR_POSE_DIM];
+    plr_kept_bias kept;
+    plr_real J[PLR_POSE_SQUARE], b[PLR_POSE_DIM], own[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE];
     if (outright) {
-        plr_mat6_vec(n, applied->L, nu);
-        in_sigmas(believed->L, n, own);
-        propagate_difference(f, applied);
-        add_difference(f, n, moved, own, 0);
-        contradict(f);
-        c->excess = plr_norm2_of_6(own);
-        c->excess_turn = material(n, applied).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
+        contradict_outright(f, believed, applied, nu, moved);
         return;
     }
     for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
@@ -321,34 +307,15 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         c->settling_frames > 0) /* it stays until it is resolved */
         propagate_difference(f, applied);
     if (c->contradicted || c->drifting) {
-        plr_real way[PLR_POSE_DIM];
-        estimate_by_vision(own, V, UNOBSERVED, n);
+        plr_real n[PLR_POSE_DIM], way[PLR_POSE_DIM];
+        plr_by_pictures_alone(own, V, UNOBSERVED, n);
         plr_mat6_vec(way, believed->L, n);
         add_difference(f, way, moved, own, trace(V));
     }
-    for (unsigned w = 0; w < PLR_CONSISTENCY_WINDOWS; w++)
-        if (w < FAST_WINDOWS || !(c->contradicted || plr_health_readings_are_old(f)))
-            add_to_window(&c->windows[w], decay[w], own, V);
-    const plr_real fast = fast_statistic(f, UNOBSERVED);
-    const plr_real slow = statistic(&c->windows[FAST_WINDOWS], UNOBSERVED).all;
-    const plr_real most = fast > slow ? fast : slow;
-    if (!c->contradicted && !c->drifting && most > DRIFTING_ABOVE)
-        begin_difference(f, believed, &c->windows[slow > fast ? FAST_WINDOWS : 1]);
-    c->drifting = most > DRIFTING_ABOVE || (c->drifting && most > AGREEING_BELOW);
-    const plr_material part = lately_material(f, believed->L, applied);
-    const bool much = part.way || part.turn;
-    c->small_frames = much ? 0 : (uint16_t)(c->small_frames + (c->small_frames < UINT16_MAX));
-    c->contradicting_frames =
-        much && fast_statistic(f, WEAK) > CONTRADICTED_ABOVE
-            ? (uint16_t)(c->contradicting_frames + (c->contradicting_frames < UINT16_MAX))
-            : 0;
-    if (!c->contradicted && c->contradicting_frames >= FEW && !plr_votes_trust_twists(f)) {
-        const plr_consistency_window fastest = c->windows[0];
-        contradict(f);
-        c->windows[0] = fastest;
-    } else if (c->small_frames >= AGREEING_FRAMES) {
-        c->contradicted = 0;
-    }
+    plr_windows_add(f, own, V, !c->contradicted && !plr_health_readings_are_old(f));
+    plr_windows_keep_bias(f, kept_bias, V, &kept);
+    look_for_drift(f, believed, &kept);
+    weigh_twists(f, believed, applied, &kept);
 }
 
 /* ---------------------------------------------------------------- the verdict */
@@ -410,14 +377,14 @@ static void resolve(plr_filter *f) {
     memset(c->difference, 0, sizeof c->difference);
     memset(c->difference_sigmas, 0, sizeof c->difference_sigmas);
     c->difference_noise = 0;
-    memset(c->windows, 0, sizeof c->windows);
+    plr_windows_clear(f);
     c->contradicted = c->drifting = c->settling_frames = 0;
     c->agreeing_frames = c->doubted_frames = 0;
 }
 
 void plr_consistency_trust_twists(plr_filter *f) {
     plr_consistency *c = &f->consistency;
-    memset(c->windows, 0, sizeof c->windows);
+    plr_windows_clear(f);
     c->contradicted = 0;
     c->contradicting_frames = 0;
     c->excess = c->excess_turn = 0;
@@ -437,11 +404,10 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
     else if ((c->drifting || scene == PLR_SCENE_WORSE) && c->settling_frames < AGREEING_FRAMES)
         c->settling_frames++; /* as long as it lasted, so that noise is soon forgotten */
     if (doubtful || c->doubted_frames > 0)
-        c->doubted_frames = (uint16_t)(c->doubted_frames + (c->doubted_frames < UINT16_MAX));
+        c->doubted_frames = one_more(c->doubted_frames);
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
-                        fast_statistic(f, UNOBSERVED) < AGREEING_BELOW && scene == PLR_SCENE_AGREES;
-    c->agreeing_frames =
-        agrees ? (uint16_t)(c->agreeing_frames + (c->agreeing_frames < UINT16_MAX)) : 0;
+                        c->fast < AGREEING_BELOW && scene == PLR_SCENE_AGREES;
+    c->agreeing_frames = agrees ? one_more(c->agreeing_frames) : 0;
     if (c->settling_frames > 0 && c->agreeing_frames >= c->settling_frames)
         resolve(f);
     return c->settling_frames > 0 ? reasons | PLR_REASON_POSE_MAY_BE_WRONG : reasons;

@@ -23,13 +23,15 @@ void plr_consistency_widen(plr_filter *f, plr_applied_motion *believed);
 
 /* Adds the result of a frame: nu with prior N(0, I), in units of applied->L, and its information
  * Lambda, 6x6 packed upper triangle, prior included. `moved`: by how much the frame moved the pose
- * from where the twists had put it, m and rad in the body. `outright`: this frame contradicts the
- * twists by itself. Where the last reading is old (plr_health_readings_are_old), vision is followed
+ * from where the twists had put it, m and rad in the body. `kept_bias`: the part of nu's covariance that
+ * is the biases', 6x6, if the frame teaches them nothing (filter/considered_bias.h), else NULL.
+ * `outright`: this frame contradicts the twists by itself. Where the last reading is old (plr_health_readings_are_old), vision is followed
  * all the same, but there is no pose by twists that the true one could be. */
 void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
                          const plr_applied_motion *applied, const plr_real nu[PLR_POSE_DIM],
                          const plr_real Lambda[PLR_POSE_TRIANGLE],
-                         const plr_real moved[PLR_POSE_DIM], bool outright);
+                         const plr_real moved[PLR_POSE_DIM], const plr_real *kept_bias,
+                         bool outright);
 
 /* Ends a contradiction, because the points have said that the twists are right (filter/votes.h). The
  * difference stays: until pictures and twists agree the covariance covers both poses. */

@@ -6,6 +6,13 @@
 #include "math/small.h"
 #include "state/covariance.h"
 
+/* Ten sigmas. A point that begins to move is not off by so much from one frame to the next. */
+#define FAR_D2 PLR_R(100)
+
+plr_real plr_gate_rejection(plr_real d2) {
+    return d2 > FAR_D2 ? PLR_GAIN_FAR : PLR_GAIN_REJECTED;
+}
+
 bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
     const bool fixed = f->par.gate_residual2 > 0;
     if (fixed && residual2 <= f->par.gate_residual2)

@@ -172,14 +172,14 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
     return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
-/* True if the gate accepts an observation. Adds its d^2 to *nis, and its innovation to its
- * track. */
-static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
-                  const plr_real dz[PLR_POSE_DIM], float *nis) {
+/* The gain of an observation that the gate accepts, or why it does not (gate.h). Adds d^2 of an accepted
+ * one to *nis, and its innovation to its track. */
+static plr_real judge(plr_search *s, unsigned i, bool found, const plr_real *U,
+                      const plr_real dz[PLR_POSE_DIM], float *nis) {
     const plr_sighting *at = &s->sightings[i];
     plr_real d2 = at->prior_d2, e[3], share = 0;
     if (!(d2 >= 0) || at->behind)
-        return false;
+        return PLR_GAIN_REJECTED;
     if (found) {
         const plr_real without_it = leave_one_out(at, U, dz, e, &share);
         d2 = share >= LEAST_SHARE ? without_it : d2;
@@ -189,10 +189,12 @@ static bool judge(plr_search *s, unsigned i, bool found, const plr_real *U,
     plr_slot *slot = plr_search_slot(s, i);
     if (accepted && share >= LEAST_SHARE)
         plr_track_add(slot, e);
-    if (!accepted || slot->moving)
-        return false;
+    if (!accepted)
+        return plr_gate_rejection(d2);
+    if (slot->moving)
+        return PLR_GAIN_REJECTED;
     *nis += (float)d2;
-    return true;
+    return at->gain;
 }
 
 /* How much an observation tells about the translation, 1/sigma: of a distant point little. */
@@ -256,12 +258,13 @@ static bool is_well_spread(const plr_search_point *point) {
 }
 
 /* True if enough observations support the motion found without the twists: at least three, a fifth
- * of all, and four times as many as support the twists. If few misfit, those three tell more about
- * the translation than all others do. They must be well spread. Of six and more, three fifths must
- * agree with the motion. Of three to five all must, whether they took part in the search or not: three
- * of five may lie on one car, which pulls the estimate of the others with it. If all agree, wheels
- * that slip are likelier than a scene that moves as one, and the covariance covers both
- * (filter/consistency.h). */
+ * of all, and four times as many as support the twists. An observation supports the motion that it
+ * agrees with, if the other one fits it clearly worse; a wrong match agrees with neither, and is
+ * nearer to one of them by chance. If few misfit, those three tell more about the translation than
+ * all others do. They must be well spread. Of six and more, three fifths must agree with the motion.
+ * Of three to five all must, whether they took part in the search or not: three of five may lie on
+ * one car, which pulls the estimate of the others with it. If all agree, wheels that slip are likelier
+ * than a scene that moves as one, and the covariance covers both (filter/consistency.h). */
 static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
     unsigned with = 0, against = 0, agree = 0, active = 0;
     plr_real told = 0, told_against = 0;
@@ -273,11 +276,11 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
         active++;
         agree += agrees(at);
         told += telling(at);
-        if (at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
+        if (agrees(at) && at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
             against++;
             told_against += telling(at);
         }
-        with += d2 > at->twist_d2 + CLEAR_DIFFERENCE;
+        with += at->twist_d2 < AGREES_BELOW && d2 > at->twist_d2 + CLEAR_DIFFERENCE;
     }
     const bool enough =
         misfit == PLR_MISFIT_MANY ? 5 * against >= active : PLR_R(2) * told_against > told;
@@ -417,12 +420,10 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     plr_motion_at(f, &s.prior, best.z, &first->motion);
     const plr_real usual = plr_vantage_usual(f);
     for (unsigned i = 0; i < s.count; i++) {
-        const bool accepted = judge(&s, i, first->found, U, dz, nis);
+        const plr_real gain = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const bool lost = !accepted && went_astray(&s, i);
-        f->work.gain[slot - f->slots] = accepted ? s.sightings[i].gain
-                                        : lost   ? PLR_GAIN_LOST
-                                                 : PLR_GAIN_REJECTED;
+        const bool accepted = gain >= 0, lost = !accepted && went_astray(&s, i);
+        f->work.gain[slot - f->slots] = lost ? PLR_GAIN_LOST : gain;
         if (lost) /* as if unseen: the frame does not correct it as it does others */
             slot->last_frame = f->frame_number - 1;
         if (accepted && !slot->known)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "filter/tracks.h"
 
+#include "filter/gate.h"
 #include "math/small.h"
 
 enum {
@@ -26,9 +27,12 @@ void plr_track_add(plr_slot *slot, const plr_real e[3]) {
         slot->moving = 1;
 }
 
-void plr_track_count(plr_slot *slot, bool rejected) {
+void plr_track_count(plr_slot *slot, plr_real gain) {
+    const bool rejected = gain < 0;
     slot->times_gated += rejected;
     slot->accepted = (uint16_t)(slot->accepted + (!rejected && slot->accepted < UINT16_MAX));
+    if (gain == PLR_GAIN_FAR)
+        slot->accepted = 0;
     slot->rejected = rejected ? (uint16_t)(slot->rejected + (slot->rejected < UINT16_MAX)) : 0;
 }
 

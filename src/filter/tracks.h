@@ -17,8 +17,10 @@
  * point moves. */
 void plr_track_add(plr_slot *slot, const plr_real e[3]);
 
-/* Counts a frame that matched the landmark, and whether the gate rejected it. */
-void plr_track_count(plr_slot *slot, bool rejected);
+/* Counts a frame that matched the landmark; `gain`: the gate's result (gate.h). A track that goes over to
+ * another point from one frame to the next says nothing against the landmark's successor: it need not be
+ * rejected for as long as one of a point that begins to move. */
+void plr_track_count(plr_slot *slot, plr_real gain);
 
 /* True if the landmark was rejected in so many successive frames that its position may be wrong: it
  * was initialised from an outlier, or its point has moved and is at rest again. */

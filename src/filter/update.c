@@ -56,9 +56,11 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         if (slot == PLR_NO_SLOT)
             continue;
         report->matched++;
-        plr_track_count(&f->slots[slot], w->gain[slot] < 0);
+        plr_track_count(&f->slots[slot], w->gain[slot]);
         if (w->gain[slot] < 0) {
             report->gated++;
+            if (f->slots[slot].rejected > 1)
+                report->gated_again++;
             continue;
         }
         w->used[used++] = (uint16_t)k;
@@ -85,7 +87,7 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
             verdict = plr_gate_judge(f, &m);
             plr_measurement_keep(f, slot, &m);
         }
-        w->gain[slot] = verdict.accepted ? verdict.gain : PLR_GAIN_REJECTED;
+        w->gain[slot] = verdict.accepted ? verdict.gain : plr_gate_rejection(verdict.d2);
         report->nis += verdict.accepted ? (float)verdict.d2 : 0;
     }
 }
@@ -146,7 +148,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
         (void)choose(f, frame, n, report);
         return correction;
     }
-    plr_bias_consider(f, first.contradicted, &before);
+    plr_bias_consider(f, believed.L, first.contradicted, &before);
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
@@ -159,7 +161,7 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     if (correction.moved) {
         plr_pose_moved_from(f, R_WB, p_WB, moved);
         plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda, moved,
-                            first.contradicted);
+                            before.considered ? before.of_nu : NULL, first.contradicted);
         if (plr_votes_add(f, frame, n, &believed, &first.motion, &correction, moved))
             plr_consistency_trust_twists(f);
     }

@@ -54,8 +54,11 @@ typedef struct scenario {
     unsigned slots;     /* 0: the filter's default */
     unsigned twists_per_frame;
     double pixel_px, velocity_mps, gyro_radps; /* true, and told to the filter */
-    bool bias; /* biases drawn from the prior and estimated; else none, and off */
-    bool few;  /* 0, 1, 2 matches in turn after the first second */
+    bool bias;            /* biases drawn from the prior and estimated; else none, and off */
+    bool few;             /* 0, 1, 2 matches in turn after the first second */
+    double wrong_matches; /* share of observations that show another point, each for one frame */
+    double
+        lost_tracks; /* share of tracks that go over to another point in a frame, and stay there */
     unsigned before, during, after; /* frames */
     mishap mishap;
     double strength;

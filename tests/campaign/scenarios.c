@@ -24,6 +24,10 @@ enum { MINUTE = 60 * FRAME_HZ, HALF_MINUTE = 30 * FRAME_HZ };
 
 #define NOMINAL(nees_limit) .bars = {.nees = (nees_limit), .good = 0.995, .no_divergence = true}
 
+/* What wrong matches look like in a few frames is what a scene that moves looks like. */
+#define MATCHING(nees_limit, good_limit)                                                           \
+    .bias = true, .bars = {.nees = (nees_limit), .good = (good_limit), .no_divergence = true}
+
 /* Where at times fewer than three points are in sight, GOOD is not to be had; where that is so in a
  * third of the frames (20 points around), NEES is printed and not judged. */
 #define ROOM_BARS(nees_limit) .bars = {.nees = (nees_limit), .no_divergence = true}
@@ -136,6 +140,12 @@ const scenario scenarios[] = {
      .bars = {.sigmas = 5, .forward_bias = 1, .good = 0.995, .no_divergence = true}},
     {"far-all", "the same, 20 points and a slot for each", CAMERA, DEFAULT, DRIVE, .near_m = 50, .far_m = 400, .bias = true,
      .bars = {.sigmas = 5, .forward_bias = 1, .good = 0.995, .no_divergence = true}},
+    {"wrong-10", "10 % of the matches are wrong, each for a frame", CAMERA, DEFAULT, DRIVE, .wrong_matches = 0.1, MATCHING(1.25, 0.99)},
+    {"wrong-20", "20 % of them", CAMERA, DEFAULT, DRIVE, .wrong_matches = 0.2, MATCHING(1.25, 0.99)},
+    {"wrong-30", "30 % of them", CAMERA, DEFAULT, DRIVE, .wrong_matches = 0.3, MATCHING(1.5, 0.97)},
+    {"lost-0.3", "of the tracks 0.3 % go over to another point in each frame, and stay there", CAMERA, DEFAULT, DRIVE,
+     .lost_tracks = 0.003, MATCHING(1.25, 0.99)},
+    {"lost-1", "the same, 1 %", CAMERA, DEFAULT, DRIVE, .lost_tracks = 0.01, MATCHING(1.25, 0.99)},
     {"parked", "standing still", CAMERA, DEFAULT, PARKED, .bars = {.sigmas = 6, .no_divergence = true}},
     {"parked-bias", "standing still with biases", CAMERA, DEFAULT, PARKED, .bias = true,
      .bars = {.sigmas = 6, .no_divergence = true}},

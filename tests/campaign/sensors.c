@@ -12,6 +12,7 @@ void sensors_begin(sensors *e, const scenario *s, const plr_config *config, uint
     e->s = s;
     e->twist_chance = chance_seeded(seed, 2);
     e->pixel_chance = chance_seeded(seed, 3);
+    e->match_chance = chance_seeded(seed, 5);
     if (!s->bias)
         return;
     chance c = chance_seeded(seed, 4);
@@ -55,6 +56,17 @@ static unsigned most_seen(const sensors *e, bool event) {
     return e->s->few && e->frames > FRAME_HZ ? e->frames % 3 : e->s->landmarks;
 }
 
+/* Of two wrong matches one shows another point, and one has another point in the right picture alone. */
+static void mismatch(sensors *e, const world *w, double z[4]) {
+    const plr_calibration *c = &w->calibration;
+    const double depth = chance_uniform(&e->match_chance, e->s->near_m, e->s->far_m);
+    if (chance_uniform(&e->match_chance, 0, 1) < 0.5) {
+        z[0] = chance_uniform(&e->match_chance, 0, WIDTH_PX);
+        z[1] = z[3] = chance_uniform(&e->match_chance, 0, HEIGHT_PX);
+    }
+    z[2] = z[0] - c->fx_px * c->baseline_m / depth;
+}
+
 void sensors_look(sensors *e, const world *w, bool event) {
     e->frames++;
     if (event && e->s->mishap == FROZEN)
@@ -65,6 +77,8 @@ void sensors_look(sensors *e, const world *w, bool event) {
         double z[4];
         if (!world_project(w, &w->points[k], z))
             continue;
+        if (chance_uniform(&e->match_chance, 0, 1) < e->s->wrong_matches)
+            mismatch(e, w, z);
         for (int i = 0; i < 4; i++)
             z[i] += e->s->pixel_px * chance_normal(&e->pixel_chance);
         e->seen[e->count++] =

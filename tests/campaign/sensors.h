@@ -13,7 +13,7 @@ typedef struct sensors {
     plr_observation seen[MAX_POINTS];
     uint16_t count;
     unsigned frames;
-    chance twist_chance, pixel_chance;
+    chance twist_chance, pixel_chance, match_chance;
 } sensors;
 
 /* Biases are drawn from the prior of `config`, if the scenario has biases. */

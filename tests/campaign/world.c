@@ -38,6 +38,13 @@ static void place(world *w, point *p) {
     p->id = w->next_id++;
 }
 
+/* The same for a point that keeps its id. */
+static void swap(world *w, point *p) {
+    const uint32_t id = p->id;
+    place(w, p);
+    p->id = id;
+}
+
 /* A point of a room: anywhere around, at the height of the camera more or less. */
 static void place_around(world *w, point *p) {
     const double distance = chance_uniform(&w->chance, w->s->near_m, w->s->far_m);
@@ -125,11 +132,8 @@ void world_strike(world *w) {
     } else if (w->s->mishap == TURN_CAMERA) {
         w->camera_turn_rad = a;
     } else if (w->s->mishap == SWAPPED) {
-        for (unsigned k = 0; k < w->s->landmarks; k++) {
-            const uint32_t id = w->points[k].id;
-            place(w, &w->points[k]);
-            w->points[k].id = id;
-        }
+        for (unsigned k = 0; k < w->s->landmarks; k++)
+            swap(w, &w->points[k]);
     }
 }
 
@@ -161,4 +165,6 @@ void world_renew(world *w) {
     for (unsigned k = 0; k < w->s->landmarks && !w->s->room; k++)
         if (!world_project(w, &w->points[k], z))
             place(w, &w->points[k]);
+        else if (w->s->lost_tracks > 0 && chance_uniform(&w->chance, 0, 1) < w->s->lost_tracks)
+            swap(w, &w->points[k]);
 }

@@ -52,7 +52,8 @@ void world_mend(world *w);
 /* (uL, vL, uR, vR) without noise; false if the point is not in sight of both cameras. */
 bool world_project(const world *w, const point *p, double z[4]);
 
-/* Points out of sight are replaced by new ones with new ids. */
+/* Points out of sight are replaced by new ones with new ids, and points whose track is lost by new ones
+ * under the same id. */
 void world_renew(world *w);
 
 #endif

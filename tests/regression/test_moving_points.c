@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unity.h>
 
+#include "filter/gate.h"
 #include "filter/tracks.h"
 #include "state/slots.h"
 #include "support/rig.h"
@@ -140,4 +141,46 @@ static void test_a_track_of_outliers_is_given_ever_fewer_chances(void) {
         go(k % 2 ? 120 : -120, 0);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(80, point()->times_gated);
     TEST_ASSERT_LESS_OR_EQUAL_UINT8(3, point()->restarts); /* after 8 frames, 16, 32 */
+}
+
+/* A point that stands, and whose track then is off by so many pixels: for how many frames it is rejected. */
+static unsigned frames_rejected(double off_px) {
+    unsigned frames = 0;
+    rig_begin();
+    rig_drive(10);
+    put_point(30, 2);
+    for (int k = 0; k < 20; k++)
+        go(0, 0);
+    do {
+        go(off_px, 0);
+        frames++;
+    } while (frames < 60 && point()->rejected > 0);
+    return frames;
+}
+
+/* With one track in 100 that went over to another point in a frame, and stayed there, a fifth of all matches
+ * was rejected and the filter GOOD in two frames of three. */
+static void test_a_good_track_that_goes_over_to_another_point_begins_anew_soon(void) {
+    const unsigned frames = frames_rejected(60);
+    TEST_ASSERT_GREATER_THAN_UINT(7, frames);
+    TEST_ASSERT_LESS_THAN_UINT(12, frames);
+}
+
+/* A point that begins to move is off by little at first, and will go on. */
+static void test_a_good_track_that_is_little_off_does_not(void) {
+    plr_slot moved = {.accepted = 20}, lost = {.accepted = 20};
+    plr_track_count(&lost, PLR_GAIN_FAR);
+    plr_track_count(&moved, PLR_GAIN_REJECTED);
+    for (int k = 1; k < 8; k++) {
+        TEST_ASSERT_FALSE(plr_track_may_restart(&lost));
+        plr_track_count(&lost, PLR_GAIN_REJECTED);
+        plr_track_count(&moved, PLR_GAIN_REJECTED);
+    }
+    TEST_ASSERT_TRUE(plr_track_may_restart(&lost));
+    TEST_ASSERT_FALSE(plr_track_may_restart(&moved));
+}
+
+static void test_far_off_is_ten_sigmas(void) {
+    TEST_ASSERT_EQUAL_DOUBLE(PLR_GAIN_REJECTED, plr_gate_rejection(PLR_R(99)));
+    TEST_ASSERT_EQUAL_DOUBLE(PLR_GAIN_FAR, plr_gate_rejection(PLR_R(101)));
 }

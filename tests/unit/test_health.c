@@ -25,11 +25,11 @@ void setUp(void) {
     memset(&events, 0, sizeof events);
 }
 
-/* A frame of `matched` matches of which `gated` were rejected, the rest used, with NIS at its mean. */
+/* A frame of `matched` matches of which `gated` were rejected again, the rest used, with NIS at its mean. */
 static void frame(unsigned matched, unsigned gated) {
     memset(&report, 0, sizeof report);
     report.matched = (uint16_t)matched;
-    report.gated = (uint16_t)gated;
+    report.gated = report.gated_again = (uint16_t)gated;
     report.used = (uint16_t)(matched - gated);
     report.nis_dof = (uint16_t)(4 * report.used);
     report.nis = (float)report.nis_dof;

@@ -15,27 +15,39 @@ void setUp(void) {
     plr_scene_clear(&filter);
 }
 
-static plr_scene_verdict add(unsigned matched, unsigned rejected, double nis) {
+/* Of the rejected ones `again` were rejected before. */
+static plr_scene_verdict add_of(unsigned matched, unsigned rejected, unsigned again, double nis) {
     plr_report report;
     memset(&report, 0, sizeof report);
     report.matched = (uint16_t)matched;
     report.gated = (uint16_t)rejected;
+    report.gated_again = (uint16_t)again;
     report.nis = (float)nis;
     return plr_scene_add(&filter, &report);
 }
 
-/* A frame of 20 points with noise as it is stated, of which one in 100 is rejected, and `rejected` more. */
-static plr_scene_verdict add_noise(unsigned rejected) {
+static plr_scene_verdict add(unsigned matched, unsigned rejected, double nis) {
+    return add_of(matched, rejected, rejected, nis);
+}
+
+/* A frame of 20 points with noise as it is stated: `again` are rejected again, and of the others this share
+ * for once. */
+static plr_scene_verdict add_matches(unsigned again, double wrong) {
+    unsigned rejected = again;
     double nis = 0;
-    for (unsigned i = 0; i < 20; i++) {
+    for (unsigned i = again; i < 20; i++) {
         double e[4];
-        const bool outlier = rng_uniform(&chance, 0, 1) < 0.01;
+        const bool outlier = rng_uniform(&chance, 0, 1) < wrong;
         rng_normals(&chance, 1, e, 4);
-        if (i >= rejected && !outlier)
+        if (!outlier)
             nis += e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
-        rejected += i >= rejected && outlier;
+        rejected += outlier;
     }
-    return add(20, rejected, nis);
+    return add_of(20, rejected, again, nis);
+}
+
+static plr_scene_verdict add_noise(unsigned again) {
+    return add_matches(again, 0.01);
 }
 
 static unsigned told_of_noise(unsigned frames, unsigned rejected) {
@@ -49,7 +61,7 @@ static void test_noise_agrees(void) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT(20, told_of_noise(10000, 0));
 }
 
-static void test_some_more_that_are_rejected_at_once_are_told(void) {
+static void test_some_more_that_are_rejected_again_are_told(void) {
     told_of_noise(200, 0);
     (void)add_noise(4);
     TEST_ASSERT_EQUAL_INT(PLR_SCENE_WORSE, add_noise(4));
@@ -77,13 +89,25 @@ static void test_bad_tracks_that_come_and_go_become_usual(void) {
 }
 
 /* The rejections say how many are off, whatever they are said to be off by. */
-static void test_three_tenths_may_be_rejected_and_no_more_however_usual_that_is(void) {
+static void test_three_tenths_may_be_rejected_again_and_no_more_however_usual_that_is(void) {
     for (unsigned k = 0; k < 300; k++)
         (void)add(100, 29, 4 * 71);
     TEST_ASSERT_EQUAL_INT(PLR_SCENE_AGREES, add(100, 29, 4 * 71));
     for (unsigned k = 0; k < 300; k++)
         (void)add(100, 31, 4 * 69);
     TEST_ASSERT_EQUAL_INT(PLR_SCENE_SPLIT, add(100, 31, 4 * 69));
+}
+
+/* A match that is wrong for one frame is no scene that moves. */
+static void test_wrong_matches_say_nothing_unless_they_are_most_of_a_frame(void) {
+    unsigned told = 0;
+    for (unsigned k = 0; k < 10000; k++)
+        told += add_matches(0, 0.3) != PLR_SCENE_AGREES;
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(20, told);
+    plr_scene_clear(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_SCENE_AGREES, add_of(100, 59, 0, 4 * 41));
+    plr_scene_clear(&filter);
+    TEST_ASSERT_EQUAL_INT(PLR_SCENE_SPLIT, add_of(100, 61, 0, 4 * 39));
 }
 
 static void test_few_matches_are_not_judged(void) {

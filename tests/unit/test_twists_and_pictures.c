@@ -54,7 +54,7 @@ static void add(const double mean[6], double noise) {
         nu[k] = (plr_real)(information[k] / (1 + information[k]) * seen);
         Lambda[plr_upper_row(6, k)] = (plr_real)(1 + information[k]);
     }
-    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, false);
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, NULL, false);
 }
 
 static void add_noise(void) {
@@ -205,7 +205,7 @@ static void contradict_outright(double way_m) {
         applied.L[7 * k] = PLR_R(0.5);
         Lambda[plr_upper_row(6, k)] = 1000;
     }
-    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, true);
+    plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, NULL, true);
     applied = believed;
 }
 
@@ -356,7 +356,8 @@ static void test_after_fifteen_frames_of_agreement_it_is_settled(void) {
 
 /* What is turned away for minutes says that the settings are wrong, not that something happens. */
 static void test_biases_are_kept_from_a_doubt_until_it_is_settled_or_has_become_usual(void) {
-    const plr_report disagrees = {.matched = 10, .gated = 5, .used = 5, .nis = 20, .nis_dof = 20};
+    const plr_report disagrees = {
+        .matched = 10, .gated = 5, .gated_again = 5, .used = 5, .nis = 20, .nis_dof = 20};
     unsigned kept = 0;
     TEST_ASSERT_FALSE(plr_consistency_keeps_biases(&filter));
     for (int k = 0; k < 800; k++) {

@@ -336,7 +336,7 @@ static void test_no_majority_contradicts_trusted_twists(void) {
         plr_consistency_clear(&filter);
         filter.own.votes.trusted_frames = (plr_real)(50 * trusted);
         for (unsigned k = 0; k < 5; k++)
-            plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, false);
+            plr_consistency_add(&filter, &believed, &applied, nu, Lambda, moved, NULL, false);
         TEST_ASSERT_EQUAL(!trusted, filter.consistency.contradicted);
     }
 }
