@@ -88,7 +88,7 @@ typedef struct plr_slot {
     uint8_t known;              /* 1: given by a map source or plr_filter_insert_known */
     uint8_t moving;             /* 1: the innovations are not white: the point moves */
     uint8_t restarts;           /* times it was initialised again after repeated rejection */
-    uint16_t accepted;          /* frames that used it since it was last initialised */
+    uint16_t accepted;          /* frames that used it since it was last initialised or far off */
     uint16_t rejected;          /* successive frames in which the gate rejected it */
 } plr_slot;
 

@@ -17,9 +17,9 @@
  * point moves. */
 void plr_track_add(plr_slot *slot, const plr_real e[3]);
 
-/* Counts a frame that matched the landmark; `gain`: the gate's result (gate.h). A track that goes over to
- * another point from one frame to the next says nothing against the landmark's successor: it need not be
- * rejected for as long as one of a point that begins to move. */
+/* Counts a frame that matched the landmark; `gain`: the gate's result (gate.h). A landmark that is far off
+ * was not good: its track was lost, and goes on at another point. One whose point begins to move is off by
+ * little at first. */
 void plr_track_count(plr_slot *slot, plr_real gain);
 
 /* True if the landmark was rejected in so many successive frames that its position may be wrong: it
