@@ -46,8 +46,9 @@ static void test_wrong_matches_neither_contradict_the_twists_nor_put_the_pose_in
 
 /* Nothing is known of the biases yet, and while the doubt lasts nothing is learnt. */
 static void test_a_doubt_at_the_beginning_ends_though_the_biases_are_unknown(void) {
+    for (int i = 3; i < 6; i++)
+        rig.options.bias[i] = 0.015;
     rig_begin();
-    rig_drive(2);
     plr_consistency_doubt(&rig.filter);
     rig.filter.consistency.doubted_frames = 1;
     reseal(&rig.filter);
@@ -57,4 +58,16 @@ static void test_a_doubt_at_the_beginning_ends_though_the_biases_are_unknown(voi
         TEST_ASSERT_EQUAL_UINT8(0, rig.filter.consistency.drifting);
     }
     TEST_ASSERT_LESS_THAN_UINT(25, frames);
+}
+
+/* Wrong matches do not support the twists either. */
+static void test_wheels_that_slip_are_told_among_wrong_matches(void) {
+    plr_totals totals;
+    rig.options.outliers = 0.35;
+    rig_begin();
+    rig_drive(50);
+    rig_drive_told(5, 0.3);
+    TEST_ASSERT_BITS_HIGH(PLR_REASON_TWIST_CONTRADICTED, rig.report.reasons);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_totals(&rig.filter, &totals));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(1, totals.contradictions);
 }
