@@ -98,9 +98,11 @@ typedef enum plr_reason {
     /* Vision contradicts the twists, or the IMU, and the filter followed vision: slipping wheels, a
      * dead encoder, a push. Where single points show that most of the scene moves instead, it went
      * back to the twists, and the reset counter counts the jump. If it repeats, check the wheels; if
-     * it stays, the scale of the odometry, and in bends the camera's place on the body. With an IMU:
-     * its noises are set too small (settings gyro-noise, accel-noise), or the clocks of camera and
-     * IMU differ (camera-offset). */
+     * it stays, the scale of the odometry, and in bends the camera's place on the body; or the noises
+     * are set too small: errors of odometry that last longer than one reading (filtered velocities, a
+     * gyro's scale) add up as if their sigma were several times as large, and that is what to set
+     * (velocity-sigma, gyro-sigma; with an IMU gyro-noise, accel-noise). Or the clocks of camera and
+     * odometry differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
      * says. Ends when twists, or the IMU, have agreed with vision for a while, or when the pose is

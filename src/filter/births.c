@@ -19,9 +19,16 @@ static void append_new(plr_filter *f, const plr_observation *seen) {
     f->slots[f->count - 1].beyond = beyond;
 }
 
+/* A frame that rejects nearly all that it matched does not know where it is: the body was pushed, and
+ * wrong matches kept the others from saying so. Landmarks that it made would speak for the pose that they
+ * were made at. */
+static bool is_at_a_loss(const plr_filter *f, const plr_frame_events *events) {
+    return f->config.model == PLR_MODEL_BODY && f->frames_mostly_gated > 0 && !events->locked;
+}
+
 void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n,
                                plr_frame_events *events, plr_report *report) {
-    const bool makes = plr_births_are_allowed(f);
+    const bool makes = plr_births_are_allowed(f) && !is_at_a_loss(f, events);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         if (f->work.slot_of[k] != PLR_NO_SLOT)

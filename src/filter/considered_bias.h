@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /*
- * From when the twists are contradicted, or the scene disagrees with itself, until that is settled,
- * a frame does not teach the twists' biases: a wheel that slips or a scene that moves is no bias.
+ * From when the twists are contradicted until that is settled, a frame does not teach the twists' biases:
+ * a wheel that slips or a scene that moves is no bias.
  * Pose, landmarks and all covariances with the biases are corrected as usual, so that what is left
  * is the Schmidt ("consider") update: the biases' own numbers stay (docs/MATH.md 17).
  */

@@ -403,7 +403,7 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
         plr_consistency_doubt(f);
     else if ((c->drifting || scene == PLR_SCENE_WORSE) && c->settling_frames < AGREEING_FRAMES)
         c->settling_frames++; /* as long as it lasted, so that noise is soon forgotten */
-    if (doubtful || c->doubted_frames > 0)
+    if (lost || c->contradicted || c->frozen || c->doubted_frames > 0)
         c->doubted_frames = one_more(c->doubted_frames);
     const bool agrees = !lost && !c->frozen && !c->drifting && report->used >= FEW &&
                         c->fast < AGREEING_BELOW && scene == PLR_SCENE_AGREES;

@@ -44,9 +44,9 @@ uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool los
 /* The pose may be wrong, until pictures and twists have agreed for as long as after a contradiction. */
 void plr_consistency_doubt(plr_filter *f);
 
-/* True if frames teach the biases of twists nothing: from when the pose came into doubt until that
- * is settled, for a scene may move a little less for some frames; but if it takes long, only while
- * the twists are contradicted. */
+/* True if frames teach the biases of twists nothing: from a contradiction, a lost lock or a frozen
+ * picture on until the pose is out of doubt, for a scene may move a little less for some frames; but if
+ * it takes long, only while the twists are contradicted. */
 bool plr_consistency_keeps_biases(const plr_filter *f);
 
 /* While a contradiction lasts, enlarges the pose's present covariance P_xi, 6x6, so that it covers

@@ -164,25 +164,43 @@ static plr_watched_point *watched(plr_alignment *at, uint32_t id) {
     return free;
 }
 
-void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
+/* What is known of a watched point. */
+enum { FILLED = 1, CONFIRMED = 2, MOVED = 4 };
+
+static void remember(plr_watched_point *point, const plr_observation *seen) {
+    point->id = seen->id;
+    point->u_px = seen->uL_px;
+    point->v_px = seen->vL_px;
+}
+
+/* True if a watched point is seen at another place for the second time in a row: any match can be wrong,
+ * the first one too. */
+static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_observation *seen) {
     const plr_real still2 = PLR_R(4) * f->par.pixel_variance;
+    const plr_real du = (plr_real)(seen->uL_px - point->u_px);
+    const plr_real dv = (plr_real)(seen->vL_px - point->v_px);
+    const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2;
+    const bool again = elsewhere && (point->used & MOVED);
+    if (elsewhere && !(point->used & CONFIRMED))
+        remember(point, seen);
+    point->used = elsewhere ? point->used | MOVED : FILLED | CONFIRMED;
+    return again;
+}
+
+void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     unsigned seen = 0, moved = 0;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_watched_point *point = watched(&f->either.alignment, o->id);
         if (!point)
             continue;
-        if (!point->used) {
-            point->used = 1;
-            point->id = o->id;
-            point->u_px = o->uL_px;
-            point->v_px = o->vL_px;
-            continue;
+        if (point->used) {
+            seen++;
+            moved += has_moved(f, point, o);
+        } else {
+            remember(point, o);
+            point->used = FILLED;
         }
-        const plr_real du = (plr_real)(o->uL_px - point->u_px);
-        const plr_real dv = (plr_real)(o->vL_px - point->v_px);
-        moved += du * du + dv * dv > MOVED_ABOVE * still2;
-        seen++;
     }
     if (seen < 3 || 2 * moved <= seen) /* a few are mismatches, or things that move */
         return;

@@ -289,11 +289,22 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
            is_well_spread(open);
 }
 
-/* Searches again with a prior so wide that the twists hardly count. True, with `best` and s->prior
- * at the result, if enough observations support it; otherwise the search is put back to where it
- * was. */
+static bool three_fifths_agree(const plr_search *s) {
+    unsigned active = 0, agree = 0;
+    for (unsigned i = 0; i < s->count; i++) {
+        active += s->sightings[i].active > 0;
+        agree += s->sightings[i].active > 0 && agrees(&s->sightings[i]);
+    }
+    return 5 * agree >= 3 * active;
+}
+
+/* Searches again with a prior so wide that the twists hardly count; where most do not agree with the
+ * twists, so that wrong matches may lead it astray, without those that fit worst, too. True, with `best`
+ * and s->prior at the result, if enough observations support it; otherwise the search is put back to
+ * where it was. */
 static bool search_without_twists(plr_search *s, plr_search_point *best, plr_misfit misfit) {
     const plr_applied_motion believed = s->prior;
+    const bool most_agree = three_fifths_agree(s);
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
         s->sightings[i].twist_d2 = plr_dot3(s->sightings[i].e, s->sightings[i].e);
@@ -301,7 +312,12 @@ static bool search_without_twists(plr_search *s, plr_search_point *best, plr_mis
     plr_search_from_zero(s, &open);
     for (unsigned i = 0; i < 2; i++)
         plr_search_descend(s, &open);
-    if (has_support(s, &open, misfit)) {
+    bool supported = has_support(s, &open, misfit);
+    if (!supported && !most_agree) {
+        plr_search_concentrate(s, &open);
+        supported = has_support(s, &open, misfit);
+    }
+    if (supported) {
         *best = open;
         return true;
     }

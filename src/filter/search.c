@@ -12,8 +12,9 @@
 #include "state/motion.h"
 
 enum {
-    TRIALS = 4
-}; /* besides the evaluations at the start and, if needed, of the best point again */
+    TRIALS = 4, /* besides the evaluations at the start and, if needed, of the best point again */
+    CONCENTRATIONS = 2
+};
 
 /* Huber's limit on the norm of a whitened residual: beyond it the pull on the motion stays
  * constant. */
@@ -138,6 +139,7 @@ void plr_search_add(plr_search *s, plr_real active) {
     plr_sighting *at = &s->sightings[s->count++];
     memcpy(at->U[s->current], identity, sizeof at->U[0]);
     at->active = active;
+    at->aside = false;
     at->cost = 0;
 }
 
@@ -168,7 +170,7 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
         }
         const plr_real d2 = plr_dot3(at->e, at->e);
         at->weight = at->active * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
-        if (!(at->active > 0))
+        if (!(at->active > 0) || at->aside)
             continue;
         change += huber(d2_by_best_covariance(at, s->current)) - at->cost;
         add_to_sums(at, point);
@@ -247,6 +249,35 @@ void plr_search_descend(plr_search *s, plr_search_point *best) {
         const plr_search_point kept = *best;
         plr_search_go_to(s, kept.z, best);
     }
+}
+
+/* Compares the costs of all pairs: they are few, and it is done seldom. */
+static void set_worst_aside(plr_search *s) {
+    for (unsigned i = 0; i < s->count; i++) {
+        plr_sighting *at = &s->sightings[i];
+        unsigned active = 0, better = 0;
+        for (unsigned j = 0; j < s->count; j++) {
+            const plr_sighting *other = &s->sightings[j];
+            if (!(other->active > 0))
+                continue;
+            active++;
+            better += other->cost < at->cost || (other->cost <= at->cost && j < i);
+        }
+        at->aside = at->behind || 5 * better >= 3 * active;
+    }
+}
+
+void plr_search_concentrate(plr_search *s, plr_search_point *best) {
+    for (unsigned again = 0; again < CONCENTRATIONS; again++) {
+        set_worst_aside(s);
+        const plr_search_point kept = *best;
+        plr_search_go_to(s, kept.z, best);
+        plr_search_descend(s, best);
+    }
+    for (unsigned i = 0; i < s->count; i++)
+        s->sightings[i].aside = false;
+    const plr_search_point kept = *best;
+    plr_search_go_to(s, kept.z, best);
 }
 
 void plr_search_from_zero(plr_search *s, plr_search_point *best) {

@@ -359,10 +359,12 @@ static void test_biases_are_kept_from_a_doubt_until_it_is_settled_or_has_become_
     const plr_report disagrees = {
         .matched = 10, .gated = 5, .gated_again = 5, .used = 5, .nis = 20, .nis_dof = 20};
     unsigned kept = 0;
+    for (int k = 0; k < 5; k++) /* what is rejected teaches nothing anyway */
+        (void)plr_consistency_judge(&filter, &disagrees, false);
     TEST_ASSERT_FALSE(plr_consistency_keeps_biases(&filter));
     for (int k = 0; k < 800; k++) {
         add_agreement();
-        (void)plr_consistency_judge(&filter, &disagrees, false);
+        (void)plr_consistency_judge(&filter, &disagrees, k == 0);
         TEST_ASSERT_EQUAL_UINT8(0, filter.consistency.contradicted);
         kept += plr_consistency_keeps_biases(&filter);
     }
