@@ -116,7 +116,7 @@ typedef struct plr_core_motion {
 typedef struct plr_watched_point {
     uint32_t id;
     float u_px, v_px;
-    uint32_t used; /* 1: filled */
+    uint32_t used; /* 0: a free place; else what is known of it, src/filter/inertial.c */
 } plr_watched_point;
 
 enum { PLR_WATCHED_POINTS = 8 };

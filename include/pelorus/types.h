@@ -271,7 +271,8 @@ typedef struct plr_report {
                                them are refused */
     uint16_t no_room;       /* new ids for which no slot was free */
     uint16_t poor;          /* new ids refused by min_disparity_px, depth or row gap; in
-                               localization, ids that the map does not know */
+                               localization, ids that the map does not know; all new ids of a
+                               frame that rejects nearly all that it matched */
     uint16_t left_out;      /* accepted by the gate, but more than the budget allows */
     uint16_t blocks_failed; /* blocks whose innovation covariance could not be factorised */
     uint16_t active;        /* landmarks in the state after the frame */

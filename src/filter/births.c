@@ -19,9 +19,8 @@ static void append_new(plr_filter *f, const plr_observation *seen) {
     f->slots[f->count - 1].beyond = beyond;
 }
 
-/* A frame that rejects nearly all that it matched does not know where it is: the body was pushed, and
- * wrong matches kept the others from saying so. Landmarks that it made would speak for the pose that they
- * were made at. */
+/* True of a frame that rejects nearly all that it matched: the pose is probably wrong. Landmarks that it
+ * made would agree with that pose in the next frames, against those that show where the body is. */
 static bool is_at_a_loss(const plr_filter *f, const plr_frame_events *events) {
     return f->config.model == PLR_MODEL_BODY && f->frames_mostly_gated > 0 && !events->locked;
 }

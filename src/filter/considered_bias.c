@@ -18,7 +18,7 @@ static bool may_be_considered(const plr_filter *f) {
 }
 
 /* X <- L^-1 X L^-T, X symmetric */
-static void in_sigmas(const plr_real L[PLR_POSE_SQUARE], plr_real X[PLR_POSE_SQUARE]) {
+static void whiten(const plr_real L[PLR_POSE_SQUARE], plr_real X[PLR_POSE_SQUARE]) {
     for (unsigned side = 0; side < 2; side++) {
         plr_motion_solve(L, PLR_POSE_DIM, X, PLR_POSE_DIM);
         for (unsigned r = 0; r < PLR_POSE_DIM; r++)
@@ -37,7 +37,7 @@ void plr_bias_consider(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE], b
         return;
     before->seconds = f->motion.seconds;
     plr_motion_covariance_by_state(f, before->of_nu);
-    in_sigmas(L, before->of_nu);
+    whiten(L, before->of_nu);
     memcpy(before->bias, f->bias, sizeof before->bias);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)

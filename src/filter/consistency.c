@@ -293,9 +293,7 @@ void plr_consistency_add(plr_filter *f, const plr_applied_motion *believed,
         contradict_outright(f, believed, applied, nu, moved);
         return;
     }
-    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
-        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++)
-            J[PLR_POSE_DIM * k + l] = J[PLR_POSE_DIM * l + k] = Lambda[at];
+    plr_upper6_unpack(J, Lambda);
     plr_mat6_vec(b, J, nu);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         J[(PLR_POSE_DIM + 1) * k] -= 1;

@@ -210,6 +210,25 @@ static bool agrees(const plr_sighting *at) {
     return !at->behind && plr_dot3(at->e, at->e) < AGREES_BELOW;
 }
 
+/* Of the observations that take part, how many agree. */
+typedef struct plr_agreement {
+    unsigned active, agree;
+} plr_agreement;
+
+static plr_agreement count_agreement(const plr_search *s) {
+    plr_agreement a = {0, 0};
+    for (unsigned i = 0; i < s->count; i++) {
+        const bool active = s->sightings[i].active > 0;
+        a.active += active;
+        a.agree += active && agrees(&s->sightings[i]);
+    }
+    return a;
+}
+
+static bool is_three_fifths(plr_agreement a) {
+    return 5 * a.agree >= 3 * a.active;
+}
+
 /* Which observations have a small weight, so that another motion may fit them better. */
 typedef enum plr_misfit {
     PLR_MISFIT_NONE,
@@ -266,15 +285,14 @@ static bool is_well_spread(const plr_search_point *point) {
  * one car, which pulls the estimate of the others with it. If all agree, wheels that slip are likelier
  * than a scene that moves as one, and the covariance covers both (filter/consistency.h). */
 static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
-    unsigned with = 0, against = 0, agree = 0, active = 0;
+    const plr_agreement all = count_agreement(s);
+    unsigned with = 0, against = 0;
     plr_real told = 0, told_against = 0;
     for (unsigned i = 0; i < s->count; i++) {
         const plr_sighting *at = &s->sightings[i];
         const plr_real d2 = plr_dot3(at->e, at->e);
         if (!(at->active > 0))
             continue;
-        active++;
-        agree += agrees(at);
         told += telling(at);
         if (agrees(at) && at->twist_d2 > d2 + CLEAR_DIFFERENCE) {
             against++;
@@ -283,19 +301,10 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
         with += at->twist_d2 < AGREES_BELOW && d2 > at->twist_d2 + CLEAR_DIFFERENCE;
     }
     const bool enough =
-        misfit == PLR_MISFIT_MANY ? 5 * against >= active : PLR_R(2) * told_against > told;
+        misfit == PLR_MISFIT_MANY ? 5 * against >= all.active : PLR_R(2) * told_against > told;
     return against >= MIN_POINTS && enough && 4 * with <= against &&
-           (active < MIN_AGAINST_TWISTS ? agree == s->count : 5 * agree >= 3 * active) &&
+           (all.active < MIN_AGAINST_TWISTS ? all.agree == s->count : is_three_fifths(all)) &&
            is_well_spread(open);
-}
-
-static bool three_fifths_agree(const plr_search *s) {
-    unsigned active = 0, agree = 0;
-    for (unsigned i = 0; i < s->count; i++) {
-        active += s->sightings[i].active > 0;
-        agree += s->sightings[i].active > 0 && agrees(&s->sightings[i]);
-    }
-    return 5 * agree >= 3 * active;
 }
 
 /* Searches again with a prior so wide that the twists hardly count; where most do not agree with the
@@ -304,7 +313,7 @@ static bool three_fifths_agree(const plr_search *s) {
  * where it was. */
 static bool search_without_twists(plr_search *s, plr_search_point *best, plr_misfit misfit) {
     const plr_applied_motion believed = s->prior;
-    const bool most_agree = three_fifths_agree(s);
+    const bool most_agree = is_three_fifths(count_agreement(s));
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
         s->sightings[i].twist_d2 = plr_dot3(s->sightings[i].e, s->sightings[i].e);
@@ -321,10 +330,9 @@ static bool search_without_twists(plr_search *s, plr_search_point *best, plr_mis
         *best = open;
         return true;
     }
-    const plr_search_point kept = *best;
     s->prior = believed;
     plr_search_prepare(s);
-    plr_search_go_to(s, kept.z, best);
+    plr_search_again(s, best);
     return false;
 }
 
@@ -364,7 +372,7 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
  * spread: a direction in which they say little keeps what the twists say of it. Otherwise the search
  * goes on with those whose prediction is good enough. Returns how many take part. */
 static unsigned search_by_agreement(plr_search *s, plr_search_point *best) {
-    unsigned active = 0, agree = 0;
+    unsigned active = 0;
     let_unknown_take_part(s);
     for (unsigned i = 0; i < s->count; i++) {
         judge_by_prior(s, i, PLR_OF_POINT);
@@ -374,9 +382,8 @@ static unsigned search_by_agreement(plr_search *s, plr_search_point *best) {
         plr_search_from_zero(s, best);
         for (unsigned again = 0; again <= MORE_SEARCHES; again++)
             plr_search_descend(s, best);
-        for (unsigned i = 0; i < s->count; i++)
-            agree += s->sightings[i].active > 0 && agrees(&s->sightings[i]);
-        if (agree >= MIN_AGREEING && 5 * agree >= 3 * active)
+        const plr_agreement all = count_agreement(s);
+        if (all.agree >= MIN_AGREEING && is_three_fifths(all))
             return active;
     }
     let_unknown_take_part(s);

@@ -190,6 +190,11 @@ void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_
     accept(s);
 }
 
+void plr_search_again(plr_search *s, plr_search_point *best) {
+    const plr_search_point kept = *best;
+    plr_search_go_to(s, kept.z, best);
+}
+
 bool plr_search_factorise(const plr_search_point *point, plr_real damping,
                           plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]) {
     memcpy(U, point->J, sizeof point->J);
@@ -245,39 +250,39 @@ void plr_search_descend(plr_search *s, plr_search_point *best) {
         }
         damping = damping > 0 ? PLR_R(10) * damping : PLR_R(0.01);
     }
-    if (!is_at_best) { /* a and e are those of a trial that was not accepted */
-        const plr_search_point kept = *best;
-        plr_search_go_to(s, kept.z, best);
-    }
+    if (!is_at_best) /* a and e are those of a trial that was not accepted */
+        plr_search_again(s, best);
 }
 
-/* Compares the costs of all pairs: they are few, and it is done seldom. */
-static void set_worst_aside(plr_search *s) {
-    for (unsigned i = 0; i < s->count; i++) {
-        plr_sighting *at = &s->sightings[i];
-        unsigned active = 0, better = 0;
-        for (unsigned j = 0; j < s->count; j++) {
-            const plr_sighting *other = &s->sightings[j];
-            if (!(other->active > 0))
-                continue;
-            active++;
-            better += other->cost < at->cost || (other->cost <= at->cost && j < i);
-        }
-        at->aside = at->behind || 5 * better >= 3 * active;
+/* Of those that take part, how many fit the best point better than sighting i. */
+static unsigned count_better(const plr_search *s, unsigned i) {
+    const plr_real cost = s->sightings[i].cost;
+    unsigned better = 0;
+    for (unsigned j = 0; j < s->count; j++) {
+        const plr_sighting *other = &s->sightings[j];
+        better += other->active > 0 && (other->cost < cost || (other->cost <= cost && j < i));
     }
+    return better;
+}
+
+/* Compares all pairs: they are few, and it is done seldom. */
+static void set_worst_aside(plr_search *s) {
+    unsigned active = 0;
+    for (unsigned i = 0; i < s->count; i++)
+        active += s->sightings[i].active > 0;
+    for (unsigned i = 0; i < s->count; i++)
+        s->sightings[i].aside = s->sightings[i].behind || 5 * count_better(s, i) >= 3 * active;
 }
 
 void plr_search_concentrate(plr_search *s, plr_search_point *best) {
     for (unsigned again = 0; again < CONCENTRATIONS; again++) {
         set_worst_aside(s);
-        const plr_search_point kept = *best;
-        plr_search_go_to(s, kept.z, best);
+        plr_search_again(s, best);
         plr_search_descend(s, best);
     }
     for (unsigned i = 0; i < s->count; i++)
         s->sightings[i].aside = false;
-    const plr_search_point kept = *best;
-    plr_search_go_to(s, kept.z, best);
+    plr_search_again(s, best);
 }
 
 void plr_search_from_zero(plr_search *s, plr_search_point *best) {

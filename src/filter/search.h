@@ -82,6 +82,9 @@ void plr_search_concentrate(plr_search *s, plr_search_point *best);
 /* Evaluates all sightings at nu = z, which becomes the best point. */
 void plr_search_go_to(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_search_point *best);
 
+/* Evaluates them at the best point again, when something else has changed. */
+void plr_search_again(plr_search *s, plr_search_point *best);
+
 /* U^T U = I + J + damping (I + diag J), packed upper; false if it cannot be factorised. */
 bool plr_search_factorise(const plr_search_point *point, plr_real damping,
                           plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]);

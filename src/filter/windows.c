@@ -32,9 +32,7 @@ void plr_windows_add(plr_filter *f, const plr_real nu[PLR_POSE_DIM],
 static void multiply_both_sides(const plr_real A[PLR_POSE_TRIANGLE],
                                 const plr_real X[PLR_POSE_SQUARE], plr_real C[PLR_POSE_TRIANGLE]) {
     plr_real full[PLR_POSE_SQUARE], XA[PLR_POSE_SQUARE], AXA[PLR_POSE_SQUARE];
-    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
-        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++)
-            full[PLR_POSE_DIM * k + l] = full[PLR_POSE_DIM * l + k] = A[at];
+    plr_upper6_unpack(full, A);
     plr_mat6_mul(XA, X, full);
     plr_mat6_mul(AXA, full, XA);
     for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)

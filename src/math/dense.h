@@ -101,6 +101,14 @@ static inline void plr_upper6_add(plr_real S[PLR_POSE_TRIANGLE], const plr_real 
     plr_upper6_add_row(5, S, a, b);
 }
 
+/* The 6x6 symmetric matrix of a packed upper triangle. */
+static inline void plr_upper6_unpack(plr_real A[PLR_POSE_SQUARE],
+                                     const plr_real S[PLR_POSE_TRIANGLE]) {
+    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++)
+            A[PLR_POSE_DIM * k + l] = A[PLR_POSE_DIM * l + k] = S[at];
+}
+
 /* Cholesky: replaces the upper triangle of S, n x n, packed row by row, by U with U^T U = S. False
  * if a pivot is not a positive finite number; S is then destroyed. PLR_KERNEL_MARGIN elements after
  * the end of S must be readable. */

@@ -57,8 +57,7 @@ typedef struct scenario {
     bool bias;            /* biases drawn from the prior and estimated; else none, and off */
     bool few;             /* 0, 1, 2 matches in turn after the first second */
     double wrong_matches; /* share of observations that show another point, each for one frame */
-    double
-        lost_tracks; /* share of tracks that go over to another point in a frame, and stay there */
+    double lost_tracks;   /* share of tracks that show another point from a frame on */
     unsigned before, during, after; /* frames */
     mishap mishap;
     double strength;

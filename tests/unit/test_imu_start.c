@@ -428,3 +428,15 @@ static void test_pictures_that_move_keep_the_filter_from_a_start_at_rest(void) {
     }
     demand_started();
 }
+
+/* Any match may be wrong, the first one of a point too. */
+static void test_wrong_matches_do_not_keep_it_from_a_start_at_rest(void) {
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    make_filter();
+    for (unsigned k = 0; k < 6; k++) { /* two frames show nothing but other points */
+        feed_up(SECOND / 6, 0, 0, g);
+        (void)look(k == 2 || k == 4 ? 50 : 0);
+    }
+    feed_up(SECOND / 6, 0, 0, g);
+    demand_started();
+}
