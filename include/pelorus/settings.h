@@ -250,6 +250,13 @@ typedef struct plr_config {
      * The same of the baseline: each distance is wrong by the same share. */
     double baseline_sigma;
 
+    /* Setting camera-turn-sigma [rad]: 0 to 0.2, default 0.003.
+     * The error of the camera's attitude on the body (T_CB, less imu-turn), one sigma about each
+     * axis. A camera that looks 0.3 degrees aside sees a straight way half a percent askew, and at
+     * constant speed that looks like a bias. The default is what a careful calibration leaves; 0.01
+     * for a mount that was measured by hand. Otherwise as focal-sigma. */
+    double camera_turn_sigma_rad;
+
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
      * Take several times the data sheet's figure: vibration, scale and timing errors come on top,

@@ -248,11 +248,14 @@ typedef struct plr_votes {
     plr_real way[3];
 } plr_votes;
 
-/* Relative errors of the camera's calibration that covariances take into account:
- * src/state/sensitivity.h. */
+/* Errors of the camera's calibration that covariances take into account: two relative ones, and
+ * three angles, rad, by which it is turned about its own axes. src/state/sensitivity.h. */
 typedef enum plr_calibration_error {
-    PLR_FOCAL_LENGTH,
     PLR_BASELINE,
+    PLR_FOCAL_LENGTH,
+    PLR_CAMERA_TURN_X,
+    PLR_CAMERA_TURN_Y,
+    PLR_CAMERA_TURN_Z,
     PLR_CALIBRATIONS
 } plr_calibration_error;
 

@@ -6,6 +6,7 @@
 #include "math/dense.h"
 #include "math/log_product.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "process/velocity.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
@@ -17,9 +18,8 @@
 #include "state/sensitivity.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
-enum { WIDE = 8 }; /* E's leading dimension: what follows its six columns makes two tiles of rows */
-enum { IN_ESTIMATE = PLR_BASELINE }; /* the column of the sensitivity that fills the second */
-enum { OF_DX, OF_S, RESIDUALS = OF_S + PLR_CALIBRATIONS }; /* the columns of Y */
+/* The columns of a batch's E, in whole tiles of rows of the product that they make. */
+enum { OF_W, OF_DX = PLR_POSE_DIM, OF_S, WIDE = OF_S + PLR_CALIBRATIONS, TILE = 4 };
 
 /* All measurements of a correction, in their order. After those of its arguments come two of the
  * biases. */
@@ -28,15 +28,14 @@ typedef struct plr_sensed {
     const plr_measurement *given;
 } plr_sensed;
 
-/* Measurements that are applied together, stacked: S = H P H^T + R and Y = [r - H dx, the same of the
- * sensitivity's columns], then S = U^T U and U^-T Y. V^T is in the workspace. */
+/* Measurements that are applied together, stacked: S = H P H^T + R and E = [H W, -y, the same of the
+ * sensitivity's columns] with y = r - H dx, then S = U^T U and U^-T E. V^T is in the workspace. */
 typedef struct plr_batch {
     unsigned rows;
-    unsigned n, ld; /* dimension of the state; between rows of V^T */
+    unsigned ld; /* between rows of V^T */
     plr_real S[PLR_BLOCK_ROWS * (PLR_BLOCK_ROWS + 1) / 2 +
                PLR_KERNEL_MARGIN]; /* packed upper triangle */
-    plr_real Y[RESIDUALS * PLR_BLOCK_ROWS];
-    plr_real E[WIDE * PLR_BLOCK_ROWS]; /* rows x 6: H W, then U^-T H W */
+    plr_real E[WIDE * PLR_BLOCK_ROWS];
 } plr_batch;
 
 /* The sums behind a plr_innovation. */
@@ -51,7 +50,7 @@ typedef struct plr_evidence {
  * beside P. */
 static void add_evidence(plr_evidence *e, const plr_batch *batch) {
     for (unsigned r = 0; r < batch->rows; r++) {
-        const plr_real y = batch->Y[RESIDUALS * r + OF_DX];
+        const plr_real y = batch->E[WIDE * r + OF_DX];
         e->d2 = PLR_FMA(y, y, e->d2);
         plr_log_product_multiply(&e->det_root, batch->S[plr_upper_row(batch->rows, r)]);
     }
@@ -101,36 +100,11 @@ static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, uns
         if (considers)
             plr_rows_apply(H, f->S[k], column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
-            batch->Y[RESIDUALS * (first + r) + OF_S + k] =
-                considers ? -H_s[k][r] - column[r] : PLR_R(0);
+            batch->E[WIDE * (first + r) + OF_S + k] = considers ? H_s[k][r] + column[r] : PLR_R(0);
     }
 }
 
-/* eta += E^T y, y a column of Y */
-static void project_on_noise(const plr_batch *batch, unsigned column, plr_real eta[PLR_POSE_DIM]) {
-    plr_real sum[PLR_POSE_DIM]; /* in registers */
-    memcpy(sum, eta, sizeof sum);
-    for (unsigned r = 0; r < batch->rows; r++)
-        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            sum[k] = PLR_FMA(batch->E[WIDE * r + k], batch->Y[RESIDUALS * r + column], sum[k]);
-    memcpy(eta, sum, sizeof sum);
-}
-
-/* f->S += V y and eta += E^T y, of each column with its own y. */
-static void correct_sensitivity(plr_filter *f, const plr_batch *batch) {
-    plr_noise *noise = &f->work.noise;
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        if (!plr_considers(f, k))
-            continue;
-        if (!(noise->open && k == IN_ESTIMATE))
-            plr_sensitivity_combine(f, k, batch->rows, batch->Y + OF_S + k, RESIDUALS, f->work.Vt,
-                                    batch->ld);
-        if (noise->open)
-            project_on_noise(batch, OF_S + k, noise->eta_of_S[k]);
-    }
-}
-
-/* Adds a measurement to the batch, from row `first` on: its rows of (P H^T)^T, y and E, and its
+/* Adds a measurement to the batch, from row `first` on: its rows of (P H^T)^T and E, and its
  * columns of S, H (P H^T) + R. */
 static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_batch *batch) {
     plr_workspace *w = &f->work;
@@ -150,41 +124,59 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
     }
     plr_rows_apply(&m->H, w->dx, column);
     for (unsigned r = 0; r < PLR_ROWS; r++)
-        batch->Y[RESIDUALS * (first + r) + OF_DX] = m->r[r] - column[r];
-    for (unsigned k = 0; w->noise.open && k < PLR_POSE_DIM; k++) {
-        plr_rows_apply(&m->H, w->noise.Wt + k * batch->ld, column);
+        batch->E[WIDE * (first + r) + OF_DX] = column[r] - m->r[r];
+    memset(column, 0, sizeof column);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        if (w->noise.open)
+            plr_rows_apply(&m->H, w->noise.Wt + k * batch->ld, column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
-            batch->E[WIDE * (first + r) + k] = column[r];
+            batch->E[WIDE * (first + r) + OF_W + k] = column[r];
     }
+}
+
+/* eta += E^T y, E the first columns, y the negative of another one */
+static void project_on_noise(const plr_batch *batch, unsigned column, plr_real eta[PLR_POSE_DIM]) {
+    plr_real sum[PLR_POSE_DIM]; /* in registers */
+    memcpy(sum, eta, sizeof sum);
+    for (unsigned r = 0; r < batch->rows; r++)
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            sum[k] = PLR_FMA(batch->E[WIDE * r + OF_W + k], -batch->E[WIDE * r + column], sum[k]);
+    memcpy(eta, sum, sizeof sum);
 }
 
 /* The batch's information about the motion's noise: Lambda += E^T E, eta += E^T y, with E = U^-T H
- * W and y = U^-T (r - H dx). */
-static void add_noise_information(plr_noise *noise, const plr_batch *batch) {
+ * W and y = U^-T (r - H dx); and eta of each column of the sensitivity. */
+static void add_noise_information(plr_filter *f, const plr_batch *batch) {
+    plr_noise *noise = &f->work.noise;
     plr_real sum[PLR_POSE_TRIANGLE]; /* in registers */
     memcpy(sum, noise->Lambda, sizeof sum);
     for (unsigned r = 0; r < batch->rows; r++)
-        plr_upper6_add(sum, batch->E + WIDE * r, batch->E + WIDE * r);
+        plr_upper6_add(sum, batch->E + WIDE * r + OF_W, batch->E + WIDE * r + OF_W);
     memcpy(noise->Lambda, sum, sizeof sum);
     project_on_noise(batch, OF_DX, noise->eta);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        if (plr_considers(f, k))
+            project_on_noise(batch, OF_S + k, noise->eta_of_S[k]);
 }
 
-/* W -= V E, dx += V y and the same of a column of the sensitivity, computed as eight rows of one
- * product, [E, -y, -its y]. */
-static void update_estimate(plr_filter *f, plr_batch *batch) {
+/* W -= V E, dx += V y and S += V y, each column of S with its own y: the rows of one product with E.
+ * Where no motion is open, its columns are zero. */
+static void update_estimate(plr_filter *f, const plr_batch *batch) {
     plr_workspace *w = &f->work;
-    plr_real *Wt = w->noise.Wt;
-    const bool considers = plr_considers(f, IN_ESTIMATE);
-    const size_t ld = batch->ld;
-    for (unsigned r = 0; r < batch->rows; r++) {
-        const plr_real *y = batch->Y + RESIDUALS * r;
-        batch->E[WIDE * r + 6] = -y[OF_DX];
-        batch->E[WIDE * r + 7] = considers ? -y[OF_S + IN_ESTIMATE] : PLR_R(0);
+    plr_real *rows[WIDE];
+    unsigned used = OF_S; /* an exact camera's columns of S are zero, and stay so */
+    PLR_ASSERT(WIDE % TILE == 0);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        rows[OF_W + k] = w->noise.Wt + k * batch->ld;
+    rows[OF_DX] = w->dx;
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        rows[OF_S + k] = f->S[k];
+        if (plr_considers(f, k))
+            used = OF_S + k + 1;
     }
-    plr_real *const first[4] = {Wt, Wt + ld, Wt + 2 * ld, Wt + 3 * ld};
-    plr_real *const last[4] = {Wt + 4 * ld, Wt + 5 * ld, w->dx, f->S[IN_ESTIMATE]};
-    plr_subtract_four_rows(batch->ld, batch->rows, batch->E, WIDE, w->Vt, ld, first);
-    plr_subtract_four_rows(batch->ld, batch->rows, batch->E + 4, WIDE, w->Vt, ld, last);
+    for (unsigned k = w->noise.open ? 0 : TILE; k < used; k += TILE)
+        plr_subtract_four_rows(batch->ld, batch->rows, batch->E + k, WIDE, w->Vt, batch->ld,
+                               rows + k);
 }
 
 /* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but
@@ -196,18 +188,11 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     if (!*factorised)
         return false;
     plr_solve_upper_transposed(batch->rows, batch->ld, batch->S, w->Vt, batch->ld);
-    plr_solve_upper_transposed(batch->rows, RESIDUALS, batch->S, batch->Y, RESIDUALS);
+    plr_solve_upper_transposed(batch->rows, WIDE, batch->S, batch->E, WIDE);
     if (!plr_covariance_subtract(f, batch->rows))
         return false;
     if (w->noise.open)
-        plr_solve_upper_transposed(batch->rows, PLR_POSE_DIM, batch->S, batch->E, WIDE);
-    correct_sensitivity(f, batch);
-    if (!w->noise.open) {
-        plr_combine_rows(batch->n, batch->rows, batch->Y + OF_DX, RESIDUALS, w->Vt, batch->ld,
-                         w->dx);
-        return true;
-    }
-    add_noise_information(&w->noise, batch);
+        add_noise_information(f, batch);
     update_estimate(f, batch);
     return true;
 }
@@ -218,7 +203,6 @@ static void correct_by_batch(plr_filter *f, const plr_sensed *sensed, unsigned a
     plr_batch batch; /* not initialised: that would cost as much as a row of S */
     bool factorised;
     batch.rows = PLR_ROWS * size;
-    batch.n = plr_covariance_dim(f);
     batch.ld = plr_covariance_ld(f);
     for (unsigned i = 0; i < size; i++) {
         plr_measurement m;

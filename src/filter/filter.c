@@ -80,6 +80,8 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     par->min_inverse_range = (plr_real)(1 / c->max_range_m);
     par->calibration_variance[PLR_FOCAL_LENGTH] = squared(c->focal_sigma);
     par->calibration_variance[PLR_BASELINE] = squared(c->baseline_sigma);
+    for (unsigned axis = 0; axis < 3; axis++)
+        par->calibration_variance[PLR_CAMERA_TURN_X + axis] = squared(c->camera_turn_sigma_rad);
     par->gravity = (plr_real)c->gravity_mps2;
     par->accel_density = squared(c->accel_noise);
     par->gyro_density = squared(c->gyro_noise);

@@ -15,7 +15,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 7 };
+enum { STATE_VERSION = 8 };
 
 /* ---------------------------------------------------------------- layout */
 

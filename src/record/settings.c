@@ -84,6 +84,7 @@ static const plr_row rows[] = {
     {{50, "imu-arm-z", "m", "along the z axis alone", PLR_SETTING_NUMBER, NULL, -100, 100, 0}, AT(imu_arm_m[2]), STORE_DOUBLE},
     {{51, "focal-sigma", "", "by what share the focal length may be wrong; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(focal_sigma), STORE_DOUBLE},
     {{52, "baseline-sigma", "", "the same of the baseline", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(baseline_sigma), STORE_DOUBLE},
+    {{53, "camera-turn-sigma", "rad", "by how much the camera may be turned on the body; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.2, 0.003}, AT(camera_turn_sigma_rad), STORE_DOUBLE},
 };
 /* clang-format on */
 
@@ -212,8 +213,9 @@ void plr_config_course(plr_config *config) {
     }
     config->landmark_prior = PLR_PRIOR_INDEPENDENT;
     config->focal_sigma = config->baseline_sigma = 0; /* it knows nothing of such errors */
-    config->gate_residual_px = 20;                    /* ours: the report names no limit */
-    config->max_depth_m = 30;                         /* ours as well */
+    config->camera_turn_sigma_rad = 0;
+    config->gate_residual_px = 20; /* ours: the report names no limit */
+    config->max_depth_m = 30;      /* ours as well */
 }
 
 static plr_status refuse(const plr_setting **culprit, const plr_setting *setting) {

@@ -120,19 +120,31 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     return true;
 }
 
+/* How the point that a pair of pixels shows would change: with a longer baseline along its ray,
+ * with a longer focal length in its depth alone. If the camera is turned by a small phi, pixels that
+ * show q mean q - phi x q in the axes that T_CB gives the camera. */
+static void point_by_calibration(const plr_real q[3], plr_real q_s[PLR_CALIBRATIONS][3]) {
+    const plr_real changes[PLR_CALIBRATIONS][3] = {
+        [PLR_BASELINE] = {q[0], q[1], q[2]},    [PLR_FOCAL_LENGTH] = {0, 0, q[2]},
+        [PLR_CAMERA_TURN_X] = {0, q[2], -q[1]}, [PLR_CAMERA_TURN_Y] = {-q[2], 0, q[0]},
+        [PLR_CAMERA_TURN_Z] = {q[1], -q[0], 0},
+    };
+    memcpy(q_s, changes, sizeof changes);
+}
+
 void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
                                plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]) {
-    const plr_camera *camera = &f->par.camera;
     plr_view view;
-    plr_real along[3], z[3];
+    plr_real Dz[9], q_s[PLR_CALIBRATIONS][3];
     if (!plr_model_of(f)->look(f, slot, &view))
         return;
-    along_the_ray(camera, along);
-    plr_stereo_project(z, camera, view.q);
-    H_s[PLR_FOCAL_LENGTH][0] = z[0] - camera->cx;
-    H_s[PLR_FOCAL_LENGTH][1] = z[1] - camera->cx;
-    H_s[PLR_FOCAL_LENGTH][2] = z[2] - camera->cy;
-    H_s[PLR_BASELINE][1] = -along[1] / view.q[2];
+    plr_stereo_jacobian(Dz, &f->par.camera, view.q);
+    point_by_calibration(view.q, q_s);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        plr_mat3_vec(H_s[k], Dz, q_s[k]);
+        for (unsigned r = 0; r < PLR_ROWS; r++)
+            H_s[k][r] = -H_s[k][r]; /* so that pixels which stay show the point that changes */
+    }
 }
 
 /* ---------------------------------------------------------------- during the search for the
@@ -240,12 +252,15 @@ static void initial_factor(const plr_filter *f, const plr_real Dq[9], plr_real S
 
 plr_real plr_stereo_initialise(const plr_filter *f, const plr_observation *seen,
                                plr_new_landmark *landmark) {
-    plr_real z[3], q[3], Dq[9], S_q[9];
+    plr_real z[3], q[3], Dq[9], S_q[9], q_s[PLR_CALIBRATIONS][3];
     plr_stereo_rows(z, seen);
     const plr_real missing = limit_disparity(f, z);
     plr_stereo_back_project(q, Dq, &f->par.camera, z);
     initial_factor(f, Dq, S_q);
     plr_model_of(f)->initialise(f, q, S_q, landmark);
+    point_by_calibration(q, q_s);
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+        plr_mat3_vec(landmark->by_calibration[k], landmark->J_q, q_s[k]);
     /* inverse range is disparity over focal length and baseline, along the ray */
     return missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (f->par.camera.fx * f->par.camera.baseline);
 }

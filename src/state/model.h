@@ -24,6 +24,7 @@ typedef struct plr_new_landmark {
     bool uses_pose;                           /* false: J_pose is zero and not filled */
     plr_real J_pose[PLR_ROWS * PLR_POSE_DIM]; /* 3x6 */
     plr_real P[9];                            /* 3x3 */
+    plr_real J_q[9]; /* 3x3: its error by that of the point it was made from; not of a known one */
     plr_real by_calibration[PLR_CALIBRATIONS][PLR_LANDMARK_DIM]; /* its error by the camera's;
                                                                     zeros if it is known */
 } plr_new_landmark;
@@ -54,8 +55,7 @@ struct plr_model {
 
     /* Makes a landmark from a point q in the camera, m, with covariance S_q S_q^T (3x3). The factor
      * S_q is passed and not the product: for a far point the variance along the ray is so large
-     * that rounding would destroy the variance across it. If the baseline is longer by a
-     * share, q is farther along its ray by the same; if the focal length is, in its depth alone. */
+     * that rounding would destroy the variance across it. The caller fills by_calibration. */
     void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 

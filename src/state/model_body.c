@@ -205,17 +205,13 @@ static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_
                             plr_new_landmark *landmark) {
     (void)f;
     plr_polar chart;
-    plr_real Jw[9], JS[9];
+    plr_real JS[9];
     plr_polar_at(&chart, q);
-    plr_polar_from_point(Jw, &chart);
-    plr_mat3_mul(JS, Jw, S_q);
+    plr_polar_from_point(landmark->J_q, &chart);
+    plr_mat3_mul(JS, landmark->J_q, S_q);
     plr_mat3_mul_nt(landmark->P, JS, JS);
     memcpy(landmark->x, q, 3 * sizeof *q);
     landmark->uses_pose = false;
-    memset(landmark->by_calibration, 0, sizeof landmark->by_calibration);
-    landmark->by_calibration[PLR_BASELINE][2] = -PLR_R(1) / chart.r; /* Jw q */
-    for (int i = 0; i < 3; i++)
-        landmark->by_calibration[PLR_FOCAL_LENGTH][i] = Jw[3 * i + 2] * q[2];
 }
 
 /* P = J P_W J^T, 3x3, in double: the bearing variance of a far point is smaller than its range

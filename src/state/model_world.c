@@ -65,7 +65,7 @@ static void world_derive(const plr_filter *f, unsigned slot, const plr_view *vie
 
 static void world_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                              plr_new_landmark *landmark) {
-    plr_real s[3], offset[3], R_WC[9], RS[9];
+    plr_real s[3], offset[3], RS[9];
     plr_camera_to_body(s, &f->par.camera, q);
     plr_mat3_vec(offset, f->R_WB, s);
     for (int i = 0; i < 3; i++)
@@ -73,12 +73,9 @@ static void world_initialise(const plr_filter *f, const plr_real q[3], const plr
     landmark->uses_pose = f->config.landmark_prior == PLR_PRIOR_CORRELATED;
     if (landmark->uses_pose)
         plr_world_by_pose(f->R_WB, s, landmark->J_pose);
-    plr_mat3_mul_nt(R_WC, f->R_WB, f->par.camera.R_CB);
-    plr_mat3_mul(RS, R_WC, S_q);
+    plr_mat3_mul_nt(landmark->J_q, f->R_WB, f->par.camera.R_CB); /* R_WC */
+    plr_mat3_mul(RS, landmark->J_q, S_q);
     plr_mat3_mul_nt(landmark->P, RS, RS);
-    plr_mat3_vec(landmark->by_calibration[PLR_BASELINE], R_WC, q);
-    for (int i = 0; i < 3; i++)
-        landmark->by_calibration[PLR_FOCAL_LENGTH][i] = R_WC[3 * i + 2] * q[2];
 }
 
 static bool world_adopt(const plr_filter *f, const plr_landmark *known,

@@ -69,6 +69,12 @@ static void set_velocity(plr_filter *f, unsigned parameter, const plr_real v[PLR
     memcpy(f->S[parameter] + plr_row_of(f, PLR_BLOCK_VELOCITY), v, PLR_VELOCITY_DIM * sizeof *v);
 }
 
+/* S_k += sum over r of a_r X_r, X 6 x dim */
+static void combine(plr_filter *f, unsigned parameter, const plr_real a[PLR_POSE_DIM],
+                    const plr_real *X, size_t ld) {
+    plr_combine_rows(plr_covariance_dim(f), PLR_POSE_DIM, a, 1, X, ld, f->S[parameter]);
+}
+
 void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V) {
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
         plr_real v[PLR_VELOCITY_DIM];
@@ -85,7 +91,7 @@ void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const 
             continue;
         by_drivers(f, k, PLR_POSE_DIM, K, nu);
         by_drivers(f, k, V ? PLR_VELOCITY_DIM : 0, V, v);
-        plr_sensitivity_combine(f, k, PLR_POSE_DIM, nu, 1, Wt, ld);
+        combine(f, k, nu, Wt, ld);
         if (V)
             set_velocity(f, k, v);
     }
@@ -97,7 +103,7 @@ void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld) {
         if (!plr_considers(f, k))
             continue;
         plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta_of_S[k], 1);
-        plr_sensitivity_combine(f, k, PLR_POSE_DIM, noise->eta_of_S[k], 1, Xt, ld);
+        combine(f, k, noise->eta_of_S[k], Xt, ld);
     }
 }
 
@@ -108,11 +114,6 @@ void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]) {
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
             S_xi[i] += n[i];
     }
-}
-
-void plr_sensitivity_combine(plr_filter *f, unsigned parameter, unsigned depth, const plr_real *a,
-                             size_t lda, const plr_real *X, size_t ld) {
-    plr_combine_rows(plr_covariance_dim(f), depth, a, lda, X, ld, f->S[parameter]);
 }
 
 /* ---------------------------------------------------------------- what is told */

@@ -2,11 +2,11 @@
 /*
  * What errors of the camera's calibration do to the state.
  *
- * The focal length and the baseline of every real camera are off by a part of a percent. No frame
- * shows it (where speed and turn are constant it looks like a bias of the twists), and it is the
- * same in all frames, so that it does not average out as noise does. The state's error is therefore
- * x + S s: x as P says, and S s with s ~ N(0, diag(par.calibration_variance)), the relative errors
- * of the calibration. S has a column for each and the rows of the state. It is carried along beside
+ * The focal length and the baseline of every real camera are off by a part of a percent, and it
+ * looks a part of a degree beside where T_CB says. No frame shows it (where speed and turn are
+ * constant it looks like a bias of the twists), and it is the same in all frames, so that it does
+ * not average out as noise does. The state's error is therefore x + S s: x as P says, and S s with
+ * s ~ N(0, diag(par.calibration_variance)), the errors of the calibration. S has a column for each and the rows of the state. It is carried along beside
  * P through motions and corrections, whose gains take no notice of it, and what is told of
  * covariances contains S diag(...) S^T: a consider covariance analysis (Tapley, Schutz and Born,
  * Statistical Orbit Determination, chapter 6; docs/MATH.md 20).
@@ -57,10 +57,6 @@ void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld);
 
 /* S_xi += B S_d, where the drivers move the pose alone. */
 void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]);
-
-/* S_k += sum over r of a_r X_r: a has lda between its elements, X is depth x dim, ld between rows. */
-void plr_sensitivity_combine(plr_filter *f, unsigned parameter, unsigned depth, const plr_real *a,
-                             size_t lda, const plr_real *X, size_t ld);
 
 /* ---------------------------------------------------------------- what is told */
 

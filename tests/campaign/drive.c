@@ -9,6 +9,7 @@
 #include "campaign/world.h"
 #include "pelorus/pelorus.h"
 #include "support/axes.h"
+#include "support/exact_camera.h"
 
 static const double BEYOND = 5; /* sigmas */
 
@@ -45,9 +46,9 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     each_axis(config.velocity_sigma, s->velocity_mps);
     each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
-    if (s->mishap != BASELINE &&
-        s->mishap != FOCAL) /* the camera is exact, and P alone is judged */
-        config.focal_sigma = config.baseline_sigma = 0;
+    if (s->mishap != BASELINE && s->mishap != FOCAL &&
+        s->mishap != ASKEW) /* the camera is exact, and P alone is judged */
+        exact_camera(&config);
     if (s->slots)
         config.slots = (uint16_t)s->slots;
     world_calibration(s, &calibration);

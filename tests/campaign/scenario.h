@@ -23,9 +23,10 @@ typedef enum mishap {
     LATE_TWISTS, /* readings come after the frame and are stamped so many seconds back */
     BASELINE,    /* the true baseline is so much larger than the filter's, as a share; all along */
     FOCAL,       /* the true focal length; all along */
-    THROWN,      /* the body is thrown by 5 m and 1 rad times the strength at the first frame */
-    SWAPPED,     /* from the first frame on every id stands for another point */
-    BLIND        /* no point is seen, and the readings are garbage */
+    ASKEW,   /* the camera is turned by so many degrees beside T_CB, about any axis; all along */
+    THROWN,  /* the body is thrown by 5 m and 1 rad times the strength at the first frame */
+    SWAPPED, /* from the first frame on every id stands for another point */
+    BLIND    /* no point is seen, and the readings are garbage */
 } mishap;
 
 /* The limits; 0: none. */

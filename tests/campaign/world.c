@@ -55,6 +55,25 @@ static void place_around(world *w, point *p) {
     p->id = w->next_id++;
 }
 
+/* Turns the camera about its own middle by `degrees`, about any axis. */
+static void turn_askew(plr_pose *T_CB, double degrees, chance *c) {
+    static const plr_pose level = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    double turn[6] = {0, 0, 0, chance_normal(c), chance_normal(c), chance_normal(c)}, length = 0;
+    for (int i = 3; i < 6; i++)
+        length += turn[i] * turn[i];
+    for (int i = 3; i < 6; i++)
+        turn[i] *= degrees * PI / 180 / sqrt(length);
+    const plr_pose turned = pose_moved(&level, turn);
+    for (int column = 0; column < 4; column++) {
+        double x[3], y[3];
+        for (int i = 0; i < 3; i++)
+            x[i] = column < 3 ? T_CB->R[3 * i + column] : T_CB->p[i];
+        pose_outwards(&turned, x, y);
+        for (int i = 0; i < 3; i++)
+            *(column < 3 ? &T_CB->R[3 * i + column] : &T_CB->p[i]) = y[i];
+    }
+}
+
 void world_begin(world *w, const scenario *s, uint64_t seed) {
     memset(w, 0, sizeof *w);
     w->s = s;
@@ -64,6 +83,8 @@ void world_begin(world *w, const scenario *s, uint64_t seed) {
         w->calibration.baseline_m *= 1 + s->strength;
     if (s->mishap == FOCAL)
         w->calibration.fx_px = w->calibration.fy_px *= 1 + s->strength;
+    if (s->mishap == ASKEW)
+        turn_askew(&w->calibration.T_CB, s->strength, &w->chance);
     for (int i = 0; i < 6; i++)
         w->phase[i] = chance_uniform(&w->chance, 0, 2 * PI);
     for (int i = 0; i < 3; i++)

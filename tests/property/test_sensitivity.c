@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /*
  * What is told of covariances contains what an error of the camera's calibration does to the
- * estimate: held against filters that believe in another focal length or baseline and are given the
- * same readings and pictures. Without noise, an estimate moves by d where the believed number grows
+ * estimate: held against filters that believe in another focal length, baseline or attitude of the
+ * camera on the body and are given the same readings and pictures. Without noise, an estimate moves by d where the believed number grows
  * by one; with a sigma for it, each covariance must be larger by sigma^2 d d^T.
  */
 #include <math.h>
@@ -23,7 +23,16 @@ static const double ROUNDING = PLR_REAL == 32 ? 0.05 : 0.02; /* of the largest e
  * about that place, but a difference of two estimates is taken at theirs. */
 static const double PIXEL_SIGMA = 0.02;
 
-typedef enum parameter { FOCAL_LENGTH, BASELINE, PARAMETERS } parameter;
+/* What has a sigma of its own; that of the turns stands for three. */
+typedef enum parameter { FOCAL_LENGTH, BASELINE, TURN, PARAMETERS } parameter;
+enum { AXES = 3 };
+
+/* What is believed beside the truth: a parameter, about or along which axis, by how much. */
+typedef struct belief {
+    parameter what;
+    unsigned axis;
+    double by;
+} belief;
 
 typedef struct outcome {
     double T[16], b[6], u[6], P_xi[36], P_b[36], P_u[36];
@@ -31,7 +40,7 @@ typedef struct outcome {
     plr_landmark landmarks[MOST_LANDMARKS];
 } outcome;
 
-static outcome plain, more, less, told;
+static outcome plain, more[AXES], less[AXES], told;
 
 void setUp(void) {
     rig_set_up();
@@ -66,24 +75,38 @@ static void look_at(plr_filter *f, outcome *o) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_landmark(f, i, &o->landmarks[i]));
 }
 
-static void vary(plr_calibration *calibration, parameter what, double share) {
-    if (what == BASELINE) {
-        calibration->baseline_m *= 1 + share;
+/* The camera turns about its own middle: T_CB <- Exp(0, turn) T_CB. */
+static void turn_camera(plr_calibration *calibration, unsigned axis, double angle) {
+    double xi[6] = {0}, turn[16], T_CB[16], turned[16];
+    xi[3 + axis] = angle;
+    rigid_exp(turn, xi);
+    rigid_from_pose(T_CB, &calibration->T_CB);
+    square_multiply(4, turn, T_CB, turned);
+    rigid_to_pose(&calibration->T_CB, turned);
+}
+
+static void vary(plr_calibration *calibration, const belief *other) {
+    if (other->what == BASELINE) {
+        calibration->baseline_m *= 1 + other->by;
+    } else if (other->what == FOCAL_LENGTH) {
+        calibration->fx_px *= 1 + other->by;
+        calibration->fy_px *= 1 + other->by;
     } else {
-        calibration->fx_px *= 1 + share;
-        calibration->fy_px *= 1 + share;
+        turn_camera(calibration, other->axis, other->by);
     }
 }
 
 static void consider(plr_config *config, parameter what, double sigma) {
-    *(what == BASELINE ? &config->baseline_sigma : &config->focal_sigma) = sigma;
+    *(what == BASELINE       ? &config->baseline_sigma
+      : what == FOCAL_LENGTH ? &config->focal_sigma
+                             : &config->camera_turn_sigma_rad) = sigma;
 }
 
 /* Ends between two frames, with motion that no frame has taken into the covariance yet. */
-static void drive(parameter what, double share, double sigma, outcome *o) {
+static void drive(const belief *other, double sigma, outcome *o) {
     scene_calibration(&rig.calibration);
-    vary(&rig.calibration, what, share);
-    consider(&rig.config, what, sigma);
+    vary(&rig.calibration, other);
+    consider(&rig.config, other->what, sigma);
     rig_begin();
     rig_drive(FRAMES);
     for (unsigned i = 0; i < RIG_TWISTS / 2; i++)
@@ -91,15 +114,15 @@ static void drive(parameter what, double share, double sigma, outcome *o) {
     look_at(&rig.filter, o);
 }
 
-static void fly(parameter what, double share, double sigma, outcome *o) {
+static void fly(const belief *other, double sigma, outcome *o) {
     static const double exact[3] = {1e-6, 1e-6, 1e-6};
     plr_filter *f = &imu_rig.filter;
     double T[16], v[3];
     plr_pose pose;
-    consider(&imu_rig.config, what, sigma);
+    consider(&imu_rig.config, other->what, sigma);
     imu_rig_begin(IMU_RIG_GIVEN, 3);
     plr_calibration believed = imu_rig.flight.calibration;
-    vary(&believed, what, share);
+    vary(&believed, other);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(f, &believed, &imu_rig.config, NULL));
     imu_flight_truth(&imu_rig.flight, T, v);
     rigid_to_pose(&pose, T);
@@ -110,53 +133,82 @@ static void fly(parameter what, double share, double sigma, outcome *o) {
     look_at(&imu_rig.filter, o);
 }
 
-/* C = with - without must be SIGMA^2 d d^T. Returns the largest element of C. */
-static double demand_share(unsigned n, const double *with, const double *without, const double *d,
+/* How far an estimate moves where a number that is believed grows by one: of each axis that is
+ * varied. */
+typedef struct moves {
+    unsigned axes;
+    double d[AXES][6];
+} moves;
+
+/* C = with - without must be SIGMA^2 sum d d^T. Returns the largest element of C. */
+static double demand_share(unsigned n, const double *with, const double *without, const moves *m,
                            const char *of) {
-    double largest = 0;
+    double share[36] = {0}, largest = 0;
+    for (unsigned axis = 0; axis < m->axes; axis++)
+        for (unsigned i = 0; i < n * n; i++)
+            share[i] += SIGMA * SIGMA * m->d[axis][i / n] * m->d[axis][i % n];
     for (unsigned i = 0; i < n; i++)
-        largest = fmax(largest, SIGMA * SIGMA * d[i] * d[i]);
-    for (unsigned i = 0; i < n; i++)
-        for (unsigned j = 0; j < n; j++)
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(ROUNDING * (largest + fabs(without[n * i + j])),
-                                              SIGMA * SIGMA * d[i] * d[j],
-                                              with[n * i + j] - without[n * i + j], of);
+        largest = fmax(largest, share[n * i + i]);
+    for (unsigned i = 0; i < n * n; i++)
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(ROUNDING * (largest + fabs(without[i])), share[i],
+                                          with[i] - without[i], of);
     return largest;
 }
 
-static void compare(void) {
-    double back[16], moved[16], d[6];
-    rigid_inverse(back, less.T);
-    square_multiply(4, back, more.T, moved);
-    rigid_log(d, moved);
-    for (unsigned i = 0; i < 6; i++)
-        d[i] /= 2 * step_of_belief;
-    TEST_ASSERT_TRUE(demand_share(6, told.P_xi, plain.P_xi, d, "pose") > 1e-6);
-    for (unsigned i = 0; i < 6; i++)
-        d[i] = (more.b[i] - less.b[i]) / (2 * step_of_belief);
-    demand_share(6, told.P_b, plain.P_b, d, "bias");
-    for (unsigned i = 0; i < 6; i++)
-        d[i] = (more.u[i] - less.u[i]) / (2 * step_of_belief);
-    demand_share(6, told.P_u, plain.P_u, d, "velocity");
-    TEST_ASSERT_TRUE(plain.count > 4 && more.count == plain.count && less.count == plain.count);
+static void difference(unsigned n, const double *higher, const double *lower, double *d) {
+    for (unsigned i = 0; i < n; i++)
+        d[i] = (higher[i] - lower[i]) / (2 * step_of_belief);
+}
+
+static void compare_landmarks(unsigned axes) {
+    TEST_ASSERT_TRUE(plain.count > 4);
     for (unsigned k = 0; k < plain.count; k++) {
-        TEST_ASSERT_EQUAL_UINT32(more.landmarks[k].id, less.landmarks[k].id);
-        for (unsigned i = 0; i < 3; i++)
-            d[i] = (more.landmarks[k].p_W_m[i] - less.landmarks[k].p_W_m[i]) / (2 * step_of_belief);
-        demand_share(3, told.landmarks[k].P_W_m2, plain.landmarks[k].P_W_m2, d, "landmark");
+        moves m = {axes, {{0}}};
+        for (unsigned axis = 0; axis < axes; axis++) {
+            const plr_landmark *high = &more[axis].landmarks[k], *low = &less[axis].landmarks[k];
+            TEST_ASSERT_EQUAL_UINT32(high->id, low->id);
+            difference(3, high->p_W_m, low->p_W_m, m.d[axis]);
+        }
+        demand_share(3, told.landmarks[k].P_W_m2, plain.landmarks[k].P_W_m2, &m, "landmark");
     }
 }
 
-static void hold_against_others(void (*run)(parameter, double, double, outcome *), double step) {
+static void compare(unsigned axes) {
+    moves pose = {axes, {{0}}}, bias = {axes, {{0}}}, velocity = {axes, {{0}}};
+    for (unsigned axis = 0; axis < axes; axis++) {
+        const outcome *high = &more[axis], *low = &less[axis];
+        double back[16], moved[16], xi[6];
+        rigid_inverse(back, low->T);
+        square_multiply(4, back, high->T, moved);
+        rigid_log(xi, moved);
+        for (unsigned i = 0; i < 6; i++)
+            pose.d[axis][i] = xi[i] / (2 * step_of_belief);
+        difference(6, high->b, low->b, bias.d[axis]);
+        difference(6, high->u, low->u, velocity.d[axis]);
+        TEST_ASSERT_TRUE(high->count == plain.count && low->count == plain.count);
+    }
+    TEST_ASSERT_TRUE(demand_share(6, told.P_xi, plain.P_xi, &pose, "pose") > 1e-6);
+    demand_share(6, told.P_b, plain.P_b, &bias, "bias");
+    demand_share(6, told.P_u, plain.P_u, &velocity, "velocity");
+    compare_landmarks(axes);
+}
+
+static void hold_against_others(void (*run)(const belief *, double, outcome *), double step) {
     step_of_belief = PLR_REAL == 32 ? step : 1e-5;
     for (int what = 0; what < PARAMETERS; what++) {
-        run((parameter)what, 0, 0, &plain);
-        run((parameter)what, step_of_belief, 0, &more);
-        run((parameter)what, -step_of_belief, 0, &less);
-        run((parameter)what, 0, SIGMA, &told);
+        const unsigned axes = what == TURN ? AXES : 1;
+        const belief truth = {(parameter)what, 0, 0};
+        run(&truth, 0, &plain);
+        for (unsigned axis = 0; axis < axes; axis++) {
+            const belief higher = {(parameter)what, axis, step_of_belief};
+            const belief lower = {(parameter)what, axis, -step_of_belief};
+            run(&higher, 0, &more[axis]);
+            run(&lower, 0, &less[axis]);
+        }
+        run(&truth, SIGMA, &told);
         TEST_ASSERT_EQUAL_MEMORY(plain.T, told.T, sizeof told.T); /* it changes no estimate */
         TEST_ASSERT_EQUAL_MEMORY(plain.b, told.b, sizeof told.b);
-        compare();
+        compare(axes);
         consider(&rig.config, (parameter)what, 0);
         consider(&imu_rig.config, (parameter)what, 0);
     }

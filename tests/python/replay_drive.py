@@ -169,7 +169,7 @@ def err0_m(log: Path) -> float:
 
 
 # A simulated camera is what it is said to be: what is told is of the noise alone.
-EXACT_CAMERA = ("--focal-sigma", "0", "--baseline-sigma", "0")
+EXACT_CAMERA = ("--focal-sigma", "0", "--baseline-sigma", "0", "--camera-turn-sigma", "0")
 
 
 def judged(

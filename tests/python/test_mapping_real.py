@@ -88,6 +88,8 @@ def test_mapping_is_as_good_as_a_fit_of_each_landmark_by_itself(
         config,
         "--pixel-sigma",
         "5",
+        "--camera-turn-sigma",
+        "0",
         "--mode",
         "mapping",
         "--gate",

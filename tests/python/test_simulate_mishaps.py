@@ -258,6 +258,21 @@ def test_a_wrong_focal_length_stretches_the_image_about_its_middle() -> None:
     assert np.allclose(wrong.tracks.pixels[ours], due)
 
 
+def test_a_turned_camera_sees_every_point_in_another_direction() -> None:
+    degrees = 2.0
+    plain, wrong = with_mishaps(), with_mishaps(camera_turned_deg=degrees)
+    assert np.array_equal(wrong.header.R_CB, plain.header.R_CB)
+    mine = (wrong.tracks.frame == 0)[:, None] & (wrong.tracks.id[:, None] == plain.tracks.id)
+    ours, theirs = np.nonzero(mine & (plain.tracks.frame == 0))
+    assert len(ours) > 10
+    seen = triangulate(plain.header.camera, wrong.tracks.pixels[ours])
+    due = triangulate(plain.header.camera, plain.tracks.pixels[theirs])
+    turn = se3.exp(np.zeros(3), np.radians(degrees) / np.sqrt(3.0) * np.ones(3)).R
+    assert np.allclose(seen, due @ turn.T)
+    assert plain.settings["camera-turn-sigma"] == 0.0
+    assert not wrong.settings
+
+
 # --- what is told and refused ---------------------------------------------------------------------
 
 
@@ -282,6 +297,7 @@ def test_mishaps_are_options_of_the_command(tmp_path: Path, pelorus: Run) -> Non
         *("--track-drift", 0.5, "--moving", 0.3, "--convoy", 0.8, "--moving-from", 1),
         *("--moving-for", 1, "--jump", 0.5, "--jump-at", 2, "--baseline-error", 2),
         *("--focal-error", -1, "--twist-delay", 0.005, "--moving-speed", 0.1),
+        *("--camera-turned", 0.5),
     ]
     pelorus("simulate", target, *options)
     mishaps = Mishaps(
@@ -299,6 +315,7 @@ def test_mishaps_are_options_of_the_command(tmp_path: Path, pelorus: Run) -> Non
         jump_at_s=2,
         baseline_error_percent=2,
         focal_error_percent=-1,
+        camera_turned_deg=0.5,
     )
     simulate(Options(duration_s=3, mishaps=mishaps)).recording.write(again)
     assert target.read_bytes() == again.read_bytes()
@@ -315,6 +332,7 @@ def test_mishaps_are_options_of_the_command(tmp_path: Path, pelorus: Run) -> Non
         (("--frozen-from", -3), "--frozen-from is -3.0: a number of seconds"),
         (("--slip-for", "nan"), "--slip-for is nan"),
         (("--baseline-error", 80), "--baseline-error is 80.0: a number of percent"),
+        (("--camera-turned", 90), "--camera-turned is 90.0: a number of degrees from -20 to 20"),
         (("--jump", "inf"), "--jump is inf: a finite number"),
         (("--baseline", 0), "--baseline is 0.0: a positive number"),
         (("--min-depth", 5, "--max-depth", 4), "--max-depth is 4.0: more than --min-depth"),

@@ -7,6 +7,7 @@
 #include <unity.h>
 
 #include "support/chi_square.h"
+#include "support/exact_camera.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
@@ -20,7 +21,7 @@ void imu_rig_set_up(void) {
     plr_config *config = &imu_rig.config;
     imu_flight_options_default(options);
     plr_config_default(config);
-    config->focal_sigma = config->baseline_sigma = 0; /* it is exact */
+    exact_camera(config);
     config->process = PLR_PROCESS_IMU;
     config->pixel_sigma_px = options->pixel_sigma_px;
     config->gyro_noise = options->gyro_noise;

@@ -7,6 +7,7 @@
 #include <unity.h>
 
 #include "state/covariance.h"
+#include "support/exact_camera.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
 #include "support/specimens.h"
@@ -19,7 +20,7 @@ void rig_set_up(void) {
     scene_options_default(&rig.options);
     scene_calibration(&rig.calibration);
     plr_config_default(&rig.config);
-    rig.config.focal_sigma = rig.config.baseline_sigma = 0; /* it is exact */
+    exact_camera(&rig.config);
     memset(&rig.map, 0, sizeof rig.map);
     rig_begin();
 }

@@ -3,6 +3,8 @@
 
 #include <unity.h>
 
+#include "support/exact_camera.h"
+
 twin_drive twins;
 
 static int record_eviction(void *context, const plr_landmark *landmark) {
@@ -13,7 +15,7 @@ static int record_eviction(void *context, const plr_landmark *landmark) {
 
 void twin_drive_set_up(void) {
     plr_config_default(&twins.config);
-    twins.config.focal_sigma = twins.config.baseline_sigma = 0; /* it is exact */
+    exact_camera(&twins.config);
     twins.config.slots = PLR_MAX_LANDMARKS < TWIN_MOST ? PLR_MAX_LANDMARKS : TWIN_MOST;
     twins.config.start_sigma = 0.01;
     twins.evictions = 0;

@@ -8,6 +8,7 @@
 #include "filter/trial.h"
 #include "pelorus/pelorus.h"
 #include "sensor/stereo.h"
+#include "support/exact_camera.h"
 #include "support/random.h"
 #include "support/scene.h"
 
@@ -26,7 +27,7 @@ void setUp(void) {
     plr_config config;
     plr_config_default(&config);
     config.pixel_sigma_px = SIGMA_PX;
-    config.focal_sigma = config.baseline_sigma = 0;
+    exact_camera(&config);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &camera, &config, NULL));
     memset(&candidates, 0, sizeof candidates);
     for (unsigned h = 0; h < PLR_MOTIONS; h++)

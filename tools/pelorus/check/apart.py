@@ -108,7 +108,7 @@ class _Part(NamedTuple):
 
 
 # What an error of the calibration does, it does to both halves.
-SAME_CAMERA = {"focal-sigma": "0", "baseline-sigma": "0"}
+SAME_CAMERA = {"focal-sigma": "0", "baseline-sigma": "0", "camera-turn-sigma": "0"}
 
 
 class Parts:

@@ -10,7 +10,7 @@ then stays untold.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,10 +20,11 @@ from pelorus.check.options import Settings
 from pelorus.check.outcome import SCALE, Bench
 from pelorus.check.parameters import PAYS
 from pelorus.consistency import mean, nees_per_dof
-from pelorus.faults.agreement import NO_BIAS_MPS, agreement
+from pelorus.faults.agreement import NO_BIAS_MPS, Agreement, agreement
 from pelorus.faults.handeye import first_part
 from pelorus.faults.two_views import TwoViews
 from pelorus.frames import Message
+from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.settings import in_force
 from pelorus.trajectory import estimate_in
@@ -104,28 +105,37 @@ class Doubt:
         return self.sigma > BY_BIAS * self.unbiased
 
 
-def doubted(recording: Recording, views: TwoViews, messages: Sequence[Message]) -> Doubt | None:
-    """Of a run with its settings' biases; None where too few frames tell. `views` of
-    neighbouring frames of the first part.
+def agreed(recording: Recording, views: TwoViews, messages: Sequence[Message]) -> Agreement | None:
+    """Images and twists of a run with its settings' biases; None where too few frames tell. `views`
+    of neighbouring frames of the first part.
     """
-    bias = in_force(messages, "bias-velocity-sigma") if in_force(messages, "bias") else None
     short = first_part(recording)
-    noise = replace(short.header.noise, bias_velocity_sigma_mps=max(bias or 0.0, NO_BIAS_MPS))
-    short = short.with_header(noise=noise)
-    found = agreement(short, views)
-    if not found.told:
-        return None
-    doubt = Doubt(found.scale, found.scale_sigma, bias or 0.0, found.through_zero_sigma, 0.0)
+    bias = max(bias_of(messages), NO_BIAS_MPS)
+    noise = replace(short.header.noise, bias_velocity_sigma_mps=bias)
+    found = agreement(short.with_header(noise=noise), views)
+    return found if found.told else None
+
+
+def bias_of(messages: Sequence[Message]) -> float:
+    """Sigma of the velocities' bias in a run, m/s; 0 where there is none."""
+    return (in_force(messages, "bias-velocity-sigma") or 0.0) if in_force(messages, "bias") else 0.0
+
+
+def doubted(found: Agreement, messages: Sequence[Message]) -> Doubt:
+    """Of the scale, in a run."""
+    doubt = Doubt(found.scale, found.scale_sigma, bias_of(messages), found.through_zero_sigma, 0.0)
     given = in_force(messages, "baseline-sigma") or 0.0
-    return replace(doubt, adds=_added_nees(doubt.share, messages), given=given)
+    return replace(doubt, adds=added_nees(messages, lambda way: doubt.share * way), given=given)
 
 
-def _added_nees(share: float, messages: Sequence[Message]) -> float:
-    """Each pose moves by that share of the way from the start."""
+def added_nees(messages: Sequence[Message], off_by: Callable[[Floats], Floats]) -> float:
+    """What it adds to the mean NEES of a run, a degree of freedom, if each pose is off by `off_by`
+    the way from the start, (n, 3) in its own axes.
+    """
     found = estimate_in(messages)
     if found is None:
         return 0.0
     (_, poses), P = found
     way_B = np.einsum("nji,nj->ni", poses.R, poses.p - poses.p[0])
-    off = np.hstack((share * way_B, np.zeros_like(way_B)))
+    off = np.hstack((off_by(way_B), np.zeros_like(way_B)))
     return mean(nees_per_dof(off, P)) or 0.0

@@ -10,6 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.arrivals import late_ones
+from pelorus.check.mount import SETTING, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
 from pelorus.frame_table import BIASES, FrameTable, frame_table
@@ -239,10 +240,24 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
     yield Remark(Grade.CARE, words)
 
 
-def of_scale(doubt: Doubt | None) -> Iterator[Remark]:
-    """What is known of the stereo pair's scale is what the twists confirm."""
-    if doubt is None:
+def of_calibration(parts: Sequence[Doubt | Turned]) -> Iterator[Remark]:
+    """What images and twists together say of the camera."""
+    for part in parts:
+        yield from of_turn(part) if isinstance(part, Turned) else of_scale(part)
+
+
+def of_turn(found: Turned) -> Iterator[Remark]:
+    """Whether the camera looks where T_CB says."""
+    if not found.is_off:
         return
+    words = f"the camera looks {found.angle_deg:.1f} +- {found.sigma_deg:.1f} degrees beside where "
+    words += f"T_CB says: positions may be off by {found.beyond:.1%} of the way"
+    words += f", for which {SETTING} stands" if found.setting else ""
+    yield Remark(Grade.CARE, f"{words}. Calibrate the camera's place on the body once more")
+
+
+def of_scale(doubt: Doubt) -> Iterator[Remark]:
+    """What is known of the stereo pair's scale is what the twists confirm."""
     if doubt.is_untold:
         yield Remark(
             Grade.CARE,
@@ -285,7 +300,8 @@ def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
         if ratios and max(ratios) > OTHER_SIGMA:
             words = ",".join(f"{x:.3g}" for x in was)
             said.append(f"{parameter.setting} {words} should be {written}")
-    for setting in ("twist-timing", "imu-timing", "bias", "camera-offset", "baseline-sigma"):
+    kept = ("twist-timing", "imu-timing", "bias", "camera-offset", "baseline-sigma", SETTING)
+    for setting in kept:
         value = tuned.settings.get(setting)
         if value is not None and value != given.get(setting, _usual(setting, header)):
             said.append(f"{setting} should be {value}")

@@ -17,8 +17,9 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.se3 import Poses
 from pelorus.simulation import settings
-from pelorus.simulation.drive import rotate
+from pelorus.simulation.drive import exp, rotate
 from pelorus.simulation.settings import (
+    DEGREES,
     FINITE,
     NOT_NEGATIVE,
     PERCENT,
@@ -71,6 +72,13 @@ class Mishaps:
         0.0, "The true focal length is so much larger than the header's.", "PERCENT", PERCENT
     )
 
+    camera_turned_deg: float = setting(
+        0.0,
+        "The true camera is turned so far beside the header's T_CB, about all axes alike.",
+        "DEG",
+        DEGREES,
+    )
+
     def check(self) -> None:
         """Refuse what makes no sense, by the option's name."""
         settings.check(self)
@@ -95,6 +103,14 @@ class Mishaps:
             fy_px=focal * told.fy_px,
             baseline_m=(1 + self.baseline_error_percent / 100) * told.baseline_m,
         )
+
+    def true_extrinsic(self, told: Poses) -> Poses:
+        """T_CB of the camera that makes the images: turned about its own middle."""
+        if not self.camera_turned_deg:
+            return told
+        about_each = np.radians(self.camera_turned_deg) / np.sqrt(3.0)
+        turn = exp(np.zeros((1, 3)), np.full((1, 3), about_each)).R[0]
+        return Poses(rotate(turn, told.R.T).T, rotate(turn, told.p))
 
     def readings(self, t_ns: Times, v: Floats, w: Floats) -> tuple[Floats, Floats]:
         """What the recording has of the twists."""

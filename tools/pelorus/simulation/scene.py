@@ -69,10 +69,11 @@ def view(
     range_m: float,
     camera: Camera = CAMERA,
     depths: Depths = ANY_DEPTH,
+    extrinsic: Poses = T_CB,
 ) -> View:
     """What the camera of a body at (R, p) sees of the points."""
     in_body = rotate(R_WB.T, points_W - p_WB)
-    q = rotate(T_CB.R, in_body) + T_CB.p
+    q = rotate(extrinsic.R, in_body) + extrinsic.p
     x, y, z = q.T
     depth = np.maximum(z, DEPTH_MIN_M)
     u_left = camera.fx_px * x / depth + camera.cx_px

@@ -27,6 +27,7 @@ UNITS = (
     "_px",
     "_m",
     "_percent",
+    "_deg",
 )  # an option's name has no unit
 
 
@@ -47,6 +48,7 @@ SHARE = Rule(lambda x: 0 <= x <= 1, "a fraction from 0 to 1")
 BELOW_ONE = Rule(lambda x: 0 <= x < 1, "a fraction from 0 to below 1")
 AT_LEAST_ONE = Rule(lambda x: x >= 1, "at least 1")
 PERCENT = Rule(lambda x: -50 <= x <= 50, "a number of percent from -50 to 50")
+DEGREES = Rule(lambda x: -20 <= x <= 20, "a number of degrees from -20 to 20")
 TIME = Rule(lambda x: 0 <= x < math.inf, "a number of seconds, not negative")
 
 

@@ -238,8 +238,10 @@ def simulate(options: Options) -> Simulation:
 
 def _exact_camera(options: Options) -> dict[str, float]:
     """No simulated camera is off by what a calibration leaves, unless that is asked for."""
-    off = options.mishaps.focal_error_percent or options.mishaps.baseline_error_percent
-    return {} if off else {"focal-sigma": 0.0, "baseline-sigma": 0.0}
+    mishaps = options.mishaps
+    off = mishaps.focal_error_percent or mishaps.baseline_error_percent or mishaps.camera_turned_deg
+    sigmas = ("focal-sigma", "baseline-sigma", "camera-turn-sigma")
+    return {} if off else dict.fromkeys(sigmas, 0.0)
 
 
 def _landmarks(options: Options, chances: _Chances) -> Floats:
@@ -355,6 +357,7 @@ class _Eye:
         mishaps = options.mishaps
         self._options = options
         self._camera = mishaps.true_camera(options.camera)
+        self._extrinsic = mishaps.true_extrinsic(scene.T_CB)
         self._poses = poses
         self._points = points
         moves = chances["moving"].random(len(points)) < mishaps.moving
@@ -367,7 +370,8 @@ class _Eye:
         options = self._options
         points = np.where(self._moves, self._points + self._ways[k], self._points)
         R, p = self._poses.at(k)
-        return scene.view(R, p, points, options.seen_m, self._camera, options.depths)
+        seen = (options.seen_m, self._camera, options.depths, self._extrinsic)
+        return scene.view(R, p, points, *seen)
 
     def drift(self, k: int, landmarks: Indices, ids: NDArray[np.int64]) -> Floats:
         return self._drift.wander(landmarks, ids, float(self._tau_s[k]))

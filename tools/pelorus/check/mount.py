@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Does the camera look where T_CB says? A degree beside it is neither noise nor a clock: every way
+is askew by as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pelorus.check.scale import ADDS, added_nees
+from pelorus.faults.agreement import Agreement
+from pelorus.frames import Message
+from pelorus.layout import Floats
+from pelorus.settings import in_force
+
+SURE = 4.5  # sigmas; on 60 drives with a right T_CB up to 4.4 were seen, with 1 degree mostly 8
+SETTING, SETTING_MOST = "camera-turn-sigma", 0.2  # rad, that it takes
+
+
+@dataclass(frozen=True)
+class Turned:
+    """The images show the camera turned by `turn_rad` in the body's axes beside the given T_CB,
+    with this covariance. `adds`: what that adds to the mean NEES of the run, a degree of freedom.
+    """
+
+    turn_rad: Floats
+    covariance: Floats
+    adds: float = 0.0
+    given: float = 0.0  # camera-turn-sigma of the run
+
+    @property
+    def angle_deg(self) -> float:
+        return float(np.degrees(np.linalg.norm(self.turn_rad)))
+
+    @property
+    def sigma_deg(self) -> float:
+        """Of the angle."""
+        axis = self.turn_rad / (np.linalg.norm(self.turn_rad) + 1e-12)
+        return float(np.degrees(np.sqrt(axis @ self.covariance @ axis)))
+
+    @property
+    def is_off(self) -> bool:
+        """Surely, and by more than the filter says of its positions."""
+        d2 = self.turn_rad @ np.linalg.solve(self.covariance, self.turn_rad)
+        return bool(d2 > SURE**2) and self.adds > ADDS
+
+    @property
+    def beyond(self) -> float:
+        """Of the way, by which positions may be off where that is so, else 0."""
+        return float(np.linalg.norm(self.turn_rad)) if self.is_off else 0.0
+
+    @property
+    def setting(self) -> dict[str, str]:
+        """By which the covariances contain it, where they do not."""
+        each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
+        if not self.is_off or each <= self.given:
+            return {}
+        return {SETTING: f"{min(each, SETTING_MOST):.2g}"}
+
+
+def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
+    """Of a run by twists."""
+    if found.tilt_rad is None or found.tilt_covariance is None:
+        return None
+    tilt = found.tilt_rad
+    adds = added_nees(messages, lambda way: np.cross(tilt, way))
+    given = in_force(messages, SETTING) or 0.0
+    return replace(Turned(tilt, found.tilt_covariance), adds=adds, given=given)
