@@ -257,6 +257,14 @@ typedef struct plr_config {
      * for a mount that was measured by hand. Otherwise as focal-sigma. */
     double camera_turn_sigma_rad;
 
+    /* Setting track-drift [px/sqrt(s)]: 0 to 100, default 0.
+     * How far tracks wander off their points: sigma after a second, growing as the root of time. A
+     * tracker that follows a patch from frame to frame (KLT) drifts, by 0.5 to 1 on KITTI's streets;
+     * `pelorus check` measures it. Without it the filter averages over a long track as if each frame
+     * showed the same point, and is more certain than it may be. Landmarks of the map do not drift.
+     * With `body` alone. */
+    double track_drift_px;
+
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
      * Take several times the data sheet's figure: vibration, scale and timing errors come on top,

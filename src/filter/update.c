@@ -179,6 +179,12 @@ static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, uns
     return plr_correct(f, choose(f, frame, n, report), NULL, 0);
 }
 
+/* Since the last frame the tracks have wandered off their points. */
+static void let_tracks_drift(plr_filter *f) {
+    if (f->last_frame_ns != PLR_NEVER_NS && f->par.track_drift > 0)
+        plr_covariance_add_drift(f, f->par.track_drift * plr_seconds(f->t_ns - f->last_frame_ns));
+}
+
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_frame_events events = {0};
     const plr_observation *seen = frame->observations;
@@ -186,6 +192,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_match_slots(f, seen, n);
     plr_match_known(f, seen, n, &events, report);
     const unsigned matched = n;
+    let_tracks_drift(f);
     if (f->config.model == PLR_MODEL_BODY && plr_frozen_is_seen(f, frame, n))
         n = 0; /* it does not show the present */
     plr_reading still;

@@ -85,6 +85,7 @@ static const plr_row rows[] = {
     {{51, "focal-sigma", "", "by what share the focal length may be wrong; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(focal_sigma), STORE_DOUBLE},
     {{52, "baseline-sigma", "", "the same of the baseline", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(baseline_sigma), STORE_DOUBLE},
     {{53, "camera-turn-sigma", "rad", "by how much the camera may be turned on the body; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.2, 0.003}, AT(camera_turn_sigma_rad), STORE_DOUBLE},
+    {{54, "track-drift", "px/sqrt(s)", "how far tracks wander off their points in a second", PLR_SETTING_NUMBER, NULL, 0, 100, 0}, AT(track_drift_px), STORE_DOUBLE},
 };
 /* clang-format on */
 
@@ -234,6 +235,8 @@ plr_status plr_config_check(const plr_config *config, const plr_setting **culpri
             return refuse(culprit, &rows[i].setting);
     if (config->model == PLR_MODEL_BODY && config->landmark_sigma_m > 0)
         return refuse(culprit, plr_setting_by_name("landmark-sigma"));
+    if (config->model == PLR_MODEL_WORLD && config->track_drift_px > 0)
+        return refuse(culprit, plr_setting_by_name("track-drift"));
     if (config->landmark_prior == PLR_PRIOR_INDEPENDENT) {
         if (config->model == PLR_MODEL_BODY)
             return refuse(culprit, plr_setting_by_name("landmark-prior"));

@@ -78,6 +78,14 @@ void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_re
         f->P[plr_packed_at(i, i)] += variance[i - row];
 }
 
+void plr_covariance_add_drift(plr_filter *f, plr_real variance) {
+    for (unsigned slot = 0; slot < f->count; slot++)
+        for (unsigned bearing = 0; bearing < 2 && !f->slots[slot].known; bearing++) {
+            const unsigned i = plr_covariance_row(f, slot) + bearing;
+            f->P[plr_packed_at(i, i)] += variance;
+        }
+}
+
 void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P) {
     plr_get_block(f, plr_row_of(f, rows), plr_block_size(f, rows), plr_row_of(f, columns),
                   plr_block_size(f, columns), P);

@@ -30,6 +30,8 @@ static const struct field {
     {"gyro", offsetof(scenario, gyro_radps), NUMBER, 0, 10},
     {"bias", offsetof(scenario, bias), SWITCH, 0, 1},
     {"wrong-matches", offsetof(scenario, wrong_matches), NUMBER, 0, 1},
+    {"track-drift", offsetof(scenario, track_drift), NUMBER, 0, 100},
+    {"told-drift", offsetof(scenario, told_drift), NUMBER, 0, 100},
     {"lost-tracks", offsetof(scenario, lost_tracks), NUMBER, 0, 1},
     {"before", offsetof(scenario, before), COUNT, 0, 1e6},
     {"during", offsetof(scenario, during), COUNT, 0, 1e6},

@@ -58,6 +58,8 @@ typedef struct scenario {
     bool bias;            /* biases drawn from the prior and estimated; else none, and off */
     bool few;             /* 0, 1, 2 matches in turn after the first second */
     double wrong_matches; /* share of observations that show another point, each for one frame */
+    double track_drift;   /* by which tracks wander off their point in a second, px */
+    double told_drift;    /* what the filter is told of it */
     double lost_tracks;   /* share of tracks that show another point from a frame on */
     unsigned before, during, after; /* frames */
     mishap mishap;

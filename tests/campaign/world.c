@@ -35,6 +35,7 @@ static void place(world *w, point *p) {
         pose_outwards(&w->T_WB, x_B, p->m);
     } while (!world_project(w, p, z));
     p->lot = chance_uniform(&w->chance, 0, 1);
+    p->drift_px[0] = p->drift_px[1] = 0;
     p->id = w->next_id++;
 }
 
@@ -181,6 +182,11 @@ bool world_project(const world *w, const point *p, double z[4]) {
            z[1] < HEIGHT_PX;
 }
 
+static void wander(world *w, point *p) {
+    for (int i = 0; i < 2; i++)
+        p->drift_px[i] += w->s->track_drift / sqrt(FRAME_HZ) * chance_normal(&w->chance);
+}
+
 void world_renew(world *w) {
     double z[4];
     for (unsigned k = 0; k < w->s->landmarks && !w->s->room; k++)
@@ -188,4 +194,6 @@ void world_renew(world *w) {
             place(w, &w->points[k]);
         else if (w->s->lost_tracks > 0 && chance_uniform(&w->chance, 0, 1) < w->s->lost_tracks)
             swap(w, &w->points[k]);
+        else if (w->s->track_drift > 0)
+            wander(w, &w->points[k]);
 }

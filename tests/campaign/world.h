@@ -13,7 +13,8 @@ enum { MAX_POINTS = 128, WIDTH_PX = 640, HEIGHT_PX = 480 };
 
 typedef struct point {
     double m[3];
-    double lot; /* uniform in 0..1: whether it belongs to a convoy */
+    double lot;         /* uniform in 0..1: whether it belongs to a convoy */
+    double drift_px[2]; /* how far its track has wandered, in both pictures alike */
     uint32_t id;
 } point;
 
@@ -52,8 +53,8 @@ void world_mend(world *w);
 /* (uL, vL, uR, vR) without noise; false if the point is not in sight of both cameras. */
 bool world_project(const world *w, const point *p, double z[4]);
 
-/* Points out of sight are replaced by new ones with new ids, and points whose track is lost by new ones
- * under the same id. */
+/* From one frame to the next: points out of sight are replaced by new ones with new ids, and points whose
+ * track is lost by new ones under the same id; the other tracks wander. */
 void world_renew(world *w);
 
 #endif

@@ -262,7 +262,11 @@ static void test_combinations_without_sense_are_refused(void) {
     demand_culprit("landmark-sigma");
     config.model = PLR_MODEL_WORLD;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_check(&config, NULL));
+    config.track_drift_px = 0.5; /* `body` alone tells a landmark by bearings */
+    demand_culprit("track-drift");
     setUp();
+    config.track_drift_px = 0.5;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_check(&config, NULL));
     config.min_depth_m = 50;
     config.max_range_m = 50;
     demand_culprit("min-depth");

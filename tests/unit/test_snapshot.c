@@ -282,7 +282,7 @@ static uint64_t number_at(uint32_t offset, unsigned bytes) {
 /* docs/STATE-FORMAT.md, by its own figures. */
 static void test_the_layout_is_the_documented_one(void) {
     const uint32_t real = sizeof(plr_real);
-    const uint32_t count_at = 13 + 9 * 53 + 17 * real;
+    const uint32_t count_at = 13 + 9 * 54 + 17 * real;
     const uint32_t frames_at = count_at + 4 + 16 + 2 + 24 + 2 + 143 * real;
     const uint32_t health_at = frames_at + 4 + 16 + 10 + 8 + 4 + 8 + 333 * real;
     const uint32_t totals_at = health_at + 5 + 16 + 4 + 8;
@@ -295,7 +295,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_MEMORY("PLRF", state.bytes, 4);
     TEST_ASSERT_EQUAL_UINT32(8, number_at(4, 4));
     TEST_ASSERT_EQUAL_UINT32(plr_build_fingerprint(), number_at(8, 4));
-    TEST_ASSERT_EQUAL_UINT(53, state.bytes[12]);
+    TEST_ASSERT_EQUAL_UINT(54, state.bytes[12]);
     TEST_ASSERT_EQUAL_UINT(driven.count, number_at(count_at, 4));
     TEST_ASSERT_EQUAL_UINT64(driven.t_ns, number_at(count_at + 4, 8));
     TEST_ASSERT_EQUAL_UINT32(driven.frame_number, number_at(frames_at, 4));
@@ -307,7 +307,7 @@ static void test_the_layout_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT32(driven.slots[0].id, number_at(id_at, 4));
     TEST_ASSERT_EQUAL_UINT32(driven.slots[1].id, number_at(id_at + slot, 4));
     TEST_ASSERT_EQUAL_HEX32(driven.slots[1].pixel_hash, number_at(id_at + slot + 16, 4));
-    TEST_ASSERT_EQUAL_UINT32(745 + 493 * real, slots_at);
+    TEST_ASSERT_EQUAL_UINT32(754 + 493 * real, slots_at);
     TEST_ASSERT_EQUAL_UINT32(
         slots_at + driven.count * slot + (dim * (dim + 1) / 2 + PLR_CALIBRATIONS * dim) * real, state.length);
 }

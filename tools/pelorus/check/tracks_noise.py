@@ -3,9 +3,9 @@
 
 White noise is as large after five frames as after one. A tracker that drifts is off by more the
 longer it follows a point, and the filter, which takes each frame's noise for new, believes such
-tracks too much: the likelihood of one step cannot see that. What stands for it is a larger sigma:
-noise of variance s^2 that keeps the share r from frame to frame averages out as white noise of
-s^2 (1 + r) / (1 - r) does.
+tracks too much: the likelihood of one step cannot see that. The setting track-drift says how far
+they wander. What they share and keep besides needs a larger sigma as well: noise of variance s^2
+that keeps the share r from frame to frame averages out as white noise of s^2 (1 + r) / (1 - r).
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import numpy as np
 from pelorus import visual_motion
 from pelorus.console import progress
 from pelorus.layout import Floats
+from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.row_gaps import TOLD_ABOVE_PX, RowGaps, row_gaps
 from pelorus.visual_motion import seen_pairs
 
+DRIFT = "track-drift"
 LAGS = (1, 2, 3, 5)
 DRIFTS_ABOVE = 1.25  # of sigma at lag 5 to that at lag 1: simulated white noise gives 0.97 to 1.05
 KEEPS = 0.86  # r: trackers of KITTI drives keep 0.83 to 0.93; lags up to 5 cannot tell it well
@@ -30,12 +32,15 @@ KNOWN_TO = 1.5  # times: that range of r alone makes sigma 0.8 to 1.3 times as l
 
 @dataclass(frozen=True)
 class TrackNoise:
-    """Sigma by lag, px (NaN: too few points are seen twice), and the one that stands for all."""
+    """Sigma by lag, px (NaN: too few points are seen twice), the one that stands for all, and how
+    far tracks wander in a second, px/sqrt(s).
+    """
 
     by_lag: dict[int, float]
     stands_for_px: float
     rows: RowGaps | None = None
     points: float = 0.0  # of a frame, in the median
+    wanders_px: float = 0.0
 
     @property
     def rows_px(self) -> float:
@@ -59,6 +64,11 @@ class TrackNoise:
     def drifts(self) -> bool:
         return self.growth > DRIFTS_ABOVE
 
+    @property
+    def setting(self) -> dict[str, str]:
+        """What the filter is told of the drift."""
+        return {DRIFT: f"{self.wanders_px:.2g}"} if self.drifts else {}
+
 
 def told_apart(found: float, given: float) -> bool:
     """Is a sigma that only stands for something clearly another one than the given one? Not where
@@ -77,7 +87,20 @@ def track_noise(recording: Recording) -> TrackNoise:
         by_lag[lag] = visual_motion.pixel_sigma(seen, camera, motion)
     tracks = recording.tracks
     points = float(np.median(tracks.counts())) if tracks.frame_count else 0.0
-    return TrackNoise(by_lag, _stands_for(by_lag), row_gaps(tracks), points)
+    wanders_px = _wanders(by_lag, recording.frame_t_ns)
+    return TrackNoise(by_lag, _stands_for(by_lag), row_gaps(tracks), points, wanders_px)
+
+
+def _wanders(by_lag: dict[int, float], frame_t_ns: Times) -> float:
+    """d, px/sqrt(s): sigma_lag^2 = w + lag tau d^2 / 2, for two views share the difference."""
+    lags = np.array([lag for lag, sigma in by_lag.items() if np.isfinite(sigma)], np.float64)
+    if len(lags) < 2:
+        return 0.0
+    tau_s = float(np.median(np.diff(frame_t_ns))) * 1e-9
+    due = np.array([by_lag[int(lag)] ** 2 for lag in lags])
+    columns: Floats = np.stack((np.ones(len(lags)), tau_s * lags / 2), axis=-1)
+    _, d2 = np.linalg.lstsq(columns, due, rcond=None)[0]
+    return float(np.sqrt(max(d2, 0.0)))
 
 
 def _stands_for(by_lag: dict[int, float]) -> float:

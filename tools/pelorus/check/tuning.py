@@ -32,7 +32,7 @@ from pelorus.check.parameters import (
     written,
 )
 from pelorus.check.search import COARSE, COARSE_FRAMES, Found, search_noises
-from pelorus.check.tracks_noise import TrackNoise, told_apart, track_noise
+from pelorus.check.tracks_noise import DRIFT, TrackNoise, told_apart, track_noise
 from pelorus.converters.twist_noise import Spread, difference_of_a_reading
 
 SPREAD_FRAMES = 20  # tell a spread to a fifth: enough to begin with
@@ -56,10 +56,11 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     fixed = {k: v for k, v in given.items() if not k.startswith(names)}
     fixed[OFFSET] = fixed.pop("camera-offset", "0")
     if noise.drifts:
+        fixed.pop(DRIFT, None)  # what one step tells of biases, it tells without it
         found = _of_drifting_tracks(bench, fixed, start, noise)
         fixed, words = told_in_drift(bench, fixed, found.values)
         offset_s = float(fixed.pop(OFFSET))
-        settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
+        settings = fixed | written(found.values, TWIST) | offset_settings(offset_s) | noise.setting
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | fewer_slots(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)

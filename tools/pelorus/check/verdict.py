@@ -13,6 +13,7 @@ from pelorus.arrivals import late_ones
 from pelorus.check.mount import SETTING, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
+from pelorus.check.tracks_noise import DRIFT
 from pelorus.frame_table import BIASES, FrameTable, frame_table
 from pelorus.frames import Header, Message, Report
 from pelorus.health import TimeLine, time_line
@@ -211,9 +212,10 @@ def _tracks(tuned: Tuned) -> Iterator[Remark]:
     yield Remark(
         Grade.CARE,
         f"the tracks drift: points are off by {known[first]:.2f} px after {first} frame and by "
-        f"{known[last]:.2f} px after {last}; in pixel-sigma, {noise.stands_for_px:.2g} px or more "
-        "stand for that. Timing, clocks and the noise of single axes cannot be told by the "
-        "likelihood of single steps then, and stay as given",
+        f"{known[last]:.2f} px after {last}; track-drift {noise.wanders_px:.2g} px/sqrt(s) and in "
+        f"pixel-sigma {noise.stands_for_px:.2g} px or more stand for that. Timing, clocks and the "
+        "noise of single axes cannot be told by the likelihood of single steps then, and stay as "
+        "given",
     )
 
 
@@ -300,7 +302,7 @@ def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
         if ratios and max(ratios) > OTHER_SIGMA:
             words = ",".join(f"{x:.3g}" for x in was)
             said.append(f"{parameter.setting} {words} should be {written}")
-    kept = ("twist-timing", "imu-timing", "bias", "camera-offset", "baseline-sigma", SETTING)
+    kept = ("twist-timing", "imu-timing", "bias", "camera-offset", "baseline-sigma", SETTING, DRIFT)
     for setting in kept:
         value = tuned.settings.get(setting)
         if value is not None and value != given.get(setting, _usual(setting, header)):
