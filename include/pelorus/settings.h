@@ -72,8 +72,8 @@ typedef enum plr_landmark_prior {
  *
  * Within the limits some combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
- * in the model `body`; the independent landmark_prior without landmark_sigma_m; the process IMU in
- * the model `world`, or without `bias`. */
+ * in the model `body`; the independent landmark_prior without landmark_sigma_m; track_drift_px
+ * in the model `world`; the process IMU in the model `world`, or without `bias`. */
 typedef struct plr_config {
     /* Setting model: one of plr_model_kind, default PLR_MODEL_BODY. */
     uint8_t model;
@@ -251,18 +251,18 @@ typedef struct plr_config {
     double baseline_sigma;
 
     /* Setting camera-turn-sigma [rad]: 0 to 0.2, default 0.003.
-     * The error of the camera's attitude on the body (T_CB, less imu-turn), one sigma about each
-     * axis. A camera that looks 0.3 degrees aside sees a straight way half a percent askew, and at
-     * constant speed that looks like a bias. The default is what a careful calibration leaves; 0.01
-     * for a mount that was measured by hand. Otherwise as focal-sigma. */
+     * The error of the camera's attitude on the body (in T_CB), one sigma about each of its axes. A
+     * camera that looks 0.3 degrees aside sees a straight way half a percent askew, and at constant
+     * speed that looks like a bias. The default is what a careful calibration leaves, and covers half
+     * a degree; 0.01 for a mount that was measured by hand. Otherwise as focal-sigma. */
     double camera_turn_sigma_rad;
 
     /* Setting track-drift [px/sqrt(s)]: 0 to 100, default 0.
      * How far tracks wander off their points: sigma after a second, growing as the root of time. A
-     * tracker that follows a patch from frame to frame (KLT) drifts, by 0.5 to 1 on KITTI's streets;
-     * `pelorus check` measures it. Without it the filter averages over a long track as if each frame
-     * showed the same point, and is more certain than it may be. Landmarks of the map do not drift.
-     * With `body` alone. */
+     * tracker that follows a patch from frame to frame (KLT) drifts, by about 1 on KITTI's streets.
+     * Without it the filter averages over a long track as if each frame showed the same point, and
+     * is more certain than it may be. `pelorus check` measures what is more than about the pixels'
+     * noise in a second, to a third. Landmarks of the map do not drift. With `body` alone. */
     double track_drift_px;
 
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.

@@ -269,7 +269,7 @@ typedef struct plr_parameters {
     plr_real gate_d2, gate_residual2;
     plr_real min_disparity, max_depth, max_row_gap, min_depth;
     plr_real landmark_variance;
-    plr_real track_drift; /* variance that a bearing gains in a second, rad^2/s */
+    plr_real track_drift; /* variance by which tracks wander in a second, px^2/s */
     plr_real min_inverse_range;
     plr_real calibration_variance[PLR_CALIBRATIONS]; /* by plr_calibration_error; 0: exact */
     plr_time_ns max_gap_ns;

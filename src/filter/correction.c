@@ -6,7 +6,6 @@
 #include "math/dense.h"
 #include "math/log_product.h"
 #include "math/small.h"
-#include "pelorus/assertions.h"
 #include "process/velocity.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
@@ -18,8 +17,9 @@
 #include "state/sensitivity.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
-/* The columns of a batch's E, in whole tiles of rows of the product that they make. */
+/* The columns of a batch's E, and that they make whole tiles of rows of the product. */
 enum { OF_W, OF_DX = PLR_POSE_DIM, OF_S, WIDE = OF_S + PLR_CALIBRATIONS, TILE = 4 };
+enum { WHOLE_TILES = 1 / (WIDE % TILE == 0) };
 
 /* All measurements of a correction, in their order. After those of its arguments come two of the
  * biases. */
@@ -160,12 +160,11 @@ static void add_noise_information(plr_filter *f, const plr_batch *batch) {
 }
 
 /* W -= V E, dx += V y and S += V y, each column of S with its own y: the rows of one product with E.
- * Where no motion is open, its columns are zero. */
+ * Where no motion is open, its columns are zero, so what stands in W is left as it is. */
 static void update_estimate(plr_filter *f, const plr_batch *batch) {
     plr_workspace *w = &f->work;
     plr_real *rows[WIDE];
     unsigned used = OF_S; /* an exact camera's columns of S are zero, and stay so */
-    PLR_ASSERT(WIDE % TILE == 0);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         rows[OF_W + k] = w->noise.Wt + k * batch->ld;
     rows[OF_DX] = w->dx;

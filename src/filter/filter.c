@@ -77,7 +77,7 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     par->max_row_gap = (plr_real)c->max_row_gap_px;
     par->min_depth = (plr_real)c->min_depth_m;
     par->landmark_variance = squared(c->landmark_sigma_m);
-    par->track_drift = squared(c->track_drift_px / calibration->fx_px);
+    par->track_drift = squared(c->track_drift_px);
     par->min_inverse_range = (plr_real)(1 / c->max_range_m);
     par->calibration_variance[PLR_FOCAL_LENGTH] = squared(c->focal_sigma);
     par->calibration_variance[PLR_BASELINE] = squared(c->baseline_sigma);

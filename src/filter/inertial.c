@@ -148,9 +148,16 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
 
 /* ---------------------------------------------------------------- frames and the start */
 
-/* A point has moved if the square of its way in the picture, in units of that of two still pixels in
- * two directions, exceeds this: of still ones it is one in a thousand. */
+/* A point has moved if the square of its way in the picture exceeds so many times what is due of two
+ * still pixels in two directions: of still ones it is one in a thousand. */
 #define MOVED_ABOVE PLR_R(7)
+
+/* What is due, px^2: pixels have noise, and tracks have wandered since the stretch began. */
+static plr_real still2(const plr_filter *f) {
+    const plr_alignment *at = &f->either.alignment;
+    const plr_real seconds = at->count > 0 ? plr_seconds(f->t_ns - at->begin_ns) : PLR_R(0);
+    return PLR_R(4) * f->par.pixel_variance + PLR_R(2) * f->par.track_drift * seconds;
+}
 
 /* The watched point of this id, or a free place for it; NULL if there is none. */
 static plr_watched_point *watched(plr_alignment *at, uint32_t id) {
@@ -176,10 +183,9 @@ static void remember(plr_watched_point *point, const plr_observation *seen) {
 /* True if a watched point is seen at another place for the second time in a row: any match can be wrong,
  * the first one too. */
 static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_observation *seen) {
-    const plr_real still2 = PLR_R(4) * f->par.pixel_variance;
     const plr_real du = (plr_real)(seen->uL_px - point->u_px);
     const plr_real dv = (plr_real)(seen->vL_px - point->v_px);
-    const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2;
+    const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2(f);
     const bool again = elsewhere && (point->used & MOVED);
     if (elsewhere && !(point->used & CONFIRMED))
         remember(point, seen);

@@ -29,6 +29,7 @@
 #include "sensor/sensor.h"
 #include "sensor/stereo.h"
 #include "state/covariance.h"
+#include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
 #include "state/slots.h"
@@ -182,7 +183,7 @@ static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, uns
 /* Since the last frame the tracks have wandered off their points. */
 static void let_tracks_drift(plr_filter *f) {
     if (f->last_frame_ns != PLR_NEVER_NS && f->par.track_drift > 0)
-        plr_covariance_add_drift(f, f->par.track_drift * plr_seconds(f->t_ns - f->last_frame_ns));
+        plr_model_of(f)->drift(f, f->par.track_drift * plr_seconds(f->t_ns - f->last_frame_ns));
 }
 
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {

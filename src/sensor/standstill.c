@@ -29,13 +29,15 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
 const plr_sensor_kind plr_standstill = {
     .of_twist = measure, .place = 1, .axes = 3, .most_value = 1e4};
 
-/* The squared distance of a landmark's pixels from those that it was anchored at, in their
- * noise. */
+/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise and
+ * in what its track has wandered since. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {
+    const plr_real since = (plr_real)((double)(f->t_ns - slot->anchor_ns) * 1e-9);
+    const plr_real drift = f->par.track_drift * since;
     plr_real sum = 0;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real step = z[i] - slot->anchor[i];
-        sum += step * step / (PLR_R(2) * plr_stereo_variance(f, i));
+        sum += step * step / (PLR_R(2) * plr_stereo_variance(f, i) + drift);
     }
     return sum;
 }

@@ -78,12 +78,11 @@ void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_re
         f->P[plr_packed_at(i, i)] += variance[i - row];
 }
 
-void plr_covariance_add_drift(plr_filter *f, plr_real variance) {
-    for (unsigned slot = 0; slot < f->count; slot++)
-        for (unsigned bearing = 0; bearing < 2 && !f->slots[slot].known; bearing++) {
-            const unsigned i = plr_covariance_row(f, slot) + bearing;
-            f->P[plr_packed_at(i, i)] += variance;
-        }
+void plr_covariance_add_to_landmark(plr_filter *f, unsigned slot, const plr_real C[9]) {
+    const unsigned row = plr_covariance_row(f, slot);
+    for (unsigned i = 0; i < PLR_LANDMARK_DIM; i++)
+        for (unsigned j = 0; j <= i; j++)
+            f->P[plr_packed_at(row + i, row + j)] += C[PLR_LANDMARK_DIM * i + j];
 }
 
 void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P) {

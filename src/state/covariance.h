@@ -51,8 +51,8 @@ void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id col
  * rows x drivers. */
 void plr_covariance_with_drivers(const plr_filter *f, unsigned row, unsigned rows, plr_real *P);
 
-/* The two bearings of every landmark that is not known gain that variance, rad^2: in `body`. */
-void plr_covariance_add_drift(plr_filter *f, plr_real variance);
+/* A landmark's own block += C, 3x3 and symmetric. */
+void plr_covariance_add_to_landmark(plr_filter *f, unsigned slot, const plr_real C[9]);
 
 /* A landmark's own block, 3x3. */
 void plr_covariance_landmark(const plr_filter *f, unsigned slot, plr_real P_ll[9]);

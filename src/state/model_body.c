@@ -362,6 +362,25 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     return cut;
 }
 
+static void body_drift(plr_filter *f, plr_real variance) {
+    const plr_camera *camera = &f->par.camera;
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const plr_real *q = f->slots[slot].x;
+        const plr_real du = q[2] / camera->fx, dv = q[2] / camera->fy; /* m in the depth, a pixel */
+        plr_polar chart;
+        plr_real Jw[9], C[9];
+        if (f->slots[slot].known)
+            continue;
+        plr_polar_at(&chart, q);
+        plr_polar_from_point(Jw, &chart);
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned j = 0; j < 3; j++)
+                C[3 * i + j] = variance * (du * du * Jw[3 * i] * Jw[3 * j] +
+                                           dv * dv * Jw[3 * i + 1] * Jw[3 * j + 1]);
+        plr_covariance_add_to_landmark(f, slot, C);
+    }
+}
+
 static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
     plr_polar chart;
     plr_real s_B[3], offset[3], Ji[9], R_WC[9], R_WB[9];
@@ -392,6 +411,7 @@ const struct plr_model plr_model_body = {
     .derive = body_derive,
     .initialise = body_initialise,
     .adopt = body_adopt,
+    .drift = body_drift,
     .retract = body_retract,
     .in_world = body_in_world,
 };

@@ -6,10 +6,11 @@
  * looks a part of a degree beside where T_CB says. No frame shows it (where speed and turn are
  * constant it looks like a bias of the twists), and it is the same in all frames, so that it does
  * not average out as noise does. The state's error is therefore x + S s: x as P says, and S s with
- * s ~ N(0, diag(par.calibration_variance)), the errors of the calibration. S has a column for each and the rows of the state. It is carried along beside
- * P through motions and corrections, whose gains take no notice of it, and what is told of
- * covariances contains S diag(...) S^T: a consider covariance analysis (Tapley, Schutz and Born,
- * Statistical Orbit Determination, chapter 6; docs/MATH.md 20).
+ * s ~ N(0, diag(par.calibration_variance)), the errors of the calibration. S has a column for each
+ * and the rows of the state. It is carried along beside P through motions and corrections, whose
+ * gains take no notice of it, and what is told of covariances contains S diag(...) S^T: a consider
+ * covariance analysis (Tapley, Schutz and Born, Statistical Orbit Determination, chapter 6;
+ * docs/MATH.md 20).
  *
  * A parameter whose sigma is zero costs next to nothing.
  */

@@ -53,6 +53,7 @@ static void place_around(world *w, point *p) {
     p->m[0] = distance * cos(bearing);
     p->m[1] = distance * sin(bearing);
     p->m[2] = 0.1 + distance * chance_uniform(&w->chance, -0.4, 0.4);
+    p->drift_px[0] = p->drift_px[1] = 0;
     p->id = w->next_id++;
 }
 

@@ -53,8 +53,8 @@ void world_mend(world *w);
 /* (uL, vL, uR, vR) without noise; false if the point is not in sight of both cameras. */
 bool world_project(const world *w, const point *p, double z[4]);
 
-/* From one frame to the next: points out of sight are replaced by new ones with new ids, and points whose
- * track is lost by new ones under the same id; the other tracks wander. */
+/* From one frame to the next: points out of sight are replaced by new ones with new ids, and points
+ * whose track is lost by new ones under the same id; the other tracks wander. */
 void world_renew(world *w);
 
 #endif

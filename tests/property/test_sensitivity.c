@@ -2,8 +2,9 @@
 /*
  * What is told of covariances contains what an error of the camera's calibration does to the
  * estimate: held against filters that believe in another focal length, baseline or attitude of the
- * camera on the body and are given the same readings and pictures. Without noise, an estimate moves by d where the believed number grows
- * by one; with a sigma for it, each covariance must be larger by sigma^2 d d^T.
+ * camera on the body and are given the same readings and pictures. Without noise, an estimate
+ * moves by d where the believed number grows by one; with a sigma for it, each covariance must be
+ * larger by sigma^2 d d^T.
  */
 #include <math.h>
 #include <string.h>

@@ -440,3 +440,22 @@ static void test_wrong_matches_do_not_keep_it_from_a_start_at_rest(void) {
     feed_up(SECOND / 6, 0, 0, g);
     demand_started();
 }
+
+/* A tracker that wanders shows points elsewhere while the body stands. */
+static void test_tracks_that_wander_do_not_keep_it_from_a_start_at_rest(void) {
+    const double drift_px[2] = {6, 0};
+    imu_rig.config.imu_start = PLR_IMU_START_REST;
+    for (unsigned k = 0; k < 2; k++) {
+        imu_rig.config.track_drift_px = drift_px[k];
+        make_filter();
+        for (unsigned frame = 0; frame < 6; frame++) {
+            feed_up(SECOND / 6, 0, 0, g);
+            (void)look(frame < 3 ? 0 : 7);
+        }
+        feed_up(SECOND / 6, 0, 0, g);
+        if (drift_px[k] > 0)
+            demand_started();
+        else
+            demand_waiting(PLR_IMU_FAULT_MOVES);
+    }
+}

@@ -14,6 +14,7 @@ from pelorus.check.scale import ADDS, added_nees
 from pelorus.faults.agreement import Agreement
 from pelorus.frames import Message
 from pelorus.layout import Floats
+from pelorus.se3 import Poses
 from pelorus.settings import in_force
 
 SURE = 4.5  # sigmas; on 60 drives with a right T_CB up to 4.4 were seen, with 1 degree mostly 8
@@ -66,6 +67,14 @@ def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
     if found.tilt_rad is None or found.tilt_covariance is None:
         return None
     tilt = found.tilt_rad
-    adds = added_nees(messages, lambda way: np.cross(tilt, way))
+    adds = added_nees(messages, lambda poses: _askew(tilt, poses))
     given = in_force(messages, SETTING) or 0.0
     return replace(Turned(tilt, found.tilt_covariance), adds=adds, given=given)
+
+
+def _askew(tilt: Floats, poses: Poses) -> Floats:
+    """The pose that a turned camera sees: T_0 Exp(tilt) T_0^-1 T Exp(-tilt), beside T."""
+    at_start = poses.R[0] @ tilt
+    off_W = np.cross(at_start, poses.p - poses.p[0])
+    way_B, turn_B = np.einsum("nji,nj->ni", poses.R, off_W), at_start @ poses.R - tilt
+    return np.hstack((way_B, turn_B))

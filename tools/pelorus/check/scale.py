@@ -26,6 +26,7 @@ from pelorus.faults.two_views import TwoViews
 from pelorus.frames import Message
 from pelorus.layout import Floats
 from pelorus.recording import Recording
+from pelorus.se3 import Poses
 from pelorus.settings import in_force
 from pelorus.trajectory import estimate_in
 
@@ -125,17 +126,22 @@ def doubted(found: Agreement, messages: Sequence[Message]) -> Doubt:
     """Of the scale, in a run."""
     doubt = Doubt(found.scale, found.scale_sigma, bias_of(messages), found.through_zero_sigma, 0.0)
     given = in_force(messages, "baseline-sigma") or 0.0
-    return replace(doubt, adds=added_nees(messages, lambda way: doubt.share * way), given=given)
+    return replace(
+        doubt, adds=added_nees(messages, lambda poses: _stretched(doubt, poses)), given=given
+    )
 
 
-def added_nees(messages: Sequence[Message], off_by: Callable[[Floats], Floats]) -> float:
-    """What it adds to the mean NEES of a run, a degree of freedom, if each pose is off by `off_by`
-    the way from the start, (n, 3) in its own axes.
+def _stretched(doubt: Doubt, poses: Poses) -> Floats:
+    way_B = np.einsum("nji,nj->ni", poses.R, poses.p - poses.p[0])
+    return np.hstack((doubt.share * way_B, np.zeros_like(way_B)))
+
+
+def added_nees(messages: Sequence[Message], off_by: Callable[[Poses], Floats]) -> float:
+    """What it adds to the mean NEES of a run, a degree of freedom, if each pose is off by `off_by`:
+    (n, 6), position and attitude in its own axes.
     """
     found = estimate_in(messages)
     if found is None:
         return 0.0
     (_, poses), P = found
-    way_B = np.einsum("nji,nj->ni", poses.R, poses.p - poses.p[0])
-    off = np.hstack((off_by(way_B), np.zeros_like(way_B)))
-    return mean(nees_per_dof(off, P)) or 0.0
+    return mean(nees_per_dof(off_by(poses), P)) or 0.0

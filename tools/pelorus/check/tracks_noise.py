@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pelorus import visual_motion
+from pelorus.check.options import Settings
 from pelorus.console import progress
 from pelorus.layout import Floats
 from pelorus.motion import Times
@@ -64,10 +65,10 @@ class TrackNoise:
     def drifts(self) -> bool:
         return self.growth > DRIFTS_ABOVE
 
-    @property
-    def setting(self) -> dict[str, str]:
-        """What the filter is told of the drift."""
-        return {DRIFT: f"{self.wanders_px:.2g}"} if self.drifts else {}
+    def setting(self, given: Settings) -> dict[str, str]:
+        """What the filter is told of the drift; `world` has no setting for it."""
+        told = self.drifts and given.get("model") != "world"
+        return {DRIFT: f"{self.wanders_px:.2g}"} if told else {}
 
 
 def told_apart(found: float, given: float) -> bool:
@@ -92,13 +93,15 @@ def track_noise(recording: Recording) -> TrackNoise:
 
 
 def _wanders(by_lag: dict[int, float], frame_t_ns: Times) -> float:
-    """d, px/sqrt(s): sigma_lag^2 = w + lag tau d^2 / 2, for two views share the difference."""
+    """d, px/sqrt(s): of the four rows of a point seen twice, each of variance 2 w, the drift is in
+    what both pictures share, which is two of the four: sigma_lag^2 = w + lag tau d^2 / 4.
+    """
     lags = np.array([lag for lag, sigma in by_lag.items() if np.isfinite(sigma)], np.float64)
     if len(lags) < 2:
         return 0.0
     tau_s = float(np.median(np.diff(frame_t_ns))) * 1e-9
     due = np.array([by_lag[int(lag)] ** 2 for lag in lags])
-    columns: Floats = np.stack((np.ones(len(lags)), tau_s * lags / 2), axis=-1)
+    columns: Floats = np.stack((np.ones(len(lags)), tau_s * lags / 4), axis=-1)
     _, d2 = np.linalg.lstsq(columns, due, rcond=None)[0]
     return float(np.sqrt(max(d2, 0.0)))
 

@@ -60,7 +60,8 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
         found = _of_drifting_tracks(bench, fixed, start, noise)
         fixed, words = told_in_drift(bench, fixed, found.values)
         offset_s = float(fixed.pop(OFFSET))
-        settings = fixed | written(found.values, TWIST) | offset_settings(offset_s) | noise.setting
+        fixed |= noise.setting(given)
+        settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)
         return Tuned(settings, before, bench.run(settings), noise, [words])
     rough = fixed | WIDE | fewer_slots(given)
     values = _roughly(bench, rough | {LENGTH: COARSE_FRAMES}, start)

@@ -223,7 +223,7 @@ def _of_drifting_tracks(
     values = dict(values)
     if told_apart(noise.stands_for_px, values["pixel"]):
         values["pixel"] = float(f"{noise.stands_for_px:.3g}")
-    settings = {**side, **noise.setting, **written(values, PIXEL | IMU | WALKS)}
+    settings = {**side, **noise.setting(side), **written(values, PIXEL | IMU | WALKS)}
     offset = clock.of_imu(bench, settings | fewer_slots(settings), float(side[OFFSET]))
     settings, words = _clock(settings, offset, {"camera-offset": side[OFFSET]})
     outcome = bench.run(settings)

@@ -253,7 +253,8 @@ def of_turn(found: Turned) -> Iterator[Remark]:
     if not found.is_off:
         return
     words = f"the camera looks {found.angle_deg:.1f} +- {found.sigma_deg:.1f} degrees beside where "
-    words += f"T_CB says: positions may be off by {found.beyond:.1%} of the way"
+    words += "T_CB says, or the velocities are off across the way: positions may be off by "
+    words += f"{found.beyond:.1%} of the way"
     words += f", for which {SETTING} stands" if found.setting else ""
     yield Remark(Grade.CARE, f"{words}. Calibrate the camera's place on the body once more")
 

@@ -52,7 +52,7 @@ class Mishaps:
     frozen: Span | None = setting(None, "From then on the camera repeats its last frame.")
     track_drift: float = setting(
         0.0,
-        "Tracks wander off their landmark: sigma in px after a second, growing as the root.",
+        "Tracks wander off their landmark: sigma after a second, growing as the root of time.",
         "PX",
     )
     moving: float = setting(0.0, "Share of the landmarks that move.", "SHARE", SHARE)
