@@ -149,7 +149,7 @@ const scenario scenarios[] = {
     {"drift-1", "tracks wander by 1 px in a second, and the filter is told", CAMERA, DEFAULT, DRIVE, .track_drift = 1, .told_drift = 1,
      MATCHING(1.15, 0.995)},
     {"drift-1-half-told", "the same, and it is told of half of that", CAMERA, DEFAULT, DRIVE, .track_drift = 1, .told_drift = 0.5,
-     MATCHING(1.25, 0.99)},
+     MATCHING(1.5, 0.99)},
     {"parked", "standing still", CAMERA, DEFAULT, PARKED, .bars = {.sigmas = 6, .no_divergence = true}},
     {"parked-bias", "standing still with biases", CAMERA, DEFAULT, PARKED, .bias = true,
      .bars = {.sigmas = 6, .no_divergence = true}},
