@@ -261,8 +261,8 @@ typedef struct plr_config {
      * How far tracks wander off their points: sigma after a second, growing as the root of time. A
      * tracker that follows a patch from frame to frame (KLT) drifts, by about 1 on KITTI's streets.
      * Without it the filter averages over a long track as if each frame showed the same point, and
-     * is more certain than it may be. `pelorus check` measures what is more than about the pixels'
-     * noise in a second, to a third. Landmarks of the map do not drift. With `body` alone. */
+     * is more certain than it may be. `pelorus check` measures it where it is more than
+     * about the pixels' noise in a second. Landmarks of the map do not drift. With `body` alone. */
     double track_drift_px;
 
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.

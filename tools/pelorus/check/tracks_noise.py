@@ -24,6 +24,7 @@ from pelorus.row_gaps import TOLD_ABOVE_PX, RowGaps, row_gaps
 from pelorus.visual_motion import seen_pairs
 
 DRIFT = "track-drift"
+LASTS = 0.7  # of it: errors of real trackers stop growing
 LAGS = (1, 2, 3, 5)
 DRIFTS_ABOVE = 1.25  # of sigma at lag 5 to that at lag 1: simulated white noise gives 0.97 to 1.05
 KEEPS = 0.86  # r: trackers of KITTI drives keep 0.83 to 0.93; lags up to 5 cannot tell it well
@@ -66,9 +67,14 @@ class TrackNoise:
         return self.growth > DRIFTS_ABOVE
 
     def setting(self, given: Settings) -> dict[str, str]:
-        """What the filter is told of the drift; `world` has no setting for it."""
-        told = self.drifts and given.get("model") != "world"
-        return {DRIFT: f"{self.wanders_px:.2g}"} if told else {}
+        """What the filter is told of the drift, unless what was given is about that. `world` has no
+        such setting.
+        """
+        if not self.drifts or given.get("model") == "world":
+            return {}
+        told, was = LASTS * self.wanders_px, float(given.get(DRIFT, "0"))
+        is_about_it = told / KNOWN_TO <= was <= 2 * self.wanders_px
+        return {DRIFT: given[DRIFT] if is_about_it else f"{told:.2g}"}
 
 
 def told_apart(found: float, given: float) -> bool:

@@ -212,7 +212,7 @@ def _tracks(tuned: Tuned) -> Iterator[Remark]:
     yield Remark(
         Grade.CARE,
         f"the tracks drift: points are off by {known[first]:.2f} px after {first} frame and by "
-        f"{known[last]:.2f} px after {last}; track-drift {noise.wanders_px:.2g} px/sqrt(s) and in "
+        f"{known[last]:.2f} px after {last}; track-drift {tuned.settings.get(DRIFT, '0')} and in "
         f"pixel-sigma {noise.stands_for_px:.2g} px or more stand for that. Timing, clocks and the "
         "noise of single axes cannot be told by the likelihood of single steps then, and stay as "
         "given",
