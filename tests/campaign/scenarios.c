@@ -146,7 +146,7 @@ const scenario scenarios[] = {
     {"lost-0.3", "of the tracks 0.3 % go over to another point in each frame, and stay there", CAMERA, DEFAULT, DRIVE,
      .lost_tracks = 0.003, MATCHING(1.25, 0.99)},
     {"lost-1", "the same, 1 %", CAMERA, DEFAULT, DRIVE, .lost_tracks = 0.01, MATCHING(1.25, 0.99)},
-    {"drift-1", "tracks wander by 1 px in a second, and the filter is told", CAMERA, DEFAULT, DRIVE, .track_drift = 1, .told_drift = 1,
+    {"drift-1", "tracks wander by 1 px in a second, and the filter is told of it", CAMERA, DEFAULT, DRIVE, .track_drift = 1, .told_drift = 1,
      MATCHING(1.15, 0.995)},
     {"drift-1-half-told", "the same, and it is told of half of that", CAMERA, DEFAULT, DRIVE, .track_drift = 1, .told_drift = 0.5,
      MATCHING(1.5, 0.99)},
