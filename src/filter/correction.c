@@ -17,7 +17,8 @@
 #include "state/sensitivity.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
-/* The columns of a batch's E, and that they make whole tiles of rows of the product. */
+/* The columns of a batch's E. They make whole tiles of rows of the product, or this does not
+ * compile. */
 enum { OF_W, OF_DX = PLR_POSE_DIM, OF_S, WIDE = OF_S + PLR_CALIBRATIONS, TILE = 4 };
 enum { WHOLE_TILES = 1 / (WIDE % TILE == 0) };
 

@@ -182,8 +182,10 @@ static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, uns
 
 /* Since the last frame the tracks have wandered off their points. */
 static void let_tracks_drift(plr_filter *f) {
-    if (f->last_frame_ns != PLR_NEVER_NS && f->par.track_drift > 0)
-        plr_model_of(f)->drift(f, f->par.track_drift * plr_seconds(f->t_ns - f->last_frame_ns));
+    if (f->last_frame_ns == PLR_NEVER_NS || !(f->par.track_drift > 0))
+        return;
+    const plr_real seconds = plr_seconds(f->t_ns - f->last_frame_ns);
+    plr_model_of(f)->drift(f, PLR_SQRT(f->par.track_drift * seconds));
 }
 
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {

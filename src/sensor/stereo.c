@@ -6,6 +6,7 @@
 #include "pelorus/assertions.h"
 #include "state/covariance.h"
 #include "state/polar.h"
+#include "state/sensitivity.h"
 
 /* ---------------------------------------------------------------- the pair of cameras */
 
@@ -141,6 +142,8 @@ void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
     plr_stereo_jacobian(Dz, &f->par.camera, view.q);
     point_by_calibration(view.q, q_s);
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+        if (!plr_considers(f, k))
+            continue;
         plr_mat3_vec(H_s[k], Dz, q_s[k]);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             H_s[k][r] = -H_s[k][r]; /* so that pixels which stay show the point that changes */

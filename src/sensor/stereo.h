@@ -58,7 +58,7 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
 
 /* H_s: how the three rows would change if the camera's focal length or baseline were longer by a
  * share, or if it were turned about one of its axes. Left as it is where the landmark is nearer than
- * min-depth. */
+ * min-depth, and for what is exact. */
 void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
                                plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]);
 

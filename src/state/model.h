@@ -63,9 +63,9 @@ struct plr_model {
      * it. */
     bool (*adopt)(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark);
 
-    /* The tracks have wandered off their points by that variance in u and in v, px^2. Both pictures
-     * show the same patch, so the point stays as deep as it is. NULL in `world`. */
-    void (*drift)(plr_filter *f, plr_real variance);
+    /* The tracks have wandered off their points by sigma px in u and in v. Both pictures show the
+     * same patch, so the point stays as deep as it is. NULL in `world`. */
+    void (*drift)(plr_filter *f, plr_real sigma);
 
     /* Applies a correction dx of the whole state (plr_covariance_dim elements) to the landmarks,
      * and transports P to the new estimate. The caller corrects pose and bias. Returns how many

@@ -201,15 +201,21 @@ static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view
     }
 }
 
-static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
-                            plr_new_landmark *landmark) {
-    (void)f;
+/* P = J_q S_q S_q^T J_q^T, 3x3, J_q the chart's error by the point's. */
+static void point_to_chart(const plr_real q[3], const plr_real S_q[9], plr_real J_q[9],
+                           plr_real P[9]) {
     plr_polar chart;
     plr_real JS[9];
     plr_polar_at(&chart, q);
-    plr_polar_from_point(landmark->J_q, &chart);
-    plr_mat3_mul(JS, landmark->J_q, S_q);
-    plr_mat3_mul_nt(landmark->P, JS, JS);
+    plr_polar_from_point(J_q, &chart);
+    plr_mat3_mul(JS, J_q, S_q);
+    plr_mat3_mul_nt(P, JS, JS);
+}
+
+static void body_initialise(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
+                            plr_new_landmark *landmark) {
+    (void)f;
+    point_to_chart(q, S_q, landmark->J_q, landmark->P);
     memcpy(landmark->x, q, 3 * sizeof *q);
     landmark->uses_pose = false;
 }
@@ -362,21 +368,15 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     return cut;
 }
 
-static void body_drift(plr_filter *f, plr_real variance) {
-    const plr_camera *camera = &f->par.camera;
+static void body_drift(plr_filter *f, plr_real sigma) {
     for (unsigned slot = 0; slot < f->count; slot++) {
-        const plr_real *q = f->slots[slot].x;
-        const plr_real du = q[2] / camera->fx, dv = q[2] / camera->fy; /* m in the depth, a pixel */
-        plr_polar chart;
-        plr_real Jw[9], C[9];
+        const plr_real *q = f->slots[slot].x, wanders = sigma * q[2];
+        const plr_real S_q[9] = {
+            [0] = wanders / f->par.camera.fx, [4] = wanders / f->par.camera.fy};
+        plr_real J_q[9], C[9];
         if (f->slots[slot].known)
             continue;
-        plr_polar_at(&chart, q);
-        plr_polar_from_point(Jw, &chart);
-        for (unsigned i = 0; i < 3; i++)
-            for (unsigned j = 0; j < 3; j++)
-                C[3 * i + j] = variance * (du * du * Jw[3 * i] * Jw[3 * j] +
-                                           dv * dv * Jw[3 * i + 1] * Jw[3 * j + 1]);
+        point_to_chart(q, S_q, J_q, C);
         plr_covariance_add_to_landmark(f, slot, C);
     }
 }

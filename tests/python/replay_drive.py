@@ -33,6 +33,7 @@ from pelorus.frames import (
     Truth,
     Twist,
 )
+from pelorus.settings import CALIBRATION_SIGMAS
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("PELORUS_BIN", ROOT / "build" / "bin"))
@@ -169,7 +170,9 @@ def err0_m(log: Path) -> float:
 
 
 # A simulated camera is what it is said to be: what is told is of the noise alone.
-EXACT_CAMERA = ("--focal-sigma", "0", "--baseline-sigma", "0", "--camera-turn-sigma", "0")
+EXACT_CAMERA: tuple[str, ...] = tuple(
+    word for name in CALIBRATION_SIGMAS for word in (f"--{name}", "0")
+)
 
 
 def judged(

@@ -350,12 +350,13 @@ def test_tracks_that_drift_are_told_from_white_noise() -> None:
     white = tracks_noise.track_noise(recording_of(moving_tracks(0.0)))
     assert not white.drifts
     assert white.by_lag[1] == pytest.approx(0.3, rel=0.2)
-    drifting = tracks_noise.track_noise(recording_of(moving_tracks(0.3)))
+    recording = recording_of(moving_tracks(0.3))
+    drifting = tracks_noise.track_noise(recording)
     assert drifting.drifts
     assert drifting.stands_for_px > 2 * drifting.by_lag[1]
     assert not white.setting({})
     assert not drifting.setting({"model": "world"})  # which has no such setting
-    tau_s = 1e-9 * np.median(np.diff(recording_of(moving_tracks(0.3)).frame_t_ns))
+    tau_s = 1e-9 * np.median(np.diff(recording.frame_t_ns))
     told = float(drifting.setting({})["track-drift"])
     # all four rows wander here, each by itself; it knows drifts that both pictures share
     due = np.sqrt(2) * 0.3 / np.sqrt(tau_s)

@@ -41,7 +41,7 @@ def test_white_noise_is_mapped_as_well_as_the_map_claims(
 ) -> None:
     path = record(with_known(300))
     log = tmp_path / "log.plr"
-    options = (*MAPPING, *EXACT_CAMERA, "--quiet", "--out", log)
+    options: tuple[str | Path, ...] = (*MAPPING, *EXACT_CAMERA, "--quiet", "--out", log)
     run(path, *options, program=program)
     told: dict[str, Any] = dict(judge(log_of(log)))
     made = made_in(log_of(log))

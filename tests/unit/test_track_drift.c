@@ -99,7 +99,7 @@ static void test_the_disparity_does_not_wander(void) {
         if (!plr_stereo_measure(&rig.filter, slot, &seen, &m))
             continue;
         plr_covariance_of_rows(&rig.filter, &m.H, before);
-        plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(100));
+        plr_model_of(&rig.filter)->drift(&rig.filter, PLR_R(10));
         plr_covariance_of_rows(&rig.filter, &m.H, after);
         const double u = (double)(after[0] - before[0]), v = (double)(after[8] - before[8]);
         const double uLR = (double)(after[1] - before[1]), uR = (double)(after[4] - before[4]);

@@ -8,9 +8,20 @@ from collections.abc import Sequence
 from pelorus.frames import Config, Message
 from pelorus.schema import SETTINGS, Setting
 
-__all__ = ["IDS", "SETTINGS", "Setting", "describe", "in_force", "mode_in_force"]
+__all__ = [
+    "CALIBRATION_SIGMAS",
+    "IDS",
+    "SETTINGS",
+    "Setting",
+    "describe",
+    "in_force",
+    "mode_in_force",
+]
 
 IDS = {setting.name: id for id, setting in SETTINGS.items()}
+
+# What the covariances contain of errors of the camera; 0: it is exact.
+CALIBRATION_SIGMAS = ("focal-sigma", "baseline-sigma", "camera-turn-sigma")
 
 
 def describe(id: int, value: float) -> tuple[str, str]:

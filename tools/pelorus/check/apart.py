@@ -39,6 +39,7 @@ from pelorus.evaluation import world_laid
 from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo
 from pelorus.layout import Floats
 from pelorus.replay import run_program
+from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory, estimate_in
 
@@ -108,7 +109,7 @@ class _Part(NamedTuple):
 
 
 # What an error of the calibration does, it does to both halves.
-SAME_CAMERA = {"focal-sigma": "0", "baseline-sigma": "0", "camera-turn-sigma": "0"}
+SAME_CAMERA = dict.fromkeys(CALIBRATION_SIGMAS, "0")
 
 
 class Parts:

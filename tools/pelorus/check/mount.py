@@ -18,7 +18,7 @@ from pelorus.se3 import Poses
 from pelorus.settings import in_force
 
 SURE = 4.5  # sigmas; of 140 drives with a right T_CB the largest are 4.4 and 4.1, with 1 degree 8
-SETTING, SETTING_MOST = "camera-turn-sigma", 0.2  # rad, that it takes
+CAMERA_TURN, TURN_MOST = "camera-turn-sigma", 0.2  # rad, that it takes
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Turned:
         each = float(np.linalg.norm(self.turn_rad) / np.sqrt(3.0))
         if not self.is_off or each <= self.given:
             return {}
-        return {SETTING: f"{min(each, SETTING_MOST):.2g}"}
+        return {CAMERA_TURN: f"{min(each, TURN_MOST):.2g}"}
 
 
 def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
@@ -68,7 +68,7 @@ def turned(found: Agreement, messages: Sequence[Message]) -> Turned | None:
         return None
     tilt = found.tilt_rad
     adds = added_nees(messages, lambda poses: _askew(tilt, poses))
-    given = in_force(messages, SETTING) or 0.0
+    given = in_force(messages, CAMERA_TURN) or 0.0
     return replace(Turned(tilt, found.tilt_covariance), adds=adds, given=given)
 
 

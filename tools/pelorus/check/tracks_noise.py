@@ -10,6 +10,7 @@ that keeps the share r from frame to frame averages out as white noise of s^2 (1
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,22 +103,23 @@ def _wanders(by_lag: dict[int, float], frame_t_ns: Times) -> float:
     """d, px/sqrt(s): of the four rows of a point seen twice, each of variance 2 w, the drift is in
     what both pictures share, which is two of the four: sigma_lag^2 = w + lag tau d^2 / 4.
     """
-    lags = np.array([lag for lag, sigma in by_lag.items() if np.isfinite(sigma)], np.float64)
-    if len(lags) < 2:
-        return 0.0
-    tau_s = float(np.median(np.diff(frame_t_ns))) * 1e-9
-    due = np.array([by_lag[int(lag)] ** 2 for lag in lags])
-    columns: Floats = np.stack((np.ones(len(lags)), tau_s * lags / 4), axis=-1)
-    _, d2 = np.linalg.lstsq(columns, due, rcond=None)[0]
-    return float(np.sqrt(max(d2, 0.0)))
+    tau_s = float(np.median(np.diff(frame_t_ns))) * 1e-9 if len(frame_t_ns) > 1 else 0.0
+    d2 = _fitted(by_lag, lambda lags: tau_s * lags / 4)[1]
+    return float(np.sqrt(d2)) if d2 > 0 else 0.0
 
 
 def _stands_for(by_lag: dict[int, float]) -> float:
-    """sigma_lag^2 = w + s^2 (1 - r^lag), by least squares over w, s^2 >= 0."""
+    """sigma_lag^2 = w + s^2 (1 - r^lag), w, s^2 >= 0."""
+    w, s2 = np.clip(_fitted(by_lag, lambda lags: 1 - KEEPS**lags), 0, None)
+    stands = np.sqrt(w + s2 * (1 + KEEPS) / (1 - KEEPS))
+    return float(min(stands, SIGMA_MOST_PX)) if np.isfinite(stands) else float("nan")
+
+
+def _fitted(by_lag: dict[int, float], growth: Callable[[Floats], Floats]) -> Floats:
+    """(a, b) of sigma_lag^2 = a + b growth(lag), by least squares; NaN where too few lags tell."""
     lags = np.array([lag for lag, sigma in by_lag.items() if np.isfinite(sigma)], np.float64)
     if len(lags) < 2:
-        return float("nan")
+        return np.full(2, np.nan)
     due = np.array([by_lag[int(lag)] ** 2 for lag in lags])
-    columns: Floats = np.stack((np.ones(len(lags)), 1 - KEEPS**lags), axis=-1)
-    w, s2 = np.clip(np.linalg.lstsq(columns, due, rcond=None)[0], 0, None)
-    return float(min(np.sqrt(w + s2 * (1 + KEEPS) / (1 - KEEPS)), SIGMA_MOST_PX))
+    columns = np.stack((np.ones(len(lags)), growth(lags)), axis=-1)
+    return np.asarray(np.linalg.lstsq(columns, due, rcond=None)[0])

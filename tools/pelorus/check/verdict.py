@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.arrivals import late_ones
-from pelorus.check.mount import SETTING, Turned
+from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
 from pelorus.check.tracks_noise import DRIFT
@@ -255,7 +255,7 @@ def of_turn(found: Turned) -> Iterator[Remark]:
     words = f"the camera looks {found.angle_deg:.1f} +- {found.sigma_deg:.1f} degrees beside where "
     words += "T_CB says, or the velocities are off across the way: positions may be off by "
     words += f"{found.beyond:.1%} of the way"
-    words += f", for which {SETTING} stands" if found.setting else ""
+    words += f", for which {CAMERA_TURN} stands" if found.setting else ""
     yield Remark(Grade.CARE, f"{words}. Calibrate the camera's place on the body once more")
 
 
@@ -303,7 +303,15 @@ def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
         if ratios and max(ratios) > OTHER_SIGMA:
             words = ",".join(f"{x:.3g}" for x in was)
             said.append(f"{parameter.setting} {words} should be {written}")
-    kept = ("twist-timing", "imu-timing", "bias", "camera-offset", "baseline-sigma", SETTING, DRIFT)
+    kept = (
+        "twist-timing",
+        "imu-timing",
+        "bias",
+        "camera-offset",
+        "baseline-sigma",
+        CAMERA_TURN,
+        DRIFT,
+    )
     for setting in kept:
         value = tuned.settings.get(setting)
         if value is not None and value != given.get(setting, _usual(setting, header)):

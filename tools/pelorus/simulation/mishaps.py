@@ -71,7 +71,6 @@ class Mishaps:
     focal_error_percent: float = setting(
         0.0, "The true focal length is so much larger than the header's.", "PERCENT", PERCENT
     )
-
     camera_turned_deg: float = setting(
         0.0,
         "The true camera is turned so far beside the header's T_CB, about all axes alike.",

@@ -26,6 +26,7 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
+from pelorus.settings import CALIBRATION_SIGMAS
 from pelorus.simulation import by_imu, scene, sensors, settings, smooth
 from pelorus.simulation.drive import TURN_MAX_RAD, Drive, drive, stood
 from pelorus.simulation.imu import NO_FAULTS, NO_IMU, Imu, ImuFaults, Sensed
@@ -240,8 +241,7 @@ def _exact_camera(options: Options) -> dict[str, float]:
     """No simulated camera is off by what a calibration leaves, unless that is asked for."""
     mishaps = options.mishaps
     off = mishaps.focal_error_percent or mishaps.baseline_error_percent or mishaps.camera_turned_deg
-    sigmas = ("focal-sigma", "baseline-sigma", "camera-turn-sigma")
-    return {} if off else dict.fromkeys(sigmas, 0.0)
+    return {} if off else dict.fromkeys(CALIBRATION_SIGMAS, 0.0)
 
 
 def _landmarks(options: Options, chances: _Chances) -> Floats:
