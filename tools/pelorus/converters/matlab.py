@@ -21,13 +21,12 @@ from pelorus.arrays import Arrays
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import BY_AXIS, Header, Landmark, Noise, Role, TwistTiming, header_name
+from pelorus.frames import Header, Landmark, Noise, Role, TwistTiming, header_name
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.tracks import Tracks
 
-SIGMAS_OF_AXES = [name for names in BY_AXIS.values() for name in names]
 LANDMARK_SIGMA_M = 0.01  # Starry Night's map was surveyed by a motion capture system
 
 
@@ -108,9 +107,10 @@ def _features(file: Arrays, count: int) -> Floats:
 
 
 def _noise(file: Arrays) -> Noise:
-    """The sigmas: w_var of the angular, v_var of the linear velocity, y_var of four pixel numbers.
+    """The sigmas: roots of the mean of w_var (angular), v_var (linear velocity), y_var (pixels).
 
-    Those of the velocities by axis, and the root of their mean variance for a reader of format 1.1.
+    One for all axes: w_var is largest about the axis that turned most. The readings are late, so
+    their error is where the rate changes, and that can be about any axis (docs/MATH.md 17).
     """
     variances = {key: file.get(key).ravel() for key in ("y_var", "v_var", "w_var")}
     for key, variance in variances.items():
@@ -118,18 +118,4 @@ def _noise(file: Arrays) -> Noise:
             raise ForeignFileError(
                 file.path, f"{key} is {variance}", due="variances that are not negative are due"
             )
-    mean = (float(np.sqrt(np.mean(variance))) for variance in variances.values())
-    axes = [
-        float(sigma)
-        for key in ("v_var", "w_var")
-        for sigma in np.sqrt(np.broadcast_to(_by_axis(file, key, variances[key]), 3))
-    ]
-    return replace(Noise(*mean), **dict(zip(SIGMAS_OF_AXES, axes, strict=True)))
-
-
-def _by_axis(file: Arrays, key: str, variance: Floats) -> Floats:
-    if variance.size not in (1, 3):
-        raise ForeignFileError(
-            file.path, f"{key} has {variance.size} numbers", due="1 or 3 are due"
-        )
-    return variance
+    return Noise(*(float(np.sqrt(np.mean(variance))) for variance in variances.values()))
