@@ -16,11 +16,6 @@
 #define PLR_MAX_BIAS     1e4  /* m/s, rad/s */
 #define PLR_MAX_VARIANCE 1e12 /* m^2, rad^2, ... */
 
-/* ns to s, in the filter's precision. */
-static inline plr_real plr_seconds(plr_time_ns ns) {
-    return (plr_real)((double)ns * 1e-9);
-}
-
 /* Forgets the last twist reading: the body is assumed to stand still, reading - bias = 0. */
 void plr_filter_forget_reading(plr_filter *f);
 

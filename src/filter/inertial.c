@@ -13,6 +13,7 @@
 #include "math/small.h"
 #include "process/alignment.h"
 #include "process/process.h"
+#include "state/seconds.h"
 
 enum {
     MOST_REPEATED = 10, /* successive readings of the same six numbers: noise never does that */

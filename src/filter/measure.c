@@ -24,6 +24,7 @@
 #include "sensor/sensor.h"
 #include "state/blocks.h"
 #include "state/motion.h"
+#include "state/seconds.h"
 #include "state/sensitivity.h"
 
 /* Beyond this a lever arm or a sigma is an error of the sender, m and so on. */

@@ -15,6 +15,7 @@
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
+#include "state/seconds.h"
 
 /* ---------------------------------------------------------------- applying what is accumulated */
 

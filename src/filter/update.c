@@ -32,6 +32,7 @@
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
+#include "state/seconds.h"
 #include "state/slots.h"
 
 /* ---------------------------------------------------------------- gate and budget */

@@ -16,6 +16,7 @@
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
+#include "state/seconds.h"
 
 /* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
 #define MAX_TURN PLR_R(3.1415926)
@@ -358,9 +359,9 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
     const uint8_t timing = f->reading_valid ? f->config.imu_timing : PLR_TWIST_END;
-    const plr_real whole = (plr_real)((double)(t_ns - f->reading_ns) * 1e-9);
+    const plr_real whole = plr_seconds(t_ns - f->reading_ns);
     const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
-                              ? (plr_real)((double)(f->t_ns - f->reading_ns) * 1e-9)
+                              ? plr_seconds(f->t_ns - f->reading_ns)
                               : PLR_R(0);
     const bool bridged = whole <= BRIDGED_S;
     for (int i = 0; i < PLR_READING_DIM; i++) {
@@ -447,7 +448,7 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
  * a row of w alone (a standstill) the mean reading since the last one, which has less noise. */
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
-    const plr_real since = (plr_real)((double)(f->t_ns - f->inertial.still_ns) * 1e-9);
+    const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);
     const plr_real most = since < PLR_R(0.5) ? since : PLR_R(0.5);
     const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : PLR_R(1e-3);
     /* at the time of the last such row the mean is used up: one reading's worth is granted */

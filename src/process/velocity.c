@@ -8,6 +8,7 @@
 #include "pelorus/assertions.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
+#include "state/seconds.h"
 
 /* If the next reading does not come, the last one is held for so many of the sensor's intervals. */
 enum { HELD_INTERVALS = 2 };
@@ -44,7 +45,7 @@ void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows
     memcpy(held->z, rows->z, sizeof held->z);
     memcpy(held->M, rows->M, sizeof held->M);
     for (unsigned r = 0; r < PLR_ROWS; r++)
-        held->density[r] = rows->R[r] * (plr_real)((double)held->interval_ns * 1e-9);
+        held->density[r] = rows->R[r] * plr_seconds(held->interval_ns);
 }
 
 void plr_velocity_forget(plr_filter *f) {

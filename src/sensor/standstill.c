@@ -5,6 +5,7 @@
 
 #include "sensor/sensor.h"
 #include "sensor/stereo.h"
+#include "state/seconds.h"
 #include "state/slots.h"
 
 enum { MIN_ROWS = 15 }; /* with fewer rows of pixels a standstill is not recognised */
@@ -32,7 +33,7 @@ const plr_sensor_kind plr_standstill = {
 /* The squared distance of a landmark's pixels from those that it was anchored at, in their noise and
  * in what its track has wandered since. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {
-    const plr_real since = (plr_real)((double)(f->t_ns - slot->anchor_ns) * 1e-9);
+    const plr_real since = plr_seconds(f->t_ns - slot->anchor_ns);
     const plr_real drift = f->par.track_drift * since;
     plr_real sum = 0;
     for (unsigned i = 0; i < PLR_ROWS; i++) {
