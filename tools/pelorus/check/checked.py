@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import hypot
 from pathlib import Path
 
 from pelorus import wire
-from pelorus.check import mount, scale, verdict
+from pelorus.check import verdict
+from pelorus.check.calibration import calibration
 from pelorus.check.halves_alike import with_halves_alike
 from pelorus.check.held import held_against
 from pelorus.check.options import Settings, options_of
@@ -21,7 +21,6 @@ from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
 from pelorus.faults.named import judged_of
-from pelorus.faults.two_views import TwoViews
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
 
@@ -70,10 +69,10 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if run is None:
         raise PelorusError(f"{recording}: {NOTHING_USED}")
     figures = {} if before is None else _figures(before, truth)
-    camera = _calibration(bench, judged.views, run)
-    wider = {name: value for part in camera for name, value in part.setting.items()}
-    if wider:  # no estimate changes by it, and each covariance
-        tuned = replace(tuned, settings=tuned.settings | wider)
+    views = None if bench.by_imu else judged.views
+    camera = calibration(bench.examined, views, run.messages)
+    if camera.settings:  # no estimate changes by it, and each covariance
+        tuned = replace(tuned, settings=tuned.settings | camera.settings)
         run = _whole(program, recording, tuned.settings, folder, "after") or run
     origin = int(run.frames.t_ns[0])
     remarks = [*faults, *verdict.remarks(run, tuned, origin), *verdict.of_calibration(camera)]
@@ -87,22 +86,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if len(spells) > SPELLS_SHOWN:
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
     changed = verdict.changes(given, bench.header, tuned, bench.by_imu)
-    share = hypot(*(part.beyond for part in camera))
-    return Checked(verdict.overall(remarks), remarks, spells, changed, [cost, *rows], tuned, share)
-
-
-def _calibration(
-    bench: Bench, views: TwoViews | None, run: Run
-) -> list[scale.Doubt | mount.Turned]:
-    """What twists and images together say of the camera. Where there are no views a fault stops."""
-    if views is None or bench.by_imu:
-        return []
-    found = scale.agreed(bench.examined, views, run.messages)
-    if found is None:
-        return []
-    turned = mount.turned(found, run.messages)
-    doubt = scale.doubted(found, run.messages)
-    return [doubt] if turned is None else [doubt, turned]
+    grade = verdict.overall(remarks)
+    return Checked(grade, remarks, spells, changed, [cost, *rows], tuned, camera.share)
 
 
 def _whole(

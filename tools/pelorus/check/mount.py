@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pelorus.check.scale import ADDS, added_nees
+from pelorus.check.lasting import ADDS, added_nees
 from pelorus.faults.agreement import Agreement
 from pelorus.frames import Message
 from pelorus.layout import Floats

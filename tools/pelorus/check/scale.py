@@ -10,29 +10,24 @@ then stays untold.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pelorus.check import clock
+from pelorus.check.lasting import ADDS, added_nees
 from pelorus.check.options import Settings
 from pelorus.check.outcome import SCALE, Bench
 from pelorus.check.parameters import PAYS
-from pelorus.consistency import mean, nees_per_dof
-from pelorus.faults.agreement import NO_BIAS_MPS, Agreement, agreement
-from pelorus.faults.handeye import first_part
-from pelorus.faults.two_views import TwoViews
+from pelorus.faults.agreement import Agreement
 from pelorus.frames import Message
 from pelorus.layout import Floats
-from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from pelorus.settings import in_force
-from pelorus.trajectory import estimate_in
 
 STEP, STEPS = 0.01, 4
 SURE = 4.0  # sigmas from which a scale is off, and not only untold
-ADDS = 0.5  # to a NEES of 1, a degree of freedom: less does not matter
 BY_BIAS = 1.5  # times as well known without biases: then it is these that hide it
 BASELINE_MOST = 0.1  # that the setting takes
 NEAR = 2.5  # steps
@@ -106,17 +101,6 @@ class Doubt:
         return self.sigma > BY_BIAS * self.unbiased
 
 
-def agreed(recording: Recording, views: TwoViews, messages: Sequence[Message]) -> Agreement | None:
-    """Images and twists of a run with its settings' biases; None where too few frames tell. `views`
-    of neighbouring frames of the first part.
-    """
-    short = first_part(recording)
-    bias = max(bias_of(messages), NO_BIAS_MPS)
-    noise = replace(short.header.noise, bias_velocity_sigma_mps=bias)
-    found = agreement(short.with_header(noise=noise), views)
-    return found if found.told else None
-
-
 def bias_of(messages: Sequence[Message]) -> float:
     """Sigma of the velocities' bias in a run, m/s; 0 where there is none."""
     return (in_force(messages, "bias-velocity-sigma") or 0.0) if in_force(messages, "bias") else 0.0
@@ -134,14 +118,3 @@ def doubted(found: Agreement, messages: Sequence[Message]) -> Doubt:
 def _stretched(doubt: Doubt, poses: Poses) -> Floats:
     way_B = np.einsum("nji,nj->ni", poses.R, poses.p - poses.p[0])
     return np.hstack((doubt.share * way_B, np.zeros_like(way_B)))
-
-
-def added_nees(messages: Sequence[Message], off_by: Callable[[Poses], Floats]) -> float:
-    """What it adds to the mean NEES of a run, a degree of freedom, if each pose is off by `off_by`:
-    (n, 6), position and attitude in its own axes.
-    """
-    found = estimate_in(messages)
-    if found is None:
-        return 0.0
-    (_, poses), P = found
-    return mean(nees_per_dof(off_by(poses), P)) or 0.0

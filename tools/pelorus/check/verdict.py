@@ -10,6 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from pelorus.arrivals import late_ones
+from pelorus.check.calibration import Calibration
 from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
@@ -242,10 +243,12 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
     yield Remark(Grade.CARE, words)
 
 
-def of_calibration(parts: Sequence[Doubt | Turned]) -> Iterator[Remark]:
+def of_calibration(found: Calibration) -> Iterator[Remark]:
     """What images and twists together say of the camera."""
-    for part in parts:
-        yield from of_turn(part) if isinstance(part, Turned) else of_scale(part)
+    if found.scale is not None:
+        yield from of_scale(found.scale)
+    if found.turn is not None:
+        yield from of_turn(found.turn)
 
 
 def of_turn(found: Turned) -> Iterator[Remark]:
