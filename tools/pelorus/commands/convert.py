@@ -19,7 +19,7 @@ from pelorus.console import out
 from pelorus.converters import csv as csv_converter
 from pelorus.converters import ece276a as ece276a_converter
 from pelorus.converters import imu_npz as imu_npz_converter
-from pelorus.converters import landmark_map, matlab, readings_csv
+from pelorus.converters import landmark_map, late_turns, matlab, readings_csv
 from pelorus.converters.columns import Columns
 from pelorus.faults.mend import held_to_fit
 from pelorus.rig.lens import LensModel
@@ -243,6 +243,26 @@ def map_(
         f"{escape(str(target))}: {size} bytes, {len(sigma)} known landmarks, sigma "
         f"{min(sigma):.3g} to {max(sigma):.3g} m"
     )
+
+
+@app.command(
+    "late-turns",
+    rich_help_panel="A recording, mended",
+    epilog="Example:  pelorus convert late-turns drive.plr moved.plr --late 0.15",
+)
+def late_turns_(
+    source: Path = typer.Argument(..., metavar="IN.plr", help="A recording moved by twists."),
+    target: Path = own.TARGET,
+    late: float = typer.Option(
+        ...,
+        metavar="S",
+        help="By how much the rates of turn come after the velocities, as convert and check say; "
+        "negative if they come before.",
+    ),
+) -> None:
+    """Move rates of turn that come later than the velocities beside them; all else stays."""
+    count = late_turns.convert(source, late, target)
+    out.print(f"{escape(str(target))}: the rates of turn of {count} twists, {late:g} s earlier")
 
 
 importers.register(app)

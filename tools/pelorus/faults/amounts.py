@@ -193,7 +193,8 @@ def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
             f"the twists' rates of turn come {abs(own.turns_late_s) * 1e3:.0f} +- "
             f"{own.turns_late_sigma_s * 1e3:.0f} ms "
             f"{'after' if own.turns_late_s > 0 else 'before'} their velocities: a filter, or "
-            "stamps of another clock. No setting makes up for it: move the gyro's stamps",
+            "stamps of another clock. No setting makes up for it: pelorus convert late-turns "
+            f"--late {own.turns_late_s:.2g} moves them; on the robot, stamp the gyro earlier",
             stops=False,
             grave=False,
         )

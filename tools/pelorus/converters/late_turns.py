@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Rates of turn that come later than the velocities beside them, moved to where they belong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pelorus import packed_file, wire
+from pelorus.console import progress
+from pelorus.errors import PelorusError, whole, writing
+from pelorus.frames import End, Message, Text, Twist
+
+LATE_MOST_S = 2.0
+
+
+def convert(source: Path, late_s: float, target: Path) -> int:
+    """The recording with the rates of turn `late_s` earlier, all else as it is; how many there are.
+
+    Between two readings a rate is on the line through them; after the last one it stays.
+    """
+    if not 0 < abs(late_s) <= LATE_MOST_S:
+        raise PelorusError(f"--late {late_s:g}: seconds are due, up to {LATE_MOST_S:g}, and not 0")
+    messages = wire.messages_of(source)
+    twists = [m for m in messages if isinstance(m, Twist)]
+    if not twists:
+        raise PelorusError(f"{source}: holds no twists whose rates of turn could be moved")
+    with whole(target) as (part,), writing(target):
+        packed = packed_file.is_packed(target)
+        with closing(packed_file.create(part, packed)) as stream:
+            writer = wire.Writer(stream)
+            for message in progress(_moved(messages, twists, late_s), "writing", len(messages)):
+                writer.write(message)
+            writer.end()
+    return len(twists)
+
+
+def _moved(
+    messages: Sequence[Message], twists: Sequence[Twist], late_s: float
+) -> Iterator[Message]:
+    t_ns = np.array([twist.t_ns for twist in twists], np.int64)
+    order = np.argsort(t_ns, kind="stable")
+    t_s = (t_ns[order] - t_ns.min()) * 1e-9
+    w = np.array([twist.w_B_radps for twist in twists])[order]
+    first = next(k for k, message in enumerate(messages) if isinstance(message, Twist))
+    for k, message in enumerate(messages):
+        if k == first:
+            yield Text(f"rates of turn moved {late_s:g} s earlier than their velocities")
+        if isinstance(message, Twist):
+            at_s = (message.t_ns - t_ns.min()) * 1e-9 + late_s
+            there = np.array([np.interp(at_s, t_s, w[:, axis]) for axis in range(3)])
+            yield replace(message, w_B_radps=there)
+        elif not isinstance(message, End):
+            yield message
