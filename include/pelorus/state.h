@@ -148,6 +148,7 @@ typedef struct plr_inertial {
     plr_real spread2[2]; /* mean square difference of readings from `slow`, linear and angular */
     plr_real change2[2]; /* mean square of the difference between successive readings */
     plr_real usual_s;    /* usual interval between readings */
+    plr_real off_usual2; /* mean square difference of intervals from that, s^2 */
     plr_time_ns started_ns;
     plr_time_ns still_ns; /* of the last standstill that was measured */
     uint16_t repeated;    /* successive readings of the same numbers */
@@ -159,6 +160,16 @@ typedef struct plr_inertial {
     uint8_t fault;        /* plr_imu_fault, found at the start or since */
     uint8_t doubts;       /* successive frames at which the mean reading did not fit gravity */
 } plr_inertial;
+
+/* What has come of a small sensor: src/filter/readings.h. */
+typedef struct plr_readings {
+    plr_time_ns t_ns; /* of the last reading that was used or rejected */
+    double value[3];  /* its numbers */
+    plr_real excess;  /* sum over readings, older ones weighted less: of d^2 less its expectation */
+    plr_real numbers; /* the same of that expectation, the numbers of a reading */
+    uint16_t rejected; /* by the gate, in succession */
+    uint8_t off;       /* 1: by more than their sigma says, and not by chance */
+} plr_readings;
 
 /* A velocity that a small sensor measured: z = M (v, w) + noise. It holds until its next reading;
  * src/process/velocity.h. */
@@ -357,8 +368,8 @@ typedef struct plr_filter {
                                 since; packed lower triangle */
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_motion motion;
-    uint16_t readings_rejected[PLR_SENSORS]; /* by the gate, in succession */
-    uint8_t health;                          /* plr_health of the last frame */
+    plr_readings readings[PLR_SENSORS];
+    uint8_t health; /* plr_health of the last frame */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];

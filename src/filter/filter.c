@@ -9,6 +9,7 @@
 #include "filter/guard.h"
 #include "filter/mount.h"
 #include "filter/predict.h"
+#include "filter/readings.h"
 #include "math/finite.h"
 #include "math/se3.h"
 #include "math/small.h"
@@ -195,7 +196,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     plr_motion_clear(f);
     plr_velocity_forget(f);
     plr_alignment_clear(f);
-    memset(f->readings_rejected, 0, sizeof f->readings_rejected);
+    plr_readings_clear(f);
     f->count = 0;
     f->frame_number = 0;
     f->frames_without_use = f->frames_mostly_gated = 0;

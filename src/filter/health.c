@@ -6,15 +6,15 @@
 #include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/readings.h"
 #include "process/alignment.h"
 
 enum {
-    LOCK_FRAMES = 10,       /* successive frames of a gate that rejects nearly all */
-    LOCK_MATCHES = 3,       /* with fewer matches the gate is not judged */
-    LOST_FRAMES = 10,       /* frames without one used observation */
-    FEW_USED = 3,           /* fewer do not fix a pose */
-    REJECTED_READINGS = 10, /* of a small sensor, in succession */
-    INERT_MATCHES = 1000    /* a gate that rejects none of so many has no effect */
+    LOCK_FRAMES = 10,    /* successive frames of a gate that rejects nearly all */
+    LOCK_MATCHES = 3,    /* with fewer matches the gate is not judged */
+    LOST_FRAMES = 10,    /* frames without one used observation */
+    FEW_USED = 3,        /* fewer do not fix a pose */
+    INERT_MATCHES = 1000 /* a gate that rejects none of so many has no effect */
 };
 
 /* After so long without observations the pose counts as lost, s. */
@@ -92,10 +92,7 @@ static uint32_t judge_readings(plr_filter *f) {
 }
 
 static uint32_t rejected_readings(const plr_filter *f) {
-    for (unsigned i = 0; i < PLR_SENSORS; i++)
-        if (f->readings_rejected[i] >= REJECTED_READINGS)
-            return PLR_REASON_READINGS_REJECTED;
-    return 0;
+    return plr_readings_are_wrong(f) ? PLR_REASON_READINGS_REJECTED : 0;
 }
 
 /* What an IMU has to say. A faulty reading counts while readings are refused, a fault of the start

@@ -7,6 +7,7 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/habit.h"
 #include "filter/mount.h"
 #include "filter/predict.h"
 #include "math/finite.h"
@@ -25,11 +26,6 @@ enum {
 #define SPIKE_CHANGES PLR_R(30)
 #define SPIKE_ACCEL   PLR_R(60) /* m/s^2 */
 #define SPIKE_GYRO    PLR_R(10) /* rad/s */
-/* What an average keeps of a new interval, and of a new difference. */
-#define INTERVAL_SHARE PLR_R(0.0625)
-#define CHANGE_SHARE   PLR_R(0.015625)
-/* The mean reading covers about this much at most, and no more than since the last standstill, s. */
-#define SLOW_S PLR_R(0.5)
 /* The largest velocity that can be set, m/s. */
 #define MAX_VELOCITY 1e4
 
@@ -42,15 +38,6 @@ static plr_status refuse(plr_filter *f, plr_status status, plr_imu_fault fault) 
 
 static bool is_at(double value, double range) {
     return range > 0 && (value >= range || value <= -range);
-}
-
-/* The square of the difference from the last reading, of three numbers from `first` on. */
-static plr_real change2_of(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
-                           unsigned first) {
-    plr_real off[3];
-    for (unsigned i = 0; i < 3; i++)
-        off[i] = reading[first + i] - f->reading[first + i];
-    return plr_dot3(off, off);
 }
 
 static bool is_spike(const plr_filter *f, const plr_real change2[2]) {
@@ -84,35 +71,6 @@ static plr_imu_fault find_fault(plr_filter *f, const plr_imu *imu,
     return PLR_IMU_FAULT_NONE;
 }
 
-/* Averages over the readings: their interval, how much they change, and their mean. */
-static void learn(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                  plr_real interval, const plr_real change2[2]) {
-    plr_inertial *s = &f->inertial;
-    if (!f->reading_valid) {
-        memcpy(s->slow, reading, sizeof s->slow);
-        s->still_ns = f->t_ns;
-    }
-    if (!f->reading_valid || !(interval > 0))
-        return;
-    if (!(s->usual_s > 0) || interval < PLR_R(0.5) * s->usual_s)
-        s->usual_s = interval;
-    else if (interval < PLR_R(1.5) * s->usual_s)
-        s->usual_s = PLR_FMA(INTERVAL_SHARE, interval - s->usual_s, s->usual_s);
-    for (unsigned i = 0; i < 2; i++)
-        s->change2[i] = PLR_FMA(CHANGE_SHARE, change2[i] / PLR_R(3) - s->change2[i], s->change2[i]);
-    const plr_real since = plr_seconds(t_ns - s->still_ns), span = since < SLOW_S ? since : SLOW_S;
-    const plr_real share = interval < span ? interval / span : PLR_R(1);
-    const plr_real slower = PLR_R(0.25) * (interval < SLOW_S ? interval / SLOW_S : PLR_R(1));
-    plr_real off2[2] = {0};
-    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        const plr_real off = reading[i] - s->slow[i];
-        off2[i / 3] = PLR_FMA(off, off, off2[i / 3]);
-        s->slow[i] = PLR_FMA(share, off, s->slow[i]);
-    }
-    for (unsigned i = 0; i < 2; i++)
-        s->spread2[i] = PLR_FMA(slower, off2[i] / PLR_R(3) - s->spread2[i], s->spread2[i]);
-}
-
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *imu) {
     plr_real reading[PLR_POSE_DIM];
     const plr_status sound = imu ? plr_guard_check(f) : PLR_E_ARGUMENT;
@@ -134,11 +92,12 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
     if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
         return plr_predict_accept(f, t_ns, reading, &planned);
-    const plr_real change2[2] = {change2_of(f, reading, 0), change2_of(f, reading, 3)};
+    plr_real change2[2];
+    plr_habit_change(f, reading, change2);
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    learn(f, t_ns, reading, planned.interval, change2);
+    plr_habit_learn(f, t_ns, reading, planned.interval, change2);
     if (f->inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
     (void)plr_alignment_add(f, t_ns, reading);

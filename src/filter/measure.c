@@ -13,6 +13,7 @@
 #include "filter/guard.h"
 #include "filter/mount.h"
 #include "filter/predict.h"
+#include "filter/readings.h"
 #include "filter/votes.h"
 #include "math/dense.h"
 #include "math/finite.h"
@@ -42,6 +43,8 @@ static plr_status check_numbers(const plr_reading *reading) {
         return PLR_E_ARGUMENT;
     if (!plr_all_finite(reading->value, 3) || !plr_all_finite(reading->at_B_m, 3))
         return PLR_E_NOT_FINITE;
+    if (kind->most_value == 0 && !plr_all_within(reading->value, 3, 0))
+        return PLR_E_ARGUMENT;
     if (!plr_all_within(reading->value, 3, kind->most_value) ||
         !plr_all_within(reading->at_B_m, 3, MAX_ARM))
         return PLR_E_RANGE;
@@ -63,7 +66,7 @@ static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
         return PLR_E_MODE;
     if (!plr_process_has_started(f))
         return PLR_E_NOT_READY;
-    if (!f->clock_started || !f->reading_valid)
+    if (!f->clock_started || !f->reading_valid || plr_readings_repeats(f, reading))
         return PLR_E_TIME;
     if (reading->t_ns < f->t_ns)
         return PLR_E_LATE;
@@ -88,8 +91,7 @@ static plr_real distance2(const plr_real M[PLR_ROWS * PLR_POSE_DIM],
     return plr_dot3(e, e);
 }
 
-static bool accepts(const plr_filter *f, plr_real d2, plr_reading_result *result) {
-    result->d2 += d2 > 0 ? (double)d2 : 0;
+static bool passes(const plr_filter *f, plr_real d2) {
     return d2 >= 0 && plr_is_finite(d2) && (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
 }
 
@@ -108,7 +110,9 @@ static bool hold(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *
             for (unsigned c = 0; c < PLR_POSE_DIM; c++)
                 r[i] = PLR_FMA(-rows[part].M[PLR_POSE_DIM * i + c], u[c], r[i]);
         }
-        accepted = accepts(f, distance2(rows[part].M, P_u, rows[part].R, r), result) && accepted;
+        const plr_real d2 = distance2(rows[part].M, P_u, rows[part].R, r);
+        result->d2 += d2 > 0 ? (double)d2 : 0;
+        accepted = passes(f, d2) && accepted;
     }
     for (unsigned part = 0; accepted && part < parts; part++)
         plr_velocity_hold(f, kind->place + part, &rows[part]);
@@ -165,8 +169,15 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = PLR_FMA(SHARPEST * PLR_EPSILON, S[4 * i], m.R[i]);
     plr_sensitivity_add_to_pose(f, P_xi); /* a camera that is off by a share is no wrong reading */
-    if (!accepts(f, distance2(m.H.term[0].H, P_xi, m.R, m.r), result) ||
-        plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
+    plr_real d2 = distance2(m.H.term[0].H, P_xi, m.R, m.r);
+    result->d2 = d2 > 0 ? (double)d2 : 0;
+    const plr_real wider = plr_readings_widening(f, reading->sensor);
+    if (wider > 1) {
+        for (unsigned i = 0; i < PLR_ROWS; i++)
+            m.R[i] *= plr_reading_has(reading, i) ? wider : PLR_R(1);
+        d2 = distance2(m.H.term[0].H, P_xi, m.R, m.r);
+    }
+    if (!passes(f, d2) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
     if (f->motion.pending)
         plr_frozen_note_motion(f);
@@ -228,9 +239,8 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
     plr_reading seen_from_imu = *reading;
     plr_mount_place_in(f, seen_from_imu.at_B_m);
     plr_predict_to(f, reading->t_ns);
-    uint16_t *rejected = &f->readings_rejected[reading->sensor - 1];
     const bool used = measure(f, &seen_from_imu, got);
-    *rejected = used ? 0 : (uint16_t)(*rejected + (*rejected < UINT16_MAX));
+    plr_readings_add(f, reading, used, (plr_real)got->d2);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -7,6 +7,7 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/habit.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
@@ -80,6 +81,16 @@ static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
 }
 
+/* Adds what the last reading misses between h0 and h1 seconds after its time. */
+static void add_missed(plr_filter *f, plr_real h0, plr_real h1, const plr_real *next) {
+    plr_real variance[PLR_POSE_DIM];
+    if (!f->reading_valid || !plr_process_of(f)->missed ||
+        !plr_process_of(f)->missed(f, h0, h1, next, variance))
+        return;
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        f->motion.Q[(PLR_POSE_DIM + 1) * i] += variance[i];
+}
+
 void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
     if (f->clock_started && t_ns > f->t_ns && plr_process_has_started(f)) {
         const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
@@ -88,6 +99,7 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
         plr_real held[PLR_POSE_DIM];
         plr_process_of(f)->hold(f, h0, held);
         plr_process_of(f)->step(f, t_ns, held, plr_seconds(t_ns - f->t_ns), interval);
+        add_missed(f, h0, h1, NULL);
     }
     f->t_ns = t_ns;
     f->clock_started = 1;
@@ -155,8 +167,10 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
         plr_guard_seal(f);
         return PLR_OK;
     }
-    if (planned->seconds > 0 && plr_process_has_started(f))
+    if (planned->seconds > 0 && plr_process_has_started(f)) {
         plr_process_of(f)->step(f, t_ns, planned->mean, planned->seconds, planned->interval);
+        add_missed(f, planned->interval - planned->seconds, planned->interval, reading);
+    }
     f->t_ns = t_ns;
     f->clock_started = 1;
     store_reading(f, t_ns, reading, planned->interval);
@@ -181,5 +195,10 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
             return refuse_twist(f, PLR_E_RANGE);
     }
     const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
+    if (planned.status == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
+        plr_real change2[2];
+        plr_habit_change(f, reading, change2);
+        plr_habit_learn(f, t_ns, reading, planned.interval, change2);
+    }
     return plr_predict_accept(f, t_ns, reading, &planned);
 }

@@ -8,6 +8,7 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "filter/readings.h"
 #include "process/velocity.h"
 #include "record/codec.h"
 #include "state/covariance.h"
@@ -15,7 +16,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 8 };
+enum { STATE_VERSION = 9 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -246,7 +247,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         f->diverged = 0;
         plr_velocity_forget(f); /* their clock is not the one that goes on */
         memset(f->slots, 0, sizeof f->slots);
-        memset(f->readings_rejected, 0, sizeof f->readings_rejected);
+        plr_readings_clear(f);
         f->last_position_ns = PLR_NEVER_NS;
     }
     for (unsigned slot = 0; slot < count.landmarks && status == PLR_OK; slot++)

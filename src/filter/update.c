@@ -205,8 +205,7 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     const bool is_state = plr_process_of(f)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
-    const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY &&
-                       f->config.mode == PLR_MODE_SLAM;
+    const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY;
     const plr_correction correction =
         finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
     plr_match_count(f, matched);

@@ -13,6 +13,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/mean.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
@@ -21,8 +22,6 @@
 /* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
 #define MAX_TURN PLR_R(3.1415926)
 #define MAX_WAY  PLR_R(1000)
-/* A reading that is held for more of the usual intervals than this is no mean any more. */
-#define LONG_INTERVALS PLR_R(2.5)
 /* The error of a reading that is held lasts about so long before it becomes another, s. */
 #define LASTING_S PLR_R(0.5)
 /* What a frame has bridged by the older reading is made up for if it is no longer than this, s. */
@@ -265,7 +264,7 @@ static void densities(const plr_filter *f, plr_real interval, plr_real density[2
     const plr_inertial *at = &f->inertial;
     density[0] = f->par.accel_density;
     density[1] = f->par.gyro_density;
-    if (!(at->usual_s > 0) || interval <= LONG_INTERVALS * at->usual_s)
+    if (!(at->usual_s > 0) || interval <= PLR_LONG_INTERVALS * at->usual_s)
         return;
     const plr_real intervals = interval / at->usual_s;
     const plr_real lasting = interval < LASTING_S ? interval : LASTING_S;
@@ -352,27 +351,9 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
 
 /* ---------------------------------------------------------------- readings */
 
-/* Between two samples of a signal that changes smoothly its mean is that of both ends. Where a frame
- * came in between, the first part of the interval was bridged by the older one: the second makes up
- * for it, so that the integral is right. Not so after many lost readings: meanwhile frames have
- * corrected what the older one did. */
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
-    const uint8_t timing = f->reading_valid ? f->config.imu_timing : PLR_TWIST_END;
-    const plr_real whole = plr_seconds(t_ns - f->reading_ns);
-    const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
-                              ? plr_seconds(f->t_ns - f->reading_ns)
-                              : PLR_R(0);
-    const bool bridged = whole <= BRIDGED_S;
-    for (int i = 0; i < PLR_READING_DIM; i++) {
-        const plr_real target = timing == PLR_TWIST_END ? reading[i]
-                                : timing == PLR_TWIST_START
-                                    ? f->reading[i]
-                                    : PLR_R(0.5) * (f->reading[i] + reading[i]);
-        held[i] = bridged && done > 0 && whole > done
-                      ? PLR_FMA(done / (whole - done), target - f->reading[i], target)
-                      : target;
-    }
+    plr_mean_reading(f, f->config.imu_timing, BRIDGED_S, t_ns, reading, held);
 }
 
 /* The accumulated motion's noise holds the walk already. */

@@ -13,6 +13,9 @@
 
 enum { PLR_READING_DIM = PLR_POSE_DIM };
 
+/* A reading that is held for more of the usual intervals than this is no mean any more. */
+#define PLR_LONG_INTERVALS PLR_R(2.5)
+
 typedef struct plr_process {
     /* Lays out the state's blocks. */
     void (*lay_out)(plr_filter *f);
@@ -34,6 +37,12 @@ typedef struct plr_process {
 
     /* The last reading, `age` seconds after its time, or what is assumed in its place. */
     void (*hold)(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]);
+
+    /* The variances of the displacement, m^2 and rad^2, that the last reading misses between h0 and h1
+     * seconds after its time, because the body's motion changes; `next` is the reading that ends it,
+     * NULL while there is none. False if it misses nothing. NULL: `step` knows by its `interval`. */
+    bool (*missed)(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
+                   plr_real variance[PLR_POSE_DIM]);
 
     /* The reading of a body that keeps its velocity: assumed while there is none. */
     void (*rest)(const plr_filter *f, plr_real reading[PLR_READING_DIM]);

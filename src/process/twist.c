@@ -6,6 +6,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
+#include "process/mean.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
@@ -14,6 +15,8 @@
 /* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
 #define MAX_TURN PLR_R(3.1415926)
 #define MAX_WAY  PLR_R(1000)
+/* An interval that is longer than usual by this many of the intervals' deviations lacks readings. */
+#define LATE_SIGMAS PLR_R(4)
 
 static void lay_out(plr_filter *f) {
     const uint8_t bias = f->config.bias ? PLR_BIAS_DIM : 0;
@@ -96,17 +99,54 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
-    const uint8_t timing = f->reading_valid ? f->config.twist_timing : PLR_TWIST_END;
-    (void)t_ns;
-    for (int i = 0; i < PLR_READING_DIM; i++)
-        held[i] = timing == PLR_TWIST_END     ? reading[i]
-                  : timing == PLR_TWIST_START ? f->reading[i]
-                                              : PLR_R(0.5) * (f->reading[i] + reading[i]);
+    plr_mean_reading(f, f->config.twist_timing, PLR_LONG_INTERVALS * f->inertial.usual_s, t_ns,
+                     reading, held);
 }
 
 static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
     (void)age;
     memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
+}
+
+/* The square of by how much a velocity is off that is held for n of the usual intervals: what readings
+ * differ by beyond their own noise, and later what they scatter by. Linear numbers are 0, angular ones
+ * 1. */
+static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
+    const plr_real *v = which == 0 ? f->par.velocity_variance : f->par.gyro_variance;
+    const plr_real noise = (v[0] + v[1] + v[2]) / PLR_R(3);
+    const plr_real change = f->inertial.change2[which] - PLR_R(2) * noise;
+    const plr_real spread = f->inertial.spread2[which] - noise;
+    if (!(change > 0))
+        return 0;
+    const plr_real changed = PLR_R(0.25) * change * n * n;
+    const plr_real most = change + (spread > 0 ? spread : PLR_R(0));
+    return changed < most ? changed : most;
+}
+
+/* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
+ * the readings are told for such intervals, and their sigma is true of them. */
+static bool lost_readings(const plr_filter *f, plr_real h) {
+    const plr_real usual = f->inertial.usual_s, late = h - usual;
+    return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
+           late * late > LATE_SIGMAS * LATE_SIGMAS * f->inertial.off_usual2;
+}
+
+static bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
+                   plr_real variance[PLR_POSE_DIM]) {
+    const plr_real usual = f->inertial.usual_s;
+    if (!lost_readings(f, h1) || f->config.noise == PLR_NOISE_STEP)
+        return false;
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
+        variance[i] = off2(f, i / 3, h1 / usual);
+        if (next) { /* when it became what it is now is not known */
+            const plr_real *v = i < 3 ? f->par.velocity_variance : f->par.gyro_variance;
+            const plr_real step = next[i] - f->reading[i],
+                           change = step * step - PLR_R(2) * v[i % 3];
+            variance[i] += change > 0 ? change / PLR_R(3) : PLR_R(0);
+        }
+        variance[i] *= h1 * h1 - h0 * h0;
+    }
+    return true;
 }
 
 static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
@@ -173,6 +213,7 @@ const plr_process plr_process_twist = {
     .step = step,
     .mean = mean,
     .hold = hold,
+    .missed = missed,
     .rest = rest,
     .walk = walk,
     .bias_walk = bias_walk,

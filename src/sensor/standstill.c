@@ -28,7 +28,7 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
 }
 
 const plr_sensor_kind plr_standstill = {
-    .of_twist = measure, .place = 1, .axes = 3, .most_value = 1e4};
+    .of_twist = measure, .place = 1, .axes = 3, .most_value = 0};
 
 /* The squared distance of a landmark's pixels from those that it was anchored at, in their noise and
  * in what its track has wandered since. */

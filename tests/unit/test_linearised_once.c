@@ -105,7 +105,7 @@ static void test_in_the_world_each_observation_is_linearised_once(void) {
 
 static void test_in_localization_each_observation_is_linearised_once(void) {
     rig.map.source = source;
-    check_drive(PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, false);
+    check_drive(PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true);
     check_drive(PLR_MODEL_WORLD, PLR_MODE_LOCALIZATION, false);
 }
 
