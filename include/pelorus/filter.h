@@ -153,10 +153,11 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
  * a position the frame.
  * A reading beyond the setting gate-d2, and a position more than 900 m off, is rejected: PLR_OK,
  * and result->used is false. `result` may be NULL.
- * PLR_E_ARGUMENT no such sensor, axes that it cannot measure, or a sigma that is not positive;
+ * PLR_E_ARGUMENT no such sensor, axes that it cannot measure, a sigma that is not positive, or a
+ * standstill whose value is not 0;
  * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4, a position beyond 1e9, an arm beyond 1 km,
  * a sigma beyond 1e6, or a prediction of more than pi rad or 1 km; PLR_E_TIME before the first
- * twist or IMU reading; PLR_E_NOT_READY before an IMU has started; PLR_E_LATE earlier than the
+ * twist or IMU reading, or a position that is the last one again; PLR_E_NOT_READY before an IMU has started; PLR_E_LATE earlier than the
  * filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in mapping. */
 plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
                               plr_reading_result *result);

@@ -139,8 +139,10 @@ typedef enum plr_reason {
     /* Twists, or IMU readings, are missing or refused, or the last one is too old. Check the
      * odometry, or the IMU, and its link; plr_filter_imu_fault says what is wrong with an IMU. */
     PLR_REASON_NO_TWISTS = 1 << 21,
-    /* Ten successive readings of a small sensor (plr_sensor) were rejected. The sensor or the
-     * estimate is wrong: check the sensor's frame, lever arm, units and sigma. */
+    /* Readings of a small sensor (plr_sensor) were rejected ten times in succession, or differ from the
+     * estimate by more than their sigma says for longer than by chance; a position counts for less
+     * meanwhile. The sensor or the estimate is wrong: check the sensor's frame, lever arm, clock, units
+     * and sigma. */
     PLR_REASON_READINGS_REJECTED = 1 << 22,
     /* With an IMU: the filter has not started, because tilt and velocity are not known yet. Let the
      * body stand for a second, or see the setting imu-start. */

@@ -40,6 +40,8 @@ static void test_bad_readings_are_refused_and_change_nothing(void) {
     bad = good, bad.at_B_m[2] = (double)INFINITY, refuse(bad, PLR_E_NOT_FINITE);
     bad = good, bad.sigma[0] = (double)NAN, refuse(bad, PLR_E_NOT_FINITE);
     bad = good, bad.sigma[0] = 0, refuse(bad, PLR_E_ARGUMENT);
+    bad = good, bad.sensor = PLR_SENSOR_STANDSTILL, bad.axes = 3, bad.value[1] = 0.5;
+    refuse(bad, PLR_E_ARGUMENT); /* a standstill has no value */
     bad = good, bad.sigma[2] = 1e7, refuse(bad, PLR_E_RANGE);
     bad = good, bad.value[0] = 2e4, refuse(bad, PLR_E_RANGE);
     bad = good, bad.sensor = PLR_SENSOR_POSITION, bad.value[0] = 2e9, refuse(bad, PLR_E_RANGE);
@@ -262,6 +264,35 @@ static void test_a_frozen_picture_is_seen_between_positions_too(void) {
         told += (rig.report.reasons & PLR_REASON_FROZEN_IMAGE) != 0;
     }
     TEST_ASSERT_GREATER_THAN_UINT(15, told);
+}
+
+static void test_a_position_given_twice_is_one(void) {
+    rig_drive(5);
+    plr_reading place = position(7, 0.05);
+    measure(place);
+    refuse(place, PLR_E_TIME);
+    place.value[0] += 0.01; /* another sensor's, of the same time */
+    measure(place);
+}
+
+/* With 10 m and 0.1 rad of uncertainty a height differs by half a metre for the second order alone. */
+static void test_a_height_tells_no_tilt_where_place_and_tilt_are_unknown(void) {
+    double P[36] = {0}, after[36];
+    const double variance[6] = {100, 100, 1, 0.01, 0.01, 0.01};
+    for (int i = 0; i < 6; i++)
+        P[7 * i] = variance[i];
+    rig_drive(1);
+    TEST_ASSERT_EQUAL_INT(PLR_OK,
+                          plr_filter_set_pose(&rig.filter, rig.world.t_ns, &rig_identity, P));
+    rig_twist();
+    for (int k = 0; k < 20; k++) {
+        rig_twist();
+        measure(position(4, 0.01));
+    }
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, after));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.009, after[21]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.009, after[28]);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.5, after[14]); /* it does tell the height */
 }
 
 static void test_heights_alone_do_not_keep_a_dark_drive_from_being_lost(void) {

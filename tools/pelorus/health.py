@@ -41,7 +41,7 @@ SHORT = {
     "NO_FRAMES": NO_FRAMES,
     "STATE_DAMAGED": "the filter's memory was changed",
     "NO_TWISTS": "twists or IMU readings missing, refused or too old",
-    "READINGS_REJECTED": "readings of a small sensor rejected",
+    "READINGS_REJECTED": "readings of a small sensor rejected or off",
 }
 # What follows from a cause; where the cause is known too, it is told first.
 SYMPTOMS = tuple(
