@@ -222,6 +222,7 @@ def _summary(outcome: Outcome, record: Path | None) -> Iterator[tuple[str, str]]
     for (subject, status), count in sorted((frames | outcome.refused).items()):
         yield "refused", refusal(subject, status, count)
     if outcome.worst_update_us:
-        yield "slowest", f"{outcome.worst_update_us} us for a frame, by the board's clock"
+        clock = "by the board's clock (an emulator's is not the chip's: docs/SIZES.md)"
+        yield "slowest", f"{outcome.worst_update_us} us for a frame, {clock}"
     if record is not None:
         yield "recorded", str(record)

@@ -139,7 +139,11 @@ def _consistency(run: Run) -> Iterator[str]:
             f"about {math.sqrt(nees):.2g} times as large as it says."
         )
     if nees is not None and nees < NEES_LOW:
-        yield f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due."
+        yield (
+            f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due. The errors that the "
+            "defaults allow the calibration (focal-sigma, baseline-sigma, camera-turn-sigma) may be "
+            "larger than yours."
+        )
 
 
 def _map(run: Run) -> Iterator[str]:
