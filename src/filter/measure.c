@@ -152,6 +152,33 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     return correct(f, m, accepted ? parts : 0) && accepted;
 }
 
+/* A place is p + R (rho + theta x rho / 2 + ...): where a height alone is measured and neither place nor
+ * tilt is known, the second order moves it by more than a sigma, and as a measurement of tilt and place
+ * it would be wrong. This is its variance, of the axes that are not measured: the others are known
+ * when the reading is used. */
+static plr_real second_order(const plr_filter *f, const plr_reading *reading,
+                             const plr_real P[PLR_POSE_SQUARE]) {
+    plr_real way = 0, turn = 0;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        plr_real row[3] = {0};
+        turn += P[(PLR_POSE_DIM + 1) * (3 + axis)];
+        if (plr_reading_has(reading, axis))
+            continue;
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned j = 0; j < 3; j++)
+                row[i] = PLR_FMA(P[PLR_POSE_DIM * i + j], f->R_WB[3 * axis + j], row[i]);
+        way += plr_dot3(row, f->R_WB + 3 * axis);
+    }
+    return PLR_R(0.25) * way * turn;
+}
+
+/* R <- times R + more, of the numbers that were measured. */
+static void widen(const plr_reading *reading, plr_real times, plr_real more, plr_real R[PLR_ROWS]) {
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        if (plr_reading_has(reading, i))
+            R[i] = PLR_FMA(times, R[i], more);
+}
+
 /* Gates a reading of the state by the pose's present covariance, and applies it. A rejected one
  * changes nothing. */
 static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading *reading,
@@ -165,6 +192,8 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     PLR_ASSERT(m.H.terms == 1 && m.H.term[0].row == plr_row_of(f, PLR_BLOCK_POSE));
     plr_motion_pose_covariance(f, P_xi);
     plr_consistency_enlarge(f, P_xi);
+    if (kind->bounds_position != 0)
+        widen(reading, 1, second_order(f, reading, P_xi), m.R);
     plr_sandwich3(S, HP, m.H.term[0].H, P_xi);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m.R[i] = PLR_FMA(SHARPEST * PLR_EPSILON, S[4 * i], m.R[i]);
@@ -173,8 +202,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     result->d2 = d2 > 0 ? (double)d2 : 0;
     const plr_real wider = plr_readings_widening(f, reading->sensor);
     if (wider > 1) {
-        for (unsigned i = 0; i < PLR_ROWS; i++)
-            m.R[i] *= plr_reading_has(reading, i) ? wider : PLR_R(1);
+        widen(reading, wider, 0, m.R);
         d2 = distance2(m.H.term[0].H, P_xi, m.R, m.r);
     }
     if (!passes(f, d2) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)

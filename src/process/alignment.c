@@ -34,11 +34,13 @@
 #define NOT_GRAVITY PLR_R(1.5)
 /* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
 #define OTHER_TILT PLR_R(0.06)
-/* So long after the start, and for so many frames in a row, the mean reading is held against
- * gravity. A body that spins faster, rad/s, would be thrown about. */
+/* So long after the start the mean reading is held against gravity. It is at fault if it does not fit in
+ * so many frames in a row, for so long: a body that swings leaves no half second of it to itself, and
+ * frames may come at any rate. A body that spins faster, rad/s, would be thrown about. */
 #define WATCH_NS UINT64_C(10000000000)
+#define DOUBT_NS UINT64_C(850000000)
 #define SPINS    PLR_R(10)
-enum { WATCH_FRAMES = 10 };
+enum { WATCH_FRAMES = 5 };
 /* The anchor comes this much after a start in motion, if this many frames were used. */
 #define ANCHOR_NS UINT64_C(2000000000)
 enum { ANCHOR_FRAMES = 10 };
@@ -336,9 +338,14 @@ void plr_alignment_watch_gravity(plr_filter *f) {
     if (!s->started || s->fault != PLR_IMU_FAULT_NONE || f->t_ns - s->started_ns > WATCH_NS)
         return;
     const plr_imu_fault doubt = find_doubt(f);
-    s->doubts = doubt == PLR_IMU_FAULT_NONE ? 0 : (uint8_t)(s->doubts + 1);
-    if (s->doubts >= WATCH_FRAMES)
+    if (doubt == PLR_IMU_FAULT_NONE)
+        s->doubts = 0;
+    else if (s->doubts++ == 0)
+        s->doubted_ns = f->t_ns;
+    if (s->doubts >= WATCH_FRAMES && f->t_ns - s->doubted_ns >= DOUBT_NS)
         s->fault = (uint8_t)doubt;
+    else if (s->doubts > WATCH_FRAMES)
+        s->doubts = WATCH_FRAMES; /* more are not counted */
 }
 
 /* ---------------------------------------------------------------- the anchor */

@@ -24,8 +24,8 @@ typedef struct plr_sensor_kind {
     uint8_t axes;      /* numbers that it can measure: bits as in plr_reading.axes */
     double most_value; /* a larger value is an error of the sender; 0: there is no value */
 
-    /* While these axes are all measured, the position cannot drift away: a dark camera alone is no
-     * LOST. 0: no such sensor. */
+    /* Of a sensor that measures where the body is: while these axes are all measured, the position cannot
+     * drift away, and a dark camera alone is no LOST. 0: no such sensor. */
     uint8_t bounds_position;
 } plr_sensor_kind;
 

@@ -5,11 +5,14 @@
 
 #include "support/imu_rig.h"
 
-enum { PER_FRAME = 40, FRAME_MS = 100 };
+enum { PER_FRAME = 40 };
+
+static unsigned per_frame;
 
 static plr_filter *const f = &imu_rig.filter;
 
 void setUp(void) {
+    per_frame = PER_FRAME;
     imu_rig_set_up();
 }
 
@@ -23,11 +26,11 @@ static void start(void) {
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_velocity(f, still, variance));
 }
 
-/* Readings about these means at 400 Hz, and a frame without observations after each PER_FRAME. */
+/* Readings about these means at 400 Hz, and a frame without observations after each `per_frame`. */
 static uint32_t reasons_after(unsigned frames, const double a[3], const double w[3]) {
     rng chance = rng_seeded(411);
     plr_report report = {0};
-    for (unsigned n = 1; n <= frames * PER_FRAME; n++) {
+    for (unsigned n = 1; n <= frames * per_frame; n++) {
         const plr_time_ns t_ns = 1000000000 + n * UINT64_C(2500000);
         plr_imu imu;
         for (int i = 0; i < 3; i++) {
@@ -36,7 +39,7 @@ static uint32_t reasons_after(unsigned frames, const double a[3], const double w
         }
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_inertial(f, t_ns, &imu));
         const plr_frame frame = {.t_ns = t_ns, .budget = PLR_NO_BUDGET};
-        if (n % PER_FRAME == 0)
+        if (n % per_frame == 0)
             TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &frame, &report));
     }
     return report.reasons;
@@ -69,6 +72,19 @@ static void test_a_wrong_sign_is_told(void) {
 
 static void test_swapped_axes_are_told(void) {
     demand(PLR_IMU_FAULT_TILT, (const double[]){9.81, 0, 0.3}, slow);
+}
+
+/* 80 frames a second: what lasts for half a second is a motion, and no fault, however many frames it
+ * has. */
+static void test_a_fault_lasts_for_a_second_at_any_rate_of_frames(void) {
+    const double sideways[3] = {9.81, 0, 0.3};
+    per_frame = 5;
+    start();
+    (void)reasons_after(65, sideways, slow); /* the mean has turned after some 0.3 s */
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
+    start();
+    (void)reasons_after(150, sideways, slow);
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_TILT, plr_filter_imu_fault(f));
 }
 
 static void test_a_gyro_in_degrees_is_told(void) {

@@ -140,9 +140,9 @@ def _consistency(run: Run) -> Iterator[str]:
         )
     if nees is not None and nees < NEES_LOW:
         yield (
-            f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due. The errors that the "
-            "defaults allow the calibration (focal-sigma, baseline-sigma, camera-turn-sigma) may be "
-            "larger than yours."
+            f"knows more than it believes: NEES/6 is {nees:.2g} where 1 is due. What the defaults "
+            "allow for the calibration (focal-sigma, baseline-sigma, camera-turn-sigma) may be too "
+            "much for yours."
         )
 
 
