@@ -144,7 +144,10 @@ def _publish(trials: list[Trial], folder: Path) -> None:
     write_text(folder / TABLE, text)
     shown = Table(box=None, pad_edge=False)
     for k, title in enumerate(table.TITLES[: -table.TRACES]):
-        shown.add_column(title, justify="left" if k < 2 else "right", no_wrap=k < 2)
+        if k < 2:
+            shown.add_column(title, min_width=9)
+        else:
+            shown.add_column(title, justify="right", overflow="fold")
     for row in table.rows(trials):
         shown.add_row(*row[: -table.TRACES])
     out.print(shown)

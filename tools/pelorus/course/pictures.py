@@ -39,7 +39,7 @@ def figure_1(trials: Sequence[Trial]) -> Figure:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center",
-                  ncols=3 if len(trials) == 1 else 6, markerscale=3)  # fmt: skip
+                  ncols=2 if len(trials) == 1 else 6, markerscale=3)  # fmt: skip
     return figure
 
 
