@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from converted import SHORT, Run, messages_of
 from drives import PERFECT, clean
+from pelorus import arrays
+from pelorus.errors import PelorusError
 from pelorus.frames import Header, Imu, Process, Reading, Stereo, Truth, Twist
 from pelorus.recording import Recording
 from pelorus.simulation.simulate import simulate
@@ -205,13 +207,22 @@ def test_a_wheel_speed_alone_and_pictures_find_the_way(tmp_path: Path, pelorus: 
     assert together < 0.05 * alone
 
 
+@pytest.mark.parametrize(("size", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_times_of_another_unit_are_named(size: float, unit: str) -> None:
+    with pytest.raises(PelorusError, match=f"are they {unit}.*--columns t=t_s:{unit}"):
+        arrays.check_seconds(Path("twists.csv"), "t_s", np.array([1.7e9, 1.7e9 + 60]) * size)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--columns", "v=vx_mps,q=x"), "--columns q=x: NAME=COLUMN is due, such as v=speed_mps"),
         (("--columns", "v"), "--columns v: NAME=COLUMN is due"),
         (("--columns", "v=pace"), "in which unit is pace? v=pace:UNIT is due, with mps or m/s or"),
-        (("--columns", "t=stamp:min"), "t=stamp:UNIT is due, with ns or us or ms or s"),
+        (
+            ("--columns", "t=stamp:min"),
+            "min is no unit of t: t=stamp:UNIT is due, with ns or us or",
+        ),
         (("--columns", "v=pace_mps"), "no file has the column pace_mps; there are: "),
         (("--columns", "vy=vx_mps"), "has the column vy_mps, and vx_mps is to be called so"),
         (("--measured", "vx,yaw"), "--measured vx,yaw: some of vx, vy, vz, wx, wy, wz are due"),

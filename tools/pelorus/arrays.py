@@ -127,15 +127,22 @@ def nanoseconds(path: Path, what: str, seconds: Floats) -> NDArray[np.int64]:
     return t_ns
 
 
+FINER = {"ms": 1e6, "us": 1e3, "ns": 1.0}  # units of time, in ns
+
+
 def check_seconds(path: Path, what: str, numbers: Floats, unit_ns: float = 1e9) -> None:
     """Refuse times that are none of this unit: negative ones, or nanoseconds by mistake."""
     most = SECONDS_MAX * 1e9 / unit_ns
     if numbers.min() < 0 or numbers.max() > most:
         name = {1e9: "seconds", 1e6: "milliseconds", 1e3: "microseconds"}[unit_ns]
+        finer = [
+            unit for unit, size_ns in FINER.items() if numbers.max() <= most * unit_ns / size_ns
+        ]
+        guess = f"; are they {finer[0]}? (of a CSV: --columns t={what}:{finer[0]})" if finer else ""
         raise ForeignFileError(
             path,
             f"{what} spans {numbers.min():g} to {numbers.max():g}",
-            due=f"{name} from 0 to {most:g} are due",
+            due=f"{name} from 0 to {most:g} are due{guess if numbers.min() >= 0 else ''}",
         )
 
 

@@ -126,9 +126,9 @@ def _column(words: str) -> Column:
     if units is NUMBER:
         return Column(words, file, target, column, 1.0)
     if unit not in units:
+        asks = f"{unit} is no unit of {short}:" if colon else f"in which unit is {column}?"
         raise PelorusError(
-            f"--columns {words}: in which unit is {column}? {short}={column}:UNIT is due, with "
-            f"{' or '.join(units)}"
+            f"--columns {words}: {asks} {short}={column}:UNIT is due, with {' or '.join(units)}"
         )
     if units is TIME_UNITS:
         return Column(words, file, f"t_{unit}", column, 1.0)
