@@ -4,6 +4,7 @@
 #include <unity.h>
 
 #include "filter/readings.h"
+#include "sensor/sensor.h"
 #include "support/axes.h"
 #include "support/random.h"
 #include "support/rig.h"
@@ -26,7 +27,7 @@ static void add(double times, double off) {
     double d2 = 0;
     for (unsigned i = 0; i < 3; i++) {
         const double error = times * rng_normal(&numbers) + off;
-        d2 += reading.axes >> i & 1U ? error * error : 0;
+        d2 += plr_reading_has(&reading, i) ? error * error : 0;
     }
     reading.t_ns++;
     plr_readings_add(&filter, &reading, d2 < 13.3, (plr_real)d2);
