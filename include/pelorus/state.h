@@ -151,6 +151,7 @@ typedef struct plr_inertial {
     plr_real off_usual2; /* mean square difference of intervals from that, s^2 */
     plr_time_ns started_ns;
     plr_time_ns still_ns;   /* of the last standstill that was measured */
+    plr_time_ns doubted_ns; /* since when the mean reading has not fitted gravity: `doubts` */
     uint16_t repeated;      /* successive readings of the same numbers */
     uint16_t out_of_line;   /* successive readings refused as spikes */
     uint16_t frames;        /* that used observations since the start, up to the anchor */
@@ -158,8 +159,7 @@ typedef struct plr_inertial {
     uint8_t pose_given;     /* 1: plr_filter_set_pose was called */
     uint8_t anchored;       /* plr_anchored: what is known of position and yaw since the start */
     uint8_t fault;          /* plr_imu_fault, found at the start or since */
-    plr_time_ns doubted_ns; /* since when the mean reading has not fitted gravity, */
-    uint8_t doubts;         /* and in how many successive frames */
+    uint8_t doubts;         /* successive frames at which the mean reading did not fit gravity */
 } plr_inertial;
 
 /* What has come of a small sensor: src/filter/readings.h. */

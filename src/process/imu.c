@@ -353,7 +353,8 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
-    plr_mean_reading(f, f->config.imu_timing, BRIDGED_S, t_ns, reading, held);
+    const bool bridged = plr_seconds(t_ns - f->reading_ns) <= BRIDGED_S;
+    plr_mean_reading(f, f->config.imu_timing, bridged, t_ns, reading, held);
 }
 
 /* The accumulated motion's noise holds the walk already. */

@@ -4,19 +4,20 @@
 #include "math/small.h"
 #include "state/seconds.h"
 
-void plr_mean_reading(const plr_filter *f, uint8_t timing, plr_real bridged_s, plr_time_ns t_ns,
+void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_time_ns t_ns,
                       const plr_real reading[PLR_READING_DIM], plr_real held[PLR_READING_DIM]) {
     const uint8_t when = f->reading_valid ? timing : PLR_TWIST_END;
     const plr_real whole = plr_seconds(t_ns - f->reading_ns);
     const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
                               ? plr_seconds(f->t_ns - f->reading_ns)
                               : PLR_R(0);
-    const bool bridged = whole <= bridged_s && done > 0 && whole > done;
+    const bool makes_up = bridged && done > 0 && whole > done;
     for (int i = 0; i < PLR_READING_DIM; i++) {
         const plr_real target = when == PLR_TWIST_END ? reading[i]
                                 : when == PLR_TWIST_START
                                     ? f->reading[i]
                                     : PLR_R(0.5) * (f->reading[i] + reading[i]);
-        held[i] = bridged ? PLR_FMA(done / (whole - done), target - f->reading[i], target) : target;
+        held[i] =
+            makes_up ? PLR_FMA(done / (whole - done), target - f->reading[i], target) : target;
     }
 }

@@ -11,6 +11,7 @@
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
+#include "state/seconds.h"
 
 /* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
 #define MAX_TURN PLR_R(3.1415926)
@@ -97,10 +98,18 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
     }
 }
 
+/* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
+ * the readings are told for such intervals, and their sigma is true of them. */
+static bool lost_readings(const plr_filter *f, plr_real h) {
+    const plr_real usual = f->inertial.usual_s, late = h - usual;
+    return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
+           late * late > LATE_SIGMAS * LATE_SIGMAS * f->inertial.off_usual2;
+}
+
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real held[PLR_READING_DIM]) {
-    plr_mean_reading(f, f->config.twist_timing, PLR_LONG_INTERVALS * f->inertial.usual_s, t_ns,
-                     reading, held);
+    const bool bridged = !lost_readings(f, plr_seconds(t_ns - f->reading_ns));
+    plr_mean_reading(f, f->config.twist_timing, bridged, t_ns, reading, held);
 }
 
 static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
@@ -121,14 +130,6 @@ static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
     const plr_real changed = PLR_R(0.25) * change * n * n;
     const plr_real most = change + (spread > 0 ? spread : PLR_R(0));
     return changed < most ? changed : most;
-}
-
-/* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
- * the readings are told for such intervals, and their sigma is true of them. */
-static bool lost_readings(const plr_filter *f, plr_real h) {
-    const plr_real usual = f->inertial.usual_s, late = h - usual;
-    return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
-           late * late > LATE_SIGMAS * LATE_SIGMAS * f->inertial.off_usual2;
 }
 
 static bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,

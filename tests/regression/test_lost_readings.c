@@ -19,8 +19,10 @@ static const double SPEED_MPS = 1, RATE_RADPS = 1, PERIOD_S = 5;
 
 static plr_filter filter;
 static plr_config config;
+static bool together;
 
 void setUp(void) {
+    together = false;
     plr_config_default(&config);
     config.bias = 0;
     config.mode = PLR_MODE_DEAD_RECKONING;
@@ -109,7 +111,18 @@ static void drive_with_frames_between(plr_twist_timing timing) {
         }
         const double early = timing == PLR_TWIST_END ? 50 : timing == PLR_TWIST_MID ? 25 : 0;
         read_mean(ms, ms - early, ms - early + 50);
+        if (ms == 0 && together) {
+            const plr_twist again = {{SPEED_MPS, 0, 0}, {0, 0, 0}};
+            TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_predict(&filter, MS / 2, &again));
+        }
     }
+}
+
+/* Two readings half a millisecond apart: the next four intervals look like lost readings, and no more. */
+static void test_nor_does_it_long_after_two_readings_that_came_together(void) {
+    together = true;
+    drive_with_frames_between(PLR_TWIST_END);
+    TEST_ASSERT_DOUBLE_WITHIN(9e-3, heading(1.25), heading_found());
 }
 
 static void test_a_frame_between_two_readings_loses_no_motion(void) {
