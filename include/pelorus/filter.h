@@ -157,8 +157,9 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
  * standstill whose value is not 0;
  * PLR_E_NOT_FINITE; PLR_E_RANGE a velocity beyond 1e4, a position beyond 1e9, an arm beyond 1 km,
  * a sigma beyond 1e6, or a prediction of more than pi rad or 1 km; PLR_E_TIME before the first
- * twist or IMU reading, or a position that is the last one again; PLR_E_NOT_READY before an IMU has started; PLR_E_LATE earlier than the
- * filter's time; PLR_E_GAP more than max_gap_s ahead; PLR_E_MODE in mapping. */
+ * twist or IMU reading, or the same position of the same time once more; PLR_E_NOT_READY before an
+ * IMU has started; PLR_E_LATE earlier than the filter's time; PLR_E_GAP more than max_gap_s ahead;
+ * PLR_E_MODE in mapping. */
 plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
                               plr_reading_result *result);
 

@@ -141,7 +141,8 @@ typedef enum plr_anchored {
     PLR_WORLD_IS_GIVEN
 } plr_anchored;
 
-/* What an IMU adds to the state: src/process/imu.c. */
+/* What an IMU adds to the state: src/process/imu.c. How readings usually come, `slow` to
+ * `off_usual2`, is kept of twists, too: src/filter/habit.h. */
 typedef struct plr_inertial {
     plr_real velocity[PLR_VELOCITY_DIM]; /* of the body in its own axes, m/s */
     plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */

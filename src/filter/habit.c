@@ -11,6 +11,7 @@
 #define CHANGE_SHARE   PLR_R(0.015625)
 /* The mean reading covers about this much at most, and no more than since the last standstill, s. */
 #define SLOW_S PLR_R(0.5)
+
 /* The square of the difference from the last reading, of three numbers from `first` on. */
 static plr_real square_of_change(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                                  unsigned first) {

@@ -152,10 +152,10 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     return correct(f, m, accepted ? parts : 0) && accepted;
 }
 
-/* A place is p + R (rho + theta x rho / 2 + ...): where a height alone is measured and neither place nor
- * tilt is known, the second order moves it by more than a sigma, and as a measurement of tilt and place
- * it would be wrong. This is its variance, of the axes that are not measured: the others are known
- * when the reading is used. */
+/* The place is p + R (rho + theta x rho / 2 + ...), and H has the first order alone. Where the other axes
+ * and the tilt are uncertain the second order is larger than a sigma, and a height would pass for a
+ * measurement of tilt. This is about its variance. Axes that are measured do not count: the reading
+ * itself makes them certain. */
 static plr_real second_order(const plr_filter *f, const plr_reading *reading,
                              const plr_real P[PLR_POSE_SQUARE]) {
     plr_real way = 0, turn = 0;

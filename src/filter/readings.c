@@ -16,8 +16,8 @@ enum {
  * sensor that is wrong. */
 #define MOST_TIMES PLR_R(3)
 #define MOST_PLUS  PLR_R(3)
-/* Readings are off from so many standard deviations of the sum on, until it is below so many. If all is
- * as stated it is beyond 5.1 in none of 140 drives of a minute. */
+/* Readings are off as soon as the sum is above the first number of its standard deviations, and until it
+ * is below the second. With the noise as stated it stayed below 5.1 in 140 drives of a minute. */
 #define OFF_ABOVE PLR_R(6)
 #define OFF_BELOW PLR_R(2)
 

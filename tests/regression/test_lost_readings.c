@@ -102,8 +102,8 @@ static void drive_with_frames_between(plr_twist_timing timing) {
     config.twist_timing = (uint8_t)timing;
     begin();
     unsigned frames = 0;
-    for (unsigned ms = 0; ms <= 1250;
-         ms += 50) { /* a quarter of the period: the rate grows all along */
+    /* for a quarter of the period: the rate grows all along */
+    for (unsigned ms = 0; ms <= 1250; ms += 50) {
         for (; frames * 1000 < ms * 30; frames++) {
             const plr_frame dark = {frames * 1000ULL * MS / 30, PLR_NO_BUDGET, 0, NULL};
             if (dark.t_ns > (ms - 50ULL) * MS)

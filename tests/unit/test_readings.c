@@ -77,7 +77,7 @@ static void test_one_sensor_says_nothing_of_another(void) {
     TEST_ASSERT_TRUE(plr_readings_widening(&filter, PLR_SENSOR_WHEEL) == 1);
 }
 
-static void test_a_position_with_half_its_sigma_is_told_and_weighed_as_it_scatters(void) {
+static void test_a_position_with_a_third_of_its_sigma_is_told_and_weighed_as_it_scatters(void) {
     rig_drive(10);
     for (unsigned k = 0; k < 60; k++) {
         rig_twists();

@@ -5,16 +5,14 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pelorus import inertial, motion, packed_file, se3
-from pelorus.console import progress
-from pelorus.errors import PelorusError, whole, writing
+from pelorus import inertial, motion, se3
+from pelorus.errors import PelorusError
 from pelorus.frames import (
     IMU_READINGS_MAX,
     Config,
@@ -35,7 +33,7 @@ from pelorus.motion import Times
 from pelorus.se3 import Poses
 from pelorus.settings import IDS
 from pelorus.tracks import Tracks
-from pelorus.wire import Writer
+from pelorus.wire import write_file
 
 
 @dataclass(frozen=True)
@@ -163,16 +161,7 @@ class Recording:
     def write(self, path: Path) -> int:
         """Write the whole file; its size in bytes. Nothing is left behind if that fails."""
         self._check(path)
-        packed = packed_file.is_packed(path)
-        with (
-            whole(path) as (part,),
-            writing(path),
-            closing(packed_file.create(part, packed)) as stream,
-        ):
-            writer = Writer(stream)
-            for message in progress(self.messages(), "writing", len(self)):
-                writer.write(message)
-            writer.end()
+        write_file(path, self.messages(), len(self))
         return path.stat().st_size
 
     def _check(self, path: Path) -> None:

@@ -11,13 +11,14 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from pelorus import cobs, packed_file, schema
 from pelorus.console import progress
-from pelorus.errors import PelorusError
+from pelorus.errors import PelorusError, whole, writing
 from pelorus.frames import KINDS, End, Header, Kind, Message
 from pelorus.layout import MalformedPayload
 
@@ -231,6 +232,21 @@ class Writer:
     def end(self, heard: End | None = None) -> None:
         """`heard` is a robot's END: what it says of what has arrived goes into this one."""
         self.write(end_of(self._counts, heard))
+
+
+def write_file(path: Path, messages: Iterable[Message], count: int) -> None:
+    """The whole file, packed if its name says so. Nothing is left behind if that fails. `count` of
+    them, for the progress.
+    """
+    with (
+        whole(path) as (part,),
+        writing(path),
+        closing(packed_file.create(part, packed_file.is_packed(path))) as stream,
+    ):
+        writer = Writer(stream)
+        for message in progress(messages, "writing", count):
+            writer.write(message)
+        writer.end()
 
 
 def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], Counts]:

@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from pelorus import packed_file, wire
-from pelorus.console import progress
-from pelorus.errors import PelorusError, whole, writing
+from pelorus import wire
+from pelorus.errors import PelorusError
 from pelorus.frames import End, Message, Text, Twist
 
 LATE_MOST_S = 2.0
@@ -29,13 +27,7 @@ def convert(source: Path, late_s: float, target: Path) -> int:
     twists = [m for m in messages if isinstance(m, Twist)]
     if not twists:
         raise PelorusError(f"{source}: holds no twists whose rates of turn could be moved")
-    with whole(target) as (part,), writing(target):
-        packed = packed_file.is_packed(target)
-        with closing(packed_file.create(part, packed)) as stream:
-            writer = wire.Writer(stream)
-            for message in progress(_moved(messages, twists, late_s), "writing", len(messages)):
-                writer.write(message)
-            writer.end()
+    wire.write_file(target, _moved(messages, twists, late_s), len(messages))
     return len(twists)
 
 
