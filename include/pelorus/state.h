@@ -322,6 +322,14 @@ typedef struct plr_kept_measurements {
     uint8_t terms;        /* 2: they depend on the pose too */
 } plr_kept_measurements;
 
+/* By how much a known map that has come in sight moves the pose: src/filter/map_check.h. */
+typedef struct plr_map_check {
+    plr_real
+        moved[PLR_POSE_DIM]; /* sum of the corrections since then, m and rad, in the world's axes */
+    plr_real V[PLR_POSE_SQUARE]; /* its covariance, if all is as stated; 6x6 */
+    uint8_t frames;              /* of attention that are left */
+} plr_map_check;
+
 /* Workspace of one call; its contents are not used by later calls. */
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
@@ -383,6 +391,7 @@ typedef struct plr_filter {
 
     plr_consistency consistency;
     plr_scene scene;
+    plr_map_check map_check;
     /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
      * twists, while any is known; alignment with an IMU, until it has started. */
     union {
@@ -399,7 +408,7 @@ typedef struct plr_filter {
     uint32_t reasons;                       /* of health, at the last frame */
     uint32_t refused_before;                /* readings refused until the last frame */
     uint32_t matches_since_gated;
-    uint16_t frames_without_use, frames_mostly_gated;
+    uint16_t frames_without_use, frames_mostly_gated, frames_off_the_map;
     plr_totals totals;
     plr_guard guard;
 } plr_filter;

@@ -149,7 +149,15 @@ typedef enum plr_reason {
     PLR_REASON_NOT_STARTED = 1 << 23,
     /* IMU readings are refused (saturated, repeated without end, spikes) or do not fit gravity:
      * check units (m/s^2, rad/s), signs, axes and range of the sensor. */
-    PLR_REASON_IMU_FAULT = 1 << 24
+    PLR_REASON_IMU_FAULT = 1 << 24,
+    /* The known landmarks lay elsewhere than the pose said in ten frames, but agreed on another pose: the
+     * filter began anew there. Wheels slipped for long, the robot was carried, or the pose that was set
+     * was wrong. Reported once; the reset counter of POSE and ODOMETRY counts it. */
+    PLR_REASON_RELOCATED = 1 << 25,
+    /* Known landmarks that came in moved the pose by more than its covariance and theirs allow: the map
+     * is off as a whole, its covariances are too small, or the pose that was set was wrong. Told in that
+     * frame; POSE_MAY_BE_WRONG stays, and the covariance covers both, until all agree. */
+    PLR_REASON_MAP_DISAGREES = 1 << 26
 } plr_reason;
 
 /* What is wrong with an IMU: plr_filter_imu_fault. Before its start the filter waits for better

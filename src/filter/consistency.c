@@ -4,6 +4,8 @@
 #include <string.h>
 
 #include "filter/health.h"
+#include "filter/map_check.h"
+#include "filter/relocate.h"
 #include "filter/scene.h"
 #include "filter/votes.h"
 #include "filter/windows.h"
@@ -61,6 +63,7 @@ enum {
 void plr_consistency_clear(plr_filter *f) {
     memset(&f->consistency, 0, sizeof f->consistency);
     plr_scene_clear(f);
+    plr_map_check_clear(f);
     plr_votes_clear(f);
 }
 
@@ -370,6 +373,7 @@ static void resolve(plr_filter *f) {
         plr_real C[PLR_POSE_SQUARE];
         covariance_of(f, c->difference, C);
         plr_covariance_add(f, PLR_BLOCK_POSE, C);
+        plr_relocate_let_go(f, C);
         f->totals.widened++;
     }
     memset(c->difference, 0, sizeof c->difference);
@@ -386,6 +390,16 @@ void plr_consistency_trust_twists(plr_filter *f) {
     c->contradicted = 0;
     c->contradicting_frames = 0;
     c->excess = c->excess_turn = 0;
+}
+
+void plr_consistency_cover(plr_filter *f, const plr_real n[PLR_POSE_DIM],
+                           const plr_real nu[PLR_POSE_DIM], plr_real noise) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        f->consistency.difference[k] += n[k];
+        f->consistency.difference_sigmas[k] += nu[k];
+    }
+    f->consistency.difference_noise += noise;
+    plr_consistency_doubt(f);
 }
 
 void plr_consistency_doubt(plr_filter *f) {

@@ -41,6 +41,12 @@ void plr_consistency_trust_twists(plr_filter *f);
  * plr_reason. */
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);
 
+/* The told covariance covers the present pose and the one by the twist n from it, m and rad in the body,
+ * and the pose may be wrong, until pictures and twists have agreed as after a contradiction. nu is n in
+ * sigmas of what was believed before, and `noise` the expected square of nu if it is only noise. */
+void plr_consistency_cover(plr_filter *f, const plr_real n[PLR_POSE_DIM],
+                           const plr_real nu[PLR_POSE_DIM], plr_real noise);
+
 /* The pose may be wrong, until pictures and twists have agreed for as long as after a contradiction. */
 void plr_consistency_doubt(plr_filter *f);
 

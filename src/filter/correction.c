@@ -229,6 +229,27 @@ static bool is_applicable(const plr_filter *f, unsigned n) {
     return plr_pose_is_correction(f->work.dx);
 }
 
+/* Corrects the estimate by work.dx, and P with it. Returns plr_correction.cut. */
+static unsigned move_estimate(plr_filter *f, unsigned n) {
+    if (!is_applicable(f, n)) {
+        plr_filter_diverge(f);
+        return 0;
+    }
+    if (plr_has_block(f, PLR_BLOCK_BIAS))
+        for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
+            f->bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
+            f->inertial.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
+    plr_velocity_forget_bias(f);
+    const unsigned cut = plr_model_of(f)->retract(f, f->work.dx);
+    plr_pose_correct(f, f->work.dx);
+    plr_covariance_make_up_for_rounding(f);
+    if (!plr_covariance_is_positive(f))
+        plr_filter_diverge(f);
+    return cut;
+}
+
 plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *given,
                            unsigned count) {
     plr_correction result = {0};
@@ -257,21 +278,14 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
     result.innovation.rows = evidence.rows;
     if (result.applied == 0 && !result.moved && all == sensed.count)
         return result;
-    if (!is_applicable(f, n)) {
-        plr_filter_diverge(f);
-        return result;
-    }
-    if (plr_has_block(f, PLR_BLOCK_BIAS))
-        for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
-            f->bias[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_BIAS) + i];
-    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
-        for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
-            f->inertial.velocity[i] += f->work.dx[plr_row_of(f, PLR_BLOCK_VELOCITY) + i];
-    plr_velocity_forget_bias(f);
-    result.cut = plr_model_of(f)->retract(f, f->work.dx);
-    plr_pose_correct(f, f->work.dx);
-    plr_covariance_make_up_for_rounding(f);
-    if (!plr_covariance_is_positive(f))
-        plr_filter_diverge(f);
+    result.cut = move_estimate(f, n);
     return result;
+}
+
+void plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
+    const unsigned n = plr_covariance_dim(f);
+    if (!plr_covariance_shift(f, xi, f->work.dx))
+        return;
+    memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
+    (void)move_estimate(f, n);
 }

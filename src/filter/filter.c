@@ -199,7 +199,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     plr_readings_clear(f);
     f->count = 0;
     f->frame_number = 0;
-    f->frames_without_use = f->frames_mostly_gated = 0;
+    f->frames_without_use = f->frames_mostly_gated = f->frames_off_the_map = 0;
     f->matches_since_gated = 0;
     f->health = PLR_HEALTH_DEGRADED; /* nothing has been seen yet */
     f->reasons = PLR_REASON_FEW_OBSERVATIONS;
@@ -294,7 +294,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     plr_consistency_clear(f);
     plr_filter_store_for_recovery(f);
     f->diverged = 0;
-    f->frames_without_use = f->frames_mostly_gated = 0;
+    f->frames_without_use = f->frames_mostly_gated = f->frames_off_the_map = 0;
     if (!plr_covariance_is_positive(f) &&
         plr_has_block(f, PLR_BLOCK_BIAS)) /* the bias is lost too */
         restore_bias_prior(f);

@@ -34,6 +34,10 @@ void plr_filter_store_for_recovery(plr_filter *f);
 /* Adds the motion that is about to be applied to the stored covariance. */
 void plr_filter_propagate_recovery(plr_filter *f);
 
+/* At the present pose: sets its covariance to P, drops the landmarks and the pending motion, takes the
+ * velocity for unknown, and doubts the pose until pictures and twists agree. */
+void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]);
+
 /* After a divergence: keeps the pose, sets its covariance to the stored one, drops the landmarks,
  * and sets the biases' covariance to their prior's. */
 void plr_filter_recover(plr_filter *f);

@@ -143,6 +143,10 @@ static uint32_t find_reasons(plr_filter *f, const plr_frame_events *events,
         reasons |= PLR_REASON_BUDGET;
     if (events->recovered)
         reasons |= PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
+    if (events->relocated)
+        reasons |= PLR_REASON_RELOCATED;
+    if (events->map_disagrees)
+        reasons |= PLR_REASON_MAP_DISAGREES;
     reasons |= rejected_readings(f) | judge_readings(f);
     return reasons | imu_reasons(f);
 }

@@ -12,6 +12,11 @@ typedef struct plr_frame_events {
     bool sink_failed;
     bool locked;
     bool recovered;
+    bool relocated;
+    bool map_disagrees; /* filter/map_check.h */
+    unsigned adopted;   /* known landmarks that have come in */
+    unsigned
+        unplaced; /* known landmarks in sight that the model cannot place at the predicted pose */
     unsigned cut;
 } plr_frame_events;
 

@@ -2,6 +2,7 @@
 #include "filter/matching.h"
 
 #include "filter/filter_internal.h"
+#include "filter/relocate.h"
 #include "math/order.h"
 #include "process/alignment.h"
 #include "state/model.h"
@@ -79,27 +80,30 @@ void plr_match_count(plr_filter *f, unsigned n) {
 void plr_match_known(plr_filter *f, const plr_observation *seen, unsigned n,
                      plr_frame_events *events, plr_report *report) {
     const bool alone = f->config.mode == PLR_MODE_LOCALIZATION;
-    const bool asks = alone || (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
-    if (!asks || !f->map.source)
+    if (!plr_relocate_asks_map(f))
         return;
-    bool moved = false;
+    unsigned before = report->created;
     for (unsigned k = 0; k < n; k++) {
         const uint32_t id = seen[f->work.order[k]].id;
         plr_landmark known = {.P_W_m2 = {-1}}; /* refused, if the source fills in nothing */
         plr_new_landmark landmark;
         if (f->work.slot_of[k] != PLR_NO_SLOT || !f->map.source(f->map.context, id, &known))
             continue;
-        if (!plr_landmark_is_valid(&known) || !plr_model_of(f)->adopt(f, &known, &landmark))
+        if (!plr_landmark_is_valid(&known))
             continue;
+        if (!plr_model_of(f)->adopt(f, &known, &landmark)) {
+            events->unplaced++;
+            continue;
+        }
         if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
             report->no_room = (uint16_t)(report->no_room + alone);
             continue;
         }
         plr_slots_append(f, id, true, &landmark);
         report->created++;
-        moved = true;
     }
-    if (!moved)
+    events->adopted = report->created - before;
+    if (events->adopted == 0)
         return;
     plr_alignment_keep_world(f);
     plr_match_slots(f, seen, n);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* Recovery after the covariance has lost positivity: the pose is kept, landmarks and correlations
- * are dropped. */
+/* Beginning anew at a pose: the landmarks and all correlations are dropped. And recovery after the covariance
+ * has lost positivity, which does so at the pose that it has. */
 #include <string.h>
 
 #include "filter/consistency.h"
@@ -66,29 +66,25 @@ void plr_filter_propagate_recovery(plr_filter *f) {
     pack(f, carried);
 }
 
-void plr_filter_recover(plr_filter *f) {
-    plr_real P[PLR_POSE_SQUARE];
-    double P_xi[PLR_POSE_SQUARE], variance[PLR_POSE_DIM];
-    if (f->motion.pending)
-        plr_filter_propagate_recovery(f);
-    unpack(f, P);
-    plr_consistency_enlarge(f, P);
-    if (plr_sensitivity_is_finite(f))
-        plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
+void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]) {
+    double P_xi[PLR_POSE_SQUARE];
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];
     f->count = 0;
-    f->diverged = 0;
-    f->totals.recoveries++;
     f->totals.widened++;
-    f->frames_without_use = f->frames_mostly_gated = 0;
+    f->frames_without_use = f->frames_mostly_gated = f->frames_off_the_map = 0;
     f->work.noise.open = 0;
     plr_motion_clear(f);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_consistency_clear(f);
     plr_consistency_doubt(f);
     plr_filter_begin_velocity(f);
+}
+
+/* What is known of the biases may be what has broken down. */
+static void begin_bias(plr_filter *f) {
+    double variance[PLR_POSE_DIM];
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
@@ -98,4 +94,18 @@ void plr_filter_recover(plr_filter *f) {
         variance[i] = (double)prior;
     }
     plr_filter_begin_bias(f, variance);
+}
+
+void plr_filter_recover(plr_filter *f) {
+    plr_real P[PLR_POSE_SQUARE];
+    if (f->motion.pending)
+        plr_filter_propagate_recovery(f);
+    unpack(f, P);
+    plr_consistency_enlarge(f, P);
+    if (plr_sensitivity_is_finite(f))
+        plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
+    f->diverged = 0;
+    f->totals.recoveries++;
+    plr_filter_begin_anew(f, P);
+    begin_bias(f);
 }

@@ -16,7 +16,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 9 };
+enum { STATE_VERSION = 10 };
 
 /* ---------------------------------------------------------------- layout */
 

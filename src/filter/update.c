@@ -16,10 +16,12 @@
 #include "filter/guard.h"
 #include "filter/health.h"
 #include "filter/inertial.h"
+#include "filter/map_check.h"
 #include "filter/matching.h"
 #include "filter/measure.h"
 #include "filter/motion_first.h"
 #include "filter/predict.h"
+#include "filter/relocate.h"
 #include "filter/tracks.h"
 #include "filter/votes.h"
 #include "math/order.h"
@@ -189,12 +191,65 @@ static void let_tracks_drift(plr_filter *f) {
     plr_model_of(f)->drift(f, PLR_SQRT(f->par.track_drift * seconds));
 }
 
+/* Finds the slots of the observations; known landmarks come in, at a pose that is found anew if need be. */
+static void match(plr_filter *f, const plr_frame *frame, unsigned n, plr_frame_events *events,
+                  plr_report *report) {
+    const plr_observation *seen = frame->observations;
+    events->relocated = plr_relocate_when_lost(f, frame, n);
+    plr_match_slots(f, seen, n);
+    if (!events->relocated) {
+        plr_match_known(f, seen, n, events, report);
+        const plr_relocation found = plr_relocate_when_uncertain(f, frame, n);
+        if (found == PLR_PLACED || f->diverged)
+            return;
+        report->created = 0; /* they come in again */
+        plr_match_slots(f, seen, n);
+        events->relocated = found == PLR_BEGUN_ANEW;
+        events->map_disagrees = found == PLR_MOVED_FAR;
+    }
+    if (events->relocated)
+        report->created = (uint16_t)f->count;
+    else
+        plr_match_known(f, seen, n, events, report);
+}
+
+/* Corrects by the observations, and fills the report with how. */
+static void correct(plr_filter *f, const plr_frame *frame, unsigned n, plr_frame_events *events,
+                    plr_report *report) {
+    const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY;
+    plr_map_check_pose before;
+    const bool attends = plr_map_check_begin(f, events->adopted, n, &before);
+    const plr_correction correction =
+        finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
+    report->used = (uint16_t)correction.applied;
+    report->blocks_failed = (uint16_t)correction.failed_batches;
+    report->innovation_rows = (uint16_t)correction.innovation.rows;
+    report->innovation_d2 = (float)correction.innovation.d2;
+    report->innovation_log_det = (float)correction.innovation.log_det;
+    report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
+    events->cut = correction.cut;
+    if (attends && !f->diverged && plr_map_check_end(f, &before))
+        events->map_disagrees = true;
+}
+
+/* After the correction: a lock is undone, and landmarks begin. */
+static void renew_landmarks(plr_filter *f, const plr_frame *frame, unsigned n,
+                            plr_frame_events *events, plr_report *report) {
+    plr_relocate_watch(f, n, events->unplaced);
+    events->locked = plr_health_gate_is_locked(f, report);
+    if (events->locked) {
+        plr_predict_apply_prior(f);
+        plr_births_drop_rejected(f, frame, n);
+    } else {
+        plr_births_restart(f, frame, n, report);
+    }
+    plr_births_from_unmatched(f, frame, n, events, report);
+}
+
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_frame_events events = {0};
-    const plr_observation *seen = frame->observations;
     unsigned n = plr_match_in_order(f, frame, report);
-    plr_match_slots(f, seen, n);
-    plr_match_known(f, seen, n, &events, report);
+    match(f, frame, n, &events, report);
     const unsigned matched = n;
     let_tracks_drift(f);
     if (f->config.model == PLR_MODEL_BODY && plr_frozen_is_seen(f, frame, n))
@@ -205,31 +260,14 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     const bool is_state = plr_process_of(f)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
-    const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY;
-    const plr_correction correction =
-        finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
+    correct(f, frame, n, &events, report);
     plr_match_count(f, matched);
-    report->used = (uint16_t)correction.applied;
-    report->blocks_failed = (uint16_t)correction.failed_batches;
-    report->innovation_rows = (uint16_t)correction.innovation.rows;
-    report->innovation_d2 = (float)correction.innovation.d2;
-    report->innovation_log_det = (float)correction.innovation.log_det;
-    report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
-    events.cut = correction.cut;
-    if (!f->diverged) {
-        events.locked = plr_health_gate_is_locked(f, report);
-        if (events.locked) {
-            plr_predict_apply_prior(f);
-            plr_births_drop_rejected(f, frame, n);
-        } else {
-            plr_births_restart(f, frame, n, report);
-        }
-        plr_births_from_unmatched(f, frame, n, &events, report);
-    }
+    if (!f->diverged)
+        renew_landmarks(f, frame, n, &events, report);
     if (f->diverged) {
         plr_filter_recover(f);
         events.recovered = true;
-        plr_match_slots(f, seen, n);
+        plr_match_slots(f, frame->observations, n);
         plr_births_from_unmatched(f, frame, n, &events, report);
     } else if (stands && is_state) {
         (void)plr_measure_twist(f, &still, &unused);

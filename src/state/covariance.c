@@ -55,6 +55,31 @@ void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, 
                 P[plr_block_size(f, columns) * i + j];
 }
 
+bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_real *g) {
+    const unsigned n = plr_covariance_dim(f);
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], y[PLR_POSE_DIM];
+    for (unsigned r = 0, at = 0; r < PLR_POSE_DIM; r++)
+        for (unsigned c = r; c < PLR_POSE_DIM; c++, at++)
+            U[at] = f->P[plr_packed_at(r, c)];
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return false;
+    memcpy(y, xi, sizeof y);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, y, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, y);
+    memcpy(g, xi, sizeof y);
+    for (unsigned i = PLR_POSE_DIM; i < n; i++) {
+        g[i] = 0;
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            g[i] = PLR_FMA(f->P[plr_packed_row(i) + k], y[k], g[i]);
+    }
+    for (unsigned i = 0; i < n; i++)
+        for (unsigned j = 0; j <= i; j++) {
+            plr_real *own = &f->P[plr_packed_row(i) + j];
+            *own = PLR_FMA(g[i], g[j], *own);
+        }
+    return true;
+}
+
 void plr_covariance_forget(plr_filter *f, plr_block_id block, const plr_real *variance) {
     const unsigned row = plr_row_of(f, block), n = plr_covariance_dim(f);
     plr_sensitivity_clear(f, row, plr_block_size(f, block));

@@ -51,6 +51,10 @@ void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id col
  * rows x drivers. */
 void plr_covariance_with_drivers(const plr_filter *f, unsigned row, unsigned rows, plr_real *P);
 
+/* g = P_xp P_pp^-1 xi, of all rows x, with p the pose and xi exactly in its rows; P += g g^T. False, and
+ * nothing is changed, if P_pp cannot be factorised. */
+bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_real *g);
+
 /* A landmark's own block += C, 3x3 and symmetric. */
 void plr_covariance_add_to_landmark(plr_filter *f, unsigned slot, const plr_real C[9]);
 

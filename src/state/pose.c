@@ -30,14 +30,25 @@ void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
     plr_pose_move(f, E, p);
 }
 
-void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
-                         plr_real moved[PLR_POSE_DIM]) {
+/* The twist from one pose to another, in the body of the first, to first order. */
+static void between(const plr_real R_from[9], const double p_from[3], const plr_real R_to[9],
+                    const double p_to[3], plr_real xi[PLR_POSE_DIM]) {
     plr_real way[3], R[9];
     for (int i = 0; i < 3; i++)
-        way[i] = (plr_real)(f->p_WB[i] - p_WB[i]);
-    plr_mat3_tvec(moved, R_WB, way);
-    plr_mat3_mul_tn(R, R_WB, f->R_WB);
-    plr_turn_of(moved + 3, R);
+        way[i] = (plr_real)(p_to[i] - p_from[i]);
+    plr_mat3_tvec(xi, R_from, way);
+    plr_mat3_mul_tn(R, R_from, R_to);
+    plr_turn_of(xi + 3, R);
+}
+
+void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
+                         plr_real moved[PLR_POSE_DIM]) {
+    between(R_WB, p_WB, f->R_WB, f->p_WB, moved);
+}
+
+void plr_pose_towards(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
+                      plr_real xi[PLR_POSE_DIM]) {
+    between(f->R_WB, f->p_WB, R_WB, p_WB, xi);
 }
 
 void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {

@@ -21,6 +21,10 @@ void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
 void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
                          plr_real moved[PLR_POSE_DIM]);
 
+/* How far the pose would have to move to get to (R_WB, p_WB): T Exp(xi), to first order. */
+void plr_pose_towards(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
+                      plr_real xi[PLR_POSE_DIM]);
+
 /* The pose to which landmarks and covariance refer: the one before the accumulated motion. */
 void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]);
 

@@ -373,7 +373,7 @@ static void test_known_landmarks_enter_between_frames_as_in_the_textbook(void) {
 
 static void run_localization(void) {
     twins.config.mode = PLR_MODE_LOCALIZATION;
-    twins.config.start_sigma = 0.05;
+    twins.config.start_sigma = 0.015; /* beyond it the filter first looks where it is */
     run_frames();
 }
 

@@ -42,6 +42,8 @@ SHORT = {
     "STATE_DAMAGED": "the filter's memory was changed",
     "NO_TWISTS": "twists or IMU readings missing, refused or too old",
     "READINGS_REJECTED": "readings of a small sensor rejected or off",
+    "RELOCATED": "the pose was found anew from known landmarks",
+    "MAP_DISAGREES": "known landmarks and the pose disagree",
 }
 # What follows from a cause; where the cause is known too, it is told first.
 SYMPTOMS = tuple(

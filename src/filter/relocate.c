@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: MIT
+#include "filter/relocate.h"
+
+#include <string.h>
+
+#include "filter/consistency.h"
+#include "filter/correction.h"
+#include "filter/filter_internal.h"
+#include "filter/placing.h"
+#include "filter/predict.h"
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "math/so3.h"
+#include "process/alignment.h"
+#include "sensor/stereo.h"
+#include "state/model.h"
+#include "state/motion.h"
+#include "state/pose.h"
+#include "state/sensitivity.h"
+#include "state/slots.h"
+
+enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
+
+/* The variance of the pose at which it begins anew, beside that by which the frame tells it. The update
+ * uses the frame once more, because it makes the correlations between pose and landmarks; what the
+ * frame says is counted twice by a hundredth then. */
+#define WIDER PLR_R(100)
+
+/* An uncertain pose is moved to the one that was found in so many steps: a step is exact to first order. */
+enum { STEPS = 3 };
+/* Chi-square with 6 degrees of freedom: chance exceeds it once in 60,000. */
+#define FAR_ABOVE PLR_R(32)
+/* Known landmarks that come in again tell the pose a second time. That is allowed only where the frame alone
+ * tells it better than all before, along each axis: P's variances exceed the frame's by this factor. */
+#define WIDE_ENOUGH PLR_R(1)
+/* Variances: beyond a hundred sigmas the update would take more digits off P than float32 has. */
+#define TOO_WIDE PLR_R(1e4)
+
+bool plr_relocate_asks_map(const plr_filter *f) {
+    const bool knows = f->config.mode == PLR_MODE_LOCALIZATION ||
+                       (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
+    return knows && f->map.source != NULL;
+}
+
+void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
+    unsigned seen = unplaced, off = unplaced;
+    for (unsigned k = 0; k < n; k++) {
+        const uint16_t slot = f->work.slot_of[k];
+        if (slot == PLR_NO_SLOT || !f->slots[slot].known)
+            continue;
+        seen++;
+        off += f->work.gain[slot] < 0;
+    }
+    if (seen < PLR_PLACING_LEAST)
+        return; /* says nothing */
+    f->frames_off_the_map = 5 * off < 4 * seen ? 0 : (uint16_t)(f->frames_off_the_map + 1);
+}
+
+/* The known landmarks of the frame, those with the lowest ids first; `origin`: where the first one
+ * lies, m. Returns how many. */
+static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
+                        plr_seen_known *seen, double origin[3]) {
+    unsigned count = 0;
+    for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < f->config.slots; k++) {
+        const plr_observation *o = &frame->observations[f->work.order[k]];
+        plr_landmark known = {.P_W_m2 = {-1}}; /* refused, if the source fills in nothing */
+        if (!f->map.source(f->map.context, o->id, &known) || !plr_landmark_is_valid(&known))
+            continue;
+        if (count == 0)
+            memcpy(origin, known.p_W_m, sizeof known.p_W_m);
+        for (unsigned i = 0; i < 3; i++)
+            seen[count].w[i] = (plr_real)(known.p_W_m[i] - origin[i]);
+        for (unsigned i = 0; i < 9; i++)
+            seen[count].P[i] = (plr_real)known.P_W_m2[i];
+        plr_stereo_rows(seen[count].z, o);
+        seen[count].gap_d2 = plr_stereo_row_gap_d2(f, o);
+        seen[count++].k = (uint16_t)k;
+    }
+    return count;
+}
+
+/* They lie in work.Vt. */
+static plr_seen_known *seen_in(plr_filter *f) {
+    return (plr_seen_known *)(void *)f->work.Vt;
+}
+
+/* A pose that known landmarks in sight agree on. */
+typedef struct plr_found_pose {
+    plr_real R_WB[9], P_xi[PLR_POSE_SQUARE]; /* P_xi: as far as this frame tells it */
+    double p_WB[3];
+    unsigned count; /* of `seen` */
+} plr_found_pose;
+
+/* The present pose. */
+static void guess_placing(const plr_filter *f, const double origin[3], plr_placing *guess) {
+    plr_real offset_W[3], offset_C[3];
+    for (unsigned i = 0; i < 3; i++)
+        offset_W[i] = (plr_real)(origin[i] - f->p_WB[i]);
+    plr_mat3_mul_nt(guess->R, f->par.camera.R_CB, f->R_WB);
+    plr_mat3_vec(offset_C, guess->R, offset_W);
+    for (unsigned i = 0; i < 3; i++)
+        guess->t[i] = offset_C[i] + f->par.camera.t_CB[i];
+}
+
+/* T_WB = T_WC T_CB. Where T_WB Exp(xi) is the truth, (rho, theta) of the camera is -Ad(T_CB) xi. False if fewer than three fifths agree. */
+static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+                      plr_found_pose *found) {
+    plr_seen_known *seen = seen_in(f);
+    const plr_camera *camera = &f->par.camera;
+    plr_real offset_C[3], offset_W[3], A[PLR_POSE_SQUARE];
+    double origin[3];
+    plr_placing guess, at;
+    found->count = collect(f, frame, n, seen, origin);
+    if (guesses)
+        guess_placing(f, origin, &guess);
+    const unsigned agreeing = plr_place(f, seen, found->count, guesses ? &guess : NULL, &at);
+    if (agreeing == 0 || 5 * agreeing < 3 * found->count)
+        return false;
+    for (unsigned i = 0; i < 3; i++)
+        offset_C[i] = camera->t_CB[i] - at.t[i];
+    plr_mat3_tvec(offset_W, at.R, offset_C);
+    for (unsigned i = 0; i < 3; i++)
+        found->p_WB[i] = origin[i] + (double)offset_W[i];
+    plr_mat3_mul_tn(found->R_WB, at.R, camera->R_CB);
+    plr_so3_orthonormalise(found->R_WB);
+    plr_se3_adjoint_inverse(A, camera->R_CB, camera->t_CB);
+    plr_sandwich6(found->P_xi, A, at.P_C);
+    return true;
+}
+
+/* ---------------------------------------------------------------- lost */
+
+/* Takes up the landmarks that agree; the others come in with the next frame. */
+static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known *seen,
+                    unsigned count) {
+    for (unsigned i = 0; i < count; i++) {
+        const uint32_t id = frame->observations[f->work.order[seen[i].k]].id;
+        plr_landmark known;
+        plr_new_landmark landmark;
+        if (seen[i].agrees && f->map.source(f->map.context, id, &known) &&
+            plr_model_of(f)->adopt(f, &known, &landmark))
+            plr_slots_append(f, id, true, &landmark);
+    }
+}
+
+static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose *found) {
+    plr_real P[PLR_POSE_SQUARE];
+    memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
+    memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        P[i] = WIDER * found->P_xi[i];
+    plr_filter_begin_anew(f, P);
+    plr_alignment_keep_world(f);
+    take_up(f, frame, seen_in(f), found->count);
+}
+
+bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n) {
+    plr_found_pose found;
+    if (f->frames_off_the_map < OFF_FRAMES || !plr_relocate_asks_map(f))
+        return false;
+    f->frames_off_the_map = 0;
+    if (!find_pose(f, frame, n, false, &found))
+        return false;
+    begin_at(f, frame, &found);
+    return true;
+}
+
+/* ---------------------------------------------------------------- uncertain */
+
+/* True if the direction in which a point is seen from range r is so uncertain that it is not linear in the
+ * error. C: covariance of the body's motion. */
+static bool is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], plr_real r2) {
+    plr_real way = 0, turn = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        way += C[(PLR_POSE_DIM + 1) * i];
+        turn += C[(PLR_POSE_DIM + 1) * (3 + i)];
+    }
+    return way + turn * r2 > 2 * plr_stereo_max_bearing_variance(f) * r2;
+}
+
+static bool slot_is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], unsigned slot) {
+    const plr_slot *s = &f->slots[slot];
+    return s->known && is_rough(f, C, plr_dot3(s->x, s->x));
+}
+
+/* False of a known landmark that the caller has inserted, and that would not come in again. */
+static bool is_in_map(const plr_filter *f, unsigned slot) {
+    plr_landmark known;
+    return f->map.source(f->map.context, f->slots[slot].id, &known);
+}
+
+void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
+    if (!plr_relocate_asks_map(f))
+        return;
+    for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
+        if (slot_is_rough(f, C, slot) && is_in_map(f, slot))
+            plr_slots_remove(f, slot);
+}
+
+/* True if enough known landmarks in sight are rough: by the pose if they have just come in, else by the
+ * motion since the last frame. */
+static bool is_seen_roughly(const plr_filter *f, unsigned n) {
+    plr_real P_xi[PLR_POSE_SQUARE], motion[PLR_POSE_SQUARE];
+    unsigned rough = 0;
+    plr_motion_pose_covariance(f, P_xi);
+    plr_motion_covariance_by_state(f, motion);
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        motion[i] += f->motion.Q[i];
+    for (unsigned k = 0; k < n; k++) {
+        const uint16_t slot = f->work.slot_of[k];
+        rough += slot != PLR_NO_SLOT &&
+                 slot_is_rough(f, f->slots[slot].times_seen == 0 ? P_xi : motion, slot);
+    }
+    return rough >= PLR_PLACING_LEAST;
+}
+
+/* They come in again. */
+static void drop_known(plr_filter *f) {
+    for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
+        if (f->slots[slot].known && is_in_map(f, slot))
+            plr_slots_remove(f, slot);
+}
+
+/* y = (P + other)^-1 xi. False if it cannot be computed. */
+static bool solve_sum(const plr_real P[PLR_POSE_SQUARE], const plr_real other[PLR_POSE_SQUARE],
+                      const plr_real xi[PLR_POSE_DIM], plr_real y[PLR_POSE_DIM]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
+    for (unsigned r = 0, at = 0; r < PLR_POSE_DIM; r++)
+        for (unsigned c = r; c < PLR_POSE_DIM; c++, at++)
+            U[at] = P[PLR_POSE_DIM * r + c] + other[PLR_POSE_DIM * r + c];
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return false;
+    memcpy(y, xi, PLR_POSE_DIM * sizeof *y);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, y, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, y);
+    return true;
+}
+
+/* Moves the pose to where prediction and frame together have it: to the one that was found, less what the
+ * frame does not know better, P_found (P + P_found)^-1 xi. Returns whether the two poses differ by more
+ * than chance. */
+static bool move_to(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], const plr_found_pose *found) {
+    plr_real xi[PLR_POSE_DIM], y[PLR_POSE_DIM], back[PLR_POSE_DIM], d2 = 0;
+    plr_pose_towards(f, found->R_WB, found->p_WB, xi);
+    if (!solve_sum(P, found->P_xi, xi, y))
+        return false;
+    plr_mat6_vec(back, found->P_xi, y);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        d2 = PLR_FMA(xi[k], y[k], d2);
+    for (unsigned step = 0; step < STEPS && !f->diverged; step++) {
+        plr_pose_towards(f, found->R_WB, found->p_WB, xi);
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            xi[k] -= back[k];
+        plr_correct_towards(f, xi);
+    }
+    return d2 > FAR_ABOVE;
+}
+
+/* The least and the largest ratio of P's variances to those that the frame tells. */
+static void compare(const plr_real P[PLR_POSE_SQUARE], const plr_real by_frame[PLR_POSE_SQUARE],
+                    plr_real *least, plr_real *largest) {
+    *least = *largest = P[0] / by_frame[0];
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
+        const plr_real ratio = P[i] / by_frame[i];
+        *least = ratio < *least ? ratio : *least;
+        *largest = ratio > *largest ? ratio : *largest;
+    }
+}
+
+plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n) {
+    plr_found_pose found;
+    plr_real P[PLR_POSE_SQUARE], least, largest;
+    if (f->config.model != PLR_MODEL_BODY || !plr_relocate_asks_map(f) || !is_seen_roughly(f, n) ||
+        !find_pose(f, frame, n, true, &found))
+        return PLR_PLACED;
+    plr_motion_pose_covariance(f, P);
+    compare(P, found.P_xi, &least, &largest);
+    if (least < WIDE_ENOUGH)
+        return PLR_PLACED;
+    if (largest > TOO_WIDE) {
+        begin_at(f, frame, &found);
+        return PLR_BEGUN_ANEW;
+    }
+    drop_known(f);
+    plr_predict_apply_prior(f);
+    plr_sensitivity_add_to_pose(f, P);
+    if (!move_to(f, P, &found))
+        return PLR_MOVED;
+    plr_consistency_doubt(f);
+    return PLR_MOVED_FAR;
+}
