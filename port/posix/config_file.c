@@ -9,7 +9,28 @@
 
 #define BLANKS " \t\r\n"
 
-enum { LINE_SIZE = 512 };
+enum { LINE_SIZE = 512, NAME_SIZE = 32, NAMES = 80 };
+
+/* Which names stand in which line: one that stands twice is an oversight. */
+typedef struct named_lines {
+    unsigned count, line[NAMES];
+    char name[NAMES][NAME_SIZE];
+} named_lines;
+
+/* False if the name stands in an earlier line. */
+static bool is_first(named_lines *before, const char *name, unsigned line, char *problem) {
+    for (unsigned i = 0; i < before->count; i++)
+        if (strcmp(before->name[i], name) == 0) {
+            snprintf(problem, PROBLEM_SIZE, "%.32s is set in line %u already: delete one of them",
+                     name, before->line[i]);
+            return false;
+        }
+    if (before->count < NAMES) {
+        snprintf(before->name[before->count], NAME_SIZE, "%s", name);
+        before->line[before->count++] = line;
+    }
+    return true;
+}
 
 /* Cuts blanks off both ends, in place. */
 static char *trim(char *text) {
@@ -22,7 +43,8 @@ static char *trim(char *text) {
 }
 
 /* One line without its comment. */
-static bool take_line(char *line, setting_list *list, char *problem) {
+static bool take_line(char *line, unsigned number, named_lines *before, setting_list *list,
+                      char *problem) {
     char *name = trim(line);
     if (*name == '\0')
         return true;
@@ -40,17 +62,19 @@ static bool take_line(char *line, setting_list *list, char *problem) {
                  name);
         return false;
     }
-    return setting_list_put(list, name, trim(equals + 1), problem);
+    return is_first(before, name, number, problem) &&
+           setting_list_put(list, name, trim(equals + 1), problem);
 }
 
 static bool take_file(FILE *file, const char *path, setting_list *list, char *problem) {
     char line[LINE_SIZE], cause[PROBLEM_SIZE];
+    named_lines before = {.count = 0};
     for (unsigned number = 1; fgets(line, sizeof line, file) != NULL; number++) {
         bool good = strchr(line, '\n') != NULL || feof(file);
         if (!good)
             snprintf(cause, sizeof cause, "the line is longer than %d characters", LINE_SIZE - 2);
         line[strcspn(line, "#")] = '\0';
-        good = good && take_line(line, list, cause);
+        good = good && take_line(line, number, &before, list, cause);
         if (!good) {
             snprintf(problem, PROBLEM_SIZE, "%.128s, line %u: %.300s", path, number, cause);
             return false;

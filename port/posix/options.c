@@ -115,7 +115,11 @@ static const char *nearest_name(const char *name) {
 
 static bool unknown(const char *name, char *problem) {
     const char *meant = nearest_name(name);
-    if (meant != NULL)
+    if (strcmp(name, "set") == 0) /* of the tools in Python */
+        snprintf(problem, PROBLEM_SIZE,
+                 "--set: unknown option; each setting is one here: --pixel-sigma 2 in place of "
+                 "--set pixel-sigma=2");
+    else if (meant != NULL)
         snprintf(problem, PROBLEM_SIZE, "--%.64s: unknown option; is --%s meant?", name, meant);
     else
         snprintf(problem, PROBLEM_SIZE, "--%.64s: unknown option; --help lists them", name);

@@ -104,6 +104,8 @@ static void test_what_is_wrong_is_named_with_what_would_be_right(void) {
     assert_problem("--slots 0: should be a whole number from 1 to");
     TEST_ASSERT_FALSE(PARSE("in.plr", "--pixel-sgima", "2"));
     assert_problem("is --pixel-sigma meant?");
+    TEST_ASSERT_FALSE(PARSE("in.plr", "--set", "slots=8"));
+    assert_problem("each setting is one here");
     TEST_ASSERT_FALSE(PARSE("in.plr", "--frobnicate"));
     assert_problem("--help");
     TEST_ASSERT_FALSE(PARSE("in.plr", "-q"));
@@ -188,6 +190,8 @@ static void test_a_bad_line_is_named_by_file_and_number(void) {
     check_bad_file("slots 3\n", "line 1: slots 3: should be `name = value`");
     check_bad_file("\nsize = 3\n", "line 2: size is not a setting");
     check_bad_file("out = x.plr\n", "out is not a setting");
+    check_bad_file("slots = 8\n# eight\nslots = 9\n", "line 3: slots is set in line 1 already");
+    check_bad_file("gate = off\n\ngate = 0.9\n", "line 3: gate is set in line 1 already");
     check_bad_file("slots =\n", "should be a whole number");
     memset(longest, '#', sizeof longest - 1);
     longest[sizeof longest - 1] = '\0';
