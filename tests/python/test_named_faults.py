@@ -182,7 +182,7 @@ def test_check_names_the_fault_and_writes_no_settings(tmp_path: Path, pelorus: R
         for m in drive(60)
     ]
     write(path, swapped)
-    said = pelorus("check", path, "--out", conf, "--bin", BIN)
+    said = pelorus("check", path, "--out", conf, "--bin", BIN, status=1)
     assert said.out.startswith("do not trust this")
     assert "left and right are swapped" in said.out
     assert not conf.exists()

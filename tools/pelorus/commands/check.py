@@ -45,7 +45,8 @@ def check(
 
     Replays it some hundred times: noise, twist timing, the camera's clock and the biases are those
     that make what was seen likeliest. Truth is not looked at. Writes the settings, and shows what
-    the filter says of itself before and after.
+    the filter says of itself before and after. Where a fault stands in the way of that, no
+    settings are written, and the exit status is 1.
     """
     from pelorus.check import checked  # noqa: PLC0415 - scipy loads slowly
 
@@ -59,6 +60,8 @@ def check(
         out.print(json.dumps(_json(found, tuned), indent=2), markup=False)
     else:
         _tell(found, tuned)
+    if found.tuned is None:
+        raise typer.Exit(1)
 
 
 def _tell(found: Checked, tuned: Path) -> None:
