@@ -139,7 +139,8 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
  * PLR_E_MODE in mapping, when plr_filter_move_to has not been called for this time.
  * If a variance is no longer positive, the filter keeps the pose, enlarges its covariance, drops
  * the landmarks and starts again with those of this frame: PLR_OK, reasons NOT_POSITIVE and
- * RECOVERED. */
+ * RECOVERED. With a known map, a pose that is lost is found again from four known landmarks, and the
+ * others are dropped: RELOCATED. */
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report);
 
 /* A reading of a small sensor (plr_sensor) at reading->t_ns. It predicts the pose to that time

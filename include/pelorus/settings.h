@@ -97,8 +97,8 @@ typedef struct plr_config {
     uint8_t bias;
 
     /* Setting known-map: 0 or 1, default 0.
-     * 1: in the mode slam, an unknown id is first looked up in the map source. (In localization it
-     * always is.) */
+     * 1: in the mode slam, an unknown id is first looked up in the map source, and a pose that is lost is
+     * found again from known landmarks. (In localization both are always so.) */
     uint8_t known_map;
 
     /* Setting landmark-prior: one of plr_landmark_prior, default PLR_PRIOR_CORRELATED. */

@@ -104,7 +104,7 @@ typedef enum plr_reason {
      * (velocity-sigma, gyro-sigma; with an IMU gyro-noise, accel-noise). Or the clocks of camera and
      * odometry differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
-    /* After GATE_LOCKED or TWIST_CONTRADICTED: the pose may be wrong by more than its covariance
+    /* After GATE_LOCKED, TWIST_CONTRADICTED, RECOVERED, RELOCATED or MAP_DISAGREES: the pose may be wrong by more than its covariance
      * says. Ends when twists, or the IMU, have agreed with vision for a while, or when the pose is
      * set. Also for two seconds after an IMU's start in motion (setting imu-start). Drive with care
      * until then. */
@@ -150,13 +150,15 @@ typedef enum plr_reason {
     /* IMU readings are refused (saturated, repeated without end, spikes) or do not fit gravity:
      * check units (m/s^2, rad/s), signs, axes and range of the sensor. */
     PLR_REASON_IMU_FAULT = 1 << 24,
-    /* The known landmarks lay elsewhere than the pose said in ten frames, but agreed on another pose: the
-     * filter began anew there. Wheels slipped for long, the robot was carried, or the pose that was set
-     * was wrong. Reported once; the reset counter of POSE and ODOMETRY counts it. */
+    /* In ten frames nearly all known landmarks lay elsewhere than the pose said, but they agree on another
+     * pose: the filter began anew there, and dropped all other landmarks without handing them to the sink.
+     * Wheels slipped for long, the robot was carried, or the pose that was set was wrong. Reported once;
+     * the reset counter of POSE and ODOMETRY counts it. */
     PLR_REASON_RELOCATED = 1 << 25,
-    /* Known landmarks that came in moved the pose by more than its covariance and theirs allow: the map
-     * is off as a whole, its covariances are too small, or the pose that was set was wrong. Told in that
-     * frame; POSE_MAY_BE_WRONG stays, and the covariance covers both, until all agree. */
+    /* A map that came in sight moved the pose by more than the covariances of both allow: the map is off as
+     * a whole, its covariances are too small, or the pose that was set was wrong. Told in that frame;
+     * POSE_MAY_BE_WRONG stays, and the covariance covers the poses before and after, until pictures and
+     * twists have agreed for a while. */
     PLR_REASON_MAP_DISAGREES = 1 << 26
 } plr_reason;
 
@@ -274,8 +276,8 @@ typedef struct plr_report {
     uint16_t used;          /* matched, accepted by the gate, and applied in the update */
     uint16_t gated;         /* matched, and rejected by the gate */
     uint16_t gated_again;   /* of these: rejected when last seen, too */
-    uint16_t created;       /* new landmarks */
-    uint16_t evicted;       /* landmarks handed to the map sink to make room */
+    uint16_t created;       /* new landmarks, and known ones that came in or came in again */
+    uint16_t evicted;       /* landmarks handed to the map sink to make room; not those dropped */
     uint16_t refused;       /* observations that are not finite or outside any image */
     uint16_t duplicates;    /* observations whose id occurs more than once in the frame: all of
                                them are refused */

@@ -42,8 +42,8 @@ void plr_consistency_trust_twists(plr_filter *f);
 uint32_t plr_consistency_judge(plr_filter *f, const plr_report *report, bool lost);
 
 /* The told covariance covers the present pose and the one by the twist n from it, m and rad in the body,
- * and the pose may be wrong, until pictures and twists have agreed as after a contradiction. nu is n in
- * sigmas of what was believed before, and `noise` the expected square of nu if it is only noise. */
+ * and the pose may be wrong, until pictures and twists have agreed as after a contradiction. `nu` is what was
+ * measured of it in sigmas of what was believed, and `noise` the expected square of nu by chance. */
 void plr_consistency_cover(plr_filter *f, const plr_real n[PLR_POSE_DIM],
                            const plr_real nu[PLR_POSE_DIM], plr_real noise);
 

@@ -284,8 +284,10 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
 
 void plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
     const unsigned n = plr_covariance_dim(f);
-    if (!plr_covariance_shift(f, xi, f->work.dx))
+    if (!plr_covariance_shift(f, xi, f->work.dx)) {
+        plr_filter_diverge(f);
         return;
+    }
     memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     (void)move_estimate(f, n);
 }

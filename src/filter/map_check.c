@@ -7,8 +7,6 @@
 #include "filter/windows.h"
 #include "math/dense.h"
 #include "math/small.h"
-#include "state/blocks.h"
-#include "state/covariance.h"
 #include "state/motion.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
@@ -19,7 +17,7 @@ enum {
     LEAST = 4    /* landmarks */
 };
 
-/* Chi-square with 6 degrees of freedom: chance exceeds it once in 400,000. */
+/* Chi-square with 6 degrees of freedom: chance exceeds it once in 360,000. */
 #define DISAGREES_ABOVE PLR_R(36)
 /* Directions in which the map improves a variance by a smaller part than this do not count. */
 #define UNTOLD PLR_R(0.01)
@@ -38,7 +36,7 @@ static void to_world(const plr_filter *f, plr_real C[PLR_POSE_SQUARE]) {
     memcpy(C, turned, sizeof turned);
 }
 
-/* What errors of the calibration may move the pose by from here on: at most what it hangs on now. */
+/* The part of the pose's error that is the calibration's: what the map may correct besides P. */
 static void add_calibration(plr_filter *f) {
     plr_real C[PLR_POSE_SQUARE] = {0};
     plr_sensitivity_add_to_pose(f, C);
@@ -47,8 +45,15 @@ static void add_calibration(plr_filter *f) {
         f->map_check.V[i] += C[i];
 }
 
+/* Then it is the twists that the map corrects. */
+static bool twists_are_off(const plr_filter *f) {
+    return f->consistency.contradicted || f->consistency.drifting;
+}
+
 bool plr_map_check_begin(plr_filter *f, unsigned adopted, unsigned n, plr_map_check_pose *before) {
     unsigned known = 0;
+    if (f->config.model != PLR_MODEL_BODY)
+        return false;
     for (unsigned k = 0; k < n; k++)
         known += f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known;
     if (adopted >= LEAST && 2 * adopted >= known) {
@@ -56,9 +61,9 @@ bool plr_map_check_begin(plr_filter *f, unsigned adopted, unsigned n, plr_map_ch
         f->map_check.frames = FRAMES;
         add_calibration(f);
     }
-    if (f->consistency.contradicted) /* then it is the twists that the map corrects */
+    if (known == 0 || twists_are_off(f))
         plr_map_check_clear(f);
-    if (f->map_check.frames == 0 || known == 0)
+    if (f->map_check.frames == 0)
         return false;
     memcpy(before->R_WB, f->R_WB, sizeof before->R_WB);
     memcpy(before->p_WB, f->p_WB, sizeof before->p_WB);
@@ -106,12 +111,6 @@ static void add_correction(plr_filter *f, const plr_map_check_pose *before,
         f->map_check.V[i] += C[i];
 }
 
-static void pack_upper(const plr_real A[PLR_POSE_SQUARE], plr_real U[PLR_POSE_TRIANGLE]) {
-    for (unsigned r = 0, at = 0; r < PLR_POSE_DIM; r++)
-        for (unsigned c = r; c < PLR_POSE_DIM; c++, at++)
-            U[at] = A[PLR_POSE_DIM * r + c];
-}
-
 /* The sum of the corrections in sigmas of the pose as it was when the map came in sight, v, and squared in
  * its own: the result. n: by how much the map would have moved it alone, m and rad in the body. */
 static plr_real judge(const plr_filter *f, const plr_real after[PLR_POSE_SQUARE],
@@ -120,14 +119,14 @@ static plr_real judge(const plr_filter *f, const plr_real after[PLR_POSE_SQUARE]
         by_map[PLR_POSE_DIM], n_W[PLR_POSE_DIM], d2 = 0;
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         C[i] = f->map_check.V[i] + after[i];
-    pack_upper(C, U);
+    plr_upper6_pack(U, C);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U)) /* the pose was known exactly */
         return 0;
     memcpy(v, f->map_check.moved, PLR_POSE_DIM * sizeof *v);
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, v, 1);
     memcpy(C, f->map_check.V, sizeof C);
     in_units_of(U, C);
-    pack_upper(C, V);
+    plr_upper6_pack(V, C);
     plr_by_pictures_alone(v, V, UNTOLD, by_map);
     *noise = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
@@ -142,7 +141,11 @@ static plr_real judge(const plr_filter *f, const plr_real after[PLR_POSE_SQUARE]
 
 bool plr_map_check_end(plr_filter *f, const plr_map_check_pose *before) {
     plr_real after[PLR_POSE_SQUARE], v[PLR_POSE_DIM], n[PLR_POSE_DIM], noise;
-    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, after);
+    if (twists_are_off(f)) {
+        plr_map_check_clear(f);
+        return false;
+    }
+    plr_motion_pose_covariance(f, after);
     add_correction(f, before, after);
     to_world(f, after);
     f->map_check.frames--;

@@ -18,15 +18,15 @@ typedef struct plr_map_check_pose {
     plr_real P_xi[PLR_POSE_SQUARE]; /* its covariance */
 } plr_map_check_pose;
 
-/* No map is in sight. */
+/* Nothing has been summed up. */
 void plr_map_check_clear(plr_filter *f);
 
-/* `adopted` known landmarks have come in, which the frame sees as it does `n` observations. Where they
- * are at least four, and half of the known ones in sight, some frames of attention begin. True if this
- * frame is one of them: then `before` is filled. */
+/* Before the correction by a frame of `n` observations, for which `adopted` known landmarks have come in. Where
+ * these are at least four, and half of the known ones in sight, a map comes in sight: from this frame on
+ * some are summed up. True if this is one of them: then `before` is filled. */
 bool plr_map_check_begin(plr_filter *f, unsigned adopted, unsigned n, plr_map_check_pose *before);
 
-/* After the correction of such a frame. True if the map has moved the pose by more than chance does; the
+/* After the correction by such a frame. True if the map has moved the pose by more than chance does; the
  * covariance that is told then covers the poses by prediction and by the map, until section 17's frames
  * of agreement. */
 bool plr_map_check_end(plr_filter *f, const plr_map_check_pose *before);

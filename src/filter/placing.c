@@ -70,7 +70,7 @@ static bool look(const plr_sights *s, const plr_seen_known *known, const plr_pla
 }
 
 /* Marks the points that agree with the pose. Returns how many. */
-static unsigned ask(const plr_sights *s, const plr_placing *at) {
+static unsigned mark_agreeing(const plr_sights *s, const plr_placing *at) {
     unsigned agreeing = 0;
     for (unsigned i = 0; i < s->count; i++) {
         plr_real e[3];
@@ -86,7 +86,7 @@ static unsigned ask(const plr_sights *s, const plr_placing *at) {
 
 /* The equations of the points that agree, factorised. False if they do not determine the pose, or if one
  * would come too near. */
-static bool set_up(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
+static bool fill_equations(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
     memset(normal, 0, sizeof *normal);
     for (unsigned i = 0; i < s->count; i++) {
         plr_real e[3], J[PLR_ROWS * PLR_POSE_DIM];
@@ -113,7 +113,7 @@ static bool improve(const plr_sights *s, plr_placing *at) {
     for (unsigned step = 0; step < STEPS; step++) {
         plr_normal normal;
         plr_real R[9], before[9], turned[3], *motion = normal.b;
-        if (!set_up(s, at, &normal))
+        if (!fill_equations(s, at, &normal))
             return false;
         plr_solve_upper_transposed(PLR_POSE_DIM, 1, normal.U, motion, 1);
         plr_solve_upper(PLR_POSE_DIM, normal.U, motion);
@@ -220,7 +220,7 @@ static void set_covariance(const plr_normal *normal, plr_placing *placing) {
 static unsigned place_by_guess(const plr_sights *s, plr_placing *at) {
     for (unsigned i = 0; i < s->count; i++)
         s->seen[i].agrees = true;
-    return improve(s, at) ? ask(s, at) : 0;
+    return improve(s, at) ? mark_agreeing(s, at) : 0;
 }
 
 /* From samples of three, if they are better than `most` points. Returns how many agree. */
@@ -232,7 +232,7 @@ static unsigned place_by_samples(const plr_sights *s, unsigned most, plr_placing
         unsigned of[3];
         plr_placing at;
         draw(&random, near, nears, of);
-        const unsigned agreeing = place_by_three(s, of, &at) ? ask(s, &at) : 0;
+        const unsigned agreeing = place_by_three(s, of, &at) ? mark_agreeing(s, &at) : 0;
         if (agreeing > most) {
             most = agreeing;
             *placing = at;
@@ -250,13 +250,16 @@ unsigned plr_place(const plr_filter *f, plr_seen_known *seen, unsigned count,
         *placing = *guess;
         most = place_by_guess(&s, placing);
     }
-    if (most < count) /* not all agree: samples may find a better one */
+    if (most < count) { /* not all agree: samples may find a better one */
         most = place_by_samples(&s, most, placing);
-    for (unsigned round = 0; round < 2; round++)
-        if (most < PLR_PLACING_LEAST || (most = ask(&s, placing)) < PLR_PLACING_LEAST ||
-            !improve(&s, placing))
+        most = most > 0 ? mark_agreeing(&s, placing) : 0;
+    }
+    for (unsigned round = 0; round < 2; round++) {
+        if (most < PLR_PLACING_LEAST || !improve(&s, placing))
             return 0;
-    if (!set_up(&s, placing, &normal))
+        most = mark_agreeing(&s, placing);
+    }
+    if (most < PLR_PLACING_LEAST || !fill_equations(&s, placing, &normal))
         return 0;
     set_covariance(&normal, placing);
     return most;

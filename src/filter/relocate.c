@@ -6,6 +6,7 @@
 #include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
+#include "filter/matching.h"
 #include "filter/placing.h"
 #include "filter/predict.h"
 #include "math/dense.h"
@@ -14,6 +15,7 @@
 #include "math/so3.h"
 #include "process/alignment.h"
 #include "sensor/stereo.h"
+#include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
@@ -22,26 +24,24 @@
 
 enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
 
-/* The variance of the pose at which it begins anew, beside that by which the frame tells it. The update
- * uses the frame once more, because it makes the correlations between pose and landmarks; what the
- * frame says is counted twice by a hundredth then. */
+/* The pose's variance before the update, as a multiple of the one by which the frame tells the pose. The update
+ * uses the frame again, because it makes the correlations between pose and landmarks, and the frame is
+ * counted twice by a hundredth then. */
 #define WIDER PLR_R(100)
 
-/* An uncertain pose is moved to the one that was found in so many steps: a step is exact to first order. */
+/* A step towards a pose is exact to first order, so it takes some. */
 enum { STEPS = 3 };
 /* Chi-square with 6 degrees of freedom: chance exceeds it once in 60,000. */
 #define FAR_ABOVE PLR_R(32)
 /* Known landmarks that come in again tell the pose a second time. That is allowed only where the frame alone
- * tells it better than all before, along each axis: P's variances exceed the frame's by this factor. */
+ * tells it better than all before: where each variance of the pose is at least this multiple of the frame's. */
 #define WIDE_ENOUGH PLR_R(1)
-/* Variances: beyond a hundred sigmas the update would take more digits off P than float32 has. */
+/* The largest such multiple at which pose and frame are joined in one matrix: beyond it the update would take
+ * more digits off P than float32 has. */
 #define TOO_WIDE PLR_R(1e4)
 
-bool plr_relocate_asks_map(const plr_filter *f) {
-    const bool knows = f->config.mode == PLR_MODE_LOCALIZATION ||
-                       (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
-    return knows && f->map.source != NULL;
-}
+/* So many landmarks fit into work.Vt. */
+#define ROOM (sizeof(((plr_workspace *)0)->Vt) / (sizeof(plr_seen_known)))
 
 void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
@@ -52,9 +52,12 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
         seen++;
         off += f->work.gain[slot] < 0;
     }
-    if (seen < PLR_PLACING_LEAST)
+    if (seen < PLR_PLACING_LEAST || !plr_match_asks_map(f))
         return; /* says nothing */
-    f->frames_off_the_map = 5 * off < 4 * seen ? 0 : (uint16_t)(f->frames_off_the_map + 1);
+    if (5 * off < 4 * seen)
+        f->frames_off_the_map = 0;
+    else if (f->frames_off_the_map < OFF_FRAMES)
+        f->frames_off_the_map++;
 }
 
 /* The known landmarks of the frame, those with the lowest ids first; `origin`: where the first one
@@ -62,10 +65,10 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
 static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
                         plr_seen_known *seen, double origin[3]) {
     unsigned count = 0;
-    for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < f->config.slots; k++) {
+    for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < ROOM; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
-        plr_landmark known = {.P_W_m2 = {-1}}; /* refused, if the source fills in nothing */
-        if (!f->map.source(f->map.context, o->id, &known) || !plr_landmark_is_valid(&known))
+        plr_landmark known;
+        if (!plr_match_ask_map(f, o->id, &known))
             continue;
         if (count == 0)
             memcpy(origin, known.p_W_m, sizeof known.p_W_m);
@@ -112,6 +115,8 @@ static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool gu
     double origin[3];
     plr_placing guess, at;
     found->count = collect(f, frame, n, seen, origin);
+    if (found->count < PLR_PLACING_LEAST)
+        return false;
     if (guesses)
         guess_placing(f, origin, &guess);
     const unsigned agreeing = plr_place(f, seen, found->count, guesses ? &guess : NULL, &at);
@@ -138,7 +143,7 @@ static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known 
         const uint32_t id = frame->observations[f->work.order[seen[i].k]].id;
         plr_landmark known;
         plr_new_landmark landmark;
-        if (seen[i].agrees && f->map.source(f->map.context, id, &known) &&
+        if (seen[i].agrees && f->count < f->config.slots && plr_match_ask_map(f, id, &known) &&
             plr_model_of(f)->adopt(f, &known, &landmark))
             plr_slots_append(f, id, true, &landmark);
     }
@@ -157,7 +162,7 @@ static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose
 
 bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_found_pose found;
-    if (f->frames_off_the_map < OFF_FRAMES || !plr_relocate_asks_map(f))
+    if (f->frames_off_the_map < OFF_FRAMES || !plr_match_asks_map(f))
         return false;
     f->frames_off_the_map = 0;
     if (!find_pose(f, frame, n, false, &found))
@@ -184,14 +189,14 @@ static bool slot_is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE]
     return s->known && is_rough(f, C, plr_dot3(s->x, s->x));
 }
 
-/* False of a known landmark that the caller has inserted, and that would not come in again. */
+/* Known landmarks that the caller has inserted stay: they would not come in again. */
 static bool is_in_map(const plr_filter *f, unsigned slot) {
     plr_landmark known;
-    return f->map.source(f->map.context, f->slots[slot].id, &known);
+    return f->slots[slot].known && plr_match_ask_map(f, f->slots[slot].id, &known);
 }
 
 void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
-    if (!plr_relocate_asks_map(f))
+    if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f))
         return;
     for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
         if (slot_is_rough(f, C, slot) && is_in_map(f, slot))
@@ -218,75 +223,85 @@ static bool is_seen_roughly(const plr_filter *f, unsigned n) {
 /* They come in again. */
 static void drop_known(plr_filter *f) {
     for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
-        if (f->slots[slot].known && is_in_map(f, slot))
+        if (is_in_map(f, slot))
             plr_slots_remove(f, slot);
 }
 
-/* y = (P + other)^-1 xi. False if it cannot be computed. */
-static bool solve_sum(const plr_real P[PLR_POSE_SQUARE], const plr_real other[PLR_POSE_SQUARE],
-                      const plr_real xi[PLR_POSE_DIM], plr_real y[PLR_POSE_DIM]) {
-    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
-    for (unsigned r = 0, at = 0; r < PLR_POSE_DIM; r++)
-        for (unsigned c = r; c < PLR_POSE_DIM; c++, at++)
-            U[at] = P[PLR_POSE_DIM * r + c] + other[PLR_POSE_DIM * r + c];
+/* A pose that was found, held against the predicted one. */
+typedef struct plr_pose_gap {
+    plr_real xi[PLR_POSE_DIM];   /* from the predicted one, m and rad in the body */
+    plr_real nu[PLR_POSE_DIM];   /* xi in sigmas of P + P_found */
+    plr_real back[PLR_POSE_DIM]; /* P_found (P + P_found)^-1 xi: what the prediction knows better */
+    plr_real least, largest;     /* of the ratios of P's variances to P_found's */
+} plr_pose_gap;
+
+/* False if P + P_found cannot be factorised. */
+static bool measure_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap) {
+    plr_real P[PLR_POSE_SQUARE], sum[PLR_POSE_SQUARE], y[PLR_POSE_DIM],
+        U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
+    plr_motion_pose_covariance(f, P);
+    gap->least = gap->largest = P[0] / found->P_xi[0];
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
+        const plr_real ratio = P[i] / found->P_xi[i];
+        gap->least = ratio < gap->least ? ratio : gap->least;
+        gap->largest = ratio > gap->largest ? ratio : gap->largest;
+    }
+    plr_sensitivity_add_to_pose(f, P);
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        sum[i] = P[i] + found->P_xi[i];
+    plr_upper6_pack(U, sum);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return false;
-    memcpy(y, xi, PLR_POSE_DIM * sizeof *y);
-    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, y, 1);
+    plr_pose_towards(f, found->R_WB, found->p_WB, gap->xi);
+    memcpy(gap->nu, gap->xi, sizeof gap->nu);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, gap->nu, 1);
+    memcpy(y, gap->nu, sizeof y);
     plr_solve_upper(PLR_POSE_DIM, U, y);
+    plr_mat6_vec(gap->back, found->P_xi, y);
     return true;
 }
 
 /* Moves the pose to where prediction and frame together have it: to the one that was found, less what the
- * frame does not know better, P_found (P + P_found)^-1 xi. Returns whether the two poses differ by more
- * than chance. */
-static bool move_to(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], const plr_found_pose *found) {
-    plr_real xi[PLR_POSE_DIM], y[PLR_POSE_DIM], back[PLR_POSE_DIM], d2 = 0;
-    plr_pose_towards(f, found->R_WB, found->p_WB, xi);
-    if (!solve_sum(P, found->P_xi, xi, y))
-        return false;
-    plr_mat6_vec(back, found->P_xi, y);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        d2 = PLR_FMA(xi[k], y[k], d2);
+ * prediction knows better. */
+static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap) {
     for (unsigned step = 0; step < STEPS && !f->diverged; step++) {
+        plr_real xi[PLR_POSE_DIM];
         plr_pose_towards(f, found->R_WB, found->p_WB, xi);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            xi[k] -= back[k];
+            xi[k] -= gap->back[k];
         plr_correct_towards(f, xi);
     }
-    return d2 > FAR_ABOVE;
 }
 
-/* The least and the largest ratio of P's variances to those that the frame tells. */
-static void compare(const plr_real P[PLR_POSE_SQUARE], const plr_real by_frame[PLR_POSE_SQUARE],
-                    plr_real *least, plr_real *largest) {
-    *least = *largest = P[0] / by_frame[0];
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
-        const plr_real ratio = P[i] / by_frame[i];
-        *least = ratio < *least ? ratio : *least;
-        *largest = ratio > *largest ? ratio : *largest;
-    }
+/* The pose that was found, with ten of the frame's sigmas. Velocity, biases and landmarks keep what they
+ * know, but not what they have in common with the pose. */
+static void replace_pose(plr_filter *f, const plr_found_pose *found) {
+    static const plr_real none[PLR_POSE_DIM] = {0};
+    plr_real P[PLR_POSE_SQUARE];
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        P[i] = WIDER * found->P_xi[i];
+    memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
+    memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
+    plr_covariance_forget(f, PLR_BLOCK_POSE, none);
+    plr_covariance_add(f, PLR_BLOCK_POSE, P);
 }
 
 plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_found_pose found;
-    plr_real P[PLR_POSE_SQUARE], least, largest;
-    if (f->config.model != PLR_MODEL_BODY || !plr_relocate_asks_map(f) || !is_seen_roughly(f, n) ||
-        !find_pose(f, frame, n, true, &found))
+    plr_pose_gap gap;
+    if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f) || !is_seen_roughly(f, n) ||
+        !find_pose(f, frame, n, true, &found) || !measure_gap(f, &found, &gap) ||
+        gap.least < WIDE_ENOUGH)
         return PLR_PLACED;
-    plr_motion_pose_covariance(f, P);
-    compare(P, found.P_xi, &least, &largest);
-    if (least < WIDE_ENOUGH)
-        return PLR_PLACED;
-    if (largest > TOO_WIDE) {
-        begin_at(f, frame, &found);
-        return PLR_BEGUN_ANEW;
-    }
     drop_known(f);
     plr_predict_apply_prior(f);
-    plr_sensitivity_add_to_pose(f, P);
-    if (!move_to(f, P, &found))
+    if (gap.largest > TOO_WIDE)
+        replace_pose(f, &found);
+    else
+        move_to(f, &found, &gap);
+    if (!(plr_norm2_of_6(gap.nu) > FAR_ABOVE))
         return PLR_MOVED;
-    plr_consistency_doubt(f);
+    f->totals.widened++;
+    plr_consistency_cover(f, gap.xi, gap.nu, PLR_POSE_DIM);
     return PLR_MOVED_FAR;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /*
- * A stereo frame: predict, match, find the motion, gate, correct, evict, initialise, in this order.
+ * A stereo frame: predict, match, take up known landmarks, find the motion, gate, correct, evict, initialise, in this order.
  * Observations are processed in the order of their ids, so the order in which they arrive changes
  * no bit.
  */
@@ -191,26 +191,27 @@ static void let_tracks_drift(plr_filter *f) {
     plr_model_of(f)->drift(f, PLR_SQRT(f->par.track_drift * seconds));
 }
 
-/* Finds the slots of the observations; known landmarks come in, at a pose that is found anew if need be. */
-static void match(plr_filter *f, const plr_frame *frame, unsigned n, plr_frame_events *events,
-                  plr_report *report) {
+/* Known landmarks come in, at a pose that is found anew if need be. */
+static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
+                          plr_frame_events *events, plr_report *report) {
     const plr_observation *seen = frame->observations;
     events->relocated = plr_relocate_when_lost(f, frame, n);
-    plr_match_slots(f, seen, n);
-    if (!events->relocated) {
-        plr_match_known(f, seen, n, events, report);
-        const plr_relocation found = plr_relocate_when_uncertain(f, frame, n);
-        if (found == PLR_PLACED || f->diverged)
-            return;
-        report->created = 0; /* they come in again */
-        plr_match_slots(f, seen, n);
-        events->relocated = found == PLR_BEGUN_ANEW;
-        events->map_disagrees = found == PLR_MOVED_FAR;
-    }
-    if (events->relocated)
+    if (events->relocated) {
         report->created = (uint16_t)f->count;
-    else
+        plr_match_slots(f, seen, n);
+        return;
+    }
+    plr_match_known(f, seen, n, events, report);
+    const plr_relocation found = plr_relocate_when_uncertain(f, frame, n);
+    if (found == PLR_PLACED)
+        return;
+    report->created = report->no_room = 0; /* they come in again */
+    events->unplaced = 0;
+    plr_match_slots(f, seen, n);
+    if (!f->diverged)
         plr_match_known(f, seen, n, events, report);
+    events->map_disagrees = found == PLR_MOVED_FAR;
+    events->adopted = 0; /* the pose has been held against the map already */
 }
 
 /* Corrects by the observations, and fills the report with how. */
@@ -249,10 +250,13 @@ static void renew_landmarks(plr_filter *f, const plr_frame *frame, unsigned n,
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_frame_events events = {0};
     unsigned n = plr_match_in_order(f, frame, report);
-    match(f, frame, n, &events, report);
+    plr_match_slots(f, frame->observations, n);
+    const bool frozen = f->config.model == PLR_MODEL_BODY && plr_frozen_is_seen(f, frame, n);
+    if (!frozen)
+        take_up_known(f, frame, n, &events, report);
     const unsigned matched = n;
     let_tracks_drift(f);
-    if (f->config.model == PLR_MODEL_BODY && plr_frozen_is_seen(f, frame, n))
+    if (frozen)
         n = 0; /* it does not show the present */
     plr_reading still;
     plr_reading_result unused = {0};

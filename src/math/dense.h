@@ -101,6 +101,14 @@ static inline void plr_upper6_add(plr_real S[PLR_POSE_TRIANGLE], const plr_real 
     plr_upper6_add_row(5, S, a, b);
 }
 
+/* The upper triangle of A, packed. */
+static inline void plr_upper6_pack(plr_real U[PLR_POSE_TRIANGLE],
+                                   const plr_real A[PLR_POSE_SQUARE]) {
+    for (unsigned r = 0, at = 0; r < PLR_POSE_DIM; r++)
+        for (unsigned c = r; c < PLR_POSE_DIM; c++, at++)
+            U[at] = A[PLR_POSE_DIM * r + c];
+}
+
 /* The 6x6 symmetric matrix of a packed upper triangle. */
 static inline void plr_upper6_unpack(plr_real A[PLR_POSE_SQUARE],
                                      const plr_real S[PLR_POSE_TRIANGLE]) {

@@ -163,25 +163,34 @@ static void test_a_true_drive_is_never_found_anew(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.filter.totals.widened);
 }
 
-/* The pose is known to half a metre and a tenth of a rad, and that is true. Landmarks that came in there were
- * linearised half a metre beside their place: in the first frame the pose was off by 5 to 21 sigma. */
-static void test_a_start_that_is_as_uncertain_as_it_says(void) {
+/* The pose is known to `sigma` m and a part of that in rad, and that is true. Landmarks that came in there
+ * were linearised beside their place: in the first frame the pose was off by 5 to 21 sigma. */
+static void check_rough_start(double sigma) {
     double sum = 0, e[6];
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         rng chance = rng_seeded(seed);
         double xi[6];
-        rng_normals(&chance, 0.5, xi, 3);
-        rng_normals(&chance, 0.1, xi + 3, 3);
+        rng_normals(&chance, sigma, xi, 6);
+        for (unsigned k = 3; k < 6; k++)
+            xi[k] *= 0.5;
         rig.options.seed = seed;
         rig_begin_with(PLR_MODE_LOCALIZATION, true);
-        set_pose_off_by(xi, 0.5);
+        set_pose_off_by(xi, sigma);
         rig_frame();
-        TEST_ASSERT_EQUAL_INT(0, rig.report.reasons & PLR_REASON_MAP_DISAGREES);
+        TEST_ASSERT_EQUAL_UINT(0, rig.report.reasons &
+                                      (PLR_REASON_MAP_DISAGREES | PLR_REASON_RELOCATED));
         sum += rig_squared_error(e);
         rig_drive(5);
         TEST_ASSERT_LESS_THAN_DOUBLE(32, rig_squared_error(e));
     }
     TEST_ASSERT_LESS_THAN_DOUBLE(6 + 4 * sqrt(12.0 / SEEDS), sum / SEEDS);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.filter.totals.widened);
+}
+
+static void test_a_start_that_is_as_uncertain_as_it_says(void) {
+    check_rough_start(0.1);
+    check_rough_start(0.2);
+    check_rough_start(0.5); /* more than float32 can join with what the frame says */
 }
 
 /* Within five sigmas along each axis. */
@@ -211,4 +220,49 @@ static void test_a_start_that_was_believed_too_well_is_told_and_covered(void) {
     demand_covered();
     TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.05, rig_sigma_m());
+}
+
+/* Off by eleven sigmas, at a pose that is uncertain by so much that it is found anew. */
+static void test_a_rough_start_that_was_believed_too_well_is_told_and_covered(void) {
+    const double xi[6] = {0.8, -0.6, 0.4, 0.1, 0.1, -0.3};
+    double P[36];
+    rig_begin_with(PLR_MODE_LOCALIZATION, true);
+    set_pose_off_by(xi, 0.1);
+    rig_frame();
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_MAP_DISAGREES);
+    TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_POSE_MAY_BE_WRONG);
+    TEST_ASSERT_GREATER_THAN_UINT32(0, rig.filter.totals.widened);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, P));
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.5,
+                                    sqrt(P[0] + P[7] + P[14])); /* the pose that was set, too */
+    demand_covered();
+    rig_drive(100);
+    demand_covered();
+    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health);
+}
+
+/* A camera that sends the same picture while the body drives on: the picture agrees with itself, and would
+ * put the pose back to where it was taken. */
+static void test_a_frozen_picture_finds_no_pose(void) {
+    rig.config.velocity_sigma[0] = rig.config.velocity_sigma[1] = rig.config.velocity_sigma[2] =
+        0.5;
+    rig.config.gyro_sigma[0] = rig.config.gyro_sigma[1] = rig.config.gyro_sigma[2] = 0.2;
+    rig_begin_with(PLR_MODE_LOCALIZATION, true);
+    rig_drive(20);
+    plr_observation seen[SCENE_MAX_SEEN];
+    plr_frame frame = scene_look(&rig.world);
+    for (unsigned i = 0; i < frame.count; i++)
+        seen[i] = frame.observations[i];
+    frame.observations = seen;
+    for (unsigned k = 0; k < 60; k++) {
+        double e[6];
+        rig_twists();
+        frame.t_ns = rig.world.t_ns;
+        TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&rig.filter, &frame, &rig.report));
+        if (k < 5)
+            continue; /* of pixels that may be noiseless */
+        TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_FROZEN_IMAGE);
+        TEST_ASSERT_EQUAL_UINT(0, rig.report.used);
+        TEST_ASSERT_LESS_THAN_DOUBLE(40, rig_squared_error(e));
+    }
 }
