@@ -228,7 +228,7 @@ static unsigned place_by_samples(const plr_sights *s, unsigned most, plr_placing
     uint8_t near[PLR_PLACING_MOST];
     const unsigned nears = find_near(s, near);
     uint32_t random = 1; /* the same samples in every frame: the same bits everywhere */
-    for (unsigned trial = 0; nears >= 3 && trial < TRIALS; trial++) {
+    for (unsigned trial = 0; nears >= 3 && most < s->count && trial < TRIALS; trial++) {
         unsigned of[3];
         plr_placing at;
         draw(&random, near, nears, of);
