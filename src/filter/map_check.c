@@ -36,13 +36,13 @@ static void to_world(const plr_filter *f, plr_real C[PLR_POSE_SQUARE]) {
     memcpy(C, turned, sizeof turned);
 }
 
-/* The part of the pose's error that is the calibration's: what the map may correct besides P. */
-static void add_calibration(plr_filter *f) {
+/* V += the part of the pose's error that is the calibration's. */
+static void add_calibration(const plr_filter *f, plr_real V[PLR_POSE_SQUARE]) {
     plr_real C[PLR_POSE_SQUARE] = {0};
     plr_sensitivity_add_to_pose(f, C);
     to_world(f, C);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
-        f->map_check.V[i] += C[i];
+        V[i] += C[i];
 }
 
 /* Then it is the twists that the map corrects. */
@@ -59,7 +59,7 @@ bool plr_map_check_begin(plr_filter *f, unsigned adopted, unsigned n, plr_map_ch
     if (adopted >= LEAST && 2 * adopted >= known) {
         plr_map_check_clear(f);
         f->map_check.frames = FRAMES;
-        add_calibration(f);
+        add_calibration(f, f->map_check.V);
     }
     if (known == 0 || twists_are_off(f))
         plr_map_check_clear(f);
@@ -116,17 +116,18 @@ static void add_correction(plr_filter *f, const plr_map_check_pose *before,
 static plr_real judge(const plr_filter *f, const plr_real after[PLR_POSE_SQUARE],
                       plr_real v[PLR_POSE_DIM], plr_real n[PLR_POSE_DIM], plr_real *noise) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], V[PLR_POSE_TRIANGLE], C[PLR_POSE_SQUARE],
-        by_map[PLR_POSE_DIM], n_W[PLR_POSE_DIM], d2 = 0;
+        due[PLR_POSE_SQUARE], by_map[PLR_POSE_DIM], n_W[PLR_POSE_DIM], d2 = 0;
+    memcpy(due, f->map_check.V, sizeof due);
+    add_calibration(f, due); /* of before and of now: the map puts one in the place of the other */
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
-        C[i] = f->map_check.V[i] + after[i];
+        C[i] = due[i] + after[i];
     plr_upper6_pack(U, C);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U)) /* the pose was known exactly */
         return 0;
     memcpy(v, f->map_check.moved, PLR_POSE_DIM * sizeof *v);
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, v, 1);
-    memcpy(C, f->map_check.V, sizeof C);
-    in_units_of(U, C);
-    plr_upper6_pack(V, C);
+    in_units_of(U, due);
+    plr_upper6_pack(V, due);
     plr_by_pictures_alone(v, V, UNTOLD, by_map);
     *noise = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
