@@ -227,6 +227,7 @@ typedef struct plr_consistency {
     uint8_t frozen;                /* 1: this frame's picture equals the one before */
     /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
     uint8_t settling_frames;
+    uint8_t relocated; /* 1: since the pose was found anew in a known map it has been in doubt */
 } plr_consistency;
 
 /* Whether what is seen agrees with itself: src/filter/scene.h. */

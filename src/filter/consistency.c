@@ -380,7 +380,7 @@ static void resolve(plr_filter *f) {
     memset(c->difference_sigmas, 0, sizeof c->difference_sigmas);
     c->difference_noise = 0;
     plr_windows_clear(f);
-    c->contradicted = c->drifting = c->settling_frames = 0;
+    c->contradicted = c->drifting = c->settling_frames = c->relocated = 0;
     c->agreeing_frames = c->doubted_frames = 0;
 }
 

@@ -26,6 +26,8 @@ typedef struct plr_sights {
     const plr_filter *f;
     plr_seen_known *seen;
     unsigned count;
+    const plr_placing *prior;              /* NULL: none */
+    plr_real information[PLR_POSE_SQUARE]; /* of it */
 } plr_sights;
 
 /* The equations of Gauss and Newton for a small motion (rho, theta) of the camera. */
@@ -84,10 +86,8 @@ static unsigned mark_agreeing(const plr_sights *s, const plr_placing *at) {
 
 /* ---------------------------------------------------------------- the pose */
 
-/* The equations of the points that agree, factorised. False if they do not determine the pose, or if one
- * would come too near. */
-static bool fill_equations(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
-    memset(normal, 0, sizeof *normal);
+/* Adds the points that agree. False if one would come too near. */
+static bool add_points(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
     for (unsigned i = 0; i < s->count; i++) {
         plr_real e[3], J[PLR_ROWS * PLR_POSE_DIM];
         if (!s->seen[i].agrees)
@@ -101,6 +101,33 @@ static bool fill_equations(const plr_sights *s, const plr_placing *at, plr_norma
                 normal->b[k] = PLR_FMA(of_row[k], e[row], normal->b[k]);
         }
     }
+    return true;
+}
+
+/* Adds what is known besides: a pose, with the inverse of its covariance. */
+static void add_prior(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
+    plr_real turn[9], turned[3], gap[PLR_POSE_DIM], by_prior[PLR_POSE_DIM];
+    plr_mat3_mul_nt(turn, s->prior->R, at->R);
+    plr_mat3_vec(turned, turn, at->t);
+    for (unsigned i = 0; i < 3; i++)
+        gap[i] = s->prior->t[i] - turned[i];
+    plr_turn_of(gap + 3, turn);
+    plr_mat6_vec(by_prior, s->information, gap);
+    for (unsigned r = 0, i = 0; r < PLR_POSE_DIM; r++) {
+        normal->b[r] += by_prior[r];
+        for (unsigned c = r; c < PLR_POSE_DIM; c++, i++)
+            normal->U[i] += s->information[PLR_POSE_DIM * r + c];
+    }
+}
+
+/* The equations of the points that agree, and of the prior if there is one, factorised. False if they do
+ * not determine the pose, or if a point would come too near. */
+static bool fill_equations(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
+    memset(normal, 0, sizeof *normal);
+    if (!add_points(s, at, normal))
+        return false;
+    if (s->prior)
+        add_prior(s, at, normal);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real *diagonal = normal->U + plr_upper_row(PLR_POSE_DIM, k);
         *diagonal += PLR_FMA(SMALL_SHARE, *diagonal, TINY);
@@ -201,18 +228,18 @@ static void draw(uint32_t *state, const uint8_t *near, unsigned count, unsigned 
         of[k] = near[of[k]];
 }
 
-/* P_C = information^-1 = U^-1 U^-T. */
-static void set_covariance(const plr_normal *normal, plr_placing *placing) {
+/* A^-1 = U^-1 U^-T, of A = U^T U. */
+static void invert(const plr_real *U, plr_real inverse[PLR_POSE_SQUARE]) {
     plr_real X[PLR_POSE_SQUARE] = {0};
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         X[(PLR_POSE_DIM + 1) * k] = 1;
-    plr_solve_upper_transposed(PLR_POSE_DIM, PLR_POSE_DIM, normal->U, X, PLR_POSE_DIM);
+    plr_solve_upper_transposed(PLR_POSE_DIM, PLR_POSE_DIM, U, X, PLR_POSE_DIM);
     for (unsigned r = 0; r < PLR_POSE_DIM; r++)
         for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
             plr_real sum = 0;
             for (unsigned l = 0; l < PLR_POSE_DIM; l++)
                 sum = PLR_FMA(X[PLR_POSE_DIM * l + r], X[PLR_POSE_DIM * l + c], sum);
-            placing->P_C[PLR_POSE_DIM * r + c] = sum;
+            inverse[PLR_POSE_DIM * r + c] = sum;
         }
 }
 
@@ -261,6 +288,18 @@ unsigned plr_place(const plr_filter *f, plr_seen_known *seen, unsigned count,
     }
     if (most < PLR_PLACING_LEAST || !fill_equations(&s, placing, &normal))
         return 0;
-    set_covariance(&normal, placing);
+    invert(normal.U, placing->P_C);
     return most;
+}
+
+bool plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
+                        const plr_placing *prior, plr_placing *placing) {
+    plr_sights s = {.f = f, .seen = seen, .count = count, .prior = prior};
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
+    plr_upper6_pack(U, prior->P_C);
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return false;
+    invert(U, s.information);
+    *placing = *prior;
+    return place_by_guess(&s, placing) == count;
 }

@@ -82,8 +82,7 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]) {
     plr_filter_begin_velocity(f);
 }
 
-/* What is known of the biases may be what has broken down. */
-static void begin_bias(plr_filter *f) {
+void plr_filter_begin_prior_bias(plr_filter *f) {
     double variance[PLR_POSE_DIM];
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
@@ -107,5 +106,5 @@ void plr_filter_recover(plr_filter *f) {
     f->diverged = 0;
     f->totals.recoveries++;
     plr_filter_begin_anew(f, P);
-    begin_bias(f);
+    plr_filter_begin_prior_bias(f); /* what is known of them may be what has broken down */
 }

@@ -52,7 +52,7 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
         seen++;
         off += f->work.gain[slot] < 0;
     }
-    if (seen < PLR_PLACING_LEAST || !plr_match_asks_map(f))
+    if (seen < 2 || !plr_match_asks_map(f))
         return; /* says nothing */
     if (5 * off < 4 * seen)
         f->frames_off_the_map = 0;
@@ -60,14 +60,21 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
         f->frames_off_the_map++;
 }
 
-/* The known landmarks of the frame, those with the lowest ids first; `origin`: where the first one
- * lies, m. Returns how many. */
+static bool has_just_come_in(const plr_filter *f, unsigned slot) {
+    return f->slots[slot].known && f->slots[slot].times_seen == 0;
+}
+
+/* The known landmarks of the frame, or those that have just come in; those with the lowest ids first.
+ * `origin`: where the first one lies, m. Returns how many. */
 static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
-                        plr_seen_known *seen, double origin[3]) {
+                        bool new_ones_alone, plr_seen_known *seen, double origin[3]) {
     unsigned count = 0;
     for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < ROOM; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
+        const uint16_t slot = f->work.slot_of[k];
         plr_landmark known;
+        if (new_ones_alone && (slot == PLR_NO_SLOT || !has_just_come_in(f, slot)))
+            continue;
         if (!plr_match_ask_map(f, o->id, &known))
             continue;
         if (count == 0)
@@ -95,7 +102,7 @@ typedef struct plr_found_pose {
     unsigned count; /* of `seen` */
 } plr_found_pose;
 
-/* The present pose. */
+/* The present pose, without its covariance. */
 static void guess_placing(const plr_filter *f, const double origin[3], plr_placing *guess) {
     plr_real offset_W[3], offset_C[3];
     for (unsigned i = 0; i < 3; i++)
@@ -106,31 +113,56 @@ static void guess_placing(const plr_filter *f, const double origin[3], plr_placi
         guess->t[i] = offset_C[i] + f->par.camera.t_CB[i];
 }
 
-/* T_WB = T_WC T_CB. Where T_WB Exp(xi) is the truth, (rho, theta) of the camera is -Ad(T_CB) xi. False if fewer than three fifths agree. */
-static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+/* T_WB = T_WC T_CB. Where T_WB Exp(xi) is the truth, (rho, theta) of the camera is -Ad(T_CB) xi. */
+static void set_found(const plr_filter *f, const plr_placing *at, const double origin[3],
                       plr_found_pose *found) {
-    plr_seen_known *seen = seen_in(f);
     const plr_camera *camera = &f->par.camera;
     plr_real offset_C[3], offset_W[3], A[PLR_POSE_SQUARE];
+    for (unsigned i = 0; i < 3; i++)
+        offset_C[i] = camera->t_CB[i] - at->t[i];
+    plr_mat3_tvec(offset_W, at->R, offset_C);
+    for (unsigned i = 0; i < 3; i++)
+        found->p_WB[i] = origin[i] + (double)offset_W[i];
+    plr_mat3_mul_tn(found->R_WB, at->R, camera->R_CB);
+    plr_so3_orthonormalise(found->R_WB);
+    plr_se3_adjoint_inverse(A, camera->R_CB, camera->t_CB);
+    plr_sandwich6(found->P_xi, A, at->P_C);
+}
+
+/* By the frame alone. False if fewer than three fifths agree. */
+static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+                      plr_found_pose *found) {
     double origin[3];
     plr_placing guess, at;
-    found->count = collect(f, frame, n, seen, origin);
+    found->count = collect(f, frame, n, false, seen_in(f), origin);
     if (found->count < PLR_PLACING_LEAST)
         return false;
     if (guesses)
         guess_placing(f, origin, &guess);
-    const unsigned agreeing = plr_place(f, seen, found->count, guesses ? &guess : NULL, &at);
+    const unsigned agreeing = plr_place(f, seen_in(f), found->count, guesses ? &guess : NULL, &at);
     if (agreeing == 0 || 5 * agreeing < 3 * found->count)
         return false;
-    for (unsigned i = 0; i < 3; i++)
-        offset_C[i] = camera->t_CB[i] - at.t[i];
-    plr_mat3_tvec(offset_W, at.R, offset_C);
-    for (unsigned i = 0; i < 3; i++)
-        found->p_WB[i] = origin[i] + (double)offset_W[i];
-    plr_mat3_mul_tn(found->R_WB, at.R, camera->R_CB);
-    plr_so3_orthonormalise(found->R_WB);
-    plr_se3_adjoint_inverse(A, camera->R_CB, camera->t_CB);
-    plr_sandwich6(found->P_xi, A, at.P_C);
+    set_found(f, &at, origin, found);
+    return true;
+}
+
+/* By the landmarks that have just come in, and by what is known of the pose. False if there are none, or if they
+ * do not agree. found->P_xi is zero. */
+static bool find_likeliest(plr_filter *f, const plr_frame *frame, unsigned n,
+                           plr_found_pose *found) {
+    double origin[3];
+    plr_real P[PLR_POSE_SQUARE];
+    plr_placing prior, at;
+    found->count = collect(f, frame, n, true, seen_in(f), origin);
+    if (found->count == 0)
+        return false;
+    guess_placing(f, origin, &prior);
+    plr_motion_pose_covariance(f, P);
+    plr_sandwich6(prior.P_C, f->par.Ad_CB, P);
+    if (!plr_place_by_prior(f, seen_in(f), found->count, &prior, &at))
+        return false;
+    memset(at.P_C, 0, sizeof at.P_C);
+    set_found(f, &at, origin, found);
     return true;
 }
 
@@ -150,12 +182,16 @@ static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known 
 }
 
 static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose *found) {
+    const bool again = f->consistency.relocated;
     plr_real P[PLR_POSE_SQUARE];
     memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
     memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = WIDER * found->P_xi[i];
     plr_filter_begin_anew(f, P);
+    if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
+        plr_filter_begin_prior_bias(f);
+    f->consistency.relocated = 1;
     plr_alignment_keep_world(f);
     take_up(f, frame, seen_in(f), found->count);
 }
@@ -165,8 +201,10 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n) {
     if (f->frames_off_the_map < OFF_FRAMES || !plr_match_asks_map(f))
         return false;
     f->frames_off_the_map = 0;
-    if (!find_pose(f, frame, n, false, &found))
+    if (!find_pose(f, frame, n, false, &found)) {
+        plr_consistency_doubt(f);
         return false;
+    }
     begin_at(f, frame, &found);
     return true;
 }
@@ -203,27 +241,32 @@ void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
             plr_slots_remove(f, slot);
 }
 
-/* True if enough known landmarks in sight are rough: by the pose if they have just come in, else by the
- * motion since the last frame. */
-static bool is_seen_roughly(const plr_filter *f, unsigned n) {
+/* How many known landmarks in sight are rough: by the pose if they have just come in (`new_ones`), else by
+ * the motion since the last frame. */
+static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones) {
     plr_real P_xi[PLR_POSE_SQUARE], motion[PLR_POSE_SQUARE];
     unsigned rough = 0;
+    *new_ones = 0;
     plr_motion_pose_covariance(f, P_xi);
     plr_motion_covariance_by_state(f, motion);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         motion[i] += f->motion.Q[i];
     for (unsigned k = 0; k < n; k++) {
         const uint16_t slot = f->work.slot_of[k];
-        rough += slot != PLR_NO_SLOT &&
-                 slot_is_rough(f, f->slots[slot].times_seen == 0 ? P_xi : motion, slot);
+        if (slot == PLR_NO_SLOT || !f->slots[slot].known)
+            continue;
+        const bool is_new = has_just_come_in(f, slot);
+        const bool is = slot_is_rough(f, is_new ? P_xi : motion, slot);
+        rough += is;
+        *new_ones += is && is_new;
     }
-    return rough >= PLR_PLACING_LEAST;
+    return rough;
 }
 
-/* They come in again. */
-static void drop_known(plr_filter *f) {
+/* They come in again: all known landmarks, or those that have just come in. */
+static void drop_known(plr_filter *f, bool new_ones_alone) {
     for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
-        if (is_in_map(f, slot))
+        if ((!new_ones_alone || has_just_come_in(f, slot)) && is_in_map(f, slot))
             plr_slots_remove(f, slot);
 }
 
@@ -235,17 +278,24 @@ typedef struct plr_pose_gap {
     plr_real least, largest;     /* of the ratios of P's variances to P_found's */
 } plr_pose_gap;
 
+static void compare(const plr_real P[PLR_POSE_SQUARE], const plr_real P_found[PLR_POSE_SQUARE],
+                    plr_pose_gap *gap) {
+    gap->least = TOO_WIDE;
+    gap->largest = 0;
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
+        if (P[i] < gap->least * P_found[i])
+            gap->least = P[i] / P_found[i];
+        if (P[i] > gap->largest * P_found[i] && P_found[i] > 0)
+            gap->largest = P[i] / P_found[i];
+    }
+}
+
 /* False if P + P_found cannot be factorised. */
 static bool measure_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap) {
     plr_real P[PLR_POSE_SQUARE], sum[PLR_POSE_SQUARE], y[PLR_POSE_DIM],
         U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
     plr_motion_pose_covariance(f, P);
-    gap->least = gap->largest = P[0] / found->P_xi[0];
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
-        const plr_real ratio = P[i] / found->P_xi[i];
-        gap->least = ratio < gap->least ? ratio : gap->least;
-        gap->largest = ratio > gap->largest ? ratio : gap->largest;
-    }
+    compare(P, found->P_xi, gap);
     plr_sensitivity_add_to_pose(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         sum[i] = P[i] + found->P_xi[i];
@@ -286,22 +336,46 @@ static void replace_pose(plr_filter *f, const plr_found_pose *found) {
     plr_covariance_add(f, PLR_BLOCK_POSE, P);
 }
 
+/* Tells what has been found out about the pose by which the landmarks come in. */
+static plr_relocation conclude(plr_filter *f, const plr_pose_gap *gap) {
+    if (!(plr_norm2_of_6(gap->nu) > FAR_ABOVE))
+        return PLR_MOVED;
+    f->totals.widened++;
+    plr_consistency_cover(f, gap->xi, gap->nu, PLR_POSE_DIM);
+    return PLR_MOVED_FAR;
+}
+
+/* Where the frame tells more of the pose than was known. */
+static bool is_told_by_frame(plr_filter *f, const plr_frame *frame, unsigned n,
+                             plr_found_pose *found, plr_pose_gap *gap) {
+    return find_pose(f, frame, n, true, found) && measure_gap(f, found, gap) &&
+           !(gap->least < WIDE_ENOUGH);
+}
+
 plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_found_pose found;
     plr_pose_gap gap;
-    if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f) || !is_seen_roughly(f, n) ||
-        !find_pose(f, frame, n, true, &found) || !measure_gap(f, &found, &gap) ||
-        gap.least < WIDE_ENOUGH)
+    unsigned new_ones;
+    if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f))
         return PLR_PLACED;
-    drop_known(f);
+    const unsigned rough = count_rough(f, n, &new_ones);
+    if (rough >= PLR_PLACING_LEAST && is_told_by_frame(f, frame, n, &found, &gap)) {
+        drop_known(f, false);
+        plr_predict_apply_prior(f);
+        if (gap.largest > TOO_WIDE)
+            replace_pose(f, &found);
+        else
+            move_to(f, &found, &gap);
+        return conclude(f, &gap);
+    }
+    if (new_ones == 0)
+        return PLR_PLACED;
+    if (!find_likeliest(f, frame, n, &found) || !measure_gap(f, &found, &gap)) {
+        plr_consistency_doubt(f); /* they come in where they are not linear */
+        return PLR_PLACED;
+    }
+    drop_known(f, true);
     plr_predict_apply_prior(f);
-    if (gap.largest > TOO_WIDE)
-        replace_pose(f, &found);
-    else
-        move_to(f, &found, &gap);
-    if (!(plr_norm2_of_6(gap.nu) > FAR_ABOVE))
-        return PLR_MOVED;
-    f->totals.widened++;
-    plr_consistency_cover(f, gap.xi, gap.nu, PLR_POSE_DIM);
-    return PLR_MOVED_FAR;
+    move_to(f, &found, &gap);
+    return conclude(f, &gap);
 }

@@ -19,7 +19,10 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced);
 /* Where the pose is lost: after each ten frames of plr_relocate_watch. If the known landmarks of this frame tell
  * a pose, and at least four of them and three fifths of those in sight agree on it, begins anew at that
  * pose with these landmarks and returns true; the others come in with the next frame. The pose's sigmas are
- * ten times those that the frame tells, until the update with this frame. Works in work.Vt. */
+ * ten times those that the frame tells, until the update with this frame. If it comes to that again before
+ * the pose is out of doubt, an IMU's biases begin at their prior, too. (Twists that are wrong would teach
+ * theirs.) If no pose is found, the present one is
+ * doubted. Works in work.Vt. */
 bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n);
 
 typedef enum plr_relocation {
@@ -28,11 +31,12 @@ typedef enum plr_relocation {
     PLR_MOVED_FAR /* the same, and the pose was further off than its covariance says */
 } plr_relocation;
 
-/* Where the pose is uncertain: four known landmarks in sight have come in at a pose, or been moved by a motion, so
+/* Where the pose is uncertain: known landmarks in sight have come in at a pose, or been moved by a motion, so
  * uncertain that what is seen of them is not linear in its error. The estimate moves to the pose that the
- * frame tells, so that they are linearised there. P is not reduced by it, and the frame is used as any
- * other. Only where the frame tells more about each axis of the pose than was known. If the pose was too far
- * off, both poses are covered (plr_consistency_cover). Works in work.Vt. */
+ * frame tells, so that they are linearised there: if four tell more about each axis of the pose than was
+ * known, by the frame alone, else by those that have just come in and what was known. P is not reduced by
+ * it, and the frame is used as any other. If the pose was too far off, both poses are covered
+ * (plr_consistency_cover). Works in work.Vt. */
 plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n);
 
 /* The pose's covariance has been enlarged by C. What known landmarks say about the pose has been used already, so

@@ -193,6 +193,15 @@ static void test_a_start_that_is_as_uncertain_as_it_says(void) {
     check_rough_start(0.5); /* more than float32 can join with what the frame says */
 }
 
+/* Too few to tell the pose by themselves: they and what is known of it do. */
+static void test_also_where_three_or_one_are_in_sight(void) {
+    rig.options.most_seen = 3;
+    check_rough_start(0.1);
+    check_rough_start(0.3);
+    rig.options.most_seen = 1;
+    check_rough_start(0.2);
+}
+
 /* Within five sigmas along each axis. */
 static void demand_covered(void) {
     double e[6], P[36];

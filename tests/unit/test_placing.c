@@ -185,3 +185,69 @@ static void test_distant_points_tell_nothing(void) {
     }
     TEST_ASSERT_EQUAL_UINT(0, plr_place(&f, seen, 20, NULL, &placing));
 }
+
+/* What the likeliest pose has least of: squared residuals of the points, and of the prior. In double. */
+static double cost_of(const double T[16], unsigned count, const double T_prior[16],
+                      const double sigma[6]) {
+    double back[16], gap[16], xi[6], sum = 0;
+    rigid_inverse(back, T);
+    square_multiply(4, T_prior, back, gap);
+    rigid_log(xi, gap);
+    for (unsigned k = 0; k < 6; k++)
+        sum += pow(xi[k] / sigma[k], 2);
+    for (unsigned i = 0; i < count; i++) {
+        const double w[3] = {(double)seen[i].w[0], (double)seen[i].w[1], (double)seen[i].w[2]};
+        double q[3];
+        rigid_apply(q, T, w);
+        const double z[3] = {400 * q[0] / q[2] + 320, 400 * (q[0] - 0.2) / q[2] + 320,
+                             400 * q[1] / q[2] + 240};
+        for (unsigned row = 0; row < 3; row++)
+            sum += pow((double)seen[i].z[row] - z[row], 2) * (row == 2 ? 2 : 1);
+    }
+    return sum;
+}
+
+/* One to three points, exact in the map, and a prior of 0.3 m and 0.1 rad: no pose near the one that was found
+ * is likelier. */
+static void test_few_points_and_a_prior_give_the_likeliest_pose(void) {
+    static const double sigma[6] = {0.3, 0.3, 0.3, 0.1, 0.1, 0.1};
+    unsigned disagreeing = 0;
+    for (unsigned run = 0; run < RUNS; run++) {
+        const unsigned count = 1 + run % 3;
+        double xi[6], off[16], T_prior[16], T[16] = {0};
+        plr_placing prior = {.R = {0}}, placing;
+        see_anywhere(count, 0, 1);
+        for (unsigned k = 0; k < 6; k++) {
+            xi[k] = sigma[k] * rng_normal(&chance);
+            prior.P_C[7 * k] = (plr_real)(sigma[k] * sigma[k]);
+        }
+        rigid_exp(off, xi);
+        square_multiply(4, off, M, T_prior);
+        for (unsigned i = 0; i < 3; i++) {
+            for (unsigned j = 0; j < 3; j++)
+                prior.R[3 * i + j] = (plr_real)T_prior[4 * i + j];
+            prior.t[i] = (plr_real)T_prior[4 * i + 3];
+        }
+        if (!plr_place_by_prior(&f, seen, count, &prior, &placing)) {
+            disagreeing++;
+            continue;
+        }
+        for (unsigned i = 0; i < 3; i++) {
+            for (unsigned j = 0; j < 3; j++)
+                T[4 * i + j] = (double)placing.R[3 * i + j];
+            T[4 * i + 3] = (double)placing.t[i];
+        }
+        T[15] = 1;
+        const double least = cost_of(T, count, T_prior, sigma);
+        TEST_ASSERT_LESS_THAN_DOUBLE(cost_of(M, count, T_prior, sigma) + 0.05, least);
+        for (unsigned k = 0; k < 6; k++)
+            for (int sign = -1; sign < 2; sign += 2) {
+                double step[6] = {0}, D[16], beside[16];
+                step[k] = sign * 0.3 * sigma[k];
+                rigid_exp(D, step);
+                square_multiply(4, D, T, beside);
+                TEST_ASSERT_LESS_THAN_DOUBLE(cost_of(beside, count, T_prior, sigma) + 0.05, least);
+            }
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(RUNS / 20, disagreeing);
+}
