@@ -292,14 +292,17 @@ unsigned plr_place(const plr_filter *f, plr_seen_known *seen, unsigned count,
     return most;
 }
 
-bool plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
-                        const plr_placing *prior, plr_placing *placing) {
+unsigned plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
+                            const plr_placing *prior, plr_placing *placing) {
     plr_sights s = {.f = f, .seen = seen, .count = count, .prior = prior};
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
     plr_upper6_pack(U, prior->P_C);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
-        return false;
+        return 0;
     invert(U, s.information);
     *placing = *prior;
-    return place_by_guess(&s, placing) == count;
+    const unsigned agreeing = place_by_guess(&s, placing);
+    if (agreeing == 0 || agreeing == count)
+        return agreeing;
+    return improve(&s, placing) ? mark_agreeing(&s, placing) : 0; /* without the others */
 }

@@ -39,8 +39,8 @@ unsigned plr_place(const plr_filter *f, plr_seen_known *seen, unsigned count,
                    const plr_placing *guess, plr_placing *placing);
 
 /* The pose that is likeliest by the points and by `prior`, a pose with its covariance P_C: for any number of
- * points. False if one of them does not agree with it. placing->P_C is not filled. */
-bool plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
-                        const plr_placing *prior, plr_placing *placing);
+ * points, of which those that agree with it are marked. Returns how many. placing->P_C is not filled. */
+unsigned plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
+                            const plr_placing *prior, plr_placing *placing);
 
 #endif

@@ -146,8 +146,8 @@ static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool gu
     return true;
 }
 
-/* By the landmarks that have just come in, and by what is known of the pose. False if there are none, or if they
- * do not agree. found->P_xi is zero. */
+/* By the landmarks that have just come in, and by what is known of the pose. False if there are none, or if
+ * fewer than three fifths agree. found->P_xi is zero. */
 static bool find_likeliest(plr_filter *f, const plr_frame *frame, unsigned n,
                            plr_found_pose *found) {
     double origin[3];
@@ -159,7 +159,8 @@ static bool find_likeliest(plr_filter *f, const plr_frame *frame, unsigned n,
     guess_placing(f, origin, &prior);
     plr_motion_pose_covariance(f, P);
     plr_sandwich6(prior.P_C, f->par.Ad_CB, P);
-    if (!plr_place_by_prior(f, seen_in(f), found->count, &prior, &at))
+    const unsigned agreeing = plr_place_by_prior(f, seen_in(f), found->count, &prior, &at);
+    if (5 * agreeing < 3 * found->count)
         return false;
     memset(at.P_C, 0, sizeof at.P_C);
     set_found(f, &at, origin, found);
@@ -370,11 +371,12 @@ plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame
     }
     if (new_ones == 0)
         return PLR_PLACED;
-    if (!find_likeliest(f, frame, n, &found) || !measure_gap(f, &found, &gap)) {
-        plr_consistency_doubt(f); /* they come in where they are not linear */
-        return PLR_PLACED;
-    }
+    const bool tells = find_likeliest(f, frame, n, &found) && measure_gap(f, &found, &gap);
     drop_known(f, true);
+    if (!tells) {
+        plr_consistency_doubt(f);
+        return PLR_LEFT_OUT;
+    }
     plr_predict_apply_prior(f);
     move_to(f, &found, &gap);
     return conclude(f, &gap);

@@ -26,15 +26,17 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced);
 bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n);
 
 typedef enum plr_relocation {
-    PLR_PLACED,   /* nothing was changed */
-    PLR_MOVED,    /* known landmarks have been dropped, and are to come in again */
-    PLR_MOVED_FAR /* the same, and the pose was further off than its covariance says */
+    PLR_PLACED,    /* nothing was changed */
+    PLR_MOVED,     /* known landmarks have been dropped, and are to come in again */
+    PLR_MOVED_FAR, /* the same, and the pose was further off than its covariance says */
+    PLR_LEFT_OUT /* those that had just come in have been dropped: no pose fits them. It is in doubt */
 } plr_relocation;
 
 /* Where the pose is uncertain: known landmarks in sight have come in at a pose, or been moved by a motion, so
  * uncertain that what is seen of them is not linear in its error. The estimate moves to the pose that the
  * frame tells, so that they are linearised there: if four tell more about each axis of the pose than was
- * known, by the frame alone, else by those that have just come in and what was known. P is not reduced by
+ * known, by the frame alone, else by those that have just come in and what was known (if no pose fits, they are
+ * left out of this frame). P is not reduced by
  * it, and the frame is used as any other. If the pose was too far off, both poses are covered
  * (plr_consistency_cover). Works in work.Vt. */
 plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n);

@@ -208,7 +208,7 @@ static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
     report->created = report->no_room = 0; /* they come in again */
     events->unplaced = 0;
     plr_match_slots(f, seen, n);
-    if (!f->diverged)
+    if (!f->diverged && found != PLR_LEFT_OUT)
         plr_match_known(f, seen, n, events, report);
     events->map_disagrees = found == PLR_MOVED_FAR;
     events->adopted = 0; /* the pose has been held against the map already */

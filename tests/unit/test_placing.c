@@ -228,7 +228,7 @@ static void test_few_points_and_a_prior_give_the_likeliest_pose(void) {
                 prior.R[3 * i + j] = (plr_real)T_prior[4 * i + j];
             prior.t[i] = (plr_real)T_prior[4 * i + 3];
         }
-        if (!plr_place_by_prior(&f, seen, count, &prior, &placing)) {
+        if (plr_place_by_prior(&f, seen, count, &prior, &placing) < count) {
             disagreeing++;
             continue;
         }
