@@ -44,8 +44,9 @@ HANDLERS = (
     r"save|compare_counts",
 )
 FILTER = (
-    r"plr_(filter|predict|correct|consistency|gate|motion|slots|births|match|landmarks)\w*|process"
-    r"|gate_each|initialise_new|append_new|adopt_known"
+    r"plr_(filter|predict|correct|consistency|gate|motion|slots|births|match|landmarks|relocate)\w*"
+    r"|process|gate_each|initialise_new|append_new|take_up\w*|is_in_map|begin_at|collect|drop_known"
+    r"|find_(pose|likeliest)"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"(gain|position|id)_before",)),
@@ -57,7 +58,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (SESSION, (*PORT, TELEMETRY)),
     (r"plr_input_handle", HANDLERS),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
-    (r"plr_correct", (r"(body|world)_retract",)),
+    (r"plr_correct|plr_correct_towards|move_estimate", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
     (r"bias_is_off|find_reasons|prior_of_drivers|restore_bias_prior", BIAS_WALK),
