@@ -2,6 +2,7 @@
 #include "filter/births.h"
 
 #include "filter/gate.h"
+#include "filter/matching.h"
 #include "filter/predict.h"
 #include "filter/tracks.h"
 #include "sensor/stereo.h"
@@ -30,8 +31,14 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
     const bool makes = plr_births_are_allowed(f) && !is_at_a_loss(f, events);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
+        plr_landmark known;
         if (f->work.slot_of[k] != PLR_NO_SLOT)
             continue;
+        if (makes && events->left_out && plr_match_asks_map(f) &&
+            plr_match_ask_map(f, o->id, &known)) {
+            report->poor++; /* it keeps its place in the map, and is asked for again */
+            continue;
+        }
         if (!makes || !plr_stereo_makes_landmark(f, o)) {
             report->poor++;
             continue;

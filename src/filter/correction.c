@@ -284,10 +284,8 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
 
 void plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]) {
     const unsigned n = plr_covariance_dim(f);
-    if (!plr_covariance_shift(f, xi, f->work.dx)) {
-        plr_filter_diverge(f);
+    if (!plr_covariance_shift(f, xi, f->work.dx))
         return;
-    }
     memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     (void)move_estimate(f, n);
 }

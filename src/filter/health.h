@@ -13,6 +13,7 @@ typedef struct plr_frame_events {
     bool locked;
     bool recovered;
     bool relocated;
+    bool left_out; /* known landmarks in sight have not come in; they must not be born as others */
     bool map_disagrees; /* filter/map_check.h */
     unsigned adopted;   /* known landmarks that have come in */
     unsigned

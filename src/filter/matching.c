@@ -3,7 +3,6 @@
 
 #include "filter/filter_internal.h"
 #include "math/order.h"
-#include "process/alignment.h"
 #include "state/model.h"
 #include "state/slots.h"
 
@@ -113,6 +112,5 @@ void plr_match_known(plr_filter *f, const plr_observation *seen, unsigned n,
     events->adopted = report->created - before;
     if (events->adopted == 0)
         return;
-    plr_alignment_keep_world(f);
     plr_match_slots(f, seen, n);
 }

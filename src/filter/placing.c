@@ -86,14 +86,12 @@ static unsigned mark_agreeing(const plr_sights *s, const plr_placing *at) {
 
 /* ---------------------------------------------------------------- the pose */
 
-/* Adds the points that agree. False if one would come too near. */
-static bool add_points(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
+/* Adds the points that agree and would be seen. */
+static void add_points(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
     for (unsigned i = 0; i < s->count; i++) {
         plr_real e[3], J[PLR_ROWS * PLR_POSE_DIM];
-        if (!s->seen[i].agrees)
+        if (!s->seen[i].agrees || !look(s, &s->seen[i], at, e, J))
             continue;
-        if (!look(s, &s->seen[i], at, e, J))
-            return false;
         for (unsigned row = 0; row < PLR_ROWS; row++) {
             const plr_real *of_row = J + PLR_POSE_DIM * row;
             plr_upper6_add(normal->U, of_row, of_row);
@@ -101,7 +99,6 @@ static bool add_points(const plr_sights *s, const plr_placing *at, plr_normal *n
                 normal->b[k] = PLR_FMA(of_row[k], e[row], normal->b[k]);
         }
     }
-    return true;
 }
 
 /* Adds what is known besides: a pose, with the inverse of its covariance. */
@@ -121,11 +118,10 @@ static void add_prior(const plr_sights *s, const plr_placing *at, plr_normal *no
 }
 
 /* The equations of the points that agree, and of the prior if there is one, factorised. False if they do
- * not determine the pose, or if a point would come too near. */
+ * not determine the pose. */
 static bool fill_equations(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
     memset(normal, 0, sizeof *normal);
-    if (!add_points(s, at, normal))
-        return false;
+    add_points(s, at, normal);
     if (s->prior)
         add_prior(s, at, normal);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
@@ -292,11 +288,23 @@ unsigned plr_place(const plr_filter *f, plr_seen_known *seen, unsigned count,
     return most;
 }
 
+/* A pose of which one axis is known far better than another would not be positive in float32. */
+static void keep_regular(const plr_real P[PLR_POSE_SQUARE], plr_real U[PLR_POSE_TRIANGLE]) {
+    for (unsigned half = 0; half < PLR_POSE_DIM; half += 3) {
+        plr_real trace = 0;
+        for (unsigned k = half; k < half + 3; k++)
+            trace += P[(PLR_POSE_DIM + 1) * k];
+        for (unsigned k = half; k < half + 3; k++)
+            U[plr_upper_row(PLR_POSE_DIM, k)] += PLR_FMA(SMALL_SHARE, trace, TINY);
+    }
+}
+
 unsigned plr_place_by_prior(const plr_filter *f, plr_seen_known *seen, unsigned count,
                             const plr_placing *prior, plr_placing *placing) {
     plr_sights s = {.f = f, .seen = seen, .count = count, .prior = prior};
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
     plr_upper6_pack(U, prior->P_C);
+    keep_regular(prior->P_C, U);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return 0;
     invert(U, s.information);

@@ -259,7 +259,7 @@ static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones)
         const bool is_new = has_just_come_in(f, slot);
         const bool is = slot_is_rough(f, is_new ? P_xi : motion, slot);
         rough += is;
-        *new_ones += is && is_new;
+        *new_ones += is && is_new && is_in_map(f, slot);
     }
     return rough;
 }
@@ -324,26 +324,41 @@ static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_g
     }
 }
 
-/* The pose that was found, with ten of the frame's sigmas. Velocity, biases and landmarks keep what they
- * know, but not what they have in common with the pose. */
-static void replace_pose(plr_filter *f, const plr_found_pose *found) {
+/* The pose that was found, with the covariance P. Velocity, biases and landmarks keep what they know, but not
+ * what they have in common with the pose. */
+static void replace_pose(plr_filter *f, const plr_found_pose *found,
+                         const plr_real P[PLR_POSE_SQUARE]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
-    plr_real P[PLR_POSE_SQUARE];
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
-        P[i] = WIDER * found->P_xi[i];
     memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
     memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
     plr_covariance_forget(f, PLR_BLOCK_POSE, none);
     plr_covariance_add(f, PLR_BLOCK_POSE, P);
 }
 
-/* Tells what has been found out about the pose by which the landmarks come in. */
-static plr_relocation conclude(plr_filter *f, const plr_pose_gap *gap) {
-    if (!(plr_norm2_of_6(gap->nu) > FAR_ABOVE))
+static bool is_far(const plr_pose_gap *gap) {
+    return plr_norm2_of_6(gap->nu) > FAR_ABOVE;
+}
+
+/* Moves to the pose that was found, by which the landmarks come in. If it is too far, what was believed of the
+ * pose was wrong, and tells nothing of biases and velocity. P_wide: of a pose that replaces the present one. */
+static plr_relocation go_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap,
+                            bool replaces, const plr_real P_wide[PLR_POSE_SQUARE]) {
+    if (replaces || is_far(gap))
+        replace_pose(f, found, P_wide);
+    else
+        move_to(f, found, gap);
+    if (!is_far(gap))
         return PLR_MOVED;
     f->totals.widened++;
     plr_consistency_cover(f, gap->xi, gap->nu, PLR_POSE_DIM);
     return PLR_MOVED_FAR;
+}
+
+/* False of a pose that is known exactly along an axis: there is no moving it. */
+static bool is_regular(const plr_real P[PLR_POSE_SQUARE]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
+    plr_upper6_pack(U, P);
+    return plr_cholesky_upper(PLR_POSE_DIM, U);
 }
 
 /* Where the frame tells more of the pose than was known. */
@@ -356,20 +371,20 @@ static bool is_told_by_frame(plr_filter *f, const plr_frame *frame, unsigned n,
 plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_found_pose found;
     plr_pose_gap gap;
+    plr_real P[PLR_POSE_SQUARE];
     unsigned new_ones;
     if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f))
         return PLR_PLACED;
     const unsigned rough = count_rough(f, n, &new_ones);
     if (rough >= PLR_PLACING_LEAST && is_told_by_frame(f, frame, n, &found, &gap)) {
+        for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+            P[i] = WIDER * found.P_xi[i];
         drop_known(f, false);
         plr_predict_apply_prior(f);
-        if (gap.largest > TOO_WIDE)
-            replace_pose(f, &found);
-        else
-            move_to(f, &found, &gap);
-        return conclude(f, &gap);
+        return go_to(f, &found, &gap, gap.largest > TOO_WIDE, P);
     }
-    if (new_ones == 0)
+    plr_motion_pose_covariance(f, P);
+    if (new_ones == 0 || !is_regular(P))
         return PLR_PLACED;
     const bool tells = find_likeliest(f, frame, n, &found) && measure_gap(f, &found, &gap);
     drop_known(f, true);
@@ -378,6 +393,5 @@ plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame
         return PLR_LEFT_OUT;
     }
     plr_predict_apply_prior(f);
-    move_to(f, &found, &gap);
-    return conclude(f, &gap);
+    return go_to(f, &found, &gap, false, P);
 }

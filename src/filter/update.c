@@ -26,6 +26,7 @@
 #include "filter/votes.h"
 #include "math/order.h"
 #include "math/small.h"
+#include "process/alignment.h"
 #include "process/process.h"
 #include "process/velocity.h"
 #include "sensor/sensor.h"
@@ -195,21 +196,29 @@ static void let_tracks_drift(plr_filter *f) {
 static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
                           plr_frame_events *events, plr_report *report) {
     const plr_observation *seen = frame->observations;
-    events->relocated = plr_relocate_when_lost(f, frame, n);
+    events->relocated = events->left_out = plr_relocate_when_lost(f, frame, n);
     if (events->relocated) {
         report->created = (uint16_t)f->count;
         plr_match_slots(f, seen, n);
         return;
     }
     plr_match_known(f, seen, n, events, report);
+    events->left_out = events->unplaced > 0;
+    const unsigned came_in = events->adopted;
     const plr_relocation found = plr_relocate_when_uncertain(f, frame, n);
+    if (came_in > 0 && found != PLR_LEFT_OUT)
+        plr_alignment_keep_world(f);
     if (found == PLR_PLACED)
         return;
     report->created = report->no_room = 0; /* they come in again */
     events->unplaced = 0;
     plr_match_slots(f, seen, n);
-    if (!f->diverged && found != PLR_LEFT_OUT)
+    if (found == PLR_LEFT_OUT) {
+        events->left_out = true;
+        events->unplaced = came_in;
+    } else if (!f->diverged) {
         plr_match_known(f, seen, n, events, report);
+    }
     events->map_disagrees = found == PLR_MOVED_FAR;
     events->adopted = 0; /* the pose has been held against the map already */
 }
