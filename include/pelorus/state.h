@@ -326,10 +326,9 @@ typedef struct plr_kept_measurements {
 
 /* By how much a known map that has come in sight moves the pose: src/filter/map_check.h. */
 typedef struct plr_map_check {
-    plr_real
-        moved[PLR_POSE_DIM]; /* sum of the corrections since then, m and rad, in the world's axes */
-    plr_real V[PLR_POSE_SQUARE]; /* its covariance, if all is as stated; 6x6 */
-    uint8_t frames;              /* of attention that are left */
+    plr_real moved[PLR_POSE_DIM]; /* sum of the corrections, m and rad, in the world's axes */
+    plr_real V[PLR_POSE_SQUARE];  /* its covariance, if all is as stated; 6x6 */
+    uint8_t frames;               /* that are still to be summed up */
 } plr_map_check;
 
 /* Workspace of one call; its contents are not used by later calls. */

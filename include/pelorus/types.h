@@ -104,8 +104,8 @@ typedef enum plr_reason {
      * (velocity-sigma, gyro-sigma; with an IMU gyro-noise, accel-noise). Or the clocks of camera and
      * odometry differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
-    /* After GATE_LOCKED, TWIST_CONTRADICTED, RECOVERED, RELOCATED or MAP_DISAGREES: the pose may be wrong by more than its covariance
-     * says. Ends when twists, or the IMU, have agreed with vision for a while, or when the pose is
+    /* After GATE_LOCKED, TWIST_CONTRADICTED, RECOVERED, RELOCATED or MAP_DISAGREES: the pose may be
+     * wrong by more than its covariance says. Ends when twists, or the IMU, have agreed with vision for a while, or when the pose is
      * set. Also for two seconds after an IMU's start in motion (setting imu-start). Drive with care
      * until then. */
     PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,

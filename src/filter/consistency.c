@@ -189,6 +189,13 @@ static void propagate_difference(plr_filter *f, const plr_applied_motion *applie
     plr_mat6_vec(f->consistency.difference, A, d);
 }
 
+/* Of a difference that is added to d: nu in sigmas, and the expected square of nu if it is only noise. */
+static void add_sigmas(plr_filter *f, const plr_real nu[PLR_POSE_DIM], plr_real noise) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        f->consistency.difference_sigmas[k] += nu[k];
+    f->consistency.difference_noise += noise;
+}
+
 /* d <- d + n, or + what the frame moved the pose by beside the twists, if that is more: points that
  * move along carry landmarks and pose further than a frame's own n says. Translation and rotation
  * each by itself. nu is n in the twists' own sigmas, and `noise` the expected square of nu if it is
@@ -204,9 +211,7 @@ static void add_difference(plr_filter *f, const plr_real n[PLR_POSE_DIM],
         for (unsigned k = 0; k < 3; k++)
             f->consistency.difference[half + k] += more[k];
     }
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        f->consistency.difference_sigmas[k] += nu[k];
-    f->consistency.difference_noise += noise;
+    add_sigmas(f, nu, noise);
 }
 
 /* v = L^-1 n */
@@ -394,11 +399,9 @@ void plr_consistency_trust_twists(plr_filter *f) {
 
 void plr_consistency_cover(plr_filter *f, const plr_real n[PLR_POSE_DIM],
                            const plr_real nu[PLR_POSE_DIM], plr_real noise) {
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         f->consistency.difference[k] += n[k];
-        f->consistency.difference_sigmas[k] += nu[k];
-    }
-    f->consistency.difference_noise += noise;
+    add_sigmas(f, nu, noise);
     plr_consistency_doubt(f);
 }
 

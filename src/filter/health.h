@@ -16,8 +16,7 @@ typedef struct plr_frame_events {
     bool left_out; /* known landmarks in sight have not come in; they must not be born as others */
     bool map_disagrees; /* filter/map_check.h */
     unsigned adopted;   /* known landmarks that have come in */
-    unsigned
-        unplaced; /* known landmarks in sight that the model cannot place at the predicted pose */
+    unsigned unplaced;  /* known landmarks in sight that could not come in at the predicted pose */
     unsigned cut;
 } plr_frame_events;
 

@@ -52,7 +52,7 @@ static bool twists_are_off(const plr_filter *f) {
 
 bool plr_map_check_begin(plr_filter *f, unsigned adopted, unsigned n, plr_map_check_pose *before) {
     unsigned known = 0;
-    if (f->config.model != PLR_MODEL_BODY)
+    if (f->config.model != PLR_MODEL_BODY || (adopted == 0 && f->map_check.frames == 0))
         return false;
     for (unsigned k = 0; k < n; k++)
         known += f->work.slot_of[k] != PLR_NO_SLOT && f->slots[f->work.slot_of[k]].known;

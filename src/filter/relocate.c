@@ -45,6 +45,8 @@ enum { STEPS = 3 };
 
 void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
+    if (!plr_match_asks_map(f))
+        return;
     for (unsigned k = 0; k < n; k++) {
         const uint16_t slot = f->work.slot_of[k];
         if (slot == PLR_NO_SLOT || !f->slots[slot].known)
@@ -52,7 +54,7 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
         seen++;
         off += f->work.gain[slot] < 0;
     }
-    if (seen < 2 || !plr_match_asks_map(f))
+    if (seen < 2)
         return; /* says nothing */
     if (5 * off < 4 * seen)
         f->frames_off_the_map = 0;

@@ -79,3 +79,26 @@ void plr_so3_orthonormalise(plr_real R[9]) {
     plr_mat3_mul(result, R, half);
     memcpy(R, result, sizeof result);
 }
+
+/* The angle from tan(t / 2) = sin t / (1 + cos t), roughly, and then by Newton's steps, which stay on the axis. */
+void plr_so3_log(plr_real theta[3], const plr_real R[9]) {
+    plr_turn_of(theta, R);
+    const plr_real sine = PLR_SQRT(plr_dot3(theta, theta));
+    const plr_real cosine = PLR_R(0.5) * (R[0] + R[4] + R[8] - PLR_R(1));
+    const plr_real tangent = sine / (PLR_R(1) + cosine + PLR_R(1e-3));
+    const plr_real small = tangent < 1 ? tangent : PLR_R(1) / tangent;
+    const plr_real arc = small * (PLR_R(0.7854) + PLR_R(0.273) * (PLR_R(1) - small));
+    const plr_real angle = PLR_R(2) * (tangent < 1 ? arc : PLR_R(1.5708) - arc);
+    if (!(sine > PLR_R(1e-6)))
+        return; /* small, or half a turn about an axis that the sines do not tell */
+    for (unsigned i = 0; i < 3; i++)
+        theta[i] *= angle / sine;
+    for (unsigned step = 0; step < 3; step++) {
+        plr_real back[9], left[9], rest[3];
+        plr_so3_exp(back, theta);
+        plr_mat3_mul_tn(left, back, R);
+        plr_turn_of(rest, left);
+        for (unsigned i = 0; i < 3; i++)
+            theta[i] += rest[i];
+    }
+}

@@ -57,10 +57,9 @@ void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, 
 
 bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_real *g) {
     const unsigned n = plr_covariance_dim(f);
-    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], y[PLR_POSE_DIM];
-    for (unsigned r = 0, at = 0; r < PLR_POSE_DIM; r++)
-        for (unsigned c = r; c < PLR_POSE_DIM; c++, at++)
-            U[at] = f->P[plr_packed_at(r, c)];
+    plr_real P[PLR_POSE_SQUARE], U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], y[PLR_POSE_DIM];
+    plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
+    plr_upper6_pack(U, P);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return false;
     memcpy(y, xi, sizeof y);

@@ -196,3 +196,17 @@ static void test_a_million_steps_stay_a_rotation(void) {
     }
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(8 * eps, distance_to_orthonormal(R));
 }
+
+/* Back to the vector, up to 3 rad: there 1 + cos t has lost two digits. */
+static void test_the_logarithm_undoes_the_exponential(void) {
+    rng r = rng_seeded(29);
+    for (int i = 0; i < RUNS; i++) {
+        double twin[3];
+        plr_real theta[3], R[9], back[3];
+        random_theta(&r, 3.0 * i / RUNS, twin, theta);
+        plr_so3_exp(R, theta);
+        plr_so3_log(back, R);
+        for (int k = 0; k < 3; k++)
+            TEST_ASSERT_DOUBLE_WITHIN(200 * eps, twin[k], (double)back[k]);
+    }
+}

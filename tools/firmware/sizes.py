@@ -30,6 +30,8 @@ from firmware.stack import image_bound
 
 FRAME_OBSERVATIONS = 20
 BUSY_OBSERVATIONS = 60
+# Of the two drives. They fit into the flash of a board, beside the filter, with some KB to spare.
+SECONDS = {FRAME_OBSERVATIONS: "12", BUSY_OBSERVATIONS: "10.5"}
 SEED = "31"
 BENCH_S = 1800.0  # against hangs
 TOLERANCE = 0.03
@@ -49,10 +51,10 @@ class Process:
     core: int  # rows of the state before the landmarks
 
 
-# By their number in a HEADER. The drives fit into the flash of a board, beside the filter.
+# By their number in a HEADER.
 PROCESSES = {
-    0: Process("twist", ("--duration", "11.5"), "predict", 12),
-    1: Process("imu", ("--duration", "11.5", "--imu-rate", "200"), "reading", 15),
+    0: Process("twist", (), "predict", 12),
+    1: Process("imu", ("--imu-rate", "200"), "reading", 15),
 }
 
 
@@ -65,10 +67,11 @@ def write_recording(process: Process, target: Path) -> None:
     A file that holds them already is left alone: images are made of it.
     """
     parts = []
-    for observations in (FRAME_OBSERVATIONS, BUSY_OBSERVATIONS):
+    for observations, seconds in SECONDS.items():
         part = target.with_suffix(f".{observations}.plr")
         command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--seed", SEED]
-        command += ["--observations", str(2 * BUSY_OBSERVATIONS), *process.options]
+        command += ["--observations", str(2 * BUSY_OBSERVATIONS), "--duration", seconds]
+        command += process.options
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         messages = [frame.message for frame in read_file(part)[0]]
         with part.open("wb") as stream:
