@@ -105,9 +105,9 @@ typedef enum plr_reason {
      * odometry differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED, TWIST_CONTRADICTED, RECOVERED, RELOCATED or MAP_DISAGREES: the pose may be
-     * wrong by more than its covariance says. Ends when twists, or the IMU, have agreed with vision for a while, or when the pose is
-     * set. Also for two seconds after an IMU's start in motion (setting imu-start). Drive with care
-     * until then. */
+     * wrong by more than its covariance says. Ends when twists, or the IMU, have agreed with vision
+     * for a while, or when the pose is set. Also for two seconds after an IMU's start in motion
+     * (setting imu-start). Drive with care until then. */
     PLR_REASON_POSE_MAY_BE_WRONG = 1 << 13,
     /* A bias estimate lies further from its prior's mean than the prior allows: 4.2 sigma of the
      * difference that is to be expected of an estimate as certain as this one. With twists: stereo

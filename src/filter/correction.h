@@ -35,8 +35,9 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
                            unsigned count);
 
 /* T <- T Exp(xi), and everything else as it is expected to be if the pose is there: x <- x + g with
- * g = P_xp P_pp^-1 xi. P grows by g g^T, so that the estimate of before is one sigma away. Nothing happens if P_pp cannot be factorised. For a pose that
- * was found otherwise, where what is seen shall be linearised; no motion may be pending. */
+ * g = P_xp P_pp^-1 xi. P grows by g g^T, so that the estimate of before is one sigma away. Nothing
+ * happens if P_pp cannot be factorised. For a pose that was found otherwise, where what is seen shall
+ * be linearised; no motion may be pending. */
 void plr_correct_towards(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
 
 #endif

@@ -93,8 +93,8 @@ static void out_of_units(const plr_real *U, const plr_real x[PLR_POSE_DIM],
     }
 }
 
-/* Adds a frame's correction, and the variance that it should have: P before less P after. In the world's
- * axes, so that the body may turn meanwhile. */
+/* Adds a frame's correction, and the variance that it should have: P before less P after. In the
+ * world's axes, so that the body may turn meanwhile. */
 static void add_correction(plr_filter *f, const plr_map_check_pose *before,
                            plr_real after[PLR_POSE_SQUARE]) {
     plr_real moved[PLR_POSE_DIM], in_world[3], C[PLR_POSE_SQUARE];
@@ -111,8 +111,9 @@ static void add_correction(plr_filter *f, const plr_map_check_pose *before,
         f->map_check.V[i] += C[i];
 }
 
-/* The sum of the corrections in sigmas of the pose as it was when the map came in sight, v, and squared in
- * its own: the result. n: by how much the map would have moved it alone, m and rad in the body. */
+/* The sum of the corrections in sigmas of the pose as it was when the map came in sight, v, and
+ * squared in its own: the result. n: by how much the map would have moved it alone, m and rad in
+ * the body. */
 static plr_real judge(const plr_filter *f, const plr_real after[PLR_POSE_SQUARE],
                       plr_real v[PLR_POSE_DIM], plr_real n[PLR_POSE_DIM], plr_real *noise) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], V[PLR_POSE_TRIANGLE], C[PLR_POSE_SQUARE],

@@ -15,7 +15,8 @@ enum {
 
 /* An observation agrees with a pose below this: chi-square, 4 degrees of freedom, once in 2000. */
 #define AGREES_BELOW PLR_R(20)
-/* Three points fix a pose well enough to begin with if their disparities are two of their sigmas, and if the triangle is as high as a tenth of the longer of two of its sides. */
+/* Three points fix a pose well enough to begin with if their disparities are two of their
+ * sigmas, and if the triangle is as high as a tenth of the longer of two of its sides. */
 #define DISPARITY_SIGMAS PLR_R(2)
 #define LEAST_HEIGHT     PLR_R(0.1)
 /* Keeps the equations regular along what no point determines. */
@@ -38,8 +39,8 @@ typedef struct plr_normal {
 
 /* ---------------------------------------------------------------- one point */
 
-/* Whitened: e of the residual and, where J is not NULL, J of the prediction by the motion, 3x6. False if
- * the point would be too near, or behind. */
+/* Whitened: e of the residual and, where J is not NULL, J of the prediction by the motion, 3x6.
+ * False if the point would be too near, or behind. */
 static bool look(const plr_sights *s, const plr_seen_known *known, const plr_placing *at,
                  plr_real e[3], plr_real *J) {
     const plr_filter *f = s->f;
@@ -117,8 +118,8 @@ static void add_prior(const plr_sights *s, const plr_placing *at, plr_normal *no
     }
 }
 
-/* The equations of the points that agree, and of the prior if there is one, factorised. False if they do
- * not determine the pose. */
+/* The equations of the points that agree, and of the prior if there is one, factorised. False if
+ * they do not determine the pose. */
 static bool fill_equations(const plr_sights *s, const plr_placing *at, plr_normal *normal) {
     memset(normal, 0, sizeof *normal);
     add_points(s, at, normal);
@@ -153,8 +154,8 @@ static bool improve(const plr_sights *s, plr_placing *at) {
     return true;
 }
 
-/* Orthonormal axes of a triangle, as columns: along its first side, across it, and off its plane. False if it
- * is nearly a line. */
+/* Orthonormal axes of a triangle, as columns: along its first side, across it, and off its
+ * plane. False if it is nearly a line. */
 static bool axes_of(const plr_real a[3], const plr_real b[3], const plr_real c[3],
                     plr_real axes[9]) {
     plr_real ab[3], ac[3], x[3], y[3], z[3];
@@ -180,8 +181,8 @@ static bool axes_of(const plr_real a[3], const plr_real b[3], const plr_real c[3
     return true;
 }
 
-/* The pose from three points: the triangles laid upon each other, which depends on the depths, and from
- * there the best one in the pixels. */
+/* The pose from three points: the triangles laid upon each other, which depends on the depths,
+ * and from there the best one in the pixels. */
 static bool place_by_three(const plr_sights *s, const unsigned of[3], plr_placing *at) {
     plr_real q[3][3], Dq[9], in_camera[9], in_world[9], turned[3];
     for (unsigned k = 0; k < 3; k++)

@@ -24,20 +24,21 @@
 
 enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
 
-/* The pose's variance before the update, as a multiple of the one by which the frame tells the pose. The update
- * uses the frame again, because it makes the correlations between pose and landmarks, and the frame is
- * counted twice by a hundredth then. */
+/* The pose's variance before the update, as a multiple of the one by which the frame tells the
+ * pose. The update uses the frame again, because it makes the correlations between pose and
+ * landmarks, and the frame is counted twice by a hundredth then. */
 #define WIDER PLR_R(100)
 
 /* A step towards a pose is exact to first order, so it takes some. */
 enum { STEPS = 3 };
 /* Chi-square with 6 degrees of freedom: chance exceeds it once in 60,000. */
 #define FAR_ABOVE PLR_R(32)
-/* Known landmarks that come in again tell the pose a second time. That is allowed only where the frame alone
- * tells it better than all before: where each variance of the pose is at least this multiple of the frame's. */
+/* Known landmarks that come in again tell the pose a second time. That is allowed only where the
+ * frame alone tells it better than all before: where each variance of the pose is at least this
+ * multiple of the frame's. */
 #define WIDE_ENOUGH PLR_R(1)
-/* The largest such multiple at which pose and frame are joined in one matrix: beyond it the update would take
- * more digits off P than float32 has. */
+/* The largest such multiple at which pose and frame are joined in one matrix: beyond it the
+ * update would take more digits off P than float32 has. */
 #define TOO_WIDE PLR_R(1e4)
 
 /* So many landmarks fit into work.Vt. */
@@ -66,8 +67,8 @@ static bool has_just_come_in(const plr_filter *f, unsigned slot) {
     return f->slots[slot].known && f->slots[slot].times_seen == 0;
 }
 
-/* The known landmarks of the frame, or those that have just come in; those with the lowest ids first.
- * `origin`: where the first one lies, m. Returns how many. */
+/* The known landmarks of the frame, or those that have just come in; those with the lowest ids
+ * first. `origin`: where the first one lies, m. Returns how many. */
 static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
                         bool new_ones_alone, plr_seen_known *seen, double origin[3]) {
     unsigned count = 0;
@@ -148,8 +149,8 @@ static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool gu
     return true;
 }
 
-/* By the landmarks that have just come in, and by what is known of the pose. False if there are none, or if
- * fewer than three fifths agree. found->P_xi is zero. */
+/* By the landmarks that have just come in, and by what is known of the pose. False if there are
+ * none, or if fewer than three fifths agree. found->P_xi is zero. */
 static bool find_likeliest(plr_filter *f, const plr_frame *frame, unsigned n,
                            plr_found_pose *found) {
     double origin[3];
@@ -214,8 +215,8 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n) {
 
 /* ---------------------------------------------------------------- uncertain */
 
-/* True if the direction in which a point is seen from range r is so uncertain that it is not linear in the
- * error. C: covariance of the body's motion. */
+/* True if the direction in which a point is seen from range r is so uncertain that it is not
+ * linear in the error. C: covariance of the body's motion. */
 static bool is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], plr_real r2) {
     plr_real way = 0, turn = 0;
     for (unsigned i = 0; i < 3; i++) {
@@ -244,8 +245,8 @@ void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
             plr_slots_remove(f, slot);
 }
 
-/* How many known landmarks in sight are rough: by the pose if they have just come in (`new_ones`), else by
- * the motion since the last frame. */
+/* How many known landmarks in sight are rough: by the pose if they have just come in
+ * (`new_ones`), else by the motion since the last frame. */
 static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones) {
     plr_real P_xi[PLR_POSE_SQUARE], motion[PLR_POSE_SQUARE];
     unsigned rough = 0;
@@ -314,8 +315,8 @@ static bool measure_gap(const plr_filter *f, const plr_found_pose *found, plr_po
     return true;
 }
 
-/* Moves the pose to where prediction and frame together have it: to the one that was found, less what the
- * prediction knows better. */
+/* Moves the pose to where prediction and frame together have it: to the one that was found, less
+ * what the prediction knows better. */
 static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap) {
     for (unsigned step = 0; step < STEPS && !f->diverged; step++) {
         plr_real xi[PLR_POSE_DIM];
@@ -326,8 +327,8 @@ static void move_to(plr_filter *f, const plr_found_pose *found, const plr_pose_g
     }
 }
 
-/* The pose that was found, with the covariance P. Velocity, biases and landmarks keep what they know, but not
- * what they have in common with the pose. */
+/* The pose that was found, with the covariance P. Velocity, biases and landmarks keep what they
+ * know, but not what they have in common with the pose. */
 static void replace_pose(plr_filter *f, const plr_found_pose *found,
                          const plr_real P[PLR_POSE_SQUARE]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
@@ -341,8 +342,9 @@ static bool is_far(const plr_pose_gap *gap) {
     return plr_norm2_of_6(gap->nu) > FAR_ABOVE;
 }
 
-/* Moves to the pose that was found, by which the landmarks come in. If it is too far, what was believed of the
- * pose was wrong, and tells nothing of biases and velocity. P_wide: of a pose that replaces the present one. */
+/* Moves to the pose that was found, by which the landmarks come in. If it is too far, what was
+ * believed of the pose was wrong, and tells nothing of biases and velocity. P_wide: of a pose that
+ * replaces the present one. */
 static plr_relocation go_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap,
                             bool replaces, const plr_real P_wide[PLR_POSE_SQUARE]) {
     if (replaces || is_far(gap))

@@ -31,7 +31,8 @@ void plr_so3_expm1(plr_real E[9], const plr_real theta[3]);
 /* plr_so3_orthonormalise of R = I + E, computed from the small numbers of E without forming R. */
 void plr_so3_orthonormalise_small(plr_real E[9]);
 
-/* theta with Exp(theta) = R, |theta| < pi. Of half a turn the axis is lost: theta is then next to nothing. */
+/* theta with Exp(theta) = R, |theta| < pi. Of half a turn the axis is lost: theta is then next
+ * to nothing. */
 void plr_so3_log(plr_real theta[3], const plr_real R[9]);
 
 /* R <- R (3 I - R^T R) / 2: one Newton step towards the nearest rotation. It squares the error, so
