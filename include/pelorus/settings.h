@@ -57,6 +57,12 @@ typedef enum plr_noise_kind {
                             takes: the matrix W in equation III.8 of the course report */
 } plr_noise_kind;
 
+/* Whether most of what is seen may move as one, and what follows where pictures contradict odometry. */
+typedef enum plr_scene_policy {
+    PLR_SCENE_STANDS = 0,  /* no: pictures that agree are right, and the covariance is theirs */
+    PLR_SCENE_MAY_MOVE = 1 /* yes: the covariance covers the poses by both */
+} plr_scene_policy;
+
 /* The error of a new landmark in the model `world`. */
 typedef enum plr_landmark_prior {
     PLR_PRIOR_CORRELATED = 0, /* contains the error of the pose it was seen from: correct */
@@ -100,6 +106,14 @@ typedef struct plr_config {
      * 1: in the mode slam, an unknown id is first looked up in the map source, and a pose that is lost is
      * found again from known landmarks. (In localization both are always so.) */
     uint8_t known_map;
+
+    /* Setting scene: one of plr_scene_policy, default PLR_SCENE_STANDS.
+     * Wheels that slip and a scene that moves as one look the same in the data: pictures that agree with
+     * each other, and odometry that does not. STANDS where most of what is seen is fixed: the reported
+     * covariance stays small after a slip. MAY_MOVE in a warehouse with forklifts, in a convoy, on a ship:
+     * after each contradiction the covariance covers both stories, for good, unless a position or a map
+     * tells which is true. */
+    uint8_t scene;
 
     /* Setting landmark-prior: one of plr_landmark_prior, default PLR_PRIOR_CORRELATED. */
     uint8_t landmark_prior;

@@ -12,14 +12,12 @@
 #include "pelorus/camera.h"
 #include "pelorus/config.h"
 #include "pelorus/settings.h"
+#include "pelorus/supervisor.h"
 #include "pelorus/types.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-/* The time of what has not been yet. */
-#define PLR_NEVER_NS UINT64_MAX
 
 /* The caller's store of landmarks outside the filter. Both functions may be NULL. They must not
  * call the filter. */
@@ -143,7 +141,7 @@ typedef enum plr_anchored {
 } plr_anchored;
 
 /* What an IMU adds to the state: src/process/imu.c. How readings usually come, `slow` to
- * `off_usual2`, is kept of twists, too: src/filter/habit.h. */
+ * `off_usual2`, is kept of twists, too: src/process/statistics.h. */
 typedef struct plr_inertial {
     plr_real velocity[PLR_VELOCITY_DIM]; /* of the body in its own axes, m/s */
     plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */
@@ -164,16 +162,6 @@ typedef struct plr_inertial {
     uint8_t doubts;         /* successive frames at which the mean reading did not fit gravity */
 } plr_inertial;
 
-/* What has come of a small sensor: src/filter/readings.h. */
-typedef struct plr_readings {
-    plr_time_ns t_ns; /* of the last reading that was used or rejected */
-    double value[3];  /* its numbers */
-    plr_real excess;  /* sum over readings, older ones weighted less: of d^2 less its expectation */
-    plr_real numbers; /* the same of that expectation, the numbers of a reading */
-    uint16_t rejected; /* by the gate, in succession */
-    uint8_t off;       /* 1: by more than their sigma says, and not by chance */
-} plr_readings;
-
 /* A velocity that a small sensor measured: z = M (v, w) + noise. It holds until its next reading;
  * src/process/velocity.h. */
 typedef struct plr_held_velocity {
@@ -193,75 +181,6 @@ typedef struct plr_velocities {
     plr_real bias_Lambda[PLR_POSE_SQUARE];
     plr_real bias_eta[PLR_BIAS_DIM];
 } plr_velocities;
-
-/* Sums over frames, in which older ones count less: of nu, the difference between the motion by
- * vision and by twists, or the IMU, in units of their sigmas, and of the covariance expected of
- * it. */
-typedef struct plr_consistency_window {
-    plr_real sum[PLR_POSE_DIM];
-    plr_real variance[PLR_POSE_TRIANGLE]; /* 6x6, packed upper triangle */
-} plr_consistency_window;
-
-enum { PLR_CONSISTENCY_WINDOWS = 3 };
-
-/* Whether twists (or IMU) and pictures agree: src/filter/consistency.h. */
-typedef struct plr_consistency {
-    plr_consistency_window windows[PLR_CONSISTENCY_WINDOWS];
-    plr_real difference
-        [PLR_POSE_DIM]; /* from the pose by twists to the pose by vision: rho m, theta rad */
-    plr_real difference_sigmas[PLR_POSE_DIM]; /* the same in units of the twists' sigmas */
-    plr_real difference_noise; /* the expected square of difference_sigmas if it is only noise */
-    plr_real frozen_motion
-        [PLR_POSE_DIM]; /* motion by twists while the picture stayed the same: m, rad */
-    plr_real frozen_variance[PLR_POSE_DIM]; /* its variance */
-    /* |L^-1 n|^2 of frames that contradicted the twists by themselves, and, if the turns are a good
-     * part of that, their part of it; older ones weighted less */
-    plr_real excess, excess_turn;
-    plr_real fast; /* the last frame's statistic of the two windows that look back least */
-    uint16_t agreeing_frames;      /* successive frames in agreement */
-    uint16_t contradicting_frames; /* successive frames with a large contradiction */
-    uint16_t small_frames;         /* successive frames with a small difference */
-    uint16_t doubted_frames;       /* frames since the pose came into doubt; 0: it is not */
-    uint8_t contradicted;          /* 1: the twists are given less weight */
-    uint8_t drifting;              /* 1: over many frames the difference exceeds noise */
-    uint8_t frozen;                /* 1: this frame's picture equals the one before */
-    /* Successive frames in agreement that end PLR_REASON_POSE_MAY_BE_WRONG; 0: it does not hold. */
-    uint8_t settling_frames;
-    uint8_t relocated; /* 1: since the pose was found anew in a known map it has been in doubt */
-} plr_consistency;
-
-/* Whether what is seen agrees with itself: src/filter/scene.h. */
-typedef struct plr_scene {
-    plr_real matched, rejected, again, nis; /* sums over frames, older ones weighted less */
-    plr_real usual_mean, usual_square;      /* of a frame's mean square, over many frames */
-} plr_scene;
-
-/* A point that is asked whether it stands, by twists or by pictures: src/filter/votes.c. */
-typedef struct plr_trial {
-    plr_real y[3][3]; /* where it is after each motion, (x/z, y/z, 1/z), 1/m, in the left camera */
-    plr_real covariance[6]; /* of each, 3x3, packed upper triangle */
-    plr_real cost[3];       /* the squared innovations under each motion */
-    plr_real frames;        /* that it was seen in; 0: no point */
-    plr_real id[2];         /* high and low 16 bits */
-} plr_trial;
-
-enum { PLR_TRIALS = 7, PLR_VOTERS = 3 };
-
-/* What single points say where twists and pictures disagree. All are plr_real: they stand where an
- * IMU has its plr_core_motion, and are saved as that. */
-typedef struct plr_votes {
-    plr_trial trials[PLR_TRIALS];
-    plr_real counts[3];             /* by plr_vote, older ones weighted less */
-    plr_real voters[PLR_VOTERS][2]; /* the ids that voted for the twists, the first of them */
-    plr_real voter_count;
-    plr_real difference[PLR_POSE_DIM]; /* from the pose by twists to the pose by vision since the
-                                          contradiction: rho m, theta rad */
-    plr_real ways2, frames;            /* sum of the squared steps of rho, m^2, and their number */
-    plr_real trusted_frames;           /* so many frames more the twists are believed */
-    /* By how much the pictures move the body in a frame beside the twists, m: a mean in which a frame
-     * counts half as much as the next. */
-    plr_real way[3];
-} plr_votes;
 
 /* Errors of the camera's calibration that covariances take into account: two relative ones, and
  * three angles, rad, by which it is turned about its own axes. src/state/sensitivity.h. */
@@ -324,13 +243,6 @@ typedef struct plr_kept_measurements {
     uint8_t terms;        /* 2: they depend on the pose too */
 } plr_kept_measurements;
 
-/* By how much a known map that has come in sight moves the pose: src/filter/map_check.h. */
-typedef struct plr_map_check {
-    plr_real moved[PLR_POSE_DIM]; /* sum of the corrections, m and rad, in the world's axes */
-    plr_real V[PLR_POSE_SQUARE];  /* its covariance, if all is as stated; 6x6 */
-    uint8_t frames;               /* that are still to be summed up */
-} plr_map_check;
-
 /* Workspace of one call; its contents are not used by later calls. */
 typedef struct plr_workspace {
     /* Rows of V^T in an update, of [Y G]^T in a predict; a 3x3 matrix a landmark in a transport.
@@ -339,8 +251,9 @@ typedef struct plr_workspace {
     plr_real dx[PLR_MAX_LD];
     plr_noise noise;                        /* of the motion that this frame applies */
     plr_kept_measurements kept;             /* those of `used`, by slot */
-    plr_real gain[PLR_MAX_LANDMARKS];       /* by slot_of[k]: plr_verdict.gain in gate.h; negative:
-                                            rejected */
+    plr_frame_evidence evidence;            /* of this frame, for the supervisor */
+    plr_real gain[PLR_MAX_LANDMARKS];       /* by slot: det S of an accepted observation */
+    uint8_t verdict[PLR_MAX_LANDMARKS];     /* by slot: plr_gate_result in gate.h */
     uint16_t order[PLR_MAX_OBSERVATIONS];   /* valid observations of the frame, ascending by id */
     uint16_t slot_of[PLR_MAX_OBSERVATIONS]; /* the slot of order[k], or PLR_NO_SLOT */
     uint16_t used[PLR_MAX_LANDMARKS];       /* positions k in order that the update uses */
@@ -379,8 +292,6 @@ typedef struct plr_filter {
                                 since; packed lower triangle */
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_motion motion;
-    plr_readings readings[PLR_SENSORS];
-    uint8_t health; /* plr_health of the last frame */
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];
@@ -390,26 +301,16 @@ typedef struct plr_filter {
                                                  calibration, relative: src/state/sensitivity.h */
     plr_workspace work;
 
-    plr_consistency consistency;
-    plr_scene scene;
-    plr_map_check map_check;
+    plr_supervisor supervisor;
+    uint16_t frames_off_the_map; /* in succession, that rejected nearly all known landmarks */
     /* What one process alone needs, and only for a time. Of the "small" checksum: velocities with
      * twists, while any is known; alignment with an IMU, until it has started. */
     union {
         plr_velocities velocities;
         plr_alignment alignment;
     } either;
-    union {                          /* from here on part of the "small" checksum */
-        plr_core_motion core_motion; /* with an IMU */
-        plr_votes votes;             /* with twists */
-    } own;
-    plr_inertial inertial;                  /* with an IMU */
-    plr_time_ns last_frame_ns, last_use_ns; /* PLR_NEVER_NS: none yet */
-    plr_time_ns last_position_ns;           /* of a position that was used; likewise */
-    uint32_t reasons;                       /* of health, at the last frame */
-    uint32_t refused_before;                /* readings refused until the last frame */
-    uint32_t matches_since_gated;
-    uint16_t frames_without_use, frames_mostly_gated, frames_off_the_map;
+    plr_core_motion core_motion; /* with an IMU; from here on part of the "small" checksum */
+    plr_inertial inertial;       /* with an IMU */
     plr_totals totals;
     plr_guard guard;
 } plr_filter;

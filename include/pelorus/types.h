@@ -58,9 +58,8 @@ typedef enum plr_health {
     PLR_HEALTH_DIVERGED = 3 /* something else wrote to the filter's memory: init again */
 } plr_health;
 
-/* Why health is as it is: bits of plr_report.reasons and plr_health_state.reasons. Three of them
- * leave it GOOD if no other is set, and ask for better settings or more slots: GATE_INERT, NO_ROOM
- * and NIS_LOW. Above each: what it means, what causes it, what to do. */
+/* Why health is as it is: bits of plr_report.reasons and plr_health_state.reasons. Those of
+ * PLR_REASONS_HARMLESS leave it GOOD if no other is set. Above each: what it means, what causes it, what to do. */
 typedef enum plr_reason {
     /* Fewer than 3 observations were used in this frame: a bare wall, darkness, a covered camera, or
      * the gate rejects what is seen. It usually passes; if it stays, check the tracker. */
@@ -95,14 +94,11 @@ typedef enum plr_reason {
     PLR_REASON_NOT_POSITIVE = 1 << 10,
     /* Observations were left out for want of time. A longer deadline, or fewer features. */
     PLR_REASON_BUDGET = 1 << 11,
-    /* Vision contradicts the twists, or the IMU, and the filter followed vision: slipping wheels, a
-     * dead encoder, a push. Where single points show that most of the scene moves instead, it went
-     * back to the twists, and the reset counter counts the jump. If it repeats, check the wheels; if
-     * it stays, the scale of the odometry, and in bends the camera's place on the body; or the noises
-     * are set too small: errors of odometry that last longer than one reading (filtered velocities, a
-     * gyro's scale) add up as if their sigma were several times as large, and that is what to set
-     * (velocity-sigma, gyro-sigma; with an IMU gyro-noise, accel-noise). Or the clocks of camera and
-     * odometry differ (camera-offset). */
+    /* Pictures and odometry (twists or IMU) differ by more than is usual on this drive: slipping wheels, a
+     * dead encoder, a push, a camera that was knocked. If they agreed before and the difference is a good
+     * part of the motion, the pictures are followed (totals.contradictions). If it repeats, check the wheels;
+     * if it stays, the scale of the odometry, and in bends the camera's place on the body; or the clocks of
+     * camera and odometry differ (camera-offset). */
     PLR_REASON_TWIST_CONTRADICTED = 1 << 12,
     /* After GATE_LOCKED, TWIST_CONTRADICTED, RECOVERED, RELOCATED or MAP_DISAGREES: the pose may be
      * wrong by more than its covariance says. Ends when twists, or the IMU, have agreed with vision
@@ -122,10 +118,7 @@ typedef enum plr_reason {
     /* The same pixels in successive frames while twists or IMU report motion: a camera or tracker
      * that sends the same image again. Restart it. */
     PLR_REASON_FROZEN_IMAGE = 1 << 16,
-    /* The matched points do not agree on one motion: more than 30 % are rejected, or all of them fit
-     * suddenly worse than usual on this drive. Much of the scene moves, or tracks are stale. The
-     * pose leans on twists or IMU until they agree. */
-    PLR_REASON_SCENE_DISAGREES = 1 << 17,
+    /* Bit 17 was SCENE_DISAGREES, and is free. */
     /* After a divergence the landmarks were dropped and the pose's covariance was enlarged, so that
      * the filter can continue. Reported once; the reset counter of POSE and ODOMETRY counts it. */
     PLR_REASON_RECOVERED = 1 << 18,
@@ -159,8 +152,20 @@ typedef enum plr_reason {
      * a whole, its covariances are too small, or the pose that was set was wrong. Told in that frame;
      * POSE_MAY_BE_WRONG stays, and the covariance covers the poses before and after, until pictures and
      * twists have agreed for a while. */
-    PLR_REASON_MAP_DISAGREES = 1 << 26
+    PLR_REASON_MAP_DISAGREES = 1 << 26,
+    /* All along this drive pictures and odometry differ by more than twice their sigmas. Weights and health
+     * count in units of what is usual, so health stays GOOD; but the sigmas are too small: velocity-sigma
+     * and gyro-sigma for odometry whose errors last longer than a reading, gyro-noise and accel-noise for an
+     * IMU; or the calibration is off. `pelorus check` measures them. */
+    PLR_REASON_NOISE_MISFIT = 1 << 27
 } plr_reason;
+
+/* Reasons that leave health GOOD: the estimate is as good as it should be, and the settings could be
+ * better. */
+enum {
+    PLR_REASONS_HARMLESS = PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW |
+                           PLR_REASON_NOISE_MISFIT
+};
 
 /* What is wrong with an IMU: plr_filter_imu_fault. Before its start the filter waits for better
  * readings. After a start from a given state, faults 2 to 6 are found within ten seconds, from the

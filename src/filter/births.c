@@ -5,6 +5,7 @@
 #include "filter/matching.h"
 #include "filter/predict.h"
 #include "filter/tracks.h"
+#include "known_map/lookup.h"
 #include "sensor/stereo.h"
 #include "state/slots.h"
 
@@ -20,22 +21,19 @@ static void append_new(plr_filter *f, const plr_observation *seen) {
     f->slots[f->count - 1].beyond = beyond;
 }
 
-/* True of a frame that rejects nearly all that it matched: the pose is probably wrong. Landmarks that it
- * made would agree with that pose in the next frames, against those that show where the body is. */
-static bool is_at_a_loss(const plr_filter *f, const plr_frame_events *events) {
-    return f->config.model == PLR_MODEL_BODY && f->frames_mostly_gated > 0 && !events->locked;
-}
-
-void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n,
+/* Landmarks that a frame makes which rejects nearly all that it matched would agree with its pose in the
+ * next frames, against those that show where the body is. */
+void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n, bool none,
                                plr_frame_events *events, plr_report *report) {
-    const bool makes = plr_births_are_allowed(f) && !is_at_a_loss(f, events);
+    const bool makes =
+        plr_births_are_allowed(f) && !(none && f->config.model == PLR_MODEL_BODY);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_landmark known;
         if (f->work.slot_of[k] != PLR_NO_SLOT)
             continue;
-        if (makes && events->left_out && plr_match_asks_map(f) &&
-            plr_match_ask_map(f, o->id, &known)) {
+        if (makes && events->left_out && plr_map_is_asked(f) &&
+            plr_map_ask(f, o->id, &known)) {
             report->poor++; /* it keeps its place in the map, and is asked for again */
             continue;
         }
@@ -57,7 +55,8 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
 void plr_births_drop_rejected(plr_filter *f, const plr_frame *frame, unsigned n) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
-        const bool was_rejected = w->slot_of[k] != PLR_NO_SLOT && w->gain[w->slot_of[k]] < 0;
+        const bool was_rejected =
+            w->slot_of[k] != PLR_NO_SLOT && !plr_gate_accepted(f, w->slot_of[k]);
         if (was_rejected)
             plr_slots_remove(f, plr_slots_find(f, frame->observations[w->order[k]].id));
     }
@@ -73,11 +72,11 @@ void plr_births_restart(plr_filter *f, const plr_frame *frame, unsigned n,
         return;
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[w->order[k]];
-        if (w->slot_of[k] == PLR_NO_SLOT || w->gain[w->slot_of[k]] >= 0)
+        if (w->slot_of[k] == PLR_NO_SLOT || plr_gate_accepted(f, w->slot_of[k]))
             continue;
         const unsigned slot = plr_slots_find(f, o->id); /* a restart may have moved others */
         const plr_slot before = f->slots[slot];
-        const bool lost = w->gain[w->slot_of[k]] == PLR_GAIN_LOST;
+        const bool lost = w->verdict[w->slot_of[k]] == PLR_GATE_LOST;
         if (!lost && !(agrees && plr_track_may_restart(&before)))
             continue;
         const bool makes = plr_stereo_makes_landmark(f, o);

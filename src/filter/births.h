@@ -5,14 +5,13 @@
 
 #include <stdbool.h>
 
-#include "filter/health.h"
 #include "pelorus/state.h"
 
 /* True if the mode initialises landmarks from pixels. */
 bool plr_births_are_allowed(const plr_filter *f);
 
-/* Initialises landmarks from the observations that match none. */
-void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n,
+/* Initialises landmarks from the observations that match none; `none`: counts them alone. */
+void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n, bool none,
                                plr_frame_events *events, plr_report *report);
 
 /* Drops the landmarks that the gate rejected in this frame, because it has rejected nearly

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /*
- * From when the twists are contradicted until that is settled, a frame does not teach the twists' biases:
- * a wheel that slips or a scene that moves is no bias.
+ * A frame that does not teach the twists' biases: a wheel that slips or a scene that moves is no bias.
  * Pose, landmarks and all covariances with the biases are corrected as usual, so that what is left
  * is the Schmidt ("consider") update: the biases' own numbers stay (docs/MATH.md 17).
  */
@@ -15,15 +14,12 @@
 typedef struct plr_considered_bias {
     plr_real bias[PLR_BIAS_DIM], P_bb[PLR_BIAS_DIM * PLR_BIAS_DIM];
     plr_real S_b[PLR_CALIBRATIONS][PLR_BIAS_DIM];
-    plr_real of_nu[PLR_POSE_SQUARE]; /* L^-1 B P_bb B^T L^-T: their part of nu's covariance */
     plr_real seconds;                /* of the motion that is pending */
     bool considered;
 } plr_considered_bias;
 
-/* Notes the biases before a frame's motion is applied, if this frame may not change them. L: the
- * twists' own, of plr_consistency_widen. `outright`: the frame contradicts the twists by itself. */
-void plr_bias_consider(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE], bool outright,
-                       plr_considered_bias *before);
+/* Notes the biases before a frame's motion is applied, if it shall not change them. */
+void plr_bias_consider(const plr_filter *f, bool hold, plr_considered_bias *before);
 
 /* After the correction: puts them back as they were, and lets them walk. */
 void plr_bias_restore(plr_filter *f, const plr_considered_bias *before);

@@ -2,10 +2,9 @@
 /* The estimate as doubles. No function here changes the filter. */
 #include <string.h>
 
-#include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/mount.h"
+#include "filter/extrinsics.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
@@ -15,6 +14,7 @@
 #include "state/motion.h"
 #include "state/sensitivity.h"
 #include "state/slots.h"
+#include "supervise/supervise.h"
 
 static bool ready(const plr_filter *f) {
     return f && f->magic == PLR_FILTER_MAGIC;
@@ -77,7 +77,7 @@ static plr_status tell_covariance(double *told, const plr_real P[PLR_POSE_SQUARE
 static void pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     plr_motion_pose_covariance(f, P_xi);
     plr_sensitivity_add_to_pose(f, P_xi);
-    plr_consistency_enlarge(f, P_xi);
+    plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P_xi);
 }
 
 plr_time_ns plr_filter_time(const plr_filter *f) {
@@ -90,7 +90,7 @@ plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB) {
         return sound;
     to_double(T_WB->R, f->R_WB, 9);
     memcpy(T_WB->p, f->p_WB, sizeof T_WB->p);
-    plr_mount_pose_out(f, T_WB);
+    plr_extrinsics_pose_out(f, T_WB);
     return PLR_OK;
 }
 
@@ -102,7 +102,7 @@ plr_status plr_filter_pose_covariance(const plr_filter *f, double *P_xi) {
         return PLR_E_DIVERGED;
     plr_real P[PLR_POSE_SQUARE];
     pose_covariance(f, P);
-    plr_mount_covariance_out(f, P);
+    plr_extrinsics_covariance_out(f, P);
     return tell_covariance(P_xi, P);
 }
 
@@ -112,7 +112,7 @@ plr_status plr_filter_velocity(const plr_filter *f, plr_twist *velocity) {
         return sound;
     plr_real u[PLR_POSE_DIM];
     plr_process_of(f)->now(f, u, NULL);
-    plr_mount_twist_out(f, u, NULL);
+    plr_extrinsics_twist_out(f, u, NULL);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         if (!plr_is_finite(u[i]))
             return PLR_E_DIVERGED;
@@ -130,7 +130,7 @@ plr_status plr_filter_velocity_covariance(const plr_filter *f, double *P_u) {
     plr_real u[PLR_POSE_DIM], P[PLR_POSE_SQUARE];
     plr_process_of(f)->now(f, u, P);
     plr_sensitivity_add_to_velocity(f, P);
-    plr_mount_twist_out(f, u, P);
+    plr_extrinsics_twist_out(f, u, P);
     return tell_covariance(P_u, P);
 }
 

@@ -4,12 +4,10 @@
 
 #include <string.h>
 
-#include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/mount.h"
+#include "filter/extrinsics.h"
 #include "filter/predict.h"
-#include "filter/readings.h"
 #include "math/finite.h"
 #include "math/se3.h"
 #include "math/small.h"
@@ -21,6 +19,7 @@
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
+#include "supervise/supervise.h"
 
 /* ---------------------------------------------------------------- init */
 
@@ -62,7 +61,7 @@ static plr_real squared(double x) {
 static void set_parameters(plr_parameters *par, const plr_calibration *calibration,
                            const plr_config *c) {
     set_camera(&par->camera, calibration);
-    plr_mount_set(par, c);
+    plr_extrinsics_set(par, c);
     plr_se3_adjoint(par->Ad_CB, par->camera.R_CB, par->camera.t_CB);
     par->pixel_variance = squared(c->pixel_sigma_px);
     for (int i = 0; i < 3; i++) {
@@ -192,22 +191,16 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(f->p_WB, 0, sizeof f->p_WB);
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->R_WB);
-    memset(&f->own.core_motion, 0, sizeof f->own.core_motion);
+    memset(&f->core_motion, 0, sizeof f->core_motion);
     plr_motion_clear(f);
     plr_velocity_forget(f);
     plr_alignment_clear(f);
-    plr_readings_clear(f);
     f->count = 0;
     f->frame_number = 0;
-    f->frames_without_use = f->frames_mostly_gated = f->frames_off_the_map = 0;
-    f->matches_since_gated = 0;
-    f->health = PLR_HEALTH_DEGRADED; /* nothing has been seen yet */
-    f->reasons = PLR_REASON_FEW_OBSERVATIONS;
-    f->last_frame_ns = f->last_use_ns = f->last_position_ns = PLR_NEVER_NS;
-    f->refused_before = 0;
+    f->frames_off_the_map = 0;
+    plr_supervise_begin(&f->supervisor, &f->config);
     memset(f->bias_prior, 0, sizeof f->bias_prior);
     f->bias_walked_s = 0;
-    plr_consistency_clear(f);
     start_covariance(f, P_xi);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
     plr_filter_store_for_recovery(f);
@@ -279,8 +272,8 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     start_covariance(f, P_start);
     if (P_xi)
         memcpy(P_start, P_xi, sizeof P_start);
-    plr_mount_pose_in(f, &at);
-    plr_mount_covariance_in(f, P_start);
+    plr_extrinsics_pose_in(f, &at);
+    plr_extrinsics_covariance_in(f, P_start);
     plr_predict_drop(f);
     plr_alignment_follow_clock(f, t_ns);
     if (f->clock_started)
@@ -291,18 +284,19 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     f->inertial.pose_given = 1;
     if (P_xi)
         plr_alignment_keep_world(f);
-    plr_consistency_clear(f);
+    plr_supervise_pose_set(&f->supervisor);
     plr_filter_store_for_recovery(f);
     f->diverged = 0;
-    f->frames_without_use = f->frames_mostly_gated = f->frames_off_the_map = 0;
+    f->frames_off_the_map = 0;
     if (!plr_covariance_is_positive(f) &&
         plr_has_block(f, PLR_BLOCK_BIAS)) /* the bias is lost too */
         restore_bias_prior(f);
     /* readings and frames of another clock are not used any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);
-    if (f->last_frame_ns > t_ns || t_ns - f->last_frame_ns > f->par.max_gap_ns)
-        f->last_frame_ns = f->last_use_ns = f->last_position_ns = PLR_NEVER_NS;
+    if (f->supervisor.last_frame_ns > t_ns ||
+        t_ns - f->supervisor.last_frame_ns > f->par.max_gap_ns)
+        plr_supervise_clock_set(&f->supervisor);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }
@@ -340,7 +334,7 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     if (f->clock_started && t_ns <= f->t_ns)
         return plr_filter_refuse(f, PLR_E_TIME);
     plr_pose at = *T_WB;
-    plr_mount_pose_in(f, &at);
+    plr_extrinsics_pose_in(f, &at);
     if (!f->clock_started) {
         store_pose(f, t_ns, &at);
         plr_guard_seal(f);
@@ -350,5 +344,59 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     get_rotation(R, &at);
     plr_motion_jump(f, t_ns, R, at.p);
     plr_guard_seal(f);
+    return PLR_OK;
+}
+
+/* ---------------------------------------------------------------- evidence */
+
+plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns now_ns) {
+    const bool imu = f->config.process == PLR_PROCESS_IMU;
+    const plr_imu_fault fault = (plr_imu_fault)f->inertial.fault;
+    return (plr_readings_evidence){
+        .now_ns = now_ns,
+        .reading_ns = f->reading_ns,
+        .interval_s = f->interval_s,
+        .valid = f->reading_valid,
+        .needed = f->config.mode != PLR_MODE_MAPPING,
+        .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
+        .imu = imu,
+        .started = !imu || f->inertial.started,
+        .unsettled = imu && plr_alignment_is_unsettled(f),
+        .fault_of_start = fault > PLR_IMU_FAULT_MOVES && fault < PLR_IMU_FAULT_SATURATED,
+        .fault_of_reading = fault >= PLR_IMU_FAULT_SATURATED,
+        .refused = f->totals.twists_refused};
+}
+
+void plr_filter_pending_motion(const plr_filter *f, plr_picture_evidence *e) {
+    const plr_motion *m = &f->motion;
+    plr_real turn[3];
+    plr_turn_of(turn, m->E);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        e->moved[k] = k < 3 ? m->p[k] : turn[k - 3];
+        e->variance[k] = m->Q[(PLR_POSE_DIM + 1) * k];
+    }
+}
+
+void plr_filter_note_motion(plr_filter *f) {
+    plr_picture_evidence pending = {0};
+    if (!f->motion.pending)
+        return;
+    plr_filter_pending_motion(f, &pending);
+    plr_supervise_moved(&f->supervisor, &pending);
+}
+
+plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health) {
+    if (!f || !health)
+        return PLR_E_ARGUMENT;
+    memset(health, 0, sizeof *health);
+    const plr_status sound = plr_guard_check(f);
+    if (sound != PLR_OK) {
+        health->health = PLR_HEALTH_DIVERGED;
+        health->reasons = sound == PLR_E_DAMAGED ? PLR_REASON_STATE_DAMAGED : 0;
+        return sound;
+    }
+    const plr_readings_evidence now = plr_filter_readings_at(f, t_ns > f->t_ns ? t_ns : f->t_ns);
+    plr_supervise_health(&f->supervisor, &now, health);
+    health->resets = f->totals.resets + f->totals.widened;
     return PLR_OK;
 }

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
 #include "filter/gate.h"
 
-#include "filter/health.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "state/covariance.h"
+#include "supervise/supervise.h"
 
 /* Ten sigmas. A point that begins to move is not off by so much from one frame to the next. */
 #define FAR_D2 PLR_R(100)
 
-plr_real plr_gate_rejection(plr_real d2) {
-    return d2 > FAR_D2 ? PLR_GAIN_FAR : PLR_GAIN_REJECTED;
+plr_gate_result plr_gate_rejection(plr_real d2) {
+    return d2 > FAR_D2 ? PLR_GATE_FAR : PLR_GATE_REJECTED;
 }
 
 bool plr_gate_accepts(const plr_filter *f, plr_real d2, plr_real residual2) {
     const bool fixed = f->par.gate_residual2 > 0;
     if (fixed && residual2 <= f->par.gate_residual2)
         return true;
-    return (!fixed || plr_health_fixed_gate_is_open(f)) && plr_is_finite(d2) &&
+    return (!fixed || plr_supervise_opens_fixed_gate(&f->supervisor)) && plr_is_finite(d2) &&
            (f->par.gate_d2 <= 0 || d2 <= f->par.gate_d2);
 }
 

@@ -18,17 +18,17 @@ enum {
 
 /* A checksum of memory, word by word. Each sum is rotated before the next word is added, so that it
  * depends on the order of the words. A change of a single word always changes the sum. */
-typedef struct plr_sum {
+typedef struct plr_checksum {
     uint32_t lane[LANES];
-} plr_sum;
+} plr_checksum;
 
 static inline uint32_t turned(uint32_t sum) {
     return sum >> 7 | sum << 25;
 }
 
-static void add(plr_sum *sum, const void *memory, size_t bytes) {
+static void add(plr_checksum *sum, const void *memory, size_t bytes) {
     const unsigned char *at = memory;
-    plr_sum now = *sum;
+    plr_checksum now = *sum;
     uint32_t word = 0;
     for (; bytes >= LANES * sizeof word; bytes -= LANES * sizeof word, at += LANES * sizeof word)
         for (unsigned lane = 0; lane < LANES; lane++) {
@@ -50,7 +50,7 @@ static void add(plr_sum *sum, const void *memory, size_t bytes) {
 }
 
 /* The members from one offset to another. */
-static void add_between(plr_sum *sum, const plr_filter *f, size_t from, size_t to) {
+static void add_between(plr_checksum *sum, const plr_filter *f, size_t from, size_t to) {
     add(sum, (const unsigned char *)f + from, to - from);
 }
 
@@ -60,7 +60,7 @@ static uint32_t step(uint32_t mixed, uint32_t word) {
     return mixed ^ mixed >> 15;
 }
 
-static uint64_t mixed(const plr_sum *sum) {
+static uint64_t mixed(const plr_checksum *sum) {
     uint32_t low = 0, high = 0;
     for (unsigned lane = 0; lane < LANES; lane++) {
         low = step(low, sum->lane[lane]);
@@ -70,17 +70,17 @@ static uint64_t mixed(const plr_sum *sum) {
 }
 
 static uint64_t constant_sum(const plr_filter *f) {
-    plr_sum sum = {{0}};
+    plr_checksum sum = {{0}};
     add_between(&sum, f, offsetof(plr_filter, config), offsetof(plr_filter, t_ns));
     return mixed(&sum);
 }
 
 static uint64_t small_sum(const plr_filter *f) {
     const size_t used = plr_covariance_size(f, f->count);
-    plr_sum sum = {{0}};
+    plr_checksum sum = {{0}};
     add_between(&sum, f, offsetof(plr_filter, t_ns), offsetof(plr_filter, slots));
     add(&sum, plr_covariance_elements(f), (used < HEAD ? used : HEAD) * sizeof(plr_real));
-    add_between(&sum, f, offsetof(plr_filter, own), offsetof(plr_filter, guard));
+    add_between(&sum, f, offsetof(plr_filter, core_motion), offsetof(plr_filter, guard));
     if (f->config.process == PLR_PROCESS_IMU && !f->inertial.started)
         add(&sum, &f->either.alignment, sizeof f->either.alignment);
     if (f->velocities_known)
@@ -89,9 +89,9 @@ static uint64_t small_sum(const plr_filter *f) {
 }
 
 static uint64_t large_sum(const plr_filter *f) {
-    plr_sum sum = {{0}};
+    plr_checksum sum = {{0}};
     add(&sum, f->slots, f->count * sizeof *f->slots);
-    add_between(&sum, f, offsetof(plr_filter, consistency), offsetof(plr_filter, either));
+    add_between(&sum, f, offsetof(plr_filter, supervisor), offsetof(plr_filter, either));
     add(&sum, plr_covariance_elements(f), plr_covariance_size(f, f->count) * sizeof(plr_real));
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
         add(&sum, f->S[k], plr_covariance_dim(f) * sizeof *f->S[k]);
@@ -107,7 +107,7 @@ static bool is_in_range(const plr_filter *f) {
            c->mode <= PLR_MODE_DEAD_RECKONING && c->twist_timing <= PLR_TWIST_MID &&
            c->noise <= PLR_NOISE_STEP && c->process <= PLR_PROCESS_IMU &&
            c->imu_start <= PLR_IMU_START_GIVEN && c->imu_timing <= PLR_TWIST_MID && c->bias <= 1 &&
-           c->known_map <= 1 && c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
+           c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE && c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
            c->slots <= PLR_MAX_LANDMARKS && f->count <= c->slots && f->clock_started <= 1 &&
            f->reading_valid <= 1 && f->diverged <= 1 && f->motion.pending <= 1 &&
            f->motion.noisy <= 1;

@@ -7,8 +7,8 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/habit.h"
-#include "filter/mount.h"
+#include "process/statistics.h"
+#include "filter/extrinsics.h"
 #include "filter/predict.h"
 #include "math/finite.h"
 #include "math/small.h"
@@ -82,7 +82,7 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
         reading[i] = (plr_real)imu->a_B_mps2[i];
         reading[3 + i] = (plr_real)imu->w_B_radps[i];
     }
-    plr_mount_reading_in(f, reading);
+    plr_extrinsics_reading_in(f, reading);
     if (!plr_all_finite(imu->a_B_mps2, 3) || !plr_all_finite(imu->w_B_radps, 3))
         return refuse(f, PLR_E_NOT_FINITE, PLR_IMU_FAULT_NOT_FINITE);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
@@ -93,11 +93,11 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     if (planned.status != PLR_OK || f->config.mode == PLR_MODE_MAPPING)
         return plr_predict_accept(f, t_ns, reading, &planned);
     plr_real change2[2];
-    plr_habit_change(f, reading, change2);
+    plr_statistics_change(f, reading, change2);
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    plr_habit_learn(f, t_ns, reading, planned.interval, change2);
+    plr_statistics_learn(f, t_ns, reading, planned.interval, change2);
     if (f->inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
     (void)plr_alignment_add(f, t_ns, reading);

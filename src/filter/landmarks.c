@@ -2,6 +2,7 @@
 /* Landmarks as the caller sees them: in the world, in and out. */
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
+#include "known_map/lookup.h"
 #include "math/finite.h"
 #include "process/alignment.h"
 #include "process/process.h"

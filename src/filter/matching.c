@@ -2,6 +2,7 @@
 #include "filter/matching.h"
 
 #include "filter/filter_internal.h"
+#include "known_map/lookup.h"
 #include "math/order.h"
 #include "state/model.h"
 #include "state/slots.h"
@@ -75,28 +76,17 @@ void plr_match_count(plr_filter *f, unsigned n) {
         }
 }
 
-bool plr_match_asks_map(const plr_filter *f) {
-    const bool knows = f->config.mode == PLR_MODE_LOCALIZATION ||
-                       (f->config.mode == PLR_MODE_SLAM && f->config.known_map);
-    return knows && f->map.source != NULL;
-}
-
-bool plr_match_ask_map(const plr_filter *f, uint32_t id, plr_landmark *known) {
-    *known = (plr_landmark){.P_W_m2 = {-1}}; /* refused, if the source fills in nothing */
-    return f->map.source(f->map.context, id, known) && plr_landmark_is_valid(known);
-}
-
 void plr_match_known(plr_filter *f, const plr_observation *seen, unsigned n,
                      plr_frame_events *events, plr_report *report) {
     const bool alone = f->config.mode == PLR_MODE_LOCALIZATION;
-    if (!plr_match_asks_map(f))
+    if (!plr_map_is_asked(f))
         return;
     unsigned before = report->created;
     for (unsigned k = 0; k < n; k++) {
         const uint32_t id = seen[f->work.order[k]].id;
         plr_landmark known;
         plr_new_landmark landmark;
-        if (f->work.slot_of[k] != PLR_NO_SLOT || !plr_match_ask_map(f, id, &known))
+        if (f->work.slot_of[k] != PLR_NO_SLOT || !plr_map_ask(f, id, &known))
             continue;
         if (!plr_model_of(f)->adopt(f, &known, &landmark)) {
             events->unplaced++;

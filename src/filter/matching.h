@@ -3,7 +3,6 @@
 #ifndef PLR_FILTER_MATCHING_H
 #define PLR_FILTER_MATCHING_H
 
-#include "filter/health.h"
 #include "pelorus/state.h"
 
 /* Fills work.order with the good observations by id, and returns their number. Malformed ones are
@@ -13,12 +12,6 @@ unsigned plr_match_in_order(plr_filter *f, const plr_frame *frame, plr_report *r
 
 /* Fills work.slot_of for the n observations in order. */
 void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n);
-
-/* True in the modes that ask the map source for landmarks, if there is one. */
-bool plr_match_asks_map(const plr_filter *f);
-
-/* Asks it for one. False if it has none, or one that is not valid. */
-bool plr_match_ask_map(const plr_filter *f, uint32_t id, plr_landmark *known);
 
 /* Asks the map source for the ids that the state does not hold. Ids that the map does not have are
  * counted when landmarks are initialised; in slam, so are those without a slot. */

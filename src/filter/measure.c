@@ -5,16 +5,12 @@
 
 #include <string.h>
 
-#include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
-#include "filter/frozen.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
-#include "filter/mount.h"
+#include "filter/extrinsics.h"
 #include "filter/predict.h"
-#include "filter/readings.h"
-#include "filter/votes.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
@@ -27,6 +23,7 @@
 #include "state/motion.h"
 #include "state/seconds.h"
 #include "state/sensitivity.h"
+#include "supervise/supervise.h"
 
 /* Beyond this a lever arm or a sigma is an error of the sender, m and so on. */
 #define MAX_ARM   1e3
@@ -61,12 +58,19 @@ static plr_status check_numbers(const plr_reading *reading) {
     return PLR_OK;
 }
 
+/* A reading of the state that comes once more says nothing new. (One of the twist takes the place of the
+ * last.) */
+static bool repeats(const plr_filter *f, const plr_reading *reading) {
+    return plr_sensor_of(reading->sensor)->of_state &&
+           plr_supervise_repeats(&f->supervisor, reading);
+}
+
 static plr_status check_time(const plr_filter *f, const plr_reading *reading) {
     if (f->config.mode == PLR_MODE_MAPPING)
         return PLR_E_MODE;
     if (!plr_process_has_started(f))
         return PLR_E_NOT_READY;
-    if (!f->clock_started || !f->reading_valid || plr_readings_repeats(f, reading))
+    if (!f->clock_started || !f->reading_valid || repeats(f, reading))
         return PLR_E_TIME;
     if (reading->t_ns < f->t_ns)
         return PLR_E_LATE;
@@ -137,8 +141,7 @@ static bool apply_to_velocity(plr_filter *f, const plr_sensor_kind *kind,
     plr_measurement m[2];
     bool accepted = true;
     const unsigned parts = kind->of_twist(reading, rows);
-    if (f->motion.pending)
-        plr_frozen_note_motion(f);
+    plr_filter_note_motion(f);
     plr_predict_apply_pending(f);
     memset(m, 0, sizeof m);
     for (unsigned part = 0; part < parts && !f->diverged; part++) {
@@ -191,7 +194,7 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     kind->of_state(f, reading, &m);
     PLR_ASSERT(m.H.terms == 1 && m.H.term[0].row == plr_row_of(f, PLR_BLOCK_POSE));
     plr_motion_pose_covariance(f, P_xi);
-    plr_consistency_enlarge(f, P_xi);
+    plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P_xi);
     if (kind->bounds_position != 0)
         widen(reading, 1, second_order(f, reading, P_xi), m.R);
     plr_sandwich3(S, HP, m.H.term[0].H, P_xi);
@@ -200,15 +203,14 @@ static bool apply(plr_filter *f, const plr_sensor_kind *kind, const plr_reading 
     plr_sensitivity_add_to_pose(f, P_xi); /* a camera that is off by a share is no wrong reading */
     plr_real d2 = distance2(m.H.term[0].H, P_xi, m.R, m.r);
     result->d2 = d2 > 0 ? (double)d2 : 0;
-    const plr_real wider = plr_readings_widening(f, reading->sensor);
+    const plr_real wider = plr_supervise_widening(&f->supervisor, reading->sensor);
     if (wider > 1) {
         widen(reading, wider, 0, m.R);
         d2 = distance2(m.H.term[0].H, P_xi, m.R, m.r);
     }
     if (!passes(f, d2) || plr_dot3(m.r, m.r) > MAX_STEP * MAX_STEP)
         return false;
-    if (f->motion.pending)
-        plr_frozen_note_motion(f);
+    plr_filter_note_motion(f);
     plr_predict_apply_pending(f);
     return correct(f, &m, 1);
 }
@@ -233,14 +235,20 @@ static bool measure(plr_filter *f, const plr_reading *reading, plr_reading_resul
         return plr_measure_twist(f, reading, result);
     result->used = apply(f, kind, reading, result);
     count(f, result);
-    const uint8_t bounding = kind->bounds_position;
-    if (result->used) {
+    if (result->used)
         plr_alignment_keep_world(f);
-        plr_votes_keep_pose(f);
-    }
-    if (result->used && bounding != 0 && (reading->axes & bounding) == bounding)
-        f->last_position_ns = f->t_ns;
     return result->used;
+}
+
+static void supervise(plr_filter *f, const plr_reading *reading, bool used, double d2) {
+    const uint8_t bounding = plr_sensor_of(reading->sensor)->bounds_position;
+    const bool bounds = bounding != 0 && (reading->axes & bounding) == bounding;
+    unsigned numbers = 0;
+    for (unsigned i = 0; i < 3; i++)
+        numbers += plr_reading_has(reading, i);
+    if (reading->sensor == PLR_SENSOR_STANDSTILL) /* three of each of its bits */
+        numbers *= 3;
+    plr_supervise_reading(&f->supervisor, reading, numbers, used, (plr_real)d2, bounds, f->t_ns);
 }
 
 static plr_status refuse(plr_filter *f, plr_status status, plr_reading_result *result) {
@@ -265,10 +273,10 @@ plr_status plr_filter_measure(plr_filter *f, const plr_reading *reading,
     if (status != PLR_OK)
         return refuse(f, status, got);
     plr_reading seen_from_imu = *reading;
-    plr_mount_place_in(f, seen_from_imu.at_B_m);
+    plr_extrinsics_place_in(f, seen_from_imu.at_B_m);
     plr_predict_to(f, reading->t_ns);
     const bool used = measure(f, &seen_from_imu, got);
-    plr_readings_add(f, reading, used, (plr_real)got->d2);
+    supervise(f, reading, used, got->d2);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

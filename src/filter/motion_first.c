@@ -6,8 +6,7 @@
 #include "filter/gate.h"
 #include "filter/search.h"
 #include "filter/tracks.h"
-#include "filter/vantage.h"
-#include "filter/votes.h"
+#include "filter/linearisation.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "sensor/stereo.h"
@@ -172,14 +171,14 @@ static plr_real residual_norm2(const plr_search *s, unsigned i) {
     return plr_stereo_residual2(plr_search_observation(s, i), r);
 }
 
-/* The gain of an observation that the gate accepts, or why it does not (gate.h). Adds d^2 of an accepted
- * one to *nis, and its innovation to its track. */
-static plr_real judge(plr_search *s, unsigned i, bool found, const plr_real *U,
-                      const plr_real dz[PLR_POSE_DIM], float *nis) {
+/* What the gate says of an observation. Adds d^2 of an accepted one to *nis, and its innovation to its
+ * track. */
+static plr_gate_result judge(plr_search *s, unsigned i, bool found, const plr_real *U,
+                             const plr_real dz[PLR_POSE_DIM], float *nis) {
     const plr_sighting *at = &s->sightings[i];
     plr_real d2 = at->prior_d2, e[3], share = 0;
     if (!(d2 >= 0) || at->behind)
-        return PLR_GAIN_REJECTED;
+        return PLR_GATE_REJECTED;
     if (found) {
         const plr_real without_it = leave_one_out(at, U, dz, e, &share);
         d2 = share >= LEAST_SHARE ? without_it : d2;
@@ -192,9 +191,9 @@ static plr_real judge(plr_search *s, unsigned i, bool found, const plr_real *U,
     if (!accepted)
         return plr_gate_rejection(d2);
     if (slot->moving)
-        return PLR_GAIN_REJECTED;
+        return PLR_GATE_REJECTED;
     *nis += (float)d2;
-    return at->gain;
+    return PLR_GATE_ACCEPTED;
 }
 
 /* How much an observation tells about the translation, 1/sigma: of a distant point little. */
@@ -283,7 +282,7 @@ static bool is_well_spread(const plr_search_point *point) {
  * all others do. They must be well spread. Of six and more, three fifths must agree with the motion.
  * Of three to five all must, whether they took part in the search or not: three of five may lie on
  * one car, which pulls the estimate of the others with it. If all agree, wheels that slip are likelier
- * than a scene that moves as one, and the covariance covers both (filter/consistency.h). */
+ * than a scene that moves as one, and the supervisor says what follows. */
 static bool has_support(const plr_search *s, const plr_search_point *open, plr_misfit misfit) {
     const plr_agreement all = count_agreement(s);
     unsigned with = 0, against = 0;
@@ -411,8 +410,8 @@ static bool is_astray(const plr_search *s) {
     return active >= MIN_ASTRAY && 4 * astray >= active;
 }
 
-void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
-                     float *nis) {
+void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may_exclude,
+                     plr_motion_first *first, float *nis) {
     plr_search s = {.f = f, .frame = frame, .sightings = (plr_sighting *)(void *)f->work.Vt};
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
@@ -434,23 +433,25 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && is_astray(&s); again++)
         plr_search_descend(&s, &best);
-    const bool in_doubt = first->found && !plr_votes_trust_twists(f);
-    const plr_misfit misfit = in_doubt ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
-    first->contradicted = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
+    const plr_misfit misfit =
+        first->found && may_exclude ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
+    first->outright = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
     first->found = first->found && plr_search_factorise(&best, 0, U);
     if (first->found)
         (void)plr_search_step(&best, U, dz);
     plr_motion_at(f, &s.prior, best.z, &first->motion);
-    const plr_real usual = plr_vantage_usual(f);
+    const plr_real usual = plr_linearisation_usual(f);
     for (unsigned i = 0; i < s.count; i++) {
-        const plr_real gain = judge(&s, i, first->found, U, dz, nis);
+        const plr_gate_result result = judge(&s, i, first->found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
-        const bool accepted = gain >= 0, lost = !accepted && went_astray(&s, i);
-        f->work.gain[slot - f->slots] = lost ? PLR_GAIN_LOST : gain;
+        const unsigned number = (unsigned)(slot - f->slots);
+        const bool accepted = result == PLR_GATE_ACCEPTED;
+        const bool lost = !accepted && went_astray(&s, i);
+        plr_gate_note(f, number, lost ? PLR_GATE_LOST : result, s.sightings[i].gain);
         if (lost) /* as if unseen: the frame does not correct it as it does others */
             slot->last_frame = f->frame_number - 1;
         if (accepted && !slot->known)
-            f->work.noise.range_shift[slot - f->slots] = plr_vantage_offset(
+            f->work.noise.range_shift[number] = plr_linearisation_offset(
                 slot, usual, s.sightings[i].range_change, s.sightings[i].range_variance);
     }
 }

@@ -15,13 +15,14 @@
 typedef struct plr_motion_first {
     plr_applied_motion motion; /* at the nu that was found, or at 0 */
     bool found;                /* false: too few observations; `motion` is the twists' */
-    bool contradicted;         /* the observations agree on a motion that the twists exclude, and
+    bool outright;             /* the observations agree on a motion that the twists exclude, and
                                   `motion` is that one, with a prior wide enough for it */
 } plr_motion_first;
 
-/* Finds nu and gates every matched observation: work.gain >= 0 if accepted, else as in gate.h.
- * Adds d^2 of the accepted ones to *nis. Call it before the motion is applied to landmarks and P. */
-void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
-                     float *nis);
+/* Finds nu and gates every matched observation (work.verdict and work.gain). `may_exclude`: a motion that
+ * the twists exclude may be found. Adds d^2 of the accepted ones to *nis. Call it before the motion is
+ * applied to landmarks and P. */
+void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may_exclude,
+                     plr_motion_first *first, float *nis);
 
 #endif

@@ -7,7 +7,7 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/habit.h"
+#include "process/statistics.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
@@ -197,8 +197,8 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     const plr_planned_step planned = plr_predict_plan(f, t_ns, reading);
     if (planned.status == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
         plr_real change2[2];
-        plr_habit_change(f, reading, change2);
-        plr_habit_learn(f, t_ns, reading, planned.interval, change2);
+        plr_statistics_change(f, reading, change2);
+        plr_statistics_learn(f, t_ns, reading, planned.interval, change2);
     }
     return plr_predict_accept(f, t_ns, reading, &planned);
 }

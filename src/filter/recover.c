@@ -3,7 +3,6 @@
  * has lost positivity, which does so at the pose that it has. */
 #include <string.h>
 
-#include "filter/consistency.h"
 #include "filter/filter_internal.h"
 #include "math/dense.h"
 #include "math/se3.h"
@@ -13,6 +12,7 @@
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/sensitivity.h"
+#include "supervise/supervise.h"
 
 static void pack(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]) {
     for (unsigned i = 0, at = 0; i < PLR_POSE_DIM; i++)
@@ -66,19 +66,18 @@ void plr_filter_propagate_recovery(plr_filter *f) {
     pack(f, carried);
 }
 
-void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE]) {
+void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], bool relocated) {
     double P_xi[PLR_POSE_SQUARE];
     pack(f, P);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] = (double)P[i];
     f->count = 0;
     f->totals.widened++;
-    f->frames_without_use = f->frames_mostly_gated = f->frames_off_the_map = 0;
+    f->frames_off_the_map = 0;
     f->work.noise.open = 0;
     plr_motion_clear(f);
     plr_covariance_begin(f, PLR_BLOCK_POSE, P_xi);
-    plr_consistency_clear(f);
-    plr_consistency_doubt(f);
+    plr_supervise_begun_anew(&f->supervisor, relocated);
     plr_filter_begin_velocity(f);
 }
 
@@ -100,11 +99,11 @@ void plr_filter_recover(plr_filter *f) {
     if (f->motion.pending)
         plr_filter_propagate_recovery(f);
     unpack(f, P);
-    plr_consistency_enlarge(f, P);
+    plr_supervise_enlarge(&f->supervisor, f->motion.E, f->motion.p, P);
     if (plr_sensitivity_is_finite(f))
         plr_sensitivity_add_to(f, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM, P);
     f->diverged = 0;
     f->totals.recoveries++;
-    plr_filter_begin_anew(f, P);
+    plr_filter_begin_anew(f, P, false);
     plr_filter_begin_prior_bias(f); /* what is known of them may be what has broken down */
 }

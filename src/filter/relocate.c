@@ -3,11 +3,12 @@
 
 #include <string.h>
 
-#include "filter/consistency.h"
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
+#include "filter/gate.h"
 #include "filter/matching.h"
-#include "filter/placing.h"
+#include "known_map/lookup.h"
+#include "known_map/placing.h"
 #include "filter/predict.h"
 #include "math/dense.h"
 #include "math/se3.h"
@@ -21,6 +22,7 @@
 #include "state/pose.h"
 #include "state/sensitivity.h"
 #include "state/slots.h"
+#include "supervise/supervise.h"
 
 enum { OFF_FRAMES = 10 }; /* successive frames, as for a locked gate */
 
@@ -46,14 +48,14 @@ enum { STEPS = 3 };
 
 void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
-    if (!plr_match_asks_map(f))
+    if (!plr_map_is_asked(f))
         return;
     for (unsigned k = 0; k < n; k++) {
         const uint16_t slot = f->work.slot_of[k];
         if (slot == PLR_NO_SLOT || !f->slots[slot].known)
             continue;
         seen++;
-        off += f->work.gain[slot] < 0;
+        off += !plr_gate_accepted(f, slot);
     }
     if (seen < 2)
         return; /* says nothing */
@@ -78,7 +80,7 @@ static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
         plr_landmark known;
         if (new_ones_alone && (slot == PLR_NO_SLOT || !has_just_come_in(f, slot)))
             continue;
-        if (!plr_match_ask_map(f, o->id, &known))
+        if (!plr_map_ask(f, o->id, &known))
             continue;
         if (count == 0)
             memcpy(origin, known.p_W_m, sizeof known.p_W_m);
@@ -179,36 +181,35 @@ static void take_up(plr_filter *f, const plr_frame *frame, const plr_seen_known 
         const uint32_t id = frame->observations[f->work.order[seen[i].k]].id;
         plr_landmark known;
         plr_new_landmark landmark;
-        if (seen[i].agrees && f->count < f->config.slots && plr_match_ask_map(f, id, &known) &&
+        if (seen[i].agrees && f->count < f->config.slots && plr_map_ask(f, id, &known) &&
             plr_model_of(f)->adopt(f, &known, &landmark))
             plr_slots_append(f, id, true, &landmark);
     }
 }
 
 static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose *found) {
-    const bool again = f->consistency.relocated;
+    const bool again = plr_supervise_was_relocated(&f->supervisor);
     plr_real P[PLR_POSE_SQUARE];
     memcpy(f->R_WB, found->R_WB, sizeof f->R_WB);
     memcpy(f->p_WB, found->p_WB, sizeof f->p_WB);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P[i] = WIDER * found->P_xi[i];
-    plr_filter_begin_anew(f, P);
+    plr_filter_begin_anew(f, P, true);
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
         plr_filter_begin_prior_bias(f);
-    f->consistency.relocated = 1;
     plr_alignment_keep_world(f);
     take_up(f, frame, seen_in(f), found->count);
 }
 
-bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n) {
+bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
+                            plr_frame_events *events) {
     plr_found_pose found;
-    if (f->frames_off_the_map < OFF_FRAMES || !plr_match_asks_map(f))
+    if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(f))
         return false;
     f->frames_off_the_map = 0;
-    if (!find_pose(f, frame, n, false, &found)) {
-        plr_consistency_doubt(f);
+    events->lost_in_map = !find_pose(f, frame, n, false, &found);
+    if (events->lost_in_map)
         return false;
-    }
     begin_at(f, frame, &found);
     return true;
 }
@@ -234,11 +235,11 @@ static bool slot_is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE]
 /* Known landmarks that the caller has inserted stay: they would not come in again. */
 static bool is_in_map(const plr_filter *f, unsigned slot) {
     plr_landmark known;
-    return f->slots[slot].known && plr_match_ask_map(f, f->slots[slot].id, &known);
+    return f->slots[slot].known && plr_map_ask(f, f->slots[slot].id, &known);
 }
 
 void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
-    if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f))
+    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
         return;
     for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
         if (slot_is_rough(f, C, slot) && is_in_map(f, slot))
@@ -346,7 +347,8 @@ static bool is_far(const plr_pose_gap *gap) {
  * believed of the pose was wrong, and tells nothing of biases and velocity. P_wide: of a pose that
  * replaces the present one. */
 static plr_relocation go_to(plr_filter *f, const plr_found_pose *found, const plr_pose_gap *gap,
-                            bool replaces, const plr_real P_wide[PLR_POSE_SQUARE]) {
+                            bool replaces, const plr_real P_wide[PLR_POSE_SQUARE],
+                            plr_frame_events *events) {
     if (replaces || is_far(gap))
         replace_pose(f, found, P_wide);
     else
@@ -354,8 +356,10 @@ static plr_relocation go_to(plr_filter *f, const plr_found_pose *found, const pl
     if (!is_far(gap))
         return PLR_MOVED;
     f->totals.widened++;
-    plr_consistency_cover(f, gap->xi, gap->nu, PLR_POSE_DIM);
-    return PLR_MOVED_FAR;
+    events->moved_far = true;
+    memcpy(events->far_xi, gap->xi, sizeof events->far_xi);
+    memcpy(events->far_nu, gap->nu, sizeof events->far_nu);
+    return PLR_MOVED;
 }
 
 /* False of a pose that is known exactly along an axis: there is no moving it. */
@@ -372,12 +376,13 @@ static bool is_told_by_frame(plr_filter *f, const plr_frame *frame, unsigned n,
            !(gap->least < WIDE_ENOUGH);
 }
 
-plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n) {
+plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n,
+                                           plr_frame_events *events) {
     plr_found_pose found;
     plr_pose_gap gap;
     plr_real P[PLR_POSE_SQUARE];
     unsigned new_ones;
-    if (f->config.model != PLR_MODEL_BODY || !plr_match_asks_map(f))
+    if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
         return PLR_PLACED;
     const unsigned rough = count_rough(f, n, &new_ones);
     if (rough >= PLR_PLACING_LEAST && is_told_by_frame(f, frame, n, &found, &gap)) {
@@ -385,17 +390,16 @@ plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame
             P[i] = WIDER * found.P_xi[i];
         drop_known(f, false);
         plr_predict_apply_prior(f);
-        return go_to(f, &found, &gap, gap.largest > TOO_WIDE, P);
+        return go_to(f, &found, &gap, gap.largest > TOO_WIDE, P, events);
     }
     plr_motion_pose_covariance(f, P);
     if (new_ones == 0 || !is_regular(P))
         return PLR_PLACED;
     const bool tells = find_likeliest(f, frame, n, &found) && measure_gap(f, &found, &gap);
     drop_known(f, true);
-    if (!tells) {
-        plr_consistency_doubt(f);
+    events->lost_in_map = !tells;
+    if (!tells)
         return PLR_LEFT_OUT;
-    }
     plr_predict_apply_prior(f);
-    return go_to(f, &found, &gap, false, P);
+    return go_to(f, &found, &gap, false, P, events);
 }

@@ -19,15 +19,15 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced);
  * begins anew at that pose with these landmarks and returns true; the others come in with the next
  * frame. The pose's sigmas are ten times those that the frame tells, until the update with this
  * frame. If it comes to that again before the pose is out of doubt, an IMU's biases begin at their
- * prior, too. (Twists that are wrong would teach theirs.) If no pose is found, the present one is
- * doubted. Works in work.Vt. */
-bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n);
+ * prior, too. (Twists that are wrong would teach theirs.) If no pose is found,
+ * events->lost_in_map. Works in work.Vt. */
+bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
+                            plr_frame_events *events);
 
 typedef enum plr_relocation {
     PLR_PLACED,    /* nothing was changed */
     PLR_MOVED,     /* known landmarks have been dropped, and are to come in again */
-    PLR_MOVED_FAR, /* the same, and the pose was further off than its covariance says */
-    PLR_LEFT_OUT /* those that had just come in have been dropped: no pose fits them. It is in doubt */
+    PLR_LEFT_OUT /* those that had just come in have been dropped: no pose fits them */
 } plr_relocation;
 
 /* Where the pose is uncertain: known landmarks in sight have come in at a pose, or been moved by
@@ -35,9 +35,10 @@ typedef enum plr_relocation {
  * to the pose that the frame tells, so that they are linearised there: if four tell more about each
  * axis of the pose than was known, by the frame alone, else by those that have just come in and
  * what was known (if no pose fits, they are left out of this frame). P is not reduced by it, and
- * the frame is used as any other. If the pose was too far off, both poses are covered
- * (plr_consistency_cover). Works in work.Vt. */
-plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n);
+ * the frame is used as any other. events->moved_far if the pose was further off than its covariance
+ * says. Works in work.Vt. */
+plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame, unsigned n,
+                                           plr_frame_events *events);
 
 /* The pose's covariance has been enlarged by C. What known landmarks say about the pose has been
  * used already, so those that stay in the state would not reduce it again. Removes those whose

@@ -4,12 +4,12 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/mount.h"
-#include "filter/votes.h"
+#include "filter/extrinsics.h"
 #include "math/finite.h"
 #include "process/alignment.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
+#include "supervise/supervise.h"
 
 static plr_status check_moved(const plr_filter *f, const double *P_moved) {
     if (!f->clock_started || (P_moved && f->config.mode == PLR_MODE_MAPPING))
@@ -33,8 +33,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     plr_alignment_follow_clock(f, t_ns);
     f->t_ns = t_ns;
     plr_filter_forget_reading(f); /* an earlier one is not valid any more */
-    f->last_frame_ns = f->last_use_ns = f->last_position_ns = PLR_NEVER_NS;
-    plr_votes_clear(f);                         /* the body may have been carried */
+    plr_supervise_clock_set(&f->supervisor);
     if (plr_has_block(f, PLR_BLOCK_VELOCITY)) { /* it is not what it was then */
         const plr_real v = f->par.start_velocity_variance, variance[3] = {v, v, v};
         memset(f->inertial.velocity, 0, sizeof f->inertial.velocity);
@@ -48,7 +47,7 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
     }
     double P[PLR_POSE_SQUARE];
     memcpy(P, P_moved, sizeof P);
-    plr_mount_covariance_in(f, P);
+    plr_extrinsics_covariance_in(f, P);
     /* T = T^ Exp(n) with n ~ N(0, P_moved): a step without motion, all noise */
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j < PLR_POSE_DIM; j++)

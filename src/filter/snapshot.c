@@ -8,15 +8,15 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/readings.h"
 #include "process/velocity.h"
 #include "record/codec.h"
 #include "state/covariance.h"
+#include "supervise/supervise.h"
 
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 10 };
+enum { STATE_VERSION = 11 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -247,8 +247,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         f->diverged = 0;
         plr_velocity_forget(f); /* their clock is not the one that goes on */
         memset(f->slots, 0, sizeof f->slots);
-        plr_readings_clear(f);
-        f->last_position_ns = PLR_NEVER_NS;
+        plr_supervise_restored(&f->supervisor);
     }
     for (unsigned slot = 0; slot < count.landmarks && status == PLR_OK; slot++)
         status = read_slot(c, f, like, slot);

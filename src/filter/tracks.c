@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "filter/tracks.h"
 
-#include "filter/gate.h"
 #include "math/small.h"
 
 enum {
@@ -27,11 +26,11 @@ void plr_track_add(plr_slot *slot, const plr_real e[3]) {
         slot->moving = 1;
 }
 
-void plr_track_count(plr_slot *slot, plr_real gain) {
-    const bool rejected = gain < 0;
+void plr_track_count(plr_slot *slot, plr_gate_result result) {
+    const bool rejected = result != PLR_GATE_ACCEPTED;
     slot->times_gated += rejected;
     slot->accepted = (uint16_t)(slot->accepted + (!rejected && slot->accepted < UINT16_MAX));
-    if (gain == PLR_GAIN_FAR)
+    if (result == PLR_GATE_FAR)
         slot->accepted = 0;
     slot->rejected = rejected ? (uint16_t)(slot->rejected + (slot->rejected < UINT16_MAX)) : 0;
 }

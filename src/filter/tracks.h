@@ -10,6 +10,7 @@
 
 #include <stdbool.h>
 
+#include "filter/gate.h"
 #include "pelorus/state.h"
 
 /* Adds the whitened innovation e, 3 rows, of an accepted observation, predicted from all other
@@ -17,10 +18,10 @@
  * point moves. */
 void plr_track_add(plr_slot *slot, const plr_real e[3]);
 
-/* Counts a frame that matched the landmark; `gain`: the gate's result (gate.h). A landmark that is far off
+/* Counts a frame that matched the landmark. A landmark that is far off
  * was not good: its track was lost, and goes on at another point. One whose point begins to move is off by
  * little at first. */
-void plr_track_count(plr_slot *slot, plr_real gain);
+void plr_track_count(plr_slot *slot, plr_gate_result result);
 
 /* True if the landmark was rejected in so many successive frames that its position may be wrong: it
  * was initialised from an outlier, or its point has moved and is at rest again. */

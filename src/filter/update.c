@@ -8,22 +8,18 @@
 
 #include "filter/births.h"
 #include "filter/considered_bias.h"
-#include "filter/consistency.h"
 #include "filter/correction.h"
+#include "filter/evidence.h"
 #include "filter/filter_internal.h"
-#include "filter/frozen.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
-#include "filter/health.h"
 #include "filter/inertial.h"
-#include "filter/map_check.h"
 #include "filter/matching.h"
 #include "filter/measure.h"
 #include "filter/motion_first.h"
 #include "filter/predict.h"
 #include "filter/relocate.h"
 #include "filter/tracks.h"
-#include "filter/votes.h"
 #include "math/order.h"
 #include "math/small.h"
 #include "process/alignment.h"
@@ -37,6 +33,7 @@
 #include "state/pose.h"
 #include "state/seconds.h"
 #include "state/slots.h"
+#include "supervise/supervise.h"
 
 /* ---------------------------------------------------------------- gate and budget */
 
@@ -61,8 +58,8 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         if (slot == PLR_NO_SLOT)
             continue;
         report->matched++;
-        plr_track_count(&f->slots[slot], w->gain[slot]);
-        if (w->gain[slot] < 0) {
+        plr_track_count(&f->slots[slot], (plr_gate_result)w->verdict[slot]);
+        if (!plr_gate_accepted(f, slot)) {
             report->gated++;
             if (f->slots[slot].rejected > 1)
                 report->gated_again++;
@@ -78,8 +75,8 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
     return frame->budget;
 }
 
-/* Fills work.gain by each observation's own prediction, when the motion has been applied
- * already, and keeps the measurements. */
+/* Gates each observation by its own prediction, when the motion has been applied already, and keeps the
+ * measurements. */
 static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report) {
     plr_workspace *w = &f->work;
     for (unsigned k = 0; k < n; k++) {
@@ -92,7 +89,9 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
             verdict = plr_gate_judge(f, &m);
             plr_measurement_keep(f, slot, &m);
         }
-        w->gain[slot] = verdict.accepted ? verdict.gain : plr_gate_rejection(verdict.d2);
+        plr_gate_note(f, slot,
+                      verdict.accepted ? PLR_GATE_ACCEPTED : plr_gate_rejection(verdict.d2),
+                      verdict.gain);
         report->nis += verdict.accepted ? (float)verdict.d2 : 0;
     }
 }
@@ -104,7 +103,7 @@ static void gate_each(plr_filter *f, const plr_frame *frame, unsigned n, plr_rep
 static bool needs_motion_applied(const plr_filter *f, const plr_frame *frame, unsigned n) {
     for (unsigned k = 0; k < n; k++) {
         const uint16_t slot = f->work.slot_of[k];
-        const bool used = slot != PLR_NO_SLOT && f->work.gain[slot] >= 0;
+        const bool used = slot != PLR_NO_SLOT && plr_gate_accepted(f, slot);
         const bool born = slot == PLR_NO_SLOT && plr_births_are_allowed(f) &&
                           plr_stereo_makes_landmark(f, &frame->observations[f->work.order[k]]);
         if (used || born)
@@ -124,36 +123,51 @@ static void measure_used(plr_filter *f, const plr_frame *frame, unsigned used) {
     }
 }
 
-/* Finds the motion and judges the observations by it; `believed` is what the twists say. False if the
- * frame does not need it: it goes on accumulating, with the original Q. */
-static bool find_motion(plr_filter *f, const plr_frame *frame, unsigned n, plr_report *report,
-                        plr_applied_motion *believed, plr_motion_first *first) {
-    plr_real Q[PLR_POSE_SQUARE];
-    memcpy(Q, f->motion.Q, sizeof Q);
-    plr_consistency_widen(f, believed);
-    plr_motion_find(f, frame, n, first, &report->nis);
-    if (needs_motion_applied(f, frame, n))
-        return true;
-    memcpy(f->motion.Q, Q, sizeof Q);
-    return false;
+/* The gate's counts, for the supervisor. */
+static plr_search_decision ask_after_search(plr_filter *f, unsigned n, bool outright) {
+    plr_search_evidence e = {0, 0, outright};
+    for (unsigned k = 0; k < n; k++)
+        if (f->work.slot_of[k] != PLR_NO_SLOT) {
+            e.matched++;
+            e.gated += !plr_gate_accepted(f, f->work.slot_of[k]);
+        }
+    return plr_supervise_search(&f->supervisor, &e);
 }
 
-/* Finds the motion, judges the observations by it, and corrects. */
+/* Q <- W Q W: the odometry's sigmas as the supervisor weighs them. */
+static void weigh_odometry(plr_filter *f) {
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++)
+            f->motion.Q[PLR_POSE_DIM * i + j] *= plr_supervise_weight(&f->supervisor, i) *
+                                                 plr_supervise_weight(&f->supervisor, j);
+}
+
+/* Finds the motion, judges the observations by it, and corrects. A frame that needs no motion applied, or
+ * that waits for the next one, leaves it accumulating with the original Q. */
 static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsigned n,
-                                   plr_report *report) {
-    plr_applied_motion believed;
+                                   plr_search_decision *decision, plr_report *report) {
     plr_motion_first first;
     plr_considered_bias before;
     plr_correction correction = {0};
-    plr_real R_WB[9], moved[PLR_POSE_DIM]; /* the pose by twists */
-    double p_WB[3];
-    memcpy(R_WB, f->R_WB, sizeof R_WB);
-    memcpy(p_WB, f->p_WB, sizeof p_WB);
-    if (!find_motion(f, frame, n, report, &believed, &first)) {
-        (void)choose(f, frame, n, report);
+    plr_applied_motion stated;
+    plr_evidence_pose by_odometry;
+    plr_real Q[PLR_POSE_SQUARE];
+    memcpy(Q, f->motion.Q, sizeof Q);
+    plr_motion_prior(f, &stated);
+    plr_evidence_note_pose(f, &by_odometry);
+    if (plr_supervise_weight(&f->supervisor, 0) > 1)
+        weigh_odometry(f);
+    plr_motion_find(f, frame, n, plr_supervise_may_exclude_odometry(&f->supervisor), &first,
+                    &report->nis);
+    *decision = ask_after_search(f, n, first.outright);
+    if (decision->wait || !needs_motion_applied(f, frame, n)) {
+        memcpy(f->motion.Q, Q, sizeof Q);
+        report->nis = decision->wait ? 0 : report->nis;
+        if (!decision->wait)
+            (void)choose(f, frame, n, report);
         return correction;
     }
-    plr_bias_consider(f, believed.L, first.contradicted, &before);
+    plr_bias_consider(f, decision->hold_biases, &before);
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
@@ -163,32 +177,28 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     if (f->diverged)
         return correction;
     plr_bias_restore(f, &before);
-    if (correction.moved) {
-        plr_pose_moved_from(f, R_WB, p_WB, moved);
-        plr_consistency_add(f, &believed, &first.motion, correction.nu, correction.Lambda, moved,
-                            before.considered ? before.of_nu : NULL, first.contradicted);
-        if (plr_votes_add(f, frame, n, &believed, &first.motion, &correction, moved))
-            plr_consistency_trust_twists(f);
-    }
+    if (correction.moved)
+        plr_evidence_of_motion(f, &by_odometry, &stated, &first, &correction);
     return correction;
 }
 
 /* The motion is known exactly, or is not searched for: predict, gate, correct. */
 static plr_correction motion_as_given(plr_filter *f, const plr_frame *frame, unsigned n,
-                                      plr_report *report) {
+                                      plr_search_decision *decision, plr_report *report) {
     const plr_correction none = {0};
     plr_predict_apply_pending(f);
     if (f->diverged)
         return none;
     gate_each(f, frame, n, report);
+    *decision = ask_after_search(f, n, false);
     return plr_correct(f, choose(f, frame, n, report), NULL, 0);
 }
 
 /* Since the last frame the tracks have wandered off their points. */
 static void let_tracks_drift(plr_filter *f) {
-    if (f->last_frame_ns == PLR_NEVER_NS || !(f->par.track_drift > 0))
+    if (f->supervisor.last_frame_ns == PLR_NEVER_NS || !(f->par.track_drift > 0))
         return;
-    const plr_real seconds = plr_seconds(f->t_ns - f->last_frame_ns);
+    const plr_real seconds = plr_seconds(f->t_ns - f->supervisor.last_frame_ns);
     plr_model_of(f)->drift(f, PLR_SQRT(f->par.track_drift * seconds));
 }
 
@@ -196,7 +206,7 @@ static void let_tracks_drift(plr_filter *f) {
 static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
                           plr_frame_events *events, plr_report *report) {
     const plr_observation *seen = frame->observations;
-    events->relocated = events->left_out = plr_relocate_when_lost(f, frame, n);
+    events->relocated = events->left_out = plr_relocate_when_lost(f, frame, n, events);
     if (events->relocated) {
         report->created = (uint16_t)f->count;
         plr_match_slots(f, seen, n);
@@ -205,7 +215,7 @@ static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
     plr_match_known(f, seen, n, events, report);
     events->left_out = events->unplaced > 0;
     const unsigned came_in = events->adopted;
-    const plr_relocation found = plr_relocate_when_uncertain(f, frame, n);
+    const plr_relocation found = plr_relocate_when_uncertain(f, frame, n, events);
     if (came_in > 0 && found != PLR_LEFT_OUT)
         plr_alignment_keep_world(f);
     if (found == PLR_PLACED)
@@ -219,50 +229,73 @@ static void take_up_known(plr_filter *f, const plr_frame *frame, unsigned n,
     } else if (!f->diverged) {
         plr_match_known(f, seen, n, events, report);
     }
-    events->map_disagrees = found == PLR_MOVED_FAR;
     events->adopted = 0; /* the pose has been held against the map already */
 }
 
 /* Corrects by the observations, and fills the report with how. */
-static void correct(plr_filter *f, const plr_frame *frame, unsigned n, plr_frame_events *events,
-                    plr_report *report) {
+static void correct(plr_filter *f, const plr_frame *frame, unsigned n,
+                    plr_search_decision *decision, plr_report *report) {
     const bool finds = f->motion.pending && f->motion.noisy && f->config.model == PLR_MODEL_BODY;
-    plr_map_check_pose before;
-    const bool attends = plr_map_check_begin(f, events->adopted, n, &before);
-    const plr_correction correction =
-        finds ? motion_first(f, frame, n, report) : motion_as_given(f, frame, n, report);
+    plr_evidence_pose before;
+    const bool sees_map = plr_evidence_before_map(f, n, &before);
+    const plr_correction correction = finds ? motion_first(f, frame, n, decision, report)
+                                            : motion_as_given(f, frame, n, decision, report);
     report->used = (uint16_t)correction.applied;
     report->blocks_failed = (uint16_t)correction.failed_batches;
     report->innovation_rows = (uint16_t)correction.innovation.rows;
     report->innovation_d2 = (float)correction.innovation.d2;
     report->innovation_log_det = (float)correction.innovation.log_det;
     report->nis_dof = (uint16_t)(4 * (report->matched - report->gated));
-    events->cut = correction.cut;
-    if (attends && !f->diverged && plr_map_check_end(f, &before))
-        events->map_disagrees = true;
+    f->work.evidence.events.cut = correction.cut;
+    if (sees_map && !f->diverged)
+        plr_evidence_after_map(f, &before);
 }
 
 /* After the correction: a lock is undone, and landmarks begin. */
 static void renew_landmarks(plr_filter *f, const plr_frame *frame, unsigned n,
-                            plr_frame_events *events, plr_report *report) {
+                            const plr_search_decision *decision, plr_report *report) {
+    plr_frame_events *events = &f->work.evidence.events;
     plr_relocate_watch(f, n, events->unplaced);
-    events->locked = plr_health_gate_is_locked(f, report);
-    if (events->locked) {
+    if (decision->drop_rejected) {
+        events->locked = true;
+        f->totals.locks++;
         plr_predict_apply_prior(f);
         plr_births_drop_rejected(f, frame, n);
-    } else {
+    } else if (!decision->wait) {
         plr_births_restart(f, frame, n, report);
     }
-    plr_births_from_unmatched(f, frame, n, events, report);
+    plr_births_from_unmatched(f, frame, n, decision->make_none, events, report);
+}
+
+/* What the supervisor has decided on the frame. */
+static void carry_out(plr_filter *f, plr_report *report) {
+    plr_frame_decision decision;
+    plr_evidence_complete(f);
+    plr_supervise_frame(&f->supervisor, &f->work.evidence, report, &decision);
+    report->health = decision.health;
+    report->reasons = decision.reasons;
+    f->totals.contradictions += decision.contradicted_now;
+    f->totals.range_limited += f->work.evidence.events.cut;
+    if (report->used > 0)
+        plr_filter_store_for_recovery(f);
+    if (!decision.covers)
+        return;
+    plr_covariance_add(f, PLR_BLOCK_POSE, decision.cover);
+    plr_relocate_let_go(f, decision.cover);
+    f->totals.widened++;
 }
 
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
-    plr_frame_events events = {0};
+    plr_frame_events *events = &f->work.evidence.events;
+    plr_search_decision decision = {false, false, false, false};
+    plr_evidence_begin(f);
     unsigned n = plr_match_in_order(f, frame, report);
     plr_match_slots(f, frame->observations, n);
-    const bool frozen = f->config.model == PLR_MODEL_BODY && plr_frozen_is_seen(f, frame, n);
+    plr_evidence_of_picture(f, frame, n);
+    const bool frozen = f->config.model == PLR_MODEL_BODY &&
+                        !plr_supervise_picture(&f->supervisor, &f->work.evidence.picture);
     if (!frozen)
-        take_up_known(f, frame, n, &events, report);
+        take_up_known(f, frame, n, events, report);
     const unsigned matched = n;
     let_tracks_drift(f);
     if (frozen)
@@ -273,27 +306,28 @@ static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     const bool is_state = plr_process_of(f)->measure != NULL;
     if (stands && !is_state)
         (void)plr_measure_twist(f, &still, &unused);
-    correct(f, frame, n, &events, report);
+    correct(f, frame, n, &decision, report);
     plr_match_count(f, matched);
     if (!f->diverged)
-        renew_landmarks(f, frame, n, &events, report);
+        renew_landmarks(f, frame, n, &decision, report);
     if (f->diverged) {
         plr_filter_recover(f);
-        events.recovered = true;
+        events->recovered = true;
         plr_match_slots(f, frame->observations, n);
-        plr_births_from_unmatched(f, frame, n, &events, report);
+        plr_births_from_unmatched(f, frame, n, false, events, report);
     } else if (stands && is_state) {
         (void)plr_measure_twist(f, &still, &unused);
     }
     plr_filter_follow_start(f, report);
-    plr_health_judge(f, &events, report);
+    carry_out(f, report);
 }
 
 /* Before an IMU's start nothing moves; the pictures only say whether the body stands. */
 static void wait_for_start(plr_filter *f, const plr_frame *frame, plr_report *report) {
     const unsigned n = plr_match_in_order(f, frame, report);
     plr_filter_watch_start(f, frame, n);
-    plr_health_waits(f, report);
+    const plr_readings_evidence now = plr_filter_readings_at(f, f->t_ns);
+    plr_supervise_waits(&f->supervisor, &now, report);
 }
 
 /* Checks the frame's time and the mode. */
@@ -325,6 +359,26 @@ static void dead_reckon(plr_filter *f) {
         plr_filter_recover(f);
 }
 
+static void count(plr_filter *f, const plr_report *report) {
+    plr_totals *t = &f->totals;
+    t->blocks_failed += report->blocks_failed;
+    t->observations += report->observations;
+    t->matched += report->matched;
+    t->used += report->used;
+    t->gated += report->gated;
+    t->created += report->created;
+    t->evicted += report->evicted;
+}
+
+static plr_status refuse_damaged(plr_filter *f, plr_report *report) {
+    if (report->status == PLR_E_DAMAGED) {
+        f->totals.damaged++; /* the sums stay wrong */
+        report->health = PLR_HEALTH_DIVERGED;
+        report->reasons = PLR_REASON_STATE_DAMAGED;
+    }
+    return report->status;
+}
+
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_report scratch;
     plr_report *r = report ? report : &scratch;
@@ -335,15 +389,14 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     r->budget = frame->budget;
     r->observations = frame->count;
     r->status = plr_guard_check_whole(f);
-    if (r->status == PLR_E_DAMAGED)
-        plr_health_damaged(f, r);
     if (r->status != PLR_OK)
-        return r->status;
+        return refuse_damaged(f, r);
     r->status = check(f, frame);
     if (r->status != PLR_OK) {
         f->totals.frames_refused++;
         (void)plr_filter_refuse(f, r->status);
-        plr_health_after_refusal(f, r);
+        plr_supervise_refused(&f->supervisor, r);
+        r->active = (uint16_t)f->count;
         return r->status;
     }
     plr_predict_to(f, frame->t_ns);
@@ -355,10 +408,14 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
         process(f, frame, r);
     } else {
         dead_reckon(f);
-        plr_health_dead_reckons(f);
+        const plr_readings_evidence now = plr_filter_readings_at(f, f->t_ns);
+        plr_supervise_dead_reckons(&f->supervisor, &now);
     }
+    if (!(f->supervisor.reasons & PLR_REASON_NO_TWISTS) &&
+        f->inertial.fault >= PLR_IMU_FAULT_SATURATED)
+        f->inertial.fault = PLR_IMU_FAULT_NONE; /* readings come again */
     r->active = (uint16_t)f->count;
-    plr_health_count(f, r);
+    count(f, r);
     plr_guard_seal_whole(f);
     return r->status;
 }

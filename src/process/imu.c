@@ -165,7 +165,7 @@ static void transition(const plr_imu_step *s, plr_real F[MOVED * DIM]) {
 /* The derivatives of the whole motion by the drivers: B of its error n, V of the velocity. */
 static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
                                    const plr_real F[MOVED * DIM]) {
-    plr_real *B = f->motion.B, *V = f->own.core_motion.V, tau = s->tau;
+    plr_real *B = f->motion.B, *V = f->core_motion.V, tau = s->tau;
     plr_real theta[3 * D] = {0}, way[3 * D], speed[3 * D], cross[3];
     for (unsigned i = 0; i < 3; i++) { /* theta now by the drivers: R_D^T theta + B_theta */
         memcpy(theta + D * i, B + D * (THETA + i), D * sizeof *B);
@@ -200,7 +200,7 @@ static void accumulate_derivatives(plr_filter *f, const plr_imu_step *s,
 
 /* The covariance of the motion's noise: of n, velocity and biases together, 15 x 15. */
 static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
-    const plr_core_motion *m = &f->own.core_motion;
+    const plr_core_motion *m = &f->core_motion;
     for (unsigned i = 0; i < VEL; i++) {
         memcpy(Q + DIM * i, f->motion.Q + PLR_POSE_DIM * i, PLR_POSE_DIM * sizeof *Q);
         memcpy(Q + DIM * i + VEL, m->Q_nc + PLR_REST_DIM * i, PLR_REST_DIM * sizeof *Q);
@@ -214,7 +214,7 @@ static void get_noise(const plr_filter *f, plr_real Q[DIM * DIM]) {
 }
 
 static void put_noise(plr_filter *f, const plr_real Q[DIM * DIM]) {
-    plr_core_motion *m = &f->own.core_motion;
+    plr_core_motion *m = &f->core_motion;
     for (unsigned i = 0; i < VEL; i++) {
         memcpy(f->motion.Q + PLR_POSE_DIM * i, Q + DIM * i, PLR_POSE_DIM * sizeof *Q);
         memcpy(m->Q_nc + PLR_REST_DIM * i, Q + DIM * i + VEL, PLR_REST_DIM * sizeof *Q);
@@ -325,7 +325,7 @@ static void move_noise(plr_filter *f, const plr_real F[MOVED * DIM], plr_real ta
     reading[1] /= tau;
     transport_noise(f, F, reading);
     for (unsigned i = ACCEL - VEL; i < PLR_REST_DIM; i++) {
-        plr_real *q = &f->own.core_motion.Q_cc[(PLR_REST_DIM + 1) * i];
+        plr_real *q = &f->core_motion.Q_cc[(PLR_REST_DIM + 1) * i];
         *q = PLR_FMA(i < GYRO - VEL ? f->par.accel_walk : f->par.gyro_walk, tau, *q);
     }
 }
@@ -386,7 +386,7 @@ static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DI
 /* ---------------------------------------------------------------- the estimate */
 
 static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
-    const plr_real *Q = f->own.core_motion.Q_cc;
+    const plr_real *Q = f->core_motion.Q_cc;
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
@@ -397,7 +397,7 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) 
 /* v with its covariance now, and w = w_m - b_g, correlated by the gyro's bias. */
 static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
     enum { V = PLR_VELOCITY_DIM };
-    const plr_core_motion *m = &f->own.core_motion;
+    const plr_core_motion *m = &f->core_motion;
     plr_real P_dd[D * D], VP[V * D] = {0}, P_vv[V * V] = {0}, P_b[PLR_POSE_SQUARE];
     for (unsigned i = 0; i < V; i++) {
         u[i] = f->inertial.velocity[i];

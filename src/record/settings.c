@@ -13,6 +13,7 @@ static const char *const noise_words[] = {"twist", "step", NULL};
 static const char *const prior_words[] = {"correlated", "independent", NULL};
 static const char *const process_words[] = {"twist", "imu", NULL};
 static const char *const imu_start_words[] = {"auto", "rest", "motion", "given", NULL};
+static const char *const scene_words[] = {"stands", "may-move", NULL};
 static const char *const switch_words[] = {"off", "on", NULL};
 
 /* How a field of plr_config is stored. */
@@ -86,6 +87,7 @@ static const plr_row rows[] = {
     {{52, "baseline-sigma", "", "the same of the baseline", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0.005}, AT(baseline_sigma), STORE_DOUBLE},
     {{53, "camera-turn-sigma", "rad", "by how much the camera may be turned on the body; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.2, 0.003}, AT(camera_turn_sigma_rad), STORE_DOUBLE},
     {{54, "track-drift", "px/sqrt(s)", "how far tracks wander off their points in a second", PLR_SETTING_NUMBER, NULL, 0, 100, 0}, AT(track_drift_px), STORE_DOUBLE},
+    {{55, "scene", "", "may most of what is seen move as one?", PLR_SETTING_CHOICE, scene_words, 0, 1, PLR_SCENE_STANDS}, AT(scene), STORE_U8},
 };
 /* clang-format on */
 

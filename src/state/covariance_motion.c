@@ -154,7 +154,7 @@ static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsig
  * V is by the drivers as they stand in P. */
 static void carry_core_covariance(plr_filter *f, const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS]) {
     enum { D = PLR_DRIVERS, C = PLR_VELOCITY_DIM };
-    const plr_core_motion *m = &f->own.core_motion;
+    const plr_core_motion *m = &f->core_motion;
     const unsigned n = plr_covariance_dim(f), first = f->layout.driver;
     const unsigned velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
     plr_real P_xd[PLR_CORE_DIM * D], VP[C * PLR_CORE_DIM] = {0}, P_vv[C * C] = {0};
@@ -181,8 +181,8 @@ static void carry_core_covariance(plr_filter *f, const plr_real V[PLR_VELOCITY_D
 void plr_covariance_carry_core(plr_filter *f) {
     if (!plr_has_block(f, PLR_BLOCK_VELOCITY))
         return;
-    carry_core_covariance(f, f->own.core_motion.V);
-    plr_sensitivity_carry_velocity(f, f->own.core_motion.V);
+    carry_core_covariance(f, f->core_motion.V);
+    plr_sensitivity_carry_velocity(f, f->core_motion.V);
 }
 
 /* The same but for S, and the rows of velocity and biases in Vt, their covariance with nu, which
@@ -192,7 +192,7 @@ static void carry_core(plr_filter *f, const plr_applied_motion *motion,
     const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
     plr_real X[PLR_POSE_DIM * PLR_REST_DIM];
     carry_core_covariance(f, V);
-    memcpy(X, f->own.core_motion.Q_nc, sizeof X);
+    memcpy(X, f->core_motion.Q_nc, sizeof X);
     plr_motion_solve(motion->L, PLR_REST_DIM, X, PLR_REST_DIM);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real *row = Vt + k * ld, v[PLR_VELOCITY_DIM] = {0};
@@ -225,7 +225,7 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
     drivers_after_motion(f, motion->E, PLR_POSE_DIM, K);
     plr_motion_transpose(K, Kt);
     if (carries) {
-        memcpy(V, f->own.core_motion.V, sizeof V);
+        memcpy(V, f->core_motion.V, sizeof V);
         drivers_after_motion(f, motion->E, PLR_VELOCITY_DIM, V);
     }
     plr_sensitivity_move(f, K, carries ? V : NULL, noise->Wt, ld);

@@ -117,7 +117,7 @@ static void fill_W(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE], plr_real *
     }
 }
 
-/* Moves a landmark along its ray to its linearisation point (filter/vantage.h). The estimate does
+/* Moves a landmark along its ray to its linearisation point (filter/linearisation.h). The estimate does
  * not change: returns the estimated inverse range minus that of the point, 1/m. */
 static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
     plr_slot *s = &f->slots[slot];

@@ -13,9 +13,9 @@ void plr_motion_clear(plr_filter *f) {
     if (!plr_has_block(f, PLR_BLOCK_VELOCITY))
         return;
     const unsigned own = plr_row_of(f, PLR_BLOCK_VELOCITY) - f->layout.driver;
-    memset(&f->own.core_motion, 0, sizeof f->own.core_motion);
+    memset(&f->core_motion, 0, sizeof f->core_motion);
     for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++)
-        f->own.core_motion.V[PLR_DRIVERS * i + own + i] = 1;
+        f->core_motion.V[PLR_DRIVERS * i + own + i] = 1;
 }
 
 void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],

@@ -157,7 +157,7 @@ void plr_sensitivity_add_to_velocity(const plr_filter *f, plr_real P_u[PLR_POSE_
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
             u[i] = -f->S[k][bias + i];            /* reading less bias */
         if (plr_has_block(f, PLR_BLOCK_VELOCITY)) /* after the motion that is pending */
-            by_drivers(f, k, PLR_VELOCITY_DIM, f->own.core_motion.V, u);
+            by_drivers(f, k, PLR_VELOCITY_DIM, f->core_motion.V, u);
         add_outer(PLR_POSE_DIM, f->par.calibration_variance[k], u, P_u);
     }
 }

@@ -47,6 +47,7 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
     config.track_drift_px = s->told_drift;
+    config.scene = scenario_may_move(s) ? PLR_SCENE_MAY_MOVE : PLR_SCENE_STANDS;
     if (s->mishap != BASELINE && s->mishap != FOCAL &&
         s->mishap != ASKEW) /* the camera is exact, and P alone is judged */
         exact_camera(&config);

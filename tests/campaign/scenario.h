@@ -70,6 +70,12 @@ typedef struct scenario {
 
 enum { FRAME_HZ = 10 };
 
+/* The policy that a scenario is judged by: where most of what is seen moves, it says so. */
+static inline bool scenario_may_move(const scenario *s) {
+    return s->mishap == SCENE_MOVES || s->mishap == CONVOY || s->mishap == JUMP_CAMERA ||
+           s->mishap == CAMERA_BACK || s->mishap == TURN_CAMERA;
+}
+
 extern const scenario scenarios[];
 extern const unsigned scenario_count;
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+#include "process/statistics.h"
+
+#include <string.h>
+
+#include "math/small.h"
+#include "state/seconds.h"
+
+/* What an average keeps of a new interval, and of a new difference. */
+#define INTERVAL_SHARE PLR_R(0.0625)
+#define CHANGE_SHARE   PLR_R(0.015625)
+/* The mean reading covers about this much at most, and no more than since the last standstill, s. */
+#define SLOW_S PLR_R(0.5)
+
+/* The square of the difference from the last reading, of three numbers from `first` on. */
+static plr_real square_of_change(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                                 unsigned first) {
+    plr_real off[3];
+    for (unsigned i = 0; i < 3; i++)
+        off[i] = reading[first + i] - f->reading[first + i];
+    return plr_dot3(off, off);
+}
+
+void plr_statistics_change(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                      plr_real change2[2]) {
+    change2[0] = square_of_change(f, reading, 0);
+    change2[1] = square_of_change(f, reading, 3);
+}
+
+void plr_statistics_learn(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                     plr_real interval, const plr_real change2[2]) {
+    plr_inertial *s = &f->inertial;
+    if (!f->reading_valid) {
+        memcpy(s->slow, reading, sizeof s->slow);
+        s->still_ns = f->t_ns;
+    }
+    if (!f->reading_valid || !(interval > 0))
+        return;
+    if (!(s->usual_s > 0) || interval < PLR_R(0.5) * s->usual_s)
+        s->usual_s = interval;
+    else if (interval < PLR_R(1.5) * s->usual_s)
+        s->usual_s = PLR_FMA(INTERVAL_SHARE, interval - s->usual_s, s->usual_s);
+    const plr_real late = interval - s->usual_s;
+    s->off_usual2 = PLR_FMA(CHANGE_SHARE, late * late - s->off_usual2, s->off_usual2);
+    for (unsigned i = 0; i < 2; i++)
+        s->change2[i] = PLR_FMA(CHANGE_SHARE, change2[i] / PLR_R(3) - s->change2[i], s->change2[i]);
+    const plr_real since = plr_seconds(t_ns - s->still_ns), span = since < SLOW_S ? since : SLOW_S;
+    const plr_real share = interval < span ? interval / span : PLR_R(1);
+    const plr_real slower = PLR_R(0.25) * (interval < SLOW_S ? interval / SLOW_S : PLR_R(1));
+    plr_real off2[2] = {0};
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
+        const plr_real off = reading[i] - s->slow[i];
+        off2[i / 3] = PLR_FMA(off, off, off2[i / 3]);
+        s->slow[i] = PLR_FMA(share, off, s->slow[i]);
+    }
+    for (unsigned i = 0; i < 2; i++)
+        s->spread2[i] = PLR_FMA(slower, off2[i] / PLR_R(3) - s->spread2[i], s->spread2[i]);
+}

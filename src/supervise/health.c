@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "supervise/health.h"
+
+#include "supervise/limits.h"
+#include "supervise/sensors.h"
+
+/* A reading is not old before this, s. */
+#define HELD_S 0.05
+
+double plr_health_seconds(plr_time_ns then, plr_time_ns now) {
+    if (then == PLR_NEVER_NS)
+        return (double)__builtin_inf();
+    return now < then ? 0 : (double)(now - then) * 1e-9;
+}
+
+bool plr_health_readings_are_old(const plr_supervisor *s, const plr_readings_evidence *now) {
+    const double held = plr_health_seconds(now->reading_ns, now->now_ns);
+    const double intervals = (double)plr_limit(s, PLR_LIMIT_HELD_INTERVALS);
+    return now->needed && (!now->valid || held > intervals * (double)now->interval_s + HELD_S);
+}
+
+uint32_t plr_health_of_readings(const plr_supervisor *s, const plr_readings_evidence *now) {
+    const bool lacking = (now->needed && now->refused != s->refused_before) ||
+                         plr_health_readings_are_old(s, now);
+    uint32_t reasons = plr_sensors_are_wrong(s) ? PLR_REASON_READINGS_REJECTED : 0;
+    if (lacking)
+        reasons |= PLR_REASON_NO_TWISTS;
+    if (!now->imu || !now->needed)
+        return reasons;
+    if (!now->started)
+        reasons |= PLR_REASON_NOT_STARTED;
+    if (now->unsettled)
+        reasons |= PLR_REASON_POSE_MAY_BE_WRONG;
+    if (now->fault_of_start || (now->fault_of_reading && lacking))
+        reasons |= PLR_REASON_IMU_FAULT;
+    return reasons;
+}
+
+uint32_t plr_health_lost_by(const plr_supervisor *s, plr_time_ns now_ns) {
+    const uint32_t always = PLR_REASON_GATE_LOCKED | PLR_REASON_NOT_STARTED;
+    const bool positioned = plr_health_seconds(s->last_position_ns, now_ns) <=
+                            (double)plr_limit(s, PLR_LIMIT_POSITION_S);
+    return positioned ? always : always | PLR_REASON_NO_OBSERVATIONS | PLR_REASON_NO_FRAMES;
+}
+
+plr_health plr_health_of(uint32_t reasons, uint32_t lost_by) {
+    if (reasons & PLR_REASON_STATE_DAMAGED)
+        return PLR_HEALTH_DIVERGED;
+    if (reasons & lost_by)
+        return PLR_HEALTH_LOST;
+    return reasons & ~(uint32_t)PLR_REASONS_HARMLESS ? PLR_HEALTH_DEGRADED : PLR_HEALTH_GOOD;
+}

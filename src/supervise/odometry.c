@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: MIT
+#include "supervise/odometry.h"
+
+#include <string.h>
+
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "pelorus/settings.h"
+#include "supervise/doubt.h"
+#include "supervise/limits.h"
+#include "supervise/sum.h"
+
+/* What an average of a frame's own square is worth to what is usual: a frame that is far off is an event. */
+#define MOST_TIMES_USUAL PLR_R(4)
+
+void plr_odometry_forget(plr_supervisor *s) {
+    memset(&s->sum, 0, sizeof s->sum);
+    s->statistic = s->excess[0] = s->excess[1] = 0;
+    s->weight[0] = s->weight[1] = 1;
+    s->contradicting_frames = s->small_frames = 0;
+    s->outright = 0;
+}
+
+static plr_real larger(plr_real a, plr_real b) {
+    return a > b ? a : b;
+}
+
+static uint16_t one_more(uint16_t frames) {
+    return (uint16_t)(frames + (frames < UINT16_MAX));
+}
+
+/* ---------------------------------------------------------------- a frame's own difference */
+
+/* v = L^-1 n; where L has a zero column v is zero. */
+static void in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
+                      plr_real v[PLR_POSE_DIM]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        v[k] = n[k];
+        for (unsigned l = 0; l < k; l++)
+            v[k] = PLR_FMA(-L[PLR_POSE_DIM * k + l], v[l], v[k]);
+        v[k] = L[(PLR_POSE_DIM + 1) * k] > 0 ? v[k] / L[(PLR_POSE_DIM + 1) * k] : 0;
+    }
+}
+
+/* Information J, b about nu from units of L_used to units of L: with T = L_used^-1 L it is T^T J T and
+ * T^T b. */
+static void to_stated_sigmas(const plr_motion_evidence *m, plr_real J[PLR_POSE_SQUARE],
+                             plr_real b[PLR_POSE_DIM]) {
+    plr_real T[PLR_POSE_SQUARE], Tt[PLR_POSE_SQUARE], JT[PLR_POSE_SQUARE], turned[PLR_POSE_DIM];
+    for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
+        plr_real column[PLR_POSE_DIM], solved[PLR_POSE_DIM];
+        for (unsigned r = 0; r < PLR_POSE_DIM; r++)
+            column[r] = m->L[PLR_POSE_DIM * r + c];
+        in_sigmas(m->L_used, column, solved);
+        for (unsigned r = 0; r < PLR_POSE_DIM; r++)
+            T[PLR_POSE_DIM * r + c] = Tt[PLR_POSE_DIM * c + r] = solved[r];
+    }
+    plr_mat6_mul(JT, J, T);
+    plr_mat6_mul(J, Tt, JT);
+    plr_mat6_vec(turned, Tt, b);
+    memcpy(b, turned, sizeof turned);
+}
+
+/* nu = (I + J)^-1 b in the odometry's own sigmas, and V = I - (I + J)^-1, its covariance if both are as
+ * stated. */
+static bool own_difference(const plr_motion_evidence *m, plr_real nu[PLR_POSE_DIM],
+                           plr_real V[PLR_POSE_TRIANGLE]) {
+    plr_real J[PLR_POSE_SQUARE], U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], C[PLR_POSE_SQUARE] = {0};
+    plr_upper6_unpack(J, m->Lambda);
+    plr_mat6_vec(nu, J, m->nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        J[(PLR_POSE_DIM + 1) * k] -= 1;
+    if (memcmp(m->L, m->L_used, sizeof m->L) != 0)
+        to_stated_sigmas(m, J, nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        J[(PLR_POSE_DIM + 1) * k] += 1;
+    plr_upper6_pack(U, J);
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return false;
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, nu, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, nu);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        C[(PLR_POSE_DIM + 1) * k] = 1;
+    plr_solve_upper_transposed(PLR_POSE_DIM, PLR_POSE_DIM, U, C, PLR_POSE_DIM);
+    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++) /* (I + J)^-1 = U^-1 U^-T */
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++) {
+            V[at] = k == l ? PLR_R(1) : PLR_R(0);
+            for (unsigned r = 0; r < PLR_POSE_DIM; r++)
+                V[at] = PLR_FMA(-C[PLR_POSE_DIM * r + k], C[PLR_POSE_DIM * r + l], V[at]);
+        }
+    return true;
+}
+
+/* Which parts of a difference n of a frame's motion are a good part of that motion. */
+typedef struct plr_material {
+    bool way, turn;
+} plr_material;
+
+static plr_material material(const plr_supervisor *s, const plr_real n[PLR_POSE_DIM],
+                             const plr_motion_evidence *m) {
+    const plr_real share = plr_limit(s, PLR_LIMIT_MATERIAL_SHARE);
+    const plr_real least = plr_limit(s, PLR_LIMIT_MATERIAL_LEAST);
+    plr_real turn[3];
+    plr_turn_of(turn, m->E);
+    const plr_real way = PLR_FMA(share, PLR_SQRT(plr_dot3(m->p, m->p)), least);
+    const plr_real angle = PLR_FMA(share, PLR_SQRT(plr_dot3(turn, turn)), least);
+    return (plr_material){plr_dot3(n, n) > way * way, plr_dot3(n + 3, n + 3) > angle * angle};
+}
+
+/* n: the mean difference of the last frames by pictures alone, m and rad a frame. */
+static void lately(const plr_supervisor *s, const plr_motion_evidence *m, plr_real floor,
+                   plr_real n[PLR_POSE_DIM]) {
+    plr_real mean[PLR_POSE_DIM];
+    plr_sum_by_pictures(s->sum.sum, s->sum.variance, floor, mean);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* s / V of a lasting difference is (1 + keep) of it */
+        mean[k] /= PLR_R(1) + plr_limit(s, PLR_LIMIT_SUM_KEEPS);
+    plr_mat6_vec(n, m->L, mean);
+}
+
+static plr_material lately_material(const plr_supervisor *s, const plr_motion_evidence *m) {
+    plr_real n[PLR_POSE_DIM];
+    lately(s, m, plr_limit(s, PLR_LIMIT_WEAK), n);
+    return material(s, n, m);
+}
+
+/* ---------------------------------------------------------------- what is usual */
+
+/* Once told it stays until the variances are usually less than half of that. */
+static void judge_usual(plr_supervisor *s) {
+    const plr_real limit = plr_limit(s, PLR_LIMIT_USUAL_TOLD) * (s->misfits ? PLR_R(0.5) : PLR_R(1));
+    s->misfits = 0;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        s->misfits |= s->usual[k] > limit;
+}
+
+/* Learns from the sum, direction by direction, how much odometry and pictures differ on this drive. */
+static void learn_usual(plr_supervisor *s) {
+    const plr_real frames = plr_limit(s, PLR_LIMIT_USUAL_FRAMES);
+    const plr_real most = plr_limit(s, PLR_LIMIT_USUAL_MOST);
+    if (s->usual_frames < frames)
+        s->usual_frames += PLR_R(1);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        const plr_real due =
+            s->sum.variance[plr_upper_row(PLR_POSE_DIM, k)] + plr_limit(s, PLR_LIMIT_UNOBSERVED);
+        const plr_real square = s->sum.sum[k] * s->sum.sum[k] / due;
+        const plr_real at_most = MOST_TIMES_USUAL * s->usual[k];
+        const plr_real now = square < at_most ? square : at_most;
+        s->usual[k] += (now - s->usual[k]) / (s->usual_frames + PLR_R(10));
+        s->usual[k] = s->usual[k] < 1 ? PLR_R(1) : s->usual[k] > most ? most : s->usual[k];
+    }
+    judge_usual(s);
+}
+
+bool plr_odometry_has_a_before(const plr_supervisor *s) {
+    const bool agreed = s->agreement >= plr_limit(s, PLR_LIMIT_BEFORE_SHARE);
+    return (agreed && !s->misfits) || plr_doubt_contradicted(s);
+}
+
+/* ---------------------------------------------------------------- the difference of two poses */
+
+/* d <- Ad(D^-1) d: d is the twist of the body from the pose by odometry to the pose by pictures. */
+static void carry_difference(plr_supervisor *s, const plr_motion_evidence *m) {
+    plr_real R[9], A[PLR_POSE_SQUARE], d[PLR_POSE_DIM];
+    plr_se3_rotation(R, m->E);
+    plr_se3_adjoint_inverse(A, R, m->p);
+    memcpy(d, s->difference, sizeof d);
+    plr_mat6_vec(s->difference, A, d);
+}
+
+void plr_odometry_differs(plr_supervisor *s, const plr_real n[PLR_POSE_DIM],
+                          const plr_real nu[PLR_POSE_DIM], plr_real noise) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        s->difference[k] += n[k];
+        s->difference_sigmas[k] += nu[k];
+    }
+    s->difference_noise += noise;
+}
+
+/* Of translation and rotation by itself the longer one: points that move along carry the pose further than
+ * a frame's own difference n says. */
+static void add_longer(plr_supervisor *s, const plr_motion_evidence *m,
+                       const plr_real n[PLR_POSE_DIM], const plr_real nu[PLR_POSE_DIM],
+                       plr_real noise) {
+    plr_real more[PLR_POSE_DIM];
+    for (unsigned half = 0; half < PLR_POSE_DIM; half += 3) {
+        const plr_real *a = n + half, *b = m->moved + half;
+        memcpy(more + half, plr_dot3(a, a) > plr_dot3(b, b) ? a : b, 3 * sizeof *more);
+    }
+    plr_odometry_differs(s, more, nu, noise);
+}
+
+static plr_real trace(const plr_real V[PLR_POSE_TRIANGLE]) {
+    plr_real sum = 0;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        sum += V[plr_upper_row(PLR_POSE_DIM, k)];
+    return sum;
+}
+
+void plr_odometry_cover(const plr_supervisor *s, const plr_real d[PLR_POSE_DIM],
+                        plr_real C[PLR_POSE_SQUARE]) {
+    const plr_real sideways = plr_limit(s, PLR_LIMIT_SIDEWAYS);
+    const plr_real sigmas2 = plr_norm2_of_6(s->difference_sigmas);
+    const plr_real unexplained =
+        sigmas2 > s->difference_noise ? PLR_R(1) - s->difference_noise / sigmas2 : PLR_R(0);
+    const plr_real way = sideways * sideways * plr_dot3(d, d);
+    const plr_real turn = sideways * sideways * plr_dot3(d + 3, d + 3);
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
+        for (unsigned j = 0; j < PLR_POSE_DIM; j++)
+            C[PLR_POSE_DIM * i + j] =
+                unexplained * (d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn));
+}
+
+void plr_odometry_settle(plr_supervisor *s) {
+    memset(s->difference, 0, sizeof s->difference);
+    memset(s->difference_sigmas, 0, sizeof s->difference_sigmas);
+    s->difference_noise = 0;
+    memset(&s->sum, 0, sizeof s->sum);
+}
+
+/* ---------------------------------------------------------------- a frame */
+
+/* A frame that excludes the odometry by itself, and is followed. The first one may have moved the camera on
+ * the body as well as the body: both are covered. */
+static void add_outright(plr_supervisor *s, const plr_motion_evidence *m, bool held) {
+    plr_real n[PLR_POSE_DIM], own[PLR_POSE_DIM];
+    plr_mat6_vec(n, m->L_used, m->nu);
+    in_sigmas(m->L, n, own);
+    carry_difference(s, m);
+    if (!held && (s->scene == PLR_SCENE_MAY_MOVE || !plr_doubt_contradicted(s)))
+        add_longer(s, m, n, own, 0);
+    memset(&s->sum, 0, sizeof s->sum);
+    s->excess[0] = plr_norm2_of_6(own);
+    s->excess[1] = material(s, n, m).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
+}
+
+/* The difference begins with what the sum holds of it. While it lasts, each frame adds what lies between the
+ * present pose and the other one: that by odometry, where most of what is seen may move as one; else that by
+ * the pictures alone, which the odometry still holds back where they say little. */
+static void follow_difference(plr_supervisor *s, const plr_motion_evidence *m,
+                              const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
+                              bool begins) {
+    plr_real n[PLR_POSE_DIM], way[PLR_POSE_DIM];
+    if (begins) {
+        plr_mat6_vec(way, m->L, s->sum.sum);
+        plr_odometry_differs(s, way, s->sum.sum, trace(s->sum.variance));
+    } else if (s->doubt == PLR_DOUBT_DEPARTED || s->misfits ||
+               (plr_doubt_contradicted(s) && s->scene == PLR_SCENE_MAY_MOVE)) {
+        plr_sum_by_pictures(nu, V, plr_limit(s, PLR_LIMIT_UNOBSERVED), n);
+        plr_mat6_vec(way, m->L, n);
+        add_longer(s, m, way, nu, trace(V));
+    } else if (plr_doubt_contradicted(s)) {
+        lately(s, m, plr_limit(s, PLR_LIMIT_UNOBSERVED), way);
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            way[k] -= m->moved[k];
+        plr_odometry_differs(s, way, nu, 0);
+    }
+}
+
+/* An average of the last frames, of those that may count: not of an event, nor shortly after it. */
+static void learn_agreement(plr_supervisor *s) {
+    const plr_real keeps = plr_limit(s, PLR_LIMIT_BEFORE_KEEPS);
+    const bool agrees = s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
+    s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
+}
+
+plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,
+                                      bool tells) {
+    plr_odometry_verdict verdict = {false, false, false};
+    plr_real nu[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE];
+    if (m->outright) {
+        add_outright(s, m, held);
+        verdict.contradicts = true;
+        return verdict;
+    }
+    if (!own_difference(m, nu, V))
+        return verdict;
+    const bool calm = s->doubt == PLR_DOUBT_NONE;
+    carry_difference(s, m);
+    plr_sum_add(&s->sum, plr_limit(s, PLR_LIMIT_SUM_KEEPS), nu, V);
+    s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED)).all;
+    const bool before = plr_odometry_has_a_before(s);
+    if ((calm || !before) && tells)
+        learn_usual(s);
+    if (calm || !before)
+        learn_agreement(s);
+    const plr_material part = lately_material(s, m);
+    const bool much = part.way || part.turn;
+    const plr_real weighed =
+        plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK)).all;
+    const bool contradicts = much && weighed > plr_limit(s, PLR_LIMIT_CONTRADICTS_ABOVE);
+    s->small_frames = much ? 0 : one_more(s->small_frames);
+    s->contradicting_frames = contradicts ? one_more(s->contradicting_frames) : 0;
+    verdict.contradicts =
+        before && !plr_doubt_contradicted(s) &&
+        s->contradicting_frames >= plr_limit_count(s, PLR_LIMIT_CONTRADICTS_FRAMES);
+    verdict.relents = s->small_frames >= plr_limit_count(s, PLR_LIMIT_SETTLED_FRAMES);
+    verdict.departs = before && s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE);
+    if (!held)
+        follow_difference(s, m, nu, V, verdict.departs && (calm || s->doubt == PLR_DOUBT_SETTLING));
+    return verdict;
+}
+
+/* By how much a standard deviation grows. */
+static plr_real widening(const plr_supervisor *s, plr_real statistic) {
+    return PLR_SQRT(PLR_FMA(plr_limit(s, PLR_LIMIT_WEIGHT_LOST), statistic, PLR_R(1)));
+}
+
+/* Wheels that slip leave the gyro as good as it was, so turns keep their weight unless they are contradicted
+ * themselves. If they are, and that is a good part of the turn, they have it back when all has. */
+void plr_odometry_weigh(plr_supervisor *s, const plr_motion_evidence *m) {
+    s->weight[0] = s->weight[1] = 1;
+    if (!plr_doubt_contradicted(s)) {
+        s->turns_fail = 0;
+        return;
+    }
+    const plr_statistic now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
+    const plr_real below = plr_limit(s, PLR_LIMIT_TURNS_BELOW);
+    s->turns_fail |= s->excess[1] > below || (now.turns > below && lately_material(s, m).turn);
+    s->weight[0] = widening(s, larger(now.all, s->excess[0]));
+    s->weight[1] = s->turns_fail       ? s->weight[0]
+                   : now.turns > below ? widening(s, now.turns)
+                                       : PLR_R(1);
+    s->excess[0] *= plr_limit(s, PLR_LIMIT_OUTRIGHT_KEEPS);
+    s->excess[1] *= plr_limit(s, PLR_LIMIT_OUTRIGHT_KEEPS);
+}

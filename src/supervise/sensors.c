@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#include "supervise/sensors.h"
+
+#include <string.h>
+
+#include "supervise/limits.h"
+
+/* What the sums keep from reading to reading; they look back 1 / (1 - KEEPS) of them. */
+#define KEEPS    PLR_R(0.95)
+#define FULL_SUM PLR_R(20)
+/* A reading counts for no more than this many times its numbers, plus this: one wrong one is no sensor that
+ * is wrong. */
+#define MOST_TIMES PLR_R(3)
+#define MOST_PLUS  PLR_R(3)
+
+void plr_sensors_forget(plr_supervisor *s) {
+    memset(s->sensors, 0, sizeof s->sensors);
+    for (unsigned i = 0; i < PLR_SENSORS; i++)
+        s->sensors[i].t_ns = PLR_NEVER_NS;
+}
+
+void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned numbers, bool used,
+                     plr_real d2) {
+    plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    const plr_real n = (plr_real)numbers, most = PLR_FMA(MOST_TIMES, n, MOST_PLUS);
+    of->rejected = used ? 0 : (uint16_t)(of->rejected + (of->rejected < UINT16_MAX));
+    of->excess = PLR_FMA(KEEPS, of->excess, (d2 < most ? d2 : most) - n);
+    of->numbers = PLR_FMA(KEEPS, of->numbers, n);
+    /* the variance of `excess`, 2 n / (1 - KEEPS^2), is about `numbers` when that is full */
+    const plr_real variance = of->numbers > FULL_SUM * n ? of->numbers : FULL_SUM * n;
+    const plr_real limit =
+        plr_limit(s, of->off ? PLR_LIMIT_SENSOR_BELOW : PLR_LIMIT_SENSOR_ABOVE);
+    of->off = of->excess > 0 && of->excess * of->excess > limit * limit * variance;
+    of->t_ns = reading->t_ns;
+    memcpy(of->value, reading->value, sizeof of->value);
+}
+
+plr_real plr_sensors_widening(const plr_supervisor *s, unsigned sensor) {
+    const plr_sensor_record *of = &s->sensors[sensor - 1];
+    return of->off ? PLR_R(1) + of->excess / of->numbers : PLR_R(1);
+}
+
+bool plr_sensors_are_wrong(const plr_supervisor *s) {
+    const unsigned most = plr_limit_count(s, PLR_LIMIT_SENSOR_REJECTED);
+    for (unsigned i = 0; i < PLR_SENSORS; i++)
+        if (s->sensors[i].rejected >= most || s->sensors[i].off)
+            return true;
+    return false;
+}
+
+bool plr_sensors_repeat(const plr_supervisor *s, const plr_reading *reading) {
+    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+/* Do the readings of a small sensor agree with the estimate, as their sigma says? One that is off by two
+ * sigma passes the gate, and pulls the pose each time. */
+#ifndef PLR_SUPERVISE_SENSORS_H
+#define PLR_SUPERVISE_SENSORS_H
+
+#include "pelorus/supervisor.h"
+
+/* Nothing is known of any sensor. */
+void plr_sensors_forget(plr_supervisor *s);
+
+/* Adds a reading of so many numbers that was used or rejected, with its squared distance d2 from what was
+ * expected. */
+void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned numbers, bool used,
+                     plr_real d2);
+
+/* By how much the variance of the sensor's readings is larger than stated, 1 or more: what they differ
+ * from the estimate by says so while they are off. */
+plr_real plr_sensors_widening(const plr_supervisor *s, unsigned sensor);
+
+/* True if ten in succession were rejected, or if readings are off, of any sensor. */
+bool plr_sensors_are_wrong(const plr_supervisor *s);
+
+/* True if a reading is the sensor's last one again, of the same time: it says nothing new. */
+bool plr_sensors_repeat(const plr_supervisor *s, const plr_reading *reading);
+
+#endif

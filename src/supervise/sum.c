@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "supervise/sum.h"
+
+#include <string.h>
+
+#include "math/dense.h"
+#include "math/small.h"
+
+void plr_sum_add(plr_sum *sum, plr_real keep, const plr_real x[PLR_POSE_DIM],
+                 const plr_real C[PLR_POSE_TRIANGLE]) {
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        sum->sum[k] = PLR_FMA(keep, sum->sum[k], x[k]);
+    for (unsigned k = 0; k < PLR_POSE_TRIANGLE; k++)
+        sum->variance[k] = PLR_FMA(keep * keep, sum->variance[k], C[k]);
+}
+
+/* U^T U = D V D + floor I; D may be NULL. */
+static bool factorise(const plr_real V[PLR_POSE_TRIANGLE], const plr_real *D, plr_real floor,
+                      plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]) {
+    for (unsigned k = 0, at = 0; k < PLR_POSE_DIM; k++)
+        for (unsigned l = k; l < PLR_POSE_DIM; l++, at++)
+            U[at] = (D ? V[at] * D[k] * D[l] : V[at]) + (k == l ? floor : PLR_R(0));
+    return plr_cholesky_upper(PLR_POSE_DIM, U);
+}
+
+/* The three numbers of the translation come first, so the last three of U^-T s are those of the turns
+ * about whatever translation fits best. */
+plr_statistic plr_sum_statistic(const plr_sum *sum, const plr_real *usual, plr_real floor) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM], D[PLR_POSE_DIM];
+    plr_statistic found = {0, 0};
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        D[k] = usual ? PLR_SQRT(usual[k]) : PLR_R(1);
+        s[k] = sum->sum[k];
+    }
+    if (!factorise(sum->variance, D, floor, U))
+        return found;
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, s, 1);
+    found.turns = plr_dot3(s + 3, s + 3);
+    found.all = plr_dot3(s, s) + found.turns;
+    return found;
+}
+
+void plr_sum_by_pictures(const plr_real s[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
+                         plr_real floor, plr_real n[PLR_POSE_DIM]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
+    memcpy(n, s, PLR_POSE_DIM * sizeof *s);
+    if (!factorise(V, NULL, floor, U))
+        return;
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, n);
+}

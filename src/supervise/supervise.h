@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The supervisor as the estimator sees it: asked at three points of a frame, told of what happens between
+ * frames. Its functions change its own state alone. src/absent/supervise.c answers in its place where it is
+ * left out of a build (PLR_SUPERVISE=0).
+ */
+#ifndef PLR_SUPERVISE_SUPERVISE_H
+#define PLR_SUPERVISE_SUPERVISE_H
+
+#include "pelorus/settings.h"
+#include "pelorus/supervisor.h"
+
+/* Nothing has been seen. */
+void plr_supervise_begin(plr_supervisor *s, const plr_config *config);
+
+/* ---------------------------------------------------------------- the three points of a frame */
+
+/* Before the search: false if the picture does not show the present, and nothing of it is to be used. */
+bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e);
+
+/* After search and gate. */
+plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e);
+
+/* At the end. */
+void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const plr_report *report,
+                         plr_frame_decision *decision);
+
+/* What was decided at the end of the last frame for this one: factors of the odometry's sigmas, of the way
+ * and of the turn, 1 or more; whether points may agree on a motion that the odometry excludes; whether a gate
+ * of fixed width is open. */
+plr_real plr_supervise_weight(const plr_supervisor *s, unsigned axis);
+bool plr_supervise_may_exclude_odometry(const plr_supervisor *s);
+bool plr_supervise_opens_fixed_gate(const plr_supervisor *s);
+
+/* ---------------------------------------------------------------- between frames */
+
+/* The pose was set: what was summed up belongs to another. */
+void plr_supervise_pose_set(plr_supervisor *s);
+
+/* The filter has begun anew at the present pose: it is in doubt. */
+void plr_supervise_begun_anew(plr_supervisor *s, bool relocated);
+
+/* True if the pose was found anew and has been in doubt since. */
+bool plr_supervise_was_relocated(const plr_supervisor *s);
+
+/* The clock was set, after an interruption or to a time that the last frame is too far from. */
+void plr_supervise_clock_set(plr_supervisor *s);
+
+/* The pending motion is applied without a frame. */
+void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e);
+
+/* A small sensor's reading that was used or rejected; its position bounds the pose if `bounds`. */
+void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,
+                           bool used, plr_real d2, bool bounds, plr_time_ns now_ns);
+plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor);
+bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading);
+
+/* After a restore: small sensors and positions of before do not count. */
+void plr_supervise_restored(plr_supervisor *s);
+
+/* ---------------------------------------------------------------- what is reported */
+
+/* Adds to a reported covariance of the pose, 6x6, what is in doubt. (I + E, p) is the motion since the last
+ * frame. */
+void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const plr_real p[3],
+                           plr_real P_xi[PLR_POSE_SQUARE]);
+
+/* Health and reasons at any time. */
+void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,
+                          plr_health_state *health);
+
+/* Health and reasons of a frame that came before an IMU's start, of one that was refused, and of one of
+ * dead reckoning. */
+void plr_supervise_waits(plr_supervisor *s, const plr_readings_evidence *now, plr_report *report);
+void plr_supervise_refused(const plr_supervisor *s, plr_report *report);
+void plr_supervise_dead_reckons(plr_supervisor *s, const plr_readings_evidence *now);
+
+#endif
