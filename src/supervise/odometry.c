@@ -146,7 +146,7 @@ static void learn_usual(plr_supervisor *s) {
         const plr_real square = s->sum.sum[k] * s->sum.sum[k] / due;
         const plr_real at_most = MOST_TIMES_USUAL * s->usual[k];
         const plr_real now = square < at_most ? square : at_most;
-        s->usual[k] += (now - s->usual[k]) / (s->usual_frames + PLR_R(10));
+        s->usual[k] += (now - s->usual[k]) / (s->usual_frames + PLR_R(20));
         s->usual[k] = s->usual[k] < 1 ? PLR_R(1) : s->usual[k] > most ? most : s->usual[k];
     }
     judge_usual(s);
