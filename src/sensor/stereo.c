@@ -161,10 +161,8 @@ static void differentiate(const plr_camera *camera, const plr_polar *chart, cons
     plr_mat3_mul_nt(DzRt, sight->Dz, R);
     for (int row = 0; row < 3; row++) {
         const plr_real along = row == 1 ? camera->fx * camera->baseline / sight->q[2] : PLR_R(0);
-        for (int column = 0; column < 2; column++) {
-            const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
-            sight->J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, n);
-        }
+        for (int column = 0; column < 2; column++)
+            sight->J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, chart->N[column]);
         sight->J[3 * row + 2] = -chart->r * (along + plr_dot3(DzRt + 3 * row, p));
     }
 }

@@ -43,7 +43,7 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
     const plr_real inverse = PLR_R(1) / chart->r;
     plr_real way[3];
     for (int row = 0; row < 2; row++) {
-        const plr_real n[3] = {chart->N[row], chart->N[2 + row], chart->N[4 + row]};
+        const plr_real *n = chart->N[row];
         plr_real turn[3];
         plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
         for (int j = 0; j < 3; j++)
@@ -64,19 +64,14 @@ static void chart_jacobian(plr_real F[9], const plr_polar *to, const plr_real R[
     const plr_real shrink = ratio / (to->r * to->r);
     plr_real turned[3];
     for (int column = 0; column < 2; column++) {
-        const plr_real n[3] = {from->N[column], from->N[2 + column], from->N[4 + column]};
-        plr_mat3_tvec(turned, R, n);
-        for (int row = 0; row < 2; row++) {
-            const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
-            F[3 * row + column] = ratio * plr_dot3(m, turned);
-        }
-        F[6 + column] = shrink * plr_dot3(p, n);
+        plr_mat3_tvec(turned, R, from->N[column]);
+        for (int row = 0; row < 2; row++)
+            F[3 * row + column] = ratio * plr_dot3(to->N[row], turned);
+        F[6 + column] = shrink * plr_dot3(p, from->N[column]);
     }
     plr_mat3_tvec(turned, R, p);
-    for (int row = 0; row < 2; row++) {
-        const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
-        F[3 * row + 2] = -ratio * plr_dot3(m, turned);
-    }
+    for (int row = 0; row < 2; row++)
+        F[3 * row + 2] = -ratio * plr_dot3(to->N[row], turned);
     F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
@@ -192,10 +187,8 @@ static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view
     H->term[0].columns = PLR_LANDMARK_DIM;
     for (int row = 0; row < 3; row++) {
         plr_real *h = H->term[0].H + 3 * row;
-        for (int column = 0; column < 2; column++) {
-            const plr_real n[3] = {chart.N[column], chart.N[2 + column], chart.N[4 + column]};
-            h[column] = chart.r * plr_dot3(Dz + 3 * row, n);
-        }
+        for (int column = 0; column < 2; column++)
+            h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
         h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
         z[row] = PLR_FMA(h[2], f->slots[slot].beyond, z[row]);
     }

@@ -18,7 +18,7 @@
 typedef struct plr_polar {
     plr_real r;     /* m */
     plr_real mu[3]; /* unit vector */
-    plr_real N[6];  /* 3x2: orthonormal, orthogonal to mu */
+    plr_real N[2][3]; /* the two columns of N(mu) */
 } plr_polar;
 
 /* The chart at q; needs |q| > 0. N follows Duff et al., Building an Orthonormal Basis, Revisited
