@@ -99,7 +99,6 @@ extern "C" {
 typedef float plr_real;
 /* a b + c with a single rounding, in float32. */
 #if PLR_PORTABLE
-float plr_fmaf_exact(float a, float b, float c);
 #define PLR_FMA(a, b, c) plr_fmaf_exact((a), (b), (c))
 #else
 #define PLR_FMA(a, b, c) __builtin_fmaf((a), (b), (c))
@@ -118,6 +117,10 @@ typedef double plr_real;
 #else
 #error "PLR_REAL must be 32 or 64."
 #endif
+
+/* a b + c in float32, rounded once, for processors without an instruction for it: the same bits for
+ * every finite input and for infinities; a NaN results in a NaN. Needs IEEE double arithmetic alone. */
+float plr_fmaf_exact(float a, float b, float c);
 
 /* A constant in the filter's precision. */
 #define PLR_R(x) ((plr_real)(x))
