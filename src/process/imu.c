@@ -436,11 +436,8 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
     /* at the time of the last such row the mean is used up: one reading's worth is granted */
     const plr_real mean_of = most > 0 ? most : usual;
     memset(H, 0, sizeof *H);
-    H->terms = 2;
-    H->term[0].row = plr_row_of(f, PLR_BLOCK_VELOCITY);
-    H->term[0].columns = PLR_VELOCITY_DIM;
-    H->term[1].row = plr_row_of(f, PLR_BLOCK_BIAS);
-    H->term[1].columns = PLR_BIAS_DIM;
+    plr_real *by_v = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_VELOCITY), PLR_VELOCITY_DIM);
+    plr_real *by_bias = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
         const bool moves = plr_dot3(M, M) > 0;
@@ -453,8 +450,8 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
             const plr_real w = w_m[c] - f->bias[3 + c];
             r[i] = PLR_FMA(-M[c], f->inertial.velocity[c], r[i]);
             r[i] = PLR_FMA(-M[3 + c], w, r[i]);
-            H->term[0].H[PLR_VELOCITY_DIM * i + c] = M[c];
-            H->term[1].H[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];
+            by_v[PLR_VELOCITY_DIM * i + c] = M[c];
+            by_bias[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];
         }
     }
 }

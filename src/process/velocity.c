@@ -217,13 +217,12 @@ void plr_velocity_bias_rows(const plr_filter *f, unsigned part, plr_rows *H, plr
             y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
         y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);
     }
-    H->terms = 1;
-    H->term[0].row = plr_row_of(f, PLR_BLOCK_BIAS);
-    H->term[0].columns = PLR_BIAS_DIM;
+    H->terms = 0;
+    plr_real *by_bias = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const unsigned k = PLR_ROWS * part + i;
         r[i] = y[k];
         for (unsigned c = 0; c < PLR_BIAS_DIM; c++)
-            H->term[0].H[PLR_BIAS_DIM * i + c] = L[PLR_BIAS_DIM * c + k];
+            by_bias[PLR_BIAS_DIM * i + c] = L[PLR_BIAS_DIM * c + k];
     }
 }

@@ -90,9 +90,7 @@ plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
 
 static void measure_nothing(const plr_filter *f, unsigned slot, plr_measurement *m) {
     memset(m, 0, sizeof *m);
-    m->H.terms = 1;
-    m->H.term[0].row = plr_covariance_row(f, slot);
-    m->H.term[0].columns = PLR_LANDMARK_DIM;
+    (void)plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m->R[i] = plr_stereo_variance(f, i);
 }

@@ -76,11 +76,6 @@ struct plr_model {
     void (*in_world)(const plr_filter *f, const plr_slot *slot, plr_world_point *point);
 };
 
-/* J = R_WB [I | -[s]x], 3x6: derivative of a point's world position by the pose's error (rho,
- * theta), where s is the point in the body, m. */
-void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
-                       plr_real J[PLR_ROWS * PLR_POSE_DIM]);
-
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 

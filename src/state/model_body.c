@@ -182,11 +182,9 @@ static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view
                         const plr_real Dz[9], const plr_real along[3], plr_real z[3], plr_rows *H) {
     plr_polar chart;
     plr_polar_at(&chart, view->q);
-    H->terms = 1;
-    H->term[0].row = plr_covariance_row(f, slot);
-    H->term[0].columns = PLR_LANDMARK_DIM;
-    for (int row = 0; row < 3; row++) {
-        plr_real *h = H->term[0].H + 3 * row;
+    H->terms = 0;
+    plr_real *h = plr_rows_add(H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
+    for (int row = 0; row < 3; row++, h += 3) {
         for (int column = 0; column < 2; column++)
             h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
         h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
@@ -384,17 +382,15 @@ static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_p
     for (int i = 0; i < 3; i++)
         point->p_W[i] = p_WB[i] + (double)offset[i];
 
-    plr_term *own = &point->J.term[0], *pose = &point->J.term[1];
-    point->J.terms = 2;
-    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
-    pose->columns = PLR_POSE_DIM;
-    plr_world_by_pose(R_WB, s_B, pose->H);
-    own->row = plr_covariance_row(f, (unsigned)(slot - f->slots));
-    own->columns = PLR_LANDMARK_DIM;
+    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    point->J.terms = 0;
+    plr_real *own = plr_rows_add(&point->J, row, PLR_LANDMARK_DIM);
+    plr_world_by_pose(R_WB, s_B,
+                      plr_rows_add(&point->J, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM));
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
     plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
-    plr_mat3_mul(own->H, R_WC, Ji);
+    plr_mat3_mul(own, R_WC, Ji);
 }
 
 const struct plr_model plr_model_body = {

@@ -70,6 +70,18 @@ void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
         p_WB[i] -= (double)moved[i];
 }
 
+void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
+                       plr_real J[PLR_ROWS * PLR_POSE_DIM]) {
+    plr_real S[9], RS[9];
+    plr_skew(S, s_B);
+    plr_mat3_mul(RS, R_WB, S);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            J[PLR_POSE_DIM * i + j] = R_WB[3 * i + j];
+            J[PLR_POSE_DIM * i + 3 + j] = -RS[3 * i + j];
+        }
+}
+
 void plr_filter_diverge(plr_filter *f) {
     if (!f->diverged)
         f->totals.diverged_ns = f->t_ns;

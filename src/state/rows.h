@@ -28,6 +28,14 @@ typedef struct plr_twist_rows {
     plr_real R[PLR_ROWS]; /* variances */
 } plr_twist_rows;
 
+/* Adds a block: sets where it is, and returns its H, which the caller fills. */
+static inline plr_real *plr_rows_add(plr_rows *rows, unsigned row, unsigned columns) {
+    plr_term *term = &rows->term[rows->terms++];
+    term->row = row;
+    term->columns = columns;
+    return term->H;
+}
+
 /* True if the first block has three columns, as a landmark has: there are special kernels for
  * it. */
 static inline bool plr_rows_begin_with_three(const plr_rows *rows) {
