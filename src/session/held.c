@@ -7,12 +7,6 @@
 
 /* --- steps --- */
 
-void plr_held_init(plr_held_steps *held) {
-    held->first = 0;
-    held->count = 0;
-    held->leads = 0;
-}
-
 bool plr_held_full(const plr_held_steps *held) {
     return held->count == PLR_SESSION_HELD_TWISTS;
 }

@@ -16,8 +16,6 @@
 
 /* --- steps --- */
 
-void plr_held_init(plr_held_steps *held);
-
 bool plr_held_full(const plr_held_steps *held);
 
 /* Inserts a step in the order of time. False, and nothing changes, if there is one of its time: it

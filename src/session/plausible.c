@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/plausible.h"
 
+#include "math/finite.h"
+
 /* The greatest value of each limit. */
 #define GROUP(name, type, what)
 #define BOUND(group, type, member, count, limit)
@@ -40,19 +42,9 @@ static const struct {
 #include "session/limits.def"
 };
 
-static bool is_finite(double x) {
-    return x - x == 0;
-}
-
-bool plr_plausible_finite(const double *x, unsigned n) {
-    while (n > 0 && is_finite(x[n - 1]))
-        n--;
-    return n == 0;
-}
-
 static bool all_within(const double *x, unsigned n, double limit) {
     for (unsigned i = 0; i < n; i++)
-        if (is_finite(x[i]) && (x[i] > limit || x[i] < -limit))
+        if (plr_all_finite(&x[i], 1) && (x[i] > limit || x[i] < -limit))
             return false;
     return true;
 }

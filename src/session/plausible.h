@@ -25,7 +25,4 @@ bool plr_plausible(plr_group group, const void *object);
 /* The same of a message as a whole: TWIST, START, LANDMARK, READING. Of other kinds true. */
 bool plr_plausible_message(const plr_message *message);
 
-/* True if all n numbers are finite. */
-bool plr_plausible_finite(const double *x, unsigned n);
-
 #endif

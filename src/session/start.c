@@ -26,9 +26,8 @@ void plr_start_clear(plr_session *s) {
     s->predict_ns = 0;
     s->imu_status = PLR_OK;
     s->imu_faults = 0;
-    plr_held_init(&s->held);
+    s->held.count = s->held_frames.count = 0;
     s->held_readings.count = 0;
-    s->held_frames.count = 0;
     memset(&s->order, 0, sizeof s->order);
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)

@@ -23,7 +23,7 @@ FOLDERS: dict[str, set[str]] = {
     "process": {"process", "state", "math"},
     "sensor": {"sensor", "state", "math"},
     "filter": {"filter", "sensor", "process", "state", "record", "math"},
-    "session": {"session", "filter", "record"},
+    "session": {"session", "filter", "record", "math"},
 }
 FILTER_HEADERS = {
     "assertions.h",

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* The queues of steps that wait for a late camera, and of frames that wait for late steps. */
+#include <string.h>
 #include <unity.h>
 
 #include "session/held.h"
@@ -7,7 +8,7 @@
 static plr_held_steps held;
 
 void setUp(void) {
-    plr_held_init(&held);
+    memset(&held, 0, sizeof held);
 }
 
 static void push(plr_time_ns t_ns) {
