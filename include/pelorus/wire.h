@@ -69,6 +69,7 @@ typedef struct plr_header {
     uint8_t version_major, version_minor; /* as read; a writer ignores them, and writes its own */
     uint8_t body_axes;                    /* plr_body_axes */
     uint8_t twist_timing;                 /* plr_twist_timing */
+    uint8_t process; /* plr_process_kind; PLR_PROCESS_TWIST from senders before format 1.4 */
     uint16_t image_width_px, image_height_px; /* 0: unknown */
     plr_calibration calibration;
     /* Values that the recorder suggests for settings (settings.h); negative: no suggestion. */
@@ -78,8 +79,6 @@ typedef struct plr_header {
     /* Along the body's x, y and z, where they differ; 0 or negative: the value for all axes
      * above. */
     double velocity_sigma_axes_mps[3], gyro_sigma_axes_radps[3];
-    /* What moves the body: plr_process_kind. Senders before format 1.4 say PLR_PROCESS_TWIST. */
-    uint8_t process;
     /* Suggestions for the settings of an IMU; negative: no suggestion, as from senders before format
      * 1.4. */
     double gyro_noise, accel_noise; /* rad/s/sqrt(Hz), m/s^2/sqrt(Hz) */
@@ -205,10 +204,9 @@ typedef enum plr_counted {
 } plr_counted;
 
 typedef struct plr_end {
-    /* How many frames of each kind, and of all kinds, the sender has written before this one. */
-    uint32_t twists, stereos, truths, landmarks, frames;
-    uint32_t readings; /* 0 from senders before format 1.3 */
-    uint32_t imus;     /* 0 from senders before format 1.4 */
+    /* How many frames of each kind (plr_counted), and of all kinds, the sender has written before
+     * this one. Senders before format 1.3 count no READING, before 1.4 no IMU. */
+    uint32_t sent[PLR_COUNTED], frames;
     /* Where this END answers another: bit i is set if of kind i (plr_counted) another number arrived
      * than that END says, and arrived[i] is that number; else it is 0. */
     uint8_t differs;

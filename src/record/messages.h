@@ -18,4 +18,7 @@ typedef struct plr_observation_room {
  * read; PLR_E_FULL more observations than there is room for. `room` is for READ. */
 void plr_message_pass(plr_codec *c, plr_kind kind, void *content, const plr_observation_room *room);
 
+/* The time of a message; 0 for kinds that have none. */
+plr_time_ns plr_message_time(const plr_message *message);
+
 #endif

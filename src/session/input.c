@@ -2,7 +2,7 @@
 #include "session/input.h"
 
 #include "pelorus/assertions.h"
-
+#include "record/messages.h"
 #include "session/data.h"
 #include "session/line.h"
 #include "session/phase.h"
@@ -18,9 +18,6 @@
 static void compare_counts(plr_session *s) {
     static const char *const names[PLR_COUNTED] = {" TWIST",    " STEREO",  " TRUTH",
                                                    " LANDMARK", " READING", " IMU"};
-    const plr_end *end = &s->in.as.end;
-    const uint32_t sent[PLR_COUNTED] = {end->twists,    end->stereos,  end->truths,
-                                        end->landmarks, end->readings, end->imus};
     plr_end answer;
     plr_text *line = &s->out.as.text;
     plr_send_describe_end(s, &answer);
@@ -29,7 +26,7 @@ static void compare_counts(plr_session *s) {
     for (unsigned i = 0; i < PLR_COUNTED; i++)
         if (answer.differs >> i & 1) {
             plr_line_count(line, ", ", answer.arrived[i]);
-            plr_line_count(line, " of ", sent[i]);
+            plr_line_count(line, " of ", s->in.as.end.sent[i]);
             plr_line_text(line, names[i]);
         }
     if (answer.differs != 0)
@@ -91,29 +88,6 @@ static unsigned row_of(const plr_message *in) {
 
 /* --- each message --- */
 
-static plr_time_ns time_of(const plr_message *in) {
-    switch (in->kind) {
-    case PLR_KIND_START:
-        return in->as.start.t_ns;
-    case PLR_KIND_TWIST:
-        return in->as.twist.t_ns;
-    case PLR_KIND_STEREO:
-        return in->as.stereo.t_ns;
-    case PLR_KIND_TRUTH:
-        return in->as.truth.t_ns;
-    case PLR_KIND_LANDMARK:
-        return in->as.landmark.landmark.last_seen_ns;
-    case PLR_KIND_STATE:
-        return in->as.state.t_ns;
-    case PLR_KIND_READING:
-        return in->as.reading.t_ns;
-    case PLR_KIND_IMU:
-        return in->as.imu.t_ns;
-    default:
-        return 0;
-    }
-}
-
 /* A flight log contains one, a recording does not. */
 static bool is_in_force(const plr_message *in) {
     return in->kind == PLR_KIND_CONFIG && in->as.config.build_fingerprint != 0;
@@ -159,9 +133,9 @@ static void refuse(plr_session *s, plr_status status) {
     if (in->kind == PLR_KIND_STEREO)
         plr_data_refuse_frame(s, &in->as.stereo, status);
     else if (in->kind == PLR_KIND_STATE)
-        plr_saving_refuse(s, (plr_state_action)in->as.state.action, time_of(in), status);
+        plr_saving_refuse(s, (plr_state_action)in->as.state.action, plr_message_time(in), status);
     else
-        plr_send_refusal(s, in->kind, time_of(in), status, NULL);
+        plr_send_refusal(s, in->kind, plr_message_time(in), status, NULL);
 }
 
 /* The first data after a HEADER starts the filter. */
@@ -172,7 +146,7 @@ static void start(plr_session *s) {
     plr_start_announce(s);
     plr_start_set_bias(s);
     if (s->options.start == PLR_START_SAVED)
-        plr_saving_restore_at_start(s, time_of(&s->in));
+        plr_saving_restore_at_start(s, plr_message_time(&s->in));
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
         s->start_pending = false; /* every pose comes as a TRUTH there */
         plr_phase_change(&s->phase, PLR_EVENT_POSE);
@@ -188,7 +162,7 @@ void plr_input_handle(plr_session *s) {
             start(s);
     }
     if (row == PLR_KIND_START || row == PLR_KIND_TRUTH)
-        plr_data_begin_before(s, time_of(&s->in));
+        plr_data_begin_before(s, plr_message_time(&s->in));
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
     PLR_ASSERT(rule != FIRST);
     if (rule == IGNORE)
