@@ -3,12 +3,10 @@
 
 #include <string.h>
 
-#include "math/dense.h"
 #include "math/small.h"
 #include "math/so3.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
-#include "state/pose.h"
 
 /* At rest this much is averaged, and after so long without rest the body counts as moving. */
 #define REST_NS   UINT64_C(1000000000)
@@ -130,6 +128,13 @@ static void tilt(plr_filter *f, const plr_real u[3]) {
     plr_so3_orthonormalise(f->R_WB);
 }
 
+/* X = scale (I - u u^T), 3x3: what lies across the unit vector u. */
+static void across(const plr_real u[3], plr_real scale, plr_real X[9]) {
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++)
+            X[3 * i + j] = scale * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
+}
+
 /* The pose's covariance with what is known of the tilt: position and heading stay as they were set.
  * `theta` is the covariance of the tilt, 3x3, across u. */
 static void set_tilt_covariance(plr_filter *f, const plr_real u[3], const plr_real theta[9]) {
@@ -225,9 +230,9 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
     plr_skew(L, u);
     for (unsigned i = 0; i < 9; i++)
         L[i] /= f->par.gravity;
+    across(u, flicker, theta);
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = 0; j < 3; j++) {
-            theta[3 * i + j] = flicker * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
             for (unsigned k = 0; k < 3; k++)
                 theta[3 * i + j] += L[3 * i + k] * L[3 * j + k] * (plr_real)variance[A + k];
             cross[PLR_POSE_DIM * (A + j) + 3 + i] = L[3 * i + j] * (plr_real)variance[A + j];
@@ -245,9 +250,7 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
 static void start_in_motion(plr_filter *f, plr_time_ns t_ns, plr_real interval,
                             const plr_real u[3]) {
     plr_real theta[9];
-    for (unsigned i = 0; i < 3; i++)
-        for (unsigned j = 0; j < 3; j++)
-            theta[3 * i + j] = TILT * TILT * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
+    across(u, TILT * TILT, theta);
     tilt(f, u);
     set_unknown_velocity(f, f->par.start_velocity_variance);
     set_tilt_covariance(f, u, theta);
@@ -385,10 +388,10 @@ static void add_to_pose(plr_filter *f, const plr_real u[3], plr_real position, p
 
 /* Removes what is known of position and yaw, and their shares in all else. */
 static void forget_place(plr_filter *f, const plr_real u[3]) {
-    plr_real A[PLR_POSE_SQUARE] = {0};
+    plr_real A[PLR_POSE_SQUARE] = {0}, stays[9];
+    across(u, 1, stays);
     for (unsigned i = 0; i < 3; i++)
-        for (unsigned j = 0; j < 3; j++)
-            A[PLR_POSE_DIM * (3 + i) + 3 + j] = (i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j];
+        memcpy(A + PLR_POSE_DIM * (3 + i) + 3, stays + 3 * i, 3 * sizeof *A);
     plr_covariance_turn_pose(f, A);
 }
 

@@ -13,15 +13,11 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
-#include "process/mean.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/seconds.h"
 
-/* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
-#define MAX_TURN PLR_R(3.1415926)
-#define MAX_WAY  PLR_R(1000)
 /* The error of a reading that is held lasts about so long before it becomes another, s. */
 #define LASTING_S PLR_R(0.5)
 /* What a frame has bridged by the older reading is made up for if it is no longer than this, s. */
@@ -110,7 +106,7 @@ static plr_status check(const plr_filter *f, const plr_real reading[PLR_READING_
         turn2 += turn * turn;
         way2 += way * way;
     }
-    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
+    return plr_step_is_possible(way2, turn2) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* ---------------------------------------------------------------- accumulation */

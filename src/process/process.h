@@ -68,6 +68,18 @@ typedef struct plr_process {
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]);
 } plr_process;
 
+/* False if a step of these squares, m^2 and rad^2, is longer than 1 km or pi rad; and for NaN. */
+bool plr_step_is_possible(plr_real way2, plr_real turn2);
+
+/* The mean reading of the step that ends at t_ns with `reading`, by the timing (plr_twist_timing).
+ *
+ * Between two samples of a signal that changes smoothly its mean is that of both ends. Where a frame
+ * came in between, the first part of the interval was bridged by the older one: the second makes up
+ * for it, so that the integral is right. Not `bridged` is an interval in which readings were lost:
+ * meanwhile frames have corrected what the older one did. */
+void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_time_ns t_ns,
+                      const plr_real reading[PLR_READING_DIM], plr_real held[PLR_READING_DIM]);
+
 extern const plr_process plr_process_twist;
 extern const plr_process plr_process_imu;
 

@@ -6,16 +6,12 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
-#include "process/mean.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/seconds.h"
 
-/* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
-#define MAX_TURN PLR_R(3.1415926)
-#define MAX_WAY  PLR_R(1000)
 /* An interval that is longer than usual by this many of the intervals' deviations lacks readings. */
 #define LATE_SIGMAS PLR_R(4)
 
@@ -73,17 +69,15 @@ static void displacement(const plr_filter *f, const plr_real reading[PLR_POSE_DI
         xi[i] = seconds * (reading[i] - f->bias[i]);
 }
 
-/* False for NaN too. */
-static bool is_within_limits(const plr_real xi[PLR_POSE_DIM]) {
-    const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
-    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
+static bool is_possible(const plr_real xi[PLR_POSE_DIM]) {
+    return plr_step_is_possible(plr_dot3(xi, xi), plr_dot3(xi + 3, xi + 3));
 }
 
 static plr_status check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                         plr_real seconds) {
     plr_real xi[PLR_POSE_DIM];
     displacement(f, reading, seconds, xi);
-    return is_within_limits(xi) ? PLR_OK : PLR_E_RANGE;
+    return is_possible(xi) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* Variances of a step's displacement, (rho, theta). */
@@ -167,7 +161,7 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POS
         for (int i = 0; i < PLR_POSE_DIM; i++)
             V[(PLR_POSE_DIM + 1) * i] = variance[i];
         plr_velocity_fuse(f, t_ns, seconds, xi, V, T);
-        if (!is_within_limits(xi)) { /* no step of a robot: the velocities are wrong */
+        if (!is_possible(xi)) { /* no step of a robot: the velocities are wrong */
             plr_velocity_forget(f);
             displacement(f, reading, seconds, xi);
             fused = false;

@@ -77,14 +77,13 @@ bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
  * with Y = -s U^-T M T. */
 static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
+    plr_real *eta = f->either.velocities.bias_eta, *Lambda = f->either.velocities.bias_Lambda;
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
-            const plr_real y = Y[PLR_POSE_DIM * r + i];
-            f->either.velocities.bias_eta[i] = PLR_FMA(y, e[r], f->either.velocities.bias_eta[i]);
+            const plr_real *y = Y + PLR_POSE_DIM * r;
+            eta[i] = PLR_FMA(y[i], e[r], eta[i]);
             for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
-                f->either.velocities.bias_Lambda[PLR_BIAS_DIM * i + j] =
-                    PLR_FMA(y, Y[PLR_POSE_DIM * r + j],
-                            f->either.velocities.bias_Lambda[PLR_BIAS_DIM * i + j]);
+                Lambda[PLR_BIAS_DIM * i + j] = PLR_FMA(y[i], y[j], Lambda[PLR_BIAS_DIM * i + j]);
         }
 }
 

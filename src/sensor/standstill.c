@@ -54,7 +54,6 @@ static void anchor(const plr_filter *f, plr_slot *slot, const plr_real z[PLR_ROW
  * second ago and more, which alone show that a slow body stands. */
 static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned *old_rows) {
     plr_real distance2 = 0;
-    unsigned rows = 0;
     *old_rows = 0;
     for (unsigned k = 0; k < n; k++) {
         plr_real z[PLR_ROWS];
@@ -66,11 +65,10 @@ static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned
             anchor(f, slot, z);
         } else if (f->t_ns - slot->anchor_ns >= STILL_NS) {
             distance2 += moved2(f, slot, z);
-            rows += PLR_ROWS;
+            *old_rows += PLR_ROWS;
         }
     }
-    *old_rows = rows;
-    const plr_real mean = (plr_real)rows;
+    const plr_real mean = (plr_real)*old_rows;
     return distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
 }
 

@@ -68,12 +68,6 @@ plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen)
     return row_gap(seen) * row_gap(seen) / (PLR_R(2) * f->par.pixel_variance);
 }
 
-/* Along a point's own ray only its right image moves: Dz q = (0, fx baseline, 0) / z. */
-static void along_the_ray(const plr_camera *camera, plr_real along[3]) {
-    along[0] = along[2] = 0;
-    along[1] = camera->fx * camera->baseline;
-}
-
 static plr_real residual_norm2(const plr_observation *seen, const plr_real z[3]) {
     const plr_real residual[4] = {(plr_real)seen->uL_px - z[0], (plr_real)seen->uR_px - z[1],
                                   (plr_real)seen->vL_px - z[2], (plr_real)seen->vR_px - z[2]};
@@ -98,7 +92,9 @@ static void measure_nothing(const plr_filter *f, unsigned slot, plr_measurement 
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m) {
     const plr_camera *camera = &f->par.camera;
-    plr_real z[3], Dz[9], along[3];
+    /* along a point's own ray only its right image moves: Dz q = (0, fx baseline, 0) / z */
+    const plr_real along[3] = {0, camera->fx * camera->baseline, 0};
+    plr_real z[3], Dz[9];
     plr_view view;
     if (!plr_model_of(f)->look(f, slot, &view)) {
         measure_nothing(f, slot, m);
@@ -106,7 +102,6 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     }
     plr_stereo_project(z, camera, view.q);
     plr_stereo_jacobian(Dz, camera, view.q);
-    along_the_ray(camera, along);
     plr_model_of(f)->derive(f, slot, &view, Dz, along, z, &m->H);
     plr_stereo_rows(m->r, seen);
     for (unsigned i = 0; i < PLR_ROWS; i++) {

@@ -5,7 +5,6 @@
 #include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
-#include "state/blocks.h"
 #include "state/elements.h"
 
 void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]) {

@@ -36,8 +36,6 @@ typedef struct plr_world_point {
 } plr_world_point;
 
 struct plr_model {
-    const char *name;
-
     /* Applies a motion to landmarks and covariance; T_WB has been moved before. `body` keeps the
      * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
     void (*propagate)(plr_filter *f, const plr_applied_motion *motion);

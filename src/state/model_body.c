@@ -10,7 +10,6 @@
 #include "state/model.h"
 #include "state/polar.h"
 #include "state/rigid_fit.h"
-#include "state/slots.h"
 
 #include "math/dense.h"
 #include "math/se3.h"
@@ -286,8 +285,7 @@ static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_rea
     const plr_real W[3] = {1, 1, baseline * baseline};
     const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
     plr_rigid_fit fit[SIGHTS];
-    plr_rigid_fit_clear(&fit[IN_SIGHT]);
-    plr_rigid_fit_clear(&fit[OUT_OF_SIGHT]);
+    memset(fit, 0, sizeof fit);
     for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_polar chart;
         plr_polar_at(&chart, f->slots[slot].x);
@@ -394,7 +392,6 @@ static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_p
 }
 
 const struct plr_model plr_model_body = {
-    .name = "body",
     .propagate = body_propagate,
     .look = body_look,
     .derive = body_derive,

@@ -8,7 +8,6 @@
 #include "state/covariance.h"
 #include "state/model.h"
 
-#include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "state/camera.h"
@@ -104,7 +103,6 @@ static void world_in_world(const plr_filter *f, const plr_slot *slot, plr_world_
 }
 
 const struct plr_model plr_model_world = {
-    .name = "world",
     .propagate = world_propagate,
     .look = world_look,
     .derive = world_derive,

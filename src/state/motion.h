@@ -4,8 +4,6 @@
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 
-#include <stdbool.h>
-
 #include "pelorus/state.h"
 
 /* Nothing accumulated: D = I, Q = 0, B = 0; velocity and biases as they are. */

@@ -17,10 +17,6 @@
 /* Added to the prior's variances, which may be zero. */
 #define SMALLEST_VARIANCE PLR_R(1e-20)
 
-void plr_rigid_fit_clear(plr_rigid_fit *fit) {
-    memset(fit, 0, sizeof *fit);
-}
-
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
                        const plr_real w[3], const plr_real W[3]) {
     fit->landmarks++;

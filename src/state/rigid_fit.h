@@ -17,14 +17,13 @@
 /* The largest rotation of a correction that a retraction can apply, squared, rad^2. */
 #define PLR_MAX_CORRECTION_TURN2 PLR_R(9)
 
+/* To be begun with zeros. */
 typedef struct plr_rigid_fit {
     plr_real A[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN]; /* 6x6, upper triangle packed row by row */
     plr_real b[PLR_POSE_DIM];                          /* sum_i J_i^T W w_i */
     plr_real w2;                                       /* sum_i w_i^T W w_i */
     unsigned landmarks;
 } plr_rigid_fit;
-
-void plr_rigid_fit_clear(plr_rigid_fit *fit);
 
 /* Adds a landmark: J 3x6, w and the diagonal of W, 3 each. */
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
