@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 #include "pelorus/wire.h"
 #include "record/bytes.h"

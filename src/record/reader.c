@@ -80,13 +80,6 @@ static plr_read_event end_frame(plr_reader *r, bool whole, plr_message *message)
     return PLR_READ_MESSAGE;
 }
 
-static void begin_frame(plr_reader *r) {
-    r->frame_start = r->counts.bytes;
-    r->length = 0;
-    r->crc = 0;
-    r->overrun = false;
-}
-
 /* What does not fit is still checked, so that a long frame and a damaged one are told apart. */
 static void append(plr_reader *r, uint8_t byte) {
     r->crc = plr_crc32(r->crc, &byte, 1);
@@ -98,8 +91,12 @@ static void append(plr_reader *r, uint8_t byte) {
 
 static plr_cobs_step take_byte(plr_reader *r, uint8_t stuffed) {
     uint8_t byte;
-    if (!plr_cobs_in_frame(&r->cobs))
-        begin_frame(r);
+    if (!plr_cobs_in_frame(&r->cobs)) {
+        r->frame_start = r->counts.bytes;
+        r->length = 0;
+        r->crc = 0;
+        r->overrun = false;
+    }
     r->counts.bytes++;
     plr_cobs_step step = plr_cobs_decode(&r->cobs, stuffed, &byte);
     if (step == PLR_COBS_BYTE)

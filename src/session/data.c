@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-#include "pelorus/assertions.h"
-
 #include "session/budget.h"
 #include "session/clock.h"
 #include "session/held.h"

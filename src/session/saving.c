@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/finite.h"
 #include "pelorus/state_store.h"
 #include "session/line.h"
 #include "session/phase.h"
@@ -88,13 +89,11 @@ void plr_saving_save(plr_session *s, plr_time_ns t_ns) {
 /* ---------------------------------------------------------------- restore */
 
 static plr_status check_moved(const plr_state_message *wanted) {
-    const double *variance = wanted->moved_variance;
-    for (unsigned i = 0; i < 6; i++) {
-        if (!(variance[i] - variance[i] == 0))
-            return PLR_E_NOT_FINITE;
-        if (variance[i] < 0)
+    if (!plr_all_finite(wanted->moved_variance, 6))
+        return PLR_E_NOT_FINITE;
+    for (unsigned i = 0; i < 6; i++)
+        if (wanted->moved_variance[i] < 0)
             return PLR_E_ARGUMENT;
-    }
     return plr_plausible(PLR_GROUP_RESTORE, wanted) ? PLR_OK : PLR_E_RANGE;
 }
 

@@ -19,11 +19,6 @@ void plr_session_options_default(plr_session_options *options) {
                       PLR_OUTPUT_LANDMARK | PLR_OUTPUT_TEXT | PLR_OUTPUT_END;
 }
 
-static int write_to_port(void *context, const uint8_t *bytes, size_t n) {
-    plr_session *s = context;
-    return s->port.write(s->port.context, bytes, n);
-}
-
 plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
                                   const plr_session_options *options, const plr_sizes *caller) {
     const plr_sizes here = plr_sizes_here(sizeof(plr_session));
@@ -44,8 +39,8 @@ plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
     plr_start_clear(s); /* and the phase is PLR_PHASE_WAITING, which is 0 */
     plr_status status =
         plr_reader_init(&s->reader, s->body, sizeof s->body, s->observations, PLR_MAX_OBSERVATIONS);
-    if (status == PLR_OK)
-        status = plr_writer_init(&s->writer, write_to_port, s);
+    if (status == PLR_OK && port->write != NULL)
+        status = plr_writer_init(&s->writer, port->write, port->context);
     return status;
 }
 

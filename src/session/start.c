@@ -5,7 +5,6 @@
 
 #include "pelorus/assertions.h"
 #include "session/budget.h"
-#include "session/held.h"
 #include "session/known_map.h"
 #include "session/layers.h"
 #include "session/line.h"
@@ -179,18 +178,19 @@ void plr_start_announce(plr_session *s) {
 void plr_start_set_bias(plr_session *s) {
     if (!s->start.has_bias || plr_filter_config(&s->filter)->bias == 0)
         return;
-    plr_status status = PLR_E_RANGE;
-    if (plr_plausible(PLR_GROUP_BIAS, &s->start))
-        status = plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance);
+    const plr_status status =
+        plr_plausible(PLR_GROUP_BIAS, &s->start)
+            ? plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance)
+            : PLR_E_RANGE;
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
 }
 
 plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns,
                               const plr_pose *T_WB, const double *P_xi) {
-    plr_status status = PLR_E_RANGE;
-    if (plr_plausible(PLR_GROUP_POSE, T_WB))
-        status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
+    const plr_status status = plr_plausible(PLR_GROUP_POSE, T_WB)
+                                  ? plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi)
+                                  : PLR_E_RANGE;
     if (status != PLR_OK) {
         plr_send_refusal(s, subject, t_ns, status, NULL);
         return status;
