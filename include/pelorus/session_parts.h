@@ -40,7 +40,7 @@ typedef struct plr_held_step {
     bool leads; /* it is the first of its message */
 } plr_held_step;
 
-/* Twists or IMU readings that wait because of the setting twist-delay: a ring, ascending by time. */
+/* Twists or IMU readings that wait because of twist-delay: a ring, ascending by time. */
 typedef struct plr_held_steps {
     uint8_t first, count;
     uint64_t leads; /* bit i: the one at place i is the first of its message */

@@ -6,7 +6,7 @@
 #include "math/small.h"
 #include "math/tile.h"
 
-/* S = B P B^T, B 6 x m with leading dimension ldb. Inlined for each m: a constant size is faster. */
+/* S = B P B^T, B 6 x m with leading dimension ldb. Inlined for each m: constants are faster. */
 static inline void sandwich(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real *B, size_t ldb,
                             const plr_real *P) {
     plr_real BP[PLR_MOTION_BY] = {0};

@@ -16,7 +16,8 @@
 /* After a longer pause between readings the average begins anew: few readings are no mean. */
 #define PAUSE_NS UINT64_C(100000000)
 /* At rest the readings spread by no more than this about their mean, besides their noise, and the
- * means of both halves agree to a part of it: a running engine is allowed, a walking hand is not. */
+ * means of both halves agree to a part of it: a running engine is allowed, a walking hand is
+ * not. */
 #define SPREAD_ACCEL PLR_R(0.5)  /* m/s^2 */
 #define SPREAD_GYRO  PLR_R(0.05) /* rad/s */
 #define DRIFT_SHARE  PLR_R(0.2)
@@ -32,9 +33,10 @@
 #define NOT_GRAVITY PLR_R(1.5)
 /* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
 #define OTHER_TILT PLR_R(0.06)
-/* So long after the start the mean reading is held against gravity. It is at fault if it does not fit in
- * so many frames in a row, for so long: a body that swings leaves no half second of it to itself, and
- * frames may come at any rate. A body that spins faster, rad/s, would be thrown about. */
+/* So long after the start the mean reading is held against gravity. It is at fault if it does not
+ * fit in so many frames in a row, for so long: a body that swings leaves no half second of it to
+ * itself, and frames may come at any rate. A body that spins faster, rad/s, would be thrown
+ * about. */
 #define WATCH_NS UINT64_C(10000000000)
 #define DOUBT_NS UINT64_C(850000000)
 #define SPINS    PLR_R(10)
@@ -42,8 +44,7 @@ enum { WATCH_FRAMES = 5 };
 /* The anchor comes this much after a start in motion, if this many frames were used. */
 #define ANCHOR_NS UINT64_C(2000000000)
 enum { ANCHOR_FRAMES = 10 };
-/* Within about this time, s, tilt and velocity are found; meanwhile their products of second order
- * have misled position and yaw. */
+/* Within this time, s, tilt and velocity are found; their product has misled position and yaw. */
 #define FOUND_S PLR_R(0.5)
 
 void plr_alignment_clear(plr_filter *f) {
@@ -84,8 +85,7 @@ static void average(plr_alignment *at, plr_time_ns t_ns, const plr_real reading[
         memcpy(at->half_mean, at->mean, sizeof at->half_mean);
 }
 
-/* True if three numbers spread and drift no more than a body at rest. `noise` is the variance of one
- * reading. */
+/* True if three numbers scatter no more than a body's at rest; `noise`: variance of one reading. */
 static bool is_steady(const plr_alignment *at, unsigned first, plr_real allowed, plr_real noise) {
     const plr_real readings = (plr_real)at->count, limit = allowed * allowed + PLR_R(4) * noise;
     plr_real drift[3];

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The process `imu`: accelerometer and gyro move pose and velocity (docs/MATH.md 19). The body's axes
- * are those of the IMU. The state before the landmarks is (rho, theta, v, b_a, b_g), with v in body
- * axes: then a shift of the world, or a turn about the vertical, changes nothing but the pose, and
- * the filter learns nothing of either.
+ * The process `imu`: accelerometer and gyro move pose and velocity (docs/MATH.md 19). The body's
+ * axes are those of the IMU. The state before the landmarks is (rho, theta, v, b_a, b_g), with v in
+ * body axes: then a shift of the world, or a turn about the vertical, changes nothing but the pose,
+ * and the filter learns nothing of either.
  */
 #include "process/process.h"
 
@@ -253,9 +253,8 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
     }
 }
 
-/* The densities of the readings' noise, squared. A reading that is held for longer than usual, since
- * others were lost, is wrong by what changes meanwhile: at first as much as successive readings
- * differ, and later as readings scatter at all. */
+/* The densities of the readings' noise, squared. A reading held for longer than usual is wrong by
+ * what changes meanwhile: at first as successive readings differ, later as they scatter at all. */
 static void densities(const plr_filter *f, plr_real interval, plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     density[0] = f->par.accel_density;
@@ -287,9 +286,8 @@ static inline void set_block(plr_real Q[DIM * DIM], const plr_real *X, const plr
                 block[3 * i + j];
 }
 
-/* Q <- F Q F^T + noise. The rows of the biases do not change. The noise of the readings, of variances
- * `reading` (accelerometer, gyro), enters as an error of the biases does that lasts for this step
- * alone. */
+/* Q <- F Q F^T + noise. The noise of the readings, of variances `reading` (accelerometer, gyro),
+ * enters as an error of the biases does that lasts for this step alone. */
 static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
                             const plr_real reading[2]) {
     plr_real Q[DIM * DIM], X[MOVED * DIM];
@@ -421,9 +419,10 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
  * independent, the gyro's bias would be believed too much. */
 #define USED_TWICE PLR_R(2)
 
-/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise adds
- * to the measurement's. A row of v and w together (a wheel) takes the last reading, for both change;
- * a row of w alone (a standstill) the mean reading since the last one, which has less noise. */
+/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise
+ * adds to the measurement's. A row of v and w together (a wheel) takes the last reading, for both
+ * change; a row of w alone (a standstill) the mean reading since the last one, which has less
+ * noise. */
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);

@@ -12,7 +12,7 @@
 #include "state/pose.h"
 #include "state/seconds.h"
 
-/* An interval that is longer than usual by this many of the intervals' deviations lacks readings. */
+/* An interval longer than usual by this many of the intervals' deviations lacks readings. */
 #define LATE_SIGMAS PLR_R(4)
 
 static void lay_out(plr_filter *f) {
@@ -92,8 +92,9 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
     }
 }
 
-/* Whether readings were lost in an interval of h seconds. Where the intervals differ by much all along,
- * a long one is nothing unusual: its reading stands for all of it, to the sigma that was told. */
+/* Whether readings were lost in an interval of h seconds. Where the intervals differ by much all
+ * along, a long one is nothing unusual: its reading stands for all of it, to the sigma that was
+ * told. */
 static bool lost_readings(const plr_filter *f, plr_real h) {
     const plr_real usual = f->inertial.usual_s, late = h - usual;
     return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
@@ -111,9 +112,8 @@ static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DI
     memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
 }
 
-/* The square of by how much a velocity is off that is held for n of the usual intervals: what readings
- * differ by beyond their own noise, and later what they scatter by. Linear numbers are 0, angular ones
- * 1. */
+/* The square of by how much a velocity is off that is held for n usual intervals: what readings
+ * differ by beyond their noise, later what they scatter by. `which`: 0 linear, 1 angular. */
 static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
     const plr_real *v = which == 0 ? f->par.velocity_variance : f->par.gyro_variance;
     const plr_real noise = (v[0] + v[1] + v[2]) / PLR_R(3);

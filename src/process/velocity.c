@@ -73,8 +73,7 @@ bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
     return false;
 }
 
-/* Lambda += Y^T Y, eta += Y^T e: the whitened difference e = U^-T (s z - M xi) is Y db + N(0, I),
- * with Y = -s U^-T M T. */
+/* Lambda += Y^T Y, eta += Y^T e for e = U^-T (s z - M xi) = Y db + N(0, I), Y = -s U^-T M T. */
 static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
     plr_real *eta = f->either.velocities.bias_eta, *Lambda = f->either.velocities.bias_Lambda;
@@ -111,8 +110,7 @@ static void correct(plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE],
     memcpy(T, next, sizeof next);
 }
 
-/* e = s z - M xi, and S = M V M^T + s density. What is below rounding in M V M^T adds to the
- * noise. */
+/* e = s z - M xi, S = M V M^T + s density. Rounding in M V M^T adds to the noise. */
 static void compare(const plr_held_velocity *held, plr_real seconds,
                     const plr_real xi[PLR_POSE_DIM], const plr_real V[PLR_POSE_SQUARE],
                     plr_real MV[PLR_ROWS * PLR_POSE_DIM], plr_real R[PLR_ROWS],

@@ -60,7 +60,7 @@ static unsigned size_in_memory(unsigned kind) {
     }
 }
 
-/* A number as the processor holds it becomes little-endian bytes, or the other way: that is the same. */
+/* A number as the processor holds it becomes little-endian bytes, or the other way round. */
 static void reorder(unsigned char *to, const unsigned char *from, unsigned width) {
     const uint16_t one = 1;
     const bool is_little = *(const unsigned char *)&one == 1;
@@ -110,8 +110,7 @@ static void pass_same(plr_codec *c, const plr_field *f, unsigned char *at) {
         reorder(at, bytes, width);
 }
 
-/* A double that is f32 outside. The conversion is that of IEEE 754 (C99 Annex F.3): to nearest, and
- * to infinity beyond the range. */
+/* A double that is f32 outside: rounded to nearest, infinite beyond the range (C99 Annex F.3). */
 static void pass_narrow(plr_codec *c, unsigned char *at) {
     static const plr_field f32 = {.kind = PLR_FIELD_F32, .count = 1};
     double wide = 0;
@@ -234,8 +233,7 @@ static size_t length_of(const char *text, size_t size) {
     return n;
 }
 
-/* Where the text is cut, it may be in the middle of a character: of UTF-8 at most three bytes go
- * before the cut. */
+/* A cut may be inside a character: of UTF-8 at most three bytes go before it. */
 static void drop_part_of_character(char *text, unsigned length) {
     unsigned n = length;
     while (n > 0 && n > length - 3 && ((uint8_t)text[n] & 0xC0) == 0x80)

@@ -61,8 +61,7 @@ static void pass_imu(plr_codec *c, plr_imu_message *m) {
         plr_codec_fields(c, &m->readings[i], IMU_rows, LENGTH(IMU_rows));
 }
 
-/* What is read goes to the reader's room; what is written comes from the message, which is only
- * looked at. */
+/* What is read goes to the reader's room; what is written is only looked at. */
 static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_room *room) {
     plr_observation *rows = (plr_observation *)m->observations;
     if (plr_codec_reads(c)) {

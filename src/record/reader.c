@@ -20,8 +20,7 @@ plr_status plr_reader_init(plr_reader *r, uint8_t *buffer, size_t buffer_size,
     return PLR_OK;
 }
 
-/* A number that is lower than expected is not a gap of almost 2^16 frames: the sender began anew,
- * or another one goes on. */
+/* A lower number than expected is no gap of almost 2^16 frames: the sender began anew. */
 static void count_missing(plr_reader *r, uint16_t sequence) {
     uint16_t gap = (uint16_t)(sequence - r->next_sequence);
     if (gap < STEP_BACK)

@@ -27,8 +27,8 @@ static bool to_frame(void *writer, uint8_t *bytes, unsigned n) {
     return true; /* w->status has the failure */
 }
 
-/* The codec takes what it could read into; in these directions it only looks at it. END says what was
- * written, whatever the message says. */
+/* The codec takes what it could read into; in these directions it only looks at it. END says what
+ * was written, whatever the message says. */
 static plr_status pass_payload(plr_direction direction, plr_writer *w, const plr_message *message) {
     plr_codec codec = {.direction = direction, .move = to_frame, .context = w};
     if (message->kind == PLR_KIND_END) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The body does not move: v = 0 with sigma[0], m/s, and w = 0 with sigma[1], rad/s, each if `axes`
- * has its bit. */
+/* The body rests: v = 0 with sigma[0], m/s, w = 0 with sigma[1], rad/s, each if in `axes`. */
 #include <string.h>
 
 #include "sensor/sensor.h"
@@ -30,8 +29,8 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
 const plr_sensor_kind plr_standstill = {
     .of_twist = measure, .place = 1, .axes = 3, .most_value = 0};
 
-/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise and
- * in what its track has wandered since. */
+/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise
+ * and in what its track has wandered since. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {
     const plr_real since = plr_seconds(f->t_ns - slot->anchor_ns);
     const plr_real drift = f->par.track_drift * since;

@@ -115,8 +115,8 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
 }
 
 /* How the point that a pair of pixels shows would change: with a longer baseline along its ray,
- * with a longer focal length in its depth alone. If the camera is turned by a small phi, pixels that
- * show q mean q - phi x q in the axes that T_CB gives the camera. */
+ * with a longer focal length in its depth alone. If the camera is turned by a small phi, pixels
+ * that show q mean q - phi x q in the axes that T_CB gives the camera. */
 static void point_by_calibration(const plr_real q[3], plr_real q_s[PLR_CALIBRATIONS][3]) {
     const plr_real changes[PLR_CALIBRATIONS][3] = {
         [PLR_BASELINE] = {q[0], q[1], q[2]},    [PLR_FOCAL_LENGTH] = {0, 0, q[2]},
@@ -143,11 +143,9 @@ void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
     }
 }
 
-/* ---------------------------------------------------------------- during the search for the
- * motion */
+/* ---------------------------------------------------------------- during the motion's search */
 
-/* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v,
- * are left out. */
+/* J = Dz R^T Ji(q0), without what vanishes, as in model_body.c: Dz q in the rows uL and v. */
 static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
                           const plr_real p[3], plr_stereo_prediction *sight) {
     plr_real DzRt[9];

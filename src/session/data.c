@@ -101,8 +101,8 @@ void plr_data_limit_frame(plr_session *s) {
         s->in.as.stereo.budget = budget;
 }
 
-/* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there are
- * none: a frame has the time of its TRUTH.) False if there is no such time. */
+/* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there
+ * are none: a frame has the time of its TRUTH.) False if there is no such time. */
 static bool move(const plr_session *s, plr_time_ns t_ns, plr_time_ns *moved_ns) {
     const plr_config *config = plr_filter_config(&s->filter);
     const double offset_ns = config->mode == PLR_MODE_MAPPING ? 0 : config->camera_offset_s * 1e9;

@@ -7,15 +7,14 @@
 
 /* Each applies its message to the filter, which must be initialised.
  *
- * With twist-delay, or if camera-offset moves it ahead, a STEREO beyond the last step waits for those
- * up to its time: an IMU may come in batches, or late. It waits until they are there, or until another
- * STEREO is newer by twist-delay and what camera-offset moves it, or until the place of those that
- * wait is taken (then totals.held_short counts it). Only messages tell the time, so that a replay
- * does the same. */
+ * With twist-delay, or if camera-offset moves it ahead, a STEREO beyond the last step waits until
+ * the steps up to its time are there, until another STEREO is newer by twist-delay and what
+ * camera-offset moves it, or until the room for those that wait is taken (totals.held_short). Only
+ * messages tell the time, so that a replay does the same. */
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
 
-/* A START or TRUTH of that time may set the start pose: STEREOs that wait and are older come before it. */
+/* A START or TRUTH of that time may set the start pose: older STEREOs that wait come first. */
 void plr_data_begin_before(plr_session *s, plr_time_ns t_ns);
 
 /* Uses the STEREOs that wait, and the steps that waited with them. */
@@ -27,8 +26,7 @@ void plr_data_use_waiting_in_time(plr_session *s);
 /* Sets the filter's pose to that of a START. */
 void plr_data_use_start(plr_session *s);
 
-/* Lowers the budget of a STEREO, the number of observations that may be used, to what can be
- * computed before the deadline. */
+/* Lowers the budget of a STEREO to what can be computed before the deadline. */
 void plr_data_limit_frame(plr_session *s);
 
 /* Answers a STEREO that is refused. */

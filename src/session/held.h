@@ -2,12 +2,10 @@
 /*
  * What waits, so that the filter is given everything in the order of time (setting twist-delay).
  *
- * Steps, the twists or readings of an IMU that move the body, wait for a late camera: a frame that is
- * older than the last step is refused, so with a camera that needs, say, 80 ms from shutter to
- * message the session hands steps to the filter 80 ms late. A step is due once a newer one is `delay`
- * ahead of it, or when a frame at or after it is used.
- *
- * Frames wait for late steps, which come in batches, or behind a filter of their own: data.h.
+ * Steps, the twists or readings of an IMU that move the body, wait for a late camera, since a frame
+ * older than the last step is refused. A step is due once a newer one is `delay` ahead of it, or
+ * when a frame at or after it is used. Frames wait for late steps, which may come in batches:
+ * data.h.
  */
 #ifndef PLR_SESSION_HELD_H
 #define PLR_SESSION_HELD_H

@@ -54,8 +54,8 @@ static void save(plr_session *s) {
 
 enum { RESTORE = PLR_WIRE_KINDS + 1, ROWS };
 
-/* docs/REPLAY-FORMAT.md shows it too. What other filters computed (POSE, REPORT, LANDMARK of another
- * role) is ignored everywhere: row PLR_KIND_NONE. */
+/* docs/REPLAY-FORMAT.md shows it too. What other filters computed (POSE, REPORT, LANDMARK of
+ * another role) is ignored everywhere: row PLR_KIND_NONE. */
 /* clang-format off */
 static const struct {
     uint8_t rules[PLR_PHASES];
@@ -104,8 +104,8 @@ static void count(plr_session *s) {
     s->is_log = s->is_log || is_in_force(&s->in);
 }
 
-/* What this session says itself is not echoed: CONFIG in force, END, a log's TEXT. A restore that is
- * used is echoed later. */
+/* What this session says itself is not echoed: CONFIG in force, END, a log's TEXT. A restore that
+ * is used is echoed later. */
 static void echo(plr_session *s, unsigned row, plr_rule rule) {
     const bool own = is_in_force(&s->in) || row == PLR_KIND_END ||
                      (row == PLR_KIND_TEXT && s->is_log) || (row == RESTORE && rule == USE);

@@ -50,8 +50,7 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
     }
 }
 
-/* PLR_E_CONFIG if a setting does not allow its value, with the first such setting in *culprit; NULL
- * if there is none of its id. */
+/* PLR_E_CONFIG if a value is not allowed; *culprit: its setting, NULL if none has its id. */
 static plr_status apply_values(plr_config *config, const plr_wire_setting *values, unsigned count,
                                const plr_setting **culprit) {
     for (unsigned i = 0; i < count; i++) {

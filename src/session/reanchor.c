@@ -128,8 +128,8 @@ static plr_status start_anew(plr_filter *f) {
     return PLR_OK;
 }
 
-/* With an IMU tilt and velocity are lost too: the filter starts anew, with the last place and heading,
- * and with the biases that it knows. A controller sees the jump in reset_count. */
+/* With an IMU tilt and velocity are lost too: the filter starts anew, with the last place and
+ * heading, and with the biases that it knows. A controller sees the jump in reset_count. */
 static plr_status carry_pose(plr_session *s, plr_time_ns t_ns, double seconds) {
     plr_filter *f = &s->filter;
     const bool inertial = plr_filter_config(f)->process == PLR_PROCESS_IMU;

@@ -117,7 +117,7 @@ static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6
     return plr_filter_resume(f, t_ns, moved ? P : NULL);
 }
 
-/* What STATE asks for, or PLR_START_SAVED; without an error, *of_ns is the time of the saved state. */
+/* What STATE asks for, or PLR_START_SAVED; *of_ns, if all is well, is the saved state's time. */
 static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_variance[6],
                        plr_stored_state *stored, plr_time_ns *of_ns) {
     if (s->options.store == NULL)

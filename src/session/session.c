@@ -44,8 +44,7 @@ plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
     return status;
 }
 
-/* A run of frames that are skipped for the same reason is answered once: noise would otherwise be
- * answered with more bytes than it has. */
+/* Frames skipped one after the other for the same reason are answered once: noise has few bytes. */
 static void answer_skip(plr_session *s) {
     static const plr_status statuses[] = {
         [PLR_SKIP_NONE] = PLR_OK,           [PLR_SKIP_DAMAGED] = PLR_E_CORRUPT,

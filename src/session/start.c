@@ -110,8 +110,7 @@ void plr_start_add_landmark(plr_session *s) {
 
 /* --- the filter --- */
 
-/* plr_map.sink: always accepts. A cut link must not fill the state with landmarks that nobody wants;
- * what the port refuses is counted in totals.not_sent. */
+/* plr_map.sink: always accepts, or a cut link would fill the state; not_sent counts the lost. */
 static int send_evicted(void *context, const plr_landmark *landmark) {
     plr_send_landmark(context, PLR_LANDMARK_EVICTED, landmark);
     return 0;

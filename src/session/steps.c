@@ -30,7 +30,7 @@ void plr_steps_note_used(plr_session *s, plr_time_ns t_ns) {
     order->ahead_ns = order->came && t_ns > order->newest_ns ? t_ns - order->newest_ns : 0;
 }
 
-/* True if the filter refused a step because something of later time was used before it, and no step. */
+/* True if the filter refused a step because of something later that was used before, but no step. */
 static bool is_late(const plr_session *s, plr_time_ns t_ns, plr_status status) {
     const plr_step_order *order = &s->order;
     return status == PLR_E_TIME && order->used && t_ns < order->used_ns &&

@@ -74,8 +74,7 @@ static void chart_jacobian(plr_real F[9], const plr_polar *to, const plr_real R[
     F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
-/* Keeps a landmark at least PLR_MIN_RANGE from the camera. Nearer than that the camera has reached
- * the point, and the chart is not defined. */
+/* Keeps a landmark at least PLR_MIN_RANGE away: nearer the chart is not defined. */
 static void enforce_min_range(plr_real q[3]) {
     const plr_real range2 = plr_dot3(q, q);
     if (range2 >= PLR_MIN_RANGE * PLR_MIN_RANGE)
@@ -261,9 +260,8 @@ typedef struct plr_common_motion {
     plr_real E[9], R[9], p[3];  /* of the camera: Exp(eta_C), R = I + E */
 } plr_common_motion;
 
-/* With an IMU, landmarks out of sight share another motion than those in sight: the frame that finds
- * the velocity after a stretch without pictures corrects the position by metres, and with it the old
- * landmarks, but not those that it sees. */
+/* With an IMU, landmarks out of sight share another motion: the frame that finds the velocity after
+ * a dark stretch corrects position and old landmarks by metres, but not those that it sees. */
 enum { IN_SIGHT, OUT_OF_SIGHT, SIGHTS };
 
 static unsigned sight_of(const plr_filter *f, unsigned slot) {
@@ -271,12 +269,11 @@ static unsigned sight_of(const plr_filter *f, unsigned slot) {
     return parted && f->slots[slot].last_frame != f->frame_number ? OUT_OF_SIGHT : IN_SIGHT;
 }
 
-/* The rigid motions eta of the body that the corrections of the landmarks have in common. They differ
- * from the pose's correction xi, which may mostly concern the way travelled before, in which no
- * visible landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity
- * that it causes. Known landmarks are left out: they are fixed in the world, so the pose moves them
- * in the camera, and the common part of a map's errors is not a motion. J becomes
- * chart_by_body_twist of every slot. */
+/* The rigid motions eta of the body that the landmarks' corrections have in common. They differ
+ * from the pose's correction xi, which may mostly concern the way before, in which no visible
+ * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
+ * causes. Known landmarks are left out: they are fixed in the world, and the common part of a map's
+ * errors is no motion. J becomes chart_by_body_twist of every slot. */
 static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_real *J,
                                 plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
@@ -304,9 +301,8 @@ static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_rea
     }
 }
 
-/* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common
- * motion has brought the point: the same angle, turned by the bearing part of F (chart_jacobian),
- * and the same inverse range. */
+/* Converts the rest of a correction from the chart `from` to `to`, where the common motion brought
+ * the point: the same angle, turned by F (chart_jacobian), and the same inverse range. */
 static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
                       const plr_polar *from) {
     const plr_real ratio = to->r / from->r, w0 = ratio * w[0], w1 = ratio * w[1];

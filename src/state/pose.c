@@ -6,8 +6,7 @@
 #include "math/so3.h"
 #include "state/rigid_fit.h"
 
-/* Without the orthonormalisation, an hour of steps in float32 makes R deviate from a rotation by
- * 0.01. */
+/* Not made orthonormal, R would deviate from a rotation by 0.01 in an hour of float32 steps. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     plr_real step[3], change[9];
     plr_mat3_vec(step, f->R_WB, d);

@@ -21,8 +21,7 @@ void plr_pose_correct(plr_filter *f, const plr_real xi[PLR_POSE_DIM]);
 void plr_pose_moved_from(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
                          plr_real moved[PLR_POSE_DIM]);
 
-/* How far the pose would have to move to get to (R_WB, p_WB): T Exp(xi), the turn exactly, the way to first
- * order. */
+/* xi from the pose to (R_WB, p_WB) = T Exp(xi): the turn exactly, the way to first order. */
 void plr_pose_towards(const plr_filter *f, const plr_real R_WB[9], const double p_WB[3],
                       plr_real xi[PLR_POSE_DIM]);
 
