@@ -129,32 +129,16 @@ static void use_in_order(plr_session *s, const plr_frame *frame, plr_time_ns mov
         use_frame(s, frame, &moved);
 }
 
-static void use_oldest(plr_session *s) {
-    const plr_held_frame *held = plr_held_pop_frame(&s->held_frames);
+static void use_held(plr_session *s, const plr_held_frame *held) {
     use_in_order(s, &held->frame, held->moved_ns);
     if (s->held_frames.count == 0)
         plr_steps_apply_due(s);
 }
 
-void plr_data_use_waiting(plr_session *s) {
-    while (s->held_frames.count > 0)
-        use_oldest(s);
-}
-
-/* Those whose time, by the clock of the steps, is at most t_ns. */
-static void use_waiting_until(plr_session *s, plr_time_ns t_ns) {
-    const plr_held_frame *oldest;
-    while ((oldest = plr_held_oldest_frame(&s->held_frames)) != NULL && oldest->moved_ns <= t_ns)
-        use_oldest(s);
-}
-
-void plr_data_begin_before(plr_session *s, plr_time_ns t_ns) {
-    if (s->phase == PLR_PHASE_STARTING && t_ns > 0)
-        use_waiting_until(s, t_ns - 1);
-}
-
-void plr_data_use_waiting_in_time(plr_session *s) {
-    use_waiting_until(s, s->order.newest_ns);
+void plr_data_use_waiting(plr_session *s, plr_time_ns until_ns) {
+    const plr_held_frame *held;
+    while ((held = plr_held_pop_frame(&s->held_frames, until_ns)) != NULL)
+        use_held(s, held);
 }
 
 /* How long a frame waits for the steps up to its time: as long as these wait for frames, and as
@@ -170,14 +154,13 @@ static plr_time_ns patience_ns(const plr_session *s, plr_time_ns t_ns, plr_time_
 static void hold(plr_session *s, const plr_frame *frame, plr_time_ns moved_ns) {
     if (s->held_frames.count == PLR_SESSION_HELD_FRAMES) {
         s->totals.held_short++;
-        use_oldest(s);
+        use_held(s, plr_held_pop_frame(&s->held_frames, UINT64_MAX));
     }
     plr_held_insert_frame(&s->held_frames, frame, moved_ns);
 }
 
 void plr_data_use_stereo(plr_session *s) {
     const plr_frame *frame = &s->in.as.stereo;
-    const plr_held_frame *before = plr_held_newest_frame(&s->held_frames);
     plr_time_ns moved_ns;
     if (!move(s, frame->t_ns, &moved_ns) ||
         plr_held_has_frame(&s->held_frames, frame->t_ns)) { /* doubled by a link */
@@ -185,11 +168,10 @@ void plr_data_use_stereo(plr_session *s) {
         return;
     }
     const plr_time_ns patience = patience_ns(s, frame->t_ns, moved_ns);
-    if (before != NULL && moved_ns < before->moved_ns &&
-        before->moved_ns - moved_ns > plr_clock_max_gap_ns(s))
-        plr_data_use_waiting(s); /* a clock was set back */
+    if (plr_clock_was_set_back(s, plr_held_newest_frame_ns(&s->held_frames), moved_ns))
+        plr_data_use_waiting(s, UINT64_MAX);
     else if (moved_ns >= patience)
-        use_waiting_until(s, moved_ns - patience);
+        plr_data_use_waiting(s, moved_ns - patience);
     if (patience > 0 && moved_ns > s->order.newest_ns)
         hold(s, frame, moved_ns);
     else
@@ -229,7 +211,7 @@ void plr_data_use_truth(plr_session *s) {
 /* --- START among the data --- */
 
 void plr_data_use_start(plr_session *s) {
-    plr_data_use_waiting(s);
+    plr_data_use_waiting(s, UINT64_MAX);
     s->start = s->in.as.start;
     plr_steps_apply_held(s, UINT64_MAX);
     plr_start_apply(s);

@@ -14,14 +14,9 @@
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
 
-/* A START or TRUTH of that time may set the start pose: older STEREOs that wait come first. */
-void plr_data_begin_before(plr_session *s, plr_time_ns t_ns);
-
-/* Uses the STEREOs that wait, and the steps that waited with them. */
-void plr_data_use_waiting(plr_session *s);
-
-/* Does so with those to whose time the steps have come. */
-void plr_data_use_waiting_in_time(plr_session *s);
+/* Uses the STEREOs that wait and whose time, by the clock of the steps, is at most until_ns, and the
+ * steps that waited with them. */
+void plr_data_use_waiting(plr_session *s, plr_time_ns until_ns);
 
 /* Sets the filter's pose to that of a START. */
 void plr_data_use_start(plr_session *s);

@@ -161,8 +161,10 @@ void plr_input_handle(plr_session *s) {
         if (s->phase == PLR_PHASE_READY)
             start(s);
     }
-    if (row == PLR_KIND_START || row == PLR_KIND_TRUTH)
-        plr_data_begin_before(s, plr_message_time(&s->in));
+    const plr_time_ns t_ns = plr_message_time(&s->in);
+    if ((row == PLR_KIND_START || row == PLR_KIND_TRUTH) && s->phase == PLR_PHASE_STARTING &&
+        t_ns > 0)
+        plr_data_use_waiting(s, t_ns - 1); /* it may set the start pose: older frames come before */
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
     PLR_ASSERT(rule != FIRST);
     if (rule == IGNORE)
@@ -177,5 +179,5 @@ void plr_input_handle(plr_session *s) {
         table[row].use(s);
     else if (rule == KEEP)
         plr_start_keep(s);
-    plr_data_use_waiting_in_time(s);
+    plr_data_use_waiting(s, s->order.newest_ns); /* to whose time the steps have come */
 }

@@ -11,8 +11,8 @@
 #define BOUND(group, type, member, count, limit)
 #define BOUND_IF(group, type, member, count, limit, flag)
 typedef enum plr_group {
+    PLR_GROUP_NONE, /* nothing */
 #include "session/limits.def"
-    PLR_GROUPS
 } plr_group;
 #undef LIMIT
 #undef GROUP

@@ -166,6 +166,10 @@ plr_time_ns plr_clock_max_gap_ns(const plr_session *s) {
     return (plr_time_ns)(plr_filter_config(&s->filter)->max_gap_s * 1e9 + 0.5);
 }
 
+bool plr_clock_was_set_back(const plr_session *s, plr_time_ns newest_ns, plr_time_ns t_ns) {
+    return t_ns < newest_ns && newest_ns - t_ns > plr_clock_max_gap_ns(s);
+}
+
 bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status) {
     return plr_clock_watch_note(&s->watch, t_ns, status, plr_filter_time(&s->filter),
                                 plr_clock_max_gap_ns(s)) &&

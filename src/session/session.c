@@ -116,7 +116,7 @@ plr_step plr_session_step(plr_session *s) {
 void plr_session_finish(plr_session *s) {
     if (s->phase >= PLR_PHASE_STARTING) {
         plr_landmark landmark;
-        plr_data_use_waiting(s);
+        plr_data_use_waiting(s, UINT64_MAX);
         plr_steps_apply_held(s, UINT64_MAX);
         if ((s->options.output & PLR_OUTPUT_STATE) != 0)
             plr_saving_save(s, plr_filter_time(&s->filter));

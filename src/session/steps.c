@@ -150,10 +150,14 @@ static void apply_step(plr_session *s, const plr_held_step *step) {
         (void)plr_send_pose(s, false);
 }
 
-void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
+static void apply_until(plr_session *s, plr_time_ns until_ns) {
     plr_held_step step;
-    while (plr_held_pop_until(&s->held, until_ns, &step))
+    while (plr_held_pop(&s->held, until_ns, &step))
         apply_step(s, &step);
+}
+
+void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
+    apply_until(s, until_ns);
     apply_readings_before(s, until_ns);
 }
 
@@ -171,16 +175,16 @@ static bool steps_wait(const plr_session *s) {
 }
 
 void plr_steps_apply_due(plr_session *s) {
-    plr_held_step due;
-    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
-        apply_step(s, &due);
+    const plr_time_ns newest_ns = plr_held_newest_ns(&s->held), delay = delay_ns(s);
+    if (newest_ns >= delay)
+        apply_until(s, newest_ns - delay);
 }
 
 static void delay_step(plr_session *s, const plr_held_step *step) {
     plr_held_step due;
-    if (plr_held_contradicts(&s->held, step->t_ns, plr_clock_max_gap_ns(s)))
+    if (plr_clock_was_set_back(s, plr_held_newest_ns(&s->held), step->t_ns))
         plr_steps_apply_held(s, UINT64_MAX);
-    if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
+    if (s->held.count == PLR_SESSION_HELD_TWISTS && plr_held_pop(&s->held, UINT64_MAX, &due)) {
         s->totals.held_short++;
         apply_step(s, &due);
     }
@@ -194,7 +198,7 @@ static void delay_step(plr_session *s, const plr_held_step *step) {
 static void note_time(plr_session *s, plr_time_ns t_ns) {
     plr_time_ns *newest_ns = &s->order.newest_ns;
     s->order.came = true;
-    if (t_ns > *newest_ns || *newest_ns - t_ns > plr_clock_max_gap_ns(s))
+    if (t_ns > *newest_ns || plr_clock_was_set_back(s, *newest_ns, t_ns))
         *newest_ns = t_ns;
 }
 
