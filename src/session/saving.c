@@ -97,24 +97,19 @@ static plr_status check_moved(const plr_state_message *wanted) {
     return plr_plausible(PLR_GROUP_RESTORE, wanted) ? PLR_OK : PLR_E_RANGE;
 }
 
-/* True if t_ns is later than the estimate by at most max-gap. */
-static bool follows(const plr_filter *f, plr_time_ns t_ns) {
-    const double max_gap_ns = plr_filter_config(f)->max_gap_s * 1e9;
-    return t_ns >= plr_filter_time(f) && (double)(t_ns - plr_filter_time(f)) <= max_gap_ns;
-}
-
 /* Sets the clock to t_ns, and allows for what may have moved. Where nothing lies between, the last
  * reading still applies, and the next bits are those of a drive that was never interrupted. */
-static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6]) {
+static plr_status go_on(plr_session *s, plr_time_ns t_ns, const double variance[6]) {
+    const plr_time_ns saved_ns = plr_filter_time(&s->filter);
     double P[36] = {0};
     bool moved = false;
     for (unsigned i = 0; i < 6; i++) {
         P[7 * i] = variance[i];
         moved = moved || variance[i] > 0;
     }
-    if (!moved && follows(f, t_ns))
+    if (!moved && t_ns >= saved_ns && t_ns - saved_ns <= plr_clock_max_gap_ns(s))
         return PLR_OK;
-    return plr_filter_resume(f, t_ns, moved ? P : NULL);
+    return plr_filter_resume(&s->filter, t_ns, moved ? P : NULL);
 }
 
 /* What STATE asks for, or PLR_START_SAVED; *of_ns, if all is well, is the saved state's time. */
@@ -126,7 +121,7 @@ static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_vari
     if (status != PLR_OK)
         return status;
     *of_ns = plr_filter_time(&s->filter);
-    status = go_on(&s->filter, t_ns, moved_variance);
+    status = go_on(s, t_ns, moved_variance);
     if (status != PLR_OK)
         (void)plr_filter_reset(&s->filter);
     return status;

@@ -131,45 +131,6 @@ static void store_motion_variance(plr_filter *f, const plr_real JL[PLR_POSE_SQUA
         f->work.noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
 }
 
-static unsigned body_retract(plr_filter *f, const plr_real *dx);
-
-static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
-    plr_real E[9], R[9], p[3];
-    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
-    plr_se3_rotation(R, E);
-
-    plr_real *F = f->work.Vt, largest_offset = 0;
-    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        plr_slot *s = &f->slots[slot];
-        plr_polar from, to;
-        const plr_real offset = move_to_linearisation_point(f, slot);
-        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
-        plr_polar_at(&from, s->x);
-        plr_se3_move_back(s->x, E, p);
-        enforce_min_range(s->x);
-        plr_polar_at(&to, s->x);
-        chart_jacobian(F + 9 * slot, &to, R, p, &from);
-        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
-        dx[0] = offset * F[9 * slot + 2];
-        dx[1] = offset * F[9 * slot + 5];
-        dx[2] = 0;
-        s->beyond = offset * F[9 * slot + 8];
-    }
-    plr_real A[PLR_POSE_SQUARE];
-    store_motion_variance(f, motion->JL);
-    plr_se3_rotation(R, motion->E);
-    plr_se3_adjoint_inverse(A, R, motion->p);
-    plr_covariance_transport(f, A, F);
-    if (!f->motion.noisy) { /* no correction follows to which dx could be added */
-        if (largest_offset > 0)
-            (void)body_retract(f, f->work.dx);
-        return;
-    }
-    fill_W(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
-    plr_covariance_open_noise(f, motion);
-}
-
 static bool body_look(const plr_filter *f, unsigned slot, plr_view *view) {
     memcpy(view->q, f->slots[slot].x, sizeof view->q);
     return view->q[2] >= f->par.min_depth;
@@ -351,6 +312,43 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     }
     plr_covariance_transport(f, A, F);
     return cut;
+}
+
+static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
+    plr_real E[9], R[9], p[3];
+    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
+    plr_se3_rotation(R, E);
+
+    plr_real *F = f->work.Vt, largest_offset = 0;
+    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        plr_slot *s = &f->slots[slot];
+        plr_polar from, to;
+        const plr_real offset = move_to_linearisation_point(f, slot);
+        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
+        plr_polar_at(&from, s->x);
+        plr_se3_move_back(s->x, E, p);
+        enforce_min_range(s->x);
+        plr_polar_at(&to, s->x);
+        chart_jacobian(F + 9 * slot, &to, R, p, &from);
+        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
+        dx[0] = offset * F[9 * slot + 2];
+        dx[1] = offset * F[9 * slot + 5];
+        dx[2] = 0;
+        s->beyond = offset * F[9 * slot + 8];
+    }
+    plr_real A[PLR_POSE_SQUARE];
+    store_motion_variance(f, motion->JL);
+    plr_se3_rotation(R, motion->E);
+    plr_se3_adjoint_inverse(A, R, motion->p);
+    plr_covariance_transport(f, A, F);
+    if (!f->motion.noisy) { /* no correction follows to which dx could be added */
+        if (largest_offset > 0)
+            (void)body_retract(f, f->work.dx);
+        return;
+    }
+    fill_W(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
+    plr_covariance_open_noise(f, motion);
 }
 
 static void body_drift(plr_filter *f, plr_real sigma) {
