@@ -30,9 +30,8 @@ static inline void plr_rows3_from_left(unsigned n, const plr_real F[9], const pl
 void plr_blocks3_transport(unsigned n, const plr_real F[9], const plr_real *G,
                            plr_real *const row[3]);
 
-/* The same bits, for processors whose registers hold several numbers: three times as fast there.
- * Gt: G_j^T for each j, PLR_WIDE_FACTOR elements. It writes to one element after the end of each
- * row. Y: space for 3 x 3n elements. */
+/* The same bits, three times as fast where registers hold several numbers. Gt: G_j^T, each of
+ * PLR_WIDE_FACTOR elements. Writes one element after the end of each row. Y: room for 3 x 3n. */
 void plr_blocks3_transport_wide(unsigned n, const plr_real F[9], const plr_real *Gt, plr_real *Y,
                                 plr_real *const row[3]);
 

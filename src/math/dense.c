@@ -105,8 +105,7 @@ static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, pl
     plr_tile_scale(row[3], PLR_R(1) / u3[0], x3);
 }
 
-/* The rows that are beyond a multiple of four are the first ones: they have the fewest above. A
- * tile has two rows above it or more. */
+/* The rows beyond a multiple of four come first. A tile has two rows above it or more. */
 static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
     enum { ROWS = PLR_TILE_ROWS };
     const unsigned alone = k % ROWS == 1 && k > 1 ? ROWS + 1 : k % ROWS;

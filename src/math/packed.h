@@ -27,9 +27,8 @@ void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const p
                          size_t ld, plr_real *P);
 
 /* d[i] = P_ii - sum_k Ut[k][i]^2 of the next rows i = first .. n-1, at most PLR_TILE_COLUMNS of
- * them: to the bit the diagonal that plr_packed_subtract with W = U would leave. Returns how many
- * they are. `first` is a multiple of PLR_TILE_COLUMNS. Reads as far beyond the end of U^T as
- * that. */
+ * them, whose number is returned: the diagonal, to the bit, that plr_packed_subtract with W = U
+ * leaves. `first` is a multiple of PLR_TILE_COLUMNS. Reads as far beyond the end of U^T as that. */
 unsigned plr_packed_subtracted_diagonal(unsigned first, unsigned n, unsigned depth,
                                         const plr_real *Ut, size_t ld, const plr_real *P,
                                         plr_real d[PLR_TILE_COLUMNS]);

@@ -15,9 +15,8 @@
 #define GLANCE_NS UINT64_C(100000000)
 /* After a longer pause between readings the average begins anew: few readings are no mean. */
 #define PAUSE_NS UINT64_C(100000000)
-/* At rest the readings spread by no more than this about their mean, besides their noise, and the
- * means of both halves agree to a part of it: a running engine is allowed, a walking hand is
- * not. */
+/* At rest the readings spread about their mean by no more than this, besides their noise, and the
+ * means of both halves agree to a part of it: an engine may run, no hand may walk. */
 #define SPREAD_ACCEL PLR_R(0.5)  /* m/s^2 */
 #define SPREAD_GYRO  PLR_R(0.05) /* rad/s */
 #define DRIFT_SHARE  PLR_R(0.2)
@@ -34,9 +33,8 @@
 /* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
 #define OTHER_TILT PLR_R(0.06)
 /* So long after the start the mean reading is held against gravity. It is at fault if it does not
- * fit in so many frames in a row, for so long: a body that swings leaves no half second of it to
- * itself, and frames may come at any rate. A body that spins faster, rad/s, would be thrown
- * about. */
+ * fit in so many frames in a row, for so long: bodies swing, and frames come at any rate. A
+ * body that spins faster, rad/s, would be thrown about. */
 #define WATCH_NS UINT64_C(10000000000)
 #define DOUBT_NS UINT64_C(850000000)
 #define SPINS    PLR_R(10)

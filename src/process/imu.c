@@ -420,9 +420,8 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
 #define USED_TWICE PLR_R(2)
 
 /* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise
- * adds to the measurement's. A row of v and w together (a wheel) takes the last reading, for both
- * change; a row of w alone (a standstill) the mean reading since the last one, which has less
- * noise. */
+ * adds to it. A row of v and w together (a wheel) takes the last reading, for both change; a row of
+ * w alone (a standstill) the mean since the last one, which has less noise. */
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);

@@ -20,8 +20,7 @@ typedef struct plr_process {
     /* Lays out the state's blocks. */
     void (*lay_out)(plr_filter *f);
 
-    /* PLR_OK if the reading may be held for `seconds`; PLR_E_RANGE if it turns the body by more
-     * than pi rad or moves it by more than 1 km. */
+    /* PLR_OK if the reading may be held for `seconds`, else PLR_E_RANGE: plr_step_is_possible. */
     plr_status (*check)(const plr_filter *f, const plr_real reading[PLR_READING_DIM],
                         plr_real seconds);
 
@@ -38,9 +37,8 @@ typedef struct plr_process {
     void (*hold)(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]);
 
     /* The variances of the displacement, m^2 and rad^2, that the last reading misses between h0 and
-     * h1 seconds after its time, because the body's motion changes; `next` is the reading that ends
-     * it, NULL while there is none. False if it misses nothing. NULL: `step` knows by its
-     * `interval`. */
+     * h1 seconds after its time, as the motion changes; `next` ends it, NULL while there is none.
+     * False: it misses nothing. NULL: `step` knows by its `interval`. */
     bool (*missed)(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
                    plr_real variance[PLR_POSE_DIM]);
 
@@ -80,8 +78,7 @@ void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_tim
 extern const plr_process plr_process_twist;
 extern const plr_process plr_process_imu;
 
-/* False until an IMU has been aligned with gravity: the state does not move before. In mapping
- * poses are given, and nothing has to start. */
+/* False until an IMU is aligned with gravity; until then the state rests, but for mapping. */
 static inline bool plr_process_has_started(const plr_filter *f) {
     return f->config.process != PLR_PROCESS_IMU || f->inertial.started != 0 ||
            f->config.mode == PLR_MODE_MAPPING;

@@ -92,9 +92,8 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
     }
 }
 
-/* Whether readings were lost in an interval of h seconds. Where the intervals differ by much all
- * along, a long one is nothing unusual: its reading stands for all of it, to the sigma that was
- * told. */
+/* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
+ * a long one is usual: its reading stands for all of it, to the sigma that was told. */
 static bool lost_readings(const plr_filter *f, plr_real h) {
     const plr_real usual = f->inertial.usual_s, late = h - usual;
     return usual > 0 && h > PLR_LONG_INTERVALS * usual &&

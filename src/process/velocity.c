@@ -19,8 +19,7 @@ enum { HELD_INTERVALS = 2 };
  * one step in 5,000 by chance. In units of the setting gate-d2. */
 #define CONTRADICTED PLR_R(1.5)
 
-/* The seconds between readings, in ns: 0 where they are not known yet, or too long. Two readings
- * of one time share their interval. */
+/* ns between readings: 0 where not known yet, or too long. Two of one time share their interval. */
 static plr_time_ns interval_of(const plr_held_velocity *held, plr_time_ns t_ns) {
     if (!held->known || t_ns < held->t_ns)
         return 0;

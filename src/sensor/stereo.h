@@ -24,8 +24,7 @@ void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real 
 /* Dz = d(uL, uR, v) / dq, 3x3, px/m. Needs q[2] != 0. */
 void plr_stereo_jacobian(plr_real Dz[9], const plr_camera *camera, const plr_real q[3]);
 
-/* The point q whose projection is z, m, and Dq = dq / d(uL, uR, v), 3x3, m/px.
- * Needs a disparity z[0] - z[1] > 0. */
+/* The point q whose projection is z, m, and Dq = dq / d(uL, uR, v), 3x3, m/px, for z[0] > z[1]. */
 void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *camera,
                              const plr_real z[3]);
 

@@ -141,8 +141,7 @@ void plr_data_use_waiting(plr_session *s, plr_time_ns until_ns) {
         use_held(s, held);
 }
 
-/* How long a frame waits for the steps up to its time: as long as these wait for frames, and as
- * camera-offset moves it ahead of what is there. */
+/* How long a frame waits for steps: as they do for frames, and as camera-offset moves it ahead. */
 static plr_time_ns patience_ns(const plr_session *s, plr_time_ns t_ns, plr_time_ns moved_ns) {
     const plr_config *config = plr_filter_config(&s->filter);
     const plr_time_ns ahead_ns = moved_ns > t_ns ? moved_ns - t_ns : 0;

@@ -14,8 +14,7 @@
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
 
-/* Uses the STEREOs that wait and whose time, by the clock of the steps, is at most until_ns, and the
- * steps that waited with them. */
+/* Uses the STEREOs that wait, of the steps' time until_ns at most, and the steps that wait too. */
 void plr_data_use_waiting(plr_session *s, plr_time_ns until_ns);
 
 /* Sets the filter's pose to that of a START. */

@@ -14,8 +14,7 @@
 
 /* --- steps --- */
 
-/* Inserts a step in the order of time. False, and nothing changes, if there is one of its time: it
- * came twice. The ring may not be full. */
+/* Inserts a step in the order of time; there must be room. False: one of its time is there. */
 bool plr_held_insert(plr_held_steps *held, const plr_held_step *step);
 
 /* The time of the newest step; 0 if there is none. */

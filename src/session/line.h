@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Builds one line of text in the fixed buffer of a TEXT message, without stdio. A text that is too
- * long is cut after a whole character. */
+/* Builds the line of a TEXT, without stdio; if too long it is cut after a whole character. */
 #ifndef PLR_SESSION_LINE_H
 #define PLR_SESSION_LINE_H
 

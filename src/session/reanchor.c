@@ -12,11 +12,6 @@
 /* A body with an IMU may turn like this at any time, rad/s. */
 #define USUAL_RATE 1.0
 
-void plr_clock_watch_init(plr_clock_watch *watch) {
-    watch->agreeing = 0;
-    watch->last_ns = 0;
-}
-
 static plr_time_ns distance_ns(plr_time_ns a, plr_time_ns b) {
     return a > b ? a - b : b - a;
 }

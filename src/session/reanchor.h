@@ -26,8 +26,6 @@
 
 #include "pelorus/session.h"
 
-void plr_clock_watch_init(plr_clock_watch *watch);
-
 /* Notes what the filter, whose estimate is at filter_ns, answered to a message of t_ns. True if the
  * new time is to be believed now. */
 bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status status,

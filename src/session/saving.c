@@ -132,7 +132,7 @@ static void start_from_state(plr_session *s, plr_phase_event event) {
     plr_send_resets_become(s, 0);
     s->start_pending = false;
     plr_phase_change(&s->phase, event);
-    plr_clock_watch_init(&s->watch);
+    s->watch.agreeing = 0;
     memset(&s->last, 0, sizeof s->last);
     s->last.t_ns = UINT64_MAX; /* no frame of this session: the next one is not its double */
 }

@@ -31,7 +31,7 @@ void plr_start_clear(plr_session *s) {
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)
         (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */
-    plr_clock_watch_init(&s->watch);
+    s->watch.agreeing = 0;
     plr_budget_init(&s->budget, s->options.deadline_us);
 }
 
@@ -194,7 +194,7 @@ plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns
         plr_send_refusal(s, subject, t_ns, status, NULL);
         return status;
     }
-    plr_clock_watch_init(&s->watch);
+    s->watch.agreeing = 0;
     if (s->phase == PLR_PHASE_STARTING)
         plr_send_resets_become(s, 0);
     plr_phase_change(&s->phase, PLR_EVENT_POSE);

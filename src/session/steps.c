@@ -13,10 +13,6 @@ static bool is_inertial(const plr_session *s) {
     return plr_filter_config(&s->filter)->process == PLR_PROCESS_IMU;
 }
 
-static plr_kind kind_of_steps(const plr_session *s) {
-    return is_inertial(s) ? PLR_KIND_IMU : PLR_KIND_TWIST;
-}
-
 /* After an IMU message that came late its faults are not told for so long: of readings that have
  * holes nearly everything looks wrong. */
 #define LATE_NS UINT64_C(1000000000)
@@ -213,15 +209,15 @@ static void use_step(plr_session *s, const plr_held_step *step) {
 void plr_steps_use_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
     const plr_held_step step = {.t_ns = twist->t_ns, .by.twist = twist->twist, .leads = true};
-    if (kind_of_steps(s) == PLR_KIND_TWIST)
-        use_step(s, &step);
-    else
+    if (is_inertial(s))
         refuse_other(s, PLR_KIND_TWIST, twist->t_ns);
+    else
+        use_step(s, &step);
 }
 
 void plr_steps_use_imu(plr_session *s) {
     const plr_imu_message *imu = &s->in.as.imu;
-    if (kind_of_steps(s) != PLR_KIND_IMU) {
+    if (!is_inertial(s)) {
         refuse_other(s, PLR_KIND_IMU, imu->t_ns);
         return;
     }

@@ -181,8 +181,7 @@ void plr_covariance_carry_core(plr_filter *f) {
     plr_sensitivity_carry_velocity(f, f->own.core_motion.V);
 }
 
-/* The same but for S, and the rows of velocity and biases in Vt, their covariance with nu, which
- * gains that of their noise with the motion's. */
+/* The same but for S; and in Vt of velocity and biases, whose noise goes with the motion's. */
 static void carry_core(plr_filter *f, const plr_applied_motion *motion,
                        const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], plr_real *Vt, size_t ld) {
     const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);
