@@ -47,8 +47,7 @@ add_executable(pelorus-textbook
   "${pelorus_textbook_dir}/filter.c"
   "${pelorus_textbook_dir}/frame.c"
   "${pelorus_textbook_dir}/estimate.c"
-  "${PROJECT_SOURCE_DIR}/src/record/settings.c"
-  "${PROJECT_SOURCE_DIR}/src/record/words.c"
+  "${PROJECT_SOURCE_DIR}/src/math/finite.c"
   ${pelorus_textbook_session} ${pelorus_textbook_posix})
 target_include_directories(pelorus-textbook PRIVATE
   "${PROJECT_SOURCE_DIR}/src" "${PROJECT_SOURCE_DIR}/port")

@@ -6,19 +6,11 @@
 
 #include "pelorus/config.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 typedef struct plr_camera {
     plr_real fx, fy, cx, cy; /* px */
     plr_real baseline;       /* m */
     plr_real R_CB[9];        /* body to left camera: q_C = R_CB s_B + t_CB */
     plr_real t_CB[3];        /* m */
 } plr_camera;
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

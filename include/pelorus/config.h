@@ -24,9 +24,8 @@ extern "C" {
  * tests/golden fails if the bits change and this number does not. */
 #define PLR_ARITHMETIC 19
 
-/* Precision of the filter's arithmetic: 32 (float; default) or 64 (double). float is tested to be
- * as accurate for the model `body` (docs/NUMERICS.md) and takes half the RAM; choose 64 for the
- * model `world`. */
+/* Precision of the filter's arithmetic: 32 (float; default) or 64 (double). For the model `body`
+ * float is as accurate (docs/NUMERICS.md) and takes half the RAM; choose 64 for `world`. */
 #ifndef PLR_REAL
 #define PLR_REAL 32
 #endif
@@ -99,7 +98,6 @@ extern "C" {
 typedef float plr_real;
 /* a b + c with a single rounding, in float32. */
 #if PLR_PORTABLE
-float plr_fmaf_exact(float a, float b, float c);
 #define PLR_FMA(a, b, c) plr_fmaf_exact((a), (b), (c))
 #else
 #define PLR_FMA(a, b, c) __builtin_fmaf((a), (b), (c))
@@ -109,8 +107,7 @@ float plr_fmaf_exact(float a, float b, float c);
 #define PLR_EPSILON         1.1920928955078125e-7F
 #elif PLR_REAL == 64
 typedef double plr_real;
-/* In float64 product and sum are rounded separately on every target, because not all have the fused
- * instruction for it. */
+/* In float64 product and sum are rounded apart: not every target has the fused instruction. */
 #define PLR_FMA(a, b, c)    ((a) * (b) + (c))
 #define PLR_SQRT(x)         __builtin_sqrt(x)
 #define PLR_SMALLEST_NORMAL 2.2250738585072014e-308
@@ -118,6 +115,11 @@ typedef double plr_real;
 #else
 #error "PLR_REAL must be 32 or 64."
 #endif
+
+/* a b + c in float32, rounded once, for processors without an instruction for it: the same bits for
+ * every finite input and for infinities; a NaN results in a NaN. Needs IEEE double arithmetic
+ * alone. */
+float plr_fmaf_exact(float a, float b, float c);
 
 /* A constant in the filter's precision. */
 #define PLR_R(x) ((plr_real)(x))
@@ -147,9 +149,8 @@ enum {
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
 };
 
-/* What the memory layout of a filter or session depends on, as one translation unit was compiled,
- * and its size there in bytes. Every init passes the caller's to the library, which refuses values
- * that differ from its own. */
+/* What the memory layout of a filter or session depends on in one translation unit, and its size in
+ * bytes. Every init passes the caller's to the library, which refuses others than its own. */
 typedef struct plr_sizes {
     uint32_t bytes, real, landmarks, observations, block;
 } plr_sizes;

@@ -26,9 +26,9 @@
  * A refused call (status < 0) changes only the counts of refused calls. Of refused IMU readings the
  * filter also remembers what was wrong, and how many came in succession (plr_filter_inertial). A
  * function that takes a const filter changes nothing: later results have the same bits whether you
- * call it or not. Every call first checks that configuration, pose and the small rest of the filter's
- * memory are as the previous call left them; an update checks landmarks and covariance as well. If
- * not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
+ * call it or not. Every call first checks that configuration, pose and the small rest of the
+ * filter's memory are as the previous call left them; an update checks landmarks and covariance as
+ * well. If not, it returns PLR_E_DAMAGED, and so does every later call until plr_filter_init.
  *
  * The error of a pose is defined on its right side: with T the true pose and T^ the estimate, T =
  * T^ Exp(xi), xi = (rho, theta) in the body frame, rho in m, theta in rad. The error of a bias is
@@ -108,12 +108,12 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
  * because it shows a true step or shock. Numbers that stay the same are used ten times, and then
  * refused until they change.
  * Statuses: those of plr_filter_predict, and PLR_E_RANGE at the limit of gyro_range or accel_range,
- * or a spike; PLR_E_ARGUMENT numbers that have stayed the same; PLR_E_MODE the process is another. */
+ * or a spike; PLR_E_ARGUMENT numbers that have stayed the same; PLR_E_MODE the process is
+ * another. */
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
 
-/* With an IMU: sets the velocity of the IMU (with the setting imu-arm not that of the body's origin),
- * in the body's axes, m/s, and its variances. It starts the filter with the pose that was set before
- * it by plr_filter_set_pose.
+/* With an IMU: sets its velocity (with the setting imu-arm not that of the body's origin), in the
+ * body's axes, m/s, and variances. It starts the filter with the pose that plr_filter_set_pose set.
  * PLR_E_MODE another process, no pose was set, or there are landmarks or readings since;
  * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e4 m/s or a variance of 1e12; PLR_E_ARGUMENT a negative
  * variance. */
@@ -139,8 +139,8 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
  * PLR_E_MODE in mapping, when plr_filter_move_to has not been called for this time.
  * If a variance is no longer positive, the filter keeps the pose, enlarges its covariance, drops
  * the landmarks and starts again with those of this frame: PLR_OK, reasons NOT_POSITIVE and
- * RECOVERED. With a known map, a pose that is lost is found again from four known landmarks, and the
- * others are dropped: RELOCATED. */
+ * RECOVERED. With a known map, a pose that is lost is found again from four known landmarks, and
+ * the others are dropped: RELOCATED. */
 plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *report);
 
 /* A reading of a small sensor (plr_sensor) at reading->t_ns. It predicts the pose to that time
@@ -173,8 +173,8 @@ plr_time_ns plr_filter_time(const plr_filter *f);
 plr_status plr_filter_pose(const plr_filter *f, plr_pose *T_WB);
 
 /* The covariances below are symmetric to the bit, and positive as plr_filter_set_pose asks for it.
- * Where float32 rounding has left a covariance that is not, its variances are enlarged until
- * it is. PLR_E_DIVERGED: a variance is negative, or (velocity and landmark, too) a number not finite. */
+ * Where float32 rounding has left a covariance that is not, its variances are enlarged until it is.
+ * PLR_E_DIVERGED: a variance is negative, or (velocity and landmark, too) a number not finite. */
 
 /* Covariance of the pose's error (rho, theta), 6x6, m and rad. While vision contradicts the twists,
  * or the IMU, it is enlarged so that it covers the pose by vision and theirs (docs/MATH.md 17). */
@@ -229,9 +229,8 @@ enum { PLR_STATE_CHUNK = 64 };
  * failure. */
 typedef int (*plr_state_sink)(void *context, const uint8_t *bytes, uint32_t n);
 
-/* Copies n bytes, 1 to PLR_STATE_CHUNK, from `offset` bytes after the beginning of a saved state.
- * Returns 0, or anything else for a failure. A restore reads the state from beginning to end,
- * twice. */
+/* Copies n bytes, 1 to PLR_STATE_CHUNK, from `offset` in a saved state. Returns 0; anything else is
+ * a failure. A restore reads the state from beginning to end, twice. */
 typedef int (*plr_state_source)(void *context, uint32_t offset, uint8_t *bytes, uint32_t n);
 
 /* Writes the whole state to a sink, as little-endian bytes that do not depend on the compiler:
@@ -286,8 +285,7 @@ const plr_config *plr_filter_config(const plr_filter *f);
 /* A sentence about a status: what is wrong and how to correct it. Never NULL. */
 const char *plr_status_text(plr_status status);
 
-/* A phrase that explains a single bit of plr_report.reasons, a health, or a fault of an IMU. Never
- * NULL. */
+/* A phrase for one bit of plr_report.reasons, a health, or a fault of an IMU. Never NULL. */
 const char *plr_reason_text(plr_reason reason);
 const char *plr_health_text(plr_health health);
 const char *plr_imu_fault_text(plr_imu_fault fault);

@@ -29,14 +29,12 @@ enum {
 typedef struct plr_port {
     void *context; /* handed to every function; may be NULL */
 
-    /* Copies up to n received bytes (n is 1 to 256), as many as are there now. Returns their
-     * number, 1 to n, or one of the values above. On a board it must not wait; on a desktop it
-     * may. */
+    /* Copies up to n received bytes (1 to 256), as many as are there now. Returns their number, or
+     * one of the values above. On a board it must not wait; on a desktop it may. */
     int (*read)(void *context, uint8_t *bytes, size_t n);
 
-    /* Sends or queues all n bytes (n is 1 to 256) and returns 0. On failure returns anything else,
-     * within a bounded time: the session counts the message as lost and continues. NULL: there is
-     * no output. */
+    /* Sends or queues all n bytes (1 to 256) and returns 0. On failure returns anything else, in
+     * bounded time: the message is counted as lost. NULL: there is no output. */
     int (*write)(void *context, const uint8_t *bytes, size_t n);
 
     /* Nanoseconds of a clock whose zero does not matter. It measures how long a frame takes, for
@@ -44,12 +42,10 @@ typedef struct plr_port {
      * are reported as 0 and a deadline cannot be kept. */
     uint64_t (*now_ns)(void *context);
 
-    /* Called when there was nothing to read. It may sleep until the next interrupt (WFI). NULL: the
-     * session returns at once. */
+    /* Called when there was nothing to read; may sleep until an interrupt (WFI). May be NULL. */
     void (*idle)(void *context);
 
-    /* Called once in every plr_session_step: tells a watchdog that the loop runs. NULL: there is no
-     * watchdog. */
+    /* Called once in every plr_session_step: feeds a watchdog. NULL: there is none. */
     void (*feed_watchdog)(void *context);
 } plr_port;
 

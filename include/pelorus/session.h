@@ -12,10 +12,10 @@
  *
  * Messages in (docs/REPLAY-FORMAT.md), in this order: HEADER; CONFIG and known LANDMARKs, as
  * needed; START, or instead of it STATE (restore); then TWIST or IMU, STEREO, TRUTH and READING,
- * and at any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a REPORT
- * after each frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END. No input
- * stops the session: a message that it cannot use is counted, and answered with a REPORT that names
- * what was refused (subject) and why (status). After END it waits for the next HEADER.
+ * and at any time among them STATE (save); END. Messages out: the CONFIG in use; a POSE and a
+ * REPORT after each frame; a LANDMARK for each one that leaves the filter; TEXT for a human; END.
+ * No input stops the session: a message that it cannot use is counted, and answered with a REPORT
+ * that names what was refused (subject) and why (status). After END it waits for the next HEADER.
  *
  * A setting's value comes from the first of these that has it: the option `overrides`, CONFIG,
  * HEADER, the default. After the first data HEADER and CONFIG cannot change anything: equal ones
@@ -132,7 +132,7 @@ typedef enum plr_step {
 /* Counts since init or since the HEADER that followed an END. */
 typedef struct plr_session_totals {
     uint32_t twists, stereos, truths, landmarks, readings, imus; /* messages received */
-    /* Messages of any kind that were refused; frames that the reader skipped are in reader.counts. */
+    /* Messages of any kind that were refused; frames that were skipped are in reader.counts. */
     uint32_t refused;
     uint32_t imu_readings;  /* in those messages */
     uint32_t imu_refused;   /* IMU readings that were refused; of those that follow one another for
@@ -199,8 +199,7 @@ plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
 
 /* Prepares a session. Port and options are copied; what they point to is not.
  * PLR_E_ARGUMENT a null pointer or a port without read; PLR_E_CONFIG an override that no setting
- * allows; PLR_E_SIZE the caller was compiled with other sizes than the library: nothing is
- * written. */
+ * allows; PLR_E_SIZE the caller was compiled with other sizes: nothing is written. */
 static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
                                           const plr_session_options *options) {
     const plr_sizes here = plr_sizes_here(sizeof(plr_session));
@@ -208,8 +207,9 @@ static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
 }
 
 /* Reads the bytes that are there, up to the end of one frame, and handles its message. The work of
- * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU readings,
- * what waited (PLR_SESSION_HELD_FRAMES updates more), and, at END, one LANDMARK for each slot. */
+ * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU
+ * readings, what waited (PLR_SESSION_HELD_FRAMES updates more), and, at END, one LANDMARK for each
+ * slot. */
 plr_step plr_session_step(plr_session *s);
 
 /* Does what END does, for a stream that stopped without one: applies the twists that still wait,

@@ -6,10 +6,6 @@
 #include "pelorus/config.h"
 #include "pelorus/wire.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 enum {
     PLR_SESSION_HELD_FRAMES = 3,    /* most frames that wait for twists or readings of an IMU */
     PLR_SESSION_HELD_READINGS = 24, /* most readings of small sensors that wait with the twists */
@@ -44,7 +40,7 @@ typedef struct plr_held_step {
     bool leads; /* it is the first of its message */
 } plr_held_step;
 
-/* Twists or IMU readings that wait because of the setting twist-delay: a ring, ascending by time. */
+/* Twists or IMU readings that wait because of twist-delay: a ring, ascending by time. */
 typedef struct plr_held_steps {
     uint8_t first, count;
     uint64_t leads; /* bit i: the one at place i is the first of its message */
@@ -102,9 +98,5 @@ typedef struct plr_budget {
     uint64_t cost_ns;      /* per observation; 0: not known yet */
     uint64_t recent_ns[2]; /* in each of the last two frames; 0: none yet */
 } plr_budget;
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -51,15 +51,13 @@ typedef struct plr_stored_state {
  * small for two slots of one erase block, or a slot for the header. */
 plr_status plr_state_store_init(plr_state_store *store, const plr_block_device *device);
 
-/* Bytes that a device needs for filters like this one, with its erase and program sizes. 0 if the
- * filter is not initialised. */
+/* Bytes that a device needs for filters like this one. 0 if the filter is not initialised. */
 uint32_t plr_state_store_needs(const plr_state_store *store, const plr_filter *f);
 
 /* Saves the filter, which is not changed. After an error the state saved before is still there.
  * `saved` may be NULL; it is filled in any case.
- * PLR_E_FULL a slot is too small for this filter with all slots in use, even if fewer are: nothing
- * is written; PLR_E_IO the device failed, or read back other bytes than were programmed; otherwise
- * as plr_filter_save. */
+ * PLR_E_FULL a slot is too small for this filter with all slots in use: nothing is written;
+ * PLR_E_IO the device failed, or read back other bytes; otherwise as plr_filter_save. */
 plr_status plr_state_store_save(plr_state_store *store, const plr_filter *f,
                                 plr_stored_state *saved);
 

@@ -55,8 +55,7 @@ enum {
 /* Bytes of a STEREO with n observations: the buffer that a reader needs for it. */
 #define PLR_WIRE_STEREO_BODY(n) (PLR_WIRE_OVERHEAD + 12 + 20 * (n))
 
-/* The smallest buffer of a reader: enough for all kinds but STEREO, of which CONFIG is the
- * longest. */
+/* The smallest buffer of a reader: enough for all kinds but STEREO, CONFIG being the longest. */
 #define PLR_WIRE_MIN_BUFFER (PLR_WIRE_OVERHEAD + 11 + 9 * PLR_WIRE_MAX_SETTINGS)
 
 typedef enum plr_body_axes {
@@ -69,19 +68,16 @@ typedef struct plr_header {
     uint8_t version_major, version_minor; /* as read; a writer ignores them, and writes its own */
     uint8_t body_axes;                    /* plr_body_axes */
     uint8_t twist_timing;                 /* plr_twist_timing */
+    uint8_t process; /* plr_process_kind; PLR_PROCESS_TWIST from senders before format 1.4 */
     uint16_t image_width_px, image_height_px; /* 0: unknown */
     plr_calibration calibration;
     /* Values that the recorder suggests for settings (settings.h); negative: no suggestion. */
     double pixel_sigma_px, velocity_sigma_mps, gyro_sigma_radps;
     double bias_velocity_sigma_mps, bias_gyro_sigma_radps;
     double bias_velocity_walk, bias_gyro_walk; /* (m/s)^2/s, (rad/s)^2/s */
-    /* Along the body's x, y and z, where they differ; 0 or negative: the value for all axes
-     * above. */
+    /* Along the body's x, y, z, where they differ; 0 or negative: as for all axes, above. */
     double velocity_sigma_axes_mps[3], gyro_sigma_axes_radps[3];
-    /* What moves the body: plr_process_kind. Senders before format 1.4 say PLR_PROCESS_TWIST. */
-    uint8_t process;
-    /* Suggestions for the settings of an IMU; negative: no suggestion, as from senders before format
-     * 1.4. */
+    /* Suggestions for an IMU's settings; negative: none, as from senders before format 1.4. */
     double gyro_noise, accel_noise; /* rad/s/sqrt(Hz), m/s^2/sqrt(Hz) */
     double gyro_walk, accel_walk;   /* rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz) */
     double bias_accel_sigma_mps2, gravity_mps2;
@@ -205,12 +201,11 @@ typedef enum plr_counted {
 } plr_counted;
 
 typedef struct plr_end {
-    /* How many frames of each kind, and of all kinds, the sender has written before this one. */
-    uint32_t twists, stereos, truths, landmarks, frames;
-    uint32_t readings; /* 0 from senders before format 1.3 */
-    uint32_t imus;     /* 0 from senders before format 1.4 */
-    /* Where this END answers another: bit i is set if of kind i (plr_counted) another number arrived
-     * than that END says, and arrived[i] is that number; else it is 0. */
+    /* How many frames of each kind (plr_counted), and of all kinds, the sender has written before
+     * this one. Senders before format 1.3 count no READING, before 1.4 no IMU. */
+    uint32_t sent[PLR_COUNTED], frames;
+    /* Where this END answers another: bit i is set if of kind i (plr_counted) another number
+     * arrived than that END says, and arrived[i] is that number; else it is 0. */
     uint8_t differs;
     uint32_t arrived[PLR_COUNTED];
 } plr_end;
@@ -328,8 +323,7 @@ bool plr_reader_mid_frame(const plr_reader *r);
 
 /* --- writing --- */
 
-/* Sends n bytes, 1 to 255. Returns 0, or anything else for a failure; the writer then returns
- * PLR_E_IO. */
+/* Sends n bytes, 1 to 255. Returns 0; after anything else the writer returns PLR_E_IO. */
 typedef int (*plr_write_function)(void *context, const uint8_t *bytes, size_t n);
 
 typedef struct plr_writer {

@@ -22,8 +22,7 @@ void plr_blocks3_transport(unsigned n, const plr_real F[9], const plr_real *G,
         transport_block(F, G, r0, r1, r2);
 }
 
-/* x <- G y: the fourth element is of no use. It is there because four numbers are calculated as
- * fast as one. */
+/* x <- G y. The fourth element is of no use: four numbers are calculated as fast as one. */
 static inline void wide_row(plr_real *restrict x, const plr_real *restrict Gt,
                             const plr_real *restrict y) {
     for (int c = 0; c < PLR_WIDE_ROW; c++)

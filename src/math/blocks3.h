@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Three rows of a matrix, as a landmark has in the covariance: multiplied from the left, and, as rows
- * of 3x3 blocks, from both sides. */
+/* Three rows of a matrix, as of a landmark in P: multiplied from the left, and as 3x3 blocks. */
 #ifndef PLR_MATH_BLOCKS3_H
 #define PLR_MATH_BLOCKS3_H
 
@@ -12,8 +11,7 @@ enum {
     PLR_WIDE_FACTOR = 3 * PLR_WIDE_ROW
 };
 
-/* Y <- F X, 3 x n, all rows apart from each other. F is copied to locals, because the compiler would
- * otherwise load it for each column. */
+/* Y <- F X, 3 x n, all rows apart. F is copied, or it would be loaded for each column. */
 static inline void plr_rows3_from_left(unsigned n, const plr_real F[9], const plr_real *restrict x0,
                                        const plr_real *restrict x1, const plr_real *restrict x2,
                                        plr_real *restrict y0, plr_real *restrict y1,
@@ -27,14 +25,13 @@ static inline void plr_rows3_from_left(unsigned n, const plr_real F[9], const pl
     }
 }
 
-/* X_j <- F X_j G_j^T, j = 0 .. n-1: n blocks side by side in three rows of 3n elements. G: 9 elements
- * for each j, row by row. For processors that calculate one number at a time. */
+/* X_j <- F X_j G_j^T, j = 0 .. n-1: n blocks side by side in three rows of 3n elements. G: 9
+ * elements for each j, row by row. For processors that calculate one number at a time. */
 void plr_blocks3_transport(unsigned n, const plr_real F[9], const plr_real *G,
                            plr_real *const row[3]);
 
-/* The same bits, for processors whose registers hold several numbers: three times as fast there.
- * Gt: G_j^T for each j, PLR_WIDE_FACTOR elements. It writes to one element after the end of each
- * row. Y: space for 3 x 3n elements. */
+/* The same bits, three times as fast where registers hold several numbers. Gt: G_j^T, each of
+ * PLR_WIDE_FACTOR elements. Writes one element after the end of each row. Y: room for 3 x 3n. */
 void plr_blocks3_transport_wide(unsigned n, const plr_real F[9], const plr_real *Gt, plr_real *Y,
                                 plr_real *const row[3]);
 

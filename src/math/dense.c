@@ -6,39 +6,31 @@
 #include "math/small.h"
 #include "math/tile.h"
 
-void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
-    plr_real AP[36] = {0};
-    plr_gemm_nn(6, 6, 6, A, 6, P, 6, AP, 6);
-    memset(S, 0, 36 * sizeof *S);
-    for (unsigned i = 0; i < 6; i++) {
-        plr_gemm_nt(1, i + 1, 6, AP + 6 * i, 6, A, 6, S + 6 * i, 6);
-        for (unsigned j = 0; j < i; j++)
-            S[6 * j + i] = S[6 * i + j];
-    }
-}
-
-/* Inlined for each m: a constant size is faster. */
-static inline void sandwich(plr_real S[PLR_POSE_SQUARE], unsigned m,
-                            const plr_real B[PLR_MOTION_BY], const plr_real *P) {
+/* S = B P B^T, B 6 x m with leading dimension ldb. Inlined for each m: constants are faster. */
+static inline void sandwich(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real *B, size_t ldb,
+                            const plr_real *P) {
     plr_real BP[PLR_MOTION_BY] = {0};
-    plr_gemm_nn(PLR_POSE_DIM, m, m, B, PLR_DRIVERS, P, m, BP, PLR_DRIVERS);
+    plr_gemm_nn(PLR_POSE_DIM, m, m, B, ldb, P, m, BP, ldb);
     memset(S, 0, PLR_POSE_SQUARE * sizeof *S);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        plr_gemm_nt(1, i + 1, m, BP + PLR_DRIVERS * i, PLR_DRIVERS, B, PLR_DRIVERS,
-                    S + PLR_POSE_DIM * i, PLR_POSE_DIM);
+        plr_gemm_nt(1, i + 1, m, BP + ldb * i, ldb, B, ldb, S + PLR_POSE_DIM * i, PLR_POSE_DIM);
         for (unsigned j = 0; j < i; j++)
             S[PLR_POSE_DIM * j + i] = S[PLR_POSE_DIM * i + j];
     }
 }
 
+void plr_sandwich6(plr_real S[36], const plr_real A[36], const plr_real P[36]) {
+    sandwich(S, PLR_POSE_DIM, A, PLR_POSE_DIM, P);
+}
+
 void plr_sandwich_drivers(plr_real S[PLR_POSE_SQUARE], unsigned m, const plr_real B[PLR_MOTION_BY],
                           const plr_real *P) {
     if (m == PLR_BIAS_DIM)
-        sandwich(S, PLR_BIAS_DIM, B, P);
+        sandwich(S, PLR_BIAS_DIM, B, PLR_DRIVERS, P);
     else if (m == PLR_DRIVERS)
-        sandwich(S, PLR_DRIVERS, B, P);
+        sandwich(S, PLR_DRIVERS, B, PLR_DRIVERS, P);
     else
-        sandwich(S, m, B, P);
+        sandwich(S, m, B, PLR_DRIVERS, P);
 }
 
 enum { STRIP = PLR_TILE_COLUMNS, FEW = 3 };
@@ -113,8 +105,7 @@ static inline void solve_four_rows(unsigned k, const plr_real *U, unsigned i, pl
     plr_tile_scale(row[3], PLR_R(1) / u3[0], x3);
 }
 
-/* The rows that are beyond a multiple of four are the first ones: they have the fewest above. A
- * tile has two rows above it or more. */
+/* The rows beyond a multiple of four come first. A tile has two rows above it or more. */
 static void solve_strip(unsigned k, const plr_real *U, plr_real *X, size_t ldx) {
     enum { ROWS = PLR_TILE_ROWS };
     const unsigned alone = k % ROWS == 1 && k > 1 ? ROWS + 1 : k % ROWS;

@@ -75,8 +75,7 @@ void plr_sandwich3(plr_real S[9], plr_real MP[PLR_ROWS * PLR_POSE_DIM],
  * becomes a zero column of the lower triangle L. */
 void plr_factor6(plr_real L[PLR_POSE_SQUARE], const plr_real M[PLR_POSE_SQUARE]);
 
-/* Index of element (i, i) of an n x n matrix whose upper triangle is packed row by row: (0,0) (0,1)
- * ... (0,n-1) (1,1) ...; i <= n. */
+/* Index of (i, i) in a packed upper triangle, n x n, by rows: (0,0) (0,1) ... (1,1) ...; i <= n. */
 static inline size_t plr_upper_row(unsigned n, unsigned i) {
     PLR_ASSERT(i <= n);
     return (size_t)i * n - (size_t)i * (i - 1U) / 2;
@@ -117,9 +116,8 @@ static inline void plr_upper6_unpack(plr_real A[PLR_POSE_SQUARE],
             A[PLR_POSE_DIM * k + l] = A[PLR_POSE_DIM * l + k] = S[at];
 }
 
-/* Cholesky: replaces the upper triangle of S, n x n, packed row by row, by U with U^T U = S. False
- * if a pivot is not a positive finite number; S is then destroyed. PLR_KERNEL_MARGIN elements after
- * the end of S must be readable. */
+/* S <- U with U^T U = S: n x n, packed upper. False if a pivot is not a positive finite number; S
+ * is then destroyed. PLR_KERNEL_MARGIN elements after its end must be readable. */
 bool plr_cholesky_upper(unsigned n, plr_real *S);
 
 /* X <- U^-T X: U is k x k, packed upper; X is k x n with leading dimension ldx. */
@@ -128,14 +126,12 @@ void plr_solve_upper_transposed(unsigned k, unsigned n, const plr_real *U, plr_r
 /* x <- U^-1 x, k long: U is k x k, packed upper. */
 void plr_solve_upper(unsigned k, const plr_real *U, plr_real *x);
 
-/* x += sum_k a_k X_k: a is a column with leading dimension lda, X is depth x n with leading
- * dimension ldx, x is n long. */
+/* x += sum_k a_k X_k: a with leading dimension lda, X depth x n with ldx, x of n elements. */
 void plr_combine_rows(unsigned n, unsigned depth, const plr_real *a, size_t lda, const plr_real *X,
                       size_t ldx, plr_real *x);
 
-/* X_r -= sum_k A(k, r) V_k for four rows X_r of n elements, r = 0 .. 3: V is depth x n with leading
- * dimension ldv, A is depth x 4 with leading dimension lda, depth >= 2, n a multiple of
- * PLR_TILE_COLUMNS. Same order of operations, and so the same bits, as plr_combine_rows. */
+/* X_r -= sum_k A(k, r) V_k for four rows X_r: V depth x n, A depth x 4, depth >= 2, n a multiple of
+ * PLR_TILE_COLUMNS. The same order of operations, and so the same bits, as plr_combine_rows. */
 void plr_subtract_four_rows(unsigned n, unsigned depth, const plr_real *A, size_t lda,
                             const plr_real *V, size_t ldv, plr_real *const X[4]);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "math/fma.h"
-
 #include <stdint.h>
 #include <string.h>
+
+#include "pelorus/config.h"
 
 /*
  * The product of two float32 is exact in double, but adding c rounds to 53 bits, and the cast would

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The logarithm of a long product of positive numbers: factor by factor, without overflow, and one
- * logarithm at the end. Sums, products and one division alone: every target computes the same
- * bits. */
+/* The logarithm of a long product of positive numbers, without overflow: factor by factor, and one
+ * logarithm at the end. No library function: every target computes the same bits. */
 #ifndef PLR_MATH_LOG_PRODUCT_H
 #define PLR_MATH_LOG_PRODUCT_H
 

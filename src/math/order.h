@@ -6,8 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* True if index a comes before index b. It must be a strict order: break all ties, because the
- * order of equal elements is unspecified. */
+/* True if index a comes before b: a strict order, without ties, or their order is unspecified. */
 typedef bool (*plr_before)(const void *context, uint16_t a, uint16_t b);
 
 /* Sorts indices[0..n-1]. */

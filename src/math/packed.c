@@ -9,8 +9,7 @@
 
 enum { ROWS = PLR_TILE_ROWS, COLUMNS = PLR_TILE_COLUMNS };
 
-/* A tile that the diagonal cuts, from column j on: only what lies inside is written; what is read
- * outside does not matter. */
+/* A tile that the diagonal cuts, from column j on: only what lies inside is written. */
 static void subtract_cut_tile(unsigned i, unsigned j, unsigned depth, const plr_real *Ut,
                               const plr_real *Wt, size_t ld, plr_real *const row[ROWS]) {
     plr_tile_row tile[ROWS];
@@ -23,8 +22,7 @@ static void subtract_cut_tile(unsigned i, unsigned j, unsigned depth, const plr_
             row[r][j + c] = tile[r][c];
 }
 
-/* P -= U W^T in the triangle of `size` rows and columns from number i on. Inlined for each size: its
- * sums stay in registers. */
+/* P -= U W^T in the triangle of `size` rows from number i on. Inlined for each size. */
 static inline void subtract_triangle(unsigned size, unsigned i, unsigned depth,
                                      const plr_real *restrict Ut, const plr_real *restrict Wt,
                                      size_t ld, plr_real *restrict P) {
@@ -59,9 +57,8 @@ static void subtract_corner(unsigned size, unsigned i, unsigned depth, const plr
         subtract_triangle(4, i, depth, Ut, Wt, ld, P);
 }
 
-/* The rows that are beyond a multiple of ROWS are the first ones: they are the shortest. Of four rows
- * come first the tiles that the diagonal leaves whole, then a cut one if there is more than a triangle
- * beside them. */
+/* The rows beyond a multiple of ROWS are the first, which are shortest. Of four rows come first the
+ * whole tiles, then a cut one if there is more than a triangle beside them. */
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P) {
     PLR_ASSERT(ld >= n);

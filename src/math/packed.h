@@ -21,15 +21,14 @@ static inline size_t plr_packed_at(size_t i, size_t j) {
     return i >= j ? plr_packed_row(i) + j : plr_packed_row(j) + i;
 }
 
-/* P -= U W^T, lower triangle: P is n x n packed, U^T and W^T are depth x n with leading dimension
- * ld. U W^T must be symmetric. PLR_KERNEL_MARGIN elements after the end of each must be
- * readable. */
+/* P -= U W^T, lower triangle: P is n x n packed, U^T and W^T depth x n with leading dimension ld, U
+ * W^T symmetric. PLR_KERNEL_MARGIN elements after the end of each must be readable. */
 void plr_packed_subtract(unsigned n, unsigned depth, const plr_real *Ut, const plr_real *Wt,
                          size_t ld, plr_real *P);
 
-/* d[i] = P_ii - sum_k Ut[k][i]^2 of the next rows i = first .. n-1, at most PLR_TILE_COLUMNS of them:
- * to the bit the diagonal that plr_packed_subtract with W = U would leave. Returns how many they are.
- * `first` is a multiple of PLR_TILE_COLUMNS. Reads as far beyond the end of U^T as that. */
+/* d[i] = P_ii - sum_k Ut[k][i]^2 of the next rows i = first .. n-1, at most PLR_TILE_COLUMNS of
+ * them, whose number is returned: the diagonal, to the bit, that plr_packed_subtract with W = U
+ * leaves. `first` is a multiple of PLR_TILE_COLUMNS. Reads as far beyond the end of U^T as that. */
 unsigned plr_packed_subtracted_diagonal(unsigned first, unsigned n, unsigned depth,
                                         const plr_real *Ut, size_t ld, const plr_real *P,
                                         plr_real d[PLR_TILE_COLUMNS]);

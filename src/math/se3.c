@@ -5,18 +5,14 @@
 #include "math/so3.h"
 #include "pelorus/assertions.h"
 
-/* Writes a 3x3 block of a 6x6 matrix. */
-static void put_block(plr_real A[36], int row, int column, const plr_real B[9]) {
-    for (int i = 0; i < 3; i++)
-        memcpy(A + 6 * (row + i) + column, B + 3 * i, 3 * sizeof *B);
-}
-
 /* A = [R, C; 0, R] */
 static void put_blocks(plr_real A[36], const plr_real R[9], const plr_real C[9]) {
     memset(A, 0, 36 * sizeof *A);
-    put_block(A, 0, 0, R);
-    put_block(A, 3, 3, R);
-    put_block(A, 0, 3, C);
+    for (int i = 0; i < 3; i++) {
+        memcpy(A + 6 * i, R + 3 * i, 3 * sizeof *R);
+        memcpy(A + 6 * i + 3, C + 3 * i, 3 * sizeof *C);
+        memcpy(A + 6 * (3 + i) + 3, R + 3 * i, 3 * sizeof *R);
+    }
 }
 
 void plr_se3_expm1(plr_real E[9], plr_real p[3], const plr_real xi[6]) {

@@ -21,9 +21,8 @@ void plr_se3_adjoint(plr_real Ad[36], const plr_real R[9], const plr_real p[3]);
 /* Ad(T^-1) = [R^T, -R^T [p]x; 0, R^T]. */
 void plr_se3_adjoint_inverse(plr_real Ad[36], const plr_real R[9], const plr_real p[3]);
 
-/* The right Jacobian: Exp(xi + d) = Exp(xi) Exp(Jr(xi) d) to first order.
- * Jr(xi) = sum_k (-ad xi)^k / (k+1)!, in the closed form of Barfoot, State Estimation for Robotics,
- * 7.86, at -xi. */
+/* The right Jacobian: Exp(xi + d) = Exp(xi) Exp(Jr(xi) d) to first order, in closed form (Barfoot,
+ * State Estimation for Robotics, 7.86, at -xi). */
 void plr_se3_right_jacobian(plr_real Jr[36], const plr_real xi[6]);
 
 /* (I + E, p) <- (I + E, p) (I + dE, dp) */

@@ -102,9 +102,8 @@ static inline bool plr_is_finite(plr_real x) {
     return x - x == 0;
 }
 
-/* Cholesky: replaces S, 3x3, packed upper (0,0) (0,1) (0,2) (1,1) (1,2) (2,2), by U with U^T U = S.
- * False if a pivot is not a positive finite number; S is then destroyed. The same bits as
- * plr_cholesky_upper(3, S), without loops. */
+/* S <- U with U^T U = S: 3x3, packed upper (0,0) (0,1) (0,2) (1,1) (1,2) (2,2). False, and S is
+ * destroyed, if a pivot is not a positive finite number. The bits of plr_cholesky_upper(3, S). */
 static inline bool plr_cholesky3(plr_real S[6]) {
     if (!(S[0] > 0) || !plr_is_finite(S[0]))
         return false;
@@ -141,8 +140,7 @@ static inline void plr_multiply3_transposed(plr_real y[3], const plr_real U[6],
     y[2] = PLR_FMA(U[5], x[2], PLR_FMA(U[4], x[1], U[2] * x[0]));
 }
 
-/* X <- U^-T X: U is 3x3, packed upper; X is 3 x n. The same bits as
- * plr_solve_upper_transposed(3, n, U, X, n). */
+/* X <- U^-T X, 3 x n, U packed upper: the bits of plr_solve_upper_transposed(3, n, U, X, n). */
 static inline void plr_solve3_transposed(unsigned n, const plr_real U[6], plr_real *X) {
     const plr_real by0 = PLR_R(1) / U[0], by1 = PLR_R(1) / U[3], by2 = PLR_R(1) / U[5];
     for (unsigned c = 0; c < n; c++) {

@@ -80,8 +80,7 @@ void plr_so3_orthonormalise(plr_real R[9]) {
     memcpy(R, result, sizeof result);
 }
 
-/* The angle from tan(t / 2) = sin t / (1 + cos t), roughly, and then by Newton's steps, which
- * stay on the axis. */
+/* The angle from tan(t / 2) = sin t / (1 + cos t), roughly; then Newton's steps, on the axis. */
 void plr_so3_log(plr_real theta[3], const plr_real R[9]) {
     plr_turn_of(theta, R);
     const plr_real sine = PLR_SQRT(plr_dot3(theta, theta));

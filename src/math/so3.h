@@ -24,19 +24,16 @@ void plr_so3_series_at(plr_so3_series *s, plr_real theta2);
 /* R = Exp(theta) = I + a [theta]x + b [theta]x^2 (Rodrigues). */
 void plr_so3_exp(plr_real R[9], const plr_real theta[3]);
 
-/* E = Exp(theta) - I, with the relative precision of theta: for a small rotation, Exp(theta) itself
- * would be rounded in units of 1. */
+/* E = Exp(theta) - I, with the relative precision of theta, and not rounded in units of 1. */
 void plr_so3_expm1(plr_real E[9], const plr_real theta[3]);
 
 /* plr_so3_orthonormalise of R = I + E, computed from the small numbers of E without forming R. */
 void plr_so3_orthonormalise_small(plr_real E[9]);
 
-/* theta with Exp(theta) = R, |theta| < pi. Of half a turn the axis is lost: theta is then next
- * to nothing. */
+/* theta with Exp(theta) = R, |theta| < pi; next to nothing for half a turn, whose axis is lost. */
 void plr_so3_log(plr_real theta[3], const plr_real R[9]);
 
-/* R <- R (3 I - R^T R) / 2: one Newton step towards the nearest rotation. It squares the error, so
- * one step a frame removes what rounding has added. */
+/* R <- R (3 I - R^T R) / 2: a Newton step towards the nearest rotation, which squares the error. */
 void plr_so3_orthonormalise(plr_real R[9]);
 
 #endif

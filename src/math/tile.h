@@ -68,8 +68,7 @@ static inline void plr_tile_next(plr_tile_factors *at) {
 }
 
 /* row[r][c] -= sum_k U(k, r) W(k, c), k = 0 .. depth-1, depth >= 2. The rows move on to the next
- * tile. The first step reads them and the last one writes them: separate copies would take the time
- * of a few steps. */
+ * tile. They are read by the first step and written by the last: copies would take time. */
 static inline void plr_tile_subtract(unsigned depth, plr_tile_factors at,
                                      plr_real *row[PLR_TILE_ROWS]);
 

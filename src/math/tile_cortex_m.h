@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: MIT
 /*
  * plr_tile_subtract of tile.h, which includes this file, for the FPU of a Cortex-M, in its own
- * instructions. A tile of 4 x 6 fills s0 to s23; a row of W comes into s24 to s29 with one load, and
- * two elements of U at a time into s30 and s31. Compilers load one register at a time, which makes 38
- * instructions of a step; here it is 30. The numbers are multiplied and added in the same order as
- * in C, so the bits are the same.
+ * instructions. A tile of 4 x 6 fills s0 to s23; a row of W comes into s24 to s29 with one load,
+ * and two elements of U at a time into s30 and s31. Compilers load one register at a time, which
+ * makes 38 instructions of a step; here it is 30. The numbers are multiplied and added in the same
+ * order as in C, so the bits are the same.
  */
 #ifndef PLR_MATH_TILE_CORTEX_M_H
 #define PLR_MATH_TILE_CORTEX_M_H
 
-/* Step k: the tile's row r loses U(k, r) times row k of W. `shrink` is empty, or the instruction
- * that makes to_next_U smaller. */
+/* Step k: row r loses U(k, r) times row k of W. `shrink`: nothing, or makes to_next_U smaller. */
 #define PLR_TILE_STEP(shrink)                                                                      \
     "vldmia %[W], {s24-s29}\n\t"                                                                   \
     "vldmia %[U]!, {s30-s31}\n\t"                                                                  \

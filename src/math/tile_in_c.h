@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* plr_tile_subtract of tile.h, which includes this file, for all processors but those of
- * tile_cortex_m.h. */
+/* plr_tile_subtract of tile.h, which includes this file, for all but a Cortex-M. */
 #ifndef PLR_MATH_TILE_IN_C_H
 #define PLR_MATH_TILE_IN_C_H
 

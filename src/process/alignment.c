@@ -3,12 +3,10 @@
 
 #include <string.h>
 
-#include "math/dense.h"
 #include "math/small.h"
 #include "math/so3.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
-#include "state/pose.h"
 
 /* At rest this much is averaged, and after so long without rest the body counts as moving. */
 #define REST_NS   UINT64_C(1000000000)
@@ -17,8 +15,8 @@
 #define GLANCE_NS UINT64_C(100000000)
 /* After a longer pause between readings the average begins anew: few readings are no mean. */
 #define PAUSE_NS UINT64_C(100000000)
-/* At rest the readings spread by no more than this about their mean, besides their noise, and the
- * means of both halves agree to a part of it: a running engine is allowed, a walking hand is not. */
+/* At rest the readings spread about their mean by no more than this, besides their noise, and the
+ * means of both halves agree to a part of it: an engine may run, no hand may walk. */
 #define SPREAD_ACCEL PLR_R(0.5)  /* m/s^2 */
 #define SPREAD_GYRO  PLR_R(0.05) /* rad/s */
 #define DRIFT_SHARE  PLR_R(0.2)
@@ -34,9 +32,9 @@
 #define NOT_GRAVITY PLR_R(1.5)
 /* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
 #define OTHER_TILT PLR_R(0.06)
-/* So long after the start the mean reading is held against gravity. It is at fault if it does not fit in
- * so many frames in a row, for so long: a body that swings leaves no half second of it to itself, and
- * frames may come at any rate. A body that spins faster, rad/s, would be thrown about. */
+/* So long after the start the mean reading is held against gravity. It is at fault if it does not
+ * fit in so many frames in a row, for so long: bodies swing, and frames come at any rate. A
+ * body that spins faster, rad/s, would be thrown about. */
 #define WATCH_NS UINT64_C(10000000000)
 #define DOUBT_NS UINT64_C(850000000)
 #define SPINS    PLR_R(10)
@@ -44,8 +42,7 @@ enum { WATCH_FRAMES = 5 };
 /* The anchor comes this much after a start in motion, if this many frames were used. */
 #define ANCHOR_NS UINT64_C(2000000000)
 enum { ANCHOR_FRAMES = 10 };
-/* Within about this time, s, tilt and velocity are found; meanwhile their products of second order
- * have misled position and yaw. */
+/* Within this time, s, tilt and velocity are found; their product has misled position and yaw. */
 #define FOUND_S PLR_R(0.5)
 
 void plr_alignment_clear(plr_filter *f) {
@@ -86,8 +83,7 @@ static void average(plr_alignment *at, plr_time_ns t_ns, const plr_real reading[
         memcpy(at->half_mean, at->mean, sizeof at->half_mean);
 }
 
-/* True if three numbers spread and drift no more than a body at rest. `noise` is the variance of one
- * reading. */
+/* True if three numbers scatter no more than a body's at rest; `noise`: variance of one reading. */
 static bool is_steady(const plr_alignment *at, unsigned first, plr_real allowed, plr_real noise) {
     const plr_real readings = (plr_real)at->count, limit = allowed * allowed + PLR_R(4) * noise;
     plr_real drift[3];
@@ -128,6 +124,13 @@ static void tilt(plr_filter *f, const plr_real u[3]) {
     plr_mat3_mul(f->R_WB, before, turn);
     plr_so3_orthonormalise(f->R_WB);
     plr_so3_orthonormalise(f->R_WB);
+}
+
+/* X = scale (I - u u^T), 3x3: what lies across the unit vector u. */
+static void across(const plr_real u[3], plr_real scale, plr_real X[9]) {
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++)
+            X[3 * i + j] = scale * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
 }
 
 /* The pose's covariance with what is known of the tilt: position and heading stay as they were set.
@@ -225,9 +228,9 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
     plr_skew(L, u);
     for (unsigned i = 0; i < 9; i++)
         L[i] /= f->par.gravity;
+    across(u, flicker, theta);
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = 0; j < 3; j++) {
-            theta[3 * i + j] = flicker * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
             for (unsigned k = 0; k < 3; k++)
                 theta[3 * i + j] += L[3 * i + k] * L[3 * j + k] * (plr_real)variance[A + k];
             cross[PLR_POSE_DIM * (A + j) + 3 + i] = L[3 * i + j] * (plr_real)variance[A + j];
@@ -245,9 +248,7 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
 static void start_in_motion(plr_filter *f, plr_time_ns t_ns, plr_real interval,
                             const plr_real u[3]) {
     plr_real theta[9];
-    for (unsigned i = 0; i < 3; i++)
-        for (unsigned j = 0; j < 3; j++)
-            theta[3 * i + j] = TILT * TILT * ((i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j]);
+    across(u, TILT * TILT, theta);
     tilt(f, u);
     set_unknown_velocity(f, f->par.start_velocity_variance);
     set_tilt_covariance(f, u, theta);
@@ -385,10 +386,10 @@ static void add_to_pose(plr_filter *f, const plr_real u[3], plr_real position, p
 
 /* Removes what is known of position and yaw, and their shares in all else. */
 static void forget_place(plr_filter *f, const plr_real u[3]) {
-    plr_real A[PLR_POSE_SQUARE] = {0};
+    plr_real A[PLR_POSE_SQUARE] = {0}, stays[9];
+    across(u, 1, stays);
     for (unsigned i = 0; i < 3; i++)
-        for (unsigned j = 0; j < 3; j++)
-            A[PLR_POSE_DIM * (3 + i) + 3 + j] = (i == j ? PLR_R(1) : PLR_R(0)) - u[i] * u[j];
+        memcpy(A + PLR_POSE_DIM * (3 + i) + 3, stays + 3 * i, 3 * sizeof *A);
     plr_covariance_turn_pose(f, A);
 }
 

@@ -36,8 +36,7 @@ void plr_alignment_watch_gravity(plr_filter *f);
 bool plr_alignment_wants_anchor(const plr_filter *f);
 
 /* The pose was set with a covariance, a position was measured, or a landmark of a map came in:
- * position and yaw are not free any more, and an anchor that is still to come would lose what is
- * known of them. */
+ * position and yaw are not free any more, and an anchor would lose what is known of them. */
 void plr_alignment_keep_world(plr_filter *f);
 
 /* The clock is about to be set from f->t_ns to t_ns: the time since the start stays what it is. */
@@ -46,9 +45,8 @@ void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns);
 /* True between a start in motion and the anchor: errors of second order are not in P yet. */
 bool plr_alignment_is_unsettled(const plr_filter *f);
 
-/* Lays the world anew so that the present position and yaw are exact, or known to start_sigma: both
- * are free. What tilt and velocity had added to their errors is gone. Where the world is given, P is
- * widened by that instead. No motion may be pending. */
+/* Lays the world anew so that the present position and yaw are exact, or known to start_sigma.
+ * Where the world is given, P is widened instead. No motion may be pending. */
 void plr_alignment_anchor(plr_filter *f);
 
 #endif

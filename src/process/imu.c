@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * The process `imu`: accelerometer and gyro move pose and velocity (docs/MATH.md 19). The body's axes
- * are those of the IMU. The state before the landmarks is (rho, theta, v, b_a, b_g), with v in body
- * axes: then a shift of the world, or a turn about the vertical, changes nothing but the pose, and
- * the filter learns nothing of either.
+ * The process `imu`: accelerometer and gyro move pose and velocity (docs/MATH.md 19). The body's
+ * axes are those of the IMU. The state before the landmarks is (rho, theta, v, b_a, b_g), with v in
+ * body axes: then a shift of the world, or a turn about the vertical, changes nothing but the pose,
+ * and the filter learns nothing of either.
  */
 #include "process/process.h"
 
@@ -13,15 +13,11 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
-#include "process/mean.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/seconds.h"
 
-/* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
-#define MAX_TURN PLR_R(3.1415926)
-#define MAX_WAY  PLR_R(1000)
 /* The error of a reading that is held lasts about so long before it becomes another, s. */
 #define LASTING_S PLR_R(0.5)
 /* What a frame has bridged by the older reading is made up for if it is no longer than this, s. */
@@ -110,7 +106,7 @@ static plr_status check(const plr_filter *f, const plr_real reading[PLR_READING_
         turn2 += turn * turn;
         way2 += way * way;
     }
-    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN ? PLR_OK : PLR_E_RANGE;
+    return plr_step_is_possible(way2, turn2) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* ---------------------------------------------------------------- accumulation */
@@ -257,9 +253,8 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
     }
 }
 
-/* The densities of the readings' noise, squared. A reading that is held for longer than usual, since
- * others were lost, is wrong by what changes meanwhile: at first as much as successive readings
- * differ, and later as readings scatter at all. */
+/* The densities of the readings' noise, squared. A reading held for longer than usual is wrong by
+ * what changes meanwhile: at first as successive readings differ, later as they scatter at all. */
 static void densities(const plr_filter *f, plr_real interval, plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     density[0] = f->par.accel_density;
@@ -291,9 +286,8 @@ static inline void set_block(plr_real Q[DIM * DIM], const plr_real *X, const plr
                 block[3 * i + j];
 }
 
-/* Q <- F Q F^T + noise. The rows of the biases do not change. The noise of the readings, of variances
- * `reading` (accelerometer, gyro), enters as an error of the biases does that lasts for this step
- * alone. */
+/* Q <- F Q F^T + noise. The noise of the readings, of variances `reading` (accelerometer, gyro),
+ * enters as an error of the biases does that lasts for this step alone. */
 static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
                             const plr_real reading[2]) {
     plr_real Q[DIM * DIM], X[MOVED * DIM];
@@ -425,9 +419,9 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
  * independent, the gyro's bias would be believed too much. */
 #define USED_TWICE PLR_R(2)
 
-/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise adds
- * to the measurement's. A row of v and w together (a wheel) takes the last reading, for both change;
- * a row of w alone (a standstill) the mean reading since the last one, which has less noise. */
+/* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise
+ * adds to it. A row of v and w together (a wheel) takes the last reading, for both change; a row of
+ * w alone (a standstill) the mean since the last one, which has less noise. */
 static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);
@@ -436,11 +430,8 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
     /* at the time of the last such row the mean is used up: one reading's worth is granted */
     const plr_real mean_of = most > 0 ? most : usual;
     memset(H, 0, sizeof *H);
-    H->terms = 2;
-    H->term[0].row = plr_row_of(f, PLR_BLOCK_VELOCITY);
-    H->term[0].columns = PLR_VELOCITY_DIM;
-    H->term[1].row = plr_row_of(f, PLR_BLOCK_BIAS);
-    H->term[1].columns = PLR_BIAS_DIM;
+    plr_real *by_v = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_VELOCITY), PLR_VELOCITY_DIM);
+    plr_real *by_bias = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
         const bool moves = plr_dot3(M, M) > 0;
@@ -453,8 +444,8 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
             const plr_real w = w_m[c] - f->bias[3 + c];
             r[i] = PLR_FMA(-M[c], f->inertial.velocity[c], r[i]);
             r[i] = PLR_FMA(-M[3 + c], w, r[i]);
-            H->term[0].H[PLR_VELOCITY_DIM * i + c] = M[c];
-            H->term[1].H[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];
+            by_v[PLR_VELOCITY_DIM * i + c] = M[c];
+            by_bias[PLR_BIAS_DIM * i + 3 + c] = -M[3 + c];
         }
     }
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /*
- * A process moves the state between frames by the readings of one kind of sensor: six numbers,
- * linear ones first. It lays out the blocks of the state that it needs, carries pose (and velocity)
- * along with each reading, and accumulates in f->motion what a frame will apply to the covariance.
- * So a reading costs the same for any number of landmarks.
+ * A process moves the state between frames by readings of six numbers, linear ones first. It lays
+ * out the blocks that it needs, carries pose (and velocity) along with each reading, and
+ * accumulates in f->motion what a frame will apply to P: a reading costs the same for any number of
+ * landmarks.
  */
 #ifndef PLR_PROCESS_PROCESS_H
 #define PLR_PROCESS_PROCESS_H
@@ -20,14 +20,12 @@ typedef struct plr_process {
     /* Lays out the state's blocks. */
     void (*lay_out)(plr_filter *f);
 
-    /* PLR_OK if the reading may be held for `seconds`; PLR_E_RANGE if it turns the body by more than
-     * pi rad or moves it by more than 1 km. */
+    /* PLR_OK if the reading may be held for `seconds`, else PLR_E_RANGE: plr_step_is_possible. */
     plr_status (*check)(const plr_filter *f, const plr_real reading[PLR_READING_DIM],
                         plr_real seconds);
 
-    /* One step to t_ns: the mean reading over `seconds`. `interval` is the time for which the
-     * reading stands, so that the parts of an interval add up to the noise of the whole. Sets the
-     * time. */
+    /* One step to t_ns: the mean reading over `seconds`. Sets the time. `interval`: the time for
+     * which the reading stands, so that its parts add up to the noise of the whole. */
     void (*step)(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
                  plr_real seconds, plr_real interval);
 
@@ -38,9 +36,9 @@ typedef struct plr_process {
     /* The last reading, `age` seconds after its time, or what is assumed in its place. */
     void (*hold)(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]);
 
-    /* The variances of the displacement, m^2 and rad^2, that the last reading misses between h0 and h1
-     * seconds after its time, because the body's motion changes; `next` is the reading that ends it,
-     * NULL while there is none. False if it misses nothing. NULL: `step` knows by its `interval`. */
+    /* The variances of the displacement, m^2 and rad^2, that the last reading misses between h0 and
+     * h1 seconds after its time, as the motion changes; `next` ends it, NULL while there is none.
+     * False: it misses nothing. NULL: `step` knows by its `interval`. */
     bool (*missed)(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
                    plr_real variance[PLR_POSE_DIM]);
 
@@ -57,22 +55,30 @@ typedef struct plr_process {
     /* The body's present twist (v, w) with its covariance, 6x6, which may be NULL. */
     void (*now)(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
 
-    /* The covariance of the biases at the time of the estimate, 6x6; zeros if they are not
-     * estimated. */
+    /* The covariance of the biases at the time of the estimate; zeros if not estimated. */
     void (*bias_covariance)(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]);
 
-    /* Turns a measurement of the body's twist into one of the state, r = H x + N(0, R), if velocity
-     * is estimated. NULL: it is held instead, and weighed against the readings of this process
-     * (process/velocity.h). */
+    /* Turns a measurement of the body's twist into one of the state, r = H x + N(0, R). NULL: it is
+     * held, and weighed against the readings of this process (process/velocity.h). */
     void (*measure)(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]);
 } plr_process;
 
+/* False if a step of these squares, m^2 and rad^2, is longer than 1 km or pi rad; and for NaN. */
+bool plr_step_is_possible(plr_real way2, plr_real turn2);
+
+/* The mean reading of the step that ends at t_ns with `reading`, by the timing (plr_twist_timing).
+ * Between two samples of a smooth signal its mean is that of both. Where a frame came in between,
+ * the first part of the interval was bridged by the older one: the second makes up for it, so that
+ * the integral is right. Not `bridged` is an interval in which readings were lost: meanwhile frames
+ * have corrected what the older one did. */
+void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_time_ns t_ns,
+                      const plr_real reading[PLR_READING_DIM], plr_real held[PLR_READING_DIM]);
+
 extern const plr_process plr_process_twist;
 extern const plr_process plr_process_imu;
 
-/* False until an IMU has been aligned with gravity: the state does not move before. In mapping poses
- * are given, and nothing has to start. */
+/* False until an IMU is aligned with gravity; until then the state rests, but for mapping. */
 static inline bool plr_process_has_started(const plr_filter *f) {
     return f->config.process != PLR_PROCESS_IMU || f->inertial.started != 0 ||
            f->config.mode == PLR_MODE_MAPPING;
@@ -82,8 +88,7 @@ static inline const plr_process *plr_process_of(const plr_filter *f) {
     return f->config.process == PLR_PROCESS_IMU ? &plr_process_imu : &plr_process_twist;
 }
 
-/* The variance of bias k about the mean of its prior, if nothing had been learnt of it: it has walked
- * since. */
+/* The variance of bias k about its prior's mean, had nothing been learnt of it: it has walked. */
 static inline plr_real plr_bias_prior_variance(const plr_filter *f, unsigned k) {
     const plr_real sigma = f->bias_prior_sigma[k], seconds = (plr_real)f->bias_walked_s;
     return sigma * sigma + seconds * plr_process_of(f)->bias_walk(f, k);

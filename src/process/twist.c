@@ -6,17 +6,13 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "math/so3.h"
-#include "process/mean.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/seconds.h"
 
-/* The largest step, rad and m. The series of SO(3) are accurate up to this angle. */
-#define MAX_TURN PLR_R(3.1415926)
-#define MAX_WAY  PLR_R(1000)
-/* An interval that is longer than usual by this many of the intervals' deviations lacks readings. */
+/* An interval longer than usual by this many of the intervals' deviations lacks readings. */
 #define LATE_SIGMAS PLR_R(4)
 
 static void lay_out(plr_filter *f) {
@@ -73,17 +69,15 @@ static void displacement(const plr_filter *f, const plr_real reading[PLR_POSE_DI
         xi[i] = seconds * (reading[i] - f->bias[i]);
 }
 
-/* False for NaN too. */
-static bool is_within_limits(const plr_real xi[PLR_POSE_DIM]) {
-    const plr_real way2 = plr_dot3(xi, xi), turn2 = plr_dot3(xi + 3, xi + 3);
-    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
+static bool is_possible(const plr_real xi[PLR_POSE_DIM]) {
+    return plr_step_is_possible(plr_dot3(xi, xi), plr_dot3(xi + 3, xi + 3));
 }
 
 static plr_status check(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                         plr_real seconds) {
     plr_real xi[PLR_POSE_DIM];
     displacement(f, reading, seconds, xi);
-    return is_within_limits(xi) ? PLR_OK : PLR_E_RANGE;
+    return is_possible(xi) ? PLR_OK : PLR_E_RANGE;
 }
 
 /* Variances of a step's displacement, (rho, theta). */
@@ -98,8 +92,8 @@ static void step_variance(const plr_filter *f, plr_real seconds, plr_real interv
     }
 }
 
-/* Whether readings were lost in an interval of h seconds. Where the intervals differ by much all along,
- * a long one is nothing unusual: its reading stands for all of it, to the sigma that was told. */
+/* Whether readings were lost in an interval of h seconds. Where intervals differ by much all along,
+ * a long one is usual: its reading stands for all of it, to the sigma that was told. */
 static bool lost_readings(const plr_filter *f, plr_real h) {
     const plr_real usual = f->inertial.usual_s, late = h - usual;
     return usual > 0 && h > PLR_LONG_INTERVALS * usual &&
@@ -117,9 +111,8 @@ static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DI
     memcpy(held, f->reading, PLR_READING_DIM * sizeof *held);
 }
 
-/* The square of by how much a velocity is off that is held for n of the usual intervals: what readings
- * differ by beyond their own noise, and later what they scatter by. Linear numbers are 0, angular ones
- * 1. */
+/* The square of by how much a velocity is off that is held for n usual intervals: what readings
+ * differ by beyond their noise, later what they scatter by. `which`: 0 linear, 1 angular. */
 static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
     const plr_real *v = which == 0 ? f->par.velocity_variance : f->par.gyro_variance;
     const plr_real noise = (v[0] + v[1] + v[2]) / PLR_R(3);
@@ -167,7 +160,7 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POS
         for (int i = 0; i < PLR_POSE_DIM; i++)
             V[(PLR_POSE_DIM + 1) * i] = variance[i];
         plr_velocity_fuse(f, t_ns, seconds, xi, V, T);
-        if (!is_within_limits(xi)) { /* no step of a robot: the velocities are wrong */
+        if (!is_possible(xi)) { /* no step of a robot: the velocities are wrong */
             plr_velocity_forget(f);
             displacement(f, reading, seconds, xi);
             fused = false;

@@ -19,8 +19,7 @@ enum { HELD_INTERVALS = 2 };
  * one step in 5,000 by chance. In units of the setting gate-d2. */
 #define CONTRADICTED PLR_R(1.5)
 
-/* The seconds between readings, in ns: 0 where they are not known yet, or too long. Two readings
- * of one time share their interval. */
+/* ns between readings: 0 where not known yet, or too long. Two of one time share their interval. */
 static plr_time_ns interval_of(const plr_held_velocity *held, plr_time_ns t_ns) {
     if (!held->known || t_ns < held->t_ns)
         return 0;
@@ -73,18 +72,16 @@ bool plr_velocity_is_held(const plr_filter *f, plr_time_ns end_ns) {
     return false;
 }
 
-/* Lambda += Y^T Y, eta += Y^T e: the whitened difference e = U^-T (s z - M xi) is Y db + N(0, I),
- * with Y = -s U^-T M T. */
+/* Lambda += Y^T Y, eta += Y^T e for e = U^-T (s z - M xi) = Y db + N(0, I), Y = -s U^-T M T. */
 static void add_bias_information(plr_filter *f, const plr_real Y[PLR_ROWS * PLR_POSE_DIM],
                                  const plr_real e[PLR_ROWS]) {
+    plr_real *eta = f->either.velocities.bias_eta, *Lambda = f->either.velocities.bias_Lambda;
     for (unsigned r = 0; r < PLR_ROWS; r++)
         for (unsigned i = 0; i < PLR_BIAS_DIM; i++) {
-            const plr_real y = Y[PLR_POSE_DIM * r + i];
-            f->either.velocities.bias_eta[i] = PLR_FMA(y, e[r], f->either.velocities.bias_eta[i]);
+            const plr_real *y = Y + PLR_POSE_DIM * r;
+            eta[i] = PLR_FMA(y[i], e[r], eta[i]);
             for (unsigned j = 0; j < PLR_BIAS_DIM; j++)
-                f->either.velocities.bias_Lambda[PLR_BIAS_DIM * i + j] =
-                    PLR_FMA(y, Y[PLR_POSE_DIM * r + j],
-                            f->either.velocities.bias_Lambda[PLR_BIAS_DIM * i + j]);
+                Lambda[PLR_BIAS_DIM * i + j] = PLR_FMA(y[i], y[j], Lambda[PLR_BIAS_DIM * i + j]);
         }
 }
 
@@ -112,8 +109,7 @@ static void correct(plr_real V[PLR_POSE_SQUARE], plr_real T[PLR_POSE_SQUARE],
     memcpy(T, next, sizeof next);
 }
 
-/* e = s z - M xi, and S = M V M^T + s density. What is below rounding in M V M^T adds to the
- * noise. */
+/* e = s z - M xi, S = M V M^T + s density. Rounding in M V M^T adds to the noise. */
 static void compare(const plr_held_velocity *held, plr_real seconds,
                     const plr_real xi[PLR_POSE_DIM], const plr_real V[PLR_POSE_SQUARE],
                     plr_real MV[PLR_ROWS * PLR_POSE_DIM], plr_real R[PLR_ROWS],
@@ -217,13 +213,12 @@ void plr_velocity_bias_rows(const plr_filter *f, unsigned part, plr_rows *H, plr
             y[k] = PLR_FMA(-L[PLR_BIAS_DIM * k + l], y[l], y[k]);
         y[k] = pivot > 0 ? y[k] / pivot : PLR_R(0);
     }
-    H->terms = 1;
-    H->term[0].row = plr_row_of(f, PLR_BLOCK_BIAS);
-    H->term[0].columns = PLR_BIAS_DIM;
+    H->terms = 0;
+    plr_real *by_bias = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_BIAS), PLR_BIAS_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
         const unsigned k = PLR_ROWS * part + i;
         r[i] = y[k];
         for (unsigned c = 0; c < PLR_BIAS_DIM; c++)
-            H->term[0].H[PLR_BIAS_DIM * i + c] = L[PLR_BIAS_DIM * c + k];
+            by_bias[PLR_BIAS_DIM * i + c] = L[PLR_BIAS_DIM * c + k];
     }
 }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 /*
- * Velocities measured by small sensors, in addition to the twists (docs/MATH.md 18). A reading is
- * held until the next one of its sensor, as a twist is. Its noise is treated as white, with a
- * density of variance times the seconds between readings. In each step of the motion, twist and
- * readings are combined by their covariances; their difference is information about the biases of
- * the twists. The information is collected until the next correction, so that twists, readings and
- * frames may come in any order.
+ * Velocities measured by small sensors, beside the twists (docs/MATH.md 18). A reading is held
+ * until the next one of its sensor, as a twist is, with a white noise of density variance times
+ * interval. In each step of the motion twist and readings are combined by their covariances; the
+ * difference informs about the twists' biases, and is collected until the next correction, so that
+ * twists, readings and frames may come in any order.
  */
 #ifndef PLR_PROCESS_VELOCITY_H
 #define PLR_PROCESS_VELOCITY_H
@@ -19,8 +18,7 @@
  * reading is not known yet, so only the second one is held. */
 void plr_velocity_hold(plr_filter *f, unsigned which, const plr_twist_rows *rows);
 
-/* Drops all held rows and their information about the biases, when the clock or the biases
- * change. */
+/* Drops all held rows and what they say of the biases: the clock or the biases change. */
 void plr_velocity_forget(plr_filter *f);
 
 /* Drops the information about the biases, which a correction has used. */

@@ -30,12 +30,10 @@ bool plr_cobs_in_frame(const plr_cobs_decoder *d);
 /* Starts a frame. */
 void plr_cobs_begin(plr_cobs_encoder *e);
 
-/* Encodes one byte of data. Returns how many bytes of e->block must now be sent, 0 to 255; the next
- * call overwrites them. */
+/* Encodes a byte. Returns how many bytes of e->block to send before the next call, 0 to 255. */
 unsigned plr_cobs_encode(plr_cobs_encoder *e, uint8_t data);
 
-/* Ends the frame. Returns how many bytes of e->block must be sent, 1 to 255; the delimiter is
- * last. */
+/* Ends the frame. Returns how many bytes of e->block must be sent, with the delimiter: 1 to 255. */
 unsigned plr_cobs_end(plr_cobs_encoder *e);
 
 #endif

@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 #include "pelorus/wire.h"
 #include "record/bytes.h"
@@ -61,49 +60,12 @@ static unsigned size_in_memory(unsigned kind) {
     }
 }
 
-/* A number as the processor holds it becomes bytes, and the other way. (The width is constant in each
- * call, so that the loops of bytes.h become a move.) */
-static void to_bytes(uint8_t *bytes, const unsigned char *number, unsigned width) {
-    uint16_t two;
-    uint32_t four;
-    uint64_t eight;
-    switch (width) {
-    case 1:
-        *bytes = *number;
-        break;
-    case 2:
-        memcpy(&two, number, sizeof two);
-        plr_bytes_put(bytes, 2, two);
-        break;
-    case 4:
-        memcpy(&four, number, sizeof four);
-        plr_bytes_put(bytes, 4, four);
-        break;
-    default:
-        memcpy(&eight, number, sizeof eight);
-        plr_bytes_put(bytes, 8, eight);
-        break;
-    }
-}
-
-static void of_bytes(unsigned char *number, const uint8_t *bytes, unsigned width) {
-    const uint16_t two = width == 2 ? (uint16_t)plr_bytes_get(bytes, 2) : 0;
-    const uint32_t four = width == 4 ? (uint32_t)plr_bytes_get(bytes, 4) : 0;
-    const uint64_t eight = width == 8 ? plr_bytes_get(bytes, 8) : 0;
-    switch (width) {
-    case 1:
-        *number = *bytes;
-        break;
-    case 2:
-        memcpy(number, &two, sizeof two);
-        break;
-    case 4:
-        memcpy(number, &four, sizeof four);
-        break;
-    default:
-        memcpy(number, &eight, sizeof eight);
-        break;
-    }
+/* A number as the processor holds it becomes little-endian bytes, or the other way round. */
+static void reorder(unsigned char *to, const unsigned char *from, unsigned width) {
+    const uint16_t one = 1;
+    const bool is_little = *(const unsigned char *)&one == 1;
+    for (unsigned i = 0; i < width; i++)
+        to[i] = from[is_little ? i : width - 1 - i];
 }
 
 /* By its exponent: no arithmetic touches the number, so its bits stay. */
@@ -130,14 +92,14 @@ static void pass_same(plr_codec *c, const plr_field *f, unsigned char *at) {
     const unsigned width = size_in_memory(f->kind);
     uint8_t bytes[8], own[8];
     if (!plr_codec_reads(c)) {
-        to_bytes(bytes, at, width);
+        reorder(bytes, at, width);
         judge(c, f, bytes, width);
         move(c, bytes, width);
         return;
     }
     move(c, bytes, width);
     if (c->direction == PLR_CODEC_MATCH) {
-        to_bytes(own, at, width);
+        reorder(own, at, width);
         c->differs = c->differs || memcmp(own, bytes, width) != 0;
         return;
     }
@@ -145,11 +107,10 @@ static void pass_same(plr_codec *c, const plr_field *f, unsigned char *at) {
     if (c->status != PLR_OK)
         memset(bytes, 0, width);
     if (at)
-        of_bytes(at, bytes, width);
+        reorder(at, bytes, width);
 }
 
-/* A double that is f32 outside. The conversion is that of IEEE 754 (C99 Annex F.3): to nearest, and
- * to infinity beyond the range. */
+/* A double that is f32 outside: rounded to nearest, infinite beyond the range (C99 Annex F.3). */
 static void pass_narrow(plr_codec *c, unsigned char *at) {
     static const plr_field f32 = {.kind = PLR_FIELD_F32, .count = 1};
     double wide = 0;
@@ -265,15 +226,14 @@ static void pass_real_bytes(plr_codec *c, unsigned char *at) {
         *at = c->real_bytes;
 }
 
-size_t plr_text_length(const char *text, size_t size) {
+static size_t length_of(const char *text, size_t size) {
     size_t n = 0;
     while (n < size && text[n] != '\0')
         n++;
     return n;
 }
 
-/* Where the text is cut, it may be in the middle of a character: of UTF-8 at most three bytes go
- * before the cut. */
+/* A cut may be inside a character: of UTF-8 at most three bytes go before it. */
 static void drop_part_of_character(char *text, unsigned length) {
     unsigned n = length;
     while (n > 0 && n > length - 3 && ((uint8_t)text[n] & 0xC0) == 0x80)
@@ -298,7 +258,7 @@ static void pass_characters(plr_codec *c, char *text, unsigned length, bool is_c
 static void pass_text(plr_codec *c, const plr_field *f, char *text) {
     size_t length = c->left;
     if (!plr_codec_reads(c))
-        length = plr_text_length(text, (size_t)f->most + 1);
+        length = length_of(text, (size_t)f->most + 1);
     if (f->kind == PLR_FIELD_LENGTH) {
         c->length = pass_byte(c, (unsigned)length);
         require(c, c->length <= f->most);

@@ -98,7 +98,4 @@ void plr_codec_numbers(plr_codec *c, plr_field_kind kind, void *numbers, uint32_
 /* Bytes of n fields of the first kinds. */
 uint32_t plr_codec_size(const plr_field *fields, unsigned n);
 
-/* Length of a text of at most `size` bytes that may end with a zero. */
-size_t plr_text_length(const char *text, size_t size);
-
 #endif

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "record/messages.h"
 
+#include <string.h>
+
 /* The fields of each message, and those of its rows. They are counted from the beginning of the
  * message's content, which all members of plr_message.as share. */
 #define MESSAGE(name, from, about) static const plr_field name##_fields[] = {
@@ -59,8 +61,7 @@ static void pass_imu(plr_codec *c, plr_imu_message *m) {
         plr_codec_fields(c, &m->readings[i], IMU_rows, LENGTH(IMU_rows));
 }
 
-/* What is read goes to the reader's room; what is written comes from the message, which is only
- * looked at. */
+/* What is read goes to the reader's room; what is written is only looked at. */
 static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_room *room) {
     plr_observation *rows = (plr_observation *)m->observations;
     if (plr_codec_reads(c)) {
@@ -92,4 +93,12 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
         m->landmark.times_gated = 0;
         m->landmark.known = m->role == PLR_LANDMARK_KNOWN;
     }
+}
+
+plr_time_ns plr_message_time(const plr_message *message) {
+    const plr_field *first = records[message->kind].fields;
+    plr_time_ns t_ns = 0;
+    if (first->kind == PLR_FIELD_U64)
+        memcpy(&t_ns, (const unsigned char *)&message->as + first->offset, sizeof t_ns);
+    return t_ns;
 }

@@ -20,8 +20,7 @@ plr_status plr_reader_init(plr_reader *r, uint8_t *buffer, size_t buffer_size,
     return PLR_OK;
 }
 
-/* A number that is lower than expected is not a gap of almost 2^16 frames: the sender began anew,
- * or another one goes on. */
+/* A lower number than expected is no gap of almost 2^16 frames: the sender began anew. */
 static void count_missing(plr_reader *r, uint16_t sequence) {
     uint16_t gap = (uint16_t)(sequence - r->next_sequence);
     if (gap < STEP_BACK)
@@ -80,13 +79,6 @@ static plr_read_event end_frame(plr_reader *r, bool whole, plr_message *message)
     return PLR_READ_MESSAGE;
 }
 
-static void begin_frame(plr_reader *r) {
-    r->frame_start = r->counts.bytes;
-    r->length = 0;
-    r->crc = 0;
-    r->overrun = false;
-}
-
 /* What does not fit is still checked, so that a long frame and a damaged one are told apart. */
 static void append(plr_reader *r, uint8_t byte) {
     r->crc = plr_crc32(r->crc, &byte, 1);
@@ -98,8 +90,12 @@ static void append(plr_reader *r, uint8_t byte) {
 
 static plr_cobs_step take_byte(plr_reader *r, uint8_t stuffed) {
     uint8_t byte;
-    if (!plr_cobs_in_frame(&r->cobs))
-        begin_frame(r);
+    if (!plr_cobs_in_frame(&r->cobs)) {
+        r->frame_start = r->counts.bytes;
+        r->length = 0;
+        r->crc = 0;
+        r->overrun = false;
+    }
     r->counts.bytes++;
     plr_cobs_step step = plr_cobs_decode(&r->cobs, stuffed, &byte);
     if (step == PLR_COBS_BYTE)

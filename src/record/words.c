@@ -1,67 +1,42 @@
 // SPDX-License-Identifier: MIT
 #include "pelorus/filter.h"
 
-/* A sentence for a number. */
-typedef struct plr_words {
+/* A sentence for a number of one of these enums. */
+typedef enum plr_words_of { OF_STATUS, OF_HEALTH, OF_REASON, OF_IMU_FAULT } plr_words_of;
+
+#define STATUS(status, text)   {OF_STATUS, (int)(status), text},
+#define HEALTH(health, text)   {OF_HEALTH, (int)(health), text},
+#define REASON(reason, text)   {OF_REASON, (int)(reason), text},
+#define IMU_FAULT(fault, text) {OF_IMU_FAULT, (int)(fault), text},
+static const struct {
+    plr_words_of of;
     int number;
     const char *text;
-} plr_words;
-
-#define STATUS(status, text) {status, text},
-#define HEALTH(health, text)
-#define REASON(reason, text)
-#define IMU_FAULT(fault, text)
-static const plr_words statuses[] = {
+} words[] = {
 #include "record/words.def"
 };
 
-#undef STATUS
-#undef HEALTH
-#define STATUS(status, text)
-#define HEALTH(health, text) {health, text},
-static const plr_words healths[] = {
-#include "record/words.def"
-};
-
-#undef HEALTH
-#undef REASON
-#define HEALTH(health, text)
-#define REASON(reason, text) {reason, text},
-static const plr_words reasons[] = {
-#include "record/words.def"
-};
-
-#undef REASON
-#undef IMU_FAULT
-#define REASON(reason, text)
-#define IMU_FAULT(fault, text) {fault, text},
-static const plr_words imu_faults[] = {
-#include "record/words.def"
-};
-
-#define LENGTH(table) (sizeof(table) / sizeof *(table))
-
-static const char *find(const plr_words *words, size_t n, int number, const char *otherwise) {
-    for (size_t i = 0; i < n; i++)
-        if (words[i].number == number)
+static const char *find(plr_words_of of, int number, const char *otherwise) {
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (words[i].of == of && words[i].number == number)
             return words[i].text;
     return otherwise;
 }
 
 const char *plr_status_text(plr_status status) {
-    return find(statuses, LENGTH(statuses), (int)status, "no status of this version");
+    return find(OF_STATUS, (int)status, "no status of this version");
 }
 
 const char *plr_reason_text(plr_reason reason) {
-    return find(reasons, LENGTH(reasons), (int)reason, "no reason of this version");
+    return find(OF_REASON, (int)reason, "no reason of this version");
 }
 
 const char *plr_health_text(plr_health health) {
-    return find(healths, LENGTH(healths), (int)health, "no health of this version");
+    return find(OF_HEALTH, (int)health, "no health of this version");
 }
 
 const char *plr_imu_fault_text(plr_imu_fault fault) {
-    return find(imu_faults, LENGTH(imu_faults), (int)fault, "no fault of this version");
+    return find(OF_IMU_FAULT, (int)fault, "no fault of this version");
 }
 
 const char *plr_version(void) {

@@ -27,8 +27,8 @@ static bool to_frame(void *writer, uint8_t *bytes, unsigned n) {
     return true; /* w->status has the failure */
 }
 
-/* The codec takes what it could read into; in these directions it only looks at it. END says what was
- * written, whatever the message says. */
+/* The codec takes what it could read into; in these directions it only looks at it. END says what
+ * was written, whatever the message says. */
 static plr_status pass_payload(plr_direction direction, plr_writer *w, const plr_message *message) {
     plr_codec codec = {.direction = direction, .move = to_frame, .context = w};
     if (message->kind == PLR_KIND_END) {
@@ -62,19 +62,11 @@ static plr_status send_frame(plr_writer *w, const plr_message *message) {
 }
 
 static void count(plr_end *counts, plr_kind kind) {
+    static const plr_kind kinds[PLR_COUNTED] = {PLR_KIND_TWIST,    PLR_KIND_STEREO,  PLR_KIND_TRUTH,
+                                                PLR_KIND_LANDMARK, PLR_KIND_READING, PLR_KIND_IMU};
     counts->frames++;
-    if (kind == PLR_KIND_TWIST)
-        counts->twists++;
-    if (kind == PLR_KIND_STEREO)
-        counts->stereos++;
-    if (kind == PLR_KIND_TRUTH)
-        counts->truths++;
-    if (kind == PLR_KIND_LANDMARK)
-        counts->landmarks++;
-    if (kind == PLR_KIND_READING)
-        counts->readings++;
-    if (kind == PLR_KIND_IMU)
-        counts->imus++;
+    for (unsigned i = 0; i < PLR_COUNTED; i++)
+        counts->sent[i] += kinds[i] == kind;
 }
 
 plr_status plr_writer_put(plr_writer *w, const plr_message *message) {

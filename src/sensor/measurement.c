@@ -26,17 +26,14 @@ void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m
 
 void plr_measurement_recall(const plr_filter *f, unsigned slot, plr_measurement *m) {
     const plr_kept_measurements *kept = &f->work.kept;
-    plr_term *own = &m->H.term[0], *pose = &m->H.term[1];
-    m->H.terms = kept->terms;
-    own->row = plr_covariance_row(f, slot);
-    own->columns = PLR_LANDMARK_DIM;
-    memcpy(own->H, kept->of_slot[slot].H, sizeof kept->of_slot[slot].H);
+    m->H.terms = 0;
+    plr_real *own = plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
+    memcpy(own, kept->of_slot[slot].H, sizeof kept->of_slot[slot].H);
     memcpy(m->r, kept->of_slot[slot].r, sizeof m->r);
     memcpy(m->R, kept->R, sizeof m->R);
     m->extra_d2 = m->residual2 = m->max_variance = 0;
     if (kept->terms == 1)
         return;
-    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
-    pose->columns = PLR_POSE_DIM;
-    memcpy(pose->H, f->work.noise.Wt + BY_POSE * slot, BY_POSE * sizeof *pose->H);
+    plr_real *pose = plr_rows_add(&m->H, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM);
+    memcpy(pose, f->work.noise.Wt + BY_POSE * slot, BY_POSE * sizeof *pose);
 }

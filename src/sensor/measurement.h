@@ -29,9 +29,8 @@ typedef struct plr_measurement {
     plr_real max_variance;
 } plr_measurement;
 
-/* Keeps H, r and R of the measurement of a slot's landmark until the correction. Its rows depend on
- * the landmark and, where the motion's noise is not kept beside P, on the pose; in one frame all
- * have the same R. */
+/* Keeps H, r and R of the measurement of a slot's landmark until the correction: rows by the
+ * landmark and maybe the pose. In one frame all have the same R. */
 void plr_measurement_keep(plr_filter *f, unsigned slot, const plr_measurement *m);
 
 /* The measurement that was kept. What the gate alone needs is zero. */

@@ -16,16 +16,15 @@ typedef struct plr_sensor_kind {
     void (*of_state)(const plr_filter *f, const plr_reading *reading, plr_measurement *m);
 
     /* For a sensor of the body's twist (v, w): fills one or two times three rows, and returns how
-     * many times. They are held until the next reading, in f->either.velocities.held[place] and after
-     * it. */
+     * many times. They are held in f->either.velocities.held[place] and after it. */
     unsigned (*of_twist)(const plr_reading *reading, plr_twist_rows rows[2]);
     unsigned place;
 
     uint8_t axes;      /* numbers that it can measure: bits as in plr_reading.axes */
     double most_value; /* a larger value is an error of the sender; 0: there is no value */
 
-    /* Of a sensor that measures where the body is: while these axes are all measured, the position cannot
-     * drift away, and a dark camera alone is no LOST. 0: no such sensor. */
+    /* Of a sensor that measures where the body is: while these axes are all measured, the position
+     * cannot drift away, and a dark camera alone is no LOST. 0: no such sensor. */
     uint8_t bounds_position;
 } plr_sensor_kind;
 

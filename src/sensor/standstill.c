@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The body does not move: v = 0 with sigma[0], m/s, and w = 0 with sigma[1], rad/s, each if `axes`
- * has its bit. */
+/* The body rests: v = 0 with sigma[0], m/s, w = 0 with sigma[1], rad/s, each if in `axes`. */
 #include <string.h>
 
 #include "sensor/sensor.h"
@@ -30,8 +29,8 @@ static unsigned measure(const plr_reading *reading, plr_twist_rows rows[2]) {
 const plr_sensor_kind plr_standstill = {
     .of_twist = measure, .place = 1, .axes = 3, .most_value = 0};
 
-/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise and
- * in what its track has wandered since. */
+/* The squared distance of a landmark's pixels from those that it was anchored at, in their noise
+ * and in what its track has wandered since. */
 static plr_real moved2(const plr_filter *f, const plr_slot *slot, const plr_real z[PLR_ROWS]) {
     const plr_real since = plr_seconds(f->t_ns - slot->anchor_ns);
     const plr_real drift = f->par.track_drift * since;
@@ -54,7 +53,6 @@ static void anchor(const plr_filter *f, plr_slot *slot, const plr_real z[PLR_ROW
  * second ago and more, which alone show that a slow body stands. */
 static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned *old_rows) {
     plr_real distance2 = 0;
-    unsigned rows = 0;
     *old_rows = 0;
     for (unsigned k = 0; k < n; k++) {
         plr_real z[PLR_ROWS];
@@ -66,11 +64,10 @@ static bool is_still(plr_filter *f, const plr_frame *frame, unsigned n, unsigned
             anchor(f, slot, z);
         } else if (f->t_ns - slot->anchor_ns >= STILL_NS) {
             distance2 += moved2(f, slot, z);
-            rows += PLR_ROWS;
+            *old_rows += PLR_ROWS;
         }
     }
-    *old_rows = rows;
-    const plr_real mean = (plr_real)rows;
+    const plr_real mean = (plr_real)*old_rows;
     return distance2 <= mean + SIGMAS * PLR_SQRT(PLR_R(2) * mean);
 }
 

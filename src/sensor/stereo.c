@@ -68,12 +68,6 @@ plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen)
     return row_gap(seen) * row_gap(seen) / (PLR_R(2) * f->par.pixel_variance);
 }
 
-/* Along a point's own ray only its right image moves: Dz q = (0, fx baseline, 0) / z. */
-static void along_the_ray(const plr_camera *camera, plr_real along[3]) {
-    along[0] = along[2] = 0;
-    along[1] = camera->fx * camera->baseline;
-}
-
 static plr_real residual_norm2(const plr_observation *seen, const plr_real z[3]) {
     const plr_real residual[4] = {(plr_real)seen->uL_px - z[0], (plr_real)seen->uR_px - z[1],
                                   (plr_real)seen->vL_px - z[2], (plr_real)seen->vR_px - z[2]};
@@ -90,9 +84,7 @@ plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
 
 static void measure_nothing(const plr_filter *f, unsigned slot, plr_measurement *m) {
     memset(m, 0, sizeof *m);
-    m->H.terms = 1;
-    m->H.term[0].row = plr_covariance_row(f, slot);
-    m->H.term[0].columns = PLR_LANDMARK_DIM;
+    (void)plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m->R[i] = plr_stereo_variance(f, i);
 }
@@ -100,7 +92,9 @@ static void measure_nothing(const plr_filter *f, unsigned slot, plr_measurement 
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m) {
     const plr_camera *camera = &f->par.camera;
-    plr_real z[3], Dz[9], along[3];
+    /* along a point's own ray only its right image moves: Dz q = (0, fx baseline, 0) / z */
+    const plr_real along[3] = {0, camera->fx * camera->baseline, 0};
+    plr_real z[3], Dz[9];
     plr_view view;
     if (!plr_model_of(f)->look(f, slot, &view)) {
         measure_nothing(f, slot, m);
@@ -108,7 +102,6 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     }
     plr_stereo_project(z, camera, view.q);
     plr_stereo_jacobian(Dz, camera, view.q);
-    along_the_ray(camera, along);
     plr_model_of(f)->derive(f, slot, &view, Dz, along, z, &m->H);
     plr_stereo_rows(m->r, seen);
     for (unsigned i = 0; i < PLR_ROWS; i++) {
@@ -122,8 +115,8 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
 }
 
 /* How the point that a pair of pixels shows would change: with a longer baseline along its ray,
- * with a longer focal length in its depth alone. If the camera is turned by a small phi, pixels that
- * show q mean q - phi x q in the axes that T_CB gives the camera. */
+ * with a longer focal length in its depth alone. If the camera is turned by a small phi, pixels
+ * that show q mean q - phi x q in the axes that T_CB gives the camera. */
 static void point_by_calibration(const plr_real q[3], plr_real q_s[PLR_CALIBRATIONS][3]) {
     const plr_real changes[PLR_CALIBRATIONS][3] = {
         [PLR_BASELINE] = {q[0], q[1], q[2]},    [PLR_FOCAL_LENGTH] = {0, 0, q[2]},
@@ -150,21 +143,17 @@ void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
     }
 }
 
-/* ---------------------------------------------------------------- during the search for the
- * motion */
+/* ---------------------------------------------------------------- during the motion's search */
 
-/* J = Dz R^T Ji(q0). As in model_body.c the products that vanish, here Dz q in the rows uL and v,
- * are left out. */
+/* J = Dz R^T Ji(q0), without what vanishes, as in model_body.c: Dz q in the rows uL and v. */
 static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
                           const plr_real p[3], plr_stereo_prediction *sight) {
     plr_real DzRt[9];
     plr_mat3_mul_nt(DzRt, sight->Dz, R);
     for (int row = 0; row < 3; row++) {
         const plr_real along = row == 1 ? camera->fx * camera->baseline / sight->q[2] : PLR_R(0);
-        for (int column = 0; column < 2; column++) {
-            const plr_real n[3] = {chart->N[column], chart->N[2 + column], chart->N[4 + column]};
-            sight->J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, n);
-        }
+        for (int column = 0; column < 2; column++)
+            sight->J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, chart->N[column]);
         sight->J[3 * row + 2] = -chart->r * (along + plr_dot3(DzRt + 3 * row, p));
     }
 }

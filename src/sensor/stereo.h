@@ -24,8 +24,7 @@ void plr_stereo_project(plr_real z[3], const plr_camera *camera, const plr_real 
 /* Dz = d(uL, uR, v) / dq, 3x3, px/m. Needs q[2] != 0. */
 void plr_stereo_jacobian(plr_real Dz[9], const plr_camera *camera, const plr_real q[3]);
 
-/* The point q whose projection is z, m, and Dq = dq / d(uL, uR, v), 3x3, m/px.
- * Needs a disparity z[0] - z[1] > 0. */
+/* The point q whose projection is z, m, and Dq = dq / d(uL, uR, v), 3x3, m/px, for z[0] > z[1]. */
 void plr_stereo_back_project(plr_real q[3], plr_real Dq[9], const plr_camera *camera,
                              const plr_real z[3]);
 
@@ -40,25 +39,22 @@ plr_real plr_stereo_variance(const plr_filter *f, unsigned row);
 /* (vL - vR)^2 / (2 s^2), which does not depend on the state; one degree of freedom. */
 plr_real plr_stereo_row_gap_d2(const plr_filter *f, const plr_observation *seen);
 
-/* The largest variance of a predicted pixel, px^2: one focal length, one radian. With a larger one
- * a linearisation is wrong, and the update would reduce the variance by more digits than float32
- * has. */
+/* The largest variance of a predicted pixel, px^2: one focal length, one radian. Beyond it a
+ * linearisation is wrong, and an update would take more digits than float32 has. */
 plr_real plr_stereo_max_variance(const plr_filter *f);
 
-/* The largest variance of a landmark's bearing, rad^2, at which a projection is taken for linear: what
- * that leaves out, fx sigma^2 / 2, is then a fifth of a pixel sigma. */
+/* The largest variance of a landmark's bearing, rad^2, at which a projection is taken for linear:
+ * what that leaves out, fx sigma^2 / 2, is then a fifth of a pixel sigma. */
 plr_real plr_stereo_max_bearing_variance(const plr_filter *f);
 
-/* An observation of a landmark, linearised at the present estimate. False if the landmark is nearer
- * than min-depth: then the measurement has no effect. Known landmarks are exempt from
- * plr_stereo_max_variance: in localization from a rough start the pose is uncertain, and only they
- * can correct it. */
+/* An observation of a landmark, linearised at the present estimate. False, and without effect, if
+ * the landmark is nearer than min-depth. Known landmarks are exempt from plr_stereo_max_variance:
+ * from a rough start only they can correct the pose. */
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m);
 
-/* H_s: how the three rows would change if the camera's focal length or baseline were longer by a
- * share, or if it were turned about one of its axes. Left as it is where the landmark is nearer than
- * min-depth, and for what is exact. */
+/* H_s: how the three rows change with what is not exact in the calibration: focal length or
+ * baseline longer by a share, camera turned. Left as it is for a landmark nearer than min-depth. */
 void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
                                plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]);
 
@@ -72,16 +68,14 @@ typedef struct plr_stereo_prediction {
     plr_real J[9];  /* rows by the error in the polar chart at q0, 3x3 */
 } plr_stereo_prediction;
 
-/* For the motion (R = I + E, p) of the camera. False if the landmark would be nearer than
- * min-depth. */
+/* For the motion (R = I + E, p) of the camera. False: then it would be nearer than min-depth. */
 bool plr_stereo_predict_after(const plr_filter *f, const plr_slot *slot,
                               const plr_observation *seen, const plr_real E[9], const plr_real R[9],
                               const plr_real p[3], plr_stereo_prediction *sight);
 
-/* True if a single observation still improves the range of a landmark noticeably. After many
- * observations the uncertainty of the range is mostly the camera's, common to all landmarks, and
- * correcting each one separately would move them relative to the pose. J is from a prediction, P
- * the landmark's covariance. */
+/* True if a single observation still improves a landmark's range noticeably. After many the range
+ * is mostly uncertain by the camera's error, common to all, and correcting each would move them
+ * relative to the pose. J is from a prediction, P the landmark's covariance. */
 bool plr_stereo_improves_range(const plr_filter *f, const plr_real J[9], const plr_real P[9]);
 
 /* The squared norm of the four residuals (uL, uR, vL, vR), px^2, from that of the three rows. */
@@ -92,8 +86,7 @@ plr_real plr_stereo_inverse_range_variance(const plr_filter *f);
 
 /* --- new landmarks --- */
 
-/* True if a landmark may be initialised from these pixels (settings min-disparity, max-depth,
- * max-row-gap, min-depth). */
+/* True if a landmark may be made of it (min-disparity, max-depth, max-row-gap, min-depth). */
 bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen);
 
 /* Initialises a landmark from them. Returns its plr_slot.beyond. */

@@ -2,16 +2,12 @@
 /*
  * A deadline in time becomes a budget of observations.
  *
- * The rule: let c be the cost of one observation. A frame that used n > 0 observations and took t
- * shows a cost of t / n, but at most the deadline. Of the last three frames the median counts, so
- * that one that was interrupted says nothing; c rises to it at once, and falls towards it by a
- * quarter of the difference. The next frame may use deadline / c observations, therefore always at
- * least one. Until a cost is known it may use one block of them.
- *
- * The fixed part of a frame's time is charged to its observations, so c is too high after a small
- * frame and falls as the budget grows; where time is linear in n the budget settles at the largest
- * n that keeps the deadline. The number is recorded in the echoed STEREO, so a replay of the log
- * takes the same observations on any machine.
+ * Let c be the cost of one observation. A frame that used n > 0 of them and took t shows t / n, but
+ * at most the deadline. Of the last three frames the median counts, so that an interrupted one says
+ * nothing; c rises to it at once, and falls towards it by a quarter of the difference. The next
+ * frame may use deadline / c, at least one; one block of them until a cost is known. Where time is
+ * linear in n, the budget settles at the largest n that keeps the deadline. It is in the echoed
+ * STEREO, so a replay of the log takes the same observations on any machine.
  */
 #ifndef PLR_SESSION_BUDGET_H
 #define PLR_SESSION_BUDGET_H

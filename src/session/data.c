@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-#include "pelorus/assertions.h"
-
 #include "session/budget.h"
 #include "session/clock.h"
 #include "session/held.h"
@@ -103,8 +101,8 @@ void plr_data_limit_frame(plr_session *s) {
         s->in.as.stereo.budget = budget;
 }
 
-/* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there are
- * none: a frame has the time of its TRUTH.) False if there is no such time. */
+/* The setting camera-offset leads from the camera's clock to that of the steps. (In mapping there
+ * are none: a frame has the time of its TRUTH.) False if there is no such time. */
 static bool move(const plr_session *s, plr_time_ns t_ns, plr_time_ns *moved_ns) {
     const plr_config *config = plr_filter_config(&s->filter);
     const double offset_ns = config->mode == PLR_MODE_MAPPING ? 0 : config->camera_offset_s * 1e9;
@@ -131,36 +129,19 @@ static void use_in_order(plr_session *s, const plr_frame *frame, plr_time_ns mov
         use_frame(s, frame, &moved);
 }
 
-static void use_oldest(plr_session *s) {
-    const plr_held_frame *held = plr_held_pop_frame(&s->held_frames);
+static void use_held(plr_session *s, const plr_held_frame *held) {
     use_in_order(s, &held->frame, held->moved_ns);
     if (s->held_frames.count == 0)
         plr_steps_apply_due(s);
 }
 
-void plr_data_use_waiting(plr_session *s) {
-    while (s->held_frames.count > 0)
-        use_oldest(s);
+void plr_data_use_waiting(plr_session *s, plr_time_ns until_ns) {
+    const plr_held_frame *held;
+    while ((held = plr_held_pop_frame(&s->held_frames, until_ns)) != NULL)
+        use_held(s, held);
 }
 
-/* Those whose time, by the clock of the steps, is at most t_ns. */
-static void use_waiting_until(plr_session *s, plr_time_ns t_ns) {
-    const plr_held_frame *oldest;
-    while ((oldest = plr_held_oldest_frame(&s->held_frames)) != NULL && oldest->moved_ns <= t_ns)
-        use_oldest(s);
-}
-
-void plr_data_begin_before(plr_session *s, plr_time_ns t_ns) {
-    if (s->phase == PLR_PHASE_STARTING && t_ns > 0)
-        use_waiting_until(s, t_ns - 1);
-}
-
-void plr_data_use_waiting_in_time(plr_session *s) {
-    use_waiting_until(s, s->order.newest_ns);
-}
-
-/* How long a frame waits for the steps up to its time: as long as these wait for frames, and as
- * camera-offset moves it ahead of what is there. */
+/* How long a frame waits for steps: as they do for frames, and as camera-offset moves it ahead. */
 static plr_time_ns patience_ns(const plr_session *s, plr_time_ns t_ns, plr_time_ns moved_ns) {
     const plr_config *config = plr_filter_config(&s->filter);
     const plr_time_ns ahead_ns = moved_ns > t_ns ? moved_ns - t_ns : 0;
@@ -172,14 +153,13 @@ static plr_time_ns patience_ns(const plr_session *s, plr_time_ns t_ns, plr_time_
 static void hold(plr_session *s, const plr_frame *frame, plr_time_ns moved_ns) {
     if (s->held_frames.count == PLR_SESSION_HELD_FRAMES) {
         s->totals.held_short++;
-        use_oldest(s);
+        use_held(s, plr_held_pop_frame(&s->held_frames, UINT64_MAX));
     }
     plr_held_insert_frame(&s->held_frames, frame, moved_ns);
 }
 
 void plr_data_use_stereo(plr_session *s) {
     const plr_frame *frame = &s->in.as.stereo;
-    const plr_held_frame *before = plr_held_newest_frame(&s->held_frames);
     plr_time_ns moved_ns;
     if (!move(s, frame->t_ns, &moved_ns) ||
         plr_held_has_frame(&s->held_frames, frame->t_ns)) { /* doubled by a link */
@@ -187,11 +167,10 @@ void plr_data_use_stereo(plr_session *s) {
         return;
     }
     const plr_time_ns patience = patience_ns(s, frame->t_ns, moved_ns);
-    if (before != NULL && moved_ns < before->moved_ns &&
-        before->moved_ns - moved_ns > plr_clock_max_gap_ns(s))
-        plr_data_use_waiting(s); /* a clock was set back */
+    if (plr_clock_was_set_back(s, plr_held_newest_frame_ns(&s->held_frames), moved_ns))
+        plr_data_use_waiting(s, UINT64_MAX);
     else if (moved_ns >= patience)
-        use_waiting_until(s, moved_ns - patience);
+        plr_data_use_waiting(s, moved_ns - patience);
     if (patience > 0 && moved_ns > s->order.newest_ns)
         hold(s, frame, moved_ns);
     else
@@ -231,7 +210,7 @@ void plr_data_use_truth(plr_session *s) {
 /* --- START among the data --- */
 
 void plr_data_use_start(plr_session *s) {
-    plr_data_use_waiting(s);
+    plr_data_use_waiting(s, UINT64_MAX);
     s->start = s->in.as.start;
     plr_steps_apply_held(s, UINT64_MAX);
     plr_start_apply(s);

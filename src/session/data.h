@@ -7,28 +7,20 @@
 
 /* Each applies its message to the filter, which must be initialised.
  *
- * With twist-delay, or if camera-offset moves it ahead, a STEREO beyond the last step waits for those
- * up to its time: an IMU may come in batches, or late. It waits until they are there, or until another
- * STEREO is newer by twist-delay and what camera-offset moves it, or until the place of those that
- * wait is taken (then totals.held_short counts it). Only messages tell the time, so that a replay
- * does the same. */
+ * With twist-delay, or if camera-offset moves it ahead, a STEREO beyond the last step waits until
+ * the steps up to its time are there, until another STEREO is newer by twist-delay and what
+ * camera-offset moves it, or until the room for those that wait is taken (totals.held_short). Only
+ * messages tell the time, so that a replay does the same. */
 void plr_data_use_stereo(plr_session *s);
 void plr_data_use_truth(plr_session *s);
 
-/* A START or TRUTH of that time may set the start pose: STEREOs that wait and are older come before it. */
-void plr_data_begin_before(plr_session *s, plr_time_ns t_ns);
-
-/* Uses the STEREOs that wait, and the steps that waited with them. */
-void plr_data_use_waiting(plr_session *s);
-
-/* Does so with those to whose time the steps have come. */
-void plr_data_use_waiting_in_time(plr_session *s);
+/* Uses the STEREOs that wait, of the steps' time until_ns at most, and the steps that wait too. */
+void plr_data_use_waiting(plr_session *s, plr_time_ns until_ns);
 
 /* Sets the filter's pose to that of a START. */
 void plr_data_use_start(plr_session *s);
 
-/* Lowers the budget of a STEREO, the number of observations that may be used, to what can be
- * computed before the deadline. */
+/* Lowers the budget of a STEREO to what can be computed before the deadline. */
 void plr_data_limit_frame(plr_session *s);
 
 /* Answers a STEREO that is refused. */

@@ -7,16 +7,6 @@
 
 /* --- steps --- */
 
-void plr_held_init(plr_held_steps *held) {
-    held->first = 0;
-    held->count = 0;
-    held->leads = 0;
-}
-
-bool plr_held_full(const plr_held_steps *held) {
-    return held->count == PLR_SESSION_HELD_TWISTS;
-}
-
 /* The place of the one that `behind` others came before. */
 static unsigned place(const plr_held_steps *held, unsigned behind) {
     return (held->first + behind) % PLR_SESSION_HELD_TWISTS;
@@ -35,12 +25,8 @@ static void put(plr_held_steps *held, unsigned at, const plr_held_step *step) {
     held->leads = step->leads ? held->leads | bit : held->leads & ~bit;
 }
 
-static plr_time_ns newest_ns(const plr_held_steps *held) {
-    return held->t_ns[place(held, held->count - 1U)];
-}
-
 bool plr_held_insert(plr_held_steps *held, const plr_held_step *step) {
-    PLR_ASSERT(!plr_held_full(held));
+    PLR_ASSERT(held->count < PLR_SESSION_HELD_TWISTS);
     unsigned at = held->count;
     while (at > 0 && held->t_ns[place(held, at - 1U)] > step->t_ns)
         at--;
@@ -54,29 +40,17 @@ bool plr_held_insert(plr_held_steps *held, const plr_held_step *step) {
     return true;
 }
 
-bool plr_held_contradicts(const plr_held_steps *held, plr_time_ns t_ns, plr_time_ns max_gap_ns) {
-    return held->count > 0 && t_ns < newest_ns(held) && newest_ns(held) - t_ns > max_gap_ns;
+plr_time_ns plr_held_newest_ns(const plr_held_steps *held) {
+    return held->count > 0 ? held->t_ns[place(held, held->count - 1U)] : 0;
 }
 
-bool plr_held_pop(plr_held_steps *held, plr_held_step *step) {
-    if (held->count == 0)
+bool plr_held_pop(plr_held_steps *held, plr_time_ns until_ns, plr_held_step *step) {
+    if (held->count == 0 || held->t_ns[held->first] > until_ns)
         return false;
     *step = step_at(held, held->first);
     held->first = (uint8_t)place(held, 1);
     held->count--;
     return true;
-}
-
-bool plr_held_pop_until(plr_held_steps *held, plr_time_ns t_ns, plr_held_step *step) {
-    if (held->count == 0 || held->t_ns[held->first] > t_ns)
-        return false;
-    return plr_held_pop(held, step);
-}
-
-bool plr_held_pop_due(plr_held_steps *held, plr_time_ns delay_ns, plr_held_step *step) {
-    if (held->count == 0 || newest_ns(held) - held->t_ns[held->first] < delay_ns)
-        return false;
-    return plr_held_pop(held, step);
 }
 
 /* --- frames --- */
@@ -113,17 +87,14 @@ void plr_held_insert_frame(plr_held_frames *held, const plr_frame *frame, plr_ti
     copy_frame(to, frame, moved_ns);
 }
 
-const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held) {
-    return held->count > 0 ? &held->frames[held->first] : NULL;
+plr_time_ns plr_held_newest_frame_ns(const plr_held_frames *held) {
+    return held->count > 0 ? held->frames[frame_place(held, held->count - 1U)].moved_ns : 0;
 }
 
-const plr_held_frame *plr_held_newest_frame(const plr_held_frames *held) {
-    return held->count > 0 ? &held->frames[frame_place(held, held->count - 1U)] : NULL;
-}
-
-const plr_held_frame *plr_held_pop_frame(plr_held_frames *held) {
-    PLR_ASSERT(held->count > 0);
+const plr_held_frame *plr_held_pop_frame(plr_held_frames *held, plr_time_ns until_ns) {
     const plr_held_frame *oldest = &held->frames[held->first];
+    if (held->count == 0 || oldest->moved_ns > until_ns)
+        return NULL;
     held->first = (uint8_t)frame_place(held, 1);
     held->count--;
     return oldest;

@@ -2,12 +2,10 @@
 /*
  * What waits, so that the filter is given everything in the order of time (setting twist-delay).
  *
- * Steps, the twists or readings of an IMU that move the body, wait for a late camera: a frame that is
- * older than the last step is refused, so with a camera that needs, say, 80 ms from shutter to
- * message the session hands steps to the filter 80 ms late. A step is due once a newer one is `delay`
- * ahead of it, or when a frame at or after it is used.
- *
- * Frames wait for late steps, which come in batches, or behind a filter of their own: data.h.
+ * Steps, the twists or readings of an IMU that move the body, wait for a late camera, since a frame
+ * older than the last step is refused. A step is due once a newer one is `delay` ahead of it, or
+ * when a frame at or after it is used. Frames wait for late steps, which may come in batches:
+ * data.h.
  */
 #ifndef PLR_SESSION_HELD_H
 #define PLR_SESSION_HELD_H
@@ -16,26 +14,14 @@
 
 /* --- steps --- */
 
-void plr_held_init(plr_held_steps *held);
-
-bool plr_held_full(const plr_held_steps *held);
-
-/* Inserts a step in the order of time. False, and nothing changes, if there is one of its time: it
- * came twice. The ring may not be full. */
+/* Inserts a step in the order of time; there must be room. False: one of its time is there. */
 bool plr_held_insert(plr_held_steps *held, const plr_held_step *step);
 
-/* True if this step's time lies more than max_gap_ns before the newest one's: then order means
- * nothing any more, and what is held is due. False for an empty ring. */
-bool plr_held_contradicts(const plr_held_steps *held, plr_time_ns t_ns, plr_time_ns max_gap_ns);
+/* The time of the newest step; 0 if there is none. */
+plr_time_ns plr_held_newest_ns(const plr_held_steps *held);
 
-/* Removes the oldest step, *step, if it is at most at t_ns; false if there is none such. */
-bool plr_held_pop_until(plr_held_steps *held, plr_time_ns t_ns, plr_held_step *step);
-
-/* Removes the oldest step if the newest is at least delay_ns ahead of it. */
-bool plr_held_pop_due(plr_held_steps *held, plr_time_ns delay_ns, plr_held_step *step);
-
-/* Removes the oldest step; false if there is none. */
-bool plr_held_pop(plr_held_steps *held, plr_held_step *step);
+/* Removes the oldest step, *step, if it is at most at until_ns; false if there is none such. */
+bool plr_held_pop(plr_held_steps *held, plr_time_ns until_ns, plr_held_step *step);
 
 /* --- frames --- */
 
@@ -45,12 +31,12 @@ bool plr_held_has_frame(const plr_held_frames *held, plr_time_ns t_ns);
 /* Inserts a frame, with its observations, in the order of moved_ns. There must be room. */
 void plr_held_insert_frame(plr_held_frames *held, const plr_frame *frame, plr_time_ns moved_ns);
 
-/* The oldest and the newest frame; NULL if there is none. */
-const plr_held_frame *plr_held_oldest_frame(const plr_held_frames *held);
-const plr_held_frame *plr_held_newest_frame(const plr_held_frames *held);
+/* moved_ns of the newest frame; 0 if there is none. */
+plr_time_ns plr_held_newest_frame_ns(const plr_held_frames *held);
 
-/* Removes the oldest frame, which is there; it holds until the next one is inserted. */
-const plr_held_frame *plr_held_pop_frame(plr_held_frames *held);
+/* Removes the oldest frame, if its moved_ns is at most until_ns: it holds until the next one is
+ * inserted. NULL if there is none such. */
+const plr_held_frame *plr_held_pop_frame(plr_held_frames *held, plr_time_ns until_ns);
 
 /* --- readings --- */
 

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "session/plausible.h"
+#include "math/finite.h"
 
 void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capacity) {
     map->landmarks = memory;
@@ -25,7 +25,7 @@ static unsigned lower_bound(const plr_known_map *map, uint32_t id) {
 }
 
 plr_status plr_known_map_add(plr_known_map *map, const plr_landmark *landmark) {
-    if (!plr_plausible_finite(landmark->p_W_m, 3) || !plr_plausible_finite(landmark->P_W_m2, 9))
+    if (!plr_all_finite(landmark->p_W_m, 3) || !plr_all_finite(landmark->P_W_m2, 9))
         return PLR_E_NOT_FINITE;
     const unsigned at = lower_bound(map, landmark->id);
     if (at < map->count && map->landmarks[at].id == landmark->id)

@@ -7,8 +7,7 @@
 
 void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capacity);
 
-/* Adds a landmark; bounded by the map's capacity. PLR_E_NOT_FINITE position or covariance;
- * PLR_E_EXISTS a landmark of this id; PLR_E_FULL. */
+/* Adds a landmark. PLR_E_NOT_FINITE; PLR_E_EXISTS a landmark of this id; PLR_E_FULL. */
 plr_status plr_known_map_add(plr_known_map *map, const plr_landmark *landmark);
 
 /* plr_map.source over a plr_known_map as context: the landmark of that id, by binary search. */

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "session/layers.h"
 
-/* Settings that a HEADER suggests, by name, in the order of the fields. */
-typedef struct {
-    const char *name;
-    double value;
-} plr_suggestion;
-
 static void suggest(plr_config *config, const char *name, double value) {
     if (value >= 0)
         (void)plr_config_set(config, plr_setting_by_name(name), value);
@@ -26,7 +20,10 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
     const double v = header->bias_velocity_sigma_mps, w = header->bias_gyro_sigma_radps;
     const bool has_none = v >= 0 && w >= 0 && header->process == PLR_PROCESS_TWIST;
     const double has_bias = v > 0 || w > 0 ? 1 : has_none ? 0 : -1;
-    const plr_suggestion suggestions[] = {
+    const struct {
+        const char *name;
+        double value;
+    } suggestions[] = {
         {"twist-timing", header->twist_timing},
         {"pixel-sigma", header->pixel_sigma_px},
         {"bias-velocity-sigma", header->bias_velocity_sigma_mps},
@@ -53,8 +50,7 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
     }
 }
 
-/* PLR_E_CONFIG if a setting does not allow its value, with the first such setting in *culprit; NULL
- * if there is none of its id. */
+/* PLR_E_CONFIG if a value is not allowed; *culprit: its setting, NULL if none has its id. */
 static plr_status apply_values(plr_config *config, const plr_wire_setting *values, unsigned count,
                                const plr_setting **culprit) {
     for (unsigned i = 0; i < count; i++) {

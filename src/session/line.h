@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* Builds one line of text in the fixed buffer of a TEXT message, without stdio. A text that is too
- * long is cut after a whole character. */
+/* Builds the line of a TEXT, without stdio; if too long it is cut after a whole character. */
 #ifndef PLR_SESSION_LINE_H
 #define PLR_SESSION_LINE_H
 
@@ -14,8 +13,7 @@ void plr_line_text(plr_text *line, const char *added);
 /* Adds a text, then a whole number. */
 void plr_line_count(plr_text *line, const char *before, uint64_t number);
 
-/* Adds a number as printf's %g would: at most six significant digits, with an exponent outside 1e-4
- * to 1e6. */
+/* Adds a number as %g would: six significant digits, with an exponent outside 1e-4 to 1e6. */
 void plr_line_number(plr_text *line, double number);
 
 /* Adds seconds with three decimals: "12.345 s". */

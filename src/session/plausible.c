@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/plausible.h"
 
+#include "math/finite.h"
+
 /* The greatest value of each limit. */
 #define GROUP(name, type, what)
 #define BOUND(group, type, member, count, limit)
@@ -21,17 +23,15 @@ static const double limits[LIMITS] = {
 #undef BOUND
 #undef BOUND_IF
 #define LIMIT(name, most, what, unit)
-#define BOUND(group_, type, member, count_, limit_)                                                \
+#define BOUND_AT(group_, type, member, count_, limit_, given_)                                     \
     {.offset = offsetof(type, member),                                                             \
+     .given = (given_),                                                                            \
      .group = PLR_GROUP_##group_,                                                                  \
      .count = (count_),                                                                            \
      .limit = AT_##limit_},
-#define BOUND_IF(group_, type, member, count_, limit_, flag)                                       \
-    {.offset = offsetof(type, member),                                                             \
-     .given = offsetof(type, flag),                                                                \
-     .group = PLR_GROUP_##group_,                                                                  \
-     .count = (count_),                                                                            \
-     .limit = AT_##limit_},
+#define BOUND(group, type, member, count, limit) BOUND_AT(group, type, member, count, limit, 0)
+#define BOUND_IF(group, type, member, count, limit, flag)                                          \
+    BOUND_AT(group, type, member, count, limit, offsetof(type, flag))
 static const struct {
     uint16_t offset;
     uint16_t given; /* a bool; 0: in any case, since none is the first member */
@@ -40,19 +40,9 @@ static const struct {
 #include "session/limits.def"
 };
 
-static bool is_finite(double x) {
-    return x - x == 0;
-}
-
-bool plr_plausible_finite(const double *x, unsigned n) {
-    while (n > 0 && is_finite(x[n - 1]))
-        n--;
-    return n == 0;
-}
-
 static bool all_within(const double *x, unsigned n, double limit) {
     for (unsigned i = 0; i < n; i++)
-        if (is_finite(x[i]) && (x[i] > limit || x[i] < -limit))
+        if (plr_all_finite(&x[i], 1) && (x[i] > limit || x[i] < -limit))
             return false;
     return true;
 }
@@ -72,16 +62,9 @@ bool plr_plausible(plr_group group, const void *object) {
 }
 
 bool plr_plausible_message(const plr_message *message) {
-    switch (message->kind) {
-    case PLR_KIND_TWIST:
-        return plr_plausible(PLR_GROUP_TWIST, &message->as);
-    case PLR_KIND_START:
-        return plr_plausible(PLR_GROUP_START, &message->as);
-    case PLR_KIND_LANDMARK:
-        return plr_plausible(PLR_GROUP_LANDMARK, &message->as);
-    case PLR_KIND_READING:
-        return plr_plausible(PLR_GROUP_READING, &message->as);
-    default:
-        return true;
-    }
+    static const uint8_t groups[PLR_WIRE_KINDS + 1] = {[PLR_KIND_TWIST] = PLR_GROUP_TWIST,
+                                                       [PLR_KIND_START] = PLR_GROUP_START,
+                                                       [PLR_KIND_LANDMARK] = PLR_GROUP_LANDMARK,
+                                                       [PLR_KIND_READING] = PLR_GROUP_READING};
+    return plr_plausible((plr_group)groups[message->kind], &message->as);
 }

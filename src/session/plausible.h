@@ -11,8 +11,8 @@
 #define BOUND(group, type, member, count, limit)
 #define BOUND_IF(group, type, member, count, limit, flag)
 typedef enum plr_group {
+    PLR_GROUP_NONE, /* nothing */
 #include "session/limits.def"
-    PLR_GROUPS
 } plr_group;
 #undef LIMIT
 #undef GROUP
@@ -24,8 +24,5 @@ bool plr_plausible(plr_group group, const void *object);
 
 /* The same of a message as a whole: TWIST, START, LANDMARK, READING. Of other kinds true. */
 bool plr_plausible_message(const plr_message *message);
-
-/* True if all n numbers are finite. */
-bool plr_plausible_finite(const double *x, unsigned n);
 
 #endif

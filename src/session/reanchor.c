@@ -12,11 +12,6 @@
 /* A body with an IMU may turn like this at any time, rad/s. */
 #define USUAL_RATE 1.0
 
-void plr_clock_watch_init(plr_clock_watch *watch) {
-    watch->agreeing = 0;
-    watch->last_ns = 0;
-}
-
 static plr_time_ns distance_ns(plr_time_ns a, plr_time_ns b) {
     return a > b ? a - b : b - a;
 }
@@ -106,12 +101,6 @@ static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_send_text(s);
 }
 
-/* The last pose, and what is known of it after so many seconds. */
-static plr_status last_pose(const plr_filter *f, double seconds, plr_pose *pose, double P[36]) {
-    const plr_status status = plr_filter_pose(f, pose);
-    return status == PLR_OK ? widen(P, f, seconds) : status;
-}
-
 static plr_status set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *pose, double P[36]) {
     const plr_status status = plr_filter_set_pose(f, t_ns, pose, P);
     if (status != PLR_E_ARGUMENT)
@@ -120,50 +109,47 @@ static plr_status set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *pose
     return plr_filter_set_pose(f, t_ns, pose, P);
 }
 
-static plr_status carry_pose(plr_filter *f, plr_time_ns t_ns, double seconds) {
-    plr_pose pose;
-    double P[36];
-    const plr_status status = last_pose(f, seconds, &pose, P);
-    return status == PLR_OK ? set_pose(f, t_ns, &pose, P) : status;
-}
-
-/* With an IMU tilt and velocity are lost too: the filter starts anew, with the last place and heading,
- * and with the biases that it knows. A controller sees the jump in reset_count. */
-static plr_status start_anew(plr_session *s, plr_time_ns t_ns, double seconds) {
-    plr_filter *f = &s->filter;
-    const uint32_t resets = plr_send_resets(s);
-    double P[36], bias[6], P_b[36], variance[6];
-    plr_pose pose;
-    plr_status status = last_pose(f, seconds, &pose, P);
-    if (status == PLR_OK)
-        status = plr_filter_bias(f, bias, P_b);
+/* As after init, but for the biases. */
+static plr_status start_anew(plr_filter *f) {
+    double bias[6], P_b[36], variance[6];
+    plr_status status = plr_filter_bias(f, bias, P_b);
     if (status == PLR_OK)
         status = plr_filter_reset(f);
     if (status != PLR_OK)
         return status;
     for (unsigned i = 0; i < 6; i++)
         variance[i] = P_b[7 * i];
-    (void)plr_filter_set_bias(f, bias,
-                              variance); /* those of a filter that diverged are not taken */
-    status = set_pose(f, t_ns, &pose, P);
-    plr_send_resets_become(s, resets + 1);
+    (void)plr_filter_set_bias(f, bias, variance); /* not those of a filter that diverged */
+    return PLR_OK;
+}
+
+/* With an IMU tilt and velocity are lost too: the filter starts anew, with the last place and
+ * heading, and with the biases that it knows. A controller sees the jump in reset_count. */
+static plr_status carry_pose(plr_session *s, plr_time_ns t_ns, double seconds) {
+    plr_filter *f = &s->filter;
+    const bool inertial = plr_filter_config(f)->process == PLR_PROCESS_IMU;
+    const uint32_t resets = plr_send_resets(s);
+    plr_pose pose;
+    double P[36];
+    plr_status status = plr_filter_pose(f, &pose);
+    if (status == PLR_OK)
+        status = widen(P, f, seconds);
+    if (status == PLR_OK && inertial)
+        status = start_anew(f);
+    if (status == PLR_OK)
+        status = set_pose(f, t_ns, &pose, P);
+    if (status == PLR_OK && inertial)
+        plr_send_resets_become(s, resets + 1);
     return status;
 }
 
 static plr_status reanchor(plr_session *s, plr_time_ns t_ns) {
     plr_filter *f = &s->filter;
     const plr_time_ns from_ns = plr_filter_time(f);
-    const double seconds = (double)distance_ns(from_ns, t_ns) * 1e-9;
-
     (void)plr_filter_flush_map(f); /* the session's sink accepts all */
-    const plr_config *config = plr_filter_config(f);
-    plr_status status;
-    if (config->mode == PLR_MODE_MAPPING)
-        status = plr_filter_reset(f);
-    else if (config->process == PLR_PROCESS_IMU)
-        status = start_anew(s, t_ns, seconds);
-    else
-        status = carry_pose(f, t_ns, seconds);
+    const plr_status status = plr_filter_config(f)->mode == PLR_MODE_MAPPING
+                                  ? plr_filter_reset(f)
+                                  : carry_pose(s, t_ns, (double)distance_ns(from_ns, t_ns) * 1e-9);
     if (status == PLR_OK) {
         s->totals.reanchored++;
         report(s, from_ns, t_ns);
@@ -173,6 +159,10 @@ static plr_status reanchor(plr_session *s, plr_time_ns t_ns) {
 
 plr_time_ns plr_clock_max_gap_ns(const plr_session *s) {
     return (plr_time_ns)(plr_filter_config(&s->filter)->max_gap_s * 1e9 + 0.5);
+}
+
+bool plr_clock_was_set_back(const plr_session *s, plr_time_ns newest_ns, plr_time_ns t_ns) {
+    return t_ns < newest_ns && newest_ns - t_ns > plr_clock_max_gap_ns(s);
 }
 
 bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status) {

@@ -7,30 +7,24 @@
  * sender that started anew) everything would be refused for ever. The rule:
  *
  * - A message is out of reach if its time is further than max-gap from the estimate's, ahead or
- *   behind, and the filter refused it for that. (What is behind by less needs no help: the clock
- *   catches up within max-gap.)
- * - Two successive messages out of reach agree if the second is later than the first by at most
- *   max-gap. Equal times are one message received twice: they count once.
- * - After PLR_SESSION_AGREEING of them that agree, with none accepted in between, the new time is
- *   believed. The session hands the landmarks to the map, sets the pose at the new time to the
- *   last one, and widens its covariance: how far the body went meanwhile is not known. To each
- *   variance of rho is added ((v + sigma_v) gap)^2, where v is the sum of the last velocity's
- *   absolute components (never less than its norm), at most (1 km)^2; to each of theta
- *   ((w + sigma_w) gap)^2, at most pi^2 / 3, the variance of an angle of which nothing is known.
- *   The gap is the whole jump: how much of it is the clock's alone the session cannot know.
+ *   behind, and the filter refused it for that. Of a batch of readings only the first counts.
+ * - Two successive ones agree if the second is later than the first by at most max-gap. Equal times
+ *   are one message received twice: they count once.
+ * - After PLR_SESSION_AGREEING that agree, with none accepted in between, the new time is believed.
+ *   The session hands the landmarks to the map, sets the pose at the new time to the last one, and
+ *   widens its covariance: by ((v + sigma_v) gap)^2 in each variance of rho, v the sum of the last
+ *   velocity's absolute components, at most (1 km)^2; by ((w + sigma_w) gap)^2 in each of theta, at
+ *   most pi^2 / 3, an angle of which nothing is known. The gap is the whole jump: how much of it is
+ *   the clock's alone nobody knows. In mapping, where every pose comes as a TRUTH, the filter just
+ *   begins anew. With an IMU it starts anew (setting imu-start), with the last pose and biases;
+ *   sigma_v is start-velocity-sigma then, and sigma_w 1 rad/s.
  *
- *   In mapping every pose comes as a TRUTH, so there the filter just begins anew. With an IMU it
- *   starts anew (setting imu-start), with the last pose and biases; sigma_v is start-velocity-sigma
- *   then, and sigma_w 1 rad/s. Of a batch of readings only the first counts.
- *
- * The third message is then used. The jump is counted, and a TEXT reports it.
+ * That message is then used. The jump is counted, and a TEXT reports it.
  */
 #ifndef PLR_SESSION_REANCHOR_H
 #define PLR_SESSION_REANCHOR_H
 
 #include "pelorus/session.h"
-
-void plr_clock_watch_init(plr_clock_watch *watch);
 
 /* Notes what the filter, whose estimate is at filter_ns, answered to a message of t_ns. True if the
  * new time is to be believed now. */
@@ -40,9 +34,11 @@ bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status s
 /* The setting max-gap: a time farther off is no pause, but another clock. */
 plr_time_ns plr_clock_max_gap_ns(const plr_session *s);
 
-/* After the filter answered data of time t_ns with that status: carries the estimate to t_ns, as
- * described above, if the new time is to be believed now. True if it did: the filter will accept
- * the same data. */
+/* True if t_ns lies further behind newest_ns than that: what waits in order of time is due. */
+bool plr_clock_was_set_back(const plr_session *s, plr_time_ns newest_ns, plr_time_ns t_ns);
+
+/* After the filter answered data of t_ns with that status: carries the estimate there, if the new
+ * time is to be believed now. True if it did: the filter will accept the same data. */
 bool plr_reanchor_follow(plr_session *s, plr_time_ns t_ns, plr_status status);
 
 #endif

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "math/finite.h"
 #include "pelorus/state_store.h"
 #include "session/line.h"
 #include "session/phase.h"
@@ -88,37 +89,30 @@ void plr_saving_save(plr_session *s, plr_time_ns t_ns) {
 /* ---------------------------------------------------------------- restore */
 
 static plr_status check_moved(const plr_state_message *wanted) {
-    const double *variance = wanted->moved_variance;
-    for (unsigned i = 0; i < 6; i++) {
-        if (!(variance[i] - variance[i] == 0))
-            return PLR_E_NOT_FINITE;
-        if (variance[i] < 0)
+    if (!plr_all_finite(wanted->moved_variance, 6))
+        return PLR_E_NOT_FINITE;
+    for (unsigned i = 0; i < 6; i++)
+        if (wanted->moved_variance[i] < 0)
             return PLR_E_ARGUMENT;
-    }
     return plr_plausible(PLR_GROUP_RESTORE, wanted) ? PLR_OK : PLR_E_RANGE;
-}
-
-/* True if t_ns is later than the estimate by at most max-gap. */
-static bool follows(const plr_filter *f, plr_time_ns t_ns) {
-    const double max_gap_ns = plr_filter_config(f)->max_gap_s * 1e9;
-    return t_ns >= plr_filter_time(f) && (double)(t_ns - plr_filter_time(f)) <= max_gap_ns;
 }
 
 /* Sets the clock to t_ns, and allows for what may have moved. Where nothing lies between, the last
  * reading still applies, and the next bits are those of a drive that was never interrupted. */
-static plr_status go_on(plr_filter *f, plr_time_ns t_ns, const double variance[6]) {
+static plr_status go_on(plr_session *s, plr_time_ns t_ns, const double variance[6]) {
+    const plr_time_ns saved_ns = plr_filter_time(&s->filter);
     double P[36] = {0};
     bool moved = false;
     for (unsigned i = 0; i < 6; i++) {
         P[7 * i] = variance[i];
         moved = moved || variance[i] > 0;
     }
-    if (!moved && follows(f, t_ns))
+    if (!moved && t_ns >= saved_ns && t_ns - saved_ns <= plr_clock_max_gap_ns(s))
         return PLR_OK;
-    return plr_filter_resume(f, t_ns, moved ? P : NULL);
+    return plr_filter_resume(&s->filter, t_ns, moved ? P : NULL);
 }
 
-/* What STATE asks for, or PLR_START_SAVED; without an error, *of_ns is the time of the saved state. */
+/* What STATE asks for, or PLR_START_SAVED; *of_ns, if all is well, is the saved state's time. */
 static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_variance[6],
                        plr_stored_state *stored, plr_time_ns *of_ns) {
     if (s->options.store == NULL)
@@ -127,7 +121,7 @@ static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_vari
     if (status != PLR_OK)
         return status;
     *of_ns = plr_filter_time(&s->filter);
-    status = go_on(&s->filter, t_ns, moved_variance);
+    status = go_on(s, t_ns, moved_variance);
     if (status != PLR_OK)
         (void)plr_filter_reset(&s->filter);
     return status;
@@ -138,7 +132,7 @@ static void start_from_state(plr_session *s, plr_phase_event event) {
     plr_send_resets_become(s, 0);
     s->start_pending = false;
     plr_phase_change(&s->phase, event);
-    plr_clock_watch_init(&s->watch);
+    s->watch.agreeing = 0;
     memset(&s->last, 0, sizeof s->last);
     s->last.t_ns = UINT64_MAX; /* no frame of this session: the next one is not its double */
 }

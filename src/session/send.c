@@ -152,11 +152,9 @@ void plr_send_words(plr_session *s, plr_severity severity, const char *words) {
 
 void plr_send_describe_end(const plr_session *s, plr_end *end) {
     const plr_session_totals *got = &s->totals;
-    const plr_end *told = &s->in.as.end;
+    const uint32_t *sent = s->in.as.end.sent;
     const uint32_t arrived[PLR_COUNTED] = {got->twists,    got->stereos,  got->truths,
                                            got->landmarks, got->readings, got->imus};
-    const uint32_t sent[PLR_COUNTED] = {told->twists,    told->stereos,  told->truths,
-                                        told->landmarks, told->readings, told->imus};
     memset(end, 0, sizeof *end);
     for (unsigned i = 0; i < PLR_COUNTED && s->in.kind == PLR_KIND_END; i++)
         if (arrived[i] != sent[i]) {

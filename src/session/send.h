@@ -13,8 +13,7 @@ void plr_send_echo(plr_session *s);
 /* Sends the settings in use, and the build. */
 void plr_send_config(plr_session *s);
 
-/* Sends the estimate at the filter's time. Returns it, valid until the next plr_send_*, or NULL if
- * there is none. */
+/* Sends the estimate. Returns it, valid until the next plr_send_*, or NULL if there is none. */
 const plr_pose_message *plr_send_pose(plr_session *s, bool after_update);
 
 /* reset_count of POSE, before it is cut to 16 bits; and to make it another number. */
@@ -24,18 +23,15 @@ void plr_send_resets_become(plr_session *s, uint32_t number);
 /* Sends the report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
 
-/* Sends the REPORT that answers a message other than a STEREO; its health is that of the last frame.
- * `notice` says what a successful STATE has done. */
+/* Answers a message other than a STEREO: a REPORT with the last frame's health, and the notice. */
 void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                      plr_notice notice);
 
-/* Counts a refused message, calls the observer, and sends a REPORT. `culprit` is the setting to
- * change, or NULL. */
+/* Counts a refusal, tells the observer, sends a REPORT. culprit: the setting to change, or NULL. */
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                       const plr_setting *culprit);
 
-/* Sends a landmark that the filter computed, or a known one of options.map. The latter makes a flight
- * log complete: it can be replayed without the map. */
+/* Sends a landmark: a computed one, or one of options.map, so that a log is complete without it. */
 void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark);
 
 /* Sends the text in s->out.as.text, which was built with session/line.h. */
@@ -44,8 +40,7 @@ void plr_send_text(plr_session *s);
 /* Sends one whole text. */
 void plr_send_words(plr_session *s, plr_severity severity, const char *words);
 
-/* Fills in `differs` and `arrived`: the kinds of which another number of messages arrived in this
- * drive than the END that was just received says. */
+/* Fills in `differs` and `arrived`: where what came and what the last END says are not the same. */
 void plr_send_describe_end(const plr_session *s, plr_end *end);
 
 void plr_send_end(plr_session *s);

@@ -3,10 +3,13 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
+#include "record/messages.h"
 #include "session/data.h"
-#include "session/input.h"
 #include "session/layers.h"
+#include "session/line.h"
 #include "session/phase.h"
+#include "session/plausible.h"
 #include "session/saving.h"
 #include "session/send.h"
 #include "session/start.h"
@@ -17,11 +20,6 @@ void plr_session_options_default(plr_session_options *options) {
     options->start = PLR_START_AUTO;
     options->output = PLR_OUTPUT_CONFIG | PLR_OUTPUT_POSE | PLR_OUTPUT_REPORT |
                       PLR_OUTPUT_LANDMARK | PLR_OUTPUT_TEXT | PLR_OUTPUT_END;
-}
-
-static int write_to_port(void *context, const uint8_t *bytes, size_t n) {
-    plr_session *s = context;
-    return s->port.write(s->port.context, bytes, n);
 }
 
 plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
@@ -44,13 +42,184 @@ plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
     plr_start_clear(s); /* and the phase is PLR_PHASE_WAITING, which is 0 */
     plr_status status =
         plr_reader_init(&s->reader, s->body, sizeof s->body, s->observations, PLR_MAX_OBSERVATIONS);
-    if (status == PLR_OK)
-        status = plr_writer_init(&s->writer, write_to_port, s);
+    if (status == PLR_OK && port->write != NULL)
+        status = plr_writer_init(&s->writer, port->write, port->context);
     return status;
 }
 
-/* A run of frames that are skipped for the same reason is answered once: noise would otherwise be
- * answered with more bytes than it has. */
+/* --- END --- */
+
+/* END says how many there were: ", 10 of 12 TWIST" if 10 arrived. */
+static void compare_counts(plr_session *s) {
+    static const char *const names[PLR_COUNTED] = {" TWIST",    " STEREO",  " TRUTH",
+                                                   " LANDMARK", " READING", " IMU"};
+    plr_end answer;
+    plr_text *line = &s->out.as.text;
+    plr_send_describe_end(s, &answer);
+    plr_line_begin(line, PLR_SEVERITY_WARNING);
+    plr_line_text(line, "the recording is not complete: not everything arrived");
+    for (unsigned i = 0; i < PLR_COUNTED; i++)
+        if (answer.differs >> i & 1) {
+            plr_line_count(line, ", ", answer.arrived[i]);
+            plr_line_count(line, " of ", s->in.as.end.sent[i]);
+            plr_line_text(line, names[i]);
+        }
+    if (answer.differs != 0)
+        plr_send_text(s);
+}
+
+/* --- the table --- */
+
+/* What happens to a message. All but those of IGNORE are echoed, into a flight log. */
+typedef enum plr_rule {
+    IGNORE = 0, /* nothing */
+    ECHO,       /* no more than that */
+    EARLY,      /* refused: PLR_E_NOT_READY */
+    LATE,       /* refused: PLR_E_MODE */
+    SAME,       /* refused: PLR_E_MODE; ignored if it says what is in force already */
+    NEW,        /* used; ignored if it says what is in force already */
+    FIRST,      /* leads to another phase, whose rule then applies */
+    KEEP,       /* kept until its time comes */
+    USE         /* used */
+} plr_rule;
+
+static void save(plr_session *s) {
+    plr_saving_save(s, s->in.as.state.t_ns);
+}
+
+enum { RESTORE = PLR_WIRE_KINDS + 1, ROWS };
+
+/* docs/REPLAY-FORMAT.md shows it too. What other filters computed (POSE, REPORT, LANDMARK of
+ * another role) is ignored everywhere: row PLR_KIND_NONE. */
+/* clang-format off */
+static const struct {
+    uint8_t rules[PLR_PHASES];
+    void (*use)(plr_session *s);
+} table[ROWS] = {
+    /*                      WAITING READY  REJECTED STARTING RESTORED RUNNING */
+    [PLR_KIND_HEADER]   = {{USE,    NEW,   NEW,     SAME,    SAME,    SAME}, plr_start_begin},
+    [PLR_KIND_CONFIG]   = {{EARLY,  USE,   USE,     SAME,    SAME,    SAME}, plr_start_change_settings},
+    [PLR_KIND_LANDMARK] = {{EARLY,  USE,   USE,     USE,     USE,     USE},  plr_start_add_landmark},
+    [PLR_KIND_START]    = {{EARLY,  KEEP,  KEEP,    KEEP,    ECHO,    USE},  plr_data_use_start},
+    [RESTORE]           = {{EARLY,  USE,   USE,     LATE,    USE,     LATE}, plr_saving_restore},
+    [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_twist},
+    [PLR_KIND_IMU]      = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_imu},
+    [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_stereo},
+    [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_data_use_truth},
+    [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_reading},
+    [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
+    [PLR_KIND_TEXT]     = {{ECHO,   ECHO,  ECHO,    ECHO,    ECHO,    ECHO}, NULL},
+    [PLR_KIND_END]      = {{USE,    USE,   USE,     USE,     USE,     USE},  compare_counts},
+};
+/* clang-format on */
+
+static unsigned row_of(const plr_message *in) {
+    if (in->kind == PLR_KIND_STATE && in->as.state.action == PLR_STATE_RESTORE)
+        return RESTORE;
+    const bool computed =
+        in->kind == PLR_KIND_LANDMARK && in->as.landmark.role != PLR_LANDMARK_KNOWN;
+    return computed ? PLR_KIND_NONE : in->kind;
+}
+
+/* --- each message --- */
+
+/* A flight log contains one, a recording does not. */
+static bool is_in_force(const plr_message *in) {
+    return in->kind == PLR_KIND_CONFIG && in->as.config.build_fingerprint != 0;
+}
+
+static void count(plr_session *s) {
+    s->totals.twists += s->in.kind == PLR_KIND_TWIST;
+    s->totals.stereos += s->in.kind == PLR_KIND_STEREO;
+    s->totals.truths += s->in.kind == PLR_KIND_TRUTH;
+    s->totals.landmarks += s->in.kind == PLR_KIND_LANDMARK;
+    s->totals.readings += s->in.kind == PLR_KIND_READING;
+    s->totals.imus += s->in.kind == PLR_KIND_IMU;
+    s->totals.imu_readings += s->in.kind == PLR_KIND_IMU ? s->in.as.imu.count : 0;
+    s->is_log = s->is_log || is_in_force(&s->in);
+}
+
+/* What this session says itself is not echoed: CONFIG in force, END, a log's TEXT. A restore that
+ * is used is echoed later. */
+static void echo(plr_session *s, unsigned row, plr_rule rule) {
+    const bool own = is_in_force(&s->in) || row == PLR_KIND_END ||
+                     (row == PLR_KIND_TEXT && s->is_log) || (row == RESTORE && rule == USE);
+    if (!own)
+        plr_send_echo(s);
+    if (row == PLR_KIND_TRUTH && s->options.observer.truth != NULL)
+        s->options.observer.truth(s->options.observer.context, &s->in.as.truth);
+}
+
+/* What is wrong with a message, if anything. A save without storage and a landmark that is none are
+ * refused for that wherever they come. */
+static plr_status check(const plr_session *s, unsigned row, plr_rule rule) {
+    const plr_status plausible = plr_plausible_message(&s->in) ? PLR_OK : PLR_E_RANGE;
+    if (rule == LATE || (rule == SAME && !plr_start_in_force(s)))
+        return PLR_E_MODE;
+    if (rule != EARLY)
+        return plausible;
+    if (row == PLR_KIND_STATE && s->options.store == NULL)
+        return PLR_E_MODE;
+    return row == PLR_KIND_LANDMARK && plausible != PLR_OK ? plausible : PLR_E_NOT_READY;
+}
+
+static void refuse(plr_session *s, plr_status status) {
+    const plr_message *in = &s->in;
+    if (in->kind == PLR_KIND_STEREO)
+        plr_data_refuse_frame(s, &in->as.stereo, status);
+    else if (in->kind == PLR_KIND_STATE)
+        plr_saving_refuse(s, (plr_state_action)in->as.state.action, plr_message_time(in), status);
+    else
+        plr_send_refusal(s, in->kind, plr_message_time(in), status, NULL);
+}
+
+/* The first data after a HEADER starts the filter. */
+static void start(plr_session *s) {
+    if (plr_start_filter(s) != PLR_OK)
+        return;
+    plr_phase_change(&s->phase, PLR_EVENT_FILTER);
+    plr_start_announce(s);
+    plr_start_set_bias(s);
+    if (s->options.start == PLR_START_SAVED)
+        plr_saving_restore_at_start(s, plr_message_time(&s->in));
+    if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
+        s->start_pending = false; /* every pose comes as a TRUTH there */
+        plr_phase_change(&s->phase, PLR_EVENT_POSE);
+    }
+}
+
+static void handle(plr_session *s) {
+    const unsigned row = row_of(&s->in);
+    count(s);
+    if (table[row].rules[s->phase] == FIRST) {
+        plr_phase_change(&s->phase, PLR_EVENT_DATA);
+        if (s->phase == PLR_PHASE_READY)
+            start(s);
+    }
+    const plr_time_ns t_ns = plr_message_time(&s->in);
+    if ((row == PLR_KIND_START || row == PLR_KIND_TRUTH) && s->phase == PLR_PHASE_STARTING &&
+        t_ns > 0)
+        plr_data_use_waiting(s, t_ns - 1); /* it may set the start pose: older frames come before */
+    const plr_rule rule = (plr_rule)table[row].rules[s->phase];
+    PLR_ASSERT(rule != FIRST);
+    if (rule == IGNORE)
+        return;
+    if (row == PLR_KIND_STEREO)
+        plr_data_limit_frame(s);
+    echo(s, row, rule);
+    const plr_status status = check(s, row, rule);
+    if (status != PLR_OK)
+        refuse(s, status);
+    else if (rule == USE || (rule == NEW && !plr_start_in_force(s)))
+        table[row].use(s);
+    else if (rule == KEEP)
+        plr_start_keep(s);
+    plr_data_use_waiting(s, s->order.newest_ns); /* to whose time the steps have come */
+}
+
+/* --- the loop --- */
+
+/* Frames skipped one after the other for the same reason are answered once: noise has few bytes. */
 static void answer_skip(plr_session *s) {
     static const plr_status statuses[] = {
         [PLR_SKIP_NONE] = PLR_OK,           [PLR_SKIP_DAMAGED] = PLR_E_CORRUPT,
@@ -82,7 +251,7 @@ static plr_step feed_reader(plr_session *s) {
     switch (event) {
     case PLR_READ_MESSAGE:
         s->last_skip = PLR_SKIP_NONE;
-        plr_input_handle(s);
+        handle(s);
         if (s->in.kind != PLR_KIND_END)
             return PLR_STEP_MESSAGE;
         plr_session_finish(s);
@@ -122,7 +291,7 @@ plr_step plr_session_step(plr_session *s) {
 void plr_session_finish(plr_session *s) {
     if (s->phase >= PLR_PHASE_STARTING) {
         plr_landmark landmark;
-        plr_data_use_waiting(s);
+        plr_data_use_waiting(s, UINT64_MAX);
         plr_steps_apply_held(s, UINT64_MAX);
         if ((s->options.output & PLR_OUTPUT_STATE) != 0)
             plr_saving_save(s, plr_filter_time(&s->filter));

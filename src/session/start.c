@@ -5,7 +5,6 @@
 
 #include "pelorus/assertions.h"
 #include "session/budget.h"
-#include "session/held.h"
 #include "session/known_map.h"
 #include "session/layers.h"
 #include "session/line.h"
@@ -26,43 +25,24 @@ void plr_start_clear(plr_session *s) {
     s->predict_ns = 0;
     s->imu_status = PLR_OK;
     s->imu_faults = 0;
-    plr_held_init(&s->held);
+    s->held.count = s->held_frames.count = 0;
     s->held_readings.count = 0;
-    s->held_frames.count = 0;
     memset(&s->order, 0, sizeof s->order);
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)
         (void)plr_known_map_add(&s->known, &s->options.map[i]); /* plr_session_init has checked */
-    plr_clock_watch_init(&s->watch);
+    s->watch.agreeing = 0;
     plr_budget_init(&s->budget, s->options.deadline_us);
 }
 
 /* --- HEADER, CONFIG, START, LANDMARK --- */
 
-static bool same_axes(const double a[3], const double b[3]) {
-    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
-}
-
-static bool same_imu(const plr_header *a, const plr_header *b) {
-    return a->process == b->process && a->gyro_noise == b->gyro_noise &&
-           a->accel_noise == b->accel_noise && a->gyro_walk == b->gyro_walk &&
-           a->accel_walk == b->accel_walk && a->bias_accel_sigma_mps2 == b->bias_accel_sigma_mps2 &&
-           a->gravity_mps2 == b->gravity_mps2;
-}
-
-/* Everything that an estimate depends on; the name and the image size are not that. */
+/* Everything that an estimate depends on; the name and the image size are not that. From the
+ * calibration to the name there are doubles alone. */
 static bool same_header(const plr_header *a, const plr_header *b) {
-    return memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
-           a->body_axes == b->body_axes && a->twist_timing == b->twist_timing &&
-           a->pixel_sigma_px == b->pixel_sigma_px &&
-           a->velocity_sigma_mps == b->velocity_sigma_mps &&
-           a->gyro_sigma_radps == b->gyro_sigma_radps &&
-           same_axes(a->velocity_sigma_axes_mps, b->velocity_sigma_axes_mps) &&
-           same_axes(a->gyro_sigma_axes_radps, b->gyro_sigma_axes_radps) &&
-           a->bias_velocity_sigma_mps == b->bias_velocity_sigma_mps &&
-           a->bias_gyro_sigma_radps == b->bias_gyro_sigma_radps &&
-           a->bias_velocity_walk == b->bias_velocity_walk &&
-           a->bias_gyro_walk == b->bias_gyro_walk && same_imu(a, b);
+    enum { BEGIN = offsetof(plr_header, calibration), END = offsetof(plr_header, name) };
+    return a->body_axes == b->body_axes && a->twist_timing == b->twist_timing &&
+           a->process == b->process && memcmp(&a->calibration, &b->calibration, END - BEGIN) == 0;
 }
 
 bool plr_start_in_force(const plr_session *s) {
@@ -130,8 +110,7 @@ void plr_start_add_landmark(plr_session *s) {
 
 /* --- the filter --- */
 
-/* plr_map.sink: always accepts. A cut link must not fill the state with landmarks that nobody wants;
- * what the port refuses is counted in totals.not_sent. */
+/* plr_map.sink: always accepts, or a cut link would fill the state; not_sent counts the lost. */
 static int send_evicted(void *context, const plr_landmark *landmark) {
     plr_send_landmark(context, PLR_LANDMARK_EVICTED, landmark);
     return 0;
@@ -198,23 +177,24 @@ void plr_start_announce(plr_session *s) {
 void plr_start_set_bias(plr_session *s) {
     if (!s->start.has_bias || plr_filter_config(&s->filter)->bias == 0)
         return;
-    plr_status status = PLR_E_RANGE;
-    if (plr_plausible(PLR_GROUP_BIAS, &s->start))
-        status = plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance);
+    const plr_status status =
+        plr_plausible(PLR_GROUP_BIAS, &s->start)
+            ? plr_filter_set_bias(&s->filter, s->start.bias, s->start.bias_variance)
+            : PLR_E_RANGE;
     if (status != PLR_OK)
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, status, NULL);
 }
 
 plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns,
                               const plr_pose *T_WB, const double *P_xi) {
-    plr_status status = PLR_E_RANGE;
-    if (plr_plausible(PLR_GROUP_POSE, T_WB))
-        status = plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi);
+    const plr_status status = plr_plausible(PLR_GROUP_POSE, T_WB)
+                                  ? plr_filter_set_pose(&s->filter, t_ns, T_WB, P_xi)
+                                  : PLR_E_RANGE;
     if (status != PLR_OK) {
         plr_send_refusal(s, subject, t_ns, status, NULL);
         return status;
     }
-    plr_clock_watch_init(&s->watch);
+    s->watch.agreeing = 0;
     if (s->phase == PLR_PHASE_STARTING)
         plr_send_resets_become(s, 0);
     plr_phase_change(&s->phase, PLR_EVENT_POSE);

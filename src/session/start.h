@@ -14,8 +14,7 @@ bool plr_start_in_force(const plr_session *s);
 /* Begins a drive with the HEADER s->in. */
 void plr_start_begin(plr_session *s);
 
-/* Adds the settings of the CONFIG s->in, before the data. A value that its setting does not allow is
- * refused; the others are used. */
+/* Adds the settings of the CONFIG s->in, before the data, but for values that are not allowed. */
 void plr_start_change_settings(plr_session *s);
 
 /* Stores the START s->in until its time has come, if the options use one. */
@@ -24,12 +23,10 @@ void plr_start_keep(plr_session *s);
 /* Adds the known LANDMARK s->in to the map. */
 void plr_start_add_landmark(plr_session *s);
 
-/* In PLR_PHASE_READY: determines the settings and initialises the filter. On an error a refusal has
- * been sent, and the phase is PLR_PHASE_REJECTED. */
+/* In PLR_PHASE_READY: initialises the filter. An error is sent, and leads to PLR_PHASE_REJECTED. */
 plr_status plr_start_filter(plr_session *s);
 
-/* Before the filter uses the first data: sends the CONFIG in use, the known landmarks of the option
- * `map`, and warnings. */
+/* Before the first data: sends the CONFIG in use, landmarks of the option `map`, and warnings. */
 void plr_start_announce(plr_session *s);
 
 /* Sets the bias prior of a START, if there is one; also if the pose starts from something else. */
@@ -46,8 +43,8 @@ void plr_start_apply(plr_session *s);
 /* Call before data of time t_ns: applies the stored START if its time has come. */
 void plr_start_apply_until(plr_session *s, plr_time_ns t_ns);
 
-/* Call before a frame of time t_ns: the same; without a START the pose starts where the options say.
- * If they need a START or TRUTH that has not arrived, the phase stays PLR_PHASE_STARTING. */
+/* Call before a frame of time t_ns: the same; without a START the pose starts where the options
+ * say. If they need a START or TRUTH that has not arrived, the phase stays PLR_PHASE_STARTING. */
 void plr_start_choose(plr_session *s, plr_time_ns t_ns);
 
 #endif

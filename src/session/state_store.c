@@ -152,15 +152,12 @@ typedef struct plr_store_view {
     int newest; /* slot, or -1 */
 } plr_store_view;
 
-static bool is_whole(plr_status status) {
-    return status == PLR_OK || status == PLR_E_FOREIGN;
-}
-
 static void look_around(plr_state_store *store, plr_store_view *view) {
     view->newest = -1;
     for (int slot = 0; slot < PLR_STORE_SLOTS; slot++) {
-        view->status[slot] = look_into(store, (unsigned)slot, &view->header[slot]);
-        if (is_whole(view->status[slot]) &&
+        const plr_status status = look_into(store, (unsigned)slot, &view->header[slot]);
+        view->status[slot] = status;
+        if ((status == PLR_OK || status == PLR_E_FOREIGN) &&
             (view->newest < 0 ||
              view->header[slot].generation > view->header[view->newest].generation))
             view->newest = slot;

@@ -13,10 +13,6 @@ static bool is_inertial(const plr_session *s) {
     return plr_filter_config(&s->filter)->process == PLR_PROCESS_IMU;
 }
 
-static plr_kind kind_of_steps(const plr_session *s) {
-    return is_inertial(s) ? PLR_KIND_IMU : PLR_KIND_TWIST;
-}
-
 /* After an IMU message that came late its faults are not told for so long: of readings that have
  * holes nearly everything looks wrong. */
 #define LATE_NS UINT64_C(1000000000)
@@ -30,7 +26,7 @@ void plr_steps_note_used(plr_session *s, plr_time_ns t_ns) {
     order->ahead_ns = order->came && t_ns > order->newest_ns ? t_ns - order->newest_ns : 0;
 }
 
-/* True if the filter refused a step because something of later time was used before it, and no step. */
+/* True if the filter refused a step because of something later that was used before, but no step. */
 static bool is_late(const plr_session *s, plr_time_ns t_ns, plr_status status) {
     const plr_step_order *order = &s->order;
     return status == PLR_E_TIME && order->used && t_ns < order->used_ns &&
@@ -150,10 +146,14 @@ static void apply_step(plr_session *s, const plr_held_step *step) {
         (void)plr_send_pose(s, false);
 }
 
-void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
+static void apply_until(plr_session *s, plr_time_ns until_ns) {
     plr_held_step step;
-    while (plr_held_pop_until(&s->held, until_ns, &step))
+    while (plr_held_pop(&s->held, until_ns, &step))
         apply_step(s, &step);
+}
+
+void plr_steps_apply_held(plr_session *s, plr_time_ns until_ns) {
+    apply_until(s, until_ns);
     apply_readings_before(s, until_ns);
 }
 
@@ -171,16 +171,16 @@ static bool steps_wait(const plr_session *s) {
 }
 
 void plr_steps_apply_due(plr_session *s) {
-    plr_held_step due;
-    while (plr_held_pop_due(&s->held, delay_ns(s), &due))
-        apply_step(s, &due);
+    const plr_time_ns newest_ns = plr_held_newest_ns(&s->held), delay = delay_ns(s);
+    if (newest_ns >= delay)
+        apply_until(s, newest_ns - delay);
 }
 
 static void delay_step(plr_session *s, const plr_held_step *step) {
     plr_held_step due;
-    if (plr_held_contradicts(&s->held, step->t_ns, plr_clock_max_gap_ns(s)))
+    if (plr_clock_was_set_back(s, plr_held_newest_ns(&s->held), step->t_ns))
         plr_steps_apply_held(s, UINT64_MAX);
-    if (plr_held_full(&s->held) && plr_held_pop(&s->held, &due)) {
+    if (s->held.count == PLR_SESSION_HELD_TWISTS && plr_held_pop(&s->held, UINT64_MAX, &due)) {
         s->totals.held_short++;
         apply_step(s, &due);
     }
@@ -194,7 +194,7 @@ static void delay_step(plr_session *s, const plr_held_step *step) {
 static void note_time(plr_session *s, plr_time_ns t_ns) {
     plr_time_ns *newest_ns = &s->order.newest_ns;
     s->order.came = true;
-    if (t_ns > *newest_ns || *newest_ns - t_ns > plr_clock_max_gap_ns(s))
+    if (t_ns > *newest_ns || plr_clock_was_set_back(s, *newest_ns, t_ns))
         *newest_ns = t_ns;
 }
 
@@ -209,15 +209,15 @@ static void use_step(plr_session *s, const plr_held_step *step) {
 void plr_steps_use_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
     const plr_held_step step = {.t_ns = twist->t_ns, .by.twist = twist->twist, .leads = true};
-    if (kind_of_steps(s) == PLR_KIND_TWIST)
-        use_step(s, &step);
-    else
+    if (is_inertial(s))
         refuse_other(s, PLR_KIND_TWIST, twist->t_ns);
+    else
+        use_step(s, &step);
 }
 
 void plr_steps_use_imu(plr_session *s) {
     const plr_imu_message *imu = &s->in.as.imu;
-    if (kind_of_steps(s) != PLR_KIND_IMU) {
+    if (!is_inertial(s)) {
         refuse_other(s, PLR_KIND_IMU, imu->t_ns);
         return;
     }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 /*
- * What moves the body: TWIST or IMU, as the setting `process` says, and the READINGs of small sensors
- * among them. With the setting twist-delay all of them wait, and while a frame waits for them (data.h).
- * The message is in s->in.
+ * What moves the body: TWIST or IMU, as the setting `process` says, and the READINGs of small
+ * sensors among them. With the setting twist-delay all of them wait, and while a frame waits for
+ * them (data.h). The message is in s->in.
  *
- * A TWIST with process = imu, or an IMU with process = twist, is refused once in a drive, with a TEXT
- * that says what would be right; the others are only counted (totals.other_process). IMU readings that
- * are refused for the same reason one after the other are answered once, for the first of them; all
- * are counted (totals.imu_refused).
+ * Of the other process (TWIST with imu, IMU with twist) one message a drive is refused, with a TEXT
+ * that says what would be right; the others are only counted. IMU readings that are refused for the
+ * same reason one after the other are answered once; all are counted (totals.imu_refused).
  *
  * A step that comes after a frame or a reading of later time cannot be used any more: it is refused
  * with PLR_E_LATE, counted (totals.late), and a TEXT says how long those would have to wait. While

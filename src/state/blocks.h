@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* The rows of the state's blocks in P. A process lays them out once, at init; the landmarks follow,
- * three rows each. */
+/* The rows of the state's blocks in P, laid out once by a process. Three a landmark follow. */
 #ifndef PLR_STATE_BLOCKS_H
 #define PLR_STATE_BLOCKS_H
 

@@ -11,8 +11,7 @@ void plr_camera_from_body(plr_real q[3], const plr_camera *camera, const plr_rea
 /* s = R_CB^T (q - t_CB): left camera to body. */
 void plr_camera_to_body(plr_real s[3], const plr_camera *camera, const plr_real q[3]);
 
-/* D_C = (I + E_C, p_C) = T_CB D T_CB^-1: the camera's motion while the body moves by D = (I + E,
- * p). */
+/* D_C = (I + E_C, p_C) = T_CB D T_CB^-1: the camera's motion for D = (I + E, p) of the body. */
 void plr_camera_motion(plr_real E_C[9], plr_real p_C[3], const plr_camera *camera,
                        const plr_real E[9], const plr_real p[3]);
 

@@ -24,15 +24,13 @@ unsigned plr_covariance_row(const plr_filter *f, unsigned slot);
 
 /* --- blocks --- */
 
-/* Sets a block to P_own (size x size; the lower triangle is used), uncorrelated with all others.
- * Only without landmarks. */
+/* Sets a block to P_own (the lower triangle), uncorrelated with all others. Without landmarks. */
 void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own);
 
 /* The same with a diagonal. */
 void plr_covariance_begin_diagonal(plr_filter *f, plr_block_id block, const double *variance);
 
-/* Sets the part between two different blocks, row by row; the one of the rows comes later in the
- * state. */
+/* Sets the part between two blocks, row by row; the one of the rows comes later in the state. */
 void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, const plr_real *P);
 
 /* Sets a block's variances and makes it uncorrelated with all others, landmarks too. */
@@ -47,12 +45,11 @@ void plr_covariance_add_variance(plr_filter *f, plr_block_id block, const plr_re
 /* The part of P between two blocks, row by row. */
 void plr_covariance_get(const plr_filter *f, plr_block_id rows, plr_block_id columns, plr_real *P);
 
-/* P between `rows` rows of the state, from `row` on, and the drivers of a motion (plr_layout):
- * rows x drivers. */
+/* P between `rows` rows, from `row` on, and the drivers (plr_layout), rows x drivers. */
 void plr_covariance_with_drivers(const plr_filter *f, unsigned row, unsigned rows, plr_real *P);
 
-/* g = P_xp P_pp^-1 xi, of all rows x, with p the pose and xi exactly in its rows; P += g g^T. False, and
- * nothing is changed, if P_pp cannot be factorised. */
+/* g = P_xp P_pp^-1 xi, of all rows x, with p the pose and xi exactly in its rows; P += g g^T.
+ * False, and nothing is changed, if P_pp cannot be factorised. */
 bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_real *g);
 
 /* A landmark's own block += C, 3x3 and symmetric. */
@@ -66,8 +63,7 @@ plr_real plr_covariance_of_range(const plr_filter *f, unsigned slot);
 
 double plr_covariance_trace(const plr_filter *f);
 
-/* Elements of P with that many landmarks. They lie row by row, the lower triangle alone, so the
- * rows of fewer landmarks are a part of the rows of more. */
+/* Elements of P with that many landmarks; those of fewer are the first of those of more. */
 size_t plr_covariance_size(const plr_filter *f, unsigned landmarks);
 
 /* The elements themselves, for a checksum or a saved state. */
@@ -81,8 +77,8 @@ bool plr_covariance_is_positive(const plr_filter *f);
 
 /* --- motion --- */
 
-/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. F may stand
- * at the beginning of work.Vt; the next 21 numbers a landmark there are used. */
+/* P <- T P T^T with T = diag(A, I, F_0, F_1, ...): A 6x6, F 3x3 a landmark, back to back. F may
+ * stand at the beginning of work.Vt; the next 21 numbers a landmark there are used. */
 void plr_covariance_transport(plr_filter *f, const plr_real A[PLR_POSE_SQUARE], const plr_real *F);
 
 /* The pose's rows alone: xi <- A xi. */
@@ -95,25 +91,21 @@ void plr_covariance_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]);
  * leading dimension plr_covariance_ld) must hold the motion's direct effect. */
 void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion);
 
-/* The reverse, after the observations: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T and
- * dx += W Lambda^-1 eta. nu (6; may be NULL) receives the estimate z + Lambda^-1 eta. Does nothing
- * if plr_covariance_open_noise was not called. */
+/* The reverse, after the observations: with Lambda = U^T U, P += (W U^-1)(W U^-1)^T, dx += W
+ * Lambda^-1 eta, and nu (6, or NULL) = z + Lambda^-1 eta. Nothing if none was opened. */
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]);
 
-/* V = C L^-T = P_(:,d) Kt, Kt of plr_motion_transpose: the covariance of three rows of the state,
- * from `row` on, with nu. */
+/* V = C L^-T = P_(:,d) Kt (plr_motion_transpose): three rows' covariance with nu, from `row` on. */
 void plr_covariance_motion_share(const plr_filter *f, unsigned row,
                                  const plr_real Kt[PLR_MOTION_BY],
                                  plr_real V[PLR_ROWS * PLR_POSE_DIM]);
 
-/* The pose's rows alone, for drivers behind the pose: xi <- A xi + n, n = B x_d + N(0, Q), with
- * M = B P_dd B^T + Q. */
+/* The pose's rows alone, drivers behind it: xi <- A xi + B x_d + N(0, Q), M = B P_dd B^T + Q. */
 void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
                                  const plr_real B[PLR_MOTION_BY],
                                  const plr_real M[PLR_POSE_SQUARE]);
 
-/* Where there is a velocity: its covariance and the biases' after the accumulated motion, without
- * the pose's and the landmarks' part. */
+/* Where there is a velocity: its and the biases' own covariance after the motion. */
 void plr_covariance_carry_core(plr_filter *f);
 
 /* --- update --- */
@@ -131,9 +123,8 @@ void plr_covariance_project(const plr_filter *f, const plr_rows *H, plr_real *ro
  * False, and nothing is changed, if a variance would not be positive. */
 bool plr_covariance_subtract(plr_filter *f, unsigned depth);
 
-/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw: more than the rounding of the updates
- * can have removed. Without it, rounding errors add up while a robot stands still and measures the
- * same landmarks, until P is no longer positive (docs/NUMERICS.md 1). */
+/* P_ii *= 1 + 8 epsilon for the landmarks that a frame saw, more than rounding can have removed:
+ * else it adds up while a robot stands still, until P is not positive (docs/NUMERICS.md 1). */
 void plr_covariance_make_up_for_rounding(plr_filter *f);
 
 /* --- slots --- */

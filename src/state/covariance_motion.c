@@ -15,8 +15,8 @@ enum {
     WIDE_REGISTERS = PLR_TILE_COLUMNS > 6
 };
 
-/* out_r = X_r B, r = 0 .. 2: three rows X_r of m numbers, B m x 6; out_r may be X_r. Every block of the
- * state has three or six rows. Inlined: the sums stay in registers. */
+/* out_r = X_r B, r = 0 .. 2: three rows X_r of m numbers, B m x 6; out_r may be X_r. Every block of
+ * the state has three or six rows. Inlined: the sums stay in registers. */
 static inline void three_rows_by_six(unsigned m, const plr_real *const X[PLR_ROWS],
                                      const plr_real *B, plr_real *const out[PLR_ROWS]) {
     plr_real sum0[PLR_POSE_DIM] = {0}, sum1[PLR_POSE_DIM] = {0}, sum2[PLR_POSE_DIM] = {0};
@@ -45,8 +45,7 @@ static void transpose6(plr_real At[PLR_POSE_SQUARE], const plr_real A[PLR_POSE_S
             At[PLR_POSE_DIM * i + j] = A[PLR_POSE_DIM * j + i];
 }
 
-/* X <- F X, 3xn, in three rows of P. F is copied to locals, because the compiler would otherwise
- * load it for each column. */
+/* X <- F X, 3xn, in three rows of P. F is copied, or it would be loaded for each column. */
 static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *restrict r0,
                              plr_real *restrict r1, plr_real *restrict r2) {
     const plr_real g[9] = {F[0], F[1], F[2], F[3], F[4], F[5], F[6], F[7], F[8]};
@@ -58,8 +57,7 @@ static inline void turn_rows(unsigned n, const plr_real *restrict F, plr_real *r
     }
 }
 
-/* The factors of a transport, by slot. Only a processor that calculates several numbers at a time
- * uses Gt and Y (math/blocks3.h). */
+/* The factors of a transport, by slot. Gt and Y are for wide registers alone (math/blocks3.h). */
 typedef struct plr_landmark_factors {
     const plr_real *F;
     plr_real *Gt, *Y;
@@ -135,9 +133,8 @@ void plr_covariance_motion_share(const plr_filter *f, unsigned row,
     three_rows_by_six(drivers, X, Kt, out);
 }
 
-/* X, rows x drivers with leading dimension PLR_DRIVERS, is a derivative by the drivers before a
- * motion (I + E, p). It becomes the same by the drivers after the pose's transport: theta is turned
- * by it, all others stay. */
+/* X, rows x drivers, PLR_DRIVERS apart, a derivative by the drivers before a motion (I + E, p),
+ * becomes that by the drivers after the pose's transport: theta is turned. */
 static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsigned rows,
                                  plr_real *X) {
     if (f->layout.driver >= PLR_POSE_DIM)
@@ -150,8 +147,7 @@ static void drivers_after_motion(const plr_filter *f, const plr_real E[9], unsig
     }
 }
 
-/* The covariance of velocity and biases after the motion: v <- V x_d + noise, b <- b + noise, where
- * V is by the drivers as they stand in P. */
+/* After the motion: v <- V x_d + noise, b <- b + noise, V by the drivers as they stand in P. */
 static void carry_core_covariance(plr_filter *f, const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS]) {
     enum { D = PLR_DRIVERS, C = PLR_VELOCITY_DIM };
     const plr_core_motion *m = &f->core_motion;
@@ -185,8 +181,7 @@ void plr_covariance_carry_core(plr_filter *f) {
     plr_sensitivity_carry_velocity(f, f->core_motion.V);
 }
 
-/* The same but for S, and the rows of velocity and biases in Vt, their covariance with nu, which
- * gains that of their noise with the motion's. */
+/* The same but for S; and in Vt of velocity and biases, whose noise goes with the motion's. */
 static void carry_core(plr_filter *f, const plr_applied_motion *motion,
                        const plr_real V[PLR_VELOCITY_DIM * PLR_DRIVERS], plr_real *Vt, size_t ld) {
     const unsigned first = f->layout.driver, velocity = plr_row_of(f, PLR_BLOCK_VELOCITY);

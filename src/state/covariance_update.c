@@ -5,7 +5,6 @@
 #include "math/blocks3.h"
 #include "math/dense.h"
 #include "math/small.h"
-#include "state/blocks.h"
 #include "state/elements.h"
 
 void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]) {
@@ -43,8 +42,7 @@ void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_r
     }
 }
 
-/* out_r[i] = H_r x(i), r = 0 .. 2, i = first .. n-1, where x(i) is in row i of P, from column s on. H is
- * copied to locals, because the compiler would otherwise load it for each i. */
+/* out_r[i] = H_r x(i), i = first .. n-1: x(i) in row i of P, from column s on. H is copied. */
 static inline void project_columns(unsigned first, unsigned n, const plr_real H[9],
                                    const plr_real *restrict P, unsigned s, plr_real *restrict out0,
                                    plr_real *restrict out1, plr_real *restrict out2) {

@@ -36,20 +36,16 @@ typedef struct plr_world_point {
 } plr_world_point;
 
 struct plr_model {
-    const char *name;
-
     /* Applies a motion to landmarks and covariance; T_WB has been moved before. `body` keeps the
      * motion's noise apart in work.noise (docs/MATH.md 10); `world` adds it to P. */
     void (*propagate)(plr_filter *f, const plr_applied_motion *motion);
 
-    /* The landmark relative to the camera. False if its depth is less than min_depth_m, where a
-     * linearisation is not valid. */
+    /* The landmark in the camera. False nearer than min_depth, where no linearisation is valid. */
     bool (*look)(const plr_filter *f, unsigned slot, plr_view *view);
 
-    /* From derivatives by the point in the camera to derivatives by the state's error: H = Dz
-     * dq/dx. Dz = dz/dq, 3x3. The derivative along the point's ray, Dz q = along / q_z, is passed
-     * separately, because computed from Dz it would be a difference of rounded numbers. z, the
-     * prediction, is corrected for plr_slot.beyond. */
+    /* From derivatives by the point in the camera to those by the state's error: H = Dz dq/dx, Dz
+     * 3x3. Dz q = along / q_z is passed besides: from Dz it would be a difference of rounded
+     * numbers. z, the prediction, is corrected for plr_slot.beyond. */
     void (*derive)(const plr_filter *f, unsigned slot, const plr_view *view, const plr_real Dz[9],
                    const plr_real along[3], plr_real z[3], plr_rows *H);
 
@@ -59,33 +55,25 @@ struct plr_model {
     void (*initialise)(const plr_filter *f, const plr_real q[3], const plr_real S_q[9],
                        plr_new_landmark *landmark);
 
-    /* Makes a landmark from a known position in the world. False if the model cannot represent
-     * it. */
+    /* Makes a landmark of a known position in the world. False if the model cannot. */
     bool (*adopt)(const plr_filter *f, const plr_landmark *known, plr_new_landmark *landmark);
 
     /* The tracks have wandered off their points by sigma px in u and in v. Both pictures show the
      * same patch, so the point stays as deep as it is. NULL in `world`. */
     void (*drift)(plr_filter *f, plr_real sigma);
 
-    /* Applies a correction dx of the whole state (plr_covariance_dim elements) to the landmarks,
-     * and transports P to the new estimate. The caller corrects pose and bias. Returns how many
-     * landmark corrections were limited: PLR_REASON_RANGE_LIMITED. */
+    /* Applies a correction dx of the whole state to the landmarks, and transports P there; pose and
+     * bias are the caller's. Returns how many were limited: PLR_REASON_RANGE_LIMITED. */
     unsigned (*retract)(plr_filter *f, const plr_real *dx);
 
     /* The position of a landmark in the world. */
     void (*in_world)(const plr_filter *f, const plr_slot *slot, plr_world_point *point);
 };
 
-/* J = R_WB [I | -[s]x], 3x6: derivative of a point's world position by the pose's error (rho,
- * theta), where s is the point in the body, m. */
-void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
-                       plr_real J[PLR_ROWS * PLR_POSE_DIM]);
-
 extern const struct plr_model plr_model_body;
 extern const struct plr_model plr_model_world;
 
-/* The filter stores the model's number and not its address, because a damaged address would be
- * followed before a checksum could be compared. */
+/* The model is stored as a number: a damaged address would be followed before any checksum. */
 static inline const struct plr_model *plr_model_of(const plr_filter *f) {
     return f->model == PLR_MODEL_BODY ? &plr_model_body : &plr_model_world;
 }

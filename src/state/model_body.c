@@ -10,7 +10,6 @@
 #include "state/model.h"
 #include "state/polar.h"
 #include "state/rigid_fit.h"
-#include "state/slots.h"
 
 #include "math/dense.h"
 #include "math/se3.h"
@@ -43,7 +42,7 @@ static void chart_by_body_twist(const plr_filter *f, const plr_polar *chart,
     const plr_real inverse = PLR_R(1) / chart->r;
     plr_real way[3];
     for (int row = 0; row < 2; row++) {
-        const plr_real n[3] = {chart->N[row], chart->N[2 + row], chart->N[4 + row]};
+        const plr_real *n = chart->N[row];
         plr_real turn[3];
         plr_cross3(turn, n, chart->mu); /* n^T [mu]x */
         for (int j = 0; j < 3; j++)
@@ -64,24 +63,18 @@ static void chart_jacobian(plr_real F[9], const plr_polar *to, const plr_real R[
     const plr_real shrink = ratio / (to->r * to->r);
     plr_real turned[3];
     for (int column = 0; column < 2; column++) {
-        const plr_real n[3] = {from->N[column], from->N[2 + column], from->N[4 + column]};
-        plr_mat3_tvec(turned, R, n);
-        for (int row = 0; row < 2; row++) {
-            const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
-            F[3 * row + column] = ratio * plr_dot3(m, turned);
-        }
-        F[6 + column] = shrink * plr_dot3(p, n);
+        plr_mat3_tvec(turned, R, from->N[column]);
+        for (int row = 0; row < 2; row++)
+            F[3 * row + column] = ratio * plr_dot3(to->N[row], turned);
+        F[6 + column] = shrink * plr_dot3(p, from->N[column]);
     }
     plr_mat3_tvec(turned, R, p);
-    for (int row = 0; row < 2; row++) {
-        const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
-        F[3 * row + 2] = -ratio * plr_dot3(m, turned);
-    }
+    for (int row = 0; row < 2; row++)
+        F[3 * row + 2] = -ratio * plr_dot3(to->N[row], turned);
     F[8] = shrink * (from->r - plr_dot3(p, from->mu)) * from->r;
 }
 
-/* Keeps a landmark at least PLR_MIN_RANGE from the camera. Nearer than that the camera has reached
- * the point, and the chart is not defined. */
+/* Keeps a landmark at least PLR_MIN_RANGE away: nearer the chart is not defined. */
 static void enforce_min_range(plr_real q[3]) {
     const plr_real range2 = plr_dot3(q, q);
     if (range2 >= PLR_MIN_RANGE * PLR_MIN_RANGE)
@@ -138,45 +131,6 @@ static void store_motion_variance(plr_filter *f, const plr_real JL[PLR_POSE_SQUA
         f->work.noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
 }
 
-static unsigned body_retract(plr_filter *f, const plr_real *dx);
-
-static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
-    plr_real E[9], R[9], p[3];
-    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
-    plr_se3_rotation(R, E);
-
-    plr_real *F = f->work.Vt, largest_offset = 0;
-    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
-    for (unsigned slot = 0; slot < f->count; slot++) {
-        plr_slot *s = &f->slots[slot];
-        plr_polar from, to;
-        const plr_real offset = move_to_linearisation_point(f, slot);
-        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
-        plr_polar_at(&from, s->x);
-        plr_se3_move_back(s->x, E, p);
-        enforce_min_range(s->x);
-        plr_polar_at(&to, s->x);
-        chart_jacobian(F + 9 * slot, &to, R, p, &from);
-        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
-        dx[0] = offset * F[9 * slot + 2];
-        dx[1] = offset * F[9 * slot + 5];
-        dx[2] = 0;
-        s->beyond = offset * F[9 * slot + 8];
-    }
-    plr_real A[PLR_POSE_SQUARE];
-    store_motion_variance(f, motion->JL);
-    plr_se3_rotation(R, motion->E);
-    plr_se3_adjoint_inverse(A, R, motion->p);
-    plr_covariance_transport(f, A, F);
-    if (!f->motion.noisy) { /* no correction follows to which dx could be added */
-        if (largest_offset > 0)
-            (void)body_retract(f, f->work.dx);
-        return;
-    }
-    fill_W(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
-    plr_covariance_open_noise(f, motion);
-}
-
 static bool body_look(const plr_filter *f, unsigned slot, plr_view *view) {
     memcpy(view->q, f->slots[slot].x, sizeof view->q);
     return view->q[2] >= f->par.min_depth;
@@ -187,15 +141,11 @@ static void body_derive(const plr_filter *f, unsigned slot, const plr_view *view
                         const plr_real Dz[9], const plr_real along[3], plr_real z[3], plr_rows *H) {
     plr_polar chart;
     plr_polar_at(&chart, view->q);
-    H->terms = 1;
-    H->term[0].row = plr_covariance_row(f, slot);
-    H->term[0].columns = PLR_LANDMARK_DIM;
-    for (int row = 0; row < 3; row++) {
-        plr_real *h = H->term[0].H + 3 * row;
-        for (int column = 0; column < 2; column++) {
-            const plr_real n[3] = {chart.N[column], chart.N[2 + column], chart.N[4 + column]};
-            h[column] = chart.r * plr_dot3(Dz + 3 * row, n);
-        }
+    H->terms = 0;
+    plr_real *h = plr_rows_add(H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
+    for (int row = 0; row < 3; row++, h += 3) {
+        for (int column = 0; column < 2; column++)
+            h[column] = chart.r * plr_dot3(Dz + 3 * row, chart.N[column]);
         h[2] = along[row] != 0 ? -along[row] * chart.r / view->q[2] : PLR_R(0);
         z[row] = PLR_FMA(h[2], f->slots[slot].beyond, z[row]);
     }
@@ -271,9 +221,8 @@ typedef struct plr_common_motion {
     plr_real E[9], R[9], p[3];  /* of the camera: Exp(eta_C), R = I + E */
 } plr_common_motion;
 
-/* With an IMU, landmarks out of sight share another motion than those in sight: the frame that finds
- * the velocity after a stretch without pictures corrects the position by metres, and with it the old
- * landmarks, but not those that it sees. */
+/* With an IMU, landmarks out of sight share another motion: the frame that finds the velocity after
+ * a dark stretch corrects position and old landmarks by metres, but not those that it sees. */
 enum { IN_SIGHT, OUT_OF_SIGHT, SIGHTS };
 
 static unsigned sight_of(const plr_filter *f, unsigned slot) {
@@ -281,12 +230,11 @@ static unsigned sight_of(const plr_filter *f, unsigned slot) {
     return parted && f->slots[slot].last_frame != f->frame_number ? OUT_OF_SIGHT : IN_SIGHT;
 }
 
-/* The rigid motions eta of the body that the corrections of the landmarks have in common. They differ
- * from the pose's correction xi, which may mostly concern the way travelled before, in which no
- * visible landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity
- * that it causes. Known landmarks are left out: they are fixed in the world, so the pose moves them
- * in the camera, and the common part of a map's errors is not a motion. J becomes
- * chart_by_body_twist of every slot. */
+/* The rigid motions eta of the body that the landmarks' corrections have in common. They differ
+ * from the pose's correction xi, which may mostly concern the way before, in which no visible
+ * landmark takes part. A bearing is weighted as an angle, an inverse range as the disparity that it
+ * causes. Known landmarks are left out: they are fixed in the world, and the common part of a map's
+ * errors is no motion. J becomes chart_by_body_twist of every slot. */
 static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_real *J,
                                 plr_common_motion common[SIGHTS]) {
     static const plr_real none[PLR_POSE_DIM] = {0};
@@ -295,8 +243,7 @@ static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_rea
     const plr_real W[3] = {1, 1, baseline * baseline};
     const plr_real angle2 = f->par.pixel_variance / (f->par.camera.fx * f->par.camera.fx);
     plr_rigid_fit fit[SIGHTS];
-    plr_rigid_fit_clear(&fit[IN_SIGHT]);
-    plr_rigid_fit_clear(&fit[OUT_OF_SIGHT]);
+    memset(fit, 0, sizeof fit);
     for (unsigned slot = 0; slot < f->count; slot++, J += PLR_ROWS * PLR_POSE_DIM) {
         plr_polar chart;
         plr_polar_at(&chart, f->slots[slot].x);
@@ -315,9 +262,8 @@ static void find_common_motions(const plr_filter *f, const plr_real *dx, plr_rea
     }
 }
 
-/* Converts the rest of a correction from the chart `from` to the chart `to`, to which the common
- * motion has brought the point: the same angle, turned by the bearing part of F (chart_jacobian),
- * and the same inverse range. */
+/* Converts the rest of a correction from the chart `from` to `to`, where the common motion brought
+ * the point: the same angle, turned by F (chart_jacobian), and the same inverse range. */
 static void turn_rest(plr_real w[3], const plr_real F[9], const plr_polar *to,
                       const plr_polar *from) {
     const plr_real ratio = to->r / from->r, w0 = ratio * w[0], w1 = ratio * w[1];
@@ -368,6 +314,43 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
     return cut;
 }
 
+static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
+    plr_real E[9], R[9], p[3];
+    plr_camera_motion(E, p, &f->par.camera, motion->E, motion->p);
+    plr_se3_rotation(R, E);
+
+    plr_real *F = f->work.Vt, largest_offset = 0;
+    memset(f->work.dx, 0, plr_covariance_row(f, 0) * sizeof *f->work.dx);
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        plr_slot *s = &f->slots[slot];
+        plr_polar from, to;
+        const plr_real offset = move_to_linearisation_point(f, slot);
+        largest_offset = plr_abs(offset) > largest_offset ? plr_abs(offset) : largest_offset;
+        plr_polar_at(&from, s->x);
+        plr_se3_move_back(s->x, E, p);
+        enforce_min_range(s->x);
+        plr_polar_at(&to, s->x);
+        chart_jacobian(F + 9 * slot, &to, R, p, &from);
+        plr_real *dx = f->work.dx + plr_covariance_row(f, slot);
+        dx[0] = offset * F[9 * slot + 2];
+        dx[1] = offset * F[9 * slot + 5];
+        dx[2] = 0;
+        s->beyond = offset * F[9 * slot + 8];
+    }
+    plr_real A[PLR_POSE_SQUARE];
+    store_motion_variance(f, motion->JL);
+    plr_se3_rotation(R, motion->E);
+    plr_se3_adjoint_inverse(A, R, motion->p);
+    plr_covariance_transport(f, A, F);
+    if (!f->motion.noisy) { /* no correction follows to which dx could be added */
+        if (largest_offset > 0)
+            (void)body_retract(f, f->work.dx);
+        return;
+    }
+    fill_W(f, motion->JL, f->work.noise.Wt, plr_covariance_ld(f));
+    plr_covariance_open_noise(f, motion);
+}
+
 static void body_drift(plr_filter *f, plr_real sigma) {
     for (unsigned slot = 0; slot < f->count; slot++) {
         const plr_real *q = f->slots[slot].x, wanders = sigma * q[2];
@@ -391,21 +374,18 @@ static void body_in_world(const plr_filter *f, const plr_slot *slot, plr_world_p
     for (int i = 0; i < 3; i++)
         point->p_W[i] = p_WB[i] + (double)offset[i];
 
-    plr_term *own = &point->J.term[0], *pose = &point->J.term[1];
-    point->J.terms = 2;
-    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
-    pose->columns = PLR_POSE_DIM;
-    plr_world_by_pose(R_WB, s_B, pose->H);
-    own->row = plr_covariance_row(f, (unsigned)(slot - f->slots));
-    own->columns = PLR_LANDMARK_DIM;
+    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    point->J.terms = 0;
+    plr_real *own = plr_rows_add(&point->J, row, PLR_LANDMARK_DIM);
+    plr_world_by_pose(R_WB, s_B,
+                      plr_rows_add(&point->J, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM));
     plr_polar_at(&chart, slot->x);
     plr_polar_to_point(Ji, &chart);
     plr_mat3_mul_nt(R_WC, R_WB, f->par.camera.R_CB);
-    plr_mat3_mul(own->H, R_WC, Ji);
+    plr_mat3_mul(own, R_WC, Ji);
 }
 
 const struct plr_model plr_model_body = {
-    .name = "body",
     .propagate = body_propagate,
     .look = body_look,
     .derive = body_derive,

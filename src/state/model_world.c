@@ -8,11 +8,11 @@
 #include "state/covariance.h"
 #include "state/model.h"
 
-#include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
 #include "state/camera.h"
 #include "state/motion.h"
+#include "state/pose.h"
 
 /* s = R^T (m - p): the landmark in the body. */
 static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
@@ -44,22 +44,18 @@ static void world_derive(const plr_filter *f, unsigned slot, const plr_view *vie
                          const plr_real Dz[9], const plr_real along[3], plr_real z[3],
                          plr_rows *H) {
     plr_real DzR[9], S[9], DzRS[9];
-    plr_term *own = &H->term[0], *pose = &H->term[1];
     (void)along;
     (void)z;
     plr_mat3_mul(DzR, Dz, f->par.camera.R_CB);
     plr_skew(S, view->s);
     plr_mat3_mul(DzRS, DzR, S);
-    H->terms = 2;
-    own->row = plr_covariance_row(f, slot);
-    own->columns = PLR_LANDMARK_DIM;
-    plr_mat3_mul_nt(own->H, DzR, f->R_WB);
-    pose->row = plr_row_of(f, PLR_BLOCK_POSE);
-    pose->columns = PLR_POSE_DIM;
+    H->terms = 0;
+    plr_mat3_mul_nt(plr_rows_add(H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM), DzR, f->R_WB);
+    plr_real *by_pose = plr_rows_add(H, plr_row_of(f, PLR_BLOCK_POSE), PLR_POSE_DIM);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
-            pose->H[PLR_POSE_DIM * i + j] = -DzR[3 * i + j];
-            pose->H[PLR_POSE_DIM * i + 3 + j] = DzRS[3 * i + j];
+            by_pose[PLR_POSE_DIM * i + j] = -DzR[3 * i + j];
+            by_pose[PLR_POSE_DIM * i + 3 + j] = DzRS[3 * i + j];
         }
 }
 
@@ -101,14 +97,12 @@ static unsigned world_retract(plr_filter *f, const plr_real *dx) {
 static void world_in_world(const plr_filter *f, const plr_slot *slot, plr_world_point *point) {
     for (int i = 0; i < 3; i++)
         point->p_W[i] = (double)slot->x[i];
-    point->J.terms = 1;
-    point->J.term[0].row = plr_covariance_row(f, (unsigned)(slot - f->slots));
-    point->J.term[0].columns = PLR_LANDMARK_DIM;
-    plr_mat3_identity(point->J.term[0].H);
+    const unsigned row = plr_covariance_row(f, (unsigned)(slot - f->slots));
+    point->J.terms = 0;
+    plr_mat3_identity(plr_rows_add(&point->J, row, PLR_LANDMARK_DIM));
 }
 
 const struct plr_model plr_model_world = {
-    .name = "world",
     .propagate = world_propagate,
     .look = world_look,
     .derive = world_derive,

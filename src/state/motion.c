@@ -34,9 +34,8 @@ void plr_motion_jump(plr_filter *f, plr_time_ns t_ns, const plr_real R_WB[9],
     memcpy(f->p_WB, p_WB, sizeof f->p_WB);
 }
 
-/* This part of B P_dd B^T is added to M as noise. Otherwise, with Q = 0, M would depend on the
- * drivers alone, and to know the motion would leave them a variance of zero, give or take
- * rounding. */
+/* This part of B P_dd B^T is added to M as noise. With Q = 0 to know the motion would otherwise
+ * leave the drivers a variance of zero, give or take rounding. */
 #define SHARE_OF_STATE PLR_R(1e-4)
 
 void plr_motion_covariance_by_state(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]) {

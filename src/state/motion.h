@@ -4,8 +4,6 @@
 #ifndef PLR_STATE_MOTION_H
 #define PLR_STATE_MOTION_H
 
-#include <stdbool.h>
-
 #include "pelorus/state.h"
 
 /* Nothing accumulated: D = I, Q = 0, B = 0; velocity and biases as they are. */
@@ -26,8 +24,7 @@ typedef struct plr_applied_motion {
 /* BPB = B P_dd B^T, the drivers' part of the accumulated motion's covariance BPB + Q; 6x6. */
 void plr_motion_covariance_by_state(const plr_filter *f, plr_real BPB[PLR_POSE_SQUARE]);
 
-/* X <- L^-1 X, 6 x columns with leading dimension ld: L is a lower triangle as in
- * plr_applied_motion. */
+/* X <- L^-1 X, 6 x columns, leading dimension ld; L as in plr_applied_motion. */
 void plr_motion_solve(const plr_real L[PLR_POSE_SQUARE], unsigned columns, plr_real *X,
                       unsigned ld);
 
@@ -50,8 +47,7 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied);
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
                    const plr_real z[PLR_POSE_DIM], plr_applied_motion *applied);
 
-/* The pose's covariance as it would be with the accumulated motion applied, 6x6; changes
- * nothing. */
+/* The pose's covariance, 6x6, as if the accumulated motion were applied. */
 void plr_motion_pose_covariance(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]);
 
 #endif

@@ -5,16 +5,16 @@
 #include "math/so3.h"
 
 /* N(mu) for a unit vector mu. */
-static void basis(plr_real N[6], const plr_real mu[3]) {
+static void basis(plr_real N[2][3], const plr_real mu[3]) {
     const plr_real sign = mu[2] < 0 ? PLR_R(-1) : PLR_R(1);
     const plr_real a = PLR_R(-1) / (sign + mu[2]);
     const plr_real b = mu[0] * mu[1] * a;
-    N[0] = PLR_FMA(sign * mu[0] * mu[0], a, PLR_R(1));
-    N[2] = sign * b;
-    N[4] = -sign * mu[0];
-    N[1] = b;
-    N[3] = PLR_FMA(mu[1] * mu[1], a, sign);
-    N[5] = -mu[1];
+    N[0][0] = PLR_FMA(sign * mu[0] * mu[0], a, PLR_R(1));
+    N[0][1] = sign * b;
+    N[0][2] = -sign * mu[0];
+    N[1][0] = b;
+    N[1][1] = PLR_FMA(mu[1] * mu[1], a, sign);
+    N[1][2] = -mu[1];
 }
 
 void plr_polar_at(plr_polar *chart, const plr_real q[3]) {
@@ -28,8 +28,8 @@ void plr_polar_at(plr_polar *chart, const plr_real q[3]) {
 void plr_polar_from_point(plr_real Jw[9], const plr_polar *chart) {
     const plr_real inverse = PLR_R(1) / chart->r;
     for (int j = 0; j < 3; j++) {
-        Jw[j] = chart->N[2 * j] * inverse;
-        Jw[3 + j] = chart->N[2 * j + 1] * inverse;
+        Jw[j] = chart->N[0][j] * inverse;
+        Jw[3 + j] = chart->N[1][j] * inverse;
         Jw[6 + j] = -chart->mu[j] * inverse * inverse;
     }
 }
@@ -37,8 +37,8 @@ void plr_polar_from_point(plr_real Jw[9], const plr_polar *chart) {
 void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart) {
     const plr_real r = chart->r;
     for (int i = 0; i < 3; i++) {
-        Ji[3 * i] = r * chart->N[2 * i];
-        Ji[3 * i + 1] = r * chart->N[2 * i + 1];
+        Ji[3 * i] = r * chart->N[0][i];
+        Ji[3 * i + 1] = r * chart->N[1][i];
         Ji[3 * i + 2] = -r * r * chart->mu[i];
     }
 }
@@ -47,15 +47,12 @@ void plr_polar_to_point(plr_real Ji[9], const plr_polar *chart) {
 static void bearing_transport(plr_real M[4], const plr_polar *to, const plr_real E[9],
                               const plr_polar *from) {
     for (int column = 0; column < 2; column++) {
-        const plr_real n[3] = {from->N[column], from->N[2 + column], from->N[4 + column]};
         plr_real turned[3];
-        plr_mat3_vec(turned, E, n);
+        plr_mat3_vec(turned, E, from->N[column]);
         for (int i = 0; i < 3; i++)
-            turned[i] += n[i];
-        for (int row = 0; row < 2; row++) {
-            const plr_real m[3] = {to->N[row], to->N[2 + row], to->N[4 + row]};
-            M[2 * row + column] = plr_dot3(m, turned);
-        }
+            turned[i] += from->N[column][i];
+        for (int row = 0; row < 2; row++)
+            M[2 * row + column] = plr_dot3(to->N[row], turned);
     }
 }
 
@@ -73,7 +70,7 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     }
     plr_real along[3], a[3], E[9];
     for (int i = 0; i < 3; i++)
-        along[i] = PLR_FMA(chart->N[2 * i + 1], w2, chart->N[2 * i] * w1);
+        along[i] = PLR_FMA(chart->N[1][i], w2, chart->N[0][i] * w1);
     plr_cross3(a, chart->mu, along);
     plr_so3_expm1(E, a);
 
@@ -98,9 +95,8 @@ bool plr_polar_retract(plr_polar *result, plr_real M[4], const plr_polar *chart,
     /* r+ - r = -r r+ w_3; and q+ - q = (r+ - r) (mu + turn) + r turn */
     const plr_real further = held ? result->r - chart->r : -chart->r * result->r * w[2];
     const plr_real mu[3] = {chart->mu[0] + turn[0], chart->mu[1] + turn[1], chart->mu[2] + turn[2]};
-    if (further <
-        PLR_R(-0.25) *
-            chart->r) { /* else the rounding of the far point would stay in the near one */
+    if (further < PLR_R(-0.25) * chart->r) {
+        /* else the rounding of the far point would stay in the near one */
         const plr_real scale = result->r / PLR_SQRT(plr_dot3(mu, mu));
         for (int i = 0; i < 3; i++)
             q[i] = scale * mu[i];

@@ -6,8 +6,7 @@
 #include "math/so3.h"
 #include "state/rigid_fit.h"
 
-/* Without the orthonormalisation, an hour of steps in float32 makes R deviate from a rotation by
- * 0.01. */
+/* Not made orthonormal, R would deviate from a rotation by 0.01 in an hour of float32 steps. */
 void plr_pose_move(plr_filter *f, const plr_real E[9], const plr_real d[3]) {
     plr_real step[3], change[9];
     plr_mat3_vec(step, f->R_WB, d);
@@ -68,6 +67,18 @@ void plr_pose_reference(const plr_filter *f, plr_real R_WB[9], double p_WB[3]) {
     plr_mat3_vec(moved, R_WB, f->motion.p);
     for (int i = 0; i < 3; i++)
         p_WB[i] -= (double)moved[i];
+}
+
+void plr_world_by_pose(const plr_real R_WB[9], const plr_real s_B[3],
+                       plr_real J[PLR_ROWS * PLR_POSE_DIM]) {
+    plr_real S[9], RS[9];
+    plr_skew(S, s_B);
+    plr_mat3_mul(RS, R_WB, S);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            J[PLR_POSE_DIM * i + j] = R_WB[3 * i + j];
+            J[PLR_POSE_DIM * i + 3 + j] = -RS[3 * i + j];
+        }
 }
 
 void plr_filter_diverge(plr_filter *f) {

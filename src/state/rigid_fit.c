@@ -8,18 +8,12 @@
 
 /* s: the weight of the pose's correction beside the landmarks'. Measured: docs/NUMERICS.md 10. */
 #define SHARE_OF_POSE PLR_R(0.1)
-/* Keeps A regular in directions that no landmark determines, such as the roll about a single one's
- * ray. */
+/* Keeps A regular where no landmark determines it, such as in the roll about a single one's ray. */
 #define TINY PLR_R(1e-12)
-/* This part of the diagonal is added to A, so that rounding does not decide where all points lie
- * alike. */
+/* This part of the diagonal is added: rounding is not to decide where all points lie alike. */
 #define SMALL_SHARE PLR_R(1e-5)
 /* Added to the prior's variances, which may be zero. */
 #define SMALLEST_VARIANCE PLR_R(1e-20)
-
-void plr_rigid_fit_clear(plr_rigid_fit *fit) {
-    memset(fit, 0, sizeof *fit);
-}
 
 void plr_rigid_fit_add(plr_rigid_fit *fit, const plr_real J[PLR_ROWS * PLR_POSE_DIM],
                        const plr_real w[3], const plr_real W[3]) {

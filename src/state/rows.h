@@ -19,17 +19,23 @@ typedef struct plr_rows {
     plr_term term[2];
 } plr_rows;
 
-/* Three rows over the body's twist u = (v, w) in place of the state: z = M u + N(0, R). How u
- * depends on the state is defined by the process. A row that is not measured has M = 0, z = 0 and R
- * = 1. */
+/* Three rows over the body's twist u = (v, w), z = M u + N(0, R); the process knows how u depends
+ * on the state. A row that is not measured has M = 0, z = 0 and R = 1. */
 typedef struct plr_twist_rows {
     plr_real z[PLR_ROWS];
     plr_real M[PLR_ROWS * PLR_POSE_DIM];
     plr_real R[PLR_ROWS]; /* variances */
 } plr_twist_rows;
 
-/* True if the first block has three columns, as a landmark has: there are special kernels for
- * it. */
+/* Adds a block: sets where it is, and returns its H, which the caller fills. */
+static inline plr_real *plr_rows_add(plr_rows *rows, unsigned row, unsigned columns) {
+    plr_term *term = &rows->term[rows->terms++];
+    term->row = row;
+    term->columns = columns;
+    return term->H;
+}
+
+/* True if the first block has three columns, as a landmark's: there are special kernels. */
 static inline bool plr_rows_begin_with_three(const plr_rows *rows) {
     return rows->term[0].columns == PLR_LANDMARK_DIM;
 }

@@ -2,17 +2,14 @@
 /*
  * What errors of the camera's calibration do to the state.
  *
- * The focal length and the baseline of every real camera are off by a part of a percent, and it
- * looks a part of a degree beside where T_CB says. No frame shows it (where speed and turn are
- * constant it looks like a bias of the twists), and it is the same in all frames, so that it does
- * not average out as noise does. The state's error is therefore x + S s: x as P says, and S s with
- * s ~ N(0, diag(par.calibration_variance)), the errors of the calibration. S has a column for each
- * and the rows of the state. It is carried along beside P through motions and corrections, whose
- * gains take no notice of it, and what is told of covariances contains S diag(...) S^T: a consider
- * covariance analysis (Tapley, Schutz and Born, Statistical Orbit Determination, chapter 6;
- * docs/MATH.md 20).
- *
- * A parameter whose sigma is zero costs next to nothing.
+ * Focal length, baseline and T_CB of a real camera are off by a part of a percent or degree. No
+ * frame shows it, and being the same in all frames it does not average out as noise does. The
+ * state's error is therefore x + S s: x as P says, and s ~ N(0, diag(par.calibration_variance)) the
+ * errors of the calibration. S, a column for each, is carried along beside P through motions and
+ * corrections, whose gains take no notice of it, and what is told of covariances contains S
+ * diag(...) S^T: a consider covariance analysis (Tapley, Schutz and Born, Statistical Orbit
+ * Determination, chapter 6; docs/MATH.md 20). A parameter whose sigma is zero costs next to
+ * nothing.
  */
 #ifndef PLR_STATE_SENSITIVITY_H
 #define PLR_STATE_SENSITIVITY_H
@@ -47,13 +44,12 @@ void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F);
 /* The rows of the velocity <- V S_d, of the drivers d. */
 void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V);
 
-/* S += W K S_d: the drivers d move the state by n = L K d, and Wt (6 x dim, ld between rows) is what
- * a motion L nu does to it. The velocity's rows, if there are any, <- V S_d. */
+/* S += W K S_d: the drivers d move the state by n = L K d, and Wt (6 x dim, ld between rows) is
+ * what a motion L nu does to it. The velocity's rows, if there are any, <- V S_d. */
 void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const plr_real *V,
                           const plr_real *Wt, size_t ld);
 
-/* S += X U^-T eta: the information of the observations about the motion's noise, Lambda = U^T U, has
- * been factorised, and Xt is U^-T W^T. */
+/* S += X U^-T eta: what a frame says of the motion's noise; Lambda = U^T U, Xt = U^-T W^T. */
 void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld);
 
 /* S_xi += B S_d, where the drivers move the pose alone. */

@@ -15,8 +15,7 @@ uint16_t plr_slots_find(const plr_filter *f, uint32_t id) {
     return PLR_NO_SLOT;
 }
 
-/* The landmark longest unseen, or PLR_NO_SLOT if all were seen in this frame. Frame numbers may
- * wrap: ages are differences. */
+/* The landmark longest unseen, or PLR_NO_SLOT. Frame numbers may wrap: ages are differences. */
 static uint16_t oldest(const plr_filter *f) {
     uint16_t found = PLR_NO_SLOT;
     uint32_t age = 0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* The landmark slots: an array whose first `count` elements are in use, so that the time of a frame
- * depends on their number. If it is full, the landmark unseen for the longest time is evicted
- * (docs/MATH.md 13). */
+/* The landmark slots: the first `count` of an array, so that a frame's time depends on their
+ * number. If it is full, the one unseen for longest is evicted (docs/MATH.md 13). */
 #ifndef PLR_STATE_SLOTS_H
 #define PLR_STATE_SLOTS_H
 
@@ -27,8 +26,7 @@ void plr_slots_append(plr_filter *f, uint32_t id, bool known, const plr_new_land
 /* Drops a landmark; the last slot takes its place. */
 void plr_slots_remove(plr_filter *f, unsigned slot);
 
-/* Landmark in the world with covariance. All motion must be applied. False if one of the numbers is
- * not finite: then it is nowhere. */
+/* Landmark in the world with covariance, all motion applied. False if a number is not finite. */
 bool plr_slots_export(const plr_filter *f, unsigned slot, plr_landmark *landmark);
 
 #endif

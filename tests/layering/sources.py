@@ -23,7 +23,7 @@ FOLDERS: dict[str, set[str]] = {
     "process": {"process", "state", "math"},
     "sensor": {"sensor", "state", "math"},
     "filter": {"filter", "sensor", "process", "state", "record", "math"},
-    "session": {"session", "filter", "record"},
+    "session": {"session", "filter", "record", "math"},
 }
 FILTER_HEADERS = {
     "assertions.h",
@@ -59,7 +59,7 @@ SESSION_PARTS = (
     "state_store",
 )
 SESSION_FILES = (
-    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "steps", "data", "input"),
+    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "steps", "data"),
     "session",
 )
 # What a public header may include of its siblings: wire.h must stay free of the filter.
@@ -172,16 +172,16 @@ def check_session(root: Path) -> Iterator[Breach]:
 def check_session_table(root: Path) -> Iterator[Breach]:
     """docs/REPLAY-FORMAT.md shows the table of phases and kinds that the session goes by."""
     page = root / "docs" / "REPLAY-FORMAT.md"
-    text = (root / "src" / "session" / "input.c").read_text(encoding="utf-8")
+    text = (root / "src" / "session" / "session.c").read_text(encoding="utf-8")
     names = {"LANDMARK": "LANDMARK (known)", "RESTORE": "STATE (restore)", "STATE": "STATE (save)"}
     rows = TABLE_ROW.findall(text)
     lines = page.read_text(encoding="utf-8").splitlines()
     if not rows:
-        yield Breach(page, 1, "the table of src/session/input.c is not found")
+        yield Breach(page, 1, "the table of src/session/session.c is not found")
     for kind, rules in rows:
         shown = " | ".join([names.get(kind, kind), *rules.lower().replace(" ", "").split(",")])
         if f"| {shown} |" not in lines:
-            yield Breach(page, 1, f"src/session/input.c says otherwise: | {shown} |")
+            yield Breach(page, 1, f"src/session/session.c says otherwise: | {shown} |")
 
 
 def check_conditions(root: Path) -> Iterator[Breach]:

@@ -121,13 +121,8 @@ static void same_report(const plr_report_message *e, const plr_report_message *a
 }
 
 static void same_end(const plr_end *e, const plr_end *a) {
-    SAME(twists);
-    SAME(stereos);
-    SAME(truths);
-    SAME(landmarks);
+    SAME(sent);
     SAME(frames);
-    SAME(readings);
-    SAME(imus);
     SAME(differs);
     SAME(arrived);
 }

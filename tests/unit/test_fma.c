@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "math/fma.h"
+#include "pelorus/config.h"
 #include "support/random.h"
 
 static float from_bits(uint32_t bits) {

@@ -12,6 +12,7 @@
 #include "filter/gate.h"
 #include "state/covariance.h"
 #include "state/model.h"
+#include "state/pose.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"

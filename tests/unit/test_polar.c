@@ -46,8 +46,8 @@ static double random_range(void) {
 static double dot_of_columns(const plr_polar *chart, int a, int b) {
     double sum = 0;
     for (int i = 0; i < 3; i++)
-        sum += (double)(a < 2 ? chart->N[2 * i + a] : chart->mu[i]) *
-               (double)(b < 2 ? chart->N[2 * i + b] : chart->mu[i]);
+        sum += (double)(a < 2 ? chart->N[a][i] : chart->mu[i]) *
+               (double)(b < 2 ? chart->N[b][i] : chart->mu[i]);
     return sum;
 }
 
@@ -76,7 +76,7 @@ static void test_basis_is_a_function_of_the_bearing_alone(void) {
         plr_polar_at(&near, q);
         plr_polar_at(&far, q8);
         TEST_ASSERT_TRUE(same_bits(near.mu, far.mu, 3));
-        TEST_ASSERT_TRUE(same_bits(near.N, far.N, 6));
+        TEST_ASSERT_TRUE(same_bits(near.N[0], far.N[0], 6));
     }
 }
 
@@ -107,8 +107,8 @@ static void coordinates(const plr_polar *chart, const double q[3], double w[3]) 
     const double r = norm(q);
     w[0] = w[1] = 0;
     for (int i = 0; i < 3; i++) {
-        w[0] += (double)chart->N[2 * i] * q[i] / r;
-        w[1] += (double)chart->N[2 * i + 1] * q[i] / r;
+        w[0] += (double)chart->N[0][i] * q[i] / r;
+        w[1] += (double)chart->N[1][i] * q[i] / r;
     }
     w[2] = 1 / r;
 }
@@ -177,7 +177,7 @@ static void test_retracting_nothing_moves_nothing(void) {
 static void retract(const plr_polar *chart, const double w[3], double q[3], double E[16]) {
     double along[3], turn[6] = {0};
     for (int i = 0; i < 3; i++)
-        along[i] = (double)chart->N[2 * i] * w[0] + (double)chart->N[2 * i + 1] * w[1];
+        along[i] = (double)chart->N[0][i] * w[0] + (double)chart->N[1][i] * w[1];
     for (int i = 0; i < 3; i++)
         turn[3 + i] = (double)chart->mu[(i + 1) % 3] * along[(i + 2) % 3] -
                       (double)chart->mu[(i + 2) % 3] * along[(i + 1) % 3];
@@ -219,7 +219,7 @@ static void test_retraction_follows_its_equations(void) {
                 for (int i = 0; i < 3; i++)
                     for (int j = 0; j < 3; j++)
                         sum +=
-                            (double)moved.N[2 * i + a] * E[4 * i + j] * (double)chart.N[2 * j + b];
+                            (double)moved.N[a][i] * E[4 * i + j] * (double)chart.N[b][j];
                 TEST_ASSERT_DOUBLE_WITHIN(30 * eps, sum, (double)M[2 * a + b]);
             }
     }

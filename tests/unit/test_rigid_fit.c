@@ -78,7 +78,7 @@ static void test_it_solves_the_normal_equations(void) {
         double J[MOST][18], w[MOST][3], xi[6], spread[6], expected[6], got[6];
         plr_real J_real[18], w_real[3], xi_real[6], spread_real[6], eta[6];
         plr_rigid_fit fit;
-        plr_rigid_fit_clear(&fit);
+        memset(&fit, 0, sizeof fit);
         for (unsigned i = 0; i < count; i++) {
             draw(J_real, J[i], 18, 1);
             draw(w_real, w[i], 3, run % 2 ? 0.1 : 0.005); /* more and less than the noise */
@@ -102,7 +102,7 @@ static void check_common_motion(const plr_real spread[6], double tolerance) {
         plr_real xi[6], eta[6];
         double same[6], got[6];
         plr_rigid_fit fit;
-        plr_rigid_fit_clear(&fit);
+        memset(&fit, 0, sizeof fit);
         draw(xi, same, 6, 0.1);
         for (unsigned i = 0; i < MOST; i++) {
             plr_real J[18], w[3] = {0};
@@ -136,7 +136,7 @@ static void test_landmarks_that_stay_outvote_the_pose(void) {
     const plr_real xi[6] = {3, -2, 1, PLR_R(0.1), PLR_R(-0.2), PLR_R(0.3)}, still[3] = {0};
     plr_real eta[6];
     plr_rigid_fit fit;
-    plr_rigid_fit_clear(&fit);
+    memset(&fit, 0, sizeof fit);
     for (unsigned i = 0; i < 200; i++) {
         plr_real J[18];
         double ignored[18];
@@ -158,7 +158,7 @@ static void test_far_points_do_not_move_further_together_than_the_body_may_have_
     for (int limited = 0; limited < 2; limited++) {
         plr_real eta[6];
         plr_rigid_fit fit;
-        plr_rigid_fit_clear(&fit);
+        memset(&fit, 0, sizeof fit);
         for (unsigned i = 0; i < 20; i++) {
             plr_real J[18] = {0}, w[3];
             double ignored[6];
@@ -183,18 +183,18 @@ static void test_without_landmarks_and_after_an_accident_it_is_the_pose(void) {
     const plr_real xi[6] = {1, 2, 3, PLR_R(0.1), PLR_R(0.2), PLR_R(0.3)};
     plr_real eta[6], J[18] = {0};
     plr_rigid_fit fit;
-    plr_rigid_fit_clear(&fit);
+    memset(&fit, 0, sizeof fit);
     plr_rigid_fit_solve(&fit, xi, no_motion, noise, eta);
     for (int k = 0; k < 6; k++)
         TEST_ASSERT_DOUBLE_WITHIN(10 * REAL_EPSILON, (double)xi[k], (double)eta[k]);
 
     const plr_real huge[3] = {PLR_R(1e6), 0, 0}, nothing[3] = {(plr_real)NAN, 0, 0};
     J[3] = J[10] = J[17] = 1;
-    plr_rigid_fit_clear(&fit);
+    memset(&fit, 0, sizeof fit);
     plr_rigid_fit_add(&fit, J, huge, W);
     plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
     TEST_ASSERT_TRUE(same_bits(xi, eta, 6));
-    plr_rigid_fit_clear(&fit);
+    memset(&fit, 0, sizeof fit);
     plr_rigid_fit_add(&fit, J, nothing, W);
     plr_rigid_fit_solve(&fit, xi, free_motion, noise, eta);
     TEST_ASSERT_TRUE(same_bits(xi, eta, 6));

@@ -157,7 +157,7 @@ static void test_end_sends_what_is_left_and_counts(void) {
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_LANDMARK, &answer));
     TEST_ASSERT_EQUAL_UINT8(PLR_LANDMARK_FINAL, answer.as.landmark.role);
     TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_END, &answer));
-    TEST_ASSERT_EQUAL_UINT32(held, answer.as.end.landmarks);
+    TEST_ASSERT_EQUAL_UINT32(held, answer.as.end.sent[PLR_COUNTED_LANDMARK]);
     TEST_ASSERT_EQUAL_UINT32(1 + 5 + 5 + held, answer.as.end.frames); /* CONFIG, POSE, REPORT */
 }
 

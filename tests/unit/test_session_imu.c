@@ -234,7 +234,7 @@ static void test_an_end_compares_the_imu_messages(void) {
     const inertial_manner batches = {.batch = 5};
     desk_begin();
     inertial_send_drive(&batches);
-    port.sender.counts.imus += 2; /* two were lost on the way */
+    port.sender.counts.sent[PLR_COUNTED_IMU] += 2; /* two were lost on the way */
     desk_send(end);
     desk_run();
     TEST_ASSERT_EQUAL_UINT(1, desk_texts_with(" 49 of 51 IMU"));

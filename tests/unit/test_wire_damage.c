@@ -27,7 +27,8 @@ void setUp(void) {
         end_of[i] = sink.length;
     }
     plr_end *end = &sent[PLR_KIND_END - 1].as.end;
-    end->twists = end->stereos = end->truths = end->landmarks = 1;
+    for (unsigned i = 0; i <= PLR_COUNTED_LANDMARK; i++)
+        end->sent[i] = 1;
     end->frames = PLR_KIND_END - 1;
     length = sink.length;
 }

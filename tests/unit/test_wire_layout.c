@@ -230,16 +230,14 @@ static void test_end_counts_lie_where_the_page_says(void) {
         payload[i] = (uint8_t)((i > 24 ? i - 1 : i) % 4 == 0 ? 1 + i / 4 : 0);
     TEST_ASSERT_EQUAL_INT(PLR_OK, wire_read_payload(PLR_KIND_END, payload, 53, &m));
     const plr_end counts = m.as.end;
-    TEST_ASSERT_EQUAL_UINT32(1, counts.twists);
-    TEST_ASSERT_EQUAL_UINT32(2, counts.stereos);
-    TEST_ASSERT_EQUAL_UINT32(3, counts.truths);
-    TEST_ASSERT_EQUAL_UINT32(4, counts.landmarks);
+    for (unsigned i = 0; i <= PLR_COUNTED_LANDMARK; i++)
+        TEST_ASSERT_EQUAL_UINT32(1 + i, counts.sent[i]);
     TEST_ASSERT_EQUAL_UINT32(5, counts.frames);
-    TEST_ASSERT_EQUAL_UINT32(6, counts.readings);
+    TEST_ASSERT_EQUAL_UINT32(6, counts.sent[PLR_COUNTED_READING]);
     TEST_ASSERT_EQUAL_UINT8(7, counts.differs);
     for (unsigned i = 0; i < PLR_COUNTED_IMU; i++)
         TEST_ASSERT_EQUAL_UINT32(7 + i, counts.arrived[i]);
-    TEST_ASSERT_EQUAL_UINT32(12, counts.imus);
+    TEST_ASSERT_EQUAL_UINT32(12, counts.sent[PLR_COUNTED_IMU]);
     TEST_ASSERT_EQUAL_UINT32(13, counts.arrived[PLR_COUNTED_IMU]);
 }
 

@@ -33,13 +33,8 @@ static size_t write_stream(unsigned first_variant, unsigned last_variant) {
                 send(&w, (plr_kind)kind, variant);
     unsigned each = last_variant - first_variant + 1;
     send(&w, PLR_KIND_END, WIRE_SAMPLE_LEAST);
-    sent[sent_count - 1].as.end = (plr_end){.twists = each,
-                                            .stereos = each,
-                                            .truths = each,
-                                            .landmarks = each,
-                                            .frames = sent_count - 1,
-                                            .readings = each,
-                                            .imus = each};
+    sent[sent_count - 1].as.end =
+        (plr_end){.sent = {each, each, each, each, each, each}, .frames = sent_count - 1};
     return sink.length;
 }
 

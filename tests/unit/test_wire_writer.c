@@ -150,14 +150,14 @@ static void test_an_end_tells_what_was_written_whatever_it_says(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, put_sample(kinds[i]));
     sink.length = 0;
     plr_message end = {.kind = PLR_KIND_END}, back;
-    end.as.end.twists = 1000;
+    end.as.end.sent[PLR_COUNTED_TWIST] = 1000;
     end.as.end.arrived[PLR_COUNTED_READING] = 9; /* which the writer cannot know */
     end.as.end.differs = 1U << PLR_COUNTED_READING;
     TEST_ASSERT_EQUAL_INT(PLR_OK, put(&end));
     plr_reader r = wire_reader();
     size_t taken;
     TEST_ASSERT_EQUAL_INT(PLR_READ_MESSAGE, plr_reader_feed(&r, bytes, sink.length, &taken, &back));
-    end.as.end = (plr_end){4, 2, 3, 2, FRAMES, 1, 2, 16, {0, 0, 0, 0, 9, 0}};
+    end.as.end = (plr_end){{4, 2, 3, 2, 1, 2}, FRAMES, 16, {0, 0, 0, 0, 9, 0}};
     wire_assert_same(&end, &back);
 }
 

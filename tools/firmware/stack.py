@@ -34,8 +34,8 @@ STORE = (
     r"|flush|append_state"
 )
 SESSION = (
-    r"plr_session_step|feed_reader|(apply|use|delay)_step|predict|update|use_frame|answer"
-    r"|use_in_order|plr_(data|steps)_\w+"
+    r"(apply|use|delay)_step|apply_until|predict|update|use_frame|use_held|answer|use_in_order"
+    r"|plr_(data|steps)_\w+"
 )
 HANDLERS = (
     r"plr_start_(begin|change_settings|add_landmark)",
@@ -50,13 +50,12 @@ FILTER = (
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"(gain|position|id)_before",)),
-    (r"to_frame|send_frame|plr_writer_put", ("write_to_port", "send")),
+    (r"to_frame|send_frame|plr_writer_put", (*PORT, "send")),
     (STORE, (DEVICE,)),
     (r"move|pass_\w+|plr_codec_\w+", (r"(from|to)_(payload|frame|source|sink|header)",)),
     (r"from_source|to_sink|plr_filter_save", ("append_state", "read_state")),
-    (r"write_to_port", PORT),
+    (r"plr_session_step|feed_reader|handle", (*PORT, TELEMETRY, *HANDLERS)),
     (SESSION, (*PORT, TELEMETRY)),
-    (r"plr_input_handle", HANDLERS),
     (r"plr_start_\w+|plr_send_\w+|echo", ()),
     (r"plr_correct|plr_correct_towards|move_estimate", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),

@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include "process/mean.h"
+#include "process/process.h"
 
-#include "math/small.h"
 #include "state/seconds.h"
+
+/* The largest step, m and rad. The series of SO(3) are accurate up to this angle. */
+#define MAX_WAY  PLR_R(1000)
+#define MAX_TURN PLR_R(3.1415926)
+
+bool plr_step_is_possible(plr_real way2, plr_real turn2) {
+    return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
+}
 
 void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_time_ns t_ns,
                       const plr_real reading[PLR_READING_DIM], plr_real held[PLR_READING_DIM]) {
