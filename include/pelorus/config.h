@@ -56,6 +56,17 @@ extern "C" {
 #define PLR_PORTABLE 0
 #endif
 
+/* 1 (default) or 0. 0: without src/supervise, the estimator alone: nothing is doubted, every picture is used,
+ * and health is that of a filter that believes what it is told. The build links src/absent/supervise.c. */
+#ifndef PLR_SUPERVISE
+#define PLR_SUPERVISE 1
+#endif
+
+/* 1 (default) or 0. 0: without src/known_map: the map source is never asked. */
+#ifndef PLR_KNOWN_MAP
+#define PLR_KNOWN_MAP 1
+#endif
+
 /* Columns of the tile that the update's kernel keeps in registers: a divisor of 16 or 6, default 16
  * with AVX, else 4. It changes the speed, and no bit of a result. */
 #ifndef PLR_TILE_COLUMNS

@@ -2,7 +2,6 @@
 /* Landmarks as the caller sees them: in the world, in and out. */
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "known_map/lookup.h"
 #include "math/finite.h"
 #include "process/alignment.h"
 #include "process/process.h"
@@ -38,7 +37,7 @@ plr_status plr_filter_insert_known(plr_filter *f, const plr_landmark *landmark) 
     if (!plr_all_within(landmark->p_W_m, 3, PLR_MAX_POSITION) ||
         !plr_all_within(landmark->P_W_m2, 9, PLR_MAX_VARIANCE))
         return PLR_E_RANGE;
-    if (!plr_landmark_is_valid(landmark))
+    if (!plr_is_place(landmark->p_W_m, landmark->P_W_m2))
         return PLR_E_ARGUMENT;
     if (f->diverged)
         return PLR_E_DIVERGED;

@@ -7,20 +7,17 @@
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
 #include "filter/matching.h"
-#include "known_map/lookup.h"
-#include "known_map/placing.h"
 #include "filter/predict.h"
+#include "known_map/find.h"
+#include "known_map/lookup.h"
 #include "math/dense.h"
-#include "math/se3.h"
 #include "math/small.h"
-#include "math/so3.h"
 #include "process/alignment.h"
 #include "sensor/stereo.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
 #include "state/pose.h"
-#include "state/sensitivity.h"
 #include "state/slots.h"
 #include "supervise/supervise.h"
 
@@ -39,13 +36,6 @@ enum { STEPS = 3 };
  * frame alone tells it better than all before: where each variance of the pose is at least this
  * multiple of the frame's. */
 #define WIDE_ENOUGH PLR_R(1)
-/* The largest such multiple at which pose and frame are joined in one matrix: beyond it the
- * update would take more digits off P than float32 has. */
-#define TOO_WIDE PLR_R(1e4)
-
-/* So many landmarks fit into work.Vt. */
-#define ROOM (sizeof(((plr_workspace *)0)->Vt) / (sizeof(plr_seen_known)))
-
 void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
     unsigned seen = unplaced, off = unplaced;
     if (!plr_map_is_asked(f))
@@ -63,113 +53,6 @@ void plr_relocate_watch(plr_filter *f, unsigned n, unsigned unplaced) {
         f->frames_off_the_map = 0;
     else if (f->frames_off_the_map < OFF_FRAMES)
         f->frames_off_the_map++;
-}
-
-static bool has_just_come_in(const plr_filter *f, unsigned slot) {
-    return f->slots[slot].known && f->slots[slot].times_seen == 0;
-}
-
-/* The known landmarks of the frame, or those that have just come in; those with the lowest ids
- * first. `origin`: where the first one lies, m. Returns how many. */
-static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
-                        bool new_ones_alone, plr_seen_known *seen, double origin[3]) {
-    unsigned count = 0;
-    for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < ROOM; k++) {
-        const plr_observation *o = &frame->observations[f->work.order[k]];
-        const uint16_t slot = f->work.slot_of[k];
-        plr_landmark known;
-        if (new_ones_alone && (slot == PLR_NO_SLOT || !has_just_come_in(f, slot)))
-            continue;
-        if (!plr_map_ask(f, o->id, &known))
-            continue;
-        if (count == 0)
-            memcpy(origin, known.p_W_m, sizeof known.p_W_m);
-        for (unsigned i = 0; i < 3; i++)
-            seen[count].w[i] = (plr_real)(known.p_W_m[i] - origin[i]);
-        for (unsigned i = 0; i < 9; i++)
-            seen[count].P[i] = (plr_real)known.P_W_m2[i];
-        plr_stereo_rows(seen[count].z, o);
-        seen[count].gap_d2 = plr_stereo_row_gap_d2(f, o);
-        seen[count++].k = (uint16_t)k;
-    }
-    return count;
-}
-
-/* They lie in work.Vt. */
-static plr_seen_known *seen_in(plr_filter *f) {
-    return (plr_seen_known *)(void *)f->work.Vt;
-}
-
-/* A pose that known landmarks in sight agree on. */
-typedef struct plr_found_pose {
-    plr_real R_WB[9], P_xi[PLR_POSE_SQUARE]; /* P_xi: as far as this frame tells it */
-    double p_WB[3];
-    unsigned count; /* of `seen` */
-} plr_found_pose;
-
-/* The present pose, without its covariance. */
-static void guess_placing(const plr_filter *f, const double origin[3], plr_placing *guess) {
-    plr_real offset_W[3], offset_C[3];
-    for (unsigned i = 0; i < 3; i++)
-        offset_W[i] = (plr_real)(origin[i] - f->p_WB[i]);
-    plr_mat3_mul_nt(guess->R, f->par.camera.R_CB, f->R_WB);
-    plr_mat3_vec(offset_C, guess->R, offset_W);
-    for (unsigned i = 0; i < 3; i++)
-        guess->t[i] = offset_C[i] + f->par.camera.t_CB[i];
-}
-
-/* T_WB = T_WC T_CB. Where T_WB Exp(xi) is the truth, (rho, theta) of the camera is -Ad(T_CB) xi. */
-static void set_found(const plr_filter *f, const plr_placing *at, const double origin[3],
-                      plr_found_pose *found) {
-    const plr_camera *camera = &f->par.camera;
-    plr_real offset_C[3], offset_W[3], A[PLR_POSE_SQUARE];
-    for (unsigned i = 0; i < 3; i++)
-        offset_C[i] = camera->t_CB[i] - at->t[i];
-    plr_mat3_tvec(offset_W, at->R, offset_C);
-    for (unsigned i = 0; i < 3; i++)
-        found->p_WB[i] = origin[i] + (double)offset_W[i];
-    plr_mat3_mul_tn(found->R_WB, at->R, camera->R_CB);
-    plr_so3_orthonormalise(found->R_WB);
-    plr_se3_adjoint_inverse(A, camera->R_CB, camera->t_CB);
-    plr_sandwich6(found->P_xi, A, at->P_C);
-}
-
-/* By the frame alone. False if fewer than three fifths agree. */
-static bool find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
-                      plr_found_pose *found) {
-    double origin[3];
-    plr_placing guess, at;
-    found->count = collect(f, frame, n, false, seen_in(f), origin);
-    if (found->count < PLR_PLACING_LEAST)
-        return false;
-    if (guesses)
-        guess_placing(f, origin, &guess);
-    const unsigned agreeing = plr_place(f, seen_in(f), found->count, guesses ? &guess : NULL, &at);
-    if (agreeing == 0 || 5 * agreeing < 3 * found->count)
-        return false;
-    set_found(f, &at, origin, found);
-    return true;
-}
-
-/* By the landmarks that have just come in, and by what is known of the pose. False if there are
- * none, or if fewer than three fifths agree. found->P_xi is zero. */
-static bool find_likeliest(plr_filter *f, const plr_frame *frame, unsigned n,
-                           plr_found_pose *found) {
-    double origin[3];
-    plr_real P[PLR_POSE_SQUARE];
-    plr_placing prior, at;
-    found->count = collect(f, frame, n, true, seen_in(f), origin);
-    if (found->count == 0)
-        return false;
-    guess_placing(f, origin, &prior);
-    plr_motion_pose_covariance(f, P);
-    plr_sandwich6(prior.P_C, f->par.Ad_CB, P);
-    const unsigned agreeing = plr_place_by_prior(f, seen_in(f), found->count, &prior, &at);
-    if (5 * agreeing < 3 * found->count)
-        return false;
-    memset(at.P_C, 0, sizeof at.P_C);
-    set_found(f, &at, origin, found);
-    return true;
 }
 
 /* ---------------------------------------------------------------- lost */
@@ -198,7 +81,7 @@ static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
         plr_filter_begin_prior_bias(f);
     plr_alignment_keep_world(f);
-    take_up(f, frame, seen_in(f), found->count);
+    take_up(f, frame, plr_seen_known_of(f), found->count);
 }
 
 bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
@@ -207,7 +90,7 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
     if (f->frames_off_the_map < OFF_FRAMES || !plr_map_is_asked(f))
         return false;
     f->frames_off_the_map = 0;
-    events->lost_in_map = !find_pose(f, frame, n, false, &found);
+    events->lost_in_map = !plr_find_pose(f, frame, n, false, &found);
     if (events->lost_in_map)
         return false;
     begin_at(f, frame, &found);
@@ -260,7 +143,7 @@ static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones)
         const uint16_t slot = f->work.slot_of[k];
         if (slot == PLR_NO_SLOT || !f->slots[slot].known)
             continue;
-        const bool is_new = has_just_come_in(f, slot);
+        const bool is_new = plr_has_just_come_in(f, slot);
         const bool is = slot_is_rough(f, is_new ? P_xi : motion, slot);
         rough += is;
         *new_ones += is && is_new && is_in_map(f, slot);
@@ -271,49 +154,8 @@ static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones)
 /* They come in again: all known landmarks, or those that have just come in. */
 static void drop_known(plr_filter *f, bool new_ones_alone) {
     for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
-        if ((!new_ones_alone || has_just_come_in(f, slot)) && is_in_map(f, slot))
+        if ((!new_ones_alone || plr_has_just_come_in(f, slot)) && is_in_map(f, slot))
             plr_slots_remove(f, slot);
-}
-
-/* A pose that was found, held against the predicted one. */
-typedef struct plr_pose_gap {
-    plr_real xi[PLR_POSE_DIM];   /* from the predicted one, m and rad in the body */
-    plr_real nu[PLR_POSE_DIM];   /* xi in sigmas of P + P_found */
-    plr_real back[PLR_POSE_DIM]; /* P_found (P + P_found)^-1 xi: what the prediction knows better */
-    plr_real least, largest;     /* of the ratios of P's variances to P_found's */
-} plr_pose_gap;
-
-static void compare(const plr_real P[PLR_POSE_SQUARE], const plr_real P_found[PLR_POSE_SQUARE],
-                    plr_pose_gap *gap) {
-    gap->least = TOO_WIDE;
-    gap->largest = 0;
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
-        if (P[i] < gap->least * P_found[i])
-            gap->least = P[i] / P_found[i];
-        if (P[i] > gap->largest * P_found[i] && P_found[i] > 0)
-            gap->largest = P[i] / P_found[i];
-    }
-}
-
-/* False if P + P_found cannot be factorised. */
-static bool measure_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap) {
-    plr_real P[PLR_POSE_SQUARE], sum[PLR_POSE_SQUARE], y[PLR_POSE_DIM],
-        U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
-    plr_motion_pose_covariance(f, P);
-    compare(P, found->P_xi, gap);
-    plr_sensitivity_add_to_pose(f, P);
-    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
-        sum[i] = P[i] + found->P_xi[i];
-    plr_upper6_pack(U, sum);
-    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
-        return false;
-    plr_pose_towards(f, found->R_WB, found->p_WB, gap->xi);
-    memcpy(gap->nu, gap->xi, sizeof gap->nu);
-    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, gap->nu, 1);
-    memcpy(y, gap->nu, sizeof y);
-    plr_solve_upper(PLR_POSE_DIM, U, y);
-    plr_mat6_vec(gap->back, found->P_xi, y);
-    return true;
 }
 
 /* Moves the pose to where prediction and frame together have it: to the one that was found, less
@@ -372,7 +214,7 @@ static bool is_regular(const plr_real P[PLR_POSE_SQUARE]) {
 /* Where the frame tells more of the pose than was known. */
 static bool is_told_by_frame(plr_filter *f, const plr_frame *frame, unsigned n,
                              plr_found_pose *found, plr_pose_gap *gap) {
-    return find_pose(f, frame, n, true, found) && measure_gap(f, found, gap) &&
+    return plr_find_pose(f, frame, n, true, found) && plr_find_gap(f, found, gap) &&
            !(gap->least < WIDE_ENOUGH);
 }
 
@@ -390,12 +232,12 @@ plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame
             P[i] = WIDER * found.P_xi[i];
         drop_known(f, false);
         plr_predict_apply_prior(f);
-        return go_to(f, &found, &gap, gap.largest > TOO_WIDE, P, events);
+        return go_to(f, &found, &gap, gap.largest > PLR_TOO_WIDE, P, events);
     }
     plr_motion_pose_covariance(f, P);
     if (new_ones == 0 || !is_regular(P))
         return PLR_PLACED;
-    const bool tells = find_likeliest(f, frame, n, &found) && measure_gap(f, &found, &gap);
+    const bool tells = plr_find_likeliest_pose(f, frame, n, &found) && plr_find_gap(f, &found, &gap);
     drop_known(f, true);
     events->lost_in_map = !tells;
     if (!tells)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "known_map/lookup.h"
 
-#include "math/finite.h"
 #include "math/validate.h"
 
 bool plr_map_is_asked(const plr_filter *f) {
@@ -12,11 +11,5 @@ bool plr_map_is_asked(const plr_filter *f) {
 
 bool plr_map_ask(const plr_filter *f, uint32_t id, plr_landmark *known) {
     *known = (plr_landmark){.P_W_m2 = {-1}}; /* refused, if the source fills in nothing */
-    return f->map.source(f->map.context, id, known) && plr_landmark_is_valid(known);
-}
-
-bool plr_landmark_is_valid(const plr_landmark *landmark) {
-    return plr_all_within(landmark->p_W_m, 3, PLR_MAX_POSITION) &&
-           plr_all_within(landmark->P_W_m2, 9, PLR_MAX_VARIANCE) &&
-           plr_is_covariance(landmark->P_W_m2, 3);
+    return f->map.source(f->map.context, id, known) && plr_is_place(known->p_W_m, known->P_W_m2);
 }

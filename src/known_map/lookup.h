@@ -13,7 +13,4 @@ bool plr_map_is_asked(const plr_filter *f);
 /* Asks it for one. False if it has none, or one that is not valid. */
 bool plr_map_ask(const plr_filter *f, uint32_t id, plr_landmark *known);
 
-/* Finite and within the limits, with a covariance that is symmetric and positive. */
-bool plr_landmark_is_valid(const plr_landmark *landmark);
-
 #endif

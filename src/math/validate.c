@@ -54,3 +54,8 @@ bool plr_is_covariance(const double *P, unsigned n) {
     }
     return true;
 }
+
+bool plr_is_place(const double p[3], const double P[9]) {
+    return plr_all_within(p, 3, PLR_MAX_POSITION) && plr_all_within(P, 9, PLR_MAX_VARIANCE) &&
+           plr_is_covariance(P, 3);
+}

@@ -18,4 +18,7 @@ bool plr_is_rotation(const double R[9]);
 /* Symmetric and positive semidefinite but for rounding; n <= 6. */
 bool plr_is_covariance(const double *P, unsigned n);
 
+/* Finite and within the limits, with a covariance that is symmetric and positive. */
+bool plr_is_place(const double p[3], const double P[9]);
+
 #endif

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 # How an image is made of the library, the port and a board.
 
-file(GLOB PELORUS_SOURCES CONFIGURE_DEPENDS "${PELORUS_ROOT}/src/*/*.c")
+include("${PELORUS_ROOT}/cmake/PelorusSources.cmake")
+pelorus_sources(PELORUS_SOURCES "${PELORUS_ROOT}")
 set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
 set(IMAGES "${CMAKE_CURRENT_BINARY_DIR}/images")
 file(MAKE_DIRECTORY "${IMAGES}")
@@ -85,6 +86,11 @@ function(cortexm_library result cpu capacity bits)
     target_compile_definitions(${name} PUBLIC PLR_REAL=${bits} PLR_MAX_LANDMARKS=${capacity}
       PLR_MAX_OBSERVATIONS=${observations} PLR_BLOCK_OBSERVATIONS=8 PLR_PORTABLE=0
       PLR_TILE_COLUMNS=6)
+    foreach(option PLR_SUPERVISE PLR_KNOWN_MAP)
+      if(DEFINED ${option})
+        target_compile_definitions(${name} PUBLIC ${option}=$<BOOL:${${option}}>)
+      endif()
+    endforeach()
   endif()
   set(${result} ${name} PARENT_SCOPE)
 endfunction()

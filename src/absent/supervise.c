@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+/* In the place of src/supervise where a build leaves it out (PLR_SUPERVISE=0): nothing is doubted, every
+ * picture is used, and health is that of a filter that believes what it is told. */
+#include "supervise/supervise.h"
+
+#include <string.h>
+
+void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
+    (void)config;
+    memset(s, 0, sizeof *s);
+    s->weight[0] = s->weight[1] = 1;
+    plr_supervise_clock_set(s);
+}
+
+bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
+    (void)s;
+    (void)e;
+    return true;
+}
+
+plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e) {
+    const plr_search_decision decision = {false, false, false, false};
+    (void)s;
+    (void)e;
+    return decision;
+}
+
+void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const plr_report *report,
+                         plr_frame_decision *decision) {
+    memset(decision, 0, sizeof *decision);
+    s->last_frame_ns = e->readings.now_ns;
+    if (report->used > 0)
+        s->last_use_ns = e->readings.now_ns;
+}
+
+plr_real plr_supervise_weight(const plr_supervisor *s, unsigned axis) {
+    (void)axis;
+    return s->weight[0];
+}
+
+bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
+    (void)s;
+    return false;
+}
+
+bool plr_supervise_opens_fixed_gate(const plr_supervisor *s) {
+    (void)s;
+    return false;
+}
+
+void plr_supervise_pose_set(plr_supervisor *s) {
+    (void)s;
+}
+
+void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
+    s->relocated = relocated;
+}
+
+bool plr_supervise_was_relocated(const plr_supervisor *s) {
+    return s->relocated;
+}
+
+void plr_supervise_clock_set(plr_supervisor *s) {
+    s->last_frame_ns = s->last_use_ns = s->last_position_ns = PLR_NEVER_NS;
+}
+
+void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
+    (void)s;
+    (void)e;
+}
+
+void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,
+                           bool used, plr_real d2, bool bounds, plr_time_ns now_ns) {
+    (void)numbers, (void)used, (void)d2, (void)bounds, (void)now_ns;
+    plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    of->t_ns = reading->t_ns;
+    memcpy(of->value, reading->value, sizeof of->value);
+}
+
+plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor) {
+    (void)s;
+    (void)sensor;
+    return 1;
+}
+
+bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading) {
+    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
+}
+
+void plr_supervise_restored(plr_supervisor *s) {
+    memset(s->sensors, 0, sizeof s->sensors);
+}
+
+void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const plr_real p[3],
+                           plr_real P_xi[PLR_POSE_SQUARE]) {
+    (void)s, (void)E, (void)p, (void)P_xi;
+}
+
+void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,
+                          plr_health_state *health) {
+    (void)s;
+    health->health = now->started ? PLR_HEALTH_GOOD : PLR_HEALTH_LOST;
+    health->reasons = now->started ? 0 : PLR_REASON_NOT_STARTED;
+}
+
+void plr_supervise_waits(plr_supervisor *s, const plr_readings_evidence *now, plr_report *report) {
+    s->last_frame_ns = now->now_ns;
+    report->health = PLR_HEALTH_LOST;
+    report->reasons = PLR_REASON_NOT_STARTED;
+}
+
+void plr_supervise_refused(const plr_supervisor *s, plr_report *report) {
+    (void)s;
+    (void)report;
+}
+
+void plr_supervise_dead_reckons(plr_supervisor *s, const plr_readings_evidence *now) {
+    (void)s;
+    (void)now;
+}
+
+const plr_limit_row *plr_limit_at(unsigned row) {
+    (void)row;
+    return NULL;
+}

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+#include "known_map/find.h"
+
+#include <string.h>
+
+#include "known_map/lookup.h"
+#include "math/dense.h"
+#include "math/se3.h"
+#include "math/small.h"
+#include "math/so3.h"
+#include "sensor/stereo.h"
+#include "state/motion.h"
+#include "state/pose.h"
+#include "state/sensitivity.h"
+#include "state/slots.h"
+
+/* So many landmarks fit into work.Vt. */
+#define ROOM (sizeof(((plr_workspace *)0)->Vt) / (sizeof(plr_seen_known)))
+
+/* The known landmarks of the frame, or those that have just come in; those with the lowest ids
+ * first. `origin`: where the first one lies, m. Returns how many. */
+static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
+                        bool new_ones_alone, plr_seen_known *seen, double origin[3]) {
+    unsigned count = 0;
+    for (unsigned k = 0; k < n && count < PLR_PLACING_MOST && count < ROOM; k++) {
+        const plr_observation *o = &frame->observations[f->work.order[k]];
+        const uint16_t slot = f->work.slot_of[k];
+        plr_landmark known;
+        if (new_ones_alone && (slot == PLR_NO_SLOT || !plr_has_just_come_in(f, slot)))
+            continue;
+        if (!plr_map_ask(f, o->id, &known))
+            continue;
+        if (count == 0)
+            memcpy(origin, known.p_W_m, sizeof known.p_W_m);
+        for (unsigned i = 0; i < 3; i++)
+            seen[count].w[i] = (plr_real)(known.p_W_m[i] - origin[i]);
+        for (unsigned i = 0; i < 9; i++)
+            seen[count].P[i] = (plr_real)known.P_W_m2[i];
+        plr_stereo_rows(seen[count].z, o);
+        seen[count].gap_d2 = plr_stereo_row_gap_d2(f, o);
+        seen[count++].k = (uint16_t)k;
+    }
+    return count;
+}
+
+/* The present pose, without its covariance. */
+static void guess_placing(const plr_filter *f, const double origin[3], plr_placing *guess) {
+    plr_real offset_W[3], offset_C[3];
+    for (unsigned i = 0; i < 3; i++)
+        offset_W[i] = (plr_real)(origin[i] - f->p_WB[i]);
+    plr_mat3_mul_nt(guess->R, f->par.camera.R_CB, f->R_WB);
+    plr_mat3_vec(offset_C, guess->R, offset_W);
+    for (unsigned i = 0; i < 3; i++)
+        guess->t[i] = offset_C[i] + f->par.camera.t_CB[i];
+}
+
+/* T_WB = T_WC T_CB. Where T_WB Exp(xi) is the truth, (rho, theta) of the camera is -Ad(T_CB) xi. */
+static void set_found(const plr_filter *f, const plr_placing *at, const double origin[3],
+                      plr_found_pose *found) {
+    const plr_camera *camera = &f->par.camera;
+    plr_real offset_C[3], offset_W[3], A[PLR_POSE_SQUARE];
+    for (unsigned i = 0; i < 3; i++)
+        offset_C[i] = camera->t_CB[i] - at->t[i];
+    plr_mat3_tvec(offset_W, at->R, offset_C);
+    for (unsigned i = 0; i < 3; i++)
+        found->p_WB[i] = origin[i] + (double)offset_W[i];
+    plr_mat3_mul_tn(found->R_WB, at->R, camera->R_CB);
+    plr_so3_orthonormalise(found->R_WB);
+    plr_se3_adjoint_inverse(A, camera->R_CB, camera->t_CB);
+    plr_sandwich6(found->P_xi, A, at->P_C);
+}
+
+bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guesses,
+                   plr_found_pose *found) {
+    double origin[3];
+    plr_placing guess, at;
+    found->count = collect(f, frame, n, false, plr_seen_known_of(f), origin);
+    if (found->count < PLR_PLACING_LEAST)
+        return false;
+    if (guesses)
+        guess_placing(f, origin, &guess);
+    const unsigned agreeing = plr_place(f, plr_seen_known_of(f), found->count, guesses ? &guess : NULL, &at);
+    if (agreeing == 0 || 5 * agreeing < 3 * found->count)
+        return false;
+    set_found(f, &at, origin, found);
+    return true;
+}
+
+bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
+                             plr_found_pose *found) {
+    double origin[3];
+    plr_real P[PLR_POSE_SQUARE];
+    plr_placing prior, at;
+    found->count = collect(f, frame, n, true, plr_seen_known_of(f), origin);
+    if (found->count == 0)
+        return false;
+    guess_placing(f, origin, &prior);
+    plr_motion_pose_covariance(f, P);
+    plr_sandwich6(prior.P_C, f->par.Ad_CB, P);
+    const unsigned agreeing = plr_place_by_prior(f, plr_seen_known_of(f), found->count, &prior, &at);
+    if (5 * agreeing < 3 * found->count)
+        return false;
+    memset(at.P_C, 0, sizeof at.P_C);
+    set_found(f, &at, origin, found);
+    return true;
+}
+
+/* The ratios of the variances. */
+static void compare(const plr_real P[PLR_POSE_SQUARE], const plr_real P_found[PLR_POSE_SQUARE],
+                    plr_pose_gap *gap) {
+    gap->least = PLR_TOO_WIDE;
+    gap->largest = 0;
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i += PLR_POSE_DIM + 1) {
+        if (P[i] < gap->least * P_found[i])
+            gap->least = P[i] / P_found[i];
+        if (P[i] > gap->largest * P_found[i] && P_found[i] > 0)
+            gap->largest = P[i] / P_found[i];
+    }
+}
+
+bool plr_find_gap(const plr_filter *f, const plr_found_pose *found, plr_pose_gap *gap) {
+    plr_real P[PLR_POSE_SQUARE], sum[PLR_POSE_SQUARE], y[PLR_POSE_DIM],
+        U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN];
+    plr_motion_pose_covariance(f, P);
+    compare(P, found->P_xi, gap);
+    plr_sensitivity_add_to_pose(f, P);
+    for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
+        sum[i] = P[i] + found->P_xi[i];
+    plr_upper6_pack(U, sum);
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return false;
+    plr_pose_towards(f, found->R_WB, found->p_WB, gap->xi);
+    memcpy(gap->nu, gap->xi, sizeof gap->nu);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, gap->nu, 1);
+    memcpy(y, gap->nu, sizeof y);
+    plr_solve_upper(PLR_POSE_DIM, U, y);
+    plr_mat6_vec(gap->back, found->P_xi, y);
+    return true;
+}
