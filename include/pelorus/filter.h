@@ -276,6 +276,13 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
  * PLR_E_DAMAGED, PLR_E_NOT_READY: `health` is filled too and says DIVERGED. */
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
 
+/* What the supervisor saw in the last frame and decided on it, for a log or for a supervisor of the caller's
+ * own. Call it before the next frame. PLR_E_NOT_READY before the first one. */
+plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *supervision);
+
+/* For measurements: leaves out rules of the supervisor, bits 1 << plr_limit_id, until the next init. */
+plr_status plr_filter_leave_out(plr_filter *f, uint64_t limits);
+
 /* Copies the counts since init or reset. */
 plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals);
 

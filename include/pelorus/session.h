@@ -63,6 +63,7 @@ typedef enum plr_output {
     PLR_OUTPUT_END = 1 << 6,        /* counts, at the end */
     PLR_OUTPUT_ECHO = 1 << 7,       /* every input: the output is then a flight log, and a replay of
                                        it computes the same bits */
+    PLR_OUTPUT_EVIDENCE = 1 << 9,   /* after each REPORT of a STEREO, what the supervisor saw; not by default */
     PLR_OUTPUT_STATE = 1 << 8       /* no message: at END the state is written to the store */
 } plr_output;
 
@@ -106,6 +107,7 @@ typedef struct plr_session_options {
     unsigned override_count;
     plr_start_choice start;
     uint32_t output;         /* bits of plr_output */
+    uint64_t left_out;       /* rules of the supervisor that are left out: plr_filter_leave_out */
     uint32_t deadline_us;    /* time that an update may take, us; 0: no limit. Kept by using fewer
                              observations: src/session/budget.h */
     plr_landmark *known;     /* memory for known LANDMARKs; must outlive the session */
@@ -189,7 +191,7 @@ typedef struct plr_session {
 
 /* --- use --- */
 
-/* PLR_START_AUTO; sends everything but twist poses and echoes; no deadline, no overrides, no memory
+/* PLR_START_AUTO; sends everything but twist poses, evidence and echoes; no deadline, no overrides, no memory
  * for known landmarks, no storage, no observer. */
 void plr_session_options_default(plr_session_options *options);
 

@@ -121,14 +121,6 @@ typedef struct plr_frame_decision {
 
 /* ---------------------------------------------------------------- the state */
 
-/* Whether the pose is in doubt. */
-typedef enum plr_doubt {
-    PLR_DOUBT_NONE,
-    PLR_DOUBT_DEPARTED,     /* odometry and pictures differ by more than is usual; both keep their weight */
-    PLR_DOUBT_CONTRADICTED, /* the odometry has lost weight, and the pictures are followed */
-    PLR_DOUBT_SETTLING      /* until both have agreed for a while */
-} plr_doubt;
-
 /* A sum of differences in which older ones count less, and the covariance that it should have. */
 typedef struct plr_sum {
     plr_real sum[PLR_POSE_DIM];
@@ -163,6 +155,8 @@ typedef struct plr_supervisor {
     plr_real difference_sigmas[PLR_POSE_DIM];
     plr_real difference_noise; /* the expected square of difference_sigmas by noise alone */
     uint8_t doubt;             /* plr_doubt */
+    plr_search_decision searched; /* of the last frame */
+    uint8_t settled;              /* the last frame ended a doubt */
     uint8_t outright;          /* the last frame contradicted outright, and waits for the next */
     uint8_t turns_fail;        /* the turns are contradicted, too */
     uint8_t relocated;         /* the pose was found anew since it came into doubt */

@@ -306,6 +306,56 @@ typedef struct plr_report {
                                of two settings the better one has the smaller sum over a drive */
 } plr_report;
 
+/* Whether the pose is in doubt: docs/SUPERVISION.md. "Odometry" stands for twists and for an IMU. */
+typedef enum plr_doubt {
+    PLR_DOUBT_NONE,
+    PLR_DOUBT_DEPARTED,     /* odometry and pictures differ by more than is usual; both keep their weight */
+    PLR_DOUBT_CONTRADICTED, /* the odometry has lost weight, and the pictures are followed */
+    PLR_DOUBT_SETTLING      /* until both have agreed for a while */
+} plr_doubt;
+
+/* Why a landmark that was seen has not been used. */
+typedef enum plr_rejection {
+    PLR_REJECTED_BY_GATE = 1, /* further off than the gate allows */
+    PLR_REJECTED_FAR = 2,     /* by so much that another point is seen: the track was lost */
+    PLR_REJECTED_LOST = 3,    /* its bearing is too uncertain for a linear correction */
+    PLR_REJECTED_MOVES = 4    /* its innovations are no white noise: the point moves */
+} plr_rejection;
+
+typedef struct plr_rejected_landmark {
+    uint32_t id;
+    uint8_t why;            /* plr_rejection */
+    uint16_t in_succession; /* frames that rejected it */
+    float mean2; /* squared sum of its innovations beside white noise: chi-square of three; above 36 it moves */
+} plr_rejected_landmark;
+
+enum { PLR_SUPERVISION_REJECTED = 24 };
+
+/* What the supervisor saw in one frame, and what it decided: plr_filter_supervision. */
+typedef struct plr_supervision {
+    plr_time_ns t_ns;
+    float nu[6];       /* pictures less odometry, in the odometry's stated sigmas: (rho, theta) */
+    float moved[6];    /* by how much the frame moved the pose beside odometry, m and rad in the body */
+    float statistic;   /* chi-square of six of the sum of nu, in units of what is usual */
+    float usual[6];    /* by how much its square is usually more than stated, 1 to 25 */
+    float agreement;   /* share of the last frames in which both agreed */
+    float weight[2];   /* factors of the odometry's sigmas in the next frame, way and turn: 1 or more */
+    float difference[6]; /* from the other pose that may be true to this one: m and rad in the body */
+    uint8_t doubt;       /* plr_doubt */
+    bool applied;        /* the frame applied a motion: nu and moved are filled */
+    bool outright;       /* the points agreed on a motion that the odometry excludes */
+    bool waits;          /* the frame was not used: the next one shall confirm it */
+    bool holds_biases;   /* it taught the biases nothing */
+    bool locked;         /* the landmarks that the gate rejected were dropped */
+    bool frozen;         /* the picture repeats the last one, and was not used */
+    bool misfits;        /* `usual` is more than the stated sigmas allow */
+    bool settled;        /* a doubt ended: the difference was added to the covariance */
+    uint16_t matched, same;  /* observations of known ids; of these, with the very pixels of last time */
+    uint16_t known, adopted; /* known landmarks in the frame; of these, that have just come in */
+    uint8_t count;           /* of `rejected`: those of the largest mean2, if there are more */
+    plr_rejected_landmark rejected[PLR_SUPERVISION_REJECTED];
+} plr_supervision;
+
 /* The filter's health at some time, with or without a frame: plr_filter_health. A time since an
  * event that never happened is infinite; the reasons then hold NO_FRAMES, NO_OBSERVATIONS or
  * NO_TWISTS. */

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "pelorus/supervisor.h"
 #include "posix/config_file.h"
 
 typedef enum option_kind { OPTION_SETTING, OPTION_PATH, OPTION_FLAG } option_kind;
@@ -53,6 +54,9 @@ static const option table[] = {
     {{"save-state", "FILE", "save the filter's state there at the end; FILE keeps the last two"},
      OPTION_PATH,
      AT(save_state)},
+    {{"without", "NAME,...", "leaves out rules of the supervisor: the names of docs/SUPERVISION.md"},
+     OPTION_PATH,
+     AT(without)},
     {{"json", NULL, "the summary as one JSON object"}, OPTION_FLAG, AT(json)},
     {{"quiet", NULL, "no summary, no progress, no warnings"}, OPTION_FLAG, AT(quiet)},
     {{"help", NULL, "this text"}, OPTION_FLAG, AT(help)},
@@ -230,6 +234,26 @@ static void merge(replay_options *options, const setting_list *list) {
         options->deadline_us = list->deadline_us;
 }
 
+/* The rules that --without names. */
+static bool find_left_out(replay_options *options, char *problem) {
+    for (const char *name = options->without; name && *name;) {
+        const size_t n = strcspn(name, ",");
+        unsigned row = 0;
+        const plr_limit_row *limit;
+        while ((limit = plr_limit_at(row)) != NULL &&
+               (strlen(limit->name) != n || memcmp(limit->name, name, n) != 0))
+            row++;
+        if (limit == NULL) {
+            snprintf(problem, PROBLEM_SIZE,
+                     "--without: %.*s is no rule; docs/SUPERVISION.md lists them", (int)n, name);
+            return false;
+        }
+        options->left_out |= UINT64_C(1) << row;
+        name += n + (name[n] == ',');
+    }
+    return true;
+}
+
 bool options_parse(replay_options *options, int argc, char *const *argv,
                    char problem[PROBLEM_SIZE]) {
     setting_list from_line = {0}, from_file = {0};
@@ -238,6 +262,8 @@ bool options_parse(replay_options *options, int argc, char *const *argv,
     if (!take_all(options, &from_line, &given, problem))
         return false;
     if (options->config != NULL && !config_file_read(options->config, &from_file, problem))
+        return false;
+    if (!find_left_out(options, problem))
         return false;
     merge(options, &from_file);
     merge(options, &from_line);

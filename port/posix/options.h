@@ -16,6 +16,8 @@ typedef struct replay_options {
     unsigned override_count;
     plr_start_choice start;
     uint32_t deadline_us;
+    const char *without; /* rules of the supervisor that are left out, with commas; NULL: none */
+    uint64_t left_out;   /* the same as bits of plr_limit_id */
 } replay_options;
 
 /* Reads the command line, and the config file that it names. On false, `problem` says what is wrong

@@ -183,7 +183,8 @@ static plr_status start_session(replay *run) {
     options.override_count = run->options.override_count;
     options.start = run->options.start;
     options.deadline_us = run->options.deadline_us;
-    options.output |= PLR_OUTPUT_ECHO;
+    options.output |= PLR_OUTPUT_ECHO | PLR_OUTPUT_EVIDENCE;
+    options.left_out = run->options.left_out;
     options.known = run->known;
     options.known_capacity = KNOWN_LANDMARKS;
     options.map = run->map_in.landmarks.items;

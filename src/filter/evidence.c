@@ -4,12 +4,15 @@
 #include <string.h>
 
 #include "filter/filter_internal.h"
+#include "filter/guard.h"
+#include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
 #include "state/slots.h"
+#include "supervise/supervise.h"
 
 void plr_evidence_begin(plr_filter *f) {
     memset(&f->work.evidence, 0, sizeof f->work.evidence);
@@ -100,4 +103,51 @@ void plr_evidence_complete(plr_filter *f) {
     add_biases(f, &e->bias);
     e->has_gate = f->par.gate_d2 > 0 || f->par.gate_residual2 > 0;
     e->readings = plr_filter_readings_at(f, f->t_ns);
+}
+
+/* ---------------------------------------------------------------- what is told of it */
+
+static plr_rejection why(const plr_filter *f, unsigned slot) {
+    if (f->slots[slot].moving)
+        return PLR_REJECTED_MOVES;
+    return f->slots[slot].accepted == 0 ? PLR_REJECTED_FAR : PLR_REJECTED_BY_GATE;
+}
+
+/* Puts a landmark among those of the largest mean2. */
+static void insert(plr_supervision *told, plr_rejected_landmark landmark) {
+    unsigned at = told->count < PLR_SUPERVISION_REJECTED ? told->count++ : PLR_SUPERVISION_REJECTED;
+    for (; at > 0 && told->rejected[at - 1].mean2 < landmark.mean2; at--)
+        if (at < PLR_SUPERVISION_REJECTED)
+            told->rejected[at] = told->rejected[at - 1];
+    if (at < PLR_SUPERVISION_REJECTED)
+        told->rejected[at] = landmark;
+}
+
+plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *told) {
+    const plr_status sound = told ? plr_guard_check(f) : PLR_E_ARGUMENT;
+    if (sound != PLR_OK)
+        return sound;
+    if (f->totals.frames == 0)
+        return PLR_E_NOT_READY;
+    plr_supervise_tell(&f->supervisor, &f->work.evidence, told);
+    for (unsigned slot = 0; slot < f->count; slot++) {
+        const plr_slot *s = &f->slots[slot];
+        const plr_real variance = s->innovation_variance;
+        if (s->last_frame != f->frame_number || s->rejected == 0)
+            continue;
+        insert(told, (plr_rejected_landmark){
+                         s->id, (uint8_t)why(f, slot), s->rejected,
+                         variance > 0 ? (float)(plr_dot3(s->innovation_sum, s->innovation_sum) / variance)
+                                      : 0.0F});
+    }
+    return PLR_OK;
+}
+
+plr_status plr_filter_leave_out(plr_filter *f, uint64_t limits) {
+    const plr_status sound = plr_guard_check_whole(f);
+    if (sound != PLR_OK)
+        return sound;
+    f->supervisor.left_out = limits;
+    plr_guard_seal_whole(f);
+    return PLR_OK;
 }

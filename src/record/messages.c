@@ -61,6 +61,11 @@ static void pass_imu(plr_codec *c, plr_imu_message *m) {
         plr_codec_fields(c, &m->readings[i], IMU_rows, LENGTH(IMU_rows));
 }
 
+static void pass_rejected(plr_codec *c, plr_supervision *m) {
+    for (unsigned i = 0; i < rows_of(c, m->count) && c->status == PLR_OK; i++)
+        plr_codec_fields(c, &m->rejected[i], EVIDENCE_rows, LENGTH(EVIDENCE_rows));
+}
+
 /* What is read goes to the reader's room; what is written is only looked at. */
 static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_room *room) {
     plr_observation *rows = (plr_observation *)m->observations;
@@ -88,6 +93,8 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
         pass_observations(c, content, room);
     if (kind == PLR_KIND_IMU)
         pass_imu(c, content);
+    if (kind == PLR_KIND_EVIDENCE)
+        pass_rejected(c, content);
     if (kind == PLR_KIND_LANDMARK && plr_codec_reads(c)) {
         plr_landmark_message *m = content;
         m->landmark.times_gated = 0;

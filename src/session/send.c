@@ -104,6 +104,13 @@ static void put_report(plr_session *s, plr_kind subject, const plr_report *repor
 
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns) {
     put_report(s, PLR_KIND_STEREO, report, compute_ns, PLR_NOTICE_NONE);
+    if ((s->options.output & PLR_OUTPUT_EVIDENCE) == 0 || report->status != PLR_OK)
+        return;
+    s->out.kind = PLR_KIND_EVIDENCE;
+    if (plr_filter_supervision(&s->filter, &s->out.as.evidence) != PLR_OK)
+        return;
+    s->out.as.evidence.t_ns = report->t_ns; /* by which the frame's sender knows it */
+    put(s, PLR_OUTPUT_EVIDENCE, &s->out);
 }
 
 void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,

@@ -148,7 +148,10 @@ static plr_status init_filter(plr_session *s, const plr_setting **culprit) {
     if (status != PLR_OK)
         return status;
     const plr_map map = {s, send_evicted, asks_for_known(&config) ? find_known : NULL};
-    return plr_filter_init(&s->filter, &s->header.calibration, &config, &map);
+    status = plr_filter_init(&s->filter, &s->header.calibration, &config, &map);
+    if (status == PLR_OK && s->options.left_out != 0)
+        status = plr_filter_leave_out(&s->filter, s->options.left_out);
+    return status;
 }
 
 plr_status plr_start_filter(plr_session *s) {

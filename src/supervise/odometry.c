@@ -32,9 +32,8 @@ static uint16_t one_more(uint16_t frames) {
 
 /* ---------------------------------------------------------------- a frame's own difference */
 
-/* v = L^-1 n; where L has a zero column v is zero. */
-static void in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
-                      plr_real v[PLR_POSE_DIM]) {
+void plr_odometry_in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
+                            plr_real v[PLR_POSE_DIM]) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         v[k] = n[k];
         for (unsigned l = 0; l < k; l++)
@@ -52,7 +51,7 @@ static void to_stated_sigmas(const plr_motion_evidence *m, plr_real J[PLR_POSE_S
         plr_real column[PLR_POSE_DIM], solved[PLR_POSE_DIM];
         for (unsigned r = 0; r < PLR_POSE_DIM; r++)
             column[r] = m->L[PLR_POSE_DIM * r + c];
-        in_sigmas(m->L_used, column, solved);
+        plr_odometry_in_sigmas(m->L_used, column, solved);
         for (unsigned r = 0; r < PLR_POSE_DIM; r++)
             T[PLR_POSE_DIM * r + c] = Tt[PLR_POSE_DIM * c + r] = solved[r];
     }
@@ -225,7 +224,7 @@ void plr_odometry_settle(plr_supervisor *s) {
 static void add_outright(plr_supervisor *s, const plr_motion_evidence *m, bool held) {
     plr_real n[PLR_POSE_DIM], own[PLR_POSE_DIM];
     plr_mat6_vec(n, m->L_used, m->nu);
-    in_sigmas(m->L, n, own);
+    plr_odometry_in_sigmas(m->L, n, own);
     carry_difference(s, m);
     if (!held && (s->scene == PLR_SCENE_MAY_MOVE || !plr_doubt_contradicted(s)))
         add_longer(s, m, n, own, 0);

@@ -41,6 +41,10 @@ void plr_odometry_differs(plr_supervisor *s, const plr_real n[PLR_POSE_DIM],
 void plr_odometry_cover(const plr_supervisor *s, const plr_real d[PLR_POSE_DIM],
                         plr_real C[PLR_POSE_SQUARE]);
 
+/* v = L^-1 n, which may be n; where L has a zero column v is zero. */
+void plr_odometry_in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
+                            plr_real v[PLR_POSE_DIM]);
+
 /* The difference has been covered for good. */
 void plr_odometry_settle(plr_supervisor *s);
 

@@ -60,6 +60,7 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     const bool first = e->outright && !s->outright && !plr_doubt_contradicted(s);
     decision.wait = first && plr_limit_count(s, PLR_LIMIT_CONFIRMED) > 0;
     s->outright = e->outright;
+    s->searched = decision;
     if (decision.wait) {
         decision.make_none = true;
         return decision;
@@ -69,6 +70,7 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
         (s->doubted_frames > 0 && s->doubted_frames < plr_limit_count(s, PLR_LIMIT_HELD_FRAMES));
     decision.drop_rejected = plr_pictures_lock(s, e->matched, e->gated);
     decision.make_none = s->frames_mostly_gated > 0 && !decision.drop_rejected;
+    s->searched = decision;
     return decision;
 }
 
@@ -156,6 +158,7 @@ static void settle(plr_supervisor *s, plr_frame_decision *decision) {
     decision->covers = plr_norm2_of_6(s->difference) > 0;
     if (decision->covers)
         plr_odometry_cover(s, s->difference, decision->cover);
+    s->settled = 1;
     plr_odometry_settle(s);
     plr_doubt_change(s, PLR_DOUBT_SETTLES);
     s->settle_frames = s->relocated = 0;
@@ -205,6 +208,7 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
     change_doubt(s, &odometry, lost);
     decision->contradicted_now = odometry.contradicts && (e->motion.outright || !was_contradicted);
     count_doubt(s, lost, report);
+    s->settled = 0;
     if (s->doubt != PLR_DOUBT_NONE && s->agreeing_frames >= s->settle_frames)
         settle(s, decision);
     if (e->motion.applied)
@@ -276,6 +280,42 @@ void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const p
     plr_odometry_cover(s, d, C);
     for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
         P_xi[i] += C[i];
+}
+
+static void copy(float *to, const plr_real *from, unsigned n) {
+    for (unsigned i = 0; i < n; i++)
+        to[i] = (float)from[i];
+}
+
+void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e, plr_supervision *told) {
+    const plr_motion_evidence *m = &e->motion;
+    plr_real n[PLR_POSE_DIM];
+    memset(told, 0, sizeof *told);
+    if (m->applied) {
+        plr_mat6_vec(n, m->L_used, m->nu);
+        plr_odometry_in_sigmas(m->L, n, n);
+        copy(told->nu, n, PLR_POSE_DIM);
+        copy(told->moved, m->moved, PLR_POSE_DIM);
+    }
+    told->t_ns = s->last_frame_ns;
+    told->statistic = (float)s->statistic;
+    copy(told->usual, s->usual, PLR_POSE_DIM);
+    told->agreement = (float)s->agreement;
+    copy(told->weight, s->weight, 2);
+    copy(told->difference, s->difference, PLR_POSE_DIM);
+    told->doubt = s->doubt;
+    told->applied = m->applied;
+    told->outright = s->outright;
+    told->waits = s->searched.wait;
+    told->holds_biases = s->searched.hold_biases;
+    told->locked = e->events.locked;
+    told->frozen = s->frozen;
+    told->misfits = s->misfits;
+    told->settled = s->settled;
+    told->matched = (uint16_t)e->picture.matched;
+    told->same = (uint16_t)e->picture.same;
+    told->known = (uint16_t)e->map.known;
+    told->adopted = (uint16_t)e->events.adopted;
 }
 
 void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,

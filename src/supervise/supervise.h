@@ -65,6 +65,9 @@ void plr_supervise_restored(plr_supervisor *s);
 void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const plr_real p[3],
                            plr_real P_xi[PLR_POSE_SQUARE]);
 
+/* What was seen in the last frame, and decided; the rejected landmarks are not filled. */
+void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e, plr_supervision *told);
+
 /* Health and reasons at any time. */
 void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,
                           plr_health_state *health);

@@ -37,7 +37,7 @@ static unsigned drive_frames(const scenario *s, unsigned parked_frames) {
     return s->is_long ? parked_frames : s->before + s->during + s->after;
 }
 
-static void begin(run *r, uint64_t seed, unsigned parked_frames) {
+static void begin(run *r, uint64_t seed, const drive_options *options) {
     const scenario *s = r->s;
     plr_config config;
     plr_calibration calibration;
@@ -47,7 +47,9 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
     config.track_drift_px = s->told_drift;
-    config.scene = scenario_may_move(s) ? PLR_SCENE_MAY_MOVE : PLR_SCENE_STANDS;
+    const bool may_move =
+        options->policy == POLICY_OWN ? scenario_may_move(s) : options->policy == POLICY_MAY_MOVE;
+    config.scene = may_move ? PLR_SCENE_MAY_MOVE : PLR_SCENE_STANDS;
     if (s->mishap != BASELINE && s->mishap != FOCAL &&
         s->mishap != ASKEW) /* the camera is exact, and P alone is judged */
         exact_camera(&config);
@@ -57,9 +59,10 @@ static void begin(run *r, uint64_t seed, unsigned parked_frames) {
     world_begin(&r->world, s, seed);
     sensors_begin(&r->sensors, s, &config, seed);
     (void)plr_filter_init(&filter, &calibration, &config, NULL);
-    r->before = s->is_long ? parked_frames : s->before;
+    (void)plr_filter_leave_out(&filter, options->left_out);
+    r->before = s->is_long ? options->parked_frames : s->before;
     r->during = s->during;
-    r->frames = drive_frames(s, parked_frames);
+    r->frames = drive_frames(s, options->parked_frames);
     r->start_ns = UINT64_C(1000000000);
     r->frame_ns = UINT64_C(1000000000) / FRAME_HZ;
     r->last_beyond = -1;
@@ -194,13 +197,13 @@ static void finish(run *r) {
     o->done = true;
 }
 
-void drive(const scenario *s, uint64_t seed, unsigned parked_frames, outcome *result) {
+void drive(const scenario *s, uint64_t seed, const drive_options *options, outcome *result) {
     run r;
     memset(result, 0, sizeof *result);
     memset(&r, 0, sizeof r);
     r.s = s;
     r.result = result;
-    begin(&r, seed, parked_frames);
+    begin(&r, seed, options);
     for (r.k = 0; r.k < r.frames; r.k++) {
         const bool event = phase_of(&r, r.k) == DURING;
         if (r.k == r.before && r.during > 0)

@@ -14,6 +14,8 @@
 typedef struct options {
     const char *wanted;  /* names with commas; NULL: all */
     const char *changes; /* to what was chosen */
+    uint64_t left_out;   /* rules of the supervisor: plr_filter_leave_out */
+    policy policy;
     unsigned long seeds, first_seed, jobs, parked_frames;
     bool list, gate;
 } options;
@@ -24,6 +26,9 @@ enum { SHORT_PARKED = 3000, PARKED = 20000, LONG_PARKED = 100000 };
 static void usage(FILE *out) {
     fputs("usage: pelorus-campaign [options]\n"
           "  --list                what there is\n"
+          "  --limits              the supervisor's thresholds\n"
+          "  --without NAME,...    leaves out these\n"
+          "  --policy NAME         stands or may-move, instead of what each scenario is judged by\n"
           "  --scenario NAME,...   only these; a name that ends with * means all that begin so\n"
           "  --seeds N             drives of each scenario (30)\n"
           "  --first-seed N        (1)\n"
@@ -64,12 +69,49 @@ static bool take_number(options *o, const char *option, const char *value) {
     return false;
 }
 
+static void list_limits(void) {
+    for (unsigned i = 0; plr_limit_at(i); i++)
+        printf("%-20s %8g %s: %s\n", plr_limit_at(i)->name, plr_limit_at(i)->value,
+               plr_limit_at(i)->unit, plr_limit_at(i)->about);
+}
+
+static uint64_t limits_named(const char *names) {
+    uint64_t found = 0;
+    for (const char *name = names; *name;) {
+        const size_t length = strcspn(name, ",");
+        unsigned row = 0;
+        while (plr_limit_at(row) && (strlen(plr_limit_at(row)->name) != length ||
+                                     memcmp(plr_limit_at(row)->name, name, length) != 0))
+            row++;
+        if (!plr_limit_at(row))
+            refuse("--without", names);
+        found |= UINT64_C(1) << row;
+        name += length + (name[length] == ',');
+    }
+    return found;
+}
+
+static policy policy_named(const char *name) {
+    if (strcmp(name, "stands") == 0)
+        return POLICY_STANDS;
+    if (strcmp(name, "may-move") != 0)
+        refuse("--policy", name);
+    return POLICY_MAY_MOVE;
+}
+
 static options parse(int argc, char **argv) {
-    options o = {NULL, "", SEEDS, 1, pool_processors(), PARKED, false, false};
+    options o = {NULL, "", 0, POLICY_OWN, SEEDS, 1, pool_processors(), PARKED, false, false};
     for (int i = 1; i < argc; i++) {
         const char *option = argv[i], *value = i + 1 < argc ? argv[i + 1] : NULL;
         if (strcmp(option, "--list") == 0) {
             o.list = true;
+        } else if (strcmp(option, "--limits") == 0) {
+            list_limits();
+            exit(0);
+        } else if (strcmp(option, "--without") == 0 && value) {
+            o.left_out = limits_named(argv[++i]);
+        } else if (strcmp(option, "--policy") == 0 && value) {
+            o.policy = policy_named(argv[++i]);
         } else if (strcmp(option, "--gate") == 0) {
             o.gate = true;
         } else if (strcmp(option, "--short") == 0) {
@@ -135,12 +177,12 @@ typedef struct task {
 typedef struct campaign {
     task *tasks;
     outcome *outcomes;
-    unsigned parked_frames;
+    drive_options options;
 } campaign;
 
 static void drive_one(void *context, unsigned index) {
     const campaign *c = context;
-    drive(c->tasks[index].s, c->tasks[index].seed, c->parked_frames, &c->outcomes[index]);
+    drive(c->tasks[index].s, c->tasks[index].seed, &c->options, &c->outcomes[index]);
 }
 
 static scenario changed(const scenario *original, const char *changes) {
@@ -171,7 +213,7 @@ static unsigned run(const options *o, const bool *chosen, unsigned n) {
         for (unsigned k = 0; chosen[i] && k < seeds; k++)
             tasks[filled++] = (task){&copies[i], o->first_seed + k};
     }
-    campaign c = {tasks, outcomes, (unsigned)o->parked_frames};
+    campaign c = {tasks, outcomes, {(unsigned)o->parked_frames, o->left_out, o->policy}};
     pool_run(filled, (unsigned)o->jobs, 0, "drives", drive_one, &c);
     table_heading();
     for (unsigned i = 0; i < filled; i += seeds)

@@ -30,6 +30,7 @@ class Kind(IntEnum):
     STATE = schema.kind("STATE")
     READING = schema.kind("READING")
     IMU = schema.kind("IMU")
+    EVIDENCE = schema.kind("EVIDENCE")
 
 
 class BodyAxes(IntEnum):

@@ -17,6 +17,7 @@ from pelorus.replay import Programs, replayed
 from pelorus.settings import describe
 
 FNV_OFFSET, FNV_PRIME = 2166136261, 16777619
+WITH_ALL_ROOMS = 3  # PLR_SUPERVISE and PLR_KNOWN_MAP
 
 
 class Verdict(IntEnum):
@@ -94,7 +95,7 @@ def fingerprint(version: str, arithmetic: int, build: Config) -> int:
     capacities = (build.max_landmarks, build.max_observations, build.block_observations)
     value = FNV_OFFSET
     number = major << 16 | minor << 8 | patch
-    for part in (number, arithmetic, 8 * build.real_bytes, *capacities):
+    for part in (number, arithmetic, 8 * build.real_bytes, *capacities, WITH_ALL_ROOMS):
         for byte in part.to_bytes(4, "little"):
             value = (value ^ byte) * FNV_PRIME & 0xFFFFFFFF
     return value or 1
