@@ -10,9 +10,6 @@
 
 enum { LEAST = 4 }; /* landmarks */
 
-/* Directions in which the map improves a variance by a smaller part than this do not count. */
-#define UNTOLD PLR_R(0.01)
-
 void plr_map_forget(plr_supervisor *s) {
     memset(s->map_moved, 0, sizeof s->map_moved);
     memset(s->map_variance, 0, sizeof s->map_variance);
@@ -82,7 +79,7 @@ static plr_real judge(const plr_supervisor *s, const plr_map_evidence *e, plr_ma
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, v->nu, 1);
     in_units_of(U, due);
     plr_upper6_pack(V, due);
-    plr_sum_by_pictures(v->nu, V, UNTOLD, by_map);
+    plr_sum_by_pictures(v->nu, V, plr_limit(s, PLR_LIMIT_UNTOLD), by_map);
     v->noise = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         d2 = PLR_FMA(v->nu[k], by_map[k], d2);

@@ -107,19 +107,17 @@ static plr_material material(const plr_supervisor *s, const plr_real n[PLR_POSE_
     return (plr_material){plr_dot3(n, n) > way * way, plr_dot3(n + 3, n + 3) > angle * angle};
 }
 
-/* n: the mean difference of the last frames by pictures alone, m and rad a frame. */
-static void lately(const plr_supervisor *s, const plr_motion_evidence *m, plr_real floor,
-                   plr_real n[PLR_POSE_DIM]) {
-    plr_real mean[PLR_POSE_DIM];
+/* The mean difference of the last frames by pictures alone, in sigmas. */
+static void lately(const plr_supervisor *s, plr_real floor, plr_real mean[PLR_POSE_DIM]) {
     plr_sum_by_pictures(s->sum.sum, s->sum.variance, floor, mean);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* s / V of a lasting difference is (1 + keep) of it */
         mean[k] /= PLR_R(1) + plr_limit(s, PLR_LIMIT_SUM_KEEPS);
-    plr_mat6_vec(n, m->L, mean);
 }
 
 static plr_material lately_material(const plr_supervisor *s, const plr_motion_evidence *m) {
-    plr_real n[PLR_POSE_DIM];
-    lately(s, m, plr_limit(s, PLR_LIMIT_WEAK), n);
+    plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
+    lately(s, plr_limit(s, PLR_LIMIT_WEAK), mean);
+    plr_mat6_vec(n, m->L, mean);
     return material(s, n, m);
 }
 
@@ -219,41 +217,72 @@ void plr_odometry_settle(plr_supervisor *s) {
 
 /* ---------------------------------------------------------------- a frame */
 
-/* A frame that excludes the odometry by itself, and is followed. The first one may have moved the camera on
- * the body as well as the body: both are covered. */
+/* A frame that excludes the odometry by itself, and is followed. */
 static void add_outright(plr_supervisor *s, const plr_motion_evidence *m, bool held) {
     plr_real n[PLR_POSE_DIM], own[PLR_POSE_DIM];
     plr_mat6_vec(n, m->L_used, m->nu);
     plr_odometry_in_sigmas(m->L, n, own);
     carry_difference(s, m);
-    if (!held && (s->scene == PLR_SCENE_MAY_MOVE || !plr_doubt_contradicted(s)))
+    if (!held && s->scene == PLR_SCENE_MAY_MOVE)
         add_longer(s, m, n, own, 0);
     memset(&s->sum, 0, sizeof s->sum);
     s->excess[0] = plr_norm2_of_6(own);
     s->excess[1] = material(s, n, m).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
 }
 
-/* The difference begins with what the sum holds of it. While it lasts, each frame adds what lies between the
- * present pose and the other one: that by odometry, where most of what is seen may move as one; else that by
- * the pictures alone, which the odometry still holds back where they say little. */
+/* From the present pose to the one by pictures alone: of the difference of the last frames what the odometry,
+ * with the weight that it has, still holds back, L Lambda^-1 L^-1 n. */
+static void differ_by_pictures(plr_supervisor *s, const plr_motion_evidence *m,
+                               const plr_real nu[PLR_POSE_DIM]) {
+    plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
+    plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
+    lately(s, plr_limit(s, PLR_LIMIT_UNTOLD), mean);
+    plr_mat6_vec(n, m->L, mean);
+    plr_odometry_in_sigmas(m->L_used, n, n);
+    memcpy(U, m->Lambda, sizeof m->Lambda);
+    if (!plr_cholesky_upper(PLR_POSE_DIM, U))
+        return;
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, n);
+    plr_mat6_vec(mean, m->L_used, n);
+    plr_odometry_differs(s, mean, nu, 0);
+}
+
+/* From the pose by odometry to the present one. */
+static void differ_by_odometry(plr_supervisor *s, const plr_motion_evidence *m,
+                               const plr_real nu[PLR_POSE_DIM],
+                               const plr_real V[PLR_POSE_TRIANGLE]) {
+    plr_real n[PLR_POSE_DIM], way[PLR_POSE_DIM];
+    plr_sum_by_pictures(nu, V, plr_limit(s, PLR_LIMIT_UNOBSERVED), n);
+    plr_mat6_vec(way, m->L, n);
+    add_longer(s, m, way, nu, trace(V));
+}
+
+/* What the sum holds of the difference when it is found: by odometry what was applied of it, by pictures
+ * what was not. */
+static void begin_difference(plr_supervisor *s, const plr_motion_evidence *m) {
+    const plr_real frames = PLR_R(1) / (PLR_R(1) - plr_limit(s, PLR_LIMIT_SUM_KEEPS));
+    plr_real all[PLR_POSE_DIM], way[PLR_POSE_DIM];
+    lately(s, plr_limit(s, PLR_LIMIT_WEAK), all);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+        all[k] = s->scene == PLR_SCENE_MAY_MOVE ? s->sum.sum[k] : frames * all[k] - s->sum.sum[k];
+    plr_mat6_vec(way, m->L, all);
+    plr_odometry_differs(s, way, s->sum.sum, trace(s->sum.variance));
+}
+
+/* While it lasts, each frame adds what lies between the present pose and the other one that may be true: that
+ * by odometry, where most of what is seen may move as one, or where both have always differed; else that by
+ * the pictures alone. */
 static void follow_difference(plr_supervisor *s, const plr_motion_evidence *m,
                               const plr_real nu[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],
                               bool begins) {
-    plr_real n[PLR_POSE_DIM], way[PLR_POSE_DIM];
-    if (begins) {
-        plr_mat6_vec(way, m->L, s->sum.sum);
-        plr_odometry_differs(s, way, s->sum.sum, trace(s->sum.variance));
-    } else if (s->doubt == PLR_DOUBT_DEPARTED || s->misfits ||
-               (plr_doubt_contradicted(s) && s->scene == PLR_SCENE_MAY_MOVE)) {
-        plr_sum_by_pictures(nu, V, plr_limit(s, PLR_LIMIT_UNOBSERVED), n);
-        plr_mat6_vec(way, m->L, n);
-        add_longer(s, m, way, nu, trace(V));
-    } else if (plr_doubt_contradicted(s)) {
-        lately(s, m, plr_limit(s, PLR_LIMIT_UNOBSERVED), way);
-        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            way[k] -= m->moved[k];
-        plr_odometry_differs(s, way, nu, 0);
-    }
+    const bool lasts = s->doubt == PLR_DOUBT_DEPARTED || plr_doubt_contradicted(s);
+    if (begins)
+        begin_difference(s, m);
+    else if (s->misfits || (lasts && s->scene == PLR_SCENE_MAY_MOVE))
+        differ_by_odometry(s, m, nu, V);
+    else if (lasts)
+        differ_by_pictures(s, m, nu);
 }
 
 /* An average of the last frames, of those that may count: not of an event, nor shortly after it. */
