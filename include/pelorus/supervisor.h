@@ -190,14 +190,14 @@ typedef struct plr_supervisor {
 /* Every threshold of the supervisor: limits.def has value, unit, reason, and the scenario
  * and recording that need it. */
 typedef enum plr_limit_id {
-#define LIMIT(name, value, off, unit, about) PLR_LIMIT_##name,
+#define LIMIT(name, value, off, unit, about, scenario, recording) PLR_LIMIT_##name,
 #include "pelorus/limits.def"
 #undef LIMIT
     PLR_LIMITS
 } plr_limit_id;
 
 typedef struct plr_limit_row {
-    const char *name, *unit, *about;
+    const char *name, *unit, *about, *scenario, *recording;
     double value, off; /* as it is; as it is where the rule is left out */
 } plr_limit_row;
 

@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 SCHEMA = "tools/pelorus/schema.json"
-PAGES = ("docs/REPLAY-FORMAT.md", "docs/STATE-FORMAT.md")
+PAGES = ("docs/REPLAY-FORMAT.md", "docs/STATE-FORMAT.md", "docs/SUPERVISION.md")
 TABLE = re.compile(r"(?<=<!-- table: )(\w+) -->\n(.*?)(?=<!-- end -->)", re.DOTALL)
 
 

@@ -370,11 +370,10 @@ blocks, rounded up. The coefficients are fitted to the worst frames of all board
 none is above; *its bound* is the formula at m = {busy}, beside the busiest frame that was met.
 Every loop has a count that N and m bound, and a library function that is not of constant time for
 such a count does not exist in it; so the worst case is no other than that of these counts.
-While twists and pictures contradict each other, points are asked which are right: some 40,000
-instructions more, for seven points at most (`src/filter/votes.c`). After frames that were lost in
+After frames that were lost in
 a fast turn the motion is searched for once more, in at most 17 evaluations of all points
 (`search_by_agreement`). A pose that is found from known landmarks, because it was lost or is too
-uncertain for them (`src/filter/placing.c`), takes at most 40 samples of three and asks 64 landmarks
+uncertain for them (`src/known_map/placing.c`), takes at most 40 samples of three and asks 64 landmarks
 at most: with wrong ones among 20 as much as one and a half of such frames, among 64 as much as
 three (compared at the desk). None of these is in these frames.
 

@@ -49,7 +49,7 @@ TEXT_BYTES_MAX = schema.LIMITS["text_bytes"]
 UNKNOWN_VARIANCE = float(schema.LIMITS["unknown_variance"])  # of a filter that has diverged
 OBSERVATION = row_type(schema.MESSAGES["STEREO"].rows)
 SETTING = row_type(schema.MESSAGES["CONFIG"].rows)
-REJECTED_MAX = 24  # landmarks in one EVIDENCE
+REJECTED_MAX = schema.LIMITS["rejected_landmarks"]  # in one EVIDENCE
 
 
 class StartFlag(IntFlag):

@@ -32,11 +32,11 @@ SHORT = {
     "RANGE_LIMITED": "a landmark's correction was limited",
     "NOT_POSITIVE": "a variance ceased to be positive",
     "BUDGET": "no time for all observations",
-    "TWIST_CONTRADICTED": "vision contradicts twists or IMU",
+    "TWIST_CONTRADICTED": "pictures contradict twists or IMU",
     "POSE_MAY_BE_WRONG": "the pose may be wrong",
     "BIAS_OFF_PRIOR": "a bias is far from its prior",
     "FROZEN_IMAGE": "identical pixels",
-    "SCENE_DISAGREES": "the points do not agree on one motion",
+    "NOISE_MISFIT": "pictures and odometry differ by more than their sigmas, all along",
     "RECOVERED": "landmarks dropped and covariance widened",
     "NO_FRAMES": NO_FRAMES,
     "STATE_DAMAGED": "the filter's memory was changed",
@@ -49,8 +49,7 @@ SHORT = {
 SYMPTOMS = tuple(
     SHORT[name] for name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS", "NO_OBSERVATIONS")
 )
-# They leave the estimate as good as it should be.
-HARMLESS = ("GATE_INERT", "NO_ROOM", "NIS_LOW")
+HARMLESS = schema.LIMITS["harmless_reasons"]  # they leave the estimate as good as it should be
 
 
 @dataclass(frozen=True)
@@ -114,10 +113,8 @@ def reasons(bits: int) -> tuple[str, ...]:
     """What a mask says, in words, without what is harmless; one of a later version by number."""
     found = []
     for k in range(bits.bit_length()):
-        if not bits >> k & 1:
-            continue
-        name = schema.REASON_NAMES.get(1 << k, "")
-        if name not in HARMLESS:
+        if bits & ~HARMLESS & 1 << k:
+            name = schema.REASON_NAMES.get(1 << k, "")
             found.append(SHORT.get(name) or schema.REASONS.get(1 << k, f"reason {k}"))
     return tuple(found)
 

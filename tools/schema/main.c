@@ -4,7 +4,7 @@
  *
  *     pelorus-schema json                  schema.json, which the Python tools read
  *     pelorus-schema markdown TABLE        a table of the docs; TABLE is kinds, settings, statuses,
- *                                          reasons, imu_faults, sensors, state, slot, bounds, or the
+ *                                          reasons, imu_faults, sensors, state, slot, bounds, limits, or the
  *                                          name of a message
  *
  * tests/layering/schema.py compares what it prints with the files, or writes them.

@@ -224,6 +224,16 @@ static void print_bounds(void) {
     }
 }
 
+static void print_limits(void) {
+    printf("| threshold | | unit | what, and why | needed on | and on the recording |\n"
+           "|---|---|---|---|---|---|\n");
+    for (unsigned i = 0; plr_limit_at(i); i++) {
+        const plr_limit_row *l = plr_limit_at(i);
+        printf("| %s | %g | %s | %s | %s | %s |\n", l->name, l->value, l->unit, l->about, l->scenario,
+               l->recording);
+    }
+}
+
 bool schema_print_markdown(const char *table) {
     const row *message = message_of(table);
     if (message)
@@ -246,6 +256,8 @@ bool schema_print_markdown(const char *table) {
         print_slot();
     else if (strcmp(table, "bounds") == 0)
         print_bounds();
+    else if (strcmp(table, "limits") == 0)
+        print_limits();
     else
         return false;
     return true;

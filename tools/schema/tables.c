@@ -129,6 +129,8 @@ const limit schema_limits[] = {
     {"observations", PLR_WIRE_MAX_OBSERVATIONS},
     {"imu_readings", PLR_WIRE_MAX_IMU},
     {"no_budget", PLR_NO_BUDGET},
+    {"rejected_landmarks", PLR_SUPERVISION_REJECTED},
+    {"harmless_reasons", PLR_REASONS_HARMLESS},
     {"unknown_variance", PLR_WIRE_UNKNOWN_VARIANCE},
 };
 const size_t schema_limit_rows = LENGTH(schema_limits);
