@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "pelorus/settings.h"
+#include "pelorus/supervisor.h"
 #include "schema/print.h"
 
 static bool is(const row *field, const char *type) {
