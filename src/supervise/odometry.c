@@ -230,6 +230,7 @@ static void add_outright(plr_supervisor *s, const plr_motion_evidence *m, bool h
     if (!held && (s->scene == PLR_SCENE_MAY_MOVE || !plr_doubt_contradicted(s)))
         add_longer(s, m, n, own, 0);
     memset(&s->sum, 0, sizeof s->sum);
+    s->small_frames = 0; /* it has to relent for a while, whatever was before */
     s->excess[0] = plr_norm2_of_6(own);
     s->excess[1] = material(s, n, m).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
 }
