@@ -258,11 +258,13 @@ static void follow_difference(plr_supervisor *s, const plr_motion_evidence *m,
     }
 }
 
-/* An average of the last frames, of those that may count: not of an event, nor shortly after it. */
+/* An average of the last frames, of those that may count: not of an event, nor shortly after it. One that
+ * neither agrees nor departs may be the beginning of an event, and must not take its before away. */
 static void learn_agreement(plr_supervisor *s) {
     const plr_real keeps = plr_limit(s, PLR_LIMIT_BEFORE_KEEPS);
     const bool agrees = s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
-    s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
+    if (agrees || s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE))
+        s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
 }
 
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,
