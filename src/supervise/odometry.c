@@ -226,6 +226,7 @@ static void add_outright(plr_supervisor *s, const plr_motion_evidence *m, bool h
     if (!held && s->scene == PLR_SCENE_MAY_MOVE)
         add_longer(s, m, n, own, 0);
     memset(&s->sum, 0, sizeof s->sum);
+    s->small_frames = 0; /* it has to relent for a while, whatever was before */
     s->excess[0] = plr_norm2_of_6(own);
     s->excess[1] = material(s, n, m).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
 }
@@ -285,11 +286,13 @@ static void follow_difference(plr_supervisor *s, const plr_motion_evidence *m,
         differ_by_pictures(s, m, nu);
 }
 
-/* An average of the last frames, of those that may count: not of an event, nor shortly after it. */
+/* An average of the last frames, of those that may count: not of an event, nor shortly after it. One that
+ * neither agrees nor departs may be the beginning of an event, and must not take its before away. */
 static void learn_agreement(plr_supervisor *s) {
     const plr_real keeps = plr_limit(s, PLR_LIMIT_BEFORE_KEEPS);
     const bool agrees = s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
-    s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
+    if (agrees || s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE))
+        s->agreement = PLR_FMA(keeps, s->agreement, agrees ? PLR_R(1) - keeps : PLR_R(0));
 }
 
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,

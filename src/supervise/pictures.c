@@ -50,11 +50,14 @@ bool plr_pictures_are_frozen(plr_supervisor *s, const plr_picture_evidence *e) {
 
 /* ---------------------------------------------------------------- the gate */
 
+bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated) {
+    return matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
+           (plr_real)gated >= plr_limit(s, PLR_LIMIT_LOCK_SHARE) * (plr_real)matched;
+}
+
 bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated) {
     const uint16_t frames = (uint16_t)plr_limit_count(s, PLR_LIMIT_LOCK_FRAMES);
-    const bool rejects =
-        matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
-        (plr_real)gated >= plr_limit(s, PLR_LIMIT_LOCK_SHARE) * (plr_real)matched;
+    const bool rejects = plr_pictures_reject_all(s, matched, gated);
     s->frames_mostly_gated = rejects ? (uint16_t)(s->frames_mostly_gated + 1) : 0;
     if (s->frames_mostly_gated >= 2 * frames) /* locked again */
         s->frames_mostly_gated = frames;

@@ -13,6 +13,9 @@ bool plr_pictures_are_frozen(plr_supervisor *s, const plr_picture_evidence *e);
 /* The pending motion is applied without a frame: adds it to what the above compares. */
 void plr_pictures_note_motion(plr_supervisor *s, const plr_picture_evidence *e);
 
+/* True if the gate rejects nearly all of a frame. */
+bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated);
+
 /* Counts a gate that rejects nearly all. True if it has done so for ten frames, and after each further
  * ten. */
 bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated);

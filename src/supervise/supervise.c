@@ -59,7 +59,9 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     plr_search_decision decision = {false, false, false, false};
     const bool first = e->outright && !s->outright && !plr_doubt_contradicted(s);
     decision.wait = first && plr_limit_count(s, PLR_LIMIT_CONFIRMED) > 0;
-    s->outright = e->outright;
+    /* a frame that rejects nearly all neither confirms nor denies */
+    const bool denies = !plr_pictures_reject_all(s, e->matched, e->gated);
+    s->outright = e->outright || (s->outright && !denies);
     s->searched = decision;
     if (decision.wait) {
         decision.make_none = true;

@@ -15,6 +15,7 @@
 #include "support/oracle.h"
 #include "support/reseal.h"
 #include "support/twin_drive.h"
+#include "supervise/supervise.h"
 
 enum { FRAMES = 60, MOST_SEEN = 20, LARGEST = 204 };
 
@@ -35,9 +36,9 @@ void tearDown(void) {
 
 /* The biases kept or not, as by a contradiction, by nothing that would change the twists' weight. */
 static void contradict(bool so) {
-    memset(&twins.filter.consistency, 0, sizeof twins.filter.consistency);
+    plr_supervise_pose_set(&twins.filter.supervisor);
     memset(H, 0, sizeof H);
-    twins.filter.consistency.doubted_frames = so;
+    twins.filter.supervisor.doubted_frames = so;
     reseal(&twins.filter);
     twins.book.considered = so ? H : NULL;
 }

@@ -70,7 +70,7 @@ static void fly_and_note(stretch *s) {
     }
     s->D[15] = 1;
     to_doubles(s->B, f->motion.B, 6 * DRIVER);
-    to_doubles(s->V, f->own.core_motion.V, 3 * DRIVER);
+    to_doubles(s->V, f->core_motion.V, 3 * DRIVER);
     pose_now(before);
     imu_rig_frame();
     pose_now(after);

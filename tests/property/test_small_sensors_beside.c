@@ -72,7 +72,8 @@ static void test_what_the_gate_rejects_changes_nothing_but_the_time(void) {
         TEST_ASSERT_EQUAL_UINT32(rig.before.totals.readings_gated + 1,
                                  rig.filter.totals.readings_gated);
         rig.before.totals = rig.filter.totals;
-        memcpy(rig.before.readings, rig.filter.readings, sizeof rig.before.readings);
+        memcpy(rig.before.supervisor.sensors, rig.filter.supervisor.sensors,
+               sizeof rig.before.supervisor.sensors);
         TEST_ASSERT_TRUE(specimen_same_state(&rig.before, &rig.filter));
         scene_move(&rig.world, RIG_STEP_NS);
     }

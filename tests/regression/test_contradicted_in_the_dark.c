@@ -20,7 +20,7 @@ static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone
     rig_begin();
     rig_drive(20);
     rig_drive_told(10, 0.5); /* the wheels slip */
-    TEST_ASSERT_EQUAL_UINT8(1, rig.filter.consistency.contradicted);
+    TEST_ASSERT_EQUAL_UINT8(PLR_DOUBT_CONTRADICTED, rig.filter.supervisor.doubt);
     const double before = rig_sigma_m();
     for (unsigned k = 0; k < DARK_FRAMES; k++) {
         rig_twists();

@@ -169,18 +169,18 @@ static void test_a_good_track_that_goes_over_to_another_point_begins_anew_soon(v
 /* A point that begins to move is off by little at first, and will go on. */
 static void test_a_good_track_that_is_little_off_does_not(void) {
     plr_slot moved = {.accepted = 20}, lost = {.accepted = 20};
-    plr_track_count(&lost, PLR_GAIN_FAR);
-    plr_track_count(&moved, PLR_GAIN_REJECTED);
+    plr_track_count(&lost, PLR_GATE_FAR);
+    plr_track_count(&moved, PLR_GATE_REJECTED);
     for (int k = 1; k < 8; k++) {
         TEST_ASSERT_FALSE(plr_track_may_restart(&lost));
-        plr_track_count(&lost, PLR_GAIN_REJECTED);
-        plr_track_count(&moved, PLR_GAIN_REJECTED);
+        plr_track_count(&lost, PLR_GATE_REJECTED);
+        plr_track_count(&moved, PLR_GATE_REJECTED);
     }
     TEST_ASSERT_TRUE(plr_track_may_restart(&lost));
     TEST_ASSERT_FALSE(plr_track_may_restart(&moved));
 }
 
 static void test_far_off_is_ten_sigmas(void) {
-    TEST_ASSERT_EQUAL_DOUBLE(PLR_GAIN_REJECTED, plr_gate_rejection(PLR_R(99)));
-    TEST_ASSERT_EQUAL_DOUBLE(PLR_GAIN_FAR, plr_gate_rejection(PLR_R(101)));
+    TEST_ASSERT_EQUAL_INT(PLR_GATE_REJECTED, plr_gate_rejection(PLR_R(99)));
+    TEST_ASSERT_EQUAL_INT(PLR_GATE_FAR, plr_gate_rejection(PLR_R(101)));
 }

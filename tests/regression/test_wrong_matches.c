@@ -5,16 +5,15 @@
  *
  * - A wrong match misfits every motion by hundreds of sigmas. It counted as support for the motion that it
  *   misfitted a little less.
- * - A rejection in one frame counted as a scene that moves.
  * - While the pose was in doubt no frame taught the biases. Their error, the same in each frame, looked like a
  *   drift, so the doubt did not end.
  * - Wrong matches led the search for a push astray.
  */
 #include <unity.h>
 
-#include "filter/consistency.h"
 #include "support/reseal.h"
 #include "support/rig.h"
+#include "supervise/supervise.h"
 
 enum { FRAMES = 600 };
 
@@ -50,13 +49,13 @@ static void test_a_doubt_at_the_beginning_ends_though_the_biases_are_unknown(voi
     for (int i = 3; i < 6; i++)
         rig.options.bias[i] = 0.015;
     rig_begin();
-    plr_consistency_doubt(&rig.filter);
-    rig.filter.consistency.doubted_frames = 1;
+    plr_supervise_begun_anew(&rig.filter.supervisor, false);
+    rig.filter.supervisor.doubted_frames = 1;
     reseal(&rig.filter);
     unsigned frames = 0;
-    for (; frames < 100 && rig.filter.consistency.settling_frames > 0; frames++) {
+    for (; frames < 100 && rig.filter.supervisor.doubt != PLR_DOUBT_NONE; frames++) {
         rig_drive(1);
-        TEST_ASSERT_EQUAL_UINT8(0, rig.filter.consistency.drifting);
+        TEST_ASSERT_NOT_EQUAL_UINT8(PLR_DOUBT_DEPARTED, rig.filter.supervisor.doubt);
     }
     TEST_ASSERT_LESS_THAN_UINT(25, frames);
 }
@@ -71,19 +70,6 @@ static void test_wheels_that_slip_are_told_among_wrong_matches(void) {
     TEST_ASSERT_BITS_HIGH(PLR_REASON_TWIST_CONTRADICTED, rig.report.reasons);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_totals(&rig.filter, &totals));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(1, totals.contradictions);
-}
-
-/* What is rejected teaches the biases nothing anyway. */
-static void test_a_scene_that_disagrees_alone_keeps_no_bias(void) {
-    unsigned told = 0;
-    rig.options.outliers = 0.4;
-    rig_begin();
-    for (unsigned k = 0; k < 100; k++) {
-        rig_drive(1);
-        told += (rig.report.reasons & PLR_REASON_SCENE_DISAGREES) != 0;
-        TEST_ASSERT_FALSE(plr_consistency_keeps_biases(&rig.filter));
-    }
-    TEST_ASSERT_GREATER_THAN_UINT(10, told);
 }
 
 static void push_to_the_left(double way_m) {

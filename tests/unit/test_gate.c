@@ -126,7 +126,7 @@ static void test_the_course_gate_when_open_looks_at_the_covariance_too(void) {
     filter.par.gate_residual2 = PLR_R(0.25);
     filter.par.gate_d2 = specimen_judge(&filter, 1, &seen).d2 + 1;
     TEST_ASSERT_FALSE(specimen_judge(&filter, 1, &seen).accepted);
-    filter.frames_mostly_gated = 10; /* locked */
+    filter.supervisor.frames_mostly_gated = 10; /* locked */
     TEST_ASSERT_TRUE(specimen_judge(&filter, 1, &seen).accepted);
     TEST_ASSERT_FALSE(specimen_judge(&filter, 1, &wild).accepted);
     filter.par.gate_residual2 = PLR_R(16.01 * 16.01); /* what passes the pixels passes */

@@ -67,8 +67,8 @@ static void test_every_flipped_bit_of_what_outlives_a_call_is_found(void) {
     demand_found(offsetof(plr_filter, config),
                  offsetof(plr_filter, slots) + sound.count * sizeof *sound.slots);
     demand_found(P, P + plr_packed_row(12 + 3 * sound.count) * sizeof *sound.P);
-    demand_found(offsetof(plr_filter, consistency), offsetof(plr_filter, either));
-    demand_found(offsetof(plr_filter, own), sizeof sound);
+    demand_found(offsetof(plr_filter, supervisor), offsetof(plr_filter, either));
+    demand_found(offsetof(plr_filter, core_motion), sizeof sound);
 }
 
 static void test_what_no_call_looks_at_may_be_changed(void) {

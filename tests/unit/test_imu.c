@@ -261,7 +261,7 @@ static void test_derivatives_by_tilt_velocity_and_biases_are_those_of_the_motion
     }
     step_all();
     to_doubles(got, filter.motion.B, 6 * DRIVER);
-    to_doubles(got + 6 * DRIVER, filter.own.core_motion.V, 3 * DRIVER);
+    to_doubles(got + 6 * DRIVER, filter.core_motion.V, 3 * DRIVER);
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 4; c++) {
             char at[32];
@@ -276,7 +276,7 @@ static void test_a_shift_and_a_turn_about_the_vertical_drive_nothing(void) {
     step_all();
     for (int r = 0; r < ERROR; r++) {
         const plr_real *row =
-            r < 6 ? filter.motion.B + DRIVER * r : filter.own.core_motion.V + DRIVER * (r - 6);
+            r < 6 ? filter.motion.B + DRIVER * r : filter.core_motion.V + DRIVER * (r - 6);
         double sum = 0, size = 1e-3;
         for (int i = 0; i < 3; i++) {
             sum += (double)row[i] * up[i];
@@ -315,8 +315,8 @@ static double filters_noise(int i, int j) {
     if (j < 6)
         return (double)filter.motion.Q[6 * i + j];
     if (i < 6)
-        return (double)filter.own.core_motion.Q_nc[PLR_REST_DIM * i + j - 6];
-    return (double)filter.own.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
+        return (double)filter.core_motion.Q_nc[PLR_REST_DIM * i + j - 6];
+    return (double)filter.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
 }
 
 static void test_noise_is_that_of_each_reading_and_of_the_walks(void) {
@@ -336,7 +336,7 @@ static void test_noise_is_that_of_each_reading_and_of_the_walks(void) {
 static void test_noise_is_symmetric_to_the_bit(void) {
     step_all();
     TEST_ASSERT_TRUE(is_symmetric(filter.motion.Q, 6));
-    TEST_ASSERT_TRUE(is_symmetric(filter.own.core_motion.Q_cc, PLR_REST_DIM));
+    TEST_ASSERT_TRUE(is_symmetric(filter.core_motion.Q_cc, PLR_REST_DIM));
 }
 
 static void test_parts_of_an_interval_add_up_to_the_whole(void) {

@@ -42,8 +42,8 @@ static void take_specimen(unsigned landmarks, bool noiseless) {
     }
     if (noiseless) {
         memset(filter.motion.Q, 0, sizeof filter.motion.Q);
-        memset(filter.own.core_motion.Q_nc, 0, sizeof filter.own.core_motion.Q_nc);
-        memset(filter.own.core_motion.Q_cc, 0, sizeof filter.own.core_motion.Q_cc);
+        memset(filter.core_motion.Q_nc, 0, sizeof filter.core_motion.Q_nc);
+        memset(filter.core_motion.Q_cc, 0, sizeof filter.core_motion.Q_cc);
     }
     reseal(&filter);
 }
@@ -64,7 +64,7 @@ static void relative_motion(double D[16]) {
 /* The core's own rows: theta and v by all drivers, biases as they are. */
 static void core_rows(const double D[16], const double B[6 * DRIVER], double *A, unsigned n) {
     double V[3 * DRIVER], back[16], Ad[36];
-    to_doubles(V, filter.own.core_motion.V, 3 * DRIVER);
+    to_doubles(V, filter.core_motion.V, 3 * DRIVER);
     rigid_inverse(back, D);
     rigid_adjoint(Ad, back);
     for (unsigned i = 0; i < 6; i++) {
@@ -124,8 +124,8 @@ static void joint_noise(const double B[6 * DRIVER], const double *P, unsigned n,
         for (unsigned j = i; j < CORE; j++) {
             const double q =
                 j < 6   ? (double)filter.motion.Q[6 * i + j]
-                : i < 6 ? (double)filter.own.core_motion.Q_nc[PLR_REST_DIM * i + j - 6]
-                        : (double)filter.own.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
+                : i < 6 ? (double)filter.core_motion.Q_nc[PLR_REST_DIM * i + j - 6]
+                        : (double)filter.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
             Q[CORE * i + j] = Q[CORE * j + i] = q;
         }
     for (unsigned i = 0; i < DRIVER; i++)

@@ -199,7 +199,7 @@ static void test_a_refused_reading_changes_nothing_that_follows(void) {
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &frame, NULL));
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&spoilt, &frame, NULL));
     }
-    spoilt.refused_before = f->refused_before; /* its count */
+    spoilt.supervisor.refused_before = f->supervisor.refused_before; /* its count */
     TEST_ASSERT_TRUE(specimen_same_state(f, &spoilt));
 }
 

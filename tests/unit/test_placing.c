@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/* The pose from known points in sight: filter/placing.c. */
+/* The pose from known points in sight: known_map/placing.c. */
 #include <math.h>
 #include <string.h>
 #include <unity.h>
 
-#include "filter/placing.h"
+#include "known_map/placing.h"
 #include "math/small.h"
 #include "math/so3.h"
 #include "pelorus/filter.h"

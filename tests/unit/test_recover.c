@@ -117,14 +117,14 @@ static void test_the_covariance_is_the_last_good_one_and_that_of_the_motion_sinc
 
 static void test_a_contradiction_that_was_open_stays_covered(void) {
     double after[36];
-    rig.filter.consistency.contradicted = rig.filter.consistency.drifting = 1;
-    rig.filter.consistency.difference[0] = PLR_R(0.5);
-    rig.filter.consistency.difference_sigmas[0] = PLR_R(50);
+    rig.filter.supervisor.doubt = PLR_DOUBT_CONTRADICTED;
+    rig.filter.supervisor.difference[0] = PLR_R(0.5);
+    rig.filter.supervisor.difference_sigmas[0] = PLR_R(50);
     break_covariance();
     plr_filter_recover(&rig.filter);
     reseal(&rig.filter);
-    TEST_ASSERT_EQUAL_UINT8(0, rig.filter.consistency.contradicted);
-    TEST_ASSERT_EQUAL_UINT8(15, rig.filter.consistency.settling_frames);
+    TEST_ASSERT_EQUAL_UINT8(PLR_DOUBT_SETTLING, rig.filter.supervisor.doubt);
+    TEST_ASSERT_EQUAL_UINT8(15, rig.filter.supervisor.settle_frames);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_pose_covariance(&rig.filter, after));
     TEST_ASSERT_TRUE(after[0] > 0.25);
 }

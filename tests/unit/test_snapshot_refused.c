@@ -116,8 +116,8 @@ static void test_numbers_that_are_not_finite_are_refused(void) {
     const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     const uint32_t P_at = place_of_P();
     const uint32_t places[] = {state_place("time", "interval_s"),
-                               state_place("filter", "own.core_motion.V"),
-                               state_place("filter", "consistency.excess"),
+                               state_place("filter", "core_motion.V"),
+                               state_place("filter", "supervisor.excess"),
                                state_place("slot", "x"),
                                state_place("slot", "beyond"),
                                P_at,
@@ -145,9 +145,9 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 static void test_a_flag_is_0_or_1(void) {
     const uint32_t flags[] = {state_place("time", "clock_started"),
                               state_place("time", "reading_valid"),
-                              state_place("filter", "consistency.contradicted"),
-                              state_place("filter", "consistency.drifting"),
-                              state_place("filter", "consistency.frozen"),
+                              state_place("filter", "supervisor.outright"),
+                              state_place("filter", "supervisor.misfits"),
+                              state_place("filter", "supervisor.frozen"),
                               state_place("slot", "known"),
                               state_place_of_landmark(1, "known")};
     for (unsigned i = 0; i < sizeof flags / sizeof *flags; i++) {
@@ -158,11 +158,11 @@ static void test_a_flag_is_0_or_1(void) {
     }
 }
 
-static void test_a_doubt_takes_at_most_fifteen_frames_to_settle(void) {
-    const uint32_t at = state_place("filter", "consistency.settling_frames");
-    state.bytes[at] = 16;
+static void test_a_doubt_is_one_of_four(void) {
+    const uint32_t at = state_place("filter", "supervisor.doubt");
+    state.bytes[at] = PLR_DOUBT_SETTLING + 1;
     refuses(PLR_E_CORRUPT);
-    state.bytes[at] = 15;
+    state.bytes[at] = PLR_DOUBT_SETTLING;
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
 }
 

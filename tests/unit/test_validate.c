@@ -4,8 +4,9 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/filter_internal.h"
+#include "known_map/lookup.h"
 #include "math/finite.h"
+#include "math/validate.h"
 #include "support/matrices.h"
 #include "support/random.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/vantage.h"
+#include "filter/linearisation.h"
 #include "math/packed.h"
 #include "pelorus/filter.h"
 #include "state/covariance.h"
@@ -46,7 +46,7 @@ static void put(double inverse_range, double sigma) {
 static void test_well_known_inverse_ranges_have_their_mean(void) {
     for (unsigned i = 0; i < SLOTS; i++)
         put(0.02 + 0.001 * i, 1e-5);
-    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0.0295, (double)plr_vantage_usual(&filter));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0.0295, (double)plr_linearisation_usual(&filter));
 }
 
 /* One pixel says 0.03 of an inverse range of 0.006; twenty of them more. */
@@ -58,7 +58,7 @@ static void test_noise_averages_out_and_what_is_well_known_counts_more(void) {
             const double sigma = i % 2 ? 0.03 : 0.003;
             put(0.006 + sigma * rng_normal(&chance), sigma);
         }
-        const double usual = (double)plr_vantage_usual(&filter);
+        const double usual = (double)plr_linearisation_usual(&filter);
         worst = fmax(worst, fabs(usual - 0.006));
         mean += usual / RUNS;
     }
@@ -71,15 +71,15 @@ static void test_noise_averages_out_and_what_is_well_known_counts_more(void) {
 static void test_it_is_positive_and_not_below_what_is_certain(void) {
     for (unsigned i = 0; i < SLOTS; i++)
         put(-0.01, 0.03);
-    const double usual = (double)plr_vantage_usual(&filter);
+    const double usual = (double)plr_linearisation_usual(&filter);
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.001, usual);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.01, usual);
     filter.count = 0;
     for (unsigned i = 0; i < SLOTS; i++)
         put(-0.01, 1e-6);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-5, (double)plr_vantage_usual(&filter)); /* max-range */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-5, (double)plr_linearisation_usual(&filter)); /* max-range */
     filter.count = 0;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-5, (double)plr_vantage_usual(&filter));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1e-5, (double)plr_linearisation_usual(&filter));
 }
 
 static void test_a_landmark_goes_to_the_usual_place_but_not_further_than_two_sigmas(void) {
@@ -91,11 +91,11 @@ static void test_a_landmark_goes_to_the_usual_place_but_not_further_than_two_sig
     } cases[] = {{0.02, -0.02}, {0.012, -0.02}, {0.005, 0.002 - 0.01}, {0, 0.002}};
     for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const double sigma = cases[i].sigma;
-        const plr_real got = plr_vantage_offset(slot, usual, change, (plr_real)(sigma * sigma));
+        const plr_real got = plr_linearisation_offset(slot, usual, change, (plr_real)(sigma * sigma));
         TEST_ASSERT_DOUBLE_WITHIN(1e-7, cases[i].expected, (double)got);
     }
-    const plr_real rounded = plr_vantage_offset(slot, usual, change, PLR_R(-1e-12));
+    const plr_real rounded = plr_linearisation_offset(slot, usual, change, PLR_R(-1e-12));
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.002, (double)rounded);
-    const plr_real nearer = plr_vantage_offset(slot, PLR_R(0.1), change, PLR_R(1e-4));
+    const plr_real nearer = plr_linearisation_offset(slot, PLR_R(0.1), change, PLR_R(1e-4));
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.022, (double)nearer);
 }

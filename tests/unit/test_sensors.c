@@ -3,19 +3,19 @@
 #include <string.h>
 #include <unity.h>
 
-#include "filter/readings.h"
 #include "sensor/sensor.h"
 #include "support/axes.h"
 #include "support/random.h"
 #include "support/rig.h"
+#include "supervise/sensors.h"
 
-static plr_filter filter;
+static plr_supervisor supervisor;
 static plr_reading reading;
 static rng numbers;
 
 void setUp(void) {
     rig_set_up();
-    plr_readings_clear(&filter);
+    plr_sensors_forget(&supervisor);
     memset(&reading, 0, sizeof reading);
     reading.sensor = PLR_SENSOR_POSITION;
     reading.axes = 7;
@@ -25,16 +25,18 @@ void setUp(void) {
 /* A reading whose errors are `times` as large as its sigma says, and `off` sigmas beside. */
 static void add(double times, double off) {
     double d2 = 0;
+    unsigned count = 0;
     for (unsigned i = 0; i < 3; i++) {
         const double error = times * rng_normal(&numbers) + off;
         d2 += plr_reading_has(&reading, i) ? error * error : 0;
+        count += plr_reading_has(&reading, i);
     }
     reading.t_ns++;
-    plr_readings_add(&filter, &reading, d2 < 13.3, (plr_real)d2);
+    plr_sensors_add(&supervisor, &reading, count, d2 < 13.3, (plr_real)d2);
 }
 
 static bool are_off(void) {
-    return plr_readings_are_wrong(&filter);
+    return plr_sensors_are_wrong(&supervisor);
 }
 
 static void test_readings_as_stated_are_never_off(void) {
@@ -43,7 +45,7 @@ static void test_readings_as_stated_are_never_off(void) {
             reading.axes = (uint8_t)axes;
             add(1, 0);
             TEST_ASSERT_FALSE(are_off());
-            TEST_ASSERT_TRUE(plr_readings_widening(&filter, PLR_SENSOR_POSITION) == 1);
+            TEST_ASSERT_TRUE(plr_sensors_widening(&supervisor, PLR_SENSOR_POSITION) == 1);
         }
 }
 
@@ -51,7 +53,7 @@ static void test_errors_of_twice_the_sigma_are_off_and_their_variance_is_found(v
     for (unsigned k = 0; k < 40; k++)
         add(2, 0);
     TEST_ASSERT_TRUE(are_off());
-    TEST_ASSERT_TRUE(plr_readings_widening(&filter, PLR_SENSOR_POSITION) > PLR_R(1.8));
+    TEST_ASSERT_TRUE(plr_sensors_widening(&supervisor, PLR_SENSOR_POSITION) > PLR_R(1.8));
     for (unsigned k = 0; k < 100; k++)
         add(1, 0);
     TEST_ASSERT_FALSE(are_off());
@@ -74,7 +76,27 @@ static void test_wild_readings_now_and_then_are_no_sensor_that_is_off(void) {
 static void test_one_sensor_says_nothing_of_another(void) {
     for (unsigned k = 0; k < 40; k++)
         add(3, 0);
-    TEST_ASSERT_TRUE(plr_readings_widening(&filter, PLR_SENSOR_WHEEL) == 1);
+    TEST_ASSERT_TRUE(plr_sensors_widening(&supervisor, PLR_SENSOR_WHEEL) == 1);
+}
+
+static void test_ten_rejected_in_succession_are_wrong_and_nine_are_not(void) {
+    for (unsigned k = 0; k < 9; k++) {
+        reading.t_ns++;
+        plr_sensors_add(&supervisor, &reading, 3, false, 3);
+    }
+    TEST_ASSERT_FALSE(are_off());
+    plr_sensors_add(&supervisor, &reading, 3, false, 3);
+    TEST_ASSERT_TRUE(are_off());
+    plr_sensors_add(&supervisor, &reading, 3, true, 3);
+    TEST_ASSERT_FALSE(are_off());
+}
+
+static void test_the_same_reading_again_says_nothing_new(void) {
+    TEST_ASSERT_FALSE(plr_sensors_repeat(&supervisor, &reading));
+    plr_sensors_add(&supervisor, &reading, 3, true, 3);
+    TEST_ASSERT_TRUE(plr_sensors_repeat(&supervisor, &reading));
+    reading.value[2] = 1; /* a correction */
+    TEST_ASSERT_FALSE(plr_sensors_repeat(&supervisor, &reading));
 }
 
 static void test_a_position_with_a_third_of_its_sigma_is_told_and_weighed_as_it_scatters(void) {
