@@ -373,9 +373,9 @@ such a count does not exist in it; so the worst case is no other than that of th
 After frames that were lost in
 a fast turn the motion is searched for once more, in at most 17 evaluations of all points
 (`search_by_agreement`). A pose that is found from known landmarks, because it was lost or is too
-uncertain for them (`src/known_map/placing.c`), takes at most 40 samples of three and asks 64 landmarks
-at most: with wrong ones among 20 as much as one and a half of such frames, among 64 as much as
-three (compared at the desk). None of these is in these frames.
+uncertain for them (`src/known_map/placing.c`), takes at most 40 samples of three and asks 64
+landmarks at most: with wrong ones among 20 as much as one and a half of such frames, among 64 as
+much as three (compared at the desk). None of these is in these frames.
 
 ### With twists
 

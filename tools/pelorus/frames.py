@@ -504,14 +504,12 @@ class Evidence(Message, kind=Kind.EVIDENCE):
     weight: Floats = field(default_factory=lambda: np.ones(2))
     difference: Floats = zeros(6)
     doubt: int = 0
-    flags: EvidenceFlag = EvidenceFlag(0)
+    flags: int = 0  # EvidenceFlag
     matched: int = 0
     same: int = 0
     known: int = 0
     adopted: int = 0
     rejected: NDArray[Any] = field(default_factory=lambda: np.zeros(0, _REJECTED_ROW))
-
-    choices: ClassVar = {"flags": EvidenceFlag}
 
     def values(self) -> dict[str, Any]:
         return vars(self) | {"count": len(self.rejected)}
