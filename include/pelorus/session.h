@@ -63,8 +63,9 @@ typedef enum plr_output {
     PLR_OUTPUT_END = 1 << 6,        /* counts, at the end */
     PLR_OUTPUT_ECHO = 1 << 7,       /* every input: the output is then a flight log, and a replay of
                                        it computes the same bits */
-    PLR_OUTPUT_EVIDENCE = 1 << 9,   /* after each REPORT of a STEREO, what the supervisor saw; not by default */
-    PLR_OUTPUT_STATE = 1 << 8       /* no message: at END the state is written to the store */
+    PLR_OUTPUT_EVIDENCE =
+        1 << 9, /* after each REPORT of a STEREO, what the supervisor saw; not by default */
+    PLR_OUTPUT_STATE = 1 << 8 /* no message: at END the state is written to the store */
 } plr_output;
 
 enum {

@@ -38,13 +38,13 @@ typedef struct plr_search_evidence {
 
 /* The motion of a frame, by pictures beside odometry. */
 typedef struct plr_motion_evidence {
-    bool applied;                    /* there is one; else nothing below is filled */
-    bool outright;                   /* as above, and it was followed */
-    plr_real E[9], p[3];             /* the motion that was applied: (I + E, p) */
-    plr_real moved[PLR_POSE_DIM];    /* by how much the frame moved the pose beside odometry: m, rad */
-    plr_real L[PLR_POSE_SQUARE];     /* sigmas of the odometry as stated: lower triangle, 6x6 */
-    plr_real L_used[PLR_POSE_SQUARE]; /* the same with the weight that it was given */
-    plr_real nu[PLR_POSE_DIM];        /* the difference, in units of L_used */
+    bool applied;                 /* there is one; else nothing below is filled */
+    bool outright;                /* as above, and it was followed */
+    plr_real E[9], p[3];          /* the motion that was applied: (I + E, p) */
+    plr_real moved[PLR_POSE_DIM]; /* by how much the frame moved the pose beside odometry: m, rad */
+    plr_real L[PLR_POSE_SQUARE];  /* sigmas of the odometry as stated: lower triangle, 6x6 */
+    plr_real L_used[PLR_POSE_SQUARE];   /* the same with the weight that it was given */
+    plr_real nu[PLR_POSE_DIM];          /* the difference, in units of L_used */
     plr_real Lambda[PLR_POSE_TRIANGLE]; /* its information, prior included: packed upper triangle */
 } plr_motion_evidence;
 
@@ -60,26 +60,26 @@ typedef struct plr_map_evidence {
 /* What the sensors send, at some time. */
 typedef struct plr_readings_evidence {
     plr_time_ns now_ns;
-    plr_time_ns reading_ns; /* of the last twist or IMU reading */
-    plr_real interval_s;    /* between the last two */
-    bool valid;             /* there is one */
-    bool needed;            /* false in mapping, where poses are given */
-    bool looks;             /* false in dead reckoning, where no picture is used */
+    plr_time_ns reading_ns;       /* of the last twist or IMU reading */
+    plr_real interval_s;          /* between the last two */
+    bool valid;                   /* there is one */
+    bool needed;                  /* false in mapping, where poses are given */
+    bool looks;                   /* false in dead reckoning, where no picture is used */
     bool imu, started, unsettled; /* an IMU; it has started; its start is not settled yet */
     bool fault_of_start;          /* it has a fault that its start has shown */
     bool fault_of_reading;        /* a reading was refused for a fault, and may come right again */
-    uint32_t refused;                     /* twists or IMU readings refused so far */
+    uint32_t refused;             /* twists or IMU readings refused so far */
 } plr_readings_evidence;
 
 /* Events of a frame. */
 typedef struct plr_frame_events {
     bool sink_failed;
-    bool locked;        /* the gate rejected nearly all for ten frames: its landmarks were dropped */
-    bool recovered;     /* a variance was not positive: the landmarks were dropped */
-    bool relocated;     /* the pose was found anew in a known map */
-    bool left_out;      /* known landmarks in sight have not come in; they must not be born as others */
-    bool lost_in_map;   /* they fit no pose */
-    bool moved_far;     /* the pose was moved to where they see it, beyond its covariance: */
+    bool locked;    /* the gate rejected nearly all for ten frames: its landmarks were dropped */
+    bool recovered; /* a variance was not positive: the landmarks were dropped */
+    bool relocated; /* the pose was found anew in a known map */
+    bool left_out;  /* known landmarks in sight have not come in; they must not be born as others */
+    bool lost_in_map; /* they fit no pose */
+    bool moved_far;   /* the pose was moved to where they see it, beyond its covariance: */
     plr_real far_xi[PLR_POSE_DIM], far_nu[PLR_POSE_DIM]; /* by so much, m and rad; in sigmas */
     unsigned adopted, unplaced; /* known landmarks that came in; that could not */
     unsigned cut;               /* landmark corrections limited */
@@ -129,10 +129,10 @@ typedef struct plr_sum {
 
 /* The readings of a small sensor beside what was expected of them. */
 typedef struct plr_sensor_record {
-    plr_time_ns t_ns; /* of the last reading that was used or rejected */
-    double value[3];  /* its numbers */
-    plr_real excess;  /* sum of d^2 less its expectation, older ones weighted less */
-    plr_real numbers; /* the same of that expectation */
+    plr_time_ns t_ns;  /* of the last reading that was used or rejected */
+    double value[3];   /* its numbers */
+    plr_real excess;   /* sum of d^2 less its expectation, older ones weighted less */
+    plr_real numbers;  /* the same of that expectation */
     uint16_t rejected; /* in succession */
     uint8_t off;       /* 1: they differ by more than their sigma says, and not by chance */
 } plr_sensor_record;
@@ -143,25 +143,28 @@ typedef struct plr_supervisor {
     uint8_t scene;     /* the setting: plr_scene_policy */
 
     /* odometry */
-    plr_sum sum;                   /* of nu, in the odometry's sigmas */
-    plr_real usual[PLR_POSE_DIM];  /* its mean square on this drive, in units of its variance: 1 and more */
-    uint8_t misfits; /* 1: that is more than the stated sigmas allow */
-    plr_real usual_frames;         /* from which that was learnt */
-    plr_real statistic;            /* chi-square of the sum in units of what is usual */
-    plr_real agreement;            /* share of the last frames in which both agreed */
-    plr_real weight[2];            /* of the odometry's sigmas in the next frame, way and turn: 1 or more */
-    plr_real excess[2];            /* of a frame that contradicted outright, and of its turn */
-    plr_real difference[PLR_POSE_DIM]; /* from the pose by odometry to the pose by pictures: m, rad */
+    plr_sum sum; /* of nu, in the odometry's sigmas */
+    plr_real usual
+        [PLR_POSE_DIM];    /* its mean square on this drive, in units of its variance: 1 and more */
+    uint8_t misfits;       /* 1: that is more than the stated sigmas allow */
+    plr_real usual_frames; /* from which that was learnt */
+    plr_real statistic;    /* chi-square of the sum in units of what is usual */
+    plr_real agreement;    /* share of the last frames in which both agreed */
+    plr_real weight[2];    /* of the odometry's sigmas in the next frame, way and turn: 1 or more */
+    plr_real excess[2];    /* of a frame that contradicted outright, and of its turn */
+    plr_real
+        difference[PLR_POSE_DIM]; /* from the pose by odometry to the pose by pictures: m, rad */
     plr_real difference_sigmas[PLR_POSE_DIM];
-    plr_real difference_noise; /* the expected square of difference_sigmas by noise alone */
-    uint8_t doubt;             /* plr_doubt */
+    plr_real difference_noise;    /* the expected square of difference_sigmas by noise alone */
+    uint8_t doubt;                /* plr_doubt */
     plr_search_decision searched; /* of the last frame */
     uint8_t settled;              /* the last frame ended a doubt */
-    uint8_t outright;          /* the last frame contradicted outright, and waits for the next */
-    uint8_t turns_fail;        /* the turns are contradicted, too */
-    uint8_t relocated;         /* the pose was found anew since it came into doubt */
-    uint8_t settle_frames;     /* frames of agreement that end the doubt */
-    uint16_t agreeing_frames, contradicting_frames, small_frames, doubted_frames; /* in succession */
+    uint8_t outright;             /* the last frame contradicted outright, and waits for the next */
+    uint8_t turns_fail;           /* the turns are contradicted, too */
+    uint8_t relocated;            /* the pose was found anew since it came into doubt */
+    uint8_t settle_frames;        /* frames of agreement that end the doubt */
+    uint16_t agreeing_frames, contradicting_frames, small_frames,
+        doubted_frames; /* in succession */
 
     /* pictures */
     plr_real frozen_motion[PLR_POSE_DIM]; /* by odometry since the picture was new, m and rad */

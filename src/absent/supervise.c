@@ -97,7 +97,8 @@ void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const p
     (void)s, (void)E, (void)p, (void)P_xi;
 }
 
-void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e, plr_supervision *told) {
+void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
+                        plr_supervision *told) {
     memset(told, 0, sizeof *told);
     told->t_ns = s->last_frame_ns;
     told->matched = (uint16_t)e->picture.matched;

@@ -25,15 +25,13 @@ static void append_new(plr_filter *f, const plr_observation *seen) {
  * next frames, against those that show where the body is. */
 void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n, bool none,
                                plr_frame_events *events, plr_report *report) {
-    const bool makes =
-        plr_births_are_allowed(f) && !(none && f->config.model == PLR_MODEL_BODY);
+    const bool makes = plr_births_are_allowed(f) && !(none && f->config.model == PLR_MODEL_BODY);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_landmark known;
         if (f->work.slot_of[k] != PLR_NO_SLOT)
             continue;
-        if (makes && events->left_out && plr_map_is_asked(f) &&
-            plr_map_ask(f, o->id, &known)) {
+        if (makes && events->left_out && plr_map_is_asked(f) && plr_map_ask(f, o->id, &known)) {
             report->poor++; /* it keeps its place in the map, and is asked for again */
             continue;
         }

@@ -14,7 +14,7 @@
 typedef struct plr_considered_bias {
     plr_real bias[PLR_BIAS_DIM], P_bb[PLR_BIAS_DIM * PLR_BIAS_DIM];
     plr_real S_b[PLR_CALIBRATIONS][PLR_BIAS_DIM];
-    plr_real seconds;                /* of the motion that is pending */
+    plr_real seconds; /* of the motion that is pending */
     bool considered;
 } plr_considered_bias;
 

@@ -2,9 +2,9 @@
 /* The estimate as doubles. No function here changes the filter. */
 #include <string.h>
 
+#include "filter/extrinsics.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/extrinsics.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"

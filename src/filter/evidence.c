@@ -135,10 +135,11 @@ plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *told) {
         const plr_real variance = s->innovation_variance;
         if (s->last_frame != f->frame_number || s->rejected == 0)
             continue;
-        insert(told, (plr_rejected_landmark){
-                         s->id, (uint8_t)why(f, slot), s->rejected,
-                         variance > 0 ? (float)(plr_dot3(s->innovation_sum, s->innovation_sum) / variance)
-                                      : 0.0F});
+        insert(told,
+               (plr_rejected_landmark){
+                   s->id, (uint8_t)why(f, slot), s->rejected,
+                   variance > 0 ? (float)(plr_dot3(s->innovation_sum, s->innovation_sum) / variance)
+                                : 0.0F});
     }
     return PLR_OK;
 }

@@ -4,9 +4,9 @@
 
 #include <string.h>
 
+#include "filter/extrinsics.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/extrinsics.h"
 #include "filter/predict.h"
 #include "math/finite.h"
 #include "math/se3.h"
@@ -352,19 +352,19 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
 plr_readings_evidence plr_filter_readings_at(const plr_filter *f, plr_time_ns now_ns) {
     const bool imu = f->config.process == PLR_PROCESS_IMU;
     const plr_imu_fault fault = (plr_imu_fault)f->inertial.fault;
-    return (plr_readings_evidence){
-        .now_ns = now_ns,
-        .reading_ns = f->reading_ns,
-        .interval_s = f->interval_s,
-        .valid = f->reading_valid,
-        .needed = f->config.mode != PLR_MODE_MAPPING,
-        .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
-        .imu = imu,
-        .started = !imu || f->inertial.started,
-        .unsettled = imu && plr_alignment_is_unsettled(f),
-        .fault_of_start = fault > PLR_IMU_FAULT_MOVES && fault < PLR_IMU_FAULT_SATURATED,
-        .fault_of_reading = fault >= PLR_IMU_FAULT_SATURATED,
-        .refused = f->totals.twists_refused};
+    return (plr_readings_evidence){.now_ns = now_ns,
+                                   .reading_ns = f->reading_ns,
+                                   .interval_s = f->interval_s,
+                                   .valid = f->reading_valid,
+                                   .needed = f->config.mode != PLR_MODE_MAPPING,
+                                   .looks = f->config.mode != PLR_MODE_DEAD_RECKONING,
+                                   .imu = imu,
+                                   .started = !imu || f->inertial.started,
+                                   .unsettled = imu && plr_alignment_is_unsettled(f),
+                                   .fault_of_start = fault > PLR_IMU_FAULT_MOVES &&
+                                                     fault < PLR_IMU_FAULT_SATURATED,
+                                   .fault_of_reading = fault >= PLR_IMU_FAULT_SATURATED,
+                                   .refused = f->totals.twists_refused};
 }
 
 void plr_filter_pending_motion(const plr_filter *f, plr_picture_evidence *e) {

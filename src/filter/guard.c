@@ -107,7 +107,8 @@ static bool is_in_range(const plr_filter *f) {
            c->mode <= PLR_MODE_DEAD_RECKONING && c->twist_timing <= PLR_TWIST_MID &&
            c->noise <= PLR_NOISE_STEP && c->process <= PLR_PROCESS_IMU &&
            c->imu_start <= PLR_IMU_START_GIVEN && c->imu_timing <= PLR_TWIST_MID && c->bias <= 1 &&
-           c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE && c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
+           c->known_map <= 1 && c->scene <= PLR_SCENE_MAY_MOVE &&
+           c->landmark_prior <= PLR_PRIOR_INDEPENDENT && c->slots >= 1 &&
            c->slots <= PLR_MAX_LANDMARKS && f->count <= c->slots && f->clock_started <= 1 &&
            f->reading_valid <= 1 && f->diverged <= 1 && f->motion.pending <= 1 &&
            f->motion.noisy <= 1;

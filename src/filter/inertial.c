@@ -5,15 +5,15 @@
 
 #include <string.h>
 
+#include "filter/extrinsics.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "process/statistics.h"
-#include "filter/extrinsics.h"
 #include "filter/predict.h"
 #include "math/finite.h"
 #include "math/small.h"
 #include "process/alignment.h"
 #include "process/process.h"
+#include "process/statistics.h"
 #include "state/seconds.h"
 
 enum {

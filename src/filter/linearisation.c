@@ -43,7 +43,7 @@ plr_real plr_linearisation_usual(const plr_filter *f) {
 }
 
 plr_real plr_linearisation_offset(const plr_slot *slot, plr_real usual, plr_real change,
-                            plr_real variance) {
+                                  plr_real variance) {
     const plr_real known_to = variance > 0 ? SIGMAS * PLR_SQRT(variance) : 0;
     const plr_real off = usual - inverse_range(slot);
     if (off < change - known_to)

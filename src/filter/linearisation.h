@@ -18,6 +18,6 @@ plr_real plr_linearisation_usual(const plr_filter *f);
  * one nearest to the usual inverse range within two sigmas of estimate + change: `change` is the
  * correction by the frame's observation, `variance` that of the inverse range after it. */
 plr_real plr_linearisation_offset(const plr_slot *slot, plr_real usual, plr_real change,
-                            plr_real variance);
+                                  plr_real variance);
 
 #endif

@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "filter/correction.h"
+#include "filter/extrinsics.h"
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
 #include "filter/guard.h"
-#include "filter/extrinsics.h"
 #include "filter/predict.h"
 #include "math/dense.h"
 #include "math/finite.h"

@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "filter/gate.h"
+#include "filter/linearisation.h"
 #include "filter/search.h"
 #include "filter/tracks.h"
-#include "filter/linearisation.h"
 #include "math/dense.h"
 #include "math/small.h"
 #include "sensor/stereo.h"

@@ -7,11 +7,11 @@
 
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "process/statistics.h"
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
 #include "process/process.h"
+#include "process/statistics.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"

@@ -237,7 +237,8 @@ plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame
     plr_motion_pose_covariance(f, P);
     if (new_ones == 0 || !is_regular(P))
         return PLR_PLACED;
-    const bool tells = plr_find_likeliest_pose(f, frame, n, &found) && plr_find_gap(f, &found, &gap);
+    const bool tells =
+        plr_find_likeliest_pose(f, frame, n, &found) && plr_find_gap(f, &found, &gap);
     drop_known(f, true);
     events->lost_in_map = !tells;
     if (!tells)

@@ -25,8 +25,8 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
                             plr_frame_events *events);
 
 typedef enum plr_relocation {
-    PLR_PLACED,    /* nothing was changed */
-    PLR_MOVED,     /* known landmarks have been dropped, and are to come in again */
+    PLR_PLACED,  /* nothing was changed */
+    PLR_MOVED,   /* known landmarks have been dropped, and are to come in again */
     PLR_LEFT_OUT /* those that had just come in have been dropped: no pose fits them */
 } plr_relocation;
 

@@ -2,9 +2,9 @@
 /* Continuing after an interruption, with another clock and perhaps at another place. */
 #include <string.h>
 
+#include "filter/extrinsics.h"
 #include "filter/filter_internal.h"
 #include "filter/guard.h"
-#include "filter/extrinsics.h"
 #include "math/finite.h"
 #include "process/alignment.h"
 #include "state/blocks.h"

@@ -138,8 +138,8 @@ static plr_search_decision ask_after_search(plr_filter *f, unsigned n, bool outr
 static void weigh_odometry(plr_filter *f) {
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j < PLR_POSE_DIM; j++)
-            f->motion.Q[PLR_POSE_DIM * i + j] *= plr_supervise_weight(&f->supervisor, i) *
-                                                 plr_supervise_weight(&f->supervisor, j);
+            f->motion.Q[PLR_POSE_DIM * i + j] *=
+                plr_supervise_weight(&f->supervisor, i) * plr_supervise_weight(&f->supervisor, j);
 }
 
 /* Finds the motion, judges the observations by it, and corrects. A frame that needs no motion applied, or

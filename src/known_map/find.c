@@ -79,7 +79,8 @@ bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guess
         return false;
     if (guesses)
         guess_placing(f, origin, &guess);
-    const unsigned agreeing = plr_place(f, plr_seen_known_of(f), found->count, guesses ? &guess : NULL, &at);
+    const unsigned agreeing =
+        plr_place(f, plr_seen_known_of(f), found->count, guesses ? &guess : NULL, &at);
     if (agreeing == 0 || 5 * agreeing < 3 * found->count)
         return false;
     set_found(f, &at, origin, found);
@@ -97,7 +98,8 @@ bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
     guess_placing(f, origin, &prior);
     plr_motion_pose_covariance(f, P);
     plr_sandwich6(prior.P_C, f->par.Ad_CB, P);
-    const unsigned agreeing = plr_place_by_prior(f, plr_seen_known_of(f), found->count, &prior, &at);
+    const unsigned agreeing =
+        plr_place_by_prior(f, plr_seen_known_of(f), found->count, &prior, &at);
     if (5 * agreeing < 3 * found->count)
         return false;
     memset(at.P_C, 0, sizeof at.P_C);

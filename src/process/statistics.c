@@ -22,13 +22,13 @@ static plr_real square_of_change(const plr_filter *f, const plr_real reading[PLR
 }
 
 void plr_statistics_change(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
-                      plr_real change2[2]) {
+                           plr_real change2[2]) {
     change2[0] = square_of_change(f, reading, 0);
     change2[1] = square_of_change(f, reading, 3);
 }
 
 void plr_statistics_learn(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                     plr_real interval, const plr_real change2[2]) {
+                          plr_real interval, const plr_real change2[2]) {
     plr_inertial *s = &f->inertial;
     if (!f->reading_valid) {
         memcpy(s->slow, reading, sizeof s->slow);

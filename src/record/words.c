@@ -45,10 +45,13 @@ const char *plr_version(void) {
 
 /* FNV-1a over what the bits of a result depend on. */
 uint32_t plr_build_fingerprint(void) {
-    static const uint32_t parts[] = {
-        PLR_VERSION_NUMBER, PLR_ARITHMETIC,       PLR_REAL,
-        PLR_MAX_LANDMARKS,  PLR_MAX_OBSERVATIONS, PLR_BLOCK_OBSERVATIONS,
-        2 * PLR_SUPERVISE + PLR_KNOWN_MAP};
+    static const uint32_t parts[] = {PLR_VERSION_NUMBER,
+                                     PLR_ARITHMETIC,
+                                     PLR_REAL,
+                                     PLR_MAX_LANDMARKS,
+                                     PLR_MAX_OBSERVATIONS,
+                                     PLR_BLOCK_OBSERVATIONS,
+                                     2 * PLR_SUPERVISE + PLR_KNOWN_MAP};
     uint32_t hash = 2166136261U;
     for (unsigned i = 0; i < sizeof parts / sizeof *parts; i++)
         for (unsigned byte = 0; byte < 4; byte++)

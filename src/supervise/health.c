@@ -20,8 +20,8 @@ bool plr_health_readings_are_old(const plr_supervisor *s, const plr_readings_evi
 }
 
 uint32_t plr_health_of_readings(const plr_supervisor *s, const plr_readings_evidence *now) {
-    const bool lacking = (now->needed && now->refused != s->refused_before) ||
-                         plr_health_readings_are_old(s, now);
+    const bool lacking =
+        (now->needed && now->refused != s->refused_before) || plr_health_readings_are_old(s, now);
     uint32_t reasons = plr_sensors_are_wrong(s) ? PLR_REASON_READINGS_REJECTED : 0;
     if (lacking)
         reasons |= PLR_REASON_NO_TWISTS;

@@ -110,7 +110,8 @@ static plr_material material(const plr_supervisor *s, const plr_real n[PLR_POSE_
 /* The mean difference of the last frames by pictures alone, in sigmas. */
 static void lately(const plr_supervisor *s, plr_real floor, plr_real mean[PLR_POSE_DIM]) {
     plr_sum_by_pictures(s->sum.sum, s->sum.variance, floor, mean);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* s / V of a lasting difference is (1 + keep) of it */
+    for (unsigned k = 0; k < PLR_POSE_DIM;
+         k++) /* s / V of a lasting difference is (1 + keep) of it */
         mean[k] /= PLR_R(1) + plr_limit(s, PLR_LIMIT_SUM_KEEPS);
 }
 
@@ -125,7 +126,8 @@ static plr_material lately_material(const plr_supervisor *s, const plr_motion_ev
 
 /* Once told it stays until the variances are usually less than half of that. */
 static void judge_usual(plr_supervisor *s) {
-    const plr_real limit = plr_limit(s, PLR_LIMIT_USUAL_TOLD) * (s->misfits ? PLR_R(0.5) : PLR_R(1));
+    const plr_real limit =
+        plr_limit(s, PLR_LIMIT_USUAL_TOLD) * (s->misfits ? PLR_R(0.5) : PLR_R(1));
     s->misfits = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         s->misfits |= s->usual[k] > limit;
@@ -204,8 +206,9 @@ void plr_odometry_cover(const plr_supervisor *s, const plr_real d[PLR_POSE_DIM],
     const plr_real turn = sideways * sideways * plr_dot3(d + 3, d + 3);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         for (unsigned j = 0; j < PLR_POSE_DIM; j++)
-            C[PLR_POSE_DIM * i + j] =
-                unexplained * (d[i] * d[j] + (i != j ? PLR_R(0) : i < 3 ? way : turn));
+            C[PLR_POSE_DIM * i + j] = unexplained * (d[i] * d[j] + (i != j  ? PLR_R(0)
+                                                                    : i < 3 ? way
+                                                                            : turn));
 }
 
 void plr_odometry_settle(plr_supervisor *s) {
@@ -317,8 +320,7 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
         learn_agreement(s);
     const plr_material part = lately_material(s, m);
     const bool much = part.way || part.turn;
-    const plr_real weighed =
-        plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK)).all;
+    const plr_real weighed = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK)).all;
     const bool contradicts = much && weighed > plr_limit(s, PLR_LIMIT_CONTRADICTS_ABOVE);
     s->small_frames = much ? 0 : one_more(s->small_frames);
     s->contradicting_frames = contradicts ? one_more(s->contradicting_frames) : 0;

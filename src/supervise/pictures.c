@@ -35,9 +35,9 @@ static bool has_moved(const plr_supervisor *s, const plr_picture_evidence *e) {
 }
 
 bool plr_pictures_are_frozen(plr_supervisor *s, const plr_picture_evidence *e) {
-    const bool repeats = e->matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
-                         (plr_real)e->same >=
-                             plr_limit(s, PLR_LIMIT_FROZEN_SHARE) * (plr_real)e->matched;
+    const bool repeats =
+        e->matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
+        (plr_real)e->same >= plr_limit(s, PLR_LIMIT_FROZEN_SHARE) * (plr_real)e->matched;
     s->frozen = repeats && has_moved(s, e);
     if (!repeats) {
         memset(s->frozen_motion, 0, sizeof s->frozen_motion);
@@ -84,9 +84,8 @@ uint32_t plr_pictures_add(plr_supervisor *s, const plr_report *report, plr_time_
     const uint32_t inert = plr_limit_count(s, PLR_LIMIT_INERT_MATCHES);
     uint32_t reasons = 0;
     s->frames_without_use =
-        report->used > 0
-            ? 0
-            : (uint16_t)(s->frames_without_use + (s->frames_without_use < UINT16_MAX));
+        report->used > 0 ? 0
+                         : (uint16_t)(s->frames_without_use + (s->frames_without_use < UINT16_MAX));
     s->matches_since_gated = report->gated ? 0 : s->matches_since_gated + report->matched;
     if (s->matches_since_gated > inert)
         s->matches_since_gated = inert;
@@ -94,9 +93,9 @@ uint32_t plr_pictures_add(plr_supervisor *s, const plr_report *report, plr_time_
     s->nis_dof = PLR_FMA(NIS_KEEPS, s->nis_dof, (plr_real)report->nis_dof);
     if (report->used < plr_limit_count(s, PLR_LIMIT_FEW))
         reasons |= PLR_REASON_FEW_OBSERVATIONS;
-    const bool late = s->last_use_ns != PLR_NEVER_NS && t_ns > s->last_use_ns &&
-                      (plr_real)(t_ns - s->last_use_ns) * PLR_R(1e-9) >
-                          plr_limit(s, PLR_LIMIT_LOST_S);
+    const bool late =
+        s->last_use_ns != PLR_NEVER_NS && t_ns > s->last_use_ns &&
+        (plr_real)(t_ns - s->last_use_ns) * PLR_R(1e-9) > plr_limit(s, PLR_LIMIT_LOST_S);
     if (s->frames_without_use >= plr_limit_count(s, PLR_LIMIT_LOST_FRAMES) ||
         (s->frames_without_use > 0 && late))
         reasons |= PLR_REASON_NO_OBSERVATIONS;

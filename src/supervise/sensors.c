@@ -28,8 +28,7 @@ void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned num
     of->numbers = PLR_FMA(KEEPS, of->numbers, n);
     /* the variance of `excess`, 2 n / (1 - KEEPS^2), is about `numbers` when that is full */
     const plr_real variance = of->numbers > FULL_SUM * n ? of->numbers : FULL_SUM * n;
-    const plr_real limit =
-        plr_limit(s, of->off ? PLR_LIMIT_SENSOR_BELOW : PLR_LIMIT_SENSOR_ABOVE);
+    const plr_real limit = plr_limit(s, of->off ? PLR_LIMIT_SENSOR_BELOW : PLR_LIMIT_SENSOR_ABOVE);
     of->off = of->excess > 0 && of->excess * of->excess > limit * limit * variance;
     of->t_ns = reading->t_ns;
     memcpy(of->value, reading->value, sizeof of->value);

@@ -169,8 +169,8 @@ static void settle(plr_supervisor *s, plr_frame_decision *decision) {
 
 static void count_doubt(plr_supervisor *s, bool lost, const plr_report *report) {
     const bool event = lost || s->frozen || plr_doubt_contradicted(s);
-    const bool agrees = !lost && !s->frozen && s->doubt != PLR_DOUBT_DEPARTED &&
-                        !s->outright && report->used >= plr_limit_count(s, PLR_LIMIT_FEW) &&
+    const bool agrees = !lost && !s->frozen && s->doubt != PLR_DOUBT_DEPARTED && !s->outright &&
+                        report->used >= plr_limit_count(s, PLR_LIMIT_FEW) &&
                         s->statistic < plr_limit(s, PLR_LIMIT_AGREES_BELOW);
     if ((event || s->doubted_frames > 0) && s->doubted_frames < UINT16_MAX)
         s->doubted_frames++;
@@ -191,8 +191,8 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
                          plr_frame_decision *decision) {
     const bool held = plr_health_readings_are_old(s, &e->readings);
     const bool was_contradicted = plr_doubt_contradicted(s);
-    const bool tells = !held && s->frames_without_use == 0 &&
-                       report->used >= plr_limit_count(s, PLR_LIMIT_FEW);
+    const bool tells =
+        !held && s->frames_without_use == 0 && report->used >= plr_limit_count(s, PLR_LIMIT_FEW);
     plr_odometry_verdict odometry = {false, false, false};
     uint32_t reasons = reasons_of_events(&e->events, report);
     memset(decision, 0, sizeof *decision);
@@ -289,7 +289,8 @@ static void copy(float *to, const plr_real *from, unsigned n) {
         to[i] = (float)from[i];
 }
 
-void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e, plr_supervision *told) {
+void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
+                        plr_supervision *told) {
     const plr_motion_evidence *m = &e->motion;
     plr_real n[PLR_POSE_DIM];
     memset(told, 0, sizeof *told);
@@ -337,8 +338,7 @@ void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *
 }
 
 void plr_supervise_waits(plr_supervisor *s, const plr_readings_evidence *now, plr_report *report) {
-    report->reasons =
-        plr_health_of_readings(s, now) & ~(uint32_t)PLR_REASON_READINGS_REJECTED;
+    report->reasons = plr_health_of_readings(s, now) & ~(uint32_t)PLR_REASON_READINGS_REJECTED;
     report->health = PLR_HEALTH_LOST;
     s->refused_before = now->refused;
     s->last_frame_ns = now->now_ns;

@@ -66,7 +66,8 @@ void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const p
                            plr_real P_xi[PLR_POSE_SQUARE]);
 
 /* What was seen in the last frame, and decided; the rejected landmarks are not filled. */
-void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e, plr_supervision *told);
+void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
+                        plr_supervision *told);
 
 /* Health and reasons at any time. */
 void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,

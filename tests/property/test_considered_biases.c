@@ -11,11 +11,11 @@
 #include <string.h>
 #include <unity.h>
 
+#include "supervise/supervise.h"
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/reseal.h"
 #include "support/twin_drive.h"
-#include "supervise/supervise.h"
 
 enum { FRAMES = 60, MOST_SEEN = 20, LARGEST = 204 };
 

@@ -11,9 +11,9 @@
  */
 #include <unity.h>
 
+#include "supervise/supervise.h"
 #include "support/reseal.h"
 #include "support/rig.h"
-#include "supervise/supervise.h"
 
 enum { FRAMES = 600 };
 

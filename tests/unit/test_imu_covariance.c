@@ -122,10 +122,10 @@ static void joint_noise(const double B[6 * DRIVER], const double *P, unsigned n,
     double P_dd[DRIVER * DRIVER], BPB[36];
     for (unsigned i = 0; i < CORE; i++)
         for (unsigned j = i; j < CORE; j++) {
-            const double q =
-                j < 6   ? (double)filter.motion.Q[6 * i + j]
-                : i < 6 ? (double)filter.core_motion.Q_nc[PLR_REST_DIM * i + j - 6]
-                        : (double)filter.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
+            const double q = j < 6 ? (double)filter.motion.Q[6 * i + j]
+                             : i < 6
+                                 ? (double)filter.core_motion.Q_nc[PLR_REST_DIM * i + j - 6]
+                                 : (double)filter.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
             Q[CORE * i + j] = Q[CORE * j + i] = q;
         }
     for (unsigned i = 0; i < DRIVER; i++)

@@ -91,7 +91,8 @@ static void test_a_landmark_goes_to_the_usual_place_but_not_further_than_two_sig
     } cases[] = {{0.02, -0.02}, {0.012, -0.02}, {0.005, 0.002 - 0.01}, {0, 0.002}};
     for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const double sigma = cases[i].sigma;
-        const plr_real got = plr_linearisation_offset(slot, usual, change, (plr_real)(sigma * sigma));
+        const plr_real got =
+            plr_linearisation_offset(slot, usual, change, (plr_real)(sigma * sigma));
         TEST_ASSERT_DOUBLE_WITHIN(1e-7, cases[i].expected, (double)got);
     }
     const plr_real rounded = plr_linearisation_offset(slot, usual, change, PLR_R(-1e-12));

@@ -218,8 +218,7 @@ static void test_retraction_follows_its_equations(void) {
                 double sum = 0;
                 for (int i = 0; i < 3; i++)
                     for (int j = 0; j < 3; j++)
-                        sum +=
-                            (double)moved.N[a][i] * E[4 * i + j] * (double)chart.N[b][j];
+                        sum += (double)moved.N[a][i] * E[4 * i + j] * (double)chart.N[b][j];
                 TEST_ASSERT_DOUBLE_WITHIN(30 * eps, sum, (double)M[2 * a + b]);
             }
     }

@@ -4,10 +4,10 @@
 #include <unity.h>
 
 #include "sensor/sensor.h"
+#include "supervise/sensors.h"
 #include "support/axes.h"
 #include "support/random.h"
 #include "support/rig.h"
-#include "supervise/sensors.h"
 
 static plr_supervisor supervisor;
 static plr_reading reading;

@@ -143,13 +143,11 @@ static void test_a_negative_variance_is_refused_and_a_negative_covariance_is_not
 }
 
 static void test_a_flag_is_0_or_1(void) {
-    const uint32_t flags[] = {state_place("time", "clock_started"),
-                              state_place("time", "reading_valid"),
-                              state_place("filter", "supervisor.outright"),
-                              state_place("filter", "supervisor.misfits"),
-                              state_place("filter", "supervisor.frozen"),
-                              state_place("slot", "known"),
-                              state_place_of_landmark(1, "known")};
+    const uint32_t flags[] = {
+        state_place("time", "clock_started"),         state_place("time", "reading_valid"),
+        state_place("filter", "supervisor.outright"), state_place("filter", "supervisor.misfits"),
+        state_place("filter", "supervisor.frozen"),   state_place("slot", "known"),
+        state_place_of_landmark(1, "known")};
     for (unsigned i = 0; i < sizeof flags / sizeof *flags; i++) {
         state_bytes_save(&state, &filter);
         TEST_ASSERT_LESS_OR_EQUAL_UINT8(1, state.bytes[flags[i]]);

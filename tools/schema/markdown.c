@@ -230,8 +230,8 @@ static void print_limits(void) {
            "|---|---|---|---|---|---|\n");
     for (unsigned i = 0; plr_limit_at(i); i++) {
         const plr_limit_row *l = plr_limit_at(i);
-        printf("| %s | %g | %s | %s | %s | %s |\n", l->name, l->value, l->unit, l->about, l->scenario,
-               l->recording);
+        printf("| %s | %g | %s | %s | %s | %s |\n", l->name, l->value, l->unit, l->about,
+               l->scenario, l->recording);
     }
 }
 
