@@ -128,8 +128,7 @@ typedef double plr_real;
 #endif
 
 /* a b + c in float32, rounded once, for processors without an instruction for it: the same bits for
- * every finite input and for infinities; a NaN results in a NaN. Needs IEEE double arithmetic
- * alone. */
+ * every finite input and for infinities; a NaN results in a NaN. */
 float plr_fmaf_exact(float a, float b, float c);
 
 /* A constant in the filter's precision. */

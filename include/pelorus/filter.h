@@ -108,15 +108,13 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
  * because it shows a true step or shock. Numbers that stay the same are used ten times, and then
  * refused until they change.
  * Statuses: those of plr_filter_predict, and PLR_E_RANGE at the limit of gyro_range or accel_range,
- * or a spike; PLR_E_ARGUMENT numbers that have stayed the same; PLR_E_MODE the process is
- * another. */
+ * or a spike; PLR_E_ARGUMENT numbers that have stayed the same. */
 plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *reading);
 
 /* With an IMU: sets its velocity (with the setting imu-arm not that of the body's origin), in the
  * body's axes, m/s, and variances. It starts the filter with the pose that plr_filter_set_pose set.
  * PLR_E_MODE another process, no pose was set, or there are landmarks or readings since;
- * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e4 m/s or a variance of 1e12; PLR_E_ARGUMENT a negative
- * variance. */
+ * PLR_E_NOT_FINITE; PLR_E_RANGE beyond 1e4 m/s or variance 1e12; PLR_E_ARGUMENT one below 0. */
 plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
                                    const double variance[3]);
 
@@ -125,8 +123,7 @@ plr_imu_fault plr_filter_imu_fault(const plr_filter *f);
 
 /* mapping only: sets the body's pose at t_ns, which is taken as exact; the landmarks keep their
  * place in the world. The first call sets the time.
- * PLR_E_MODE, PLR_E_TIME, PLR_E_NOT_FINITE, PLR_E_ARGUMENT (not a rotation), PLR_E_RANGE (beyond
- * 1e9 m). */
+ * PLR_E_MODE, _TIME, _NOT_FINITE; PLR_E_ARGUMENT no rotation; PLR_E_RANGE above 1e9 m. */
 plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T_WB);
 
 /* A stereo frame: predicts the pose at its time with the last reading, matches observations to

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-/* Pelorus: a stereo visual-inertial SLAM filter. Includes the complete interface of the filter.
- * Separate headers: the frame format of recordings and links in wire.h, a main loop over such a
- * link in session.h, what that loop needs of the machine in port.h, saved states in
- * state_store.h. */
+/* Pelorus: a stereo visual-inertial SLAM filter; includes its complete interface. In headers of
+ * their own: the frame format of recordings and links (wire.h), a main loop over such a link
+ * (session.h), what it needs of the machine (port.h), saved states (state_store.h). */
 #ifndef PELORUS_PELORUS_H
 #define PELORUS_PELORUS_H
 

@@ -211,8 +211,7 @@ static inline plr_status plr_session_init(plr_session *s, const plr_port *port,
 
 /* Reads the bytes that are there, up to the end of one frame, and handles its message. The work of
  * one step is bounded: at most PLR_SESSION_CHUNK bytes, one filter update, PLR_WIRE_MAX_IMU
- * readings, what waited (PLR_SESSION_HELD_FRAMES updates more), and, at END, one LANDMARK for each
- * slot. */
+ * readings, PLR_SESSION_HELD_FRAMES updates that waited, and, at END, one LANDMARK a slot. */
 plr_step plr_session_step(plr_session *s);
 
 /* Does what END does, for a stream that stopped without one: applies the twists that still wait,

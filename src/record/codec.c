@@ -233,14 +233,6 @@ static size_t length_of(const char *text, size_t size) {
     return n;
 }
 
-/* A cut may be inside a character: of UTF-8 at most three bytes go before it. */
-static void drop_part_of_character(char *text, unsigned length) {
-    unsigned n = length;
-    while (n > 0 && n > length - 3 && ((uint8_t)text[n] & 0xC0) == 0x80)
-        n--;
-    text[n] = '\0';
-}
-
 static void pass_characters(plr_codec *c, char *text, unsigned length, bool is_cut) {
     for (unsigned i = 0; i < length && c->status == PLR_OK; i++) {
         const char character = (char)pass_byte(c, (uint8_t)text[i]);
@@ -250,8 +242,10 @@ static void pass_characters(plr_codec *c, char *text, unsigned length, bool is_c
     if (!plr_codec_reads(c) || c->status != PLR_OK)
         return;
     text[length] = is_cut ? (char)pass_byte(c, 0) : '\0';
-    if (is_cut)
-        drop_part_of_character(text, length);
+    unsigned end = length; /* of a character of UTF-8 that is cut, up to three bytes go too */
+    while (is_cut && end > 0 && end > length - 3 && ((uint8_t)text[end] & 0xC0) == 0x80)
+        end--;
+    text[end] = '\0';
 }
 
 /* REST, and the length of a TEXT. */

@@ -47,23 +47,10 @@ static const plr_record records[PLR_WIRE_KINDS + 1] = {
 };
 
 /* No row can be refused, so CHECK passes over them. */
-static unsigned rows_of(const plr_codec *c, unsigned count) {
-    return c->direction == PLR_CODEC_CHECK ? 0 : count;
-}
-
-static void pass_settings(plr_codec *c, plr_config_message *m) {
-    for (unsigned i = 0; i < rows_of(c, m->count) && c->status == PLR_OK; i++)
-        plr_codec_fields(c, &m->settings[i], CONFIG_rows, LENGTH(CONFIG_rows));
-}
-
-static void pass_imu(plr_codec *c, plr_imu_message *m) {
-    for (unsigned i = 0; i < rows_of(c, m->count) && c->status == PLR_OK; i++)
-        plr_codec_fields(c, &m->readings[i], IMU_rows, LENGTH(IMU_rows));
-}
-
-static void pass_rejected(plr_codec *c, plr_supervision *m) {
-    for (unsigned i = 0; i < rows_of(c, m->count) && c->status == PLR_OK; i++)
-        plr_codec_fields(c, &m->rejected[i], EVIDENCE_rows, LENGTH(EVIDENCE_rows));
+static void pass_rows(plr_codec *c, unsigned count, void *rows, size_t size,
+                      const plr_field *fields, unsigned n) {
+    for (unsigned i = 0; i < count && c->status == PLR_OK && c->direction != PLR_CODEC_CHECK; i++)
+        plr_codec_fields(c, (unsigned char *)rows + i * size, fields, n);
 }
 
 /* What is read goes to the reader's room; what is written is only looked at. */
@@ -76,8 +63,7 @@ static void pass_observations(plr_codec *c, plr_frame *m, const plr_observation_
     } else if (m->count > 0 && !rows) {
         plr_codec_fail(c, PLR_E_ARGUMENT);
     }
-    for (unsigned i = 0; i < rows_of(c, m->count) && c->status == PLR_OK; i++)
-        plr_codec_fields(c, &rows[i], STEREO_rows, LENGTH(STEREO_rows));
+    pass_rows(c, m->count, rows, sizeof *rows, STEREO_rows, LENGTH(STEREO_rows));
 }
 
 void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
@@ -87,14 +73,21 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
         return;
     }
     plr_codec_fields(c, content, records[kind].fields, records[kind].count);
-    if (kind == PLR_KIND_CONFIG)
-        pass_settings(c, content);
     if (kind == PLR_KIND_STEREO)
         pass_observations(c, content, room);
-    if (kind == PLR_KIND_IMU)
-        pass_imu(c, content);
-    if (kind == PLR_KIND_EVIDENCE)
-        pass_rejected(c, content);
+    if (kind == PLR_KIND_CONFIG) {
+        plr_config_message *m = content;
+        pass_rows(c, m->count, m->settings, sizeof *m->settings, CONFIG_rows, LENGTH(CONFIG_rows));
+    }
+    if (kind == PLR_KIND_IMU) {
+        plr_imu_message *m = content;
+        pass_rows(c, m->count, m->readings, sizeof *m->readings, IMU_rows, LENGTH(IMU_rows));
+    }
+    if (kind == PLR_KIND_EVIDENCE) {
+        plr_supervision *m = content;
+        pass_rows(c, m->count, m->rejected, sizeof *m->rejected, EVIDENCE_rows,
+                  LENGTH(EVIDENCE_rows));
+    }
     if (kind == PLR_KIND_LANDMARK && plr_codec_reads(c)) {
         plr_landmark_message *m = content;
         m->landmark.times_gated = 0;

@@ -20,19 +20,14 @@ plr_status plr_reader_init(plr_reader *r, uint8_t *buffer, size_t buffer_size,
     return PLR_OK;
 }
 
-/* A lower number than expected is no gap of almost 2^16 frames: the sender began anew. */
-static void count_missing(plr_reader *r, uint16_t sequence) {
-    uint16_t gap = (uint16_t)(sequence - r->next_sequence);
-    if (gap < STEP_BACK)
-        r->counts.missing += gap;
-    r->next_sequence = (uint16_t)(sequence + 1);
-}
-
 /* The message of a body whose checksum is good. PLR_OK, or as plr_message_pass. */
 static plr_status decode(plr_reader *r, plr_message *message) {
     PLR_ASSERT(r->length >= PLR_WIRE_OVERHEAD && r->length <= r->buffer_size);
-    uint16_t sequence = (uint16_t)plr_bytes_get(r->buffer + AT_SEQUENCE, 2);
-    count_missing(r, sequence);
+    const uint16_t sequence = (uint16_t)plr_bytes_get(r->buffer + AT_SEQUENCE, 2);
+    const uint16_t gap = (uint16_t)(sequence - r->next_sequence);
+    if (gap < STEP_BACK) /* else it is no gap of almost 2^16 frames: the sender began anew */
+        r->counts.missing += gap;
+    r->next_sequence = (uint16_t)(sequence + 1);
     if (r->overrun)
         return PLR_E_FULL;
     const uint8_t *payload = r->buffer + AT_PAYLOAD;
@@ -79,15 +74,6 @@ static plr_read_event end_frame(plr_reader *r, bool whole, plr_message *message)
     return PLR_READ_MESSAGE;
 }
 
-/* What does not fit is still checked, so that a long frame and a damaged one are told apart. */
-static void append(plr_reader *r, uint8_t byte) {
-    r->crc = plr_crc32(r->crc, &byte, 1);
-    if (r->length < r->buffer_size)
-        r->buffer[r->length++] = byte;
-    else
-        r->overrun = true;
-}
-
 static plr_cobs_step take_byte(plr_reader *r, uint8_t stuffed) {
     uint8_t byte;
     if (!plr_cobs_in_frame(&r->cobs)) {
@@ -98,8 +84,13 @@ static plr_cobs_step take_byte(plr_reader *r, uint8_t stuffed) {
     }
     r->counts.bytes++;
     plr_cobs_step step = plr_cobs_decode(&r->cobs, stuffed, &byte);
-    if (step == PLR_COBS_BYTE)
-        append(r, byte);
+    if (step != PLR_COBS_BYTE)
+        return step;
+    r->crc = plr_crc32(r->crc, &byte, 1); /* of what does not fit, too: is it long, or damaged? */
+    if (r->length < r->buffer_size)
+        r->buffer[r->length++] = byte;
+    else
+        r->overrun = true;
     return step;
 }
 

@@ -82,13 +82,6 @@ plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
     return PLR_R(0.4) * PLR_SQRT(f->par.pixel_variance) / f->par.camera.fx;
 }
 
-static void measure_nothing(const plr_filter *f, unsigned slot, plr_measurement *m) {
-    memset(m, 0, sizeof *m);
-    (void)plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
-    for (unsigned i = 0; i < PLR_ROWS; i++)
-        m->R[i] = plr_stereo_variance(f, i);
-}
-
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m) {
     const plr_camera *camera = &f->par.camera;
@@ -96,18 +89,19 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     const plr_real along[3] = {0, camera->fx * camera->baseline, 0};
     plr_real z[3], Dz[9];
     plr_view view;
+    memset(m, 0, sizeof *m);
+    for (unsigned i = 0; i < PLR_ROWS; i++)
+        m->R[i] = plr_stereo_variance(f, i);
     if (!plr_model_of(f)->look(f, slot, &view)) {
-        measure_nothing(f, slot, m);
+        (void)plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
         return false;
     }
     plr_stereo_project(z, camera, view.q);
     plr_stereo_jacobian(Dz, camera, view.q);
     plr_model_of(f)->derive(f, slot, &view, Dz, along, z, &m->H);
     plr_stereo_rows(m->r, seen);
-    for (unsigned i = 0; i < PLR_ROWS; i++) {
+    for (unsigned i = 0; i < PLR_ROWS; i++)
         m->r[i] -= z[i];
-        m->R[i] = plr_stereo_variance(f, i);
-    }
     m->extra_d2 = plr_stereo_row_gap_d2(f, seen);
     m->residual2 = residual_norm2(seen, z);
     m->max_variance = f->slots[slot].known ? 0 : plr_stereo_max_variance(f);

@@ -57,14 +57,6 @@ static void answer(plr_session *s, const plr_frame *frame, uint64_t compute_ns) 
     plr_send_report(s, report, compute_ns);
 }
 
-static void learn(plr_session *s, uint64_t update_ns) {
-    if (s->last.status != PLR_OK)
-        return;
-    plr_budget_learn(&s->budget, update_ns, s->last.used);
-    if (s->budget.deadline_ns > 0 && update_ns > s->budget.deadline_ns)
-        s->totals.over_deadline++;
-}
-
 /* A frame that a link has doubled: used twice, its pixels would count for more than they know. */
 static bool is_repeated(const plr_session *s, const plr_frame *frame) {
     plr_totals totals;
@@ -84,12 +76,16 @@ static void use_frame(plr_session *s, const plr_frame *frame, const plr_frame *m
         plr_data_refuse_frame(s, frame, status);
         return;
     }
-    if (status != PLR_OK)
+    if (status == PLR_OK) {
+        plr_budget_learn(&s->budget, update_ns, report.used);
+        s->totals.over_deadline +=
+            s->budget.deadline_ns > 0 && update_ns > s->budget.deadline_ns ? 1 : 0;
+    } else {
         s->totals.refused++;
+    }
     plr_steps_note_used(s, moved->t_ns);
     s->last = report;
     s->last.t_ns = frame->t_ns; /* by which its sender knows it */
-    learn(s, update_ns);
     answer(s, frame, update_ns + s->predict_ns);
     s->predict_ns = 0;
     report_divergence(s);
@@ -150,14 +146,6 @@ static plr_time_ns patience_ns(const plr_session *s, plr_time_ns t_ns, plr_time_
     return (plr_time_ns)(config->twist_delay_s * 1e9 + 0.5) + ahead_ns;
 }
 
-static void hold(plr_session *s, const plr_frame *frame, plr_time_ns moved_ns) {
-    if (s->held_frames.count == PLR_SESSION_HELD_FRAMES) {
-        s->totals.held_short++;
-        use_held(s, plr_held_pop_frame(&s->held_frames, UINT64_MAX));
-    }
-    plr_held_insert_frame(&s->held_frames, frame, moved_ns);
-}
-
 void plr_data_use_stereo(plr_session *s) {
     const plr_frame *frame = &s->in.as.stereo;
     plr_time_ns moved_ns;
@@ -171,10 +159,15 @@ void plr_data_use_stereo(plr_session *s) {
         plr_data_use_waiting(s, UINT64_MAX);
     else if (moved_ns >= patience)
         plr_data_use_waiting(s, moved_ns - patience);
-    if (patience > 0 && moved_ns > s->order.newest_ns)
-        hold(s, frame, moved_ns);
-    else
+    if (patience == 0 || moved_ns <= s->order.newest_ns) {
         use_in_order(s, frame, moved_ns);
+        return;
+    }
+    if (s->held_frames.count == PLR_SESSION_HELD_FRAMES) {
+        s->totals.held_short++;
+        use_held(s, plr_held_pop_frame(&s->held_frames, UINT64_MAX));
+    }
+    plr_held_insert_frame(&s->held_frames, frame, moved_ns);
 }
 
 /* --- TRUTH --- */
@@ -190,18 +183,13 @@ static void move_to(plr_session *s, const plr_truth *truth) {
         plr_send_refusal(s, PLR_KIND_TRUTH, truth->t_ns, status, NULL);
 }
 
-/* True if the pose starts from the first TRUTH, and this is it. */
-static bool starts_here(const plr_session *s) {
-    return s->phase == PLR_PHASE_STARTING && !s->start_pending &&
-           (s->options.start == PLR_START_AUTO || s->options.start == PLR_START_TRUTH);
-}
-
 void plr_data_use_truth(plr_session *s) {
     const plr_truth *truth = &s->in.as.truth;
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
         plr_steps_apply_held(s, truth->t_ns);
         move_to(s, truth);
-    } else if (starts_here(s)) {
+    } else if (s->phase == PLR_PHASE_STARTING && !s->start_pending &&
+               (s->options.start == PLR_START_AUTO || s->options.start == PLR_START_TRUTH)) {
         plr_steps_apply_held(s, truth->t_ns);
         plr_start_set_pose(s, PLR_KIND_TRUTH, truth->t_ns, &truth->T_WB, NULL);
     }

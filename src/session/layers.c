@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "session/layers.h"
 
-static void suggest(plr_config *config, const char *name, double value) {
-    if (value >= 0)
-        (void)plr_config_set(config, plr_setting_by_name(name), value);
-}
-
 /* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
     const plr_setting *setting = plr_setting_by_name(name);
@@ -42,7 +37,9 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
         {"bias", has_bias},
     };
     for (unsigned i = 0; i < sizeof suggestions / sizeof suggestions[0]; i++)
-        suggest(config, suggestions[i].name, suggestions[i].value);
+        if (suggestions[i].value >= 0)
+            (void)plr_config_set(config, plr_setting_by_name(suggestions[i].name),
+                                 suggestions[i].value);
     if (sigmas_of_a_reading) {
         suggest_axes(config, "velocity-sigma", header->velocity_sigma_mps,
                      header->velocity_sigma_axes_mps);

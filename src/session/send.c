@@ -23,14 +23,8 @@ void plr_send_config(plr_session *s) {
     put(s, PLR_OUTPUT_CONFIG, &s->out);
 }
 
-/* The lower triangle of a 6x6, row by row. */
-static void pack6(double packed[21], const double full[36]) {
-    for (unsigned i = 0, k = 0; i < 6; i++)
-        for (unsigned j = 0; j <= i; j++)
-            packed[k++] = full[6 * i + j];
-}
-
-/* The filter's covariance; where it has diverged and has none, PLR_WIRE_UNKNOWN_VARIANCE. */
+/* The filter's covariance, its lower triangle row by row; where it has diverged and has none,
+ * PLR_WIRE_UNKNOWN_VARIANCE. */
 static bool describe_covariance(double packed[21], double P[36], plr_status status) {
     if (status == PLR_E_DIVERGED) {
         memset(P, 0, 36 * sizeof *P);
@@ -39,7 +33,9 @@ static bool describe_covariance(double packed[21], double P[36], plr_status stat
     } else if (status != PLR_OK) {
         return false;
     }
-    pack6(packed, P);
+    for (unsigned i = 0, k = 0; i < 6; i++)
+        for (unsigned j = 0; j <= i; j++)
+            packed[k++] = P[6 * i + j];
     return true;
 }
 

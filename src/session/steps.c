@@ -190,16 +190,11 @@ static void delay_step(plr_session *s, const plr_held_step *step) {
         plr_steps_apply_due(s);
 }
 
-/* The newest time of a step; a clock that was set back is followed. */
-static void note_time(plr_session *s, plr_time_ns t_ns) {
-    plr_time_ns *newest_ns = &s->order.newest_ns;
-    s->order.came = true;
-    if (t_ns > *newest_ns || plr_clock_was_set_back(s, *newest_ns, t_ns))
-        *newest_ns = t_ns;
-}
-
 static void use_step(plr_session *s, const plr_held_step *step) {
-    note_time(s, step->t_ns);
+    s->order.came = true;
+    if (step->t_ns > s->order.newest_ns ||
+        plr_clock_was_set_back(s, s->order.newest_ns, step->t_ns)) /* which is followed */
+        s->order.newest_ns = step->t_ns;
     if (steps_wait(s))
         delay_step(s, step);
     else

@@ -125,12 +125,6 @@ static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
     return s->beyond - (ratio - PLR_R(1)) / range;
 }
 
-/* Stores the variances of the motion, the prior of the common motions. */
-static void store_motion_variance(plr_filter *f, const plr_real JL[PLR_POSE_SQUARE]) {
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        f->work.noise.motion_variance[k] = plr_norm2_of_6(JL + PLR_POSE_DIM * k);
-}
-
 static bool body_look(const plr_filter *f, unsigned slot, plr_view *view) {
     memcpy(view->q, f->slots[slot].x, sizeof view->q);
     return view->q[2] >= f->par.min_depth;
@@ -338,7 +332,8 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
         s->beyond = offset * F[9 * slot + 8];
     }
     plr_real A[PLR_POSE_SQUARE];
-    store_motion_variance(f, motion->JL);
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) /* the prior of the common motions */
+        f->work.noise.motion_variance[k] = plr_norm2_of_6(motion->JL + PLR_POSE_DIM * k);
     plr_se3_rotation(R, motion->E);
     plr_se3_adjoint_inverse(A, R, motion->p);
     plr_covariance_transport(f, A, F);

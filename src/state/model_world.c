@@ -14,14 +14,6 @@
 #include "state/motion.h"
 #include "state/pose.h"
 
-/* s = R^T (m - p): the landmark in the body. */
-static void in_body(const plr_filter *f, const plr_real m[3], plr_real s[3]) {
-    plr_real offset[3];
-    for (int i = 0; i < 3; i++)
-        offset[i] = (plr_real)((double)m[i] - f->p_WB[i]);
-    plr_mat3_tvec(s, f->R_WB, offset);
-}
-
 static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_real A[PLR_POSE_SQUARE], R[9], BPB[PLR_POSE_SQUARE], M[PLR_POSE_SQUARE];
     (void)motion; /* the pose alone moves, by f->motion */
@@ -33,8 +25,12 @@ static void world_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_covariance_predict_pose(f, A, f->motion.B, M);
 }
 
+/* s = R^T (m - p): the landmark in the body. */
 static bool world_look(const plr_filter *f, unsigned slot, plr_view *view) {
-    in_body(f, f->slots[slot].x, view->s);
+    plr_real offset[3];
+    for (int i = 0; i < 3; i++)
+        offset[i] = (plr_real)((double)f->slots[slot].x[i] - f->p_WB[i]);
+    plr_mat3_tvec(view->s, f->R_WB, offset);
     plr_camera_from_body(view->q, &f->par.camera, view->s);
     return view->q[2] >= f->par.min_depth;
 }
