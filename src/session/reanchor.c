@@ -37,13 +37,12 @@ bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status s
     return true;
 }
 
-static double absolute(double x) {
-    return x < 0 ? -x : x;
-}
-
 /* |x_1| + |x_2| + |x_3|: never less than the norm. */
 static double sum3(const double x[3]) {
-    return absolute(x[0]) + absolute(x[1]) + absolute(x[2]);
+    double sum = 0;
+    for (unsigned i = 0; i < 3; i++)
+        sum += x[i] < 0 ? -x[i] : x[i];
+    return sum;
 }
 
 static double largest3(const double x[3]) {
@@ -60,14 +59,14 @@ static double wandered(double speed, double seconds, double limit) {
 /* The last pose with a covariance that a gap of so many seconds leaves. */
 static plr_status widen(double P[36], const plr_filter *f, double seconds) {
     const plr_config *config = plr_filter_config(f);
-    const bool inertial = config->process == PLR_PROCESS_IMU;
-    const bool of_reading = config->noise == PLR_NOISE_TWIST;
-    double beside_v = of_reading ? largest3(config->velocity_sigma) : 0;
-    double beside_w = of_reading ? largest3(config->gyro_sigma) : 0;
+    double beside_v = 0, beside_w = 0;
     plr_twist u;
-    if (inertial) {
+    if (config->process == PLR_PROCESS_IMU) {
         beside_v = config->start_velocity_sigma_mps;
         beside_w = USUAL_RATE;
+    } else if (config->noise == PLR_NOISE_TWIST) {
+        beside_v = largest3(config->velocity_sigma);
+        beside_w = largest3(config->gyro_sigma);
     }
     if (plr_filter_velocity(f, &u) != PLR_OK || plr_filter_pose_covariance(f, P) != PLR_OK)
         return PLR_E_NOT_READY;
