@@ -18,7 +18,7 @@ void setUp(void) {
 static void test_the_dark_after_a_contradiction_widens_by_the_twists_noise_alone(void) {
     rig.config.bias = 0;
     rig_begin();
-    rig_drive(20);
+    rig_drive(30);
     rig_drive_told(10, 0.5); /* the wheels slip */
     TEST_ASSERT_EQUAL_UINT8(PLR_DOUBT_CONTRADICTED, rig.filter.supervisor.doubt);
     const double before = rig_sigma_m();

@@ -18,7 +18,7 @@
 #include "support/random.h"
 #include "support/rig.h"
 
-enum { NEAR = 4, FAR = 24, COUNT = NEAR + FAR };
+enum { NEAR = 4, FAR = 24, COUNT = NEAR + FAR, AGREEING = 30 };
 
 static plr_filter filter;
 static rng pixels; /* without noise the picture would count as frozen */
@@ -61,15 +61,21 @@ static void look(unsigned frame, double ahead_mps, unsigned moving, float moved_
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&filter, &of, &report));
 }
 
+/* An event needs a before. */
+static void agree(void) {
+    for (unsigned frame = 1; frame <= AGREEING; frame++)
+        look(frame, 0, 0, 0);
+}
+
 static double sideways(void) {
     const plr_pose pose = pose_of(&filter);
     return fabs(pose.p[0]);
 }
 
 static void test_a_seventh_of_the_points_is_no_contradiction_of_the_twists(void) {
-    for (unsigned frame = 1; frame <= 5; frame++)
-        look(frame, 0, 0, 0);
-    look(6, 0, NEAR, 15);
+    agree();
+    look(AGREEING + 1, 0, NEAR, 15);
+    look(AGREEING + 2, 0, NEAR, 15);
     TEST_ASSERT_EQUAL_UINT32(0, filter.totals.contradictions);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sideways());
 }
@@ -77,28 +83,27 @@ static void test_a_seventh_of_the_points_is_no_contradiction_of_the_twists(void)
 static void test_the_few_that_can_tell_are(void) {
     near_points = 5;
     far_m = 200;
-    for (unsigned frame = 1; frame <= 10; frame++)
-        look(frame, 0, 0, 0);
-    for (unsigned frame = 11; frame <= 40; frame++)
-        look(frame, 2, 0, 0);
+    agree();
+    for (unsigned frame = 1; frame <= 30; frame++)
+        look(AGREEING + frame, 2, 0, 0);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(1, filter.totals.contradictions);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.5, fabs(pose_of(&filter).p[2])); /* of 6 m by the wheels */
 }
 
 /* The whole picture moves by 15 px: the camera has been turned. */
 static void test_all_the_points_are(void) {
-    for (unsigned frame = 1; frame <= 5; frame++)
-        look(frame, 0, 0, 0);
-    look(6, 0, COUNT, 15);
+    agree();
+    look(AGREEING + 1, 0, COUNT, 15);
+    look(AGREEING + 2, 0, COUNT, 15); /* and confirms it */
     TEST_ASSERT_EQUAL_UINT32(1, filter.totals.contradictions);
 }
 
 static uint32_t contradictions_of_five(unsigned moving) {
     setUp();
     count = near_points = 5;
-    for (unsigned frame = 1; frame <= 5; frame++)
-        look(frame, 0, 0, 0);
-    look(6, 0, moving, 15);
+    agree();
+    look(AGREEING + 1, 0, moving, 30);
+    look(AGREEING + 2, 0, moving, 30);
     return filter.totals.contradictions;
 }
 

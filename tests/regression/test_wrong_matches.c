@@ -57,17 +57,22 @@ static void test_a_doubt_at_the_beginning_ends_though_the_biases_are_unknown(voi
         rig_drive(1);
         TEST_ASSERT_NOT_EQUAL_UINT8(PLR_DOUBT_DEPARTED, rig.filter.supervisor.doubt);
     }
-    TEST_ASSERT_LESS_THAN_UINT(25, frames);
+    TEST_ASSERT_LESS_THAN_UINT(35, frames);
 }
 
 /* Wrong matches do not support the twists either. */
 static void test_wheels_that_slip_are_told_among_wrong_matches(void) {
     plr_totals totals;
+    uint32_t told = 0;
     rig.options.outliers = 0.35;
     rig_begin();
     rig_drive(50);
-    rig_drive_told(5, 0.3);
-    TEST_ASSERT_BITS_HIGH(PLR_REASON_TWIST_CONTRADICTED, rig.report.reasons);
+    for (unsigned k = 0; k < 5; k++) {
+        rig_drive_told(1, 0.3);
+        told |= rig.report.reasons;
+    }
+    TEST_ASSERT_BITS_HIGH(PLR_REASON_TWIST_CONTRADICTED, told);
+    TEST_ASSERT_NOT_EQUAL_INT(PLR_HEALTH_GOOD, rig.report.health);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_totals(&rig.filter, &totals));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(1, totals.contradictions);
 }
@@ -77,6 +82,7 @@ static void push_to_the_left(double way_m) {
         rig.world.T_WB[4 * i + 3] += way_m * rig.world.T_WB[4 * i + 1];
 }
 
+/* The search finds it in four frames of five, and it takes two of them: one that waits, and one that confirms. */
 static void test_a_push_is_found_among_wrong_matches(void) {
     unsigned found = 0;
     rig.options.outliers = 0.2;
@@ -86,7 +92,7 @@ static void test_a_push_is_found_among_wrong_matches(void) {
         rig_begin();
         rig_drive(30);
         push_to_the_left(2);
-        rig_drive(3);
+        rig_drive(6);
         (void)rig_squared_error(e);
         found += e[1] * e[1] < 0.25;
     }

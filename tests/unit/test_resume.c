@@ -97,11 +97,14 @@ static void test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks
 
 static void test_without_an_allowance_landmarks_that_agree_are_believed_and_it_is_said(void) {
     start();
-    drive(10, 0);
+    drive(30, 0);
     world.T_WB[3] += 0.4;
     world.T_WB[7] -= 0.3;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_resume(&filter, world.t_ns, NULL));
     TEST_ASSERT_TRUE(error_m() > 0.4);
+    drive(1, 0); /* which waits for the next one */
+    TEST_ASSERT_TRUE(report.reasons & PLR_REASON_TWIST_CONTRADICTED);
+    TEST_ASSERT_EQUAL_UINT32(0, filter.totals.contradictions);
     drive(1, 0); /* the landmarks agree on where it is, and they are believed: but it is said */
     TEST_ASSERT_BITS(PLR_REASON_TWIST_CONTRADICTED | PLR_REASON_POSE_MAY_BE_WRONG, UINT32_MAX,
                      report.reasons);

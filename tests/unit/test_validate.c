@@ -4,7 +4,6 @@
 #include <string.h>
 #include <unity.h>
 
-#include "known_map/lookup.h"
 #include "math/finite.h"
 #include "math/validate.h"
 #include "support/matrices.h"
@@ -120,11 +119,11 @@ static void test_more_than_six_rows_are_refused(void) {
 }
 
 static void test_a_landmark_needs_a_place_and_a_covariance(void) {
-    plr_landmark landmark = {.p_W_m = {1, 2, 3}, .P_W_m2 = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    TEST_ASSERT_TRUE(plr_landmark_is_valid(&landmark));
-    landmark.p_W_m[1] = (double)INFINITY;
-    TEST_ASSERT_FALSE(plr_landmark_is_valid(&landmark));
-    landmark.p_W_m[1] = 2;
-    landmark.P_W_m2[4] = -1;
-    TEST_ASSERT_FALSE(plr_landmark_is_valid(&landmark));
+    double p[3] = {1, 2, 3}, P[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    TEST_ASSERT_TRUE(plr_is_place(p, P));
+    p[1] = (double)INFINITY;
+    TEST_ASSERT_FALSE(plr_is_place(p, P));
+    p[1] = 2;
+    P[4] = -1;
+    TEST_ASSERT_FALSE(plr_is_place(p, P));
 }
