@@ -9,7 +9,7 @@ set(pelorus_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/pelorus")
 install(TARGETS pelorus pelorus_f64 EXPORT pelorusTargets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/include/pelorus"
-  DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h")
+  DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h" PATTERN "*.def")
 install(EXPORT pelorusTargets NAMESPACE pelorus:: DESTINATION "${pelorus_package_dir}")
 configure_package_config_file(
   "${PROJECT_SOURCE_DIR}/cmake/pelorusConfig.cmake.in"

@@ -2,7 +2,7 @@
 #include "supervise/health.h"
 
 #include "supervise/limits.h"
-#include "supervise/sensors.h"
+#include "supervise/readings.h"
 
 /* A reading is not old before this, s. */
 #define HELD_S 0.05

@@ -12,7 +12,7 @@
 #include "supervise/map.h"
 #include "supervise/odometry.h"
 #include "supervise/pictures.h"
-#include "supervise/sensors.h"
+#include "supervise/readings.h"
 
 /* Reasons that do not apply in dead reckoning, and those that hold now or not at all. */
 #define OF_PICTURES (PLR_REASON_FEW_OBSERVATIONS | PLR_REASON_NO_OBSERVATIONS)

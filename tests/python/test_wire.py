@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pelorus import cobs, wire
+from pelorus import cobs, schema, wire
 from pelorus.errors import PelorusError
+from pelorus.evidence import Evidence, EvidenceFlag
 from pelorus.frames import (
-    KINDS,
     Camera,
     Config,
     End,
@@ -41,9 +41,9 @@ from pelorus.frames import (
     TruthKnows,
     Twist,
 )
-from pelorus.layout import MalformedPayload
+from pelorus.layout import MalformedPayload, row_type
 from pelorus.schema import SENSORS
-from pelorus.wire import Counts, Reader, Received, VersionError, Writer
+from pelorus.wire import KINDS, Counts, Reader, Received, VersionError, Writer
 
 CHANCE = np.random.default_rng(11)
 R = np.linalg.qr(CHANCE.normal(size=(3, 3)))[0]
@@ -54,6 +54,7 @@ def stereo(count: int, t_ns: int = 3) -> Stereo:
     return Stereo(t_ns, ids, CHANCE.normal(300, 100, (count, 4)).astype(np.float32), 17)
 
 
+REJECTED = row_type(schema.MESSAGES["EVIDENCE"].rows)
 COUNTS = tuple(range(100, 114))  # of a REPORT
 MESSAGES: list[Message] = [
     Header(Camera(700.5, 701.5, 320.1, 240.2, 0.54), R, CHANCE.normal(size=3), name="Straße 7"),
@@ -68,6 +69,8 @@ MESSAGES: list[Message] = [
     Pose(5, CHANCE.normal(size=3), R, CHANCE.normal(size=21), real_bytes=8, reset_count=3),
     Pose(5, CHANCE.normal(size=3), real_bytes=4, after_stereo=True, trace=0.5),
     Report(8, 5, -7, 3, 0xFFFF, 60, *COUNTS, nis=1.5, update_us=2**32 - 1, notice=3),  # type: ignore[misc]
+    Evidence(14, nu=CHANCE.normal(size=6).astype(np.float32), doubt=3, flags=EvidenceFlag(255)),
+    Evidence(15, statistic=2.5, adopted=7, rejected=np.array([(9, 4, 8, 40.5)], REJECTED)),
     Text("grün", 2),
     End(1, 2, 3, 4, 5, 6, 63, (7, 8, 9, 10, 11), 12, 13),
     State(9, StateAction.RESTORE, CHANCE.normal(size=6)),
@@ -85,6 +88,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.LANDMARK: [90],
     Kind.POSE: [36 + 63 * 8 + 32, 36 + 63 * 4 + 32],
     Kind.REPORT: [66],
+    Kind.EVIDENCE: [131 + 11 * n for n in (0, 1)],
     Kind.TEXT: [1 + 5],
     Kind.END: [53],
     Kind.STATE: [57],

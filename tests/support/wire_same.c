@@ -120,6 +120,37 @@ static void same_report(const plr_report_message *e, const plr_report_message *a
     SAME(report.nis);
 }
 
+static void same_evidence(const plr_supervision *e, const plr_supervision *a) {
+    SAME(t_ns);
+    SAME(nu);
+    SAME(moved);
+    SAME(statistic);
+    SAME(usual);
+    SAME(agreement);
+    SAME(weight);
+    SAME(difference);
+    SAME(doubt);
+    SAME(applied);
+    SAME(outright);
+    SAME(waits);
+    SAME(holds_biases);
+    SAME(locked);
+    SAME(frozen);
+    SAME(misfits);
+    SAME(settled);
+    SAME(matched);
+    SAME(same);
+    SAME(known);
+    SAME(adopted);
+    SAME(count);
+    for (unsigned i = 0; i < e->count; i++) {
+        SAME(rejected[i].id);
+        SAME(rejected[i].why);
+        SAME(rejected[i].in_succession);
+        SAME(rejected[i].mean2);
+    }
+}
+
 static void same_end(const plr_end *e, const plr_end *a) {
     SAME(sent);
     SAME(frames);
@@ -177,6 +208,9 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         break;
     case PLR_KIND_REPORT:
         same_report(&e->as.report, &a->as.report);
+        break;
+    case PLR_KIND_EVIDENCE:
+        same_evidence(&e->as.evidence, &a->as.evidence);
         break;
     case PLR_KIND_TEXT:
         TEST_ASSERT_EQUAL_UINT8(e->as.text.severity, a->as.text.severity);

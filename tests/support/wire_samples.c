@@ -253,6 +253,30 @@ static void make_report(plr_report_message *m, unsigned variant) {
     r->innovation_log_det = real_of_f32(variant, 5);
 }
 
+static void make_evidence(plr_supervision *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    float *const numbers[] = {m->nu, m->moved, &m->statistic, m->usual, &m->agreement, m->weight,
+                              m->difference};
+    static const unsigned sizes[] = {6, 6, 1, 6, 1, 2, 6};
+    for (unsigned i = 0; i < sizeof sizes / sizeof sizes[0]; i++)
+        for (unsigned j = 0; j < sizes[i]; j++)
+            numbers[i][j] = real_of_f32(variant, 10 * i + j);
+    m->doubt = whole8(variant, PLR_DOUBT_SETTLING, PLR_DOUBT_CONTRADICTED);
+    m->applied = m->waits = m->locked = m->misfits = variant != WIRE_SAMPLE_LEAST;
+    m->outright = m->holds_biases = m->frozen = m->settled = variant == WIRE_SAMPLE_MOST;
+    m->matched = whole16(variant, 40);
+    m->same = whole16(variant, 41);
+    m->known = whole16(variant, 42);
+    m->adopted = whole16(variant, 43);
+    m->count = whole8(variant, PLR_SUPERVISION_REJECTED, 3);
+    for (unsigned i = 0; i < m->count; i++) {
+        m->rejected[i].id = whole32(variant, 80U + i);
+        m->rejected[i].why = whole8(variant, PLR_REJECTED_MOVES, PLR_REJECTED_LOST);
+        m->rejected[i].in_succession = whole16(variant, (uint16_t)(44 + i));
+        m->rejected[i].mean2 = real_of_f32(variant, 90U + i);
+    }
+}
+
 plr_message wire_sample(plr_kind kind, unsigned variant) {
     plr_message m;
     memset(&m, 0, sizeof m);
@@ -286,6 +310,9 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         break;
     case PLR_KIND_REPORT:
         make_report(&m.as.report, variant);
+        break;
+    case PLR_KIND_EVIDENCE:
+        make_evidence(&m.as.evidence, variant);
         break;
     case PLR_KIND_TEXT:
         m.as.text.severity = whole8(variant, PLR_SEVERITY_ERROR, PLR_SEVERITY_WARNING);

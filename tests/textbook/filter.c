@@ -225,3 +225,20 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
     stand_at(t_ns);
     return PLR_OK;
 }
+
+/* The textbook trusts: it has no supervisor, and no rules to leave out. */
+plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *supervision) {
+    (void)f;
+    memset(supervision, 0, sizeof *supervision);
+    return PLR_E_NOT_READY;
+}
+
+plr_status plr_filter_leave_out(plr_filter *f, uint64_t limits) {
+    (void)f;
+    return limits ? PLR_E_RANGE : PLR_OK;
+}
+
+const plr_limit_row *plr_limit_at(unsigned row) {
+    (void)row;
+    return NULL;
+}

@@ -49,7 +49,6 @@ TEXT_BYTES_MAX = schema.LIMITS["text_bytes"]
 UNKNOWN_VARIANCE = float(schema.LIMITS["unknown_variance"])  # of a filter that has diverged
 OBSERVATION = row_type(schema.MESSAGES["STEREO"].rows)
 SETTING = row_type(schema.MESSAGES["CONFIG"].rows)
-REJECTED_MAX = schema.LIMITS["rejected_landmarks"]  # in one EVIDENCE
 
 
 class StartFlag(IntFlag):
@@ -64,19 +63,6 @@ class TruthKnows(IntFlag):
 
     VELOCITY = 1
     BIAS = 2
-
-
-class EvidenceFlag(IntFlag):
-    """What an EVIDENCE says yes to."""
-
-    APPLIED = 1
-    OUTRIGHT = 2
-    WAITS = 4
-    HOLDS_BIASES = 8
-    LOCKED = 16
-    FROZEN = 32
-    MISFITS = 64
-    SETTLED = 128
 
 
 def header_name(words: str) -> str:
@@ -250,7 +236,7 @@ class Imu(Message, kind=Kind.IMU):
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
-        rows = _rows(payload, end, _IMU_ROW, values["count"])["numbers"].astype(np.float64)
+        rows = rows_of(payload, end, _IMU_ROW, values["count"])["numbers"].astype(np.float64)
         return cls(values["t_ns"], rows[:, :3], rows[:, 3:], values["period_ns"])
 
 
@@ -277,7 +263,7 @@ class Stereo(Message, kind=Kind.STEREO):
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
-        rows = _rows(payload, end, _STEREO_ROW, values["count"])
+        rows = rows_of(payload, end, _STEREO_ROW, values["count"])
         ids, pixels = rows["id"].astype(np.uint32), rows["pixels"].astype(np.float32)
         return cls(values["t_ns"], ids, pixels, values["budget"])
 
@@ -289,12 +275,11 @@ _STEREO_ROW = np.dtype(
 assert _STEREO_ROW.itemsize == OBSERVATION.itemsize
 
 
-_REJECTED_ROW = row_type(schema.MESSAGES["EVIDENCE"].rows)
 _IMU_ROW = np.dtype([("numbers", "<f4", (6,))])
 assert _IMU_ROW.itemsize == row_type(schema.MESSAGES["IMU"].rows).itemsize
 
 
-def _rows(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[Any]:
+def rows_of(payload: bytes, at: int, row: np.dtype[Any], count: int) -> NDArray[Any]:
     need(payload, at + count * row.itemsize)
     return np.frombuffer(payload, row, count, at)
 
@@ -403,7 +388,7 @@ class Config(Message, kind=Kind.CONFIG):
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
-        rows = _rows(payload, end, SETTING, values.pop("count"))
+        rows = rows_of(payload, end, SETTING, values.pop("count"))
         return cls({int(row["id"]): float(row["value"]) for row in rows}, **values)
 
 
@@ -486,43 +471,3 @@ class Report(Message, kind=Kind.REPORT):
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
         values["reasons"] |= values.pop("reasons_upper", 0) << 16
         return cls(**values)
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence(Message, kind=Kind.EVIDENCE):
-    """What the supervisor saw in one frame, and what it decided: docs/SUPERVISION.md.
-
-    `rejected` are landmarks that were seen and not used: id, why, in_succession, mean2.
-    """
-
-    t_ns: int
-    nu: Floats = zeros(6)
-    moved: Floats = zeros(6)
-    statistic: float = 0.0
-    usual: Floats = field(default_factory=lambda: np.ones(6))
-    agreement: float = 0.0
-    weight: Floats = field(default_factory=lambda: np.ones(2))
-    difference: Floats = zeros(6)
-    doubt: int = 0
-    flags: int = 0  # EvidenceFlag
-    matched: int = 0
-    same: int = 0
-    known: int = 0
-    adopted: int = 0
-    rejected: NDArray[Any] = field(default_factory=lambda: np.zeros(0, _REJECTED_ROW))
-
-    def values(self) -> dict[str, Any]:
-        return vars(self) | {"count": len(self.rejected)}
-
-    def pack(self) -> bytes:
-        if len(self.rejected) > REJECTED_MAX:
-            raise ValueError(f"{len(self.rejected)} landmarks, at most {REJECTED_MAX} fit")
-        return super().pack() + self.rejected.astype(_REJECTED_ROW).tobytes()
-
-    @classmethod
-    def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:
-        rows = _rows(payload, end, _REJECTED_ROW, values.pop("count"))
-        return cls(**values, rejected=rows)
-
-
-KINDS: dict[int, type[Message]] = {cls.kind: cls for cls in Message.__subclasses__()}

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /* Do the readings of a small sensor agree with the estimate, as their sigma says? One that is off by two
  * sigma passes the gate, and pulls the pose each time. */
-#ifndef PLR_SUPERVISE_SENSORS_H
-#define PLR_SUPERVISE_SENSORS_H
+#ifndef PLR_SUPERVISE_READINGS_H
+#define PLR_SUPERVISE_READINGS_H
 
 #include "pelorus/supervisor.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "supervise/sensors.h"
+#include "supervise/readings.h"
 
 #include <string.h>
 

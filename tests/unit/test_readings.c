@@ -4,7 +4,7 @@
 #include <unity.h>
 
 #include "sensor/sensor.h"
-#include "supervise/sensors.h"
+#include "supervise/readings.h"
 #include "support/axes.h"
 #include "support/random.h"
 #include "support/rig.h"
