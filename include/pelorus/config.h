@@ -56,13 +56,13 @@ extern "C" {
 #define PLR_PORTABLE 0
 #endif
 
-/* 1 (default) or 0. 0: without src/supervise, the estimator alone: nothing is doubted, every picture is used,
- * and health is that of a filter that believes what it is told. The build links src/absent/supervise.c. */
+/* 1 (default) or 0. 0: without src/supervise, which is then not compiled: the estimator alone. Nothing is
+ * doubted, every picture is used, and health is that of a filter whose input is all good. */
 #ifndef PLR_SUPERVISE
 #define PLR_SUPERVISE 1
 #endif
 
-/* 1 (default) or 0. 0: without src/known_map: the map source is never asked. */
+/* 1 (default) or 0. 0: without src/known_map, which is then not compiled: the map source is never asked. */
 #ifndef PLR_KNOWN_MAP
 #define PLR_KNOWN_MAP 1
 #endif

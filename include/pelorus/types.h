@@ -326,7 +326,8 @@ typedef struct plr_rejected_landmark {
     uint32_t id;
     uint8_t why;            /* plr_rejection */
     uint16_t in_succession; /* frames that rejected it */
-    float mean2; /* its innovations' sum beside white noise: chi-square of three, above 36 it moves */
+    float
+        mean2; /* its innovations' sum beside white noise: chi-square of three, above 36 it moves */
 } plr_rejected_landmark;
 
 enum { PLR_SUPERVISION_REJECTED = 24 };
@@ -334,27 +335,27 @@ enum { PLR_SUPERVISION_REJECTED = 24 };
 /* What the supervisor saw in one frame, and what it decided: plr_filter_supervision. */
 typedef struct plr_supervision {
     plr_time_ns t_ns;
-    float nu[6];         /* pictures less odometry, in the odometry's stated sigmas: (rho, theta) */
-    float moved[6];      /* what the frame moved the pose beside odometry: m and rad, in the body */
-    float statistic;     /* chi-square of six of the sum of nu, in units of what is usual */
-    float usual[6];      /* by how much its square is usually more than stated, 1 to 25 */
-    float agreement;     /* share of the last frames in which both agreed */
-    float weight[2];     /* factors of the odometry's sigmas in the next frame: way and turn, >= 1 */
+    float nu[6];     /* pictures less odometry, in the odometry's stated sigmas: (rho, theta) */
+    float moved[6];  /* what the frame moved the pose beside odometry: m and rad, in the body */
+    float statistic; /* chi-square of six of the sum of nu, in units of what is usual */
+    float usual[6];  /* by how much its square is usually more than stated, 1 to 25 */
+    float agreement; /* share of the last frames in which both agreed */
+    float weight[2]; /* factors of the odometry's sigmas in the next frame: way and turn, >= 1 */
     float difference[6]; /* from the other pose that may be true: m and rad, in the body */
     uint8_t doubt;       /* plr_doubt */
-    bool applied;      /* the frame applied a motion: nu and moved are filled */
-    bool outright;     /* the points agreed on a motion that the odometry excludes */
-    bool waits;        /* the frame was not used: the next one shall confirm it */
-    bool holds_biases; /* it taught the biases nothing */
-    bool locked;       /* the landmarks that the gate rejected were dropped */
-    bool frozen;       /* the picture repeats the last one, and was not used */
-    bool misfits;      /* `usual` is more than the stated sigmas allow */
-    bool settled;      /* a doubt ended: the difference was added to the covariance */
-    uint16_t matched;  /* observations of ids in the state */
-    uint16_t same;     /* of these, with the very pixels of last time */
-    uint16_t known;    /* known landmarks in the frame */
-    uint16_t adopted;  /* of these, that have just come in */
-    uint8_t count;     /* of `rejected`: those of the largest mean2, if there are more */
+    bool applied;        /* the frame applied a motion: nu and moved are filled */
+    bool outright;       /* the points agreed on a motion that the odometry excludes */
+    bool waits;          /* the frame was not used: the next one shall confirm it */
+    bool holds_biases;   /* it taught the biases nothing */
+    bool locked;         /* the landmarks that the gate rejected were dropped */
+    bool frozen;         /* the picture repeats the last one, and was not used */
+    bool misfits;        /* `usual` is more than the stated sigmas allow */
+    bool settled;        /* a doubt ended: the difference was added to the covariance */
+    uint16_t matched;    /* observations of ids in the state */
+    uint16_t same;       /* of these, with the very pixels of last time */
+    uint16_t known;      /* known landmarks in the frame */
+    uint16_t adopted;    /* of these, that have just come in */
+    uint8_t count;       /* of `rejected`: those of the largest mean2, if there are more */
     plr_rejected_landmark rejected[PLR_SUPERVISION_REJECTED];
 } plr_supervision;
 

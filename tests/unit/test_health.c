@@ -295,7 +295,8 @@ static bool is_locked(unsigned matched, unsigned gated) {
     const plr_search_decision decision = plr_supervise_search(&supervisor, &e);
     TEST_ASSERT_FALSE(decision.wait || decision.hold_biases);
     /* landmarks that it made would agree with the wrong pose */
-    TEST_ASSERT_EQUAL(supervisor.frames_mostly_gated > 0, decision.make_none || decision.drop_rejected);
+    TEST_ASSERT_EQUAL(supervisor.frames_mostly_gated > 0,
+                      decision.make_none || decision.drop_rejected);
     return decision.drop_rejected;
 }
 
