@@ -155,14 +155,14 @@ typedef struct plr_supervisor {
     plr_real
         difference[PLR_POSE_DIM]; /* from the pose by odometry to the pose by pictures: m, rad */
     plr_real difference_sigmas[PLR_POSE_DIM];
-    plr_real difference_noise;    /* the expected square of difference_sigmas by noise alone */
-    uint8_t doubt;                /* plr_doubt */
-    plr_search_decision searched; /* of the last frame */
-    uint8_t settled;              /* the last frame ended a doubt */
-    uint8_t outright;             /* the last frame contradicted outright, and waits for the next */
-    uint8_t turns_fail;           /* the turns are contradicted, too */
-    uint8_t relocated;            /* the pose was found anew since it came into doubt */
-    uint8_t settle_frames;        /* frames of agreement that end the doubt */
+    plr_real difference_noise; /* the expected square of difference_sigmas by noise alone */
+    uint8_t doubt;             /* plr_doubt */
+    uint8_t waits, holds_biases,
+        settled;           /* the last frame waited, taught no bias, ended a doubt: to be told */
+    uint8_t outright;      /* the last frame contradicted outright, and waits for the next */
+    uint8_t turns_fail;    /* the turns are contradicted, too */
+    uint8_t relocated;     /* the pose was found anew since it came into doubt */
+    uint8_t settle_frames; /* frames of agreement that end the doubt */
     uint16_t agreeing_frames, contradicting_frames, small_frames,
         doubted_frames; /* in succession */
 

@@ -288,7 +288,6 @@ static void carry_out(plr_filter *f, plr_report *report) {
 static void process(plr_filter *f, const plr_frame *frame, plr_report *report) {
     plr_frame_events *events = &f->work.evidence.events;
     plr_search_decision decision = {false, false, false, false};
-    plr_evidence_begin(f);
     unsigned n = plr_match_in_order(f, frame, report);
     plr_match_slots(f, frame->observations, n);
     plr_evidence_of_picture(f, frame, n);
@@ -402,6 +401,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     plr_predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
+    plr_evidence_begin(f);
     if (!plr_process_has_started(f)) {
         wait_for_start(f, frame, r);
     } else if (f->config.mode != PLR_MODE_DEAD_RECKONING) {

@@ -62,7 +62,8 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     /* a frame that rejects nearly all neither confirms nor denies */
     const bool denies = !plr_pictures_reject_all(s, e->matched, e->gated);
     s->outright = e->outright || (s->outright && !denies);
-    s->searched = decision;
+    s->waits = decision.wait;
+    s->holds_biases = 0;
     if (decision.wait) {
         decision.make_none = true;
         return decision;
@@ -72,7 +73,7 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
         (s->doubted_frames > 0 && s->doubted_frames < plr_limit_count(s, PLR_LIMIT_HELD_FRAMES));
     decision.drop_rejected = plr_pictures_lock(s, e->matched, e->gated);
     decision.make_none = s->frames_mostly_gated > 0 && !decision.drop_rejected;
-    s->searched = decision;
+    s->holds_biases = decision.hold_biases;
     return decision;
 }
 
@@ -309,8 +310,8 @@ void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
     told->doubt = s->doubt;
     told->applied = m->applied;
     told->outright = s->outright;
-    told->waits = s->searched.wait;
-    told->holds_biases = s->searched.hold_biases;
+    told->waits = s->waits;
+    told->holds_biases = s->holds_biases;
     told->locked = e->events.locked;
     told->frozen = s->frozen;
     told->misfits = s->misfits;
