@@ -35,7 +35,8 @@ void setUp(void) {
     memset(&s, 0, sizeof s);
     plr_supervise_begin(&s, &config);
     memset(&e, 0, sizeof e);
-    e.readings = (plr_readings_evidence){.now_ns = 1, .reading_ns = 1, .valid = true, .needed = true};
+    e.readings =
+        (plr_readings_evidence){.now_ns = 1, .reading_ns = 1, .valid = true, .needed = true};
     e.motion.p[0] = PLR_R(WAY_M);
     for (unsigned k = 0; k < 6; k++) {
         e.motion.L[7 * k] = (plr_real)(k < 3 ? SIGMA_M : SIGMA_RAD);
@@ -224,9 +225,7 @@ static void test_turns_that_are_off_by_little_keep_most_of_their_weight(void) {
 /* Noise settings are never quite true: what is no good part of the motion is said, and the odometry keeps its
  * weight; so is what distant points say of the way, next to nothing in a frame and enough in twenty. */
 static void test_a_small_difference_and_one_that_is_hardly_seen_are_said_and_take_no_weight(void) {
-    static const struct {
-        double nu, information;
-    } cases[] = {{3, 100}, {10, 0.025}};
+    static const struct { double nu, information; } cases[] = {{3, 100}, {10, 0.025}};
     for (unsigned i = 0; i < 2; i++) {
         const double nu[6] = {cases[i].nu};
         unsigned told = 0;
@@ -348,7 +347,8 @@ static unsigned doubted_after(unsigned frames, double sigmas) {
     return agreeing;
 }
 
-static void test_a_departure_is_doubted_as_long_as_it_lasted_and_no_longer_than_a_contradiction(void) {
+static void
+test_a_departure_is_doubted_as_long_as_it_lasted_and_no_longer_than_a_contradiction(void) {
     TEST_ASSERT_LESS_THAN_UINT(SETTLED - 5, doubted_after(1, 14)); /* as noise may, in 60,000 */
     TEST_ASSERT_EQUAL_UINT(SETTLED, doubted_after(30, 2.5));
 }
@@ -379,7 +379,8 @@ static void test_a_pose_that_is_set_is_in_no_doubt_and_one_found_anew_is(void) {
     plr_supervise_pose_set(&s);
     TEST_ASSERT_EQUAL_UINT8(PLR_DOUBT_NONE, s.doubt);
     TEST_ASSERT_EQUAL_DOUBLE(0, cover(0));
-    TEST_ASSERT_TRUE(plr_supervise_may_exclude_odometry(&s)); /* what was learnt of the odometry holds */
+    TEST_ASSERT_TRUE(
+        plr_supervise_may_exclude_odometry(&s)); /* what was learnt of the odometry holds */
     plr_supervise_begun_anew(&s, true);
     TEST_ASSERT_TRUE(plr_supervise_was_relocated(&s));
     add_agreement(SETTLED - 1);
@@ -402,7 +403,8 @@ static void test_wheels_that_slip_do_not_carry_the_pose_away(void) {
         TEST_ASSERT_TRUE(k < 4 || rig.report.reasons & CONTRADICTED);
     }
     (void)rig_squared_error(e6);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, sqrt(e6[0] * e6[0] + e6[1] * e6[1] + e6[2] * e6[2])); /* of 6 m */
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1,
+                                 sqrt(e6[0] * e6[0] + e6[1] * e6[1] + e6[2] * e6[2])); /* of 6 m */
     for (unsigned k = 0; k < 60; k++) {
         rig_twists_in_place(0);
         rig_frame();
