@@ -79,7 +79,7 @@ static plr_real judge(const plr_supervisor *s, const plr_map_evidence *e, plr_ma
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, v->nu, 1);
     in_units_of(U, due);
     plr_upper6_pack(V, due);
-    plr_sum_by_pictures(v->nu, V, plr_limit(s, PLR_LIMIT_UNTOLD), by_map);
+    plr_sum_by_pictures(v->nu, V, plr_limit(s, PLR_LIMIT_UNOBSERVED), by_map);
     v->noise = 0;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         d2 = PLR_FMA(v->nu[k], by_map[k], d2);

@@ -240,7 +240,7 @@ static void differ_by_pictures(plr_supervisor *s, const plr_motion_evidence *m,
                                const plr_real nu[PLR_POSE_DIM]) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
     plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    lately(s, plr_limit(s, PLR_LIMIT_UNTOLD), mean);
+    lately(s, plr_limit(s, PLR_LIMIT_UNOBSERVED), mean);
     plr_mat6_vec(n, m->L, mean);
     plr_odometry_in_sigmas(m->L_used, n, n);
     memcpy(U, m->Lambda, sizeof m->Lambda);
