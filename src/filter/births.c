@@ -6,6 +6,7 @@
 #include "filter/predict.h"
 #include "filter/tracks.h"
 #include "known_map/lookup.h"
+#include "pelorus/assertions.h"
 #include "sensor/stereo.h"
 #include "state/slots.h"
 
@@ -15,6 +16,7 @@ bool plr_births_are_allowed(const plr_filter *f) {
 
 /* Initialises a landmark. A slot must be free, and plr_stereo_makes_landmark true. */
 static void append_new(plr_filter *f, const plr_observation *seen) {
+    PLR_ASSERT(f->count < PLR_MAX_LANDMARKS && plr_stereo_makes_landmark(f, seen));
     plr_new_landmark landmark;
     const plr_real beyond = plr_stereo_initialise(f, seen, &landmark);
     plr_slots_append(f, seen->id, false, &landmark);

@@ -6,6 +6,7 @@
 #include "math/dense.h"
 #include "math/log_product.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "process/velocity.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
@@ -109,6 +110,7 @@ static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, uns
  * columns of S, H (P H^T) + R. */
 static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_batch *batch) {
     plr_workspace *w = &f->work;
+    PLR_ASSERT(first + PLR_ROWS <= batch->rows);
     plr_real column[PLR_ROWS];
     plr_covariance_project(f, &m->H, w->Vt + first * batch->ld, batch->ld);
     plr_real *S = batch->S + first; /* element (i, first) */
@@ -200,6 +202,7 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
 /* Applies `size` measurements, from number `at` on. */
 static void correct_by_batch(plr_filter *f, const plr_sensed *sensed, unsigned at, unsigned size,
                              plr_correction *result, plr_evidence *evidence) {
+    PLR_ASSERT(0 < size && size <= PLR_BLOCK_OBSERVATIONS);
     plr_batch batch; /* not initialised: that would cost as much as a row of S */
     bool factorised;
     batch.rows = PLR_ROWS * size;
@@ -231,6 +234,7 @@ static bool is_applicable(const plr_filter *f, unsigned n) {
 
 /* Corrects the estimate by work.dx, and P with it. Returns plr_correction.cut. */
 static unsigned move_estimate(plr_filter *f, unsigned n) {
+    PLR_ASSERT(n == plr_covariance_dim(f));
     if (!is_applicable(f, n)) {
         plr_filter_diverge(f);
         return 0;

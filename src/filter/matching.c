@@ -4,6 +4,7 @@
 #include "filter/filter_internal.h"
 #include "known_map/lookup.h"
 #include "math/order.h"
+#include "pelorus/assertions.h"
 #include "state/model.h"
 #include "state/slots.h"
 
@@ -61,6 +62,7 @@ void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n) {
                 high = middle;
         }
         if (low < n && seen[w->order[low]].id == id) {
+            PLR_ASSERT(w->slot_of[low] == PLR_NO_SLOT); /* no two slots have one id */
             w->slot_of[low] = (uint16_t)slot;
             f->slots[slot].last_frame = f->frame_number; /* so it is not evicted for another */
         }
@@ -70,6 +72,7 @@ void plr_match_slots(plr_filter *f, const plr_observation *seen, unsigned n) {
 void plr_match_count(plr_filter *f, unsigned n) {
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
+            PLR_ASSERT(f->work.slot_of[k] < f->count);
             plr_slot *slot = &f->slots[f->work.slot_of[k]];
             slot->times_seen++;
             slot->last_seen_ns = f->t_ns;

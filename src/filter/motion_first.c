@@ -9,6 +9,7 @@
 #include "filter/tracks.h"
 #include "math/dense.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
 #include "state/motion.h"
@@ -17,7 +18,7 @@
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
     MIN_AGAINST_TWISTS = 6, /* fewer points outweigh the twists only if all of them agree */
-    MIN_ASTRAY = 6,         /* fewer points do not show that a search went astray */
+    MIN_POOR = 6,           /* fewer points do not show that a search found the wrong minimum */
     MIN_AGREEING = 6,       /* fewer points do not tell a motion of which nothing else is known */
     MORE_SEARCHES = 2       /* at most, if the first ends beside the minimum */
 };
@@ -60,12 +61,12 @@ static bool is_dark(const plr_search *s) {
     return s->f->motion.seconds > DARK_S;
 }
 
-/* True if a rejected landmark is lost, because it is adrift. What drifted in a darkness is in nu when
- * it ends; by an IMU, which lost velocity and tilt as well, it stays in the landmarks' own covariance
- * after that. By twists, where frames did measure the motion, one rejection is an outlier. */
-static bool went_astray(const plr_search *s, unsigned i) {
+/* True if a rejected landmark is lost, because its bearing is too uncertain. What drifted in a darkness is
+ * in nu when it ends; by an IMU, which lost velocity and tilt as well, it stays in the landmarks' own
+ * covariance after that. By twists, where frames did measure the motion, one rejection is an outlier. */
+static bool has_drifted(const plr_search *s, unsigned i) {
     const bool may_be = is_dark(s) || plr_has_block(s->f, PLR_BLOCK_VELOCITY);
-    return may_be && s->sightings[i].adrift && is_unseen(s, i);
+    return may_be && s->sightings[i].uncertain && is_unseen(s, i);
 }
 
 /* What makes a prediction too uncertain to linearise at. */
@@ -81,7 +82,7 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
     plr_sighting *at = &s->sightings[i];
     at->prior_d2 = -1;
     const bool dark = is_dark(s) && by == PLR_OF_POINT_AND_MOTION, lost = is_lost(s, i);
-    at->adrift = dark || lost; /* unless the prediction below says otherwise */
+    at->uncertain = dark || lost; /* unless the prediction below says otherwise */
     if (at->behind || lost) {
         at->active = 0;
         return;
@@ -90,7 +91,7 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
     plr_real M[6], x[3];
     const plr_real limit = plr_stereo_max_variance(s->f);
     /* px^2, as the limit is */
-    const plr_real adrift = limit * plr_stereo_max_bearing_variance(s->f);
+    const plr_real most = limit * plr_stereo_max_bearing_variance(s->f);
     bool basis = true, within = true;
     for (unsigned r = 0, k = 0; r < 3; r++)
         for (unsigned c = r; c < 3; c++, k++) {
@@ -111,9 +112,9 @@ static void judge_by_prior(plr_search *s, unsigned i, plr_uncertainty by) {
                        M[k <= l ? plr_upper_row(3, k) + l - k : plr_upper_row(3, l) + k - l];
         const plr_real noise = plr_stereo_variance(s->f, r);
         basis = basis && (by == PLR_OF_POINT ? own : sum) - noise <= limit;
-        within = within && (dark ? sum : own) - noise <= adrift;
+        within = within && (dark ? sum : own) - noise <= most;
     }
-    at->adrift = !within;
+    at->uncertain = !within;
     if ((!basis && !plr_search_slot(s, i)->known) || !plr_cholesky3(M)) {
         at->active = 0;
         return;
@@ -132,6 +133,7 @@ static plr_real leave_one_out(const plr_sighting *at, const plr_real *U,
                               const plr_real dz[PLR_POSE_DIM], plr_real e[3], plr_real *share) {
     plr_real X[PLR_ROWS * PLR_POSE_DIM], h[9], M[6];
     const plr_real w = at->weight;
+    PLR_ASSERT(0 <= w && w <= 1);
     for (unsigned r = 0; r < 3; r++) {
         e[r] = at->e[r];
         for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
@@ -307,11 +309,11 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
 }
 
 /* Searches again with a prior so wide that the twists hardly count; where most do not agree with the
- * twists, so that wrong matches may lead it astray, without those that fit worst, too. True, with `best`
+ * twists, so that wrong matches may mislead it, without those that fit worst, too. True, with `best`
  * and s->prior at the result, if enough observations support it; otherwise the search is put back to
  * where it was. */
 static bool search_without_twists(plr_search *s, plr_search_point *best, plr_misfit misfit) {
-    const plr_applied_motion believed = s->prior;
+    const plr_applied_motion stated = s->prior;
     const bool most_agree = is_three_fifths(count_agreement(s));
     plr_search_point open;
     for (unsigned i = 0; i < s->count; i++)
@@ -329,7 +331,7 @@ static bool search_without_twists(plr_search *s, plr_search_point *best, plr_mis
         *best = open;
         return true;
     }
-    s->prior = believed;
+    s->prior = stated;
     plr_search_prepare(s);
     plr_search_again(s, best);
     return false;
@@ -397,17 +399,17 @@ static unsigned search_by_agreement(plr_search *s, plr_search_point *best) {
 /* True if at least a quarter of the points disagree with the result of a search although the twists'
  * prediction allows them: from a prediction that is off by metres the bounded number of trials may not
  * lead to the minimum. */
-static bool is_astray(const plr_search *s) {
-    unsigned active = 0, astray = 0;
+static bool fits_poorly(const plr_search *s) {
+    unsigned active = 0, poor = 0;
     for (unsigned i = 0; i < s->count; i++) {
         const plr_sighting *at = &s->sightings[i];
         if (!(at->active > 0))
             continue;
         active++;
         const bool allowed = plr_gate_accepts(s->f, at->prior_d2 * ASTRAY_SHARE, 0);
-        astray += allowed && (at->behind || !plr_gate_accepts(s->f, plr_dot3(at->e, at->e), 0));
+        poor += allowed && (at->behind || !plr_gate_accepts(s->f, plr_dot3(at->e, at->e), 0));
     }
-    return active >= MIN_ASTRAY && 4 * astray >= active;
+    return active >= MIN_POOR && 4 * poor >= active;
 }
 
 void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may_exclude,
@@ -431,7 +433,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may
     first->found = active >= MIN_POINTS;
     if (active > 0)
         plr_search_descend(&s, &best);
-    for (unsigned again = 0; again < MORE_SEARCHES && is_astray(&s); again++)
+    for (unsigned again = 0; again < MORE_SEARCHES && fits_poorly(&s); again++)
         plr_search_descend(&s, &best);
     const plr_misfit misfit =
         first->found && may_exclude ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
@@ -446,7 +448,7 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may
         plr_slot *slot = plr_search_slot(&s, i);
         const unsigned number = (unsigned)(slot - f->slots);
         const bool accepted = result == PLR_GATE_ACCEPTED;
-        const bool lost = !accepted && went_astray(&s, i);
+        const bool lost = !accepted && has_drifted(&s, i);
         plr_gate_note(f, number, lost ? PLR_GATE_LOST : result, s.sightings[i].gain);
         if (lost) /* as if unseen: the frame does not correct it as it does others */
             slot->last_frame = f->frame_number - 1;

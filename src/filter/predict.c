@@ -10,6 +10,7 @@
 #include "math/dense.h"
 #include "math/finite.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "process/process.h"
 #include "process/statistics.h"
 #include "state/covariance.h"
@@ -129,6 +130,7 @@ static plr_status check_reading(const plr_filter *f, const plr_real reading[PLR_
 
 static void store_reading(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
                           plr_real interval) {
+    PLR_ASSERT(interval >= 0);
     memcpy(f->reading, reading, sizeof f->reading);
     f->reading_ns = t_ns;
     f->reading_valid = 1;

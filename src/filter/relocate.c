@@ -101,7 +101,7 @@ bool plr_relocate_when_lost(plr_filter *f, const plr_frame *frame, unsigned n,
 
 /* True if the direction in which a point is seen from range r is so uncertain that it is not
  * linear in the error. C: covariance of the body's motion. */
-static bool is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], plr_real r2) {
+static bool is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], plr_real r2) {
     plr_real way = 0, turn = 0;
     for (unsigned i = 0; i < 3; i++) {
         way += C[(PLR_POSE_DIM + 1) * i];
@@ -110,9 +110,10 @@ static bool is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], plr
     return way + turn * r2 > 2 * plr_stereo_max_bearing_variance(f) * r2;
 }
 
-static bool slot_is_rough(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE], unsigned slot) {
+static bool slot_is_uncertain(const plr_filter *f, const plr_real C[PLR_POSE_SQUARE],
+                              unsigned slot) {
     const plr_slot *s = &f->slots[slot];
-    return s->known && is_rough(f, C, plr_dot3(s->x, s->x));
+    return s->known && is_uncertain(f, C, plr_dot3(s->x, s->x));
 }
 
 /* Known landmarks that the caller has inserted stay: they would not come in again. */
@@ -125,15 +126,15 @@ void plr_relocate_let_go(plr_filter *f, const plr_real C[PLR_POSE_SQUARE]) {
     if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
         return;
     for (unsigned slot = f->count; slot-- > 0;) /* backwards: removing moves the last */
-        if (slot_is_rough(f, C, slot) && is_in_map(f, slot))
+        if (slot_is_uncertain(f, C, slot) && is_in_map(f, slot))
             plr_slots_remove(f, slot);
 }
 
-/* How many known landmarks in sight are rough: by the pose if they have just come in
+/* How many known landmarks in sight are too uncertain: by the pose if they have just come in
  * (`new_ones`), else by the motion since the last frame. */
-static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones) {
+static unsigned count_uncertain(const plr_filter *f, unsigned n, unsigned *new_ones) {
     plr_real P_xi[PLR_POSE_SQUARE], motion[PLR_POSE_SQUARE];
-    unsigned rough = 0;
+    unsigned uncertain = 0;
     *new_ones = 0;
     plr_motion_pose_covariance(f, P_xi);
     plr_motion_covariance_by_state(f, motion);
@@ -144,11 +145,11 @@ static unsigned count_rough(const plr_filter *f, unsigned n, unsigned *new_ones)
         if (slot == PLR_NO_SLOT || !f->slots[slot].known)
             continue;
         const bool is_new = plr_has_just_come_in(f, slot);
-        const bool is = slot_is_rough(f, is_new ? P_xi : motion, slot);
-        rough += is;
+        const bool is = slot_is_uncertain(f, is_new ? P_xi : motion, slot);
+        uncertain += is;
         *new_ones += is && is_new && is_in_map(f, slot);
     }
-    return rough;
+    return uncertain;
 }
 
 /* They come in again: all known landmarks, or those that have just come in. */
@@ -226,8 +227,8 @@ plr_relocation plr_relocate_when_uncertain(plr_filter *f, const plr_frame *frame
     unsigned new_ones;
     if (f->config.model != PLR_MODEL_BODY || !plr_map_is_asked(f))
         return PLR_PLACED;
-    const unsigned rough = count_rough(f, n, &new_ones);
-    if (rough >= PLR_PLACING_LEAST && is_told_by_frame(f, frame, n, &found, &gap)) {
+    const unsigned uncertain = count_uncertain(f, n, &new_ones);
+    if (uncertain >= PLR_PLACING_LEAST && is_told_by_frame(f, frame, n, &found, &gap)) {
         for (unsigned i = 0; i < PLR_POSE_SQUARE; i++)
             P[i] = WIDER * found.P_xi[i];
         drop_known(f, false);

@@ -139,7 +139,7 @@ void plr_search_add(plr_search *s, plr_real active) {
     plr_sighting *at = &s->sightings[s->count++];
     memcpy(at->U[s->current], identity, sizeof at->U[0]);
     at->active = active;
-    at->aside = false;
+    at->trimmed = false;
     at->cost = 0;
 }
 
@@ -170,7 +170,7 @@ static plr_real evaluate(plr_search *s, const plr_real z[PLR_POSE_DIM], plr_sear
         }
         const plr_real d2 = plr_dot3(at->e, at->e);
         at->weight = at->active * (d2 <= HUBER * HUBER ? PLR_R(1) : HUBER / PLR_SQRT(d2));
-        if (!(at->active > 0) || at->aside)
+        if (!(at->active > 0) || at->trimmed)
             continue;
         change += huber(d2_by_best_covariance(at, s->current)) - at->cost;
         add_to_sums(at, point);
@@ -266,22 +266,22 @@ static unsigned count_better(const plr_search *s, unsigned i) {
 }
 
 /* Compares all pairs: they are few, and it is done seldom. */
-static void set_worst_aside(plr_search *s) {
+static void trim_worst(plr_search *s) {
     unsigned active = 0;
     for (unsigned i = 0; i < s->count; i++)
         active += s->sightings[i].active > 0;
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].aside = s->sightings[i].behind || 5 * count_better(s, i) >= 3 * active;
+        s->sightings[i].trimmed = s->sightings[i].behind || 5 * count_better(s, i) >= 3 * active;
 }
 
 void plr_search_concentrate(plr_search *s, plr_search_point *best) {
     for (unsigned again = 0; again < CONCENTRATIONS; again++) {
-        set_worst_aside(s);
+        trim_worst(s);
         plr_search_again(s, best);
         plr_search_descend(s, best);
     }
     for (unsigned i = 0; i < s->count; i++)
-        s->sightings[i].aside = false;
+        s->sightings[i].trimmed = false;
     plr_search_again(s, best);
 }
 

@@ -27,8 +27,8 @@ typedef struct plr_sighting {
     plr_real gain;           /* det S of that prediction */
     plr_real active;         /* 1: takes part in the search; 0: a known landmark, or excluded */
     bool behind;             /* at the last point the landmark lies behind the camera */
-    bool adrift;             /* the prediction is too uncertain for a linear correction */
-    bool aside;              /* takes no part for now: it fits the last point worst */
+    bool uncertain;          /* the prediction is too uncertain for a linear correction */
+    bool trimmed;            /* takes no part for now: it fits the last point worst */
     plr_real twist_d2;       /* |e|^2 at the result of the search with the twists */
 } plr_sighting;
 
@@ -75,7 +75,7 @@ void plr_search_from_zero(plr_search *s, plr_search_point *best);
 void plr_search_descend(plr_search *s, plr_search_point *best);
 
 /* The motion on which three fifths agree, though the others are off by any amount: twice, sets the two
- * fifths aside that fit the best point worst, and descends without them (concentration steps of least
+ * fifths out that fit the best point worst, and descends without them (concentration steps of least
  * trimmed squares). At the end all sightings are evaluated at the best point. */
 void plr_search_concentrate(plr_search *s, plr_search_point *best);
 

@@ -2,6 +2,7 @@
 #include "filter/tracks.h"
 
 #include "math/small.h"
+#include "pelorus/assertions.h"
 
 enum {
     MIN_REJECTIONS = 8, /* successive rejections before a landmark is initialised again */
@@ -21,6 +22,7 @@ void plr_track_add(plr_slot *slot, const plr_real e[3]) {
     for (unsigned r = 0; r < 3; r++)
         slot->innovation_sum[r] = PLR_FMA(DECAY, slot->innovation_sum[r], e[r]);
     slot->innovation_variance = PLR_FMA(DECAY * DECAY, slot->innovation_variance, PLR_R(1));
+    PLR_ASSERT(slot->innovation_variance >= 1);
     if (plr_dot3(slot->innovation_sum, slot->innovation_sum) >
         MOVING_ABOVE * slot->innovation_variance)
         slot->moving = 1;
@@ -36,6 +38,7 @@ void plr_track_count(plr_slot *slot, plr_gate_result result) {
 }
 
 bool plr_track_may_restart(const plr_slot *slot) {
+    PLR_ASSERT(slot->restarts <= MAX_RESTARTS);
     const bool was_good = slot->moving || slot->accepted >= GOOD_FRAMES;
     const unsigned first = was_good ? MIN_REJECTIONS_OF_GOOD : MIN_REJECTIONS;
     return !slot->known && slot->rejected >= first << slot->restarts;

@@ -22,6 +22,7 @@
 #include "filter/tracks.h"
 #include "math/order.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "process/alignment.h"
 #include "process/process.h"
 #include "process/velocity.h"
@@ -39,6 +40,7 @@
 
 static bool gain_before(const void *context, uint16_t a, uint16_t b) {
     const plr_workspace *w = context;
+    PLR_ASSERT(w->slot_of[a] != PLR_NO_SLOT && w->slot_of[b] != PLR_NO_SLOT);
     const plr_real gain_a = w->gain[w->slot_of[a]], gain_b = w->gain[w->slot_of[b]];
     return gain_a > gain_b || (!(gain_a < gain_b) && a < b);
 }

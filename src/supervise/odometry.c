@@ -6,6 +6,7 @@
 #include "math/dense.h"
 #include "math/se3.h"
 #include "math/small.h"
+#include "pelorus/assertions.h"
 #include "pelorus/settings.h"
 #include "supervise/doubt.h"
 #include "supervise/limits.h"
@@ -354,6 +355,7 @@ void plr_odometry_weigh(plr_supervisor *s, const plr_motion_evidence *m) {
     s->weight[1] = s->turns_fail       ? s->weight[0]
                    : now.turns > below ? widening(s, now.turns)
                                        : PLR_R(1);
+    PLR_ASSERT(s->weight[0] >= 1 && s->weight[1] >= 1);
     s->excess[0] *= plr_limit(s, PLR_LIMIT_OUTRIGHT_KEEPS);
     s->excess[1] *= plr_limit(s, PLR_LIMIT_OUTRIGHT_KEEPS);
 }
