@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 # How an image is made of the library, the port and a board.
 
-include("${PELORUS_ROOT}/cmake/PelorusSources.cmake")
-pelorus_sources(PELORUS_SOURCES "${PELORUS_ROOT}")
+include("${PELORUS_ROOT}/src/sources.cmake")
+pelorus_sources(PELORUS_SOURCES)
 set(PORT "${CMAKE_CURRENT_SOURCE_DIR}")
 set(IMAGES "${CMAKE_CURRENT_BINARY_DIR}/images")
 file(MAKE_DIRECTORY "${IMAGES}")
