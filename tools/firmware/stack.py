@@ -45,8 +45,7 @@ HANDLERS = (
 )
 FILTER = (
     r"plr_(filter|predict|correct|consistency|gate|motion|slots|births|match|landmarks|relocate)\w*"
-    r"|process|gate_each|initialise_new|append_new|take_up\w*|is_in_map|begin_at|collect|drop_known"
-    r"|find_(pose|likeliest)"
+    r"|process|gate_each|append_new|take_up|begin_at"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"(gain|position|id)_before",)),
@@ -60,9 +59,10 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_correct|plr_correct_towards|move_estimate", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
-    (r"bias_is_off|find_reasons|prior_of_drivers|restore_bias_prior", BIAS_WALK),
+    (r"plr_evidence_complete|prior_of_drivers|restore_bias_prior", BIAS_WALK),
     (r"plr_filter_(propagate_recovery|recover)", BIAS_WALK),
     (r"plr_bias_\w+", (PROCESS,)),
+    (r"plr_map_ask", ("find_known",)),
     (FILTER, (*MODEL, *MAP, PROCESS)),
 )
 
