@@ -61,7 +61,8 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
     (
-        r"plr_bias_prior_variance|plr_evidence_complete|prior_of_drivers|restore_bias_prior",
+        r"plr_bias_prior_variance|plr_evidence_complete|add_biases|prior_of_drivers"
+        r"|restore_bias_prior",
         BIAS_WALK,
     ),
     (r"plr_filter_(propagate_recovery|recover)", BIAS_WALK),
