@@ -337,8 +337,8 @@ TEMPLATE = """# What it costs
 Made by `tools/sizes.sh`; `tools/sizes.sh --check` measures again and fails where a number has moved
 by more than {tolerance} (stack seen: 64 bytes; worst / median: never above {spread_limit}).
 The images are float32, bias on, blocks of 8, at most 128 observations a frame (64 for N = 8 and
-16); compiler
-`arm-none-eabi-gcc` 12.2, library at -O3.
+16), with every room of the library; compiler `arm-none-eabi-gcc` 12.2, what frames are spent in at
+-O3, the rest at -Os (`port/cortex_m/cmake/CortexM.cmake`).
 
 ## Memory
 
@@ -370,12 +370,11 @@ blocks, rounded up. The coefficients are fitted to the worst frames of all board
 none is above; *its bound* is the formula at m = {busy}, beside the busiest frame that was met.
 Every loop has a count that N and m bound, and a library function that is not of constant time for
 such a count does not exist in it; so the worst case is no other than that of these counts.
-After frames that were lost in
-a fast turn the motion is searched for once more, in at most 17 evaluations of all points
-(`search_by_agreement`). A pose that is found from known landmarks, because it was lost or is too
-uncertain for them (`src/known_map/placing.c`), takes at most 40 samples of three and asks 64
-landmarks at most: with wrong ones among 20 as much as one and a half of such frames, among 64 as
-much as three (compared at the desk). None of these is in these frames.
+After frames that were lost in a fast turn the motion is searched for once more, in at most 17
+evaluations of all points (`search_by_agreement`). A pose that is found from known landmarks,
+because it was lost or is too uncertain for them (`src/known_map/placing.c`), takes at most 40
+samples of three and asks 64 landmarks at most: with wrong ones among 20 as much as one and a half
+of such frames, among 64 as much as three (compared at the desk). None of these is in these frames.
 
 ### With twists
 

@@ -22,7 +22,8 @@ from pelorus.errors import PelorusError
 # observers the firmware sets one, the telemetry's, and that not in every image.
 MODEL = (r"body_\w+", r"world_\w+")
 PROCESS = (
-    r"(twist|imu)\.c:(lay_out|check|step|mean|hold|rest|walk|bias_walk|now|bias_covariance|measure)"
+    r"(twist|imu)\.c:(lay_out|check|step|mean|hold|missed|rest|walk|bias_walk|now|bias_covariance"
+    r"|measure)"
 )
 BIAS_WALK = (r"(twist|imu)\.c:bias_walk",)
 MAP = ("send_evicted", "find_known")
@@ -45,12 +46,11 @@ HANDLERS = (
 )
 FILTER = (
     r"plr_(filter|predict|correct|consistency|gate|motion|slots|births|match|landmarks|relocate)\w*"
-    r"|process|gate_each|initialise_new|append_new|take_up\w*|is_in_map|begin_at|collect|drop_known"
-    r"|find_(pose|likeliest)"
+    r"|process|add_missed|finish_motion|gate_each|append_new|take_up|begin_at"
 )
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_order_sort|sink", (r"(gain|position|id)_before",)),
-    (r"to_frame|send_frame|plr_writer_put", (*PORT, "send")),
+    (r"to_frame|send_frame|send|plr_writer_put", (*PORT, r"panic\.c:send")),
     (STORE, (DEVICE,)),
     (r"move|pass_\w+|plr_codec_\w+", (r"(from|to)_(payload|frame|source|sink|header)",)),
     (r"from_source|to_sink|plr_filter_save", ("append_state", "read_state")),
@@ -60,9 +60,14 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"plr_correct|plr_correct_towards|move_estimate", (r"(body|world)_retract",)),
     (r"hold|apply|apply_to_velocity", (*MODEL, "measure", PROCESS)),
     (r"plr_stereo\w*", (r"(body|world)_(look|derive|initialise|adopt|in_world)",)),
-    (r"bias_is_off|find_reasons|prior_of_drivers|restore_bias_prior", BIAS_WALK),
+    (
+        r"plr_bias_prior_variance|plr_evidence_complete|add_biases|prior_of_drivers"
+        r"|restore_bias_prior",
+        BIAS_WALK,
+    ),
     (r"plr_filter_(propagate_recovery|recover)", BIAS_WALK),
     (r"plr_bias_\w+", (PROCESS,)),
+    (r"plr_map_ask", ("find_known",)),
     (FILTER, (*MODEL, *MAP, PROCESS)),
 )
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-# The library's sources. A room that is left out is replaced by the file of its name in src/absent.
-function(pelorus_sources result root)
-  file(GLOB sources CONFIGURE_DEPENDS "${root}/src/*/*.c")
+# The library's sources, for every build: it stands beside them, so that src, include and a port are all that a
+# build on another system has to take. A room that is left out is replaced by the file of its name in absent.
+function(pelorus_sources result)
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/*/*.c")
   foreach(room supervise known_map)
     string(TOUPPER "PLR_${room}" option)
     if(DEFINED ${option} AND NOT ${option})
