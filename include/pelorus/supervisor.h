@@ -144,27 +144,25 @@ typedef struct plr_supervisor {
 
     /* odometry */
     plr_sum sum; /* of nu, in the odometry's sigmas */
-    plr_real usual
-        [PLR_POSE_DIM];    /* its mean square on this drive, in units of its variance: 1 and more */
-    uint8_t misfits;       /* 1: that is more than the stated sigmas allow */
-    plr_real usual_frames; /* from which that was learnt */
-    plr_real statistic;    /* chi-square of the sum in units of what is usual */
-    plr_real agreement;    /* share of the last frames in which both agreed */
-    plr_real weight[2];    /* of the odometry's sigmas in the next frame, way and turn: 1 or more */
-    plr_real excess[2];    /* of a frame that contradicted outright, and of its turn */
     plr_real
-        difference[PLR_POSE_DIM]; /* from the pose by odometry to the pose by pictures: m, rad */
+        usual[PLR_POSE_DIM]; /* its mean square on this drive, in units of its variance: >= 1 */
+    uint8_t misfits;         /* 1: that is more than the stated sigmas allow */
+    plr_real usual_frames;   /* from which that was learnt */
+    plr_real statistic;      /* chi-square of the sum in units of what is usual */
+    plr_real agreement;      /* share of the last frames in which both agreed */
+    plr_real weight[2]; /* of the odometry's sigmas in the next frame, way and turn: 1 or more */
+    plr_real excess[2]; /* of a frame that contradicted outright, and of its turn */
+    plr_real difference[PLR_POSE_DIM]; /* from the pose by odometry to that by pictures: m, rad */
     plr_real difference_sigmas[PLR_POSE_DIM];
     plr_real difference_noise; /* the expected square of difference_sigmas by noise alone */
     uint8_t doubt;             /* plr_doubt */
-    uint8_t waits, holds_biases,
-        settled;           /* the last frame waited, taught no bias, ended a doubt: to be told */
+    uint8_t waits, holds_biases, settled; /* what the last frame did: plr_supervision */
     uint8_t outright;      /* the last frame contradicted outright, and waits for the next */
     uint8_t turns_fail;    /* the turns are contradicted, too */
     uint8_t relocated;     /* the pose was found anew since it came into doubt */
     uint8_t settle_frames; /* frames of agreement that end the doubt */
-    uint16_t agreeing_frames, contradicting_frames, small_frames,
-        doubted_frames; /* in succession */
+    /* in succession: */
+    uint16_t agreeing_frames, contradicting_frames, small_frames, doubted_frames;
 
     /* pictures */
     plr_real frozen_motion[PLR_POSE_DIM]; /* by odometry since the picture was new, m and rad */
