@@ -5,6 +5,7 @@ what a board's log compares to is tests/target's.
 
 from __future__ import annotations
 
+import re
 import struct
 from dataclasses import replace
 from pathlib import Path
