@@ -180,8 +180,9 @@ static const char *reason_name(unsigned bit) {
     static const char *const names[] = {
         "few",          "none-used",    "gate-locked", "gate-inert", "block-failed", "sink",
         "no-room",      "refused",      "nis-high",    "range",      "not-positive", "budget",
-        "contradicted", "may-be-wrong", "bias-off",    "nis-low",    "frozen",       "disagrees",
-        "recovered",    "no-frames",    "damaged",     "no-twists"};
+        "contradicted", "may-be-wrong", "bias-off",    "nis-low",    "frozen",       "?",
+        "recovered",    "no-frames",    "damaged",     "no-twists",  "readings",     "not-started",
+        "imu-fault",    "relocated",    "map",         "misfit"};
     return bit < sizeof names / sizeof names[0] ? names[bit] : "?";
 }
 
