@@ -99,7 +99,7 @@ static void test_a_body_that_was_moved_meanwhile_is_found_again_by_its_landmarks
  * covariance afterwards, as metres. */
 static double width_after_it_was_carried(plr_scene_policy policy) {
     double P[36];
-    config.scene = policy;
+    config.scene = (uint8_t)policy;
     start();
     drive(30, 0);
     world.T_WB[3] += 0.4;
