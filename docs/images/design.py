@@ -28,8 +28,8 @@ FRAME_STEPS = (
     ("apply the motion; its noise stays in W", "predict.c, model_body.c"),
     ("correct x, W and P, batch by batch", "correction.c"),
     ("add W to P; retract; transport P", "covariance_motion.c, model_body.c"),
-    ("compare with twists or IMU", "consistency.c"),
-    ("evict, initialise; judge health", "births.c, health.c"),
+    ("evict, initialise", "births.c"),
+    ("evidence to the supervisor; decisions, health", "evidence.c, src/supervise"),
 )
 
 
