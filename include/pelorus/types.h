@@ -318,7 +318,6 @@ typedef enum plr_doubt {
 typedef enum plr_rejection {
     PLR_REJECTED_BY_GATE = 1, /* further off than the gate allows */
     PLR_REJECTED_FAR = 2,     /* by so much that another point is seen: the track was lost */
-    PLR_REJECTED_LOST = 3,    /* its bearing is too uncertain for a linear correction */
     PLR_REJECTED_MOVES = 4    /* its innovations are no white noise: the point moves */
 } plr_rejection;
 

@@ -5,12 +5,16 @@
 
 #include <string.h>
 
+#include "supervise/health.h"
+#include "supervise/readings.h"
+
 #if !PLR_SUPERVISE
 
 void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
     (void)config;
     memset(s, 0, sizeof *s);
     s->weight[0] = s->weight[1] = 1;
+    plr_sensors_forget(s);
     plr_supervise_clock_set(s);
 }
 
@@ -58,14 +62,6 @@ void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
     s->relocated = relocated;
 }
 
-bool plr_supervise_was_relocated(const plr_supervisor *s) {
-    return s->relocated;
-}
-
-void plr_supervise_clock_set(plr_supervisor *s) {
-    s->last_frame_ns = s->last_use_ns = s->last_position_ns = PLR_NEVER_NS;
-}
-
 void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
     (void)s;
     (void)e;
@@ -74,9 +70,7 @@ void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
 void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,
                            bool used, plr_real d2, bool bounds, plr_time_ns now_ns) {
     (void)numbers, (void)used, (void)d2, (void)bounds, (void)now_ns;
-    plr_sensor_record *of = &s->sensors[reading->sensor - 1];
-    of->t_ns = reading->t_ns;
-    memcpy(of->value, reading->value, sizeof of->value);
+    plr_sensors_note(s, reading);
 }
 
 plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor) {
@@ -86,12 +80,11 @@ plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor) {
 }
 
 bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading) {
-    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
-    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
+    return plr_sensors_repeat(s, reading);
 }
 
 void plr_supervise_restored(plr_supervisor *s) {
-    memset(s->sensors, 0, sizeof s->sensors);
+    plr_sensors_forget(s);
 }
 
 void plr_supervise_enlarge(const plr_supervisor *s, const plr_real E[9], const plr_real p[3],
@@ -109,7 +102,7 @@ void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
 
 void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,
                           plr_health_state *health) {
-    (void)s;
+    plr_health_ages(s, now, health);
     health->health = now->started ? PLR_HEALTH_GOOD : PLR_HEALTH_LOST;
     health->reasons = now->started ? 0 : PLR_REASON_NOT_STARTED;
 }

@@ -7,12 +7,6 @@
 /* A reading is not old before this, s. */
 #define HELD_S 0.05
 
-double plr_health_seconds(plr_time_ns then, plr_time_ns now) {
-    if (then == PLR_NEVER_NS)
-        return (double)__builtin_inf();
-    return now < then ? 0 : (double)(now - then) * 1e-9;
-}
-
 bool plr_health_readings_are_old(const plr_supervisor *s, const plr_readings_evidence *now) {
     const double held = plr_health_seconds(now->reading_ns, now->now_ns);
     const double intervals = (double)plr_limit(s, PLR_LIMIT_HELD_INTERVALS);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "supervise/readings.h"
 
-#include <string.h>
-
 #include "supervise/limits.h"
 
 /* What the sums keep from reading to reading; they look back 1 / (1 - KEEPS) of them. */
@@ -12,12 +10,6 @@
  * is wrong. */
 #define MOST_TIMES PLR_R(3)
 #define MOST_PLUS  PLR_R(3)
-
-void plr_sensors_forget(plr_supervisor *s) {
-    memset(s->sensors, 0, sizeof s->sensors);
-    for (unsigned i = 0; i < PLR_SENSORS; i++)
-        s->sensors[i].t_ns = PLR_NEVER_NS;
-}
 
 void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned numbers, bool used,
                      plr_real d2) {
@@ -30,8 +22,7 @@ void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned num
     const plr_real variance = of->numbers > FULL_SUM * n ? of->numbers : FULL_SUM * n;
     const plr_real limit = plr_limit(s, of->off ? PLR_LIMIT_SENSOR_BELOW : PLR_LIMIT_SENSOR_ABOVE);
     of->off = of->excess > 0 && of->excess * of->excess > limit * limit * variance;
-    of->t_ns = reading->t_ns;
-    memcpy(of->value, reading->value, sizeof of->value);
+    plr_sensors_note(s, reading);
 }
 
 plr_real plr_sensors_widening(const plr_supervisor *s, unsigned sensor) {
@@ -45,9 +36,4 @@ bool plr_sensors_are_wrong(const plr_supervisor *s) {
         if (s->sensors[i].rejected >= most || s->sensors[i].off)
             return true;
     return false;
-}
-
-bool plr_sensors_repeat(const plr_supervisor *s, const plr_reading *reading) {
-    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
-    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
 }

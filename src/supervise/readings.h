@@ -4,10 +4,23 @@
 #ifndef PLR_SUPERVISE_READINGS_H
 #define PLR_SUPERVISE_READINGS_H
 
+#include <string.h>
+
 #include "pelorus/supervisor.h"
 
 /* Nothing is known of any sensor. */
-void plr_sensors_forget(plr_supervisor *s);
+static inline void plr_sensors_forget(plr_supervisor *s) {
+    memset(s->sensors, 0, sizeof s->sensors);
+    for (unsigned i = 0; i < PLR_SENSORS; i++)
+        s->sensors[i].t_ns = PLR_NEVER_NS;
+}
+
+/* The last reading of its sensor. */
+static inline void plr_sensors_note(plr_supervisor *s, const plr_reading *reading) {
+    plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    of->t_ns = reading->t_ns;
+    memcpy(of->value, reading->value, sizeof of->value);
+}
 
 /* Adds a reading of so many numbers that was used or rejected, with its squared distance d2 from what was
  * expected. */
@@ -22,6 +35,9 @@ plr_real plr_sensors_widening(const plr_supervisor *s, unsigned sensor);
 bool plr_sensors_are_wrong(const plr_supervisor *s);
 
 /* True if a reading is the sensor's last one again, of the same time: it says nothing new. */
-bool plr_sensors_repeat(const plr_supervisor *s, const plr_reading *reading);
+static inline bool plr_sensors_repeat(const plr_supervisor *s, const plr_reading *reading) {
+    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
+}
 
 #endif

@@ -40,7 +40,7 @@ void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
     plr_sensors_forget(s);
     s->health = PLR_HEALTH_DEGRADED; /* nothing has been seen yet */
     s->reasons = PLR_REASON_FEW_OBSERVATIONS;
-    s->last_frame_ns = s->last_use_ns = s->last_position_ns = PLR_NEVER_NS;
+    plr_supervise_clock_set(s);
 }
 
 /* The pose may be wrong, until pictures and odometry have agreed. */
@@ -238,14 +238,6 @@ void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
     s->relocated = relocated;
 }
 
-bool plr_supervise_was_relocated(const plr_supervisor *s) {
-    return s->relocated;
-}
-
-void plr_supervise_clock_set(plr_supervisor *s) {
-    s->last_frame_ns = s->last_use_ns = s->last_position_ns = PLR_NEVER_NS;
-}
-
 void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
     plr_pictures_note_motion(s, e);
 }
@@ -325,10 +317,7 @@ void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
 void plr_supervise_health(const plr_supervisor *s, const plr_readings_evidence *now,
                           plr_health_state *health) {
     health->reasons = s->reasons & ~(uint32_t)(now->looks ? OF_NOW : OF_NOW | OF_PICTURES);
-    health->seconds_without_frame = plr_health_seconds(s->last_frame_ns, now->now_ns);
-    health->seconds_without_use = plr_health_seconds(s->last_use_ns, now->now_ns);
-    health->seconds_without_twist =
-        plr_health_seconds(now->valid ? now->reading_ns : PLR_NEVER_NS, now->now_ns);
+    plr_health_ages(s, now, health);
     const double lost_s = (double)plr_limit(s, PLR_LIMIT_LOST_S);
     if (now->looks && health->seconds_without_frame > lost_s)
         health->reasons |= PLR_REASON_NO_FRAMES;

@@ -41,10 +41,14 @@ void plr_supervise_pose_set(plr_supervisor *s);
 void plr_supervise_begun_anew(plr_supervisor *s, bool relocated);
 
 /* True if the pose was found anew and has been in doubt since. */
-bool plr_supervise_was_relocated(const plr_supervisor *s);
+static inline bool plr_supervise_was_relocated(const plr_supervisor *s) {
+    return s->relocated;
+}
 
 /* The clock was set, after an interruption or to a time that the last frame is too far from. */
-void plr_supervise_clock_set(plr_supervisor *s);
+static inline void plr_supervise_clock_set(plr_supervisor *s) {
+    s->last_frame_ns = s->last_use_ns = s->last_position_ns = PLR_NEVER_NS;
+}
 
 /* The pending motion is applied without a frame. */
 void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e);

@@ -11,14 +11,12 @@ tenth, or a share by five hundredths.
 
 from __future__ import annotations
 
-import argparse
 import re
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
-from judge import ROOT, Figures, cases, converted, figures, run
+from judge import Figures, cases, converted, figures, parser_of, run
 
 SCENARIOS = (
     "mc-default-bias,fast,far,wrong-20,lost-1,isotropic,alternate,slip-0.25,slip-0.5,slip-2,"
@@ -104,14 +102,8 @@ def recording_changes(whole: dict[str, Figures], without: dict[str, Figures]) ->
 
 def main() -> int:
     """Prints a row for each threshold."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    cache = Path(tempfile.gettempdir()) / "pelorus-recordings"
-    parser.add_argument("--bin", type=Path, default=ROOT / "build/bin")
+    parser = parser_of(__doc__, "thresholds, by name")
     parser.add_argument("--seeds", type=int, default=8)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--cache", type=Path, default=cache)
     given = parser.parse_args()
     given.cache.mkdir(exist_ok=True)
     program, replay = given.bin / "pelorus-campaign", given.bin / "pelorus-replay"

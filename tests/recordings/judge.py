@@ -131,15 +131,21 @@ def figures(messages: list[Message]) -> Figures:
     return out
 
 
-def main() -> int:
-    """Prints the table."""
+def parser_of(about: str | None, only: str) -> argparse.ArgumentParser:
+    """The options that the harnesses of recordings share."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     cache = Path(tempfile.gettempdir()) / "pelorus-recordings"
     parser.add_argument("--bin", type=Path, default=ROOT / "build/bin")
-    parser.add_argument("--only", default="", help="recordings whose name contains it")
+    parser.add_argument("--only", default="", help=only)
     parser.add_argument("--cache", type=Path, default=cache, help="of converted recordings")
+    return parser
+
+
+def main() -> int:
+    """Prints the table."""
+    parser = parser_of(__doc__, "recordings whose name contains it")
     parser.add_argument("--f64", action="store_true")
     parser.add_argument("options", nargs="*")
     given = parser.parse_args()

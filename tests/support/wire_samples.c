@@ -271,7 +271,7 @@ static void make_evidence(plr_supervision *m, unsigned variant) {
     m->count = whole8(variant, PLR_SUPERVISION_REJECTED, 3);
     for (unsigned i = 0; i < m->count; i++) {
         m->rejected[i].id = whole32(variant, 80U + i);
-        m->rejected[i].why = whole8(variant, PLR_REJECTED_MOVES, PLR_REJECTED_LOST);
+        m->rejected[i].why = whole8(variant, PLR_REJECTED_MOVES, PLR_REJECTED_FAR);
         m->rejected[i].in_succession = whole16(variant, (uint16_t)(44 + i));
         m->rejected[i].mean2 = real_of_f32(variant, 90U + i);
     }
