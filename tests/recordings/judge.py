@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pelorus import road
 from pelorus.evaluation import assess, by_imu
 from pelorus.frames import Kind, Message, Report
+from pelorus.road import compare, read_road
 from pelorus.trajectory import estimate_in, filled, truth_in
 from pelorus.wire import messages_of
 
@@ -112,8 +112,8 @@ def figures(messages: list[Message]) -> Figures:
     if found is None:
         return out
     if truth is None:  # 03
-        way = road.read_road(DATA / "truth/kitti360-0003-path.csv")
-        return out | {"ATE": road.compare(found[0].poses.p, way, 45.0).road_m}
+        way = read_road(DATA / "truth/kitti360-0003-path.csv")
+        return out | {"ATE": compare(found[0].poses.p, way, 45.0).road_m}
     accuracy = assess(found[0], filled(truth, found[0].t_ns), found[1], 0, by_imu(messages))
     if accuracy is None:
         return out
