@@ -43,9 +43,10 @@ typedef struct plr_motion_evidence {
     plr_real E[9], p[3];          /* the motion that was applied: (I + E, p) */
     plr_real moved[PLR_POSE_DIM]; /* by how much the frame moved the pose beside odometry: m, rad */
     plr_real L[PLR_POSE_SQUARE];  /* sigmas of the odometry as stated: lower triangle, 6x6 */
-    plr_real L_used[PLR_POSE_SQUARE];   /* the same with the weight that it was given */
-    plr_real nu[PLR_POSE_DIM];          /* the difference, in units of L_used */
-    plr_real Lambda[PLR_POSE_TRIANGLE]; /* its information, prior included: packed upper triangle */
+    plr_real weight;              /* the factor of these that the frame used: 1 or more */
+    plr_real nu[PLR_POSE_DIM];    /* pictures less odometry, in units of L */
+    /* its information, prior included, in units of weight L: packed upper triangle */
+    plr_real Lambda[PLR_POSE_TRIANGLE];
 } plr_motion_evidence;
 
 /* What a frame with known landmarks did to the pose; covariances 6x6 of (rho, theta). */
@@ -150,19 +151,17 @@ typedef struct plr_supervisor {
     plr_real usual_frames;   /* from which that was learnt */
     plr_real statistic;      /* chi-square of the sum in units of what is usual */
     plr_real agreement;      /* share of the last frames in which both agreed */
-    plr_real weight[2]; /* of the odometry's sigmas in the next frame, way and turn: 1 or more */
-    plr_real excess[2]; /* of a frame that contradicted outright, and of its turn */
+    plr_real weight;         /* factor of the odometry's sigmas in the next frame: 1 or more */
     plr_real difference[PLR_POSE_DIM]; /* from the pose by odometry to that by pictures: m, rad */
     plr_real difference_sigmas[PLR_POSE_DIM];
     plr_real difference_noise; /* the expected square of difference_sigmas by noise alone */
     uint8_t doubt;             /* plr_doubt */
     uint8_t waits, holds_biases, settled; /* what the last frame did: plr_supervision */
     uint8_t outright;      /* the last frame contradicted outright, and waits for the next */
-    uint8_t turns_fail;    /* the turns are contradicted, too */
     uint8_t relocated;     /* the pose was found anew since it came into doubt */
     uint8_t settle_frames; /* frames of agreement that end the doubt */
     /* in succession: */
-    uint16_t agreeing_frames, contradicting_frames, small_frames, doubted_frames;
+    uint16_t agreeing_frames, contradicting_frames, doubted_frames;
 
     /* pictures */
     plr_real frozen_motion[PLR_POSE_DIM]; /* by odometry since the picture was new, m and rad */

@@ -334,12 +334,12 @@ enum { PLR_SUPERVISION_REJECTED = 24 };
 /* What the supervisor saw in one frame, and what it decided: plr_filter_supervision. */
 typedef struct plr_supervision {
     plr_time_ns t_ns;
-    float nu[6];     /* pictures less odometry, in the odometry's stated sigmas: (rho, theta) */
-    float moved[6];  /* what the frame moved the pose beside odometry: m and rad, in the body */
-    float statistic; /* chi-square of six of the sum of nu, in units of what is usual */
-    float usual[6];  /* by how much its square is usually more than stated, 1 to 25 */
-    float agreement; /* share of the last frames in which both agreed */
-    float weight[2]; /* factors of the odometry's sigmas in the next frame: way and turn, >= 1 */
+    float nu[6];         /* pictures less odometry, in the odometry's stated sigmas: (rho, theta) */
+    float moved[6];      /* what the frame moved the pose beside odometry: m and rad, in the body */
+    float statistic;     /* chi-square of six of the sum of nu, in units of what is usual */
+    float usual[6];      /* by how much its square is usually more than stated, 1 to 25 */
+    float agreement;     /* share of the last frames in which both agreed */
+    float weight;        /* factor of the odometry's sigmas in the next frame, 1 or more */
     float difference[6]; /* from the other pose that may be true: m and rad, in the body */
     uint8_t doubt;       /* plr_doubt */
     bool applied;        /* the frame applied a motion: nu and moved are filled */

@@ -13,7 +13,7 @@
 void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
     (void)config;
     memset(s, 0, sizeof *s);
-    s->weight[0] = s->weight[1] = 1;
+    s->weight = 1;
     plr_sensors_forget(s);
     plr_supervise_clock_set(s);
 }
@@ -37,11 +37,6 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
     s->last_frame_ns = e->readings.now_ns;
     if (report->used > 0)
         s->last_use_ns = e->readings.now_ns;
-}
-
-plr_real plr_supervise_weight(const plr_supervisor *s, unsigned axis) {
-    (void)axis;
-    return s->weight[0];
 }
 
 bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {

@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include "filter/filter_internal.h"
+#include "filter/gate.h"
 #include "filter/guard.h"
+#include "math/dense.h"
 #include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
@@ -59,8 +61,9 @@ void plr_evidence_of_motion(plr_filter *f, const plr_evidence_pose *by_odometry,
     memcpy(e->E, first->motion.E, sizeof e->E);
     memcpy(e->p, first->motion.p, sizeof e->p);
     memcpy(e->L, stated->L, sizeof e->L);
-    memcpy(e->L_used, first->motion.L, sizeof e->L_used);
-    memcpy(e->nu, correction->nu, sizeof e->nu);
+    e->weight = plr_supervise_weight(&f->supervisor);
+    plr_mat6_vec(e->nu, first->motion.L, correction->nu);
+    plr_motion_solve(stated->L, 1, e->nu, 1);
     memcpy(e->Lambda, correction->Lambda, sizeof e->Lambda);
     plr_pose_moved_from(f, by_odometry->R_WB, by_odometry->p_WB, e->moved);
 }
@@ -110,7 +113,7 @@ void plr_evidence_complete(plr_filter *f) {
 static plr_rejection why(const plr_filter *f, unsigned slot) {
     if (f->slots[slot].moving)
         return PLR_REJECTED_MOVES;
-    return f->slots[slot].accepted == 0 ? PLR_REJECTED_FAR : PLR_REJECTED_BY_GATE;
+    return f->work.verdict[slot] == PLR_GATE_FAR ? PLR_REJECTED_FAR : PLR_REJECTED_BY_GATE;
 }
 
 /* Puts a landmark among those of the largest mean2. */

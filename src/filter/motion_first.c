@@ -14,6 +14,7 @@
 #include "state/blocks.h"
 #include "state/motion.h"
 #include "state/slots.h"
+#include "supervise/supervise.h"
 
 enum {
     MIN_POINTS = 3,         /* of fewer points none can be checked by the others */
@@ -412,12 +413,12 @@ static bool fits_poorly(const plr_search *s) {
     return active >= MIN_POOR && 4 * poor >= active;
 }
 
-void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may_exclude,
-                     plr_motion_first *first, float *nis) {
+void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_motion_first *first,
+                     float *nis) {
     plr_search s = {.f = f, .frame = frame, .sightings = (plr_sighting *)(void *)f->work.Vt};
     plr_search_point best;
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, dz[PLR_POSE_DIM] = {0};
-    plr_motion_prior(f, &s.prior);
+    plr_motion_prior(f, plr_supervise_weight(&f->supervisor), &s.prior);
     unsigned unknown = 0; /* the others are of a given map, and take no part */
     for (unsigned k = 0; k < n; k++)
         if (f->work.slot_of[k] != PLR_NO_SLOT) {
@@ -435,8 +436,9 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, bool may
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && fits_poorly(&s); again++)
         plr_search_descend(&s, &best);
-    const plr_misfit misfit =
-        first->found && may_exclude ? find_misfit(&s, &best) : PLR_MISFIT_NONE;
+    const plr_misfit misfit = first->found && plr_supervise_may_exclude_odometry(&f->supervisor)
+                                  ? find_misfit(&s, &best)
+                                  : PLR_MISFIT_NONE;
     first->outright = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
     first->found = first->found && plr_search_factorise(&best, 0, U);
     if (first->found)

@@ -56,7 +56,7 @@ void plr_predict_apply_pending(plr_filter *f) {
     plr_applied_motion applied;
     if (!f->motion.pending)
         return;
-    plr_motion_prior(f, &applied);
+    plr_motion_prior(f, 1, &applied);
     plr_predict_apply(f, &applied);
 }
 

@@ -136,16 +136,8 @@ static plr_search_decision ask_after_search(plr_filter *f, unsigned n, bool outr
     return plr_supervise_search(&f->supervisor, &e);
 }
 
-/* Q <- W Q W: the odometry's sigmas as the supervisor weighs them. */
-static void weigh_odometry(plr_filter *f) {
-    for (unsigned i = 0; i < PLR_POSE_DIM; i++)
-        for (unsigned j = 0; j < PLR_POSE_DIM; j++)
-            f->motion.Q[PLR_POSE_DIM * i + j] *=
-                plr_supervise_weight(&f->supervisor, i) * plr_supervise_weight(&f->supervisor, j);
-}
-
 /* Finds the motion, judges the observations by it, and corrects. A frame that needs no motion applied, or
- * that waits for the next one, leaves it accumulating with the original Q. */
+ * that waits for the next one, leaves it accumulating. */
 static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsigned n,
                                    plr_search_decision *decision, plr_report *report) {
     plr_motion_first first;
@@ -153,17 +145,11 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
     plr_correction correction = {0};
     plr_applied_motion stated;
     plr_evidence_pose by_odometry;
-    plr_real Q[PLR_POSE_SQUARE];
-    memcpy(Q, f->motion.Q, sizeof Q);
-    plr_motion_prior(f, &stated);
+    plr_motion_prior(f, 1, &stated);
     plr_evidence_note_pose(f, &by_odometry);
-    if (plr_supervise_weight(&f->supervisor, 0) > 1)
-        weigh_odometry(f);
-    plr_motion_find(f, frame, n, plr_supervise_may_exclude_odometry(&f->supervisor), &first,
-                    &report->nis);
+    plr_motion_find(f, frame, n, &first, &report->nis);
     *decision = ask_after_search(f, n, first.outright);
     if (decision->wait || !needs_motion_applied(f, frame, n)) {
-        memcpy(f->motion.Q, Q, sizeof Q);
         report->nis = decision->wait ? 0 : report->nis;
         if (!decision->wait)
             (void)choose(f, frame, n, report);

@@ -89,8 +89,8 @@ static void fill_prior(plr_filter *f, plr_applied_motion *applied, plr_real scal
     memcpy(applied->JL, applied->L, sizeof applied->JL);
 }
 
-void plr_motion_prior(plr_filter *f, plr_applied_motion *applied) {
-    fill_prior(f, applied, 1, 0, 0);
+void plr_motion_prior(plr_filter *f, plr_real weight, plr_applied_motion *applied) {
+    fill_prior(f, applied, weight * weight, 0, 0);
 }
 
 void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {

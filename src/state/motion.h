@@ -36,8 +36,8 @@ void plr_motion_by_drivers(const plr_filter *f, const plr_real L[PLR_POSE_SQUARE
 /* Kt = K^T, drivers x 6. */
 void plr_motion_transpose(const plr_real K[PLR_MOTION_BY], plr_real Kt[PLR_MOTION_BY]);
 
-/* The motion at nu = 0: D' = D. */
-void plr_motion_prior(plr_filter *f, plr_applied_motion *applied);
+/* The motion at nu = 0: D' = D, with the odometry's sigmas times `weight`. */
+void plr_motion_prior(plr_filter *f, plr_real weight, plr_applied_motion *applied);
 
 /* The motion at nu = 0 with a prior so wide that it allows any motion of a robot between two
  * frames: 30 times the sigmas of plr_motion_prior, plus 0.3 m and 0.1 rad. */

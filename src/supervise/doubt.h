@@ -8,7 +8,6 @@
 /* What a frame, or something between frames, says of the pose. */
 typedef enum plr_doubt_event {
     PLR_DOUBT_CONTRADICTS, /* pictures contradict the odometry, and it loses weight */
-    PLR_DOUBT_RELENTS,     /* they do not any more */
     PLR_DOUBT_DEPARTS,     /* odometry and pictures differ by more than is usual */
     PLR_DOUBT_RETURNS,     /* by no more than is usual */
     PLR_DOUBT_LOSES,       /* something else may have moved the pose, or left it without pictures */

@@ -17,14 +17,10 @@
 
 void plr_odometry_forget(plr_supervisor *s) {
     memset(&s->sum, 0, sizeof s->sum);
-    s->statistic = s->excess[0] = s->excess[1] = 0;
-    s->weight[0] = s->weight[1] = 1;
-    s->contradicting_frames = s->small_frames = 0;
+    s->statistic = 0;
+    s->weight = 1;
+    s->contradicting_frames = 0;
     s->outright = 0;
-}
-
-static plr_real larger(plr_real a, plr_real b) {
-    return a > b ? a : b;
 }
 
 static uint16_t one_more(uint16_t frames) {
@@ -33,48 +29,20 @@ static uint16_t one_more(uint16_t frames) {
 
 /* ---------------------------------------------------------------- a frame's own difference */
 
-void plr_odometry_in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
-                            plr_real v[PLR_POSE_DIM]) {
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
-        v[k] = n[k];
-        for (unsigned l = 0; l < k; l++)
-            v[k] = PLR_FMA(-L[PLR_POSE_DIM * k + l], v[l], v[k]);
-        v[k] = L[(PLR_POSE_DIM + 1) * k] > 0 ? v[k] / L[(PLR_POSE_DIM + 1) * k] : 0;
-    }
-}
-
-/* Information J, b about nu from units of L_used to units of L: with T = L_used^-1 L it is T^T J T and
- * T^T b. */
-static void to_stated_sigmas(const plr_motion_evidence *m, plr_real J[PLR_POSE_SQUARE],
-                             plr_real b[PLR_POSE_DIM]) {
-    plr_real T[PLR_POSE_SQUARE], Tt[PLR_POSE_SQUARE], JT[PLR_POSE_SQUARE], turned[PLR_POSE_DIM];
-    for (unsigned c = 0; c < PLR_POSE_DIM; c++) {
-        plr_real column[PLR_POSE_DIM], solved[PLR_POSE_DIM];
-        for (unsigned r = 0; r < PLR_POSE_DIM; r++)
-            column[r] = m->L[PLR_POSE_DIM * r + c];
-        plr_odometry_in_sigmas(m->L_used, column, solved);
-        for (unsigned r = 0; r < PLR_POSE_DIM; r++)
-            T[PLR_POSE_DIM * r + c] = Tt[PLR_POSE_DIM * c + r] = solved[r];
-    }
-    plr_mat6_mul(JT, J, T);
-    plr_mat6_mul(J, Tt, JT);
-    plr_mat6_vec(turned, Tt, b);
-    memcpy(b, turned, sizeof turned);
-}
-
 /* nu = (I + J)^-1 b in the odometry's own sigmas, and V = I - (I + J)^-1, its covariance if both are as
- * stated. */
+ * stated; J = (Lambda - I) / w^2 and b = Lambda nu^ / w^2 are what the pictures say. */
 static bool own_difference(const plr_motion_evidence *m, plr_real nu[PLR_POSE_DIM],
                            plr_real V[PLR_POSE_TRIANGLE]) {
     plr_real J[PLR_POSE_SQUARE], U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], C[PLR_POSE_SQUARE] = {0};
     plr_upper6_unpack(J, m->Lambda);
     plr_mat6_vec(nu, J, m->nu);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        J[(PLR_POSE_DIM + 1) * k] -= 1;
-    if (memcmp(m->L, m->L_used, sizeof m->L) != 0)
-        to_stated_sigmas(m, J, nu);
-    for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-        J[(PLR_POSE_DIM + 1) * k] += 1;
+    const plr_real share = PLR_R(1) / (m->weight * m->weight);
+    for (unsigned k = 0; k < PLR_POSE_SQUARE; k++)
+        J[k] *= share;
+    for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
+        J[(PLR_POSE_DIM + 1) * k] += PLR_R(1) - share;
+        nu[k] *= share;
+    }
     plr_upper6_pack(U, J);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return false;
@@ -92,35 +60,12 @@ static bool own_difference(const plr_motion_evidence *m, plr_real nu[PLR_POSE_DI
     return true;
 }
 
-/* Which parts of a difference n of a frame's motion are a good part of that motion. */
-typedef struct plr_material {
-    bool way, turn;
-} plr_material;
-
-static plr_material material(const plr_supervisor *s, const plr_real n[PLR_POSE_DIM],
-                             const plr_motion_evidence *m) {
-    const plr_real share = plr_limit(s, PLR_LIMIT_MATERIAL_SHARE);
-    const plr_real least = plr_limit(s, PLR_LIMIT_MATERIAL_LEAST);
-    plr_real turn[3];
-    plr_turn_of(turn, m->E);
-    const plr_real way = PLR_FMA(share, PLR_SQRT(plr_dot3(m->p, m->p)), least);
-    const plr_real angle = PLR_FMA(share, PLR_SQRT(plr_dot3(turn, turn)), least);
-    return (plr_material){plr_dot3(n, n) > way * way, plr_dot3(n + 3, n + 3) > angle * angle};
-}
-
 /* The mean difference of the last frames by pictures alone, in sigmas. */
 static void lately(const plr_supervisor *s, plr_real floor, plr_real mean[PLR_POSE_DIM]) {
     plr_sum_by_pictures(s->sum.sum, s->sum.variance, floor, mean);
     for (unsigned k = 0; k < PLR_POSE_DIM;
          k++) /* s / V of a lasting difference is (1 + keep) of it */
         mean[k] /= PLR_R(1) + plr_limit(s, PLR_LIMIT_SUM_KEEPS);
-}
-
-static plr_material lately_material(const plr_supervisor *s, const plr_motion_evidence *m) {
-    plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
-    lately(s, plr_limit(s, PLR_LIMIT_WEAK), mean);
-    plr_mat6_vec(n, m->L, mean);
-    return material(s, n, m);
 }
 
 /* ---------------------------------------------------------------- what is usual */
@@ -223,16 +168,12 @@ void plr_odometry_settle(plr_supervisor *s) {
 
 /* A frame that excludes the odometry by itself, and is followed. */
 static void add_outright(plr_supervisor *s, const plr_motion_evidence *m, bool held) {
-    plr_real n[PLR_POSE_DIM], own[PLR_POSE_DIM];
-    plr_mat6_vec(n, m->L_used, m->nu);
-    plr_odometry_in_sigmas(m->L, n, own);
+    plr_real n[PLR_POSE_DIM];
+    plr_mat6_vec(n, m->L, m->nu);
     carry_difference(s, m);
     if (!held && s->scene == PLR_SCENE_MAY_MOVE)
-        add_longer(s, m, n, own, 0);
+        add_longer(s, m, n, m->nu, 0);
     memset(&s->sum, 0, sizeof s->sum);
-    s->small_frames = 0; /* it has to relent for a while, whatever was before */
-    s->excess[0] = plr_norm2_of_6(own);
-    s->excess[1] = material(s, n, m).turn ? plr_dot3(own + 3, own + 3) : PLR_R(0);
 }
 
 /* From the present pose to the one by pictures alone: of the difference of the last frames what the odometry,
@@ -242,15 +183,13 @@ static void differ_by_pictures(plr_supervisor *s, const plr_motion_evidence *m,
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0};
     plr_real mean[PLR_POSE_DIM], n[PLR_POSE_DIM];
     lately(s, plr_limit(s, PLR_LIMIT_UNOBSERVED), mean);
-    plr_mat6_vec(n, m->L, mean);
-    plr_odometry_in_sigmas(m->L_used, n, n);
     memcpy(U, m->Lambda, sizeof m->Lambda);
     if (!plr_cholesky_upper(PLR_POSE_DIM, U))
         return;
-    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, n, 1);
-    plr_solve_upper(PLR_POSE_DIM, U, n);
-    plr_mat6_vec(mean, m->L_used, n);
-    plr_odometry_differs(s, mean, nu, 0);
+    plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, mean, 1);
+    plr_solve_upper(PLR_POSE_DIM, U, mean);
+    plr_mat6_vec(n, m->L, mean);
+    plr_odometry_differs(s, n, nu, 0);
 }
 
 /* From the pose by odometry to the present one. */
@@ -301,11 +240,12 @@ static void learn_agreement(plr_supervisor *s) {
 
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,
                                       bool tells) {
-    plr_odometry_verdict verdict = {false, false, false};
+    plr_odometry_verdict verdict = {false, false, 0};
     plr_real nu[PLR_POSE_DIM], V[PLR_POSE_TRIANGLE];
     if (m->outright) {
         add_outright(s, m, held);
         verdict.contradicts = true;
+        verdict.excess = plr_norm2_of_6(m->nu);
         return verdict;
     }
     if (!own_difference(m, nu, V))
@@ -313,49 +253,30 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
     const bool calm = s->doubt == PLR_DOUBT_NONE;
     carry_difference(s, m);
     plr_sum_add(&s->sum, plr_limit(s, PLR_LIMIT_SUM_KEEPS), nu, V);
-    s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED)).all;
+    s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED));
     const bool before = plr_odometry_has_a_before(s);
     if ((calm || !before) && tells)
         learn_usual(s);
     if (calm || !before)
         learn_agreement(s);
-    const plr_material part = lately_material(s, m);
-    const bool much = part.way || part.turn;
-    const plr_real weighed = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK)).all;
-    const bool contradicts = much && weighed > plr_limit(s, PLR_LIMIT_CONTRADICTS_ABOVE);
-    s->small_frames = much ? 0 : one_more(s->small_frames);
+    const plr_real weighed = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
+    const bool contradicts = weighed > plr_limit(s, PLR_LIMIT_CONTRADICTS_ABOVE);
     s->contradicting_frames = contradicts ? one_more(s->contradicting_frames) : 0;
     verdict.contradicts =
         before && !plr_doubt_contradicted(s) &&
         s->contradicting_frames >= plr_limit_count(s, PLR_LIMIT_CONTRADICTS_FRAMES);
-    verdict.relents = s->small_frames >= plr_limit_count(s, PLR_LIMIT_SETTLED_FRAMES);
     verdict.departs = before && s->statistic > plr_limit(s, PLR_LIMIT_DEPARTS_ABOVE);
     if (!held)
         follow_difference(s, m, nu, V, verdict.departs && (calm || s->doubt == PLR_DOUBT_SETTLING));
     return verdict;
 }
 
-/* By how much a standard deviation grows. */
-static plr_real widening(const plr_supervisor *s, plr_real statistic) {
-    return PLR_SQRT(PLR_FMA(plr_limit(s, PLR_LIMIT_WEIGHT_LOST), statistic, PLR_R(1)));
-}
-
-/* Wheels that slip leave the gyro as good as it was, so turns keep their weight unless they are contradicted
- * themselves. If they are, and that is a good part of the turn, they have it back when all has. */
-void plr_odometry_weigh(plr_supervisor *s, const plr_motion_evidence *m) {
-    s->weight[0] = s->weight[1] = 1;
-    if (!plr_doubt_contradicted(s)) {
-        s->turns_fail = 0;
+void plr_odometry_weigh(plr_supervisor *s, plr_real excess) {
+    s->weight = 1;
+    if (!plr_doubt_contradicted(s))
         return;
-    }
-    const plr_statistic now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
-    const plr_real below = plr_limit(s, PLR_LIMIT_TURNS_BELOW);
-    s->turns_fail |= s->excess[1] > below || (now.turns > below && lately_material(s, m).turn);
-    s->weight[0] = widening(s, larger(now.all, s->excess[0]));
-    s->weight[1] = s->turns_fail       ? s->weight[0]
-                   : now.turns > below ? widening(s, now.turns)
-                                       : PLR_R(1);
-    PLR_ASSERT(s->weight[0] >= 1 && s->weight[1] >= 1);
-    s->excess[0] *= plr_limit(s, PLR_LIMIT_OUTRIGHT_KEEPS);
-    s->excess[1] *= plr_limit(s, PLR_LIMIT_OUTRIGHT_KEEPS);
+    const plr_real now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
+    const plr_real most = now > excess ? now : excess;
+    s->weight = PLR_SQRT(PLR_FMA(plr_limit(s, PLR_LIMIT_WEIGHT_LOST), most, PLR_R(1)));
+    PLR_ASSERT(s->weight >= 1);
 }

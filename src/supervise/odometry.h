@@ -13,8 +13,8 @@
 /* What a frame has shown. */
 typedef struct plr_odometry_verdict {
     bool contradicts; /* from this frame on, or in this frame by itself, and in earnest */
-    bool relents;     /* the difference has been immaterial for as long as settles a doubt */
     bool departs;     /* the sum exceeds what is usual, and did not always do so */
+    plr_real excess;  /* chi-square of a frame that contradicts by itself, else 0 */
 } plr_odometry_verdict;
 
 /* The sum forgets; what is usual is kept. */
@@ -28,8 +28,8 @@ bool plr_odometry_has_a_before(const plr_supervisor *s);
 plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_evidence *m, bool held,
                                       bool tells);
 
-/* The weight of the odometry in the next frame, once the doubt about it is known. */
-void plr_odometry_weigh(plr_supervisor *s, const plr_motion_evidence *m);
+/* The weight of the odometry in the next frame, once the doubt about it is known; `excess` as above. */
+void plr_odometry_weigh(plr_supervisor *s, plr_real excess);
 
 /* Adds to the difference between the pose by odometry and the present one: n, m and rad in the body, nu of
  * it in sigmas, and the expected square of nu by chance. */
@@ -40,10 +40,6 @@ void plr_odometry_differs(plr_supervisor *s, const plr_real n[PLR_POSE_DIM],
  * difference d; s is the share of it that the odometry's noise does not explain: the rest is in P already. */
 void plr_odometry_cover(const plr_supervisor *s, const plr_real d[PLR_POSE_DIM],
                         plr_real C[PLR_POSE_SQUARE]);
-
-/* v = L^-1 n, which may be n; where L has a zero column v is zero. */
-void plr_odometry_in_sigmas(const plr_real L[PLR_POSE_SQUARE], const plr_real n[PLR_POSE_DIM],
-                            plr_real v[PLR_POSE_DIM]);
 
 /* The difference has been covered for good. */
 void plr_odometry_settle(plr_supervisor *s);

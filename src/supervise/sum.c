@@ -23,21 +23,16 @@ static bool factorise(const plr_real V[PLR_POSE_TRIANGLE], const plr_real *D, pl
     return plr_cholesky_upper(PLR_POSE_DIM, U);
 }
 
-/* The three numbers of the translation come first, so the last three of U^-T s are those of the turns
- * about whatever translation fits best. */
-plr_statistic plr_sum_statistic(const plr_sum *sum, const plr_real *usual, plr_real floor) {
+plr_real plr_sum_statistic(const plr_sum *sum, const plr_real *usual, plr_real floor) {
     plr_real U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN] = {0}, s[PLR_POSE_DIM], D[PLR_POSE_DIM];
-    plr_statistic found = {0, 0};
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         D[k] = usual ? PLR_SQRT(usual[k]) : PLR_R(1);
         s[k] = sum->sum[k];
     }
     if (!factorise(sum->variance, D, floor, U))
-        return found;
+        return 0;
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, U, s, 1);
-    found.turns = plr_dot3(s + 3, s + 3);
-    found.all = plr_dot3(s, s) + found.turns;
-    return found;
+    return plr_norm2_of_6(s);
 }
 
 void plr_sum_by_pictures(const plr_real s[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],

@@ -14,13 +14,8 @@ void plr_sum_add(plr_sum *sum, plr_real keep, const plr_real x[PLR_POSE_DIM],
                  const plr_real C[PLR_POSE_TRIANGLE]);
 
 /* s^T (D V D + floor I)^-1 s, chi-square with 6 degrees of freedom, with D^2 = diag(usual), or I where that
- * is NULL; and the part that no translation explains, 3 degrees of freedom. `floor` keeps directions of
- * which nothing is said out of it. */
-typedef struct plr_statistic {
-    plr_real all, turns;
-} plr_statistic;
-
-plr_statistic plr_sum_statistic(const plr_sum *sum, const plr_real *usual, plr_real floor);
+ * is NULL. `floor` keeps directions of which nothing is said out of it. */
+plr_real plr_sum_statistic(const plr_sum *sum, const plr_real *usual, plr_real floor);
 
 /* n = (V + floor I)^-1 s: the difference by pictures alone, without the odometry's prior. */
 void plr_sum_by_pictures(const plr_real s[PLR_POSE_DIM], const plr_real V[PLR_POSE_TRIANGLE],

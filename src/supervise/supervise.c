@@ -77,10 +77,6 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     return decision;
 }
 
-plr_real plr_supervise_weight(const plr_supervisor *s, unsigned axis) {
-    return s->weight[axis < 3 ? 0 : 1];
-}
-
 bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
     return plr_odometry_has_a_before(s);
 }
@@ -143,8 +139,6 @@ static void change_doubt(plr_supervisor *s, const plr_odometry_verdict *o, bool 
     if (o->contradicts) {
         plr_doubt_change(s, PLR_DOUBT_CONTRADICTS);
         s->settle_frames = settled;
-    } else if (plr_doubt_contradicted(s) && o->relents) {
-        plr_doubt_change(s, PLR_DOUBT_RELENTS);
     } else if (o->departs) {
         plr_doubt_change(s, PLR_DOUBT_DEPARTS);
         if (s->doubt == PLR_DOUBT_DEPARTED && s->settle_frames < settled)
@@ -194,7 +188,7 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
     const bool was_contradicted = plr_doubt_contradicted(s);
     const bool tells =
         !held && s->frames_without_use == 0 && report->used >= plr_limit_count(s, PLR_LIMIT_FEW);
-    plr_odometry_verdict odometry = {false, false, false};
+    plr_odometry_verdict odometry = {false, false, 0};
     uint32_t reasons = reasons_of_events(&e->events, report);
     memset(decision, 0, sizeof *decision);
     if (e->motion.applied)
@@ -215,7 +209,7 @@ void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const p
     if (s->doubt != PLR_DOUBT_NONE && s->agreeing_frames >= s->settle_frames)
         settle(s, decision);
     if (e->motion.applied)
-        plr_odometry_weigh(s, &e->motion);
+        plr_odometry_weigh(s, odometry.excess);
     reasons |= reasons_of_doubt(s);
     s->refused_before = e->readings.refused;
     s->last_frame_ns = e->readings.now_ns;
@@ -285,19 +279,16 @@ static void copy(float *to, const plr_real *from, unsigned n) {
 void plr_supervise_tell(const plr_supervisor *s, const plr_frame_evidence *e,
                         plr_supervision *told) {
     const plr_motion_evidence *m = &e->motion;
-    plr_real n[PLR_POSE_DIM];
     memset(told, 0, sizeof *told);
     if (m->applied) {
-        plr_mat6_vec(n, m->L_used, m->nu);
-        plr_odometry_in_sigmas(m->L, n, n);
-        copy(told->nu, n, PLR_POSE_DIM);
+        copy(told->nu, m->nu, PLR_POSE_DIM);
         copy(told->moved, m->moved, PLR_POSE_DIM);
     }
     told->t_ns = s->last_frame_ns;
     told->statistic = (float)s->statistic;
     copy(told->usual, s->usual, PLR_POSE_DIM);
     told->agreement = (float)s->agreement;
-    copy(told->weight, s->weight, 2);
+    told->weight = (float)s->weight;
     copy(told->difference, s->difference, PLR_POSE_DIM);
     told->doubt = s->doubt;
     told->applied = m->applied;

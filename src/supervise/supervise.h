@@ -25,10 +25,12 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
 void plr_supervise_frame(plr_supervisor *s, const plr_frame_evidence *e, const plr_report *report,
                          plr_frame_decision *decision);
 
-/* What was decided at the end of the last frame for this one: factors of the odometry's sigmas, of the way
- * and of the turn, 1 or more; whether points may agree on a motion that the odometry excludes; whether a gate
- * of fixed width is open. */
-plr_real plr_supervise_weight(const plr_supervisor *s, unsigned axis);
+/* What was decided at the end of the last frame for this one: a factor of the odometry's sigmas, 1 or more;
+ * whether points may agree on a motion that the odometry excludes; whether a gate of fixed width is open. */
+static inline plr_real plr_supervise_weight(const plr_supervisor *s) {
+    return s->weight;
+}
+
 bool plr_supervise_may_exclude_odometry(const plr_supervisor *s);
 bool plr_supervise_opens_fixed_gate(const plr_supervisor *s);
 

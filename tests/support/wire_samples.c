@@ -255,9 +255,9 @@ static void make_report(plr_report_message *m, unsigned variant) {
 
 static void make_evidence(plr_supervision *m, unsigned variant) {
     m->t_ns = time_of(variant);
-    float *const numbers[] = {m->nu,         m->moved,  &m->statistic, m->usual,
-                              &m->agreement, m->weight, m->difference};
-    static const unsigned sizes[] = {6, 6, 1, 6, 1, 2, 6};
+    float *const numbers[] = {m->nu,         m->moved,   &m->statistic, m->usual,
+                              &m->agreement, &m->weight, m->difference};
+    static const unsigned sizes[] = {6, 6, 1, 6, 1, 1, 6};
     for (unsigned i = 0; i < sizeof sizes / sizeof sizes[0]; i++)
         for (unsigned j = 0; j < sizes[i]; j++)
             numbers[i][j] = real_of_f32(variant, 10 * i + j);

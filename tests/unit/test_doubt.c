@@ -10,12 +10,12 @@ enum { STATES = PLR_DOUBT_SETTLING + 1, EVENTS = PLR_DOUBT_SETTLES + 1 };
 
 static void test_every_event_leads_where_it_should_from_every_doubt(void) {
     enum { NONE, DEPARTED, CONTRADICTED, SETTLING };
-    /* contradicts, relents, departs, returns, loses, settles */
+    /* contradicts, departs, returns, loses, settles */
     static const uint8_t to[STATES][EVENTS] = {
-        [NONE] = {CONTRADICTED, NONE, DEPARTED, NONE, SETTLING, NONE},
-        [DEPARTED] = {CONTRADICTED, DEPARTED, DEPARTED, SETTLING, DEPARTED, DEPARTED},
-        [CONTRADICTED] = {CONTRADICTED, SETTLING, CONTRADICTED, CONTRADICTED, CONTRADICTED, NONE},
-        [SETTLING] = {CONTRADICTED, SETTLING, DEPARTED, SETTLING, SETTLING, NONE},
+        [NONE] = {CONTRADICTED, DEPARTED, NONE, SETTLING, NONE},
+        [DEPARTED] = {CONTRADICTED, DEPARTED, SETTLING, DEPARTED, DEPARTED},
+        [CONTRADICTED] = {CONTRADICTED, CONTRADICTED, CONTRADICTED, CONTRADICTED, NONE},
+        [SETTLING] = {CONTRADICTED, DEPARTED, SETTLING, SETTLING, NONE},
     };
     for (unsigned from = 0; from < STATES; from++)
         for (unsigned event = 0; event < EVENTS; event++) {

@@ -60,7 +60,7 @@ static void take_specimen(noise_kind kind, bool bias, bool shifted) {
     for (unsigned i = 0; bias && i < 36; i++) /* as a tenth of a second of driving leaves it */
         filter.motion.B[PLR_DRIVERS * (i / 6) + i % 6] =
             (plr_real)(0.01 * rng_normal(&chance) - (i % 7 == 0 ? 0.1 : 0));
-    plr_motion_prior(&filter, &motion);
+    plr_motion_prior(&filter, 1, &motion);
     rng_normals(&chance, kind == HUGE_NOISE ? 0.01 : 1, z_double, 6);
     if (shifted)
         to_reals(z, z_double, 6);

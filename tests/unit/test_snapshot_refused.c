@@ -117,7 +117,7 @@ static void test_numbers_that_are_not_finite_are_refused(void) {
     const uint32_t P_at = place_of_P();
     const uint32_t places[] = {state_place("time", "interval_s"),
                                state_place("filter", "core_motion.V"),
-                               state_place("filter", "supervisor.excess"),
+                               state_place("filter", "supervisor.statistic"),
                                state_place("slot", "x"),
                                state_place("slot", "beyond"),
                                P_at,

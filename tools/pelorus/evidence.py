@@ -44,7 +44,7 @@ class Evidence(Message, kind=Kind.EVIDENCE):
     statistic: float = 0.0
     usual: Floats = field(default_factory=lambda: np.ones(6))
     agreement: float = 0.0
-    weight: Floats = field(default_factory=lambda: np.ones(2))
+    weight: float = 1.0
     difference: Floats = zeros(6)
     doubt: int = 0
     flags: int = 0  # EvidenceFlag
