@@ -88,7 +88,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.LANDMARK: [90],
     Kind.POSE: [36 + 63 * 8 + 32, 36 + 63 * 4 + 32],
     Kind.REPORT: [66],
-    Kind.EVIDENCE: [131 + 11 * n for n in (0, 1)],
+    Kind.EVIDENCE: [127 + 11 * n for n in (0, 1)],
     Kind.TEXT: [1 + 5],
     Kind.END: [53],
     Kind.STATE: [57],

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""The estimator alone (PLR_SUPERVISE=0, PLR_KNOWN_MAP=0) beside the whole filter.
+
+usage: alone.py REPLAY REPLAY-ALONE
+
+On the golden drives, where nothing goes wrong, each pose is the same to the bit.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+DRIVES = ("drive.plr", "imu.plr")
+
+
+def trajectory(replay: str, drive: Path) -> bytes:
+    """Poses of the drive, as the replay writes them."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out.tum"
+        subprocess.run([replay, str(drive), "--quiet", "--trajectory", str(out)], check=True)
+        return out.read_bytes()
+
+
+def main() -> None:
+    """Compares both on each drive."""
+    whole, alone = sys.argv[1:]
+    for name in DRIVES:
+        drive = Path(__file__).parent / name
+        poses = trajectory(whole, drive)
+        if poses.count(b"\n") < 20:
+            sys.exit(f"{name}: the replay wrote no trajectory")
+        if trajectory(alone, drive) != poses:
+            sys.exit(f"{name}: the estimator alone goes another way than the whole filter")
+        print(f"{name}: the same to the bit")
+
+
+main()
