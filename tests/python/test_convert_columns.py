@@ -262,12 +262,11 @@ def test_velocities_that_are_not_there_are_named_with_what_to_do(
 def test_columns_of_other_names_are_told_how_to_be_named_whichever_file_lacks_them(
     tmp_path: Path, pelorus: Run
 ) -> None:
-    """All of them other: vx, vy, ... as most would call them; no hint stood there."""
     files = csv_files(tmp_path, clean(**SHORT))
     for name, old, new, hint in (
         ("twists.csv", "ps", "", "--columns vx=COLUMN:mps"),
-        ("truth.csv", "_m", "", "--columns px=COLUMN:m"),
-        ("stereo.csv", "_px", "", "--columns uL=COLUMN"),
+        ("truth.csv", "p", "at_", "--columns px=COLUMN:m"),
+        ("stereo.csv", "_px", "_pixel", "--columns uL=COLUMN"),
         ("stereo.csv", "t_ns", "stamp", "--columns t=COLUMN:s"),
     ):
         text = (tmp_path / name).read_text()
@@ -312,7 +311,8 @@ def test_a_complaint_calls_a_column_as_its_file_does(tmp_path: Path, pelorus: Ru
         return said
 
     named = "v=speed_kmh,wx=roll_rate_dps"
-    assert "row 2: roll_rate_dps is not finite" in complaint(f"{named},twists.t=stamp_ms", "nan")
+    said = complaint(f"{named},twists.t=stamp_ms", "fast")
+    assert "row 2: roll_rate_dps is 'fast', a number is due" in said
     typed = complaint(f"{named},twists.t=stmp_ms", "0")
     assert "lacks the column stmp_ms; there are: stamp_ms, speed_kmh, roll_rate_dps" in typed
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from pelorus import road
-from pelorus.trajectory import read_tum
+from pelorus.trajectory import read_stamped
 from replay_drive import Result, judged, run
 
 SLOTS_MOST = ("100", "256")  # what is lost by eviction is centimetres here
@@ -26,7 +26,7 @@ def test_on_03_the_preset_stays_within_5_m_of_the_road(
     trajectory = tmp_path / "03.tum"
     replay(plr_03, "100", "--trajectory", trajectory)
     way = road.read_road(real("truth/kitti360-0003-path.csv"))
-    found = road.compare(read_tum(trajectory).poses.p, way, skip_m=45.0)
+    found = road.compare(read_stamped(trajectory).poses.p, way, skip_m=45.0)
     assert 4.0 < found.road_m <= 5.0  # numpy, without a gate that opens: 4.5
 
 

@@ -25,7 +25,7 @@ from pelorus.replay import Outputs, Programs
 from pelorus.report import pictures, words
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import read_map
-from pelorus.trajectory import Trajectory, estimate_in, read_tum
+from pelorus.trajectory import Trajectory, estimate_in, read_stamped
 from PIL import Image
 from replay_drive import FRAMES, ROOT, drive, encode, header, known, t_ns
 from replay_drive import run as run_replay
@@ -71,7 +71,7 @@ def test_poses_of_the_log_are_those_of_the_trajectory_file(
     tmp_path: Path, programs: Programs
 ) -> None:
     found = compared(recorded(tmp_path, drive()), programs)
-    written = read_tum(Outputs.named(tmp_path / "runs", "yours").trajectory)
+    written = read_stamped(Outputs.named(tmp_path / "runs", "yours").trajectory)
     assert np.array_equal(written.t_ns, found.main.trajectory.t_ns)
     assert np.allclose(written.poses.p, found.main.trajectory.poses.p, atol=1e-7)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pelorus.frames import Kind, Landmark, Stereo
-from pelorus.trajectory import read_tum
+from pelorus.trajectory import read_stamped
 from replay_drive import (
     BIN,
     EXACT_CAMERA,
@@ -58,7 +58,7 @@ def test_with_slots_for_all_the_replay_computes_the_same(
         way = tmp_path / f"{program}.tum"
         slots = ("--slots", "256", "--trajectory", way)
         summaries.append(judged(path, *options, *EXACT_CAMERA, *slots, program=program))
-        ways.append(read_tum(way))
+        ways.append(read_stamped(way))
     assert summaries[0].keys() == summaries[1].keys()
     for count in ("frames", "matched", "used", "gated", "new", "poor", "evicted"):
         assert summaries[0][count] == summaries[1][count], count

@@ -16,6 +16,14 @@ from pelorus.layout import Floats
 ORTHOGONAL_TOLERANCE = 1e-3
 BASELINES_M = (1e-3, 5.0)  # what a body can carry
 SECONDS_MAX = 9e9  # below 2^63 ns
+STAMP_MAX_S = 1e11  # the year 5138; today's times in ns are larger by far
+STEP_MAX_S = 1e4  # rows hours apart are none of a drive; in ns it would be 100 kHz
+
+
+def are_ns(stamps: Floats) -> bool:
+    """Whether times are ns rather than s: by their size, else by their steps."""
+    step = float(np.median(np.abs(np.diff(stamps)))) if len(stamps) > 1 else 0.0
+    return step > STEP_MAX_S or bool((np.abs(stamps) > STAMP_MAX_S).any())
 
 
 class Arrays:

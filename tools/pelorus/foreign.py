@@ -13,6 +13,8 @@ import io
 import json
 import math
 import zipfile
+from collections import Counter
+from collections.abc import Callable
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,8 +35,11 @@ YAML_BYTES_MAX = 1 << 18  # its reader is slow
 YAML_DEPTH_MAX = 50
 ARRAYS_BYTES_MAX = 1 << 31  # unpacked; the course's largest drive has 0.2 GB
 INTEGER_DIGITS_MAX = 20  # 2^64 has as many
+BAD_ROWS_MAX = 0.1  # of a file's rows may be left out; more is another fault
 PIECE_BYTES = 1 << 20
 BEGINNING_BYTES = 1 << 17
+NOT_FINITE = "holds a number that is not finite"
+COMMENT = "#"
 NPY_MAGIC = b"\x93NUMPY"
 
 ArraysByName = dict[str, NDArray[np.generic]]
@@ -103,7 +108,12 @@ class Row(NamedTuple):
 
 def rows(path: Path) -> list[Row]:
     """Lines of cells parted by blanks or commas; neither blank lines nor # comments."""
-    lines = enumerate(text(path).splitlines(), 1)
+    return rows_of(path, text(path))
+
+
+def rows_of(path: Path, whole: str) -> list[Row]:
+    """The same of the file's text."""
+    lines = enumerate(whole.splitlines(), 1)
     bare = ((number, line.partition("#")[0].replace(",", " ").split()) for number, line in lines)
     found = [Row(number, cells) for number, cells in bare if cells]
     if not found:
@@ -111,8 +121,82 @@ def rows(path: Path) -> list[Row]:
     return found
 
 
+class Written(NamedTuple):
+    """Rows of numbers, and what else their file shows: the columns' names, if any; commas."""
+
+    rows: list[Row]
+    names: list[str]
+    by_commas: bool
+
+
+def written(path: Path) -> Written:
+    """`rows`; a first row of words, or the comment before the numbers, names the columns."""
+    whole = text(path)
+    found = rows_of(path, whole)
+    names: list[str] = []
+    if not any(map(is_number, found[0].cells)) and len(found) > 1:
+        names, found = found[0].cells, found[1:]
+    lines = whole.splitlines()
+    comments = [line for line in lines[: found[0].line - 1] if line.lstrip().startswith(COMMENT)]
+    if comments and not names:
+        last = comments[-1].lstrip().lstrip(COMMENT)
+        names = [name.strip() for name in (last.split(",") if "," in last else last.split())]
+    return Written(found, names, "," in lines[found[0].line - 1])
+
+
+class Sound(NamedTuple):
+    """The rows that can be used, their numbers, and what is to be said of the others."""
+
+    rows: list[Row]
+    numbers: Floats
+    remarks: tuple[str, ...]
+
+
+def sound(
+    path: Path, given: list[Row], columns: int | None = None, used: int | None = None
+) -> Sound:
+    """`numbers` without the few rows that are cut off or have one that is not finite: of the first
+    `used` columns, or of all.
+    """
+    due = columns or Counter(len(row.cells) for row in given).most_common(1)[0][0]
+    short = np.array([len(row.cells) for row in given]) != due
+    first = given[int(short.argmax())]
+    what = f"has {len(first.cells)} numbers; {due} a row are due"
+    remarks = left_out(path, short, lambda k: f"line {given[k].line}", what)
+    whole = _where(given, ~short)
+    found = _numbers(path, whole, due)
+    bad = np.asarray(~np.isfinite(found[:, :used]).all(axis=1), np.bool_)
+    remarks += left_out(path, bad, lambda k: f"line {whole[k].line}", NOT_FINITE)
+    return Sound(_where(whole, ~bad), found[~bad], remarks)
+
+
+def _where(given: list[Row], good: NDArray[np.bool_]) -> list[Row]:
+    return [row for row, is_good in zip(given, good, strict=True) if is_good]
+
+
+def left_out(
+    path: Path, bad: NDArray[np.bool_], at: Callable[[int], str], what: str
+) -> tuple[str, ...]:
+    """What to say of bad rows, none or one sentence; ForeignFileError where they are many."""
+    count = int(bad.sum())
+    if not count:
+        return ()
+    first = at(int(bad.argmax()))
+    if count > BAD_ROWS_MAX * len(bad):
+        raise ForeignFileError(path, f"{what} ({count} of {len(bad)} rows)", at=first)
+    return (f"{path}: {count} of {len(bad)} rows are left out, {first} first: {what}",)
+
+
 def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
     """(rows, columns) finite numbers; as many columns as the first row has, if not said."""
+    out = _numbers(path, given, columns)
+    bad = np.nonzero(~np.isfinite(out).all(axis=1))[0]
+    if len(bad):
+        raise ForeignFileError(path, NOT_FINITE, at=f"line {given[int(bad[0])].line}")
+    return out
+
+
+def _numbers(path: Path, given: list[Row], columns: int | None) -> Floats:
     due = columns or len(given[0].cells)
     out = np.empty((len(given), due))
     for k, (line, cells) in enumerate(given):
@@ -124,15 +208,10 @@ def numbers(path: Path, given: list[Row], columns: int | None = None) -> Floats:
         if not all(map(is_number, cells)):
             raise ForeignFileError(path, "holds something that is no number", at=at)
         out[k] = [float(cell) for cell in cells]
-        if not np.isfinite(out[k]).all():
-            raise ForeignFileError(path, "holds a number that is not finite", at=at)
     return out
 
 
 # --- CSV ------------------------------------------------------------------------------------------
-
-
-COMMENT = "#"
 
 
 class Csv(NamedTuple):

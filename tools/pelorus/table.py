@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
 
@@ -19,6 +20,7 @@ DIGITS_MAX = 19  # 2^63 has as many
 SHOWN_MAX = 40
 WHOLE = re.compile(r"(?<=\d)\.0*$")  # behind a whole number: pandas writes 3.0
 TIME_UNITS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}  # a column t_ms and so on; in ns
+PLAIN_TIME = "t"
 TIME_COLUMNS = [f"t_{unit}" for unit in TIME_UNITS]
 
 
@@ -28,6 +30,9 @@ class Table:
     def __init__(self, path: Path, columns: dict[str, list[str]], first_row: int = 2) -> None:
         self.path = path
         self.first_row = first_row  # of the numbers, counted as messages do: from 1
+        self.rows = np.arange(first_row, first_row + len(next(iter(columns.values()), [])))
+        self.remarks: list[str] = []  # what is to be said of how the file was read
+        self.plain: Mapping[str, tuple[str, str]] = {}  # by column, its name without unit; a unit
         self._columns = columns
         self._factor: dict[str, float] = {}
         self._own: dict[str, str] = {}  # what a renamed column is called in the file
@@ -55,7 +60,7 @@ class Table:
 
     def row(self, k: int) -> str:
         """Where the k-th row of numbers stands in the file."""
-        return f"row {self.first_row + k}"
+        return f"row {self.rows[k]}"
 
     def rename(self, column: str, name: str, factor: float) -> None:
         """Give a column another name; its numbers are `factor` times what stands there."""
@@ -67,13 +72,31 @@ class Table:
         self._factor[name] = factor
         self._own[name] = column
 
+    def leave_out_bad(self, *names: str, each_time_once: bool = True) -> None:
+        """Without the few rows in which a number of these columns is missing or not finite, or
+        which repeat a time; ForeignFileError where they are many.
+        """
+        for name in filter(self.has, (self._time_column(), *names)):
+            wrong = np.array([_is_none(cell) for cell in self._columns[name]], np.bool_)
+            self._leave_out(wrong, f"{self._called(name)} is not finite")
+        if each_time_once and self.has(self._time_column()):
+            again = np.diff(self.times(), prepend=-1) == 0
+            self._leave_out(again, "time does not ascend but repeats")
+
+    def _leave_out(self, wrong: NDArray[np.bool_], what: str) -> None:
+        self.remarks += foreign.left_out(self.path, wrong, self.row, what)
+        if wrong.any():
+            keep = np.nonzero(~wrong)[0].tolist()
+            self.rows = self.rows[~wrong]
+            self._columns = {n: [column[k] for k in keep] for n, column in self._columns.items()}
+
     def miss(self, column: str, name: str) -> None:
         """`column`, which is not here, should have been renamed."""
         self._missed[name] = column
 
     def require(self, *names: str) -> None:
         """Refuse a file without these columns."""
-        lacking = [name for name in names if name not in self._columns]
+        lacking = [name for name in names if not self.has(name)]
         if lacking:
             there = ", ".join(self._called(name) for name in self._columns)
             hint = "; commas should part them" if len(self._columns) == 1 and ";" in there else ""
@@ -107,7 +130,22 @@ class Table:
         return out
 
     def has(self, name: str) -> bool:
-        return name in self._columns
+        """Under its name, or under the plain one without a unit, which is then told."""
+        if name in self._columns:
+            return True
+        short, unit = self.plain.get(name, ("", ""))
+        if short not in self._columns or name in self._missed:
+            return False
+        self._take(short, name, unit)
+        return True
+
+    def _take(self, short: str, name: str, unit: str) -> None:
+        self.rename(short, name, 1.0)
+        if unit:
+            self.remarks.append(
+                f"{self.path}: {short} is taken in {unit}; if it is not: --columns "
+                f"{short}={short}:UNIT"
+            )
 
     def words(self, name: str) -> list[str]:
         """The cells of a column, without the blanks around them."""
@@ -116,9 +154,8 @@ class Table:
 
     def times(self) -> NDArray[np.int64]:
         """ns from the column t_ns, t_us, t_ms or t_s; not yet checked to ascend."""
-        known = [*self._columns, *self._missed]
-        unit = next((name[2:] for name in known if name in TIME_COLUMNS), "s")
-        name = f"t_{unit}"
+        name = self._time_column()
+        unit = name[2:]
         if unit == "ns":
             t_ns = self.integers(name, 2**63 - 1)
         else:
@@ -129,6 +166,18 @@ class Table:
         if not len(t_ns):
             raise ForeignFileError(self.path, "holds column names but no row")
         return t_ns
+
+    def _time_column(self) -> str:
+        """t_ns and such, t_s if there is none; t is one of them: its numbers are s or ns."""
+        known = [*self._columns, *self._missed]
+        found = next((name for name in known if name in TIME_COLUMNS), "")
+        if found or not self.plain or PLAIN_TIME not in self._columns:
+            return found or "t_s"
+        cells = self._columns[PLAIN_TIME]
+        stamps = np.array([float(cell) for cell in cells if foreign.is_number(cell)])
+        unit = "ns" if arrays.are_ns(stamps[np.isfinite(stamps)]) else "s"
+        self._take(PLAIN_TIME, f"t_{unit}", unit)
+        return f"t_{unit}"
 
     def _exact_ns(self, name: str, factor: float) -> NDArray[np.int64]:
         """As decimals: a double would round today's clock to 0.2 microseconds."""
@@ -170,6 +219,12 @@ class Table:
             )
         factor = self._factor.get(name, 1.0)
         return column if factor == 1.0 else column * factor
+
+
+def _is_none(cell: str) -> bool:
+    """Nothing, or a number that is not finite."""
+    bare = cell.strip()
+    return not bare or (foreign.is_number(bare) and not math.isfinite(float(bare)))
 
 
 def _shown(cell: str) -> str:

@@ -1,17 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""Trajectories with times: TUM files (`t x y z qx qy qz qw`), EuRoC's, recordings, KITTI poses."""
+"""Trajectories with times: of text files, recordings, KITTI poses.
+
+A text file has a pose a row: time, position, quaternion. What differs from program to program is
+told by its columns' names, where it has any, else by what their writers do:
+
+TUM, evo, OpenVINS      s, blanks; x y z w; what stands behind (OpenVINS: covariance) is not used
+ORB-SLAM3 (EuRoC)       ns, blanks; x y z w
+EuRoC, VINS-Fusion      ns, commas; w x y z; velocity and biases stand behind
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from decimal import Decimal, DecimalException
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from pelorus import foreign, packed_file, se3, wire
+from pelorus import arrays, foreign, packed_file, se3, wire
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Message, Pose, Stereo, Truth
@@ -20,20 +30,20 @@ from pelorus.motion import Times
 from pelorus.se3 import Poses
 
 POSE_SIZE = 6
-TUM_COLUMNS = 8
+POSE_COLUMNS = 8  # t x y z, a quaternion
 KITTI_COLUMNS = 12
-EUROC_COLUMNS = (8, 17)  # t x y z qw qx qy qz, and velocity and biases behind them
-NS_DIGITS = (16, 19)  # of today's time in ns; seconds have 10 before the point
+EUROC_COLUMNS = 17  # velocity and biases stand behind; w is first, whatever parts them
 QUATERNION_NORM_TOLERANCE = 1e-2
 TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up
 CELL_SHOWN = 40  # characters of a bad one
 
 
 class Trajectory(NamedTuple):
-    """Body poses at ascending times."""
+    """Body poses at ascending times; `remarks` say how a file was read, and what was left out."""
 
     t_ns: Times
     poses: Poses
+    remarks: tuple[str, ...] = ()
 
 
 def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
@@ -53,58 +63,80 @@ def filled(whole: Trajectory, wanted_t_ns: Times) -> Trajectory:
     together = np.concatenate((t_ns, lacking))
     order = np.argsort(together)
     poses = Poses(np.concatenate((whole.poses.R, R)), np.concatenate((whole.poses.p, p)))
-    return Trajectory(together[order], poses.at(order))
+    return Trajectory(together[order], poses.at(order), whole.remarks)
 
 
-def read_tum(path: Path) -> Trajectory:
-    """Times are read as decimals: a double would round today's clock to 0.2 microseconds."""
-    rows = foreign.rows(path)
-    for line, cells in rows:
-        if len(cells) != TUM_COLUMNS:
-            raise ForeignFileError(
-                path,
-                f"has {len(cells)} numbers",
-                at=f"line {line}",
-                due=f"{TUM_COLUMNS} are due: t x y z qx qy qz qw",
-            )
-    t_ns = _times(path, rows)
-    numbers = foreign.numbers(path, [Row(line, cells[1:]) for line, cells in rows])
-    return _checked(path, rows, t_ns, numbers[:, :3], numbers[:, 3:])
-
-
-def read_stamped(path: Path) -> Trajectory:
-    """A TUM file, or EuRoC's: its times are whole ns, and the quaternion begins with w."""
-    rows = foreign.rows(path)
-    cells = rows[0].cells
-    stamp = cells[0].isdecimal() and NS_DIGITS[0] <= len(cells[0]) <= NS_DIGITS[1]
-    if not (stamp and len(cells) in EUROC_COLUMNS):
-        return read_tum(path)
-    numbers = foreign.numbers(path, rows)
-    t_ns = np.array([whole_ns(path, row) for row in rows], np.int64)
-    return _checked(path, rows, t_ns, numbers[:, 1:4], np.roll(numbers[:, 4:8], -1, axis=1))
-
-
-def whole_ns(path: Path, row: Row) -> int:
-    """The time that the row begins with."""
-    cell = row.cells[0]
-    if not cell.isdecimal() or len(cell) > NS_DIGITS[1] or int(cell) >= 2**63:
-        at = f"line {row.line}"
-        raise ForeignFileError(path, f"{cell[:CELL_SHOWN]!r} is no time in ns", at=at)
-    return int(cell)
-
-
-def _checked(path: Path, rows: list[Row], t_ns: Times, p: Floats, q: Floats) -> Trajectory:
-    """Ascending times, and quaternions x y z w."""
-    back = np.nonzero(np.diff(t_ns) <= 0)[0]
-    if len(back):
-        raise ForeignFileError(path, "time does not ascend", at=f"line {rows[back[0] + 1].line}")
-    norms = np.linalg.norm(q, axis=1)
-    wrong = np.nonzero(np.abs(norms - 1) > QUATERNION_NORM_TOLERANCE)[0]
-    if len(wrong):
+def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
+    """A text file of poses; the times' unit, if it is not said, is told by their size and steps."""
+    file = foreign.written(path)
+    sound = foreign.sound(path, file.rows, used=POSE_COLUMNS)
+    columns = sound.numbers.shape[1]
+    if columns < POSE_COLUMNS:
         raise ForeignFileError(
-            path, "the quaternion's norm is not 1", at=f"line {rows[wrong[0]].line}"
+            path,
+            f"has {columns} numbers",
+            at=f"line {sound.rows[0].line}",
+            due=f"{POSE_COLUMNS} are due: t x y z qx qy qz qw",
         )
-    return Trajectory(t_ns, Poses(Rotation.from_quat(q).as_matrix(), p))
+    if in_ns is None:
+        in_ns = arrays.are_ns(sound.numbers[:, 0])
+    by_name = _order_named(path, file.names) if len(file.names) == columns else None
+    usual = "wxyz" if in_ns and (file.by_commas or columns == EUROC_COLUMNS) else "xyzw"
+    p_at, q_at, order = by_name or (1, 4, usual)
+    remarks = list(sound.remarks)
+    if in_ns and by_name is None and not file.by_commas and columns != EUROC_COLUMNS:
+        remarks.append(f"{path}: times in ns, parted by blanks: the quaternion is read as x y z w")
+    if columns > POSE_COLUMNS and columns != EUROC_COLUMNS:
+        remarks.append(f"{path}: {columns - POSE_COLUMNS} numbers behind each pose are not used")
+    t_ns = times_of(path, sound.rows, in_ns)
+    q = sound.numbers[:, q_at : q_at + 4]
+    q = np.roll(q, -1, axis=1) if order == "wxyz" else q
+    once, repeats = ascending(path, sound.rows, t_ns)
+    turned, turnless = _turned(path, sound.rows, q)
+    good = once & turned
+    poses = Poses(Rotation.from_quat(q[good]).as_matrix(), sound.numbers[good, p_at : p_at + 3])
+    return Trajectory(t_ns[good], poses, (*remarks, *repeats, *turnless))
+
+
+def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
+    """Where position and quaternion begin, and its order: q_RS_w [], qx, q_z and such are known."""
+    at: dict[str, int] = {}
+    for k, name in enumerate(names):
+        found = re.fullmatch(r"q\w*?_?([xyzw])", name.partition("[")[0].strip().lower())
+        if found:
+            at.setdefault(found[1], k)
+    if len(at) != 4:
+        return None
+    order = "".join(sorted(at, key=lambda letter: at[letter]))
+    begin = min(at.values())
+    if order not in ("xyzw", "wxyz") or max(at.values()) != begin + 3 or begin not in (1, 4):
+        raise ForeignFileError(
+            path,
+            f"names the columns {', '.join(names[:POSE_COLUMNS])}",
+            due="time, position and quaternion (x y z w, or w first) are due, in that order or "
+            "the quaternion before the position",
+        )
+    return (1, 4, order) if begin == 4 else (5, 1, order)
+
+
+def ascending(
+    path: Path, rows: list[Row], t_ns: Times
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Which rows do not repeat a time, and what to say of the others."""
+    back = np.nonzero(np.diff(t_ns) < 0)[0]
+    if len(back):
+        at = f"line {rows[back[0] + 1].line}"
+        raise ForeignFileError(path, "time does not ascend", at=at)
+    again = np.asarray(np.diff(t_ns, prepend=t_ns[:1] - 1) == 0, np.bool_)
+    what = "time does not ascend but repeats"
+    return ~again, foreign.left_out(path, again, lambda k: f"line {rows[k].line}", what)
+
+
+def _turned(path: Path, rows: list[Row], q: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Which quaternions are rotations, and what to say of the other rows."""
+    wrong = np.asarray(np.abs(np.linalg.norm(q, axis=1) - 1) > QUATERNION_NORM_TOLERANCE, np.bool_)
+    what = "the quaternion's norm is not 1"
+    return ~wrong, foreign.left_out(path, wrong, lambda k: f"line {rows[k].line}", what)
 
 
 def read_truth(path: Path, times: Path | None = None, recording: Path | None = None) -> Trajectory:
@@ -117,16 +149,16 @@ def read_truth(path: Path, times: Path | None = None, recording: Path | None = N
         raise ForeignFileError(path, "there is no such file")
     if is_recording(path):
         return truth_of(path)
-    columns = len(foreign.rows(path)[0].cells)
-    if columns in EUROC_COLUMNS:  # as many as TUM's
-        return read_stamped(path)
+    columns = len(foreign.written(path).rows[0].cells)
     if columns == KITTI_COLUMNS:
         return _kitti(path, times, recording)
-    raise ForeignFileError(
-        path,
-        f"rows of {columns} numbers",
-        due=f"{TUM_COLUMNS} or {EUROC_COLUMNS[1]} (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are due",
-    )
+    if columns < POSE_COLUMNS:
+        raise ForeignFileError(
+            path,
+            f"rows of {columns} numbers",
+            due=f"{POSE_COLUMNS} or more (TUM, EuRoC) or {KITTI_COLUMNS} (KITTI) are due",
+        )
+    return read_stamped(path)
 
 
 def truth_of(path: Path) -> Trajectory:
@@ -208,7 +240,7 @@ def _kitti(path: Path, times: Path | None, recording: Path | None) -> Trajectory
         poses = body_poses(poses, Poses(header.R_CB, header.t_CB_m))
         whose = recording
     elif times is not None:
-        t_ns = _times(times, foreign.rows(times))
+        t_ns = times_of(times, foreign.rows(times))
         whose = times
     else:
         raise ForeignFileError(
@@ -229,19 +261,18 @@ def is_recording(path: Path) -> bool:
     return path.suffix == ".plr" or beginning.startswith(packed_file.MAGIC) or b"\0" in beginning
 
 
-def _times(path: Path, rows: list[Row]) -> Times:
-    return np.array([_nanoseconds(path, line, cells[0]) for line, cells in rows], np.int64)
+def times_of(path: Path, rows: list[Row], in_ns: bool = False) -> Times:
+    """The first cells, s or ns, read as decimals: a double would round today's clock."""
+    return np.array([_nanoseconds(path, line, cells[0], in_ns) for line, cells in rows], np.int64)
 
 
-def _nanoseconds(path: Path, line: int, cell: str) -> int:
-    at = f"line {line}"
+def _nanoseconds(path: Path, line: int, cell: str, in_ns: bool) -> int:
+    at, unit = f"line {line}", "ns" if in_ns else "s"
     try:
-        t_ns = Decimal(cell) * 10**9
+        t_ns = Decimal(cell).scaleb(0 if in_ns else 9)
         in_range = -(2**63) <= t_ns < 2**63 - 1  # half a nanosecond below the end
     except DecimalException:
-        raise ForeignFileError(
-            path, f"{cell[:CELL_SHOWN]!r} is no time in seconds", at=at
-        ) from None
+        raise ForeignFileError(path, f"{cell[:CELL_SHOWN]!r} is no time in {unit}", at=at) from None
     if not in_range:
-        raise ForeignFileError(path, f"time {cell[:CELL_SHOWN]} s is out of range", at=at)
+        raise ForeignFileError(path, f"time {cell[:CELL_SHOWN]} {unit} is out of range", at=at)
     return int(t_ns.to_integral_value())

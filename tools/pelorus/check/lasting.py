@@ -21,5 +21,5 @@ def added_nees(messages: Sequence[Message], off_by: Callable[[Poses], Floats]) -
     found = estimate_in(messages)
     if found is None:
         return 0.0
-    (_, poses), P = found
-    return mean(nees_per_dof(off_by(poses), P)) or 0.0
+    estimate, P = found
+    return mean(nees_per_dof(off_by(estimate.poses), P)) or 0.0

@@ -165,6 +165,8 @@ def csv(
         twist_timing.value_in_header if twist_timing else None,
         readings,
     )
+    for remark in recording.remarks:
+        out.print(escape(remark.text))
     write(recording, findings, target)
 
 

@@ -8,17 +8,25 @@ from dataclasses import asdict
 from pathlib import Path
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
-from pelorus import evaluation, road
+from pelorus import evaluation, misread, road
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.consistency import Figures
-from pelorus.console import out
+from pelorus.console import err, out
 from pelorus.errors import PelorusError
-from pelorus.evaluation import assess, judge, known_in
+from pelorus.evaluation import assess, judge, known_in, match
 from pelorus.frames import Message
 from pelorus.replay import result_of
-from pelorus.trajectory import Trajectory, estimate_in, is_recording, read_truth, read_tum, truth_of
+from pelorus.trajectory import (
+    Trajectory,
+    estimate_in,
+    is_recording,
+    read_stamped,
+    read_truth,
+    truth_of,
+)
 from pelorus.wire import messages_of
 
 POSES_MIN = 3  # three points fix a rigid fit
@@ -87,13 +95,16 @@ def evaluate(
     elif truth is None and road_file is None:
         raise typer.BadParameter("for a TUM file one is due", param_hint="--truth / --road")
     found_poses = estimate_in(messages)
-    estimate = found_poses[0] if found_poses else read_tum(source)
+    estimate = found_poses[0] if found_poses else read_stamped(source)
     found: Figures = {}
+    asked: list[str] = []
     if road_file is not None:
         found |= asdict(road.compare(estimate.poses.p, road.read_road(road_file), skip))
     else:
         reference = truth_of(source) if truth is None else read_truth(truth, times, recording)
         theirs = messages_of(truth) if truth is not None and is_recording(truth) else []
+        for remark in reference.remarks:
+            err.print(escape(remark))
         reference = _until(reference, estimate, first)
         tolerance_ns = round(tolerance * 1e9)
         if messages:
@@ -101,6 +112,7 @@ def evaluate(
         else:
             accuracy = assess(estimate, reference, tolerance_ns=tolerance_ns)
             found |= accuracy.figures if accuracy else {"truth_frames": 0}
+        asked = _doubts(truth, (source, estimate), reference, tolerance_ns, bool(messages))
         _require_something(found, (source, estimate), (truth or source, reference), messages)
     found["path_m"] = evaluation.path_m(estimate.poses)
     found["step_change_m"] = evaluation.step_change(estimate.poses)
@@ -108,6 +120,22 @@ def evaluate(
         typer.echo(json.dumps(found))
     else:
         _show(found)
+    for question in asked:
+        (err if as_json else out).print(f"    -> {escape(question)}")
+
+
+def _doubts(
+    truth: Path | None,
+    mine: tuple[Path, Trajectory],
+    reference: Trajectory,
+    tolerance_ns: int,
+    replayed: bool,
+) -> list[str]:
+    """Whether one of the two may have been misread; what the filter itself says is as it is."""
+    here, there = match(mine[1], reference, tolerance_ns)
+    name = f"the truth in {mine[0]}" if truth is None else str(truth)
+    a = misread.Named(str(mine[0]), mine[1].poses.at(here))
+    return misread.doubts(a, misread.Named(name, reference.poses.at(there)), replayed)
 
 
 def _until(reference: Trajectory, estimate: Trajectory, first_s: float) -> Trajectory:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,7 @@ def _asked(
         files.measured,
         timing,
         fix is Fix.AUTO,
+        tuple(named.remarks),
     )
 
 
@@ -212,7 +214,8 @@ def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> r
 
 
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
-    for remark in found.remarks:
+    found = replace(found, remarks=[*asked.remarks, *found.remarks])
+    for remark in found.told:
         out.print(escape(remark))
     timing = usual if asked.timing is None else asked.timing
     write(*streams.converted(found, timing, asked.fix), target)

@@ -2,8 +2,9 @@
 """How the columns of a user's CSV are called, and their units: `--columns v=speed_kmh,t=stamp_ms`.
 
 NAME=COLUMN gives a column of the file the project's name; the unit is what stands behind its last
-underscore, in brackets, or behind a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file alone. A
-number without a unit is refused, not guessed.
+underscore, in brackets, or behind a colon: v=speed:km/h. FILE.NAME=COLUMN is for one file alone.
+Without a unit it is asked for, not guessed; but a column that is called plainly vx, wz, ax, px or t
+is taken in SI units, and that is said.
 """
 
 from __future__ import annotations
@@ -37,6 +38,13 @@ NAMES: dict[str, tuple[str, Mapping[str, float]]] = {
     **{f"{axis}{side}": (f"{axis}{side}_px", NUMBER) for side in "LR" for axis in "uv"},
 }
 
+# A column with the plain name, vx, is taken in the first unit, and that is said.
+PLAIN = {
+    target: (short, "" if units is NUMBER else next(iter(units)))
+    for short, (target, units) in NAMES.items()
+    if target not in (short, "t") and len(short) > 1
+}
+
 
 @dataclass
 class Column:
@@ -56,16 +64,18 @@ class Columns:
 
     given: list[Column] = field(default_factory=list)
     seen: dict[Path, list[str]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)  # of the files that were read
 
     @classmethod
     def of(cls, words: list[str]) -> Columns:
         """Of the options' words."""
-        return cls([_column(part) for word in words for part in word.split(",") if part.strip()])
+        parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
+        return cls([_column(part) for part in parts if not _says_nothing(part)])
 
     def read(self, path: Path, file: str) -> Table:
         """The file's columns under the project's names; `file` is its option's name."""
         table = Table.read(path)
-        table.hint_of = _hint
+        table.hint_of, table.plain, table.remarks = _hint, PLAIN, self.remarks
         self.seen[path] = table.names
         for one in self.given:
             if one.file not in ("", file):
@@ -86,6 +96,12 @@ class Columns:
                     f"--columns {one.words}: no file has the column {one.column}; there are: "
                     f"{there}"
                 )
+
+
+def _says_nothing(words: str) -> bool:
+    """vx=vx: a column that has the plain name already."""
+    name, _, column = words.partition("=")
+    return name == column and name in NAMES
 
 
 def _hint(lacking: str) -> str:

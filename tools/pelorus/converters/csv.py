@@ -38,7 +38,6 @@ from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory
 
 ID_MAX = 2**32 - 1
-QUATERNION_NORM_TOLERANCE = 1e-2
 VELOCITIES = {
     f"{kind}{axis}": f"{kind}{axis}_{unit}"
     for kind, unit in (("v", "mps"), ("w", "radps"))
@@ -46,6 +45,8 @@ VELOCITIES = {
 }
 RATES = {short: name for short, name in VELOCITIES.items() if short[0] == "w"}
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
+PIXELS = ("uL_px", "vL_px", "uR_px", "vR_px")
+POSITION, QUATERNION = ("px_m", "py_m", "pz_m"), ("qx", "qy", "qz", "qw")
 NAMES_ITS_COLUMNS = 0.5  # of the first row's cells: letters, where others have numbers
 
 
@@ -101,15 +102,11 @@ def read(
     timing = calibrated.header.twist_timing if twist_timing is None else twist_timing
     motion = motion_of(sources.motion, columns, timing)
     frame_t_ns, tracks = _stereo(columns.read(sources.stereo, "stereo"))
-    found = Streams(
-        calibrated,
-        Seen(sources.stereo, frame_t_ns, tracks),
-        motion,
-        None if sources.truth is None else truth_of(sources.truth, columns),
-        _readings(readings, motion, columns),
-    )
+    truth = None if sources.truth is None else truth_of(sources.truth, columns)
+    small = _readings(readings, motion, columns)
     columns.require_used()
-    return found
+    frames = Seen(sources.stereo, frame_t_ns, tracks)
+    return Streams(calibrated, frames, motion, truth, small, columns.remarks)
 
 
 # --- motion ---------------------------------------------------------------------------------------
@@ -123,10 +120,12 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
             return _twists(twists, files.measured, columns)
         speeds = _twists(twists, files.measured - RATES.keys(), columns)
         table = columns.read(files.gyro, "gyro")
+        table.leave_out_bad(*RATES.values())
         rates = table.numbers(*RATES.values())
         return streams.with_gyro(speeds, files.gyro, table.ascending_times(), rates, timing)
     if imu is not None and twists is None:
         table = columns.read(imu, "imu")
+        table.leave_out_bad(*FORCES, *RATES.values())
         a, w = table.numbers(*FORCES), table.numbers(*RATES.values())
         return Readings(imu, Inertial(table.ascending_times(), a, w))
     raise PelorusError(
@@ -159,6 +158,7 @@ def _twists(path: Path, measured: frozenset[str], columns: Columns) -> Twists:
             f"{','.join(there)}. If they are called otherwise: --columns {_example(lacking[0])}",
         )
     table.require(*lacking)
+    table.leave_out_bad(*(name for short, name in VELOCITIES.items() if short in measured))
     numbers = [
         table.numbers(name)[:, 0] if short in measured else np.zeros(table.count)
         for short, name in VELOCITIES.items()
@@ -197,17 +197,18 @@ def _readings(
 
 def _stereo(table: Table) -> tuple[Times, Tracks]:
     path = table.path
+    table.leave_out_bad("id", *PIXELS, each_time_once=False)
     row_t_ns = table.times()
     frame_t_ns, frame = np.unique(row_t_ns, return_inverse=True)
     id = table.integers("id", ID_MAX)
-    pixels = table.numbers("uL_px", "vL_px", "uR_px", "vR_px")
+    pixels = table.numbers(*PIXELS)
     tracks = Tracks.from_rows(len(frame_t_ns), frame.reshape(-1).astype(np.intp), id, pixels)
     tracks.check(path)
     twice = (np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)
     if twice.any():
         k = int(np.nonzero(twice)[0][0])
         t_ns = frame_t_ns[tracks.frame[k]]
-        rows = np.nonzero((row_t_ns == t_ns) & (id == tracks.id[k]))[0] + table.first_row
+        rows = table.rows[(row_t_ns == t_ns) & (id == tracks.id[k])]
         raise ForeignFileError(
             path,
             f"id {tracks.id[k]} stands twice in the frame at {t_ns} ns: "
@@ -223,19 +224,13 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
     if not _names_columns(first.split(",")):
         return trajectory.read_stamped(path)
     table = columns.read(path, "truth")
-    t_ns = table.ascending_times()
-    quaternions = table.numbers("qx", "qy", "qz", "qw")
-    off = np.abs(np.linalg.norm(quaternions, axis=1) - 1)
-    if off.max() > QUATERNION_NORM_TOLERANCE:
-        raise ForeignFileError(
-            path,
-            "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
-            at=table.row(int(off.argmax())),
-        )
-    poses = Poses(
-        Rotation.from_quat(quaternions).as_matrix(), table.numbers("px_m", "py_m", "pz_m")
-    )
-    return Trajectory(t_ns, poses)
+    table.leave_out_bad(*QUATERNION, *POSITION)
+    t_ns, p = table.ascending_times(), table.numbers(*POSITION)
+    q = table.numbers(*QUATERNION)
+    off = np.abs(np.linalg.norm(q, axis=1) - 1) > trajectory.QUATERNION_NORM_TOLERANCE
+    what = "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)"
+    table.remarks += foreign.left_out(path, off, table.row, what)
+    return Trajectory(t_ns[~off], Poses(Rotation.from_quat(q[~off]).as_matrix(), p[~off]))
 
 
 def _names_columns(cells: Sequence[str]) -> bool:

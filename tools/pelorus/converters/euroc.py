@@ -3,7 +3,11 @@
 
 mav0/cam0, cam1    data.csv (time in ns, file), data/ with the pictures, sensor.yaml
 mav0/imu0          data.csv (ns, gyro rad/s, specific force m/s^2), sensor.yaml
-mav0/state_groundtruth_estimate0 or mocap0    data.csv (ns, position, quaternion w x y z)
+mav0/state_groundtruth_estimate0, mocap0, gt0 or vicon0    data.csv (ns, position, quaternion
+                   w x y z), sensor.yaml; the first that is there
+
+Public copies lack some of the pictures that data.csv lists. What is lost is left out, counted and
+told; where it is much, the folder is refused.
 """
 
 from __future__ import annotations
@@ -14,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import foreign, se3, trajectory
+from pelorus import foreign, motion, se3, trajectory
 from pelorus.converters.streams import Asked, Pictures, Readings, Streams
 from pelorus.errors import PelorusError
-from pelorus.foreign import ForeignFileError, Row
+from pelorus.foreign import ForeignFileError
 from pelorus.inertial import Inertial
 from pelorus.motion import Times
 from pelorus.named import Named
@@ -32,7 +36,8 @@ from pelorus.trajectory import Trajectory
 
 CAMERAS = ("cam0", "cam1")
 IMU = "imu0"
-TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0")
+TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0", "vicon0")
+POSITIONS = "leica0"  # of a prism, without attitude
 IMU_COLUMNS = 7
 NS_MAX = 2**63
 
@@ -47,12 +52,10 @@ def read(folder: Path, asked: Asked) -> Streams:
         calibrated = _on_imu(calibrated, body)
     rig = calibrated.rig
     ordered = tuple(reversed(CAMERAS)) if rig is not None and rig.swapped else CAMERAS
-    pictures, alone = _pictures(top, ordered)
-    motion = asked.motion or Readings(top / IMU / "data.csv", _imu(top / IMU / "data.csv"))
-    remarks = []
-    if alone:
-        remarks.append(f"{len(alone)} pictures have no partner and are left out, {alone[0]} first")
-    truth = asked.truth or _truth(top, body)
+    remarks: list[str] = []
+    pictures = _pictures(top, ordered, remarks)
+    motion = asked.motion or Readings(top / IMU / "data.csv", _imu(top / IMU / "data.csv", remarks))
+    truth = asked.truth or _truth(top, body, remarks)
     return Streams(calibrated, pictures, motion, truth, remarks=remarks)
 
 
@@ -109,81 +112,103 @@ def _on_imu(calibrated: Calibrated, body_of_imu: Poses) -> Calibrated:
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def _pictures(top: Path, ordered: Sequence[str]) -> tuple[Pictures, list[str]]:
-    """Pairs of one time, and the names of pictures that have no partner."""
-    left, right = (_listed(top / name) for name in ordered)
-    both = sorted(left.keys() & right.keys())
-    alone = sorted(left.keys() ^ right.keys())
+def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures:
+    """Pairs that were taken together."""
     where = top / ordered[0], top / ordered[1]
-    if images.too_many_alone(len(both), len(alone)):
+    (left, lost_left), (right, lost_right) = (_listed(camera, remarks) for camera in where)
+    of_left, of_right = (np.array(sorted(side), np.int64) for side in (left, right))
+    both = images.together(of_left, of_right, images.APART_NS)
+    t_ns, partner_ns = of_left[both[:, 0]], of_right[both[:, 1]]
+    alone, lost = len(left) + len(right) - 2 * len(both), [*lost_left, *lost_right]
+    if images.too_many_alone(len(both), max(alone, len(lost))):
         raise PelorusError(
-            f"{where[0]} and {where[1]}: {len(both)} pairs have equal times, {len(alone)} pictures "
-            f"are alone ({alone[0]} ns first); the cameras' times should be the same"
+            f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
+            f"{images.APART_NS * 1e-6:g} ms; {alone} pictures have no partner"
+            + (f", {len(lost)} are not there, {lost[0]} first" if lost else "")
+            + (_apart(of_left, of_right) if alone > len(lost) else "")
         )
     if len(both) < images.PAIRS_MIN:
         raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are due")
-    pairs = [Pair(left[t], right[t]) for t in both]
-    t_ns = np.array(both, np.int64)
-    return Pictures(where, t_ns, lambda: images.in_order(pairs)), [str(t) for t in alone]
+    if alone:
+        remarks.append(f"{alone} pictures have no partner and are left out")
+    if (t_ns != partner_ns).any():
+        apart_ms = float(np.abs(t_ns - partner_ns).max()) * 1e-6
+        remarks.append(
+            f"the two cameras' times differ by up to {apart_ms:.3g} ms: {ordered[0]}'s are taken"
+        )
+    times = zip(t_ns.tolist(), partner_ns.tolist(), strict=True)
+    pairs = [Pair(left[mine], right[theirs]) for mine, theirs in times]
+    return Pictures(where, t_ns, lambda: images.in_order(pairs))
 
 
-def _listed(camera: Path) -> dict[int, Path]:
-    """By time: of data.csv where there is one, else the names in data/."""
+def _apart(left_ns: Times, right_ns: Times) -> str:
+    """Of cameras that were not triggered together."""
+    apart_ns = np.abs(right_ns[motion.nearest(right_ns, left_ns)] - left_ns)
+    return (
+        f"; the nearest times are {np.median(apart_ns) * 1e-6:.3g} ms apart in the median, "
+        f"{apart_ns.max() * 1e-6:.3g} ms at most: cameras that are triggered together are due"
+    )
+
+
+def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Path]]:
+    """By time the pictures that are there, of data.csv where there is one, else the names in data/;
+    and those that are not there.
+    """
     listing, data = camera / "data.csv", camera / "data"
+    there = images.pictures(data)
     if not listing.is_file():
-        found = images.pictures(data)
-        named = [name for name in found if not (name.isdecimal() and int(name) < NS_MAX)]
+        named = [name for name in there if not (name.isdecimal() and int(name) < NS_MAX)]
         if named:
             raise PelorusError(
                 f"{data}: the name {named[0]} is no time in ns, and there is no data.csv beside it"
             )
-        return {int(name): path for name, path in found.items()}
-    listed: dict[int, Path] = {}
+        return {int(name): path for name, path in there.items()}, []
+    named_there: dict[int, Path] = {}
+    lost: list[Path] = []
     for line, cells in foreign.rows(listing):
-        at = f"line {line}"
         if len(cells) != 2 or not cells[0].isdecimal() or int(cells[0][:20]) >= NS_MAX:
             raise ForeignFileError(
                 listing,
                 f"holds {' '.join(cells)[:60]!r}",
-                at=at,
+                at=f"line {line}",
                 due="a time in ns, a file are due",
             )
         path = data / cells[1]
-        if not path.is_file():
-            raise ForeignFileError(listing, f"names {path}, which is not there", at=at)
-        listed[int(cells[0])] = path
-    return listed
+        if path.stem in there:  # another kind of file is the same picture
+            named_there[int(cells[0])] = there.pop(path.stem)
+        elif int(cells[0]) not in named_there:  # a line may stand twice
+            lost.append(path)
+    if lost:
+        remarks.append(f"{listing}: {len(lost)} pictures are not there, {lost[0].name} first")
+    if there:
+        first = next(iter(there.values()))
+        remarks.append(f"{listing}: does not list {len(there)} pictures, {first.name} first")
+    return named_there, lost
 
 
 # --- IMU and truth --------------------------------------------------------------------------------
 
 
-def _imu(path: Path) -> Inertial:
+def _imu(path: Path, remarks: list[str]) -> Inertial:
     if not path.is_file():
         raise PelorusError(
             f"{path}: there is no such file; it, or --twists FILE, or --imu FILE is due"
         )
-    rows = foreign.rows(path)
-    numbers = foreign.numbers(path, rows, IMU_COLUMNS)
-    t_ns = _times(path, rows)
-    return Inertial(t_ns, numbers[:, 4:7], numbers[:, 1:4])
+    sound = foreign.sound(path, foreign.rows(path), IMU_COLUMNS)
+    t_ns = trajectory.times_of(path, sound.rows, in_ns=True)
+    good, more = trajectory.ascending(path, sound.rows, t_ns)
+    remarks += [*sound.remarks, *more]
+    return Inertial(t_ns[good], sound.numbers[good, 4:7], sound.numbers[good, 1:4])
 
 
-def _times(path: Path, rows: list[Row]) -> Times:
-    t_ns = np.array([trajectory.whole_ns(path, row) for row in rows], np.int64)
-    back = np.nonzero(np.diff(t_ns) <= 0)[0]
-    if len(back):
-        at = f"line {rows[int(back[0]) + 1].line}"
-        raise ForeignFileError(path, "time does not ascend", at=at)
-    return t_ns
-
-
-def _truth(top: Path, body_of_imu: Poses | None) -> Trajectory | None:
+def _truth(top: Path, body_of_imu: Poses | None, remarks: list[str]) -> Trajectory | None:
     """The IMU's poses: those of the sensor, times where the IMU sits in it."""
     folder = next((top / name for name in TRUTHS if (top / name / "data.csv").is_file()), None)
     if folder is None:
+        if (top / POSITIONS / "data.csv").is_file():
+            remarks.append(f"{top / POSITIONS}: positions without attitude: not read as the truth")
         return None
-    t_ns, poses = trajectory.read_stamped(folder / "data.csv")
+    found = trajectory.read_stamped(folder / "data.csv", in_ns=True)
     T_BS, T_BI = _of_body(folder), body_of_imu
     T_SI = se3.compose(se3.inverse(T_BS or se3.IDENTITY), T_BI or se3.IDENTITY)
-    return Trajectory(t_ns, se3.compose(poses, T_SI))
+    return found._replace(poses=se3.compose(found.poses, T_SI))

@@ -38,6 +38,7 @@ def columns_of(sensor: SmallSensor) -> str:
 def read(table: Table, sensor: SmallSensor) -> list[Reading]:
     """The file's rows."""
     path = table.path
+    table.leave_out_bad(*(name for name in _known(sensor) if table.has(name)))
     t_ns = table.ascending_times()
     value, sigma = np.zeros((2, len(t_ns), 3))
     measured = ""
@@ -59,6 +60,13 @@ def read(table: Table, sensor: SmallSensor) -> list[Reading]:
     axes = sensor.axes(measured)
     rows = zip(t_ns.tolist(), value, sigma, arm, strict=True)
     return [Reading(t, sensor.number, axes, *numbers) for t, *numbers in rows]
+
+
+def _known(sensor: SmallSensor) -> list[str]:
+    """All columns of numbers that such a file may have."""
+    shared = [_shared(sensor, letter) for letter in sensor.letters]
+    own = list(sensor.columns.values())
+    return list(dict.fromkeys((*own, *shared, *(f"sigma_{name}" for name in own), *ARM)))
 
 
 def _wanted(sensor: SmallSensor) -> list[str]:

@@ -22,7 +22,7 @@ from pelorus.faults import stale
 from pelorus.faults.finding import Finding
 from pelorus.faults.mend import held_to_fit, mend
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Noise, Process, Reading, Text, TwistTiming
+from pelorus.frames import TEXT_BYTES_MAX, Header, Noise, Process, Reading, Text, TwistTiming
 from pelorus.inertial import NO_READINGS, Inertial
 from pelorus.layout import Floats
 from pelorus.motion import Times
@@ -81,6 +81,7 @@ class Asked:
     measured: frozenset[str] = Twists.measured  # of the source's own twists
     timing: TwistTiming | None = None
     fix: bool = True
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,11 @@ class Streams:
     small: list[Reading] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
+    @property
+    def told(self) -> list[str]:
+        """What its user is to be told of how the files were read."""
+        return [*self.remarks, *(self.truth.remarks if self.truth else ())]
+
 
 def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     """`settings` are those of the tracker."""
@@ -129,7 +135,8 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     made = _with_motion(header, streams, t_ns, tracks)
     if streams.truth is None:
         return made
-    return made.with_truth(*_at_frames(streams.truth, t_ns))
+    truth = _at_frames(streams.truth, t_ns)
+    return made.with_truth(truth.t_ns, truth.poses)
 
 
 def converted(
@@ -160,7 +167,7 @@ def converted(
 
 
 def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) -> Recording:
-    remarks = [Text(words) for words in streams.remarks]
+    remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.told]
     motion = streams.motion
     if isinstance(motion, Twists):
         header = replace(header, noise=_with_blind_axes(header.noise, motion.measured))

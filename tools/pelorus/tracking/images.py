@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import ImageFile
 
-from pelorus import arrays, foreign
+from pelorus import arrays, foreign, motion
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.motion import Times
@@ -21,6 +21,7 @@ Gray = NDArray[np.uint8]
 SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff")
 PAIRS_MIN = 3  # an id is admitted after as many frames
 ALONE_MAX = 0.1  # of the pictures may lack their partner, as in EuRoC V2_03; more is another fault
+APART_NS = 2_000_000  # pictures of cameras that are triggered together
 SIDE_MIN_PX = 64  # less shows no track worth having
 IMAGE_BYTES_MAX = 1 << 28
 NAMES_SHOWN = 3
@@ -63,7 +64,7 @@ def _in_order(names: dict[str, Path]) -> list[str]:
 def pictures(folder: Path) -> dict[str, Path]:
     """By name, without its ending."""
     try:
-        files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
+        files = sorted(p for p in folder.iterdir() if _is_picture(p))
     except OSError as error:
         raise PelorusError(
             f"{folder}: cannot be read as a folder: {error.strerror}; a folder of pictures "
@@ -79,6 +80,20 @@ def pictures(folder: Path) -> dict[str, Path]:
             )
         found[path.stem] = path
     return found
+
+
+def _is_picture(path: Path) -> bool:
+    """Not what a desktop leaves beside one: ._0001.png."""
+    return path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
+
+
+def together(left_ns: Times, right_ns: Times, apart_ns: int) -> NDArray[np.intp]:
+    """(n, 2) indices of pictures that are each other's nearest in time, and near enough."""
+    left = np.arange(len(left_ns))
+    right = motion.nearest(right_ns, left_ns)
+    mutual = motion.nearest(left_ns, right_ns)[right] == left
+    near = np.abs(right_ns[right] - left_ns) <= apart_ns
+    return np.asarray(np.stack((left, right), axis=-1)[mutual & near], np.intp)
 
 
 def too_many_alone(pairs: int, alone: int) -> bool:

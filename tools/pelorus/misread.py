@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Whether a trajectory fits another one if its file is read otherwise: its unit, its quaternion's
+order, the direction of its transforms, another frame on the same body.
+
+Each is a way to write the same poses down, and none of it shows in one file alone: a quaternion
+whose numbers are taken in another order is a rotation too. Two trajectories of one drive tell it.
+Nothing is changed; it is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pelorus import se3
+from pelorus.consistency import rms
+from pelorus.layout import Floats
+from pelorus.se3 import Poses
+
+POSES_MIN = 3
+SCALE_MIN = 1.5  # a unit or a monocular camera's; odometry is off by some per cent
+UNITS = {1000.0: "mm", 100.0: "cm", 1 / 0.3048: "feet"}
+UNIT_TOLERANCE = 0.05
+BETTER = 2.0  # by so much smaller an error has to become
+UNEXPLAINED_MAX = 0.01  # of the positions' variance, where they fit
+
+
+class Named(NamedTuple):
+    """Poses, and what their file is called."""
+
+    name: str
+    poses: Poses
+
+
+class Fit(NamedTuple):
+    """How well b's positions, moved, turned and scaled, are a's."""
+
+    scale: float
+    scaled_m: float  # RMS distance with the scale
+    plain_m: float  # and without
+    unexplained: float  # share of a's variance, with the scale
+
+
+def doubts(a: Named, b: Named, fixed: bool) -> list[str]:
+    """What is to be asked of poses that were taken at the same times; `fixed`: a is as it is."""
+    if len(a.poses.p) < POSES_MIN:
+        return []
+    found = fit(a.poses.p, b.poses.p)
+    if found is None:
+        return []
+    if found.unexplained > UNEXPLAINED_MAX:
+        return _inverse(a, b)
+    return [*_scale(found, a, b), *_turned(found, a, b, fixed)]
+
+
+def fit(a: Floats, b: Floats) -> Fit | None:
+    """a = s R b + t by least squares (Umeyama 1991); None where one of them does not move."""
+    from_a, from_b = a - a.mean(axis=0), b - b.mean(axis=0)
+    moved_a, moved_b = rms(from_a), rms(from_b)
+    if not moved_a or not moved_b:
+        return None
+    turned = from_b @ se3.nearest_rotation(from_a.T @ from_b).T
+    scale = float((turned * from_a).sum() / (turned * turned).sum())
+    scaled_m, plain_m = rms(from_a - scale * turned), rms(from_a - turned)
+    return Fit(scale, scaled_m, plain_m, (scaled_m / moved_a) ** 2)
+
+
+def _scale(found: Fit, a: Named, b: Named) -> list[str]:
+    larger = max(found.scale, 1 / found.scale)
+    if larger < SCALE_MIN or found.plain_m < BETTER * found.scaled_m:
+        return []
+    large, small = (a, b) if found.scale > 1 else (b, a)
+    unit = next((u for s, u in UNITS.items() if abs(larger / s - 1) < UNIT_TOLERANCE), "")
+    asked = f"is it in {unit}?" if unit else "is one of them of a camera that knows no scale?"
+    return [
+        f"a scale of {larger:.4g} fits: {large.name} is by so much larger than {small.name}: "
+        f"{asked} With it positions fit to {found.scaled_m:.2g} m, without it to "
+        f"{found.plain_m:.2g} m"
+    ]
+
+
+# --- rotations ------------------------------------------------------------------------------------
+
+
+def _turned(found: Fit, a: Named, b: Named, fixed: bool) -> list[str]:
+    as_read = _apart_deg(a.poses.R, b.poses.R)
+    sides = [(a, b)] if fixed else [(a, b), (b, a)]
+    best_deg, best = as_read / BETTER, ""
+    for one, other in sides:
+        for words, R in _readings(other.poses.R):
+            apart_deg = _apart_deg(one.poses.R, R)
+            if apart_deg < best_deg:
+                best_deg, best = apart_deg, words.format(other.name)
+    if not best:
+        apart_deg, words = _other_frame(a, b)
+        if apart_deg >= best_deg:
+            return []
+        best_deg, best = apart_deg, words
+    return [
+        f"positions fit to {found.scaled_m:.2f} m, rotations do not ({as_read:.1f} deg RMS): "
+        f"{best} Read so, rotations fit to {best_deg:.2g} deg"
+    ]
+
+
+def _readings(R: Floats) -> Iterator[tuple[str, Floats]]:
+    q = Rotation.from_matrix(R).as_quat()
+    for words, by in (
+        ("is the quaternion of {} w first?", -1),
+        ("is the quaternion of {} w last?", 1),
+    ):
+        rolled = Rotation.from_quat(np.roll(q, by, axis=1)).as_matrix()
+        yield words, rolled
+    yield "are the rotations of {} world to body? Body to world is due.", np.swapaxes(R, 1, 2)
+
+
+def _steps(R: Floats) -> Floats:
+    """Rotation vectors from the first pose to each, (n, 3): no world's axes are in them."""
+    return np.asarray(Rotation.from_matrix(R[0].T @ R).as_rotvec())
+
+
+def _apart_deg(R_a: Floats, R_b: Floats) -> float:
+    between = np.swapaxes(R_a[0].T @ R_a, 1, 2) @ (R_b[0].T @ R_b)
+    return float(np.degrees(rms(Rotation.from_matrix(between).as_rotvec())))
+
+
+def _other_frame(a: Named, b: Named) -> tuple[float, str]:
+    """Poses of another frame that is fixed to the same body: one rotation turns its axes."""
+    B = se3.nearest_rotation(_steps(a.poses.R).T @ _steps(b.poses.R))  # a's vectors from b's
+    angle_deg = float(np.degrees(Rotation.from_matrix(B).magnitude()))
+    return _apart_deg(a.poses.R, b.poses.R @ B.T), (
+        f"are the poses of {b.name} those of another frame, such as the camera's? Its axes are "
+        f"turned by {angle_deg:.0f} deg."
+    )
+
+
+def _inverse(a: Named, b: Named) -> list[str]:
+    """Where the positions do not fit: those of the inverse transforms."""
+    found = fit(a.poses.p, se3.inverse(b.poses).p)
+    if found is None or found.unexplained > UNEXPLAINED_MAX:
+        return []
+    return [
+        f"positions do not fit, but those of the inverse transforms do, to {found.scaled_m:.2g} m: "
+        f"are the poses of {b.name} world to body? Body to world is due"
+    ]
