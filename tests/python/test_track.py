@@ -280,7 +280,10 @@ def test_calls_that_make_no_sense_are_refused_with_what_would_be_right(
     for words, said in (
         ((left, right, out), "left: the name 0 is no time in ns: when were the pictures taken?"),
         ((left, left, out, *rate), "is given as the left and as the right folder; two are due"),
-        ((right, left, out, *rate), "further left; a rectified pair is due (are left and right"),
+        (
+            (right, left, out, *rate),
+            "further left, as a rectified pair would; are left and right sw",
+        ),
         ((tmp_path / "nix", right, out, *rate), "nix: cannot be read as a folder: No such"),
         ((folder, right, out, *rate), "out.folder: holds no picture; .png"),
         ((left, right, tmp_path / "no" / "o.csv", *rate), "cannot be written: there is no folder"),

@@ -17,6 +17,7 @@ from pelorus.tracking import matching, patches
 from pelorus.tracking.images import PAIRS_MIN, Gray
 from pelorus.tracking.matching import Mask, Points
 from pelorus.tracking.patches import Patches
+from pelorus.tracking.rectified import Evidence
 from pelorus.tracking.settings import Settings
 from pelorus.tracks import Tracks
 
@@ -24,7 +25,6 @@ ADMITTED_AFTER = PAIRS_MIN  # frames
 LOOP_PX = 1.0  # flow in the right picture and the match from the left one must meet
 MOVED_PX = 1.5  # by the patch of its birth a point may be so far from where the flow led
 LIKENESS_MIN = 0.8  # to the patch of its birth
-MATCHED_MIN = 0.1  # of the new corners, over the drive
 
 
 class Live(NamedTuple):
@@ -48,8 +48,6 @@ class Tracker:
 
     settings: Settings = field(default_factory=Settings)
     frames: list[Live] = field(default_factory=list)
-    corners: int = 0  # new ones, so far
-    matched: int = 0  # of them found on the right
     _before: tuple[Gray, Gray] | None = None
     _next_id: int = 0
     _births: Patches | None = None  # of the last frame's tracks
@@ -97,8 +95,6 @@ class Tracker:
     def _filled(self, live: Live, left: Gray, right: Gray) -> Live:
         fresh = matching.new_corners(left, live.left, self.settings)
         on_right, good = matching.match(left, right, fresh, self.settings)
-        self.corners += len(fresh)
-        self.matched += int(good.sum())
         id = np.arange(self._next_id, self._next_id + int(good.sum()), dtype=np.int64)
         self._next_id += len(id)
         return Live(
@@ -132,16 +128,11 @@ def track(
 ) -> Tracks:
     """All of a drive; PelorusError where there is nothing to follow."""
     settings.check()
-    tracker = Tracker(settings)
+    tracker, evidence = Tracker(settings), Evidence(settings)
     for left, right in images:
         tracker.add(left, right)
-    if tracker.matched < MATCHED_MIN * tracker.corners:
-        raise PelorusError(
-            f"{where[1]}: shows {tracker.matched} of {tracker.corners} corners of {where[0]} in "
-            "the same row, further left; a rectified pair is due (are left and right swapped, is "
-            "the transform between the cameras (T_cn_cnm1; R, T) the inverse, are they rectified, "
-            "is the largest disparity too small?)"
-        )
+        evidence.add(left, right)
+    evidence.require_rectified(where)
     tracks = tracker.tracks()
     if not len(tracks):
         raise PelorusError(
