@@ -218,6 +218,24 @@ def test_a_picture_of_16_bits_or_in_colour_is_the_same_in_grey(tmp_path: Path) -
         assert np.array_equal(images.gray(path), grey), name
 
 
+@pytest.mark.parametrize("bits", [10, 12])
+def test_pictures_of_16_bits_that_use_fewer_show_the_same_points(
+    frames: Frames, tmp_path: Path, pelorus: Run, bits: int
+) -> None:
+    def found(shift: int) -> Table:
+        folder = tmp_path / str(shift)
+        folder.mkdir()
+        left, right = write(folder, frames)
+        for path in (*left.iterdir(), *right.iterdir()):
+            cv2.imwrite(str(path), images.gray(path).astype(np.uint16) << shift)
+        said = pelorus("track", left, right, folder / "out.csv", "--rate", 10).out
+        assert (f"pictures of 16 bits hold {8 + shift} (the brightest" in said) == (shift < 8)
+        return Table.read(folder / "out.csv")
+
+    names = "uL_px", "vL_px", "uR_px", "vR_px"
+    assert np.array_equal(found(bits - 8).numbers(*names), found(8).numbers(*names))
+
+
 def _resize(path: Path) -> None:
     cv2.imwrite(str(path), np.zeros((100, 100), np.uint8))
 

@@ -86,7 +86,11 @@ def track(
     pairs = images.pairs(left, right)
     t_ns = images.times(pairs, times, rate)
     shown: dict[int, Gray] = {}
-    tracks = track_all(_read(pairs, shown), (left, right), settings)
+    remarks: list[str] = []
+    bits = images.bits_of(pairs, remarks)
+    for remark in remarks:
+        out.print(escape(remark))
+    tracks = track_all(_read(pairs, bits, shown), (left, right), settings)
     files = {target: output.csv_text(t_ns, tracks).encode()}
     if sheet_file is not None:
         files[sheet_file] = sheet.sheet(shown, [pair.left.name for pair in pairs], tracks)
@@ -103,10 +107,12 @@ def _require_places(target: Path, sheet_file: Path | None) -> None:
         raise PelorusError(f"{target}: is given for the tracks and for the sheet; two are due")
 
 
-def _read(pairs: list[Pair], shown: dict[int, Gray]) -> Iterator[tuple[Gray, Gray]]:
+def _read(pairs: list[Pair], bits: int, shown: dict[int, Gray]) -> Iterator[tuple[Gray, Gray]]:
     """Pair by pair; the left pictures of the sheet stay in `shown`."""
     wanted = set(sheet.chosen(len(pairs)))
-    for k, (left, right) in enumerate(images.in_order(progress(pairs, "tracking", len(pairs)))):
+    for k, (left, right) in enumerate(
+        images.in_order(progress(pairs, "tracking", len(pairs)), bits)
+    ):
         if k in wanted:
             shown[k] = left
         yield left, right

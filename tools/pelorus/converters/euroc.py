@@ -138,7 +138,8 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
         )
     times = zip(t_ns.tolist(), partner_ns.tolist(), strict=True)
     pairs = [Pair(left[mine], right[theirs]) for mine, theirs in times]
-    return Pictures(where, t_ns, lambda: images.in_order(pairs))
+    bits = images.bits_of(pairs, remarks)
+    return Pictures(where, t_ns, lambda: images.in_order(pairs, bits))
 
 
 def _apart(left_ns: Times, right_ns: Times) -> str:
