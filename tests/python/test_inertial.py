@@ -85,6 +85,7 @@ def batches(t_ns: Times, cuts: Times, most: int = IMU_READINGS_MAX) -> list[list
     assert np.array_equal(np.concatenate([m.a_B_mps2 for _, m in found]), rows)
     assert np.array_equal(np.concatenate([m.w_B_radps for _, m in found]), -rows)
     assert all(t == end for (t, _), end in zip(found, ends(t_ns, found), strict=True))
+    assert all(message.pack() for _, message in found)
     return [m.times_ns for _, m in found]
 
 
@@ -108,5 +109,15 @@ def test_a_batch_keeps_every_stamp_to_a_ten_millionth_of_a_second() -> None:
     told = [t for times in batches(t_ns, np.empty(0, np.int64)) for t in times]
     assert np.abs(np.array(told) - t_ns).max() <= 100
     assert len(told) == 400
-    even = np.arange(400) * 2_500_057 + chance.integers(-1, 2, 400)
+    even = 9 + np.arange(400) * 2_500_057 + chance.integers(-1, 2, 400)
     assert len(batches(even, np.empty(0, np.int64))) == 20, "stamps that are rounded do no harm"
+
+
+@pytest.mark.parametrize("pause_s", [4.28, 4.31, 9.0, 86_400.0])
+def test_readings_beyond_a_pause_of_any_length_can_be_written(pause_s: float) -> None:
+    """The period of a batch is an u32 of ns, 4.29 s at most."""
+    for before in range(1, 20):
+        t_ns = np.arange(30) * 10_000_000
+        t_ns[before:] += round(pause_s * 1e9)
+        told = [t for times in batches(t_ns, np.array([105_000_000])) for t in times]
+        assert told == t_ns.tolist()

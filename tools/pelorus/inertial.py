@@ -25,6 +25,7 @@ from pelorus.motion import Times
 GRAVITY_MPS2 = 9.81
 SERIES_TERMS = 6  # exact to rounding for up to 0.3 rad a step
 STAMP_TOLERANCE_NS = 100  # a batch has one period: its stamps may be off by so much
+PERIOD_MAX_NS = 2**32 - 1  # of a batch, an u32; readings beyond a longer pause begin a new one
 
 
 class Inertial(NamedTuple):
@@ -156,8 +157,9 @@ def _batch_end(t_ns: Times, side: NDArray[np.intp], begin: int, most: int) -> in
     end = begin + int(np.searchsorted(side[begin:most], side[begin], side="right"))
     while end - begin > 1:
         own = t_ns[begin:end]
-        off = own - own[0] - _period(own) * np.arange(end - begin)
-        if np.abs(off).max() <= STAMP_TOLERANCE_NS:
+        period = _period(own)
+        off = own - own[0] - period * np.arange(end - begin)
+        if period <= PERIOD_MAX_NS and np.abs(off).max() <= STAMP_TOLERANCE_NS:
             break
         end = begin + max((end - begin) // 2, 1)
     return end
