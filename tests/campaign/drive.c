@@ -37,7 +37,7 @@ static unsigned drive_frames(const scenario *s, unsigned parked_frames) {
     return s->is_long ? parked_frames : s->before + s->during + s->after;
 }
 
-static void begin(run *r, uint64_t seed, const drive_options *options) {
+static void begin(run *r, uint64_t seed, uint8_t scene, const drive_options *options) {
     const scenario *s = r->s;
     plr_config config;
     plr_calibration calibration;
@@ -47,9 +47,7 @@ static void begin(run *r, uint64_t seed, const drive_options *options) {
     each_axis(config.gyro_sigma, s->gyro_radps);
     config.bias = s->bias;
     config.track_drift_px = s->told_drift;
-    const bool may_move =
-        options->policy == POLICY_OWN ? scenario_may_move(s) : options->policy == POLICY_MAY_MOVE;
-    config.scene = may_move ? PLR_SCENE_MAY_MOVE : PLR_SCENE_STANDS;
+    config.scene = scene;
     if (s->mishap != BASELINE && s->mishap != FOCAL &&
         s->mishap != ASKEW) /* the camera is exact, and P alone is judged */
         exact_camera(&config);
@@ -197,13 +195,14 @@ static void finish(run *r) {
     o->done = true;
 }
 
-void drive(const scenario *s, uint64_t seed, const drive_options *options, outcome *result) {
+void drive(const scenario *s, uint64_t seed, uint8_t scene, const drive_options *options,
+           outcome *result) {
     run r;
     memset(result, 0, sizeof *result);
     memset(&r, 0, sizeof r);
     r.s = s;
     r.result = result;
-    begin(&r, seed, options);
+    begin(&r, seed, scene, options);
     for (r.k = 0; r.k < r.frames; r.k++) {
         const bool event = phase_of(&r, r.k) == DURING;
         if (r.k == r.before && r.during > 0)

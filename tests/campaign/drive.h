@@ -42,15 +42,13 @@ typedef struct outcome {
     double later_sigmas, later_error_m, later_own_m, fresh_own_m;
 } outcome;
 
-/* The setting `scene` of a drive. */
-typedef enum policy { POLICY_OWN, POLICY_STANDS, POLICY_MAY_MOVE } policy;
-
 typedef struct drive_options {
     unsigned parked_frames; /* replaces the length of a scenario that is_long */
     uint64_t left_out;      /* rules of the supervisor that are left out */
-    policy policy;          /* POLICY_OWN: what the scenario is judged by */
 } drive_options;
 
-void drive(const scenario *s, uint64_t seed, const drive_options *options, outcome *result);
+/* `scene` is the setting: plr_scene_policy. */
+void drive(const scenario *s, uint64_t seed, uint8_t scene, const drive_options *options,
+           outcome *result);
 
 #endif

@@ -15,7 +15,7 @@ typedef struct options {
     const char *wanted;  /* names with commas; NULL: all */
     const char *changes; /* to what was chosen */
     uint64_t left_out;   /* rules of the supervisor: plr_filter_leave_out */
-    policy policy;
+    const char *policy;
     unsigned long seeds, first_seed, jobs, parked_frames;
     bool list, gate;
 } options;
@@ -28,13 +28,15 @@ static void usage(FILE *out) {
           "  --list                what there is\n"
           "  --limits              the supervisor's thresholds\n"
           "  --without NAME,...    leaves out these\n"
-          "  --policy NAME         stands or may-move, instead of what each scenario is judged by\n"
+          "  --policy NAME         own: only what each scenario is judged by; stands or may-move: "
+          "by\n"
+          "                        that instead (both: the other one's rows stand below)\n"
           "  --scenario NAME,...   only these; a name that ends with * means all that begin so\n"
           "  --seeds N             drives of each scenario (30)\n"
           "  --first-seed N        (1)\n"
           "  --jobs N              processes (as many as processors)\n"
           "  --parked-frames N     length of the parked scenarios (20000)\n"
-          "  --short               4 seeds, 3000 parked frames\n"
+          "  --short               4 seeds, 3000 parked frames, --policy own\n"
           "  --long                300 seeds, 100000 parked frames\n"
           "  --set NAME=VALUE,...  change the scenarios; the limits are not meant for that\n"
           "  --gate                exit status 1 if a limit is not met\n"
@@ -91,16 +93,17 @@ static uint64_t limits_named(const char *names) {
     return found;
 }
 
-static policy policy_named(const char *name) {
-    if (strcmp(name, "stands") == 0)
-        return POLICY_STANDS;
-    if (strcmp(name, "may-move") != 0)
-        refuse("--policy", name);
-    return POLICY_MAY_MOVE;
+static const char *policy_named(const char *name) {
+    static const char *const names[] = {"both", "own", "stands", "may-move"};
+    for (unsigned i = 0; i < sizeof names / sizeof names[0]; i++)
+        if (strcmp(name, names[i]) == 0)
+            return names[i];
+    refuse("--policy", name);
+    return NULL;
 }
 
 static options parse(int argc, char **argv) {
-    options o = {NULL, "", 0, POLICY_OWN, SEEDS, 1, pool_processors(), PARKED, false, false};
+    options o = {NULL, "", 0, "both", SEEDS, 1, pool_processors(), PARKED, false, false};
     for (int i = 1; i < argc; i++) {
         const char *option = argv[i], *value = i + 1 < argc ? argv[i + 1] : NULL;
         if (strcmp(option, "--list") == 0) {
@@ -116,6 +119,7 @@ static options parse(int argc, char **argv) {
             o.gate = true;
         } else if (strcmp(option, "--short") == 0) {
             o.seeds = SHORT_SEEDS;
+            o.policy = "own";
             o.parked_frames = SHORT_PARKED;
         } else if (strcmp(option, "--long") == 0) {
             o.seeds = LONG_SEEDS;
@@ -172,6 +176,7 @@ static void list(void) {
 typedef struct task {
     const scenario *s;
     uint64_t seed;
+    uint8_t scene;
 } task;
 
 typedef struct campaign {
@@ -182,7 +187,8 @@ typedef struct campaign {
 
 static void drive_one(void *context, unsigned index) {
     const campaign *c = context;
-    drive(c->tasks[index].s, c->tasks[index].seed, &c->options, &c->outcomes[index]);
+    const task *t = &c->tasks[index];
+    drive(t->s, t->seed, t->scene, &c->options, &c->outcomes[index]);
 }
 
 static scenario changed(const scenario *original, const char *changes) {
@@ -197,27 +203,46 @@ static scenario changed(const scenario *original, const char *changes) {
     return s;
 }
 
+/* By which policies a scenario is run, the one that it is judged by first. Without an event both are the same. */
+static unsigned scenes_of(const options *o, const scenario *s, uint8_t scenes[2]) {
+    scenes[0] = scenario_scene(s);
+    if (strcmp(o->policy, "stands") == 0)
+        scenes[0] = PLR_SCENE_STANDS;
+    else if (strcmp(o->policy, "may-move") == 0)
+        scenes[0] = PLR_SCENE_MAY_MOVE;
+    scenes[1] = scenes[0] == PLR_SCENE_STANDS ? PLR_SCENE_MAY_MOVE : PLR_SCENE_STANDS;
+    return strcmp(o->policy, "both") == 0 && s->during > 0 ? 2 : 1;
+}
+
 /* Runs what was chosen, and prints it in the table's order. Returns how many fell short. */
 static unsigned run(const options *o, const bool *chosen, unsigned n) {
     const unsigned seeds = (unsigned)o->seeds;
-    task *tasks = calloc((size_t)n * seeds, sizeof *tasks);
-    outcome *outcomes = pool_shared((size_t)n * seeds * sizeof *outcomes);
+    task *tasks = calloc((size_t)n * seeds * 2, sizeof *tasks);
+    outcome *outcomes = pool_shared((size_t)n * seeds * 2 * sizeof *outcomes);
     scenario *copies = calloc(scenario_count, sizeof *copies);
     unsigned filled = 0, failed = 0;
     if (!tasks || !copies) {
-        fprintf(stderr, "pelorus-campaign: no memory for %u drives\n", n * seeds);
+        fprintf(stderr, "pelorus-campaign: no memory for %u drives\n", 2 * n * seeds);
         exit(2);
     }
     for (unsigned i = 0; i < scenario_count; i++) {
+        uint8_t scenes[2];
         copies[i] = changed(&scenarios[i], o->changes);
-        for (unsigned k = 0; chosen[i] && k < seeds; k++)
-            tasks[filled++] = (task){&copies[i], o->first_seed + k};
+        const unsigned times = chosen[i] ? scenes_of(o, &copies[i], scenes) : 0;
+        for (unsigned k = 0; k < times * seeds; k++)
+            tasks[filled++] = (task){&copies[i], o->first_seed + k % seeds, scenes[k / seeds]};
     }
-    campaign c = {tasks, outcomes, {(unsigned)o->parked_frames, o->left_out, o->policy}};
+    campaign c = {tasks, outcomes, {(unsigned)o->parked_frames, o->left_out}};
     pool_run(filled, (unsigned)o->jobs, 0, "drives", drive_one, &c);
     table_heading();
-    for (unsigned i = 0; i < filled; i += seeds)
-        failed += !table_print(tasks[i].s, outcomes + i, seeds);
+    const scenario *judged = NULL;
+    for (unsigned i = 0; i < filled; i += seeds) {
+        if (tasks[i].s == judged)
+            table_print_other(judged, tasks[i].scene, outcomes + i, seeds);
+        else
+            failed += !table_print(tasks[i].s, outcomes + i, seeds);
+        judged = tasks[i].s;
+    }
     free(copies);
     free(tasks);
     return failed;

@@ -4,6 +4,9 @@
 #define CAMPAIGN_SCENARIO_H
 
 #include <stdbool.h>
+#include <stdint.h>
+
+#include "pelorus/settings.h"
 
 /* What goes wrong between `before` and `before + during` frames. */
 typedef enum mishap {
@@ -70,10 +73,12 @@ typedef struct scenario {
 
 enum { FRAME_HZ = 10 };
 
-/* The policy that a scenario is judged by: where most of what is seen moves, it says so. */
-static inline bool scenario_may_move(const scenario *s) {
-    return s->mishap == SCENE_MOVES || s->mishap == CONVOY || s->mishap == JUMP_CAMERA ||
-           s->mishap == CAMERA_BACK || s->mishap == TURN_CAMERA;
+/* The policy that a scenario is judged by, a plr_scene_policy: where most of what is seen moves, it says so. */
+static inline uint8_t scenario_scene(const scenario *s) {
+    const bool moves = s->mishap == SCENE_MOVES || s->mishap == CONVOY ||
+                       s->mishap == JUMP_CAMERA || s->mishap == CAMERA_BACK ||
+                       s->mishap == TURN_CAMERA;
+    return moves ? PLR_SCENE_MAY_MOVE : PLR_SCENE_STANDS;
 }
 
 extern const scenario scenarios[];

@@ -259,20 +259,30 @@ static void print_details(const scenario *s, const tally *t) {
     printf("\n");
 }
 
-bool table_print(const scenario *s, const outcome *outcomes, unsigned seeds) {
-    tally t;
-    memset(&t, 0, sizeof t);
-    t.first_diverged = (double)NAN;
-    t.told = calloc(seeds, sizeof *t.told);
-    t.again = calloc(seeds, sizeof *t.again);
-    if (!t.told || !t.again) {
+static void add_all(tally *t, const outcome *outcomes, unsigned seeds) {
+    memset(t, 0, sizeof *t);
+    t->first_diverged = (double)NAN;
+    t->told = calloc(seeds, sizeof *t->told);
+    t->again = calloc(seeds, sizeof *t->again);
+    if (!t->told || !t->again) {
         fprintf(stderr, "campaign: no memory for %u seeds\n", seeds);
         exit(2);
     }
     for (unsigned i = 0; i < seeds; i++)
-        add(&t, &outcomes[i]);
-    qsort(t.told, t.seeds, sizeof *t.told, compare);
-    qsort(t.again, t.seeds, sizeof *t.again, compare);
+        add(t, &outcomes[i]);
+    qsort(t->told, t->seeds, sizeof *t->told, compare);
+    qsort(t->again, t->seeds, sizeof *t->again, compare);
+}
+
+static void release(tally *t) {
+    fflush(stdout);
+    free(t->told);
+    free(t->again);
+}
+
+bool table_print(const scenario *s, const outcome *outcomes, unsigned seeds) {
+    tally t;
+    add_all(&t, outcomes, seeds);
     print_phase(s->name, s->during ? "before" : "nominal", &t, BEFORE);
     print_phase(t.phase[BEFORE].frames ? "" : s->name, "event", &t, DURING);
     print_phase("", "after", &t, AFTER);
@@ -281,8 +291,16 @@ bool table_print(const scenario *s, const outcome *outcomes, unsigned seeds) {
         print_reasons(&t, (phase)p);
     const verdict v = judge(s, &t);
     printf("  %s: %s\n", v.pass ? "pass" : "FAIL", v.text);
-    fflush(stdout);
-    free(t.told);
-    free(t.again);
+    release(&t);
     return v.pass;
+}
+
+void table_print_other(const scenario *s, uint8_t scene, const outcome *outcomes, unsigned seeds) {
+    tally t;
+    add_all(&t, outcomes, seeds);
+    const char *label = scene == PLR_SCENE_STANDS ? "  by stands" : "  by may-move";
+    print_phase(label, "event", &t, DURING);
+    print_phase(label, "after", &t, AFTER);
+    print_details(s, &t);
+    release(&t);
 }

@@ -12,4 +12,7 @@ void table_heading(void);
 /* True if the scenario meets every limit that it has. */
 bool table_print(const scenario *s, const outcome *outcomes, unsigned seeds);
 
+/* The same by the policy that it is not judged by, below. */
+void table_print_other(const scenario *s, uint8_t scene, const outcome *outcomes, unsigned seeds);
+
 #endif
