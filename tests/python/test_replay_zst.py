@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from pelorus import packed_file
-from replay_drive import BIN, RECORDING, Record, bits_of, drive, run
+from replay_drive import BIN, OUTPUT, RECORDING, Record, bits_of, drive, run
 
 ZSTD = shutil.which("zstd")
 pytestmark = pytest.mark.skipif(ZSTD is None, reason="the program zstd is not here")
@@ -107,7 +107,7 @@ def test_without_the_library_the_way_round_is_named(record: Record, tmp_path: Pa
     assert "zstdcat FILE | pelorus-replay -" in result.stderr
     run("-", stdin=zstd("-dc", path))
     log = tmp_path / "out.plr.zst"
-    refused = run(path, "--out", log)
+    refused = run(record(drive(3)), "--out", log, status=OUTPUT)
     assert "no libzstd" in refused.stderr
     assert not log.exists()
 
