@@ -15,6 +15,7 @@ from converted import Run, messages_of
 from pelorus import se3
 from pelorus.frames import Header, Imu, Process, Stereo, Truth, Twist
 from pelorus.se3 import Poses
+from pelorus.tracking import images
 from pelorus.tracks import triangulate
 from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene, write_picture
 from rigs import IMU_NOISE, camchain, matrix, write_yaml
@@ -216,3 +217,124 @@ def test_a_folder_that_lacks_something_is_told_what_and_where(
     outcome = pelorus("convert", "euroc", folder, tmp_path / "out.plr", status=1)
     assert said.format(folder=folder) in outcome.err
     assert not list(tmp_path.glob("out*"))
+
+
+# --- what public copies are like ------------------------------------------------------------------
+
+
+def _edit(path: Path, harm: Callable[[list[str]], list[str]]) -> None:
+    """The lines behind the names."""
+    names, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([names, *harm(rows), ""]))
+
+
+def _moved(rows: list[str], by_ns: int) -> list[str]:
+    """Times alone, not the files' names."""
+    cut = [row.split(",", 1) for row in rows]
+    return [f"{int(t) + by_ns},{rest}" for t, rest in cut]
+
+
+def test_a_listed_picture_that_is_not_there_costs_its_pair_and_is_told(
+    folder: Path, tmp_path: Path, pelorus: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lost = Scene().t_ns[3]
+    (folder / f"mav0/cam1/data/{lost}.png").unlink()
+    extra = folder / "mav0/cam0/data" / f"{lost + 7}.png"
+    shutil.copy(folder / f"mav0/cam0/data/{lost}.png", extra)
+    (folder / f"mav0/cam0/data/._{lost}.png").write_bytes(b"of a desktop")
+    monkeypatch.setattr("pelorus.tracking.images.ALONE_MAX", 0.3)
+    said = pelorus("convert", "euroc", folder, tmp_path / "out.plr").out
+    assert [m.t_ns for m in messages_of(tmp_path / "out.plr", Stereo)] == [
+        t for t in Scene().t_ns if t != lost
+    ]
+    assert f"cam1/data.csv: 1 pictures are not there, {lost}.png first" in said
+    assert f"cam0/data.csv: does not list 1 pictures, {extra.name} first" in said
+    assert "1 pictures have no partner and are left out" in said
+
+
+def test_a_picture_of_another_kind_is_the_one_that_is_listed(
+    folder: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    for path in (folder / "mav0/cam0/data").iterdir():
+        cv2.imwrite(str(path.with_suffix(".pgm")), images.gray(path))
+        path.unlink()
+    pelorus("convert", "euroc", folder, tmp_path / "out.plr")
+    assert len(messages_of(tmp_path / "out.plr", Stereo)) == FRAMES
+
+
+@pytest.mark.parametrize("apart_ns", [15_000, -400_000])
+def test_cameras_whose_clocks_differ_a_little_are_paired_one_to_one(
+    folder: Path, tmp_path: Path, pelorus: Run, apart_ns: int
+) -> None:
+    _edit(folder / "mav0/cam1/data.csv", lambda rows: _moved(rows, apart_ns))
+    said = pelorus("convert", "euroc", folder, tmp_path / "out.plr").out
+    assert [m.t_ns for m in messages_of(tmp_path / "out.plr", Stereo)] == Scene().t_ns
+    assert f"times differ by up to {abs(apart_ns) / 1e6:.3g} ms: cam0's are taken" in said
+    _edit(folder / "mav0/cam1/data.csv", lambda rows: _moved(rows, 21_000_000))
+    said = pelorus("convert", "euroc", folder, tmp_path / "no.plr", status=1).err
+    assert "0 pairs, taken within 2 ms; 12 pictures have no partner; the nearest times are" in said
+
+
+def test_a_recording_may_begin_at_time_0(folder: Path, tmp_path: Path, pelorus: Run) -> None:
+    for path in folder.glob("mav0/*/data.csv"):
+        _edit(path, lambda rows: _moved(rows, 10**8 - BEGIN_NS))
+    target = tmp_path / "out.plr"
+    said = pelorus("convert", "euroc", folder, target).out
+    assert "never set" not in said
+    shift_ns = BEGIN_NS - 10**8
+    assert [m.t_ns + shift_ns for m in messages_of(target, Stereo)] == Scene().t_ns
+    assert {m.t_ns + shift_ns for m in messages_of(target, Truth)} >= set(Scene().t_ns)
+
+
+def test_readings_and_poses_that_are_none_are_left_out_if_they_are_few(
+    folder: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    imu, truth = (
+        folder / "mav0" / name / "data.csv" for name in ("imu0", "state_groundtruth_estimate0")
+    )
+
+    def broken(rows: list[str]) -> list[str]:
+        rows = [*rows[:20], rows[20].replace("4.0", "nan"), rows[20], rows[20], *rows[21:-1]]
+        return [f"0,{rows[0].split(',', 1)[1]}", *rows, rows[-1][:25]]
+
+    _edit(imu, broken)
+    _edit(truth, lambda rows: [rows[0], rows[1].replace(",0.03,", ",NaN,"), *rows[2:]])
+    target = tmp_path / "out.plr"
+    said = pelorus("convert", "euroc", folder, target).out
+    assert sum(len(m.a_B_mps2) for m in messages_of(target, Imu)) == IMU_HZ - 1
+    for words in (
+        "imu0/data.csv: 1 of 203 rows are left out, line 204 first: has 3 numbers; 7 a row are due",
+        "imu0/data.csv: 1 of 202 rows are left out, line 23 first: holds a number that is not fin",
+        "imu0/data.csv: 1 of 201 rows are left out, line 2 first: its time is 0: it was never set",
+        "imu0/data.csv: 1 of 201 rows are left out, line 25 first: time does not ascend but rep",
+        "state_groundtruth_estimate0/data.csv: 1 of 12 rows are left out, line 3 first: holds a",
+    ):
+        assert words in said
+    _edit(imu, lambda rows: [row.replace(",4.0,", ",nan,") for row in rows[:30]] + rows[30:])
+    said = pelorus("convert", "euroc", folder, tmp_path / "no.plr", status=1).err
+    assert "line 2: holds a number that is not finite (" in said
+
+
+def test_the_truth_of_a_motion_capture_is_brought_to_the_imu_and_positions_alone_are_none(
+    folder: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    own = folder / "mav0/state_groundtruth_estimate0"
+    marker = Poses(Rotation.from_rotvec([0.2, -0.4, 0.9]).as_matrix(), np.array([0.3, -0.1, 0.05]))
+    rows = []
+    for line in (own / "data.csv").read_text().splitlines()[1:]:
+        t, *numbers = line.split(",")
+        w, x, y, z = map(float, numbers[3:7])
+        R = Rotation.from_quat([x, y, z, w]).as_matrix()
+        T = se3.compose(Poses(R, np.array(numbers[:3], float)), marker)
+        x, y, z, w = Rotation.from_matrix(T.R).as_quat()
+        rows.append(",".join([t, *(f"{n:.9f}" for n in (*T.p, w, x, y, z))]))
+    shutil.rmtree(own)
+    (folder / "mav0/vicon0").mkdir()
+    (folder / "mav0/vicon0/data.csv").write_text("#timestamp [ns],p\n" + "\n".join(rows) + "\n")
+    write_yaml(folder / "mav0/vicon0/sensor.yaml", sensor(marker))
+    pelorus("convert", "euroc", folder, tmp_path / "out.plr")
+    assert_on_surfaces(tmp_path / "out.plr")
+    (folder / "mav0/vicon0").rename(folder / "mav0/leica0")
+    said = pelorus("convert", "euroc", folder, tmp_path / "bare.plr").out
+    assert "leica0: positions without attitude: not read as the truth" in said
+    assert not messages_of(tmp_path / "bare.plr", Truth)

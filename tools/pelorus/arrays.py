@@ -26,6 +26,17 @@ def are_ns(stamps: Floats) -> bool:
     return step > STEP_MAX_S or bool((np.abs(stamps) > STAMP_MAX_S).any())
 
 
+def never_set(t_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which times are 0 because nobody set them: the others are of another day."""
+    zero = np.asarray(t_ns == 0, np.bool_)
+    others = t_ns[~zero]
+    is_clock = not len(others) or int(np.abs(others).min()) <= STEP_MAX_S * 1e9
+    return np.zeros_like(zero) if is_clock else zero
+
+
+NEVER_SET = "its time is 0: it was never set"
+
+
 class Arrays:
     """The named arrays of one file."""
 

@@ -74,13 +74,15 @@ class Table:
 
     def leave_out_bad(self, *names: str, each_time_once: bool = True) -> None:
         """Without the few rows in which a number of these columns is missing or not finite, or
-        which repeat a time; ForeignFileError where they are many.
+        time was never set, or repeats; ForeignFileError where they are many.
         """
         for name in filter(self.has, (self._time_column(), *names)):
             wrong = np.array([_is_none(cell) for cell in self._columns[name]], np.bool_)
             self._leave_out(wrong, f"{self._called(name)} is not finite")
+        if self.has(self._time_column()):
+            self._leave_out(arrays.never_set(self.times()), arrays.NEVER_SET)
         if each_time_once and self.has(self._time_column()):
-            again = np.diff(self.times(), prepend=-1) == 0
+            again = np.asarray(np.diff(self.times(), prepend=-1) == 0, np.bool_)
             self._leave_out(again, "time does not ascend but repeats")
 
     def _leave_out(self, wrong: NDArray[np.bool_], what: str) -> None:

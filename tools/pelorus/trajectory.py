@@ -122,14 +122,22 @@ def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
 def ascending(
     path: Path, rows: list[Row], t_ns: Times
 ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Which rows do not repeat a time, and what to say of the others."""
-    back = np.nonzero(np.diff(t_ns) < 0)[0]
-    if len(back):
-        at = f"line {rows[back[0] + 1].line}"
-        raise ForeignFileError(path, "time does not ascend", at=at)
-    again = np.asarray(np.diff(t_ns, prepend=t_ns[:1] - 1) == 0, np.bool_)
-    what = "time does not ascend but repeats"
-    return ~again, foreign.left_out(path, again, lambda k: f"line {rows[k].line}", what)
+    """Which rows have a time of their own, and what to say of the others."""
+
+    def at(k: int) -> str:
+        return f"line {rows[k].line}"
+
+    unset = arrays.never_set(t_ns)
+    remarks = foreign.left_out(path, unset, at, arrays.NEVER_SET)
+    kept = np.nonzero(~unset)[0]
+    step = np.diff(t_ns[kept])
+    if (step < 0).any():
+        k = int(kept[int((step < 0).argmax()) + 1])
+        raise ForeignFileError(path, "time does not ascend", at=at(k))
+    again = np.zeros(len(t_ns), np.bool_)
+    again[kept[1:][step == 0]] = True
+    remarks += foreign.left_out(path, again, at, "time does not ascend but repeats")
+    return ~(unset | again), remarks
 
 
 def _turned(path: Path, rows: list[Row], q: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pelorus import foreign, motion, se3, trajectory
+from pelorus import arrays, foreign, motion, se3, trajectory
 from pelorus.converters.streams import Asked, Pictures, Readings, Streams
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
@@ -116,10 +116,10 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
     """Pairs that were taken together."""
     where = top / ordered[0], top / ordered[1]
     (left, lost_left), (right, lost_right) = (_listed(camera, remarks) for camera in where)
-    of_left, of_right = (np.array(sorted(side), np.int64) for side in (left, right))
+    of_left, of_right = _times(left, remarks), _times(right, remarks)
     both = images.together(of_left, of_right, images.APART_NS)
     t_ns, partner_ns = of_left[both[:, 0]], of_right[both[:, 1]]
-    alone, lost = len(left) + len(right) - 2 * len(both), [*lost_left, *lost_right]
+    alone, lost = len(of_left) + len(of_right) - 2 * len(both), [*lost_left, *lost_right]
     if images.too_many_alone(len(both), max(alone, len(lost))):
         raise PelorusError(
             f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
@@ -140,6 +140,15 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
     pairs = [Pair(left[mine], right[theirs]) for mine, theirs in times]
     bits = images.bits_of(pairs, remarks)
     return Pictures(where, t_ns, lambda: images.in_order(pairs, bits))
+
+
+def _times(listed: dict[int, Path], remarks: list[str]) -> Times:
+    """In order, without one that was never set."""
+    t_ns = np.array(sorted(listed), np.int64)
+    unset = arrays.never_set(t_ns)
+    if unset.any():
+        remarks.append(f"{listed[0]} is left out: {arrays.NEVER_SET}")
+    return t_ns[~unset]
 
 
 def _apart(left_ns: Times, right_ns: Times) -> str:
