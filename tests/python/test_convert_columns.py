@@ -277,6 +277,30 @@ def test_columns_of_other_names_are_told_how_to_be_named_whichever_file_lacks_th
         (tmp_path / name).write_text(text)
 
 
+def test_files_with_plain_names_and_a_few_bad_rows_are_converted_and_that_is_said(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    drive = clean(**SHORT)
+    files, target = csv_files(tmp_path, drive), tmp_path / "out.plr"
+    for name in ("twists", "truth", "stereo"):
+        path = tmp_path / f"{name}.csv"
+        names, *rows = path.read_text().splitlines()
+        for unit in ("_mps", "_radps", "_px", "_m"):
+            names = names.replace(unit, "")
+        if name != "stereo":
+            rows[4] = rows[4].rpartition(",")[0] + ",nan"
+        path.write_text("\n".join([names, *rows, ""]))
+    said = pelorus("convert", "csv", *files, target, "--fix", "none").out
+    for words in ("vx is taken in mps", "wz is taken in radps", "px is taken in m;"):
+        assert words in said
+    for words in ("twists.csv: 1 of 61 rows are left out, row 6", "truth.csv: 1 of 61 rows"):
+        assert words in said
+        assert words in pelorus("info", target).out
+    found = messages_of(target, Twist)
+    assert np.allclose([m.v_B_mps for m in found], np.delete(drive.v_B_mps, 4, axis=0))
+    assert len(messages_of(target, Truth)) == 61  # between its neighbours there is one
+
+
 def test_the_name_that_the_project_asks_for_names_its_unit(tmp_path: Path, pelorus: Run) -> None:
     drive = clean(**SHORT)
     files = csv_files(tmp_path, drive)

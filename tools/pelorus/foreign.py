@@ -133,15 +133,14 @@ def written(path: Path) -> Written:
     """`rows`; a first row of words, or the comment before the numbers, names the columns."""
     whole = text(path)
     found = rows_of(path, whole)
-    names: list[str] = []
-    if not any(map(is_number, found[0].cells)) and len(found) > 1:
-        names, found = found[0].cells, found[1:]
     lines = whole.splitlines()
     comments = [line for line in lines[: found[0].line - 1] if line.lstrip().startswith(COMMENT)]
-    if comments and not names:
-        last = comments[-1].lstrip().lstrip(COMMENT)
-        names = [name.strip() for name in (last.split(",") if "," in last else last.split())]
-    return Written(found, names, "," in lines[found[0].line - 1])
+    heading = comments[-1].lstrip().lstrip(COMMENT) if comments else ""
+    if not any(map(is_number, found[0].cells)) and len(found) > 1:
+        heading, found = lines[found[0].line - 1], found[1:]
+    names = heading.split(",") if "," in heading else heading.split()
+    by_commas = "," in lines[found[0].line - 1]
+    return Written(found, [name.strip() for name in names], by_commas)
 
 
 class Sound(NamedTuple):

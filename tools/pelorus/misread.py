@@ -73,8 +73,10 @@ def _scale(found: Fit, a: Named, b: Named) -> list[str]:
     if larger < SCALE_MIN or found.plain_m < BETTER * found.scaled_m:
         return []
     large, small = (a, b) if found.scale > 1 else (b, a)
-    unit = next((u for s, u in UNITS.items() if abs(larger / s - 1) < UNIT_TOLERANCE), "")
-    asked = f"is it in {unit}?" if unit else "is one of them of a camera that knows no scale?"
+    asked = "is one of them of a camera that knows no scale?"
+    for scale, unit in UNITS.items():
+        if abs(larger / scale - 1) < UNIT_TOLERANCE:
+            larger, asked = scale, f"is it in {unit}?"
     return [
         f"a scale of {larger:.4g} fits: {large.name} is by so much larger than {small.name}: "
         f"{asked} With it positions fit to {found.scaled_m:.2g} m, without it to "
