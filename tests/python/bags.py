@@ -20,7 +20,9 @@ from scipy.spatial.transform import Rotation
 NS = 10**9
 FEATURES = "msckf_vio/msg/CameraMeasurement"
 ONE_FEATURE = "msckf_vio/msg/FeatureMeasurement"
+TF = "tf2_msgs/msg/TFMessage"
 DEFINITIONS = {
+    TF: "geometry_msgs/TransformStamped[] transforms\n",
     ONE_FEATURE: "uint64 id\nfloat64 u0\nfloat64 v0\nfloat64 u1\nfloat64 v1\n",
     FEATURES: "std_msgs/Header header\nFeatureMeasurement[] features\n",
 }
@@ -36,7 +38,8 @@ class Recorder:
     def __post_init__(self) -> None:
         store = get_typestore(Stores.ROS1_NOETIC if self.ros == 1 else Stores.ROS2_HUMBLE)
         for name, text in DEFINITIONS.items():
-            store.register(get_types_from_msg(text, name))
+            if name not in store.types:
+                store.register(get_types_from_msg(text, name))
         self.store = store
 
     def new(self, kind: str, *values: Any, **named: Any) -> Any:
@@ -61,7 +64,13 @@ class Recorder:
         return self.new("geometry_msgs/msg/Twist", self.xyz("Vector3", v), self.xyz("Vector3", w))
 
     def odometry(
-        self, topic: str, t_ns: int, v: Iterable[float], w: Iterable[float], pose: Poses
+        self,
+        topic: str,
+        t_ns: int,
+        v: Iterable[float],
+        w: Iterable[float],
+        pose: Poses,
+        child: str = "base_link",
     ) -> None:
         place = self.new(
             "geometry_msgs/msg/Pose",
@@ -76,7 +85,7 @@ class Recorder:
             self.new(
                 "nav_msgs/msg/Odometry",
                 self.header(t_ns, "odom"),
-                "base_link",
+                child,
                 self.new("geometry_msgs/msg/PoseWithCovariance", place, zeros),
                 self.new("geometry_msgs/msg/TwistWithCovariance", self.twist(v, w), zeros),
             ),
@@ -86,11 +95,35 @@ class Recorder:
         kind = "geometry_msgs/msg/TwistStamped"
         self.add(topic, kind, t_ns, self.new(kind, self.header(t_ns, "base"), self.twist(v, w)))
 
-    def imu(self, topic: str, t_ns: int, a: Iterable[float], w: Iterable[float]) -> None:
+    def imu(
+        self, topic: str, t_ns: int, a: Iterable[float], w: Iterable[float], frame: str = ""
+    ) -> None:
         kind, zeros = "sensor_msgs/msg/Imu", np.zeros(9)
         upright = self.xyz("Quaternion", (0, 0, 0, 1))
         both = self.xyz("Vector3", w), zeros, self.xyz("Vector3", a), zeros
-        self.add(topic, kind, t_ns, self.new(kind, self.header(t_ns), upright, zeros, *both))
+        header = self.header(t_ns, frame)
+        self.add(topic, kind, t_ns, self.new(kind, header, upright, zeros, *both))
+
+    def vector(self, topic: str, t_ns: int, x: Iterable[float]) -> None:
+        kind = "geometry_msgs/msg/Vector3Stamped"
+        self.add(topic, kind, t_ns, self.new(kind, self.header(t_ns), self.xyz("Vector3", x)))
+
+    def transforms(self, topic: str, t_ns: int, links: dict[tuple[str, str], Poses]) -> None:
+        """The pose of the second frame in the first one, by pairs."""
+        each = [
+            self.new(
+                "geometry_msgs/msg/TransformStamped",
+                self.header(t_ns, parent),
+                child,
+                self.new(
+                    "geometry_msgs/msg/Transform",
+                    self.xyz("Vector3", T.p),
+                    self.xyz("Quaternion", Rotation.from_matrix(T.R).as_quat()),
+                ),
+            )
+            for (parent, child), T in links.items()
+        ]
+        self.add(topic, TF, t_ns, self.new(TF, each))
 
     def joints(self, topic: str, t_ns: int, speeds: dict[str, float]) -> None:
         kind, none = "sensor_msgs/msg/JointState", np.zeros(0)
@@ -105,6 +138,7 @@ class Recorder:
         picture: NDArray[np.generic],
         encoding: str = "mono8",
         pad: int = 0,
+        frame: str = "",
     ) -> None:
         """Rows with `pad` bytes behind each."""
         kind = "sensor_msgs/msg/Image"
@@ -112,7 +146,7 @@ class Recorder:
         packed = np.hstack((rows, np.full((len(rows), pad), 77, np.uint8)))
         size = picture.shape[0], picture.shape[1]
         image = self.new(
-            kind, self.header(t_ns), *size, encoding, 0, packed.shape[1], packed.ravel()
+            kind, self.header(t_ns, frame), *size, encoding, 0, packed.shape[1], packed.ravel()
         )
         self.add(topic, kind, t_ns, image)
 
@@ -142,7 +176,9 @@ class Recorder:
         )
         self.add(topic, kind, t_ns, info)
 
-    def cloud(self, topic: str, t_ns: int, rows: dict[str, NDArray[np.generic]]) -> None:
+    def cloud(
+        self, topic: str, t_ns: int, rows: dict[str, NDArray[np.generic]], frame: str = ""
+    ) -> None:
         """PointCloud2: ids as uint32, pixels as float32, four bytes of nothing between."""
         kind = "sensor_msgs/msg/PointCloud2"
         formats = ["<u4" if name == "id" else "<f4" for name in rows]
@@ -161,7 +197,7 @@ class Recorder:
         ]
         data = np.frombuffer(table.tobytes(), np.uint8)
         cloud = self.new(
-            kind, self.header(t_ns), 1, count, fields, False, size, size * count, data, True
+            kind, self.header(t_ns, frame), 1, count, fields, False, size, size * count, data, True
         )
         self.add(topic, kind, t_ns, cloud)
 

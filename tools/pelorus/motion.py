@@ -29,6 +29,13 @@ def steps(t_ns: Times, v: Floats, w: Floats, timing: TwistTiming) -> Poses:
     return se3.exp(tau * held(v, timing), tau * held(w, timing))
 
 
+def rates(t_ns: Times, poses: Poses) -> Floats:
+    """(n-1, 6) twists (v, w) in body axes that bring each of n poses to the next one."""
+    before, after = poses.at(slice(None, -1)), poses.at(slice(1, None))
+    tau = np.diff(t_ns)[:, None] * 1e-9
+    return np.asarray(se3.log(se3.compose(se3.inverse(before), after)) / tau)
+
+
 def nearest(t_ns: Times, wanted_t_ns: Times) -> NDArray[np.intp]:
     """Which of ascending times is nearest to each wanted one; of two the earlier."""
     at = np.clip(np.searchsorted(t_ns, wanted_t_ns), 1, max(len(t_ns) - 1, 1))

@@ -21,6 +21,7 @@ from pelorus.converters import ece276a as ece276a_converter
 from pelorus.converters import imu_npz as imu_npz_converter
 from pelorus.converters import landmark_map, late_turns, matlab, readings_csv
 from pelorus.converters.columns import Columns
+from pelorus.converters.streams import TwistIn
 from pelorus.faults.mend import held_to_fit
 from pelorus.rig.lens import LensModel
 from pelorus.small_sensors import SMALL_SENSORS
@@ -144,6 +145,7 @@ def csv(
     truth: Path | None = own.TRUTH,
     columns: list[str] = own.COLUMNS,
     measured: str = own.MEASURED,
+    twist_in: TwistIn = own.TWIST_IN,
     extrinsic: Path | None = own.EXTRINSIC,
     lens: LensModel | None = own.LENS,
     fix: Fix = own.FIX,
@@ -151,23 +153,18 @@ def csv(
     **readings: list[Path],
 ) -> None:
     """CSV files: stereo tracks, and twists, a wheel speed alone or an IMU; your own columns."""
-    recording, findings = csv_converter.convert(
-        csv_converter.Sources(
-            csv_converter.MotionFiles(twists, gyro, imu, csv_converter.measured_of(measured)),
-            stereo,
-            tuple(calibration),
-            truth,
-            extrinsic,
-            lens,
-            Columns.of(columns),
-        ),
-        fix is Fix.AUTO,
-        twist_timing.value_in_header if twist_timing else None,
-        readings,
+    timing = twist_timing.value_in_header if twist_timing else None
+    sources = csv_converter.Sources(
+        csv_converter.MotionFiles(twists, gyro, imu, csv_converter.measured_of(measured), twist_in),
+        stereo,
+        tuple(calibration),
+        truth,
+        extrinsic,
+        lens,
+        Columns.of(columns),
     )
-    for remark in recording.remarks:
-        out.print(escape(remark.text))
-    write(recording, findings, target)
+    found = csv_converter.read(sources, readings, timing)
+    importers.converted(found, timing, fix is Fix.AUTO, target)
 
 
 @app.command(

@@ -21,7 +21,8 @@ from pelorus.converters import bag, csv, euroc, kitti, ros, streams
 from pelorus.converters.bag import Bag
 from pelorus.converters.columns import Columns
 from pelorus.converters.ros_frames import Cameras
-from pelorus.converters.streams import Asked, Streams
+from pelorus.converters.ros_motion import Moving, Wheels
+from pelorus.converters.streams import Asked, Streams, TwistIn
 from pelorus.errors import PelorusError
 from pelorus.frames import TwistTiming
 from pelorus.rig.lens import LensModel
@@ -39,6 +40,7 @@ SHARED: dict[str, tuple[Any, Any]] = {
     "truth": (Path | None, own.TRUTH),
     "columns": (list[str], own.COLUMNS),
     "measured": (str, own.MEASURED),
+    "twist_in": (TwistIn, own.TWIST_IN),
     "twist_timing": (Timing | None, own.TIMING),
     "fix": (Fix, own.FIX),
 }
@@ -91,18 +93,19 @@ def _asked(
     truth: Path | None,
     columns: list[str],
     measured: str,
+    twist_in: TwistIn,
     twist_timing: Timing | None,
     fix: Fix,
 ) -> Asked:
     named = Columns.of(columns)
     timing = None if twist_timing is None else twist_timing.value_in_header
-    files = csv.MotionFiles(twists, gyro, imu, csv.measured_of(measured))
+    files = csv.MotionFiles(twists, gyro, imu, csv.measured_of(measured), twist_in)
     motion = None
     if twists or imu:
         held = TwistTiming.START if timing is None else timing
         motion = csv.motion_of(files, named, held)
     elif gyro:
-        raise PelorusError("--gyro: it goes with --twists FILE, whose velocities lack a gyro")
+        raise PelorusError("--gyro: it goes with --twists FILE or --imu FILE, which lack a gyro")
     poses = csv.truth_of(truth, named) if truth else None
     named.require_used()
     return Asked(
@@ -112,6 +115,7 @@ def _asked(
         motion,
         poses,
         files.measured,
+        twist_in,
         timing,
         fix is Fix.AUTO,
         tuple(named.remarks),
@@ -169,9 +173,15 @@ def _ros(
         "", help="Odometry, TwistStamped or TwistWithCovarianceStamped; else the only one."
     ),
     gyro_topic: str = typer.Option(
-        "", help="Imu whose gyro, in body axes, takes the place of the twists' rotation."
+        "",
+        help="Imu whose gyro takes the place of the twists' rotation; or, beside --imu-topic, that "
+        "of the gyro alone.",
     ),
-    imu_topic: str = typer.Option("", help="Or: the raw readings of an IMU move the body."),
+    imu_topic: str = typer.Option(
+        "",
+        help="Or: the raw readings of an IMU move the body; or those of an accelerometer, with the "
+        "gyro on another topic.",
+    ),
     joint_topic: str = typer.Option("", help="Or: JointState with the speeds of wheels, rad/s."),
     joints: list[str] = typer.Option([], "--joint", help="A wheel's joint, left ones first."),
     wheel_radius: float = typer.Option(0.0, metavar="M", help="Of the wheels of --joint."),
@@ -181,6 +191,10 @@ def _ros(
     truth_topic: str = typer.Option(
         "", help="Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped."
     ),
+    body_frame: str = typer.Option(
+        "", help="Of what moves the body, for /tf_static; else as its messages say."
+    ),
+    camera_frame: str = typer.Option("", help="Likewise, of the left camera; z looks forward."),
     stamps: Stamps = typer.Option(Stamps.HEADER, help="Times of the headers, or of the arrival."),
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
@@ -192,30 +206,39 @@ def _ros(
             round(pair_within * 1e6),
             left_info_topic,
             right_info_topic,
+            camera_frame,
         ),
-        twist_topic,
-        gyro_topic,
-        imu_topic,
-        truth_topic,
-        _wheels(joint_topic, joints, wheel_radius, track_width),
+        Moving(
+            twist_topic,
+            gyro_topic,
+            imu_topic,
+            _wheels(joint_topic, joints, wheel_radius, track_width),
+            body_frame,
+            truth_topic,
+        ),
     )
     with Bag(source, stamps.value) as opened:
         _convert(ros.read(opened, topics, asked), asked, target)
 
 
-def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> ros.Wheels | None:
+def _wheels(topic: str, joints: list[str], radius_m: float, track_m: float) -> Wheels | None:
     if not topic and not joints:
         return None
     if not topic or not joints or not 0 < radius_m < RADIUS_MAX_M or track_m < 0:
         raise PelorusError(
             "wheels: --joint-topic TOPIC, --joint NAME (once or more) and --wheel-radius M are due"
         )
-    return ros.Wheels(topic, tuple(joints), radius_m, track_m)
+    return Wheels(topic, tuple(joints), radius_m, track_m)
 
 
 def _convert(found: Streams, asked: Asked, target: Path, usual: TwistTiming | None = None) -> None:
-    found = replace(found, remarks=[*asked.remarks, *found.remarks])
+    whole = replace(found, remarks=[*asked.remarks, *found.remarks])
+    timing = usual if asked.timing is None else asked.timing
+    converted(whole, timing, asked.fix, target)
+
+
+def converted(found: Streams, timing: TwistTiming | None, fix: bool, target: Path) -> None:
+    """Say what was remarked, make the recording, write it."""
     for remark in found.told:
         out.print(escape(remark))
-    timing = usual if asked.timing is None else asked.timing
-    write(*streams.converted(found, timing, asked.fix), target)
+    write(*streams.converted(found, timing, fix), target)

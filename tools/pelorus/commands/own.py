@@ -6,6 +6,7 @@ from __future__ import annotations
 import typer
 
 from pelorus.commands.choices import Fix
+from pelorus.converters.streams import TwistIn
 
 TARGET = typer.Argument(
     ..., metavar="OUT.plr", help="The recording to write; as OUT.plr.zst it is packed."
@@ -29,7 +30,8 @@ TWISTS = typer.Option(
 GYRO = typer.Option(
     None,
     help="Beside --twists: columns t_s, wx_radps, wy_radps, wz_radps of a gyro in body axes, in "
-    "place of the twists' own; its mean between two twists is taken.",
+    "place of the twists' own; its mean between two twists is taken. Beside --imu: of an "
+    "accelerometer's file the gyro's, with times of its own.",
 )
 IMU = typer.Option(
     None,
@@ -52,6 +54,12 @@ MEASURED = typer.Option(
     metavar="NAMES",
     help="Which velocities the twists' file has: vx for a wheel speed alone, vx,wz for wheels that "
     "tell a turn. The others are taken as 0 and little believed.",
+)
+TWIST_IN = typer.Option(
+    TwistIn.AUTO,
+    help="The axes of the twists: body; world, or world-velocity for the velocity alone, turned by "
+    "their orientation (odometry's pose, columns qx, qy, qz, qw); poses: made of the poses, where "
+    "nobody fills in the twist. auto: body, unless their own poses say otherwise.",
 )
 TIMING = typer.Option(
     None, help="When a twist reading holds; else the calibration says it, else start."

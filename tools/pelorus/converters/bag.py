@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from functools import cached_property, partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Connection
+from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from rosbags.typesys import Stores, get_typestore
 
 from pelorus.errors import PelorusError
@@ -25,6 +30,7 @@ class Stamped(NamedTuple):
     topic: str
     t_ns: int
     message: Any
+    arrival_ns: int
 
 
 def require_messages(bag: Bag, topic: str, count: int) -> None:
@@ -47,13 +53,17 @@ class Bag(AbstractContextManager["Bag"]):
                 due="a ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), a .mcap or a "
                 ".db3 is due (ros2 bag reindex makes a metadata.yaml)",
             )
+        self._open_files = ExitStack()
+        self._reader = self._opened()
+        self._seconds = max(self._reader.duration, 1) / NS
+
+    def _opened(self) -> AnyReader:
         try:
             # bags of before ROS 2 iron hold no definitions
-            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-            self._reader.open()
+            store = get_typestore(Stores.ROS2_HUMBLE)
+            return self._open_files.enter_context(AnyReader([self.path], default_typestore=store))
         except Exception as error:  # the readers raise a dozen kinds on damaged files
             raise self._unreadable(error) from error
-        self._seconds = max(self._reader.duration, 1) / NS
 
     def __exit__(
         self,
@@ -61,7 +71,7 @@ class Bag(AbstractContextManager["Bag"]):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._reader.close()
+        self._open_files.close()
 
     @property
     def types(self) -> dict[str, str]:
@@ -101,11 +111,26 @@ class Bag(AbstractContextManager["Bag"]):
 
     def messages(self, topics: Sequence[str]) -> Iterator[Stamped]:
         """In the order of their arrival."""
-        wanted = [c for c in self._reader.connections if c.topic in topics]
+        return self._messages(self._reader, topics)
+
+    def written(self, topics: Sequence[str]) -> Iterator[Stamped]:
+        """In the order in which they stand in the file, whatever the recorder's clock said."""
+        return self._messages(self._by_place, topics)
+
+    @cached_property
+    def _by_place(self) -> AnyReader:
+        reader = self._opened()
+        for one in reader.readers:
+            _keep_order(one)
+        return reader
+
+    def _messages(self, reader: AnyReader, topics: Sequence[str]) -> Iterator[Stamped]:
+        wanted = [c for c in reader.connections if c.topic in topics]
         try:
-            for connection, arrival_ns, raw in self._reader.messages(wanted):
-                message: Any = self._reader.deserialize(raw, connection.msgtype)
-                yield Stamped(connection.topic, self._time(message, arrival_ns), message)
+            for connection, arrival_ns, raw in reader.messages(wanted):
+                message: Any = reader.deserialize(raw, connection.msgtype)
+                t_ns = self._time(message, arrival_ns)
+                yield Stamped(connection.topic, t_ns, message, arrival_ns)
         except PelorusError:
             raise
         except Exception as error:
@@ -125,3 +150,33 @@ class Bag(AbstractContextManager["Bag"]):
             due="a whole ROS 1 bag, ROS 2 bag or .mcap is due (rosbag reindex, ros2 bag reindex or "
             "mcap recover mend one that was cut short)",
         )
+
+
+# --- order ----------------------------------------------------------------------------------------
+
+
+def _keep_order(reader: Any) -> None:
+    """Have the library give messages as they stand in the file; it sorts them by their arrival."""
+    if isinstance(reader, Reader1):
+        for index in reader.indexes.values():
+            index.sort(key=lambda entry: (entry.chunk_pos, entry.offset))
+        return
+    for storage in getattr(reader.storage, "storages", [reader.storage]):
+        if isinstance(storage, McapReader):
+            storage.__dict__["messages"] = storage.messages_scan
+        elif isinstance(storage, Sqlite3Reader):
+            storage.__dict__["messages"] = partial(_rows_by_id, storage)
+
+
+def _rows_by_id(
+    storage: Sqlite3Reader, connections: Collection[Connection], *_: int | None
+) -> Iterator[tuple[Connection, int, bytes]]:
+    of_id = {connection.id: connection for connection in connections}
+    assert storage.dbconn
+    rows = storage.dbconn.execute(
+        "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN "
+        f"({','.join('?' * len(of_id))}) ORDER BY id",
+        tuple(of_id),
+    )
+    for id, t_ns, packed in rows:
+        yield of_id[id], t_ns, packed

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import foreign, trajectory
-from pelorus.converters import readings_csv, streams
+from pelorus.converters import readings_csv, streams, twist_axes
 from pelorus.converters.columns import Columns
-from pelorus.converters.streams import Readings, Seen, Streams, Twists
+from pelorus.converters.streams import Readings, Seen, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
 from pelorus.foreign import ForeignFileError
@@ -52,15 +52,16 @@ NAMES_ITS_COLUMNS = 0.5  # of the first row's cells: letters, where others have 
 
 @dataclass(frozen=True)
 class MotionFiles:
-    """Twists, with a gyro beside them or without, or an IMU: one of them is due.
+    """Twists or an IMU, with a gyro's file beside them or without: one of them is due.
 
-    `measured` are the velocities that the twists' file has.
+    `measured` are the velocities that the twists' file has, `axes` are theirs.
     """
 
     twists: Path | None = None
     gyro: Path | None = None
     imu: Path | None = None
     measured: frozenset[str] = frozenset(VELOCITIES)
+    axes: TwistIn = TwistIn.AUTO
 
 
 @dataclass(frozen=True)
@@ -117,17 +118,34 @@ def motion_of(files: MotionFiles, columns: Columns, timing: TwistTiming) -> Twis
     twists, imu = files.twists, files.imu
     if twists is not None and imu is None:
         if files.gyro is None:
-            return _twists(twists, files.measured, columns)
-        speeds = _twists(twists, files.measured - RATES.keys(), columns)
+            table = columns.read(twists, "twists")
+            found = _twists(table, files.measured)
+            poses = _poses_beside(table)
+            return twist_axes.in_body(found, poses, files.axes, timing, columns.remarks)
+        speeds = _twists(columns.read(twists, "twists"), files.measured - RATES.keys())
         table = columns.read(files.gyro, "gyro")
         table.leave_out_bad(*RATES.values())
         rates = table.numbers(*RATES.values())
         return streams.with_gyro(speeds, files.gyro, table.ascending_times(), rates, timing)
     if imu is not None and twists is None:
         table = columns.read(imu, "imu")
-        table.leave_out_bad(*FORCES, *RATES.values())
-        a, w = table.numbers(*FORCES), table.numbers(*RATES.values())
-        return Readings(imu, Inertial(table.ascending_times(), a, w))
+        if files.gyro is None and not any(map(table.has, RATES.values())):
+            raise ForeignFileError(
+                imu,
+                "has no rates of turn",
+                due=f"{', '.join(RATES.values())} are due, or --gyro FILE with them; there are: "
+                f"{', '.join(table.names)}",
+            )
+        if files.gyro is None:
+            table.leave_out_bad(*FORCES, *RATES.values())
+            a, w = table.numbers(*FORCES), table.numbers(*RATES.values())
+            return Readings(imu, Inertial(table.ascending_times(), a, w))
+        table.leave_out_bad(*FORCES)
+        gyro = columns.read(files.gyro, "gyro")
+        gyro.leave_out_bad(*RATES.values())
+        forces = table.ascending_times(), table.numbers(*FORCES)
+        turns = gyro.ascending_times(), gyro.numbers(*RATES.values())
+        return Readings(imu, streams.joined(imu, files.gyro, forces, turns, columns.remarks))
     raise PelorusError(
         f"{'--twists and --imu' if imu else 'neither --twists nor --imu'} given; one is due: "
         "twists (wheels, odometry, a wheel speed alone) or the raw readings of an IMU"
@@ -144,8 +162,8 @@ def measured_of(words: str) -> frozenset[str]:
     return frozenset(found)
 
 
-def _twists(path: Path, measured: frozenset[str], columns: Columns) -> Twists:
-    table = columns.read(path, "twists")
+def _twists(table: Table, measured: frozenset[str]) -> Twists:
+    path = table.path
     lacking = [
         name for short, name in VELOCITIES.items() if short in measured and not table.has(name)
     ]
@@ -165,6 +183,24 @@ def _twists(path: Path, measured: frozenset[str], columns: Columns) -> Twists:
     ]
     whole = np.stack(numbers, axis=-1)
     return Twists(path, table.ascending_times(), whole[:, :3], whole[:, 3:], measured)
+
+
+def _poses_beside(table: Table) -> Poses | None:
+    """Of the twists' own file, if it tells how the body stood; NaN where it does not say where."""
+    if not all(map(table.has, QUATERNION)):
+        return None
+    p = np.full((table.count, 3), np.nan)
+    if all(map(table.has, POSITION)):
+        p = table.numbers(*POSITION)
+    q = table.numbers(*QUATERNION)
+    off = np.abs(np.linalg.norm(q, axis=1) - 1)
+    if off.max() > trajectory.QUATERNION_NORM_TOLERANCE:
+        raise ForeignFileError(
+            table.path,
+            "the quaternion's norm is not 1 (the columns are qx, qy, qz, qw)",
+            at=table.row(int(off.argmax())),
+        )
+    return Poses(np.asarray(Rotation.from_quat(q).as_matrix()), p)
 
 
 def _example(column: str) -> str:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import arrays, foreign, se3, trajectory
+from pelorus import arrays, foreign, motion, se3, trajectory
 from pelorus.console import progress
 from pelorus.converters.streams import Asked, Pictures, Streams, Twists
 from pelorus.errors import PelorusError
@@ -211,9 +211,7 @@ def _made_twists(where: Path, truth: Trajectory, made: Made) -> Twists:
     """What moves each pose to the next one, and noise; a reading holds from its time on."""
     if min(made.velocity_sigma_mps, made.gyro_sigma_radps) < 0 or made.seed < 0:
         raise PelorusError("--velocity-sigma, --gyro-sigma and --seed: none may be negative")
-    tau = (np.diff(truth.t_ns) * 1e-9)[:, None]
-    before, after = truth.poses.at(slice(None, -1)), truth.poses.at(slice(1, None))
-    rate = se3.log(se3.compose(se3.inverse(before), after)) / tau
+    rate = motion.rates(truth.t_ns, truth.poses)
     rate = np.concatenate((rate, rate[-1:]))
     noise = np.random.Generator(np.random.PCG64(made.seed)).standard_normal(rate.shape)
     noise *= np.repeat([made.velocity_sigma_mps, made.gyro_sigma_radps], 3)

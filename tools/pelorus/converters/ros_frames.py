@@ -14,20 +14,22 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from pelorus import motion, se3
+from pelorus import motion
 from pelorus.console import progress
 from pelorus.converters.bag import Bag, require_messages
+from pelorus.converters.order import in_order, leave_out, sound
 from pelorus.converters.streams import Pictures, Seen
+from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
+from pelorus.rig.camera_info import Info, Infos
+from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray
-from pelorus.rig.rig import Rig
-from pelorus.se3 import Poses
 from pelorus.tracking import images
 from pelorus.tracks import Tracks
 
@@ -36,12 +38,6 @@ CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 CLOUD2, CLOUD = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud"
 FIELDS = ("id", "uL", "vL", "uR", "vR")
 RAYS = ("id", "u0", "v0", "u1", "v1")
-LENSES = {
-    "plumb_bob": LensModel.RADTAN,
-    "rational_polynomial": LensModel.RADTAN,
-    "equidistant": LensModel.EQUIDISTANT,
-    "": LensModel.NONE,
-}
 TO_GRAY = {
     "rgb8": cv2.COLOR_RGB2GRAY,
     "bgr8": cv2.COLOR_BGR2GRAY,
@@ -55,6 +51,7 @@ TO_GRAY = {
 }
 CHANNELS = {"rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
 PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
+SIDES = (("left", "right"), ("infra1", "infra2"))  # as RealSense calls them
 WAITING_MAX = 200  # pictures of one side that wait for the other
 # The numbers of PointCloud2's types.
 TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -70,6 +67,7 @@ class Cameras:
     apart_ns: int = 2_000_000
     left_info: str = ""
     right_info: str = ""
+    frame: str = ""  # of the left one, in place of what its messages say
 
 
 def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Cameras:
@@ -83,9 +81,10 @@ def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Camer
         return cameras
     if len(of_calibration) == 2 and all(topic in there for topic in of_calibration):
         return replace(cameras, left=of_calibration[0], right=of_calibration[1])
-    lefts, rights = ([t for t in there if word in t.lower()] for word in ("left", "right"))
-    if len(lefts) == len(rights) == 1:
-        return replace(cameras, left=lefts[0], right=rights[0])
+    for words in SIDES:
+        lefts, rights = ([t for t in there if word in t.lower()] for word in words)
+        if len(lefts) == len(rights) == 1:
+            return replace(cameras, left=lefts[0], right=rights[0])
     tracked = bag.of_type(CLOUD, CLOUD2)
     if not there and len(tracked) == 1:
         return replace(cameras, tracks=tracked[0])
@@ -98,7 +97,7 @@ def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Camer
 def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]) -> Pictures | Seen:
     """Pictures, or tracks."""
     if cameras.tracks:
-        return _tracks(bag, cameras.tracks, calibrated)
+        return _tracks(bag, cameras.tracks, calibrated, remarks)
     return _pictures(bag, cameras, remarks)
 
 
@@ -109,11 +108,16 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     """Pairs by the times of their headers: of each left picture the nearest right one."""
     topics = [cameras.left, cameras.right]
     stamps: dict[str, list[int]] = {topic: [] for topic in topics}
-    for topic, t_ns, _ in progress(bag.messages(topics), "finding pictures", bag.count(topics)):
-        stamps[topic].append(t_ns)
-    for topic, found in stamps.items():
-        require_messages(bag, topic, len(found))
-    left, right = (np.unique(np.array(stamps[topic], np.int64)) for topic in topics)
+    brightest = 0
+    for found in progress(bag.written(topics), "finding pictures", bag.count(topics)):
+        stamps[found.topic].append(found.t_ns)
+        if getattr(found.message, "encoding", "") in DEEP:
+            grey = _deep(bag.path / found.topic.lstrip("/"), found.message)
+            brightest = max(brightest, int(grey.max(initial=0)))
+    bits = max(brightest.bit_length(), 8)
+    if brightest and bits < 16:
+        remarks.append(f"pictures of 16 bits hold {bits} (the brightest pixel is {brightest})")
+    left, right = (_times(bag, topic, stamps[topic], remarks) for topic in topics)
     pairs = _paired(bag, cameras, left, right)
     alone = len(left) + len(right) - 2 * len(pairs)
     if alone:
@@ -121,15 +125,25 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     where = bag.path / cameras.left.lstrip("/"), bag.path / cameras.right.lstrip("/")
 
     def pixels() -> Iterator[tuple[Gray, Gray]]:
-        return _in_pairs(bag, cameras, pairs)
+        return _in_pairs(bag, cameras, pairs, bits)
 
     return Pictures(where, pairs[:, 0], pixels)
 
 
+def _times(bag: Bag, topic: str, stamps: list[int], remarks: list[str]) -> Times:
+    """Of the pictures that have one, in order."""
+    require_messages(bag, topic, len(stamps))
+    t_ns = np.array(stamps, np.int64)
+    t_ns = t_ns[sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks)]
+    return t_ns[in_order(bag, topic, t_ns, None, remarks)]
+
+
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
-    """(n, 2) times."""
-    nearest = right[motion.nearest(right, left)]
-    near = np.abs(nearest - left) <= cameras.apart_ns
+    """(n, 2) times: two pictures of which each is the nearest to the other."""
+    partner = motion.nearest(right, left)
+    nearest = right[partner]
+    mutual = motion.nearest(left, right)[partner] == np.arange(len(left))
+    near = mutual & (np.abs(nearest - left) <= cameras.apart_ns)
     alone = len(left) + len(right) - 2 * int(near.sum())
     if images.too_many_alone(int(near.sum()), alone) or near.sum() < images.PAIRS_MIN:
         apart_ms = np.median(np.abs(nearest - left)) * 1e-6
@@ -141,16 +155,16 @@ def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
     return np.stack((left[near], nearest[near]), axis=-1)
 
 
-def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times) -> Iterator[tuple[Gray, Gray]]:
+def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[tuple[Gray, Gray]]:
     """One pass through the bag; what comes early waits for its partner."""
     wanted = {cameras.left: set(pairs[:, 0].tolist()), cameras.right: set(pairs[:, 1].tolist())}
     waiting: dict[str, dict[int, Gray]] = {cameras.left: {}, cameras.right: {}}
     due = iter(pairs.tolist())
     first, second = next(due)
-    for topic, t_ns, message in bag.messages([cameras.left, cameras.right]):
+    for topic, t_ns, message, _ in bag.messages([cameras.left, cameras.right]):
         if t_ns not in wanted[topic] or t_ns in waiting[topic]:
             continue
-        waiting[topic][t_ns] = gray(bag.path / topic.lstrip("/"), message)
+        waiting[topic][t_ns] = gray(bag.path / topic.lstrip("/"), message, bits)
         if len(waiting[topic]) > WAITING_MAX:
             raise PelorusError(f"{bag.path}: {topic}: pictures lie in no order of time")
         while first in waiting[cameras.left] and second in waiting[cameras.right]:
@@ -164,8 +178,8 @@ def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times) -> Iterator[tuple[Gray, 
             first, second = following
 
 
-def gray(where: Path, message: Any) -> Gray:
-    """(rows, columns) of 8 bits."""
+def gray(where: Path, message: Any, bits: int = 16) -> Gray:
+    """(rows, columns) of 8 bits; of a picture of 16 bits the upper eight of those that are used."""
     if hasattr(message, "format"):
         return images.decoded(where, bytes(message.data))
     encoding = message.encoding
@@ -173,48 +187,60 @@ def gray(where: Path, message: Any) -> Gray:
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):
         known = ", ".join((*PLAIN, *DEEP, *TO_GRAY))
         raise ForeignFileError(where, f"pictures are encoded as {encoding}", due=f"{known} are due")
-    size = 2 if encoding in DEEP else 1
+    if encoding in DEEP:
+        return np.asarray(_deep(where, message) >> (bits - 8), np.uint8)
+    plain = _lines(where, message, channels)
+    if encoding in PLAIN:
+        return plain
+    shaped = plain.reshape(len(plain), -1, channels) if channels > 1 else plain
+    return np.asarray(cv2.cvtColor(shaped, TO_GRAY[encoding]), np.uint8)
+
+
+def _lines(where: Path, message: Any, pixel_bytes: int) -> NDArray[np.uint8]:
+    """(rows, bytes of a row), without what pads it."""
     rows, columns, step = int(message.height), int(message.width), int(message.step)
     packed = np.asarray(message.data, np.uint8)
-    if len(packed) < rows * step or step < columns * channels * size:
+    if len(packed) < rows * step or step < columns * pixel_bytes:
         raise ForeignFileError(
             where, f"a picture of {columns} x {rows} has {len(packed)} bytes in rows of {step}"
         )
-    lines = packed[: rows * step].reshape(rows, step)[:, : columns * channels * size]
-    if size == 2:
-        high = lines[:, 0::2] if message.is_bigendian else lines[:, 1::2]
-        return np.ascontiguousarray(high)
-    plain = np.ascontiguousarray(lines)
-    if encoding in PLAIN:
-        return plain
-    shaped = plain.reshape(rows, columns, channels) if channels > 1 else plain
-    return np.asarray(cv2.cvtColor(shaped, TO_GRAY[encoding]), np.uint8)
+    return np.ascontiguousarray(
+        packed[: rows * step].reshape(rows, step)[:, : columns * pixel_bytes]
+    )
+
+
+def _deep(where: Path, message: Any) -> NDArray[np.uint16]:
+    order = ">u2" if message.is_bigendian else "<u2"
+    return _lines(where, message, 2).view(order).astype(np.uint16)
 
 
 # --- tracks ---------------------------------------------------------------------------------------
 
 
-def _tracks(bag: Bag, topic: str, calibrated: Calibrated) -> Seen:
+def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) -> Seen:
     if topic not in bag.types:
         raise PelorusError(f"{bag.path}: has no topic {topic}; {bag.listing()}")
-    rows: dict[int, Floats] = {}
-    for _, t_ns, message in progress(bag.messages([topic]), f"reading {topic}", bag.count([topic])):
-        rows.setdefault(t_ns, _observations(bag.path / topic.lstrip("/"), message, calibrated))
-    times = sorted(rows)
-    if not times or times[0] <= 0:
-        raise ForeignFileError(
-            bag.path,
-            "headers have no time" if times else "there is no message",
-            at=topic,
-            due="times in header.stamp are due, or --stamps log",
-        )
-    table = np.concatenate([rows[t] for t in times])
-    frame = np.repeat(np.arange(len(times)), [len(rows[t]) for t in times])
+    where = bag.path / topic.lstrip("/")
+    stamps, messages = [], []
+    for found in progress(bag.written([topic]), f"reading {topic}", bag.count([topic])):
+        stamps.append(found.t_ns)
+        messages.append(_observations(where, found.message, calibrated))
+    require_messages(bag, topic, len(stamps))
+    t_ns = np.array(stamps, np.int64)
+    good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks))[0]
+    order = good[in_order(bag, topic, t_ns[good], None, remarks)]
+    rows = [messages[k] for k in order]
+    table = np.concatenate(rows)
+    broken = ~np.isfinite(table).all(axis=1)
+    if broken.any():
+        leave_out(bag, topic, int(broken.sum()), len(table), "observations are not finite", remarks)
+    frame = np.repeat(np.arange(len(rows)), [len(one) for one in rows])[~broken]
+    table, times = table[~broken], t_ns[order]
     tracks = Tracks.from_rows(len(times), frame, table[:, 0].astype(np.int64), table[:, 1:])
     tracks.check(bag.path)
     if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
         raise ForeignFileError(bag.path, "an id stands twice in a message", at=topic)
-    return Seen(bag.path / topic.lstrip("/"), np.array(times, np.int64), tracks)
+    return Seen(where, times, tracks)
 
 
 def _observations(where: Path, message: Any, calibrated: Calibrated) -> Floats:
@@ -272,24 +298,23 @@ def _lenses(calibrated: Calibrated) -> tuple[Lens, Lens]:
 # --- camera_info ----------------------------------------------------------------------------------
 
 
-def camera_info_rig(bag: Bag, cameras: Cameras) -> Rig | None:
-    """Of the first camera_info of each picture topic; None where there are not two."""
+def camera_frame(bag: Bag, topic: str) -> str:
+    """What the messages of a topic call the frame of their sensor."""
+    first = next(bag.messages([topic]), None)
+    return "" if first is None else bare(first.message.header.frame_id)
+
+
+def camera_infos(bag: Bag, cameras: Cameras) -> Infos | None:
+    """The first camera_info of each picture topic; None where there are not two."""
     named = (cameras.left, cameras.left_info), (cameras.right, cameras.right_info)
     beside = [
         bag.require(info, CAMERA_INFO) if info else _info_topic(bag, topic) for topic, info in named
     ]
     if not all(beside):
         return None
-    infos = [next(bag.messages([topic])).message for topic in beside]
+    left, right = (_info(bag, topic) for topic in beside)
     rectified = "rect" in cameras.left.removesuffix("/compressed").rpartition("/")[2]
-    left, right = (_lens(bag, *pair, rectified) for pair in zip(beside, infos, strict=True))
-    P = np.reshape(_numbers(infos[1], "p"), (3, 4))
-    turns = [np.reshape(_numbers(info, "r"), (3, 3)) for info in infos]
-    R_left, R_right = (np.eye(3), np.eye(3)) if rectified else turns
-    shift = Poses(np.eye(3), np.array([P[0, 3] / P[0, 0], 0.0, 0.0]))  # q_right = q_left + it
-    outer = Poses(R_right.T, np.zeros(3)), Poses(R_left, np.zeros(3))
-    T_RL = se3.compose(se3.compose(outer[0], shift), outer[1])
-    return Rig.of_cameras(bag.path / beside[1].lstrip("/"), left, right, T_RL)
+    return Infos(left, right, rectified)
 
 
 def _info_topic(bag: Bag, topic: str) -> str:
@@ -305,30 +330,13 @@ def _info_topic(bag: Bag, topic: str) -> str:
     return ""
 
 
-def _numbers(info: Any, name: str) -> list[float]:
-    """ROS 1 has capital letters, ROS 2 small ones."""
-    return [float(x) for x in getattr(info, name if hasattr(info, name) else name.upper())]
-
-
-def _lens(bag: Bag, topic: str, info: Any, rectified: bool) -> Lens:
-    P, K, D = (_numbers(info, name) for name in "pkd")
-    if P[0] <= 0 or K[0] <= 0:
-        raise ForeignFileError(
-            bag.path,
-            "the camera is not calibrated: K or P is 0",
-            at=topic,
-            due="--calibration is due",
-        )
-    if rectified:
-        return Lens(LensModel.NONE, (P[0], P[5], P[2], P[6]), (), info.width, info.height)
-    model = LENSES.get(info.distortion_model, LensModel.NONE) if any(D) else LensModel.NONE
-    if any(D) and (info.distortion_model not in LENSES or len(D) not in COEFFICIENTS[model]):
-        raise ForeignFileError(
-            bag.path,
-            f"distortion model {info.distortion_model!r} with {len(D)} numbers",
-            at=topic,
-            due=f"{' or '.join(filter(None, LENSES))} is due",
-        )
-    intrinsics = (K[0], K[4], K[2], K[5])
-    coefficients = tuple(D) if any(D) else ()
-    return Lens(model, intrinsics, coefficients, info.width, info.height)
+def _info(bag: Bag, topic: str) -> Info:
+    info = next(bag.messages([topic])).message
+    # ROS 1 has capital letters, ROS 2 small ones
+    K, D, R, P = (
+        np.array(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
+        for name in "kdrp"
+    )
+    matrices = K.reshape(3, 3), D, R.reshape(3, 3), P.reshape(3, 4)
+    where = bag.path / topic.lstrip("/")
+    return Info(where, "", *matrices, info.distortion_model, info.width, info.height)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from itertools import chain
 from pathlib import Path
 
@@ -40,7 +41,18 @@ FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
+PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
 BLIND_GYRO_RADPS = 0.5  # about one: the pictures find the rotation
+
+
+class TwistIn(StrEnum):
+    """The axes in which somebody's twists are given; poses: none, they are made of his poses."""
+
+    AUTO = "auto"
+    BODY = "body"
+    WORLD = "world"
+    WORLD_VELOCITY = "world-velocity"
+    POSES = "poses"
 
 
 @dataclass(frozen=True)
@@ -52,6 +64,7 @@ class Twists:
     v_B_mps: Floats
     w_B_radps: Floats
     measured: frozenset[str] = frozenset(("vx", "vy", "vz", "wx", "wy", "wz"))
+    frame: str = ""  # the body's name, where the source tells it
 
     @property
     def is_whole(self) -> bool:
@@ -64,6 +77,7 @@ class Readings:
 
     where: Path
     inertial: Inertial
+    frame: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,6 +93,7 @@ class Asked:
     motion: Twists | Readings | None = None
     truth: Trajectory | None = None
     measured: frozenset[str] = Twists.measured  # of the source's own twists
+    axes: TwistIn = TwistIn.AUTO  # likewise
     timing: TwistTiming | None = None
     fix: bool = True
     remarks: tuple[str, ...] = ()
@@ -116,7 +131,8 @@ class Streams:
     @property
     def told(self) -> list[str]:
         """What its user is to be told of how the files were read."""
-        return [*self.remarks, *(self.truth.remarks if self.truth else ())]
+        of_truth = self.truth.remarks if self.truth else ()
+        return [*self.remarks, *of_truth, *self.calibrated.remarks]
 
 
 def recording(streams: Streams, settings: Settings | None = None) -> Recording:
@@ -238,7 +254,43 @@ def with_gyro(
     elif timing is TwistTiming.END:
         w = np.concatenate((w[:1], w))
     measured = twists.measured | {"wx", "wy", "wz"}
-    return Twists(twists.where, t, twists.v_B_mps[inside], w, measured)
+    return Twists(twists.where, t, twists.v_B_mps[inside], w, measured, twists.frame)
+
+
+def joined(
+    accel: Path,
+    gyro: Path,
+    forces: tuple[Times, Floats],
+    rates: tuple[Times, Floats],
+    remarks: list[str],
+) -> Inertial:
+    """Readings of an accelerometer and a gyro with clocks of their own, each as times and numbers.
+
+    The slower one is interpolated to the times of the faster one; where it pauses, none is made up.
+    """
+    slow, fast = sorted((forces, rates), key=lambda one: len(one[0]))
+    (own, x), (t_ns, _) = slow, fast
+    after = np.clip(np.searchsorted(own, t_ns), 1, max(len(own) - 1, 1))
+    inside = (t_ns >= own[0]) & (t_ns <= own[-1])
+    if len(own) < 2 or inside.sum() < 2:
+        raise ForeignFileError(
+            accel,
+            f"spans {forces[0][0]} to {forces[0][-1]} ns, {gyro} {rates[0][0]} to "
+            f"{rates[0][-1]} ns: they do not overlap",
+        )
+    steps = np.diff(own)
+    near = steps[after - 1] <= PAUSE_STEPS * np.median(steps)
+    kept = inside & near
+    seconds, at = (own - own[0]) * 1e-9, (t_ns[kept] - own[0]) * 1e-9
+    between = np.stack([np.interp(at, seconds, column) for column in x.T], axis=-1)
+    names = (accel, gyro) if slow is forces else (gyro, accel)
+    left_out = int((~kept).sum())
+    remarks.append(
+        f"{names[0]}: interpolated to the times of {names[1]}"
+        + (f", of which {left_out} lie outside or in its pauses and are left out" * bool(left_out))
+    )
+    both = (between, fast[1][kept]) if slow is forces else (fast[1][kept], between)
+    return Inertial(t_ns[kept], *both)
 
 
 def _held_between(t_ns: Times, timing: TwistTiming) -> Times:

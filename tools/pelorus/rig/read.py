@@ -34,6 +34,12 @@ class Calibrated:
     header: Header
     rig: Rig | None = None
     imu: Noise = field(default_factory=Noise)
+    remarks: tuple[str, ...] = ()
+
+
+def is_own(paths: Sequence[Path]) -> bool:
+    """Whether this is the project's own JSON, of a rectified pair."""
+    return len(paths) == 1 and paths[0].suffix.lower() == ".json"
 
 
 def read(
@@ -43,7 +49,7 @@ def read(
     lens: LensModel | None = None,
 ) -> Calibrated:
     """`extrinsic` says where the left camera sits on the body, whatever the other files say."""
-    if len(paths) == 1 and paths[0].suffix.lower() == ".json":
+    if is_own(paths):
         header = calibration.read(paths[0])
         if extrinsic is not None:
             T = calibration.read_extrinsic(extrinsic)

@@ -35,6 +35,9 @@ class Rig:
     offset_s: float = 0.0  # the body's clock = the cameras' + offset
     swapped: bool = False  # the file's second camera is the left one
     topics: tuple[str, ...] = ()  # of the left and the right camera, where the file names them
+    T_LF: Poses = (
+        se3.IDENTITY
+    )  # from the frame that the left camera's owner names; it may be turned
 
     @classmethod
     def of_cameras(

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""The order of a bag's stamps: what is merely late is put in its place, a clock that was set back
+is told.
+
+After it was set back two stretches of the drive have the same times. Where a recorder's messages
+stand as they came, the stamps go back. Where they were sorted by their arrival, which the same
+clock told, they are interleaved like the teeth of two combs, each with the period of the stream.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus import arrays, foreign
+from pelorus.converters.bag import NS, Bag
+from pelorus.foreign import ForeignFileError
+from pelorus.layout import Floats
+from pelorus.motion import Times
+
+TWICE = 1.5  # times as many messages as fit into a time that is covered once; covered twice: 2
+TEETH_MIN = 8  # in a stretch, to tell two combs from a stumble of the driver
+SAME_PERIOD = 0.1  # of it, inside and outside of the stretch
+COMBS_SIGMA = 5.0  # that the steps differ in turn, and not by chance
+
+
+class SetBack(NamedTuple):
+    """By how much, and at which message."""
+
+    by_ns: int
+    message: int
+
+
+def sound(
+    bag: Bag, topic: str, t_ns: Times, numbers: Floats, remarks: list[str]
+) -> NDArray[np.bool_]:
+    """Which messages have a time and finite numbers; refused where too many have not."""
+    timed = ~arrays.never_set(t_ns) if t_ns.any() else np.zeros(len(t_ns), np.bool_)
+    finite = np.isfinite(numbers).all(axis=1)
+    due = "times in header.stamp are due, or --stamps log: those of the messages' arrival"
+    leave_out(bag, topic, int((~timed).sum()), len(t_ns), "headers have no time", remarks, due)
+    wrong = "messages hold a number that is not finite"
+    leave_out(bag, topic, int((~finite).sum()), len(t_ns), wrong, remarks)
+    return np.asarray(timed & finite)
+
+
+def leave_out(
+    bag: Bag, topic: str, bad: int, count: int, wrong: str, remarks: list[str], due: str = ""
+) -> None:
+    """Say that so many of so many are left out; refuse if they are too many."""
+    if bad > foreign.BAD_ROWS_MAX * count:
+        raise ForeignFileError(bag.path, f"{bad} of {count} {wrong}", at=topic, due=due)
+    if bad:
+        remarks.append(f"{topic}: {bad} of {count} {wrong}: left out")
+
+
+def in_order(
+    bag: Bag, topic: str, t_ns: Times, numbers: Floats | None, remarks: list[str]
+) -> NDArray[np.intp]:
+    """Which messages are taken, of those whose times and numbers stand so in the file: in the order
+    of time, the first of those of one time. A clock that was set back is refused.
+    """
+    found = _written_back(t_ns)
+    order = np.argsort(t_ns, kind="stable")
+    if found is None:
+        found = _interleaved(t_ns[_without_copies(order, t_ns, numbers)])
+    if found is not None:
+        raise ForeignFileError(
+            bag.path,
+            f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}",
+            at=topic,
+            due="was a clock set back, or are two recordings in one bag? Each stretch must be "
+            "converted alone; if only the sensor's clock was set, --stamps log is due",
+        )
+    behind = np.maximum.accumulate(t_ns) - t_ns
+    if behind.any():
+        remarks.append(
+            f"{topic}: {int((behind > 0).sum())} messages come late, by up to "
+            f"{behind.max() * 1e-6:.3g} ms: put in the order of their stamps"
+        )
+    times, first = np.unique(t_ns, return_index=True)
+    if len(times) < len(t_ns):
+        remarks.append(f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out")
+    return first
+
+
+def _written_back(t_ns: Times) -> SetBack | None:
+    """Where stamps go back and the time behind is covered a second time."""
+    latest = np.maximum.accumulate(t_ns)
+    late = t_ns < latest
+    starts = np.nonzero(late & ~np.concatenate(([False], late[:-1])))[0]
+    steps = np.diff(t_ns)
+    period = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    for k, end in zip(starts.tolist(), np.append(starts, len(t_ns))[1:].tolist(), strict=True):
+        last = int(t_ns[k:end][late[k:end]].max())
+        there = int(((t_ns >= t_ns[k]) & (t_ns <= last)).sum())
+        if there > TWICE * ((last - t_ns[k]) / period + 1):
+            return SetBack(int(latest[k] - t_ns[k]), k)
+    return None
+
+
+def _without_copies(
+    order: NDArray[np.intp], t_ns: Times, numbers: Floats | None
+) -> NDArray[np.intp]:
+    """Without messages that are there twice, as in a bag of two recorders; without numbers to
+    compare, without all that repeat a time.
+    """
+    same = np.diff(t_ns[order]) == 0
+    if numbers is not None:
+        same &= (numbers[order[1:]] == numbers[order[:-1]]).all(axis=1)
+    return order[~np.concatenate(([False], same))]
+
+
+def _interleaved(t_ns: Times) -> SetBack | None:
+    """Of sorted stamps: a stretch of two combs, each with the period of all that is outside."""
+    steps = np.diff(t_ns).astype(np.float64)
+    if len(steps) < 2 * TEETH_MIN:
+        return None
+    usual = float(np.percentile(steps, 90))
+    dense = np.concatenate(([False], steps[1:] + steps[:-1] < TWICE * usual, [False]))
+    edges = np.nonzero(np.diff(dense.astype(np.int8)))[0]
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        inside, outside = steps[begin : end + 1], np.delete(steps, slice(begin, end + 1))
+        if len(inside) < TEETH_MIN or not len(outside):
+            continue
+        even, odd = inside[::2], inside[1::2]
+        period, alone = float(even.mean() + odd.mean()), float(np.median(outside))
+        apart = abs(even.mean() - odd.mean())
+        chance = np.sqrt(even.var() / len(even) + odd.var() / len(odd))
+        if abs(period - alone) < SAME_PERIOD * alone and apart > max(COMBS_SIGMA * chance, 1):
+            return SetBack(int(t_ns[end + 1] - t_ns[begin]), begin + (end - begin + 1) // 2)
+    return None

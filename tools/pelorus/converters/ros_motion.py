@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: MIT
+"""What moves the body in a bag: twists of odometry or wheels, a gyro beside them, or an IMU."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pelorus.console import progress
+from pelorus.converters import streams, twist_axes
+from pelorus.converters.bag import Bag, require_messages
+from pelorus.converters.order import in_order, sound
+from pelorus.converters.streams import Asked, Readings, Twists
+from pelorus.converters.transforms import Tree, bare
+from pelorus.errors import PelorusError
+from pelorus.foreign import ForeignFileError
+from pelorus.frames import TwistTiming
+from pelorus.inertial import Inertial
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.se3 import Poses
+from pelorus.trajectory import QUATERNION_NORM_TOLERANCE, Trajectory
+
+# What gives twists, and how.
+TWISTS: dict[str, Callable[[Any], Any]] = {
+    "nav_msgs/msg/Odometry": lambda m: m.twist.twist,
+    "geometry_msgs/msg/TwistStamped": lambda m: m.twist,
+    "geometry_msgs/msg/TwistWithCovarianceStamped": lambda m: m.twist.twist,
+}
+IMU = "sensor_msgs/msg/Imu"
+VECTOR = "geometry_msgs/msg/Vector3Stamped"  # of a driver that parts gyro and accelerometer
+JOINTS = "sensor_msgs/msg/JointState"
+POSES: dict[str, Callable[[Any], tuple[Any, Any]]] = {
+    "nav_msgs/msg/Odometry": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
+    "geometry_msgs/msg/PoseStamped": lambda m: (m.pose.position, m.pose.orientation),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: (
+        m.pose.pose.position,
+        m.pose.pose.orientation,
+    ),
+    "geometry_msgs/msg/TransformStamped": lambda m: (m.transform.translation, m.transform.rotation),
+}
+NO_POSE = [0.0] * 7
+AXES = [f"{kind}{axis}" for kind in "vw" for axis in "xyz"]
+
+
+@dataclass(frozen=True)
+class Wheels:
+    """Joints that turn at rad/s; with a track width the last one less the first one is a turn."""
+
+    topic: str
+    joints: tuple[str, ...]
+    radius_m: float
+    track_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Topics that the user names; else the only ones."""
+
+    twist: str = ""
+    gyro: str = ""
+    imu: str = ""
+    wheels: Wheels | None = None
+    frame: str = ""  # of the body, in place of what the messages say
+    truth: str = ""  # moves nothing, unless it is named twice
+
+
+class Rows(NamedTuple):
+    """Numbers of a topic in the order of time, and the frame that its messages name."""
+
+    t_ns: Times
+    numbers: Floats
+    frame: str
+
+
+def read(
+    bag: Bag, topics: Moving, asked: Asked, tree: Tree, remarks: list[str]
+) -> Twists | Readings:
+    """Of the topics that are named, else of those that there are but one of."""
+    found = _alone(bag, topics, asked, remarks)
+    if topics.frame:
+        found = replace(found, frame=bare(topics.frame))
+    if isinstance(found, Readings) or not topics.gyro:
+        return found
+    rows = _halves(bag, topics.gyro, remarks)
+    if not rows.numbers[:, 3:].any():
+        raise ForeignFileError(bag.path, "all its rates of turn are 0", at=topics.gyro)
+    w_B = rows.numbers[:, 3:]
+    if rows.frame and found.frame and rows.frame != found.frame:
+        w_B = _turned(w_B, topics.gyro, rows.frame, found.frame, tree, remarks)
+    where = bag.path / topics.gyro.lstrip("/")
+    return streams.with_gyro(found, where, rows.t_ns, w_B, _timing(asked))
+
+
+def _turned(w: Floats, topic: str, frame: str, body: str, tree: Tree, remarks: list[str]) -> Floats:
+    """A gyro's rates in the axes of the body, as far as the transforms know both."""
+    if not {frame, body} <= tree.frames:
+        remarks.append(f"{topic}: of the frame {frame!r}, taken as having the axes of {body!r}")
+        return w
+    chain = tree.chain(frame, body)
+    remarks.append(f"{topic}: its rates are turned into {body!r} as /tf_static says: {chain.words}")
+    return np.asarray(w @ chain.T.R.T)
+
+
+def _timing(asked: Asked) -> TwistTiming:
+    return TwistTiming.START if asked.timing is None else asked.timing
+
+
+def _alone(bag: Bag, topics: Moving, asked: Asked, remarks: list[str]) -> Twists | Readings:
+    """Without the gyro beside twists."""
+    named = [topic for topic in (topics.twist, topics.imu) if topic]
+    if len(named) + (topics.wheels is not None) > 1:
+        raise PelorusError(
+            "--twist-topic, --imu-topic and --joint-topic: one of them is due, it moves the body"
+        )
+    if topics.wheels is not None:
+        return _wheels(bag, topics.wheels, remarks)
+    if topics.imu:
+        return _imu(bag, topics.imu, topics.gyro, remarks)
+    twists = [topic for topic in bag.of_type(*TWISTS) if topic != topics.truth]
+    imus = bag.of_type(IMU)
+    if topics.twist or len(twists) == 1:
+        unused = [topic for topic in imus if topic != topics.gyro]
+        if unused:
+            said = "not used; --imu-topic or --gyro-topic would use it"
+            remarks.append(f"{', '.join(unused)}: {said}")
+        return _twists(bag, bag.require(topics.twist or twists[0], *TWISTS), asked, remarks)
+    if not twists and len(imus) == 1:
+        return _imu(bag, imus[0], topics.gyro, remarks)
+    pair = _apart(bag, imus, remarks) if not twists and len(imus) == 2 else None
+    if pair is not None:
+        return pair
+    raise PelorusError(
+        f"{bag.path}: what moves the body? {len(twists)} topics hold twists, {len(imus)} hold "
+        f"{IMU}; --twist-topic, --imu-topic or --joint-topic is due; {bag.listing()}"
+    )
+
+
+# --- twists ---------------------------------------------------------------------------------------
+
+
+def _twists(bag: Bag, topic: str, asked: Asked, remarks: list[str]) -> Twists:
+    of_twist, of_pose = TWISTS[bag.types[topic]], POSES.get(bag.types[topic])
+    kept = np.array([name in asked.measured for name in AXES])
+
+    def row(message: Any) -> list[float]:
+        twist = of_twist(message)
+        numbers = np.array([*_xyz(twist.linear), *_xyz(twist.angular)])
+        pose = [] if of_pose is None else _pose(of_pose(message))
+        pose = pose if np.isfinite(pose).all() else NO_POSE
+        return [*np.where(kept, numbers, 0.0).tolist(), *pose]
+
+    t_ns, numbers, frame = _rows(bag, topic, row, remarks)
+    where = bag.path / topic.lstrip("/")
+    found = Twists(where, t_ns, numbers[:, :3], numbers[:, 3:6], asked.measured, frame)
+    remarks.append(
+        f"{topic}: twists of the frame {frame!r}: the calibration's extrinsic must be of the same"
+    )
+    poses = None
+    if of_pose is not None and _are_rotations(numbers[:, 9:]):
+        poses = _poses(numbers[:, 6:])
+    return twist_axes.in_body(found, poses, asked.axes, _timing(asked), remarks)
+
+
+def _wheels(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
+    """Forward the mean of the wheels' speeds; nothing else, unless the track width gives a turn."""
+    topic = bag.require(wheels.topic, JOINTS)
+
+    def row(message: Any) -> list[float]:
+        lacking = [name for name in wheels.joints if name not in message.name]
+        if lacking or len(message.velocity) != len(message.name):
+            raise ForeignFileError(
+                bag.path,
+                f"{topic} has the joints {', '.join(message.name)} with "
+                f"{len(message.velocity)} velocities",
+                due=f"{', '.join(wheels.joints)} with a velocity each are due",
+            )
+        return [float(message.velocity[message.name.index(name)]) for name in wheels.joints]
+
+    t_ns, turning, frame = _rows(bag, topic, row, remarks)
+    speed = turning * wheels.radius_m
+    v, w = np.zeros((2, len(t_ns), 3))
+    v[:, 0] = speed.mean(axis=1)
+    measured = {"vx"}
+    if wheels.track_m:
+        w[:, 2] = (speed[:, -1] - speed[:, 0]) / wheels.track_m
+        measured.add("wz")
+    where = bag.path / topic.lstrip("/")
+    return Twists(where, t_ns, v, w, frozenset(measured), frame)
+
+
+# --- an IMU ---------------------------------------------------------------------------------------
+
+
+def _imu(bag: Bag, topic: str, gyro: str, remarks: list[str]) -> Readings:
+    """Of one topic; or of two, if the gyro is named, or if each of two has one of the halves."""
+    if gyro == topic:
+        raise PelorusError(f"--imu-topic and --gyro-topic: {topic} is named twice")
+    if gyro:
+        pair = _halves(bag, topic, remarks), _halves(bag, gyro, remarks)
+        return _joined(bag, topic, gyro, *pair, remarks)
+    rows = _halves(bag, bag.require(topic, IMU), remarks)
+    others = [other for other in bag.of_type(IMU) if other != topic]
+    a, w = rows.numbers[:, :3].any(), rows.numbers[:, 3:].any()
+    if a and w:
+        return _readings(bag, topic, rows)
+    if len(others) == 1:
+        second = _halves(bag, others[0], remarks)
+        if a and second.numbers[:, 3:].any():
+            return _joined(bag, topic, others[0], rows, second, remarks)
+        if w and second.numbers[:, :3].any():
+            return _joined(bag, others[0], topic, second, rows, remarks)
+    what = "specific forces" if w else "rates of turn"
+    raise ForeignFileError(
+        bag.path,
+        f"all its {what} are 0",
+        at=topic,
+        due="are they on another topic? --imu-topic of the accelerometer and --gyro-topic of the "
+        f"gyro are due; {bag.listing()}",
+    )
+
+
+def _apart(bag: Bag, topics: list[str], remarks: list[str]) -> Readings | None:
+    """Of an accelerometer's topic and a gyro's, if these are that."""
+    pair = [_halves(bag, topic, []) for topic in topics]
+    forces = [bool(rows.numbers[:, :3].any()) for rows in pair]
+    rates = [bool(rows.numbers[:, 3:].any()) for rows in pair]
+    if forces == rates or sum(forces) != 1 or sum(rates) != 1:
+        return None
+    a, g = forces.index(True), rates.index(True)
+    return _joined(bag, topics[a], topics[g], pair[a], pair[g], remarks)
+
+
+def _joined(bag: Bag, accel: str, gyro: str, a: Rows, w: Rows, remarks: list[str]) -> Readings:
+    """The slower one of the two is interpolated to the times of the faster one."""
+    forces, rates = (a.t_ns, a.numbers[:, :3]), (w.t_ns, w.numbers[:, 3:])
+    if not forces[1].any():
+        raise ForeignFileError(bag.path, "all its specific forces are 0", at=accel)
+    if not rates[1].any():
+        raise ForeignFileError(bag.path, "all its rates of turn are 0", at=gyro)
+    if a.frame and w.frame and a.frame != w.frame:
+        remarks.append(f"{accel}, {gyro}: of {a.frame!r} and {w.frame!r}: taken as one frame")
+    where = bag.path / accel.lstrip("/")
+    inertial = streams.joined(where, bag.path / gyro.lstrip("/"), forces, rates, remarks)
+    return Readings(where, inertial, a.frame or w.frame)
+
+
+def _halves(bag: Bag, topic: str, remarks: list[str]) -> Rows:
+    """(n, 6) specific force and rate of turn; a lone vector stands in both."""
+    bag.require(topic, IMU, VECTOR)
+
+    def row(message: Any) -> list[float]:
+        if hasattr(message, "vector"):
+            return [*_xyz(message.vector), *_xyz(message.vector)]
+        return [*_xyz(message.linear_acceleration), *_xyz(message.angular_velocity)]
+
+    return _rows(bag, topic, row, remarks)
+
+
+def _readings(bag: Bag, topic: str, rows: Rows) -> Readings:
+    inertial = Inertial(rows.t_ns, rows.numbers[:, :3], rows.numbers[:, 3:])
+    return Readings(bag.path / topic.lstrip("/"), inertial, rows.frame)
+
+
+# --- truth ----------------------------------------------------------------------------------------
+
+
+def truth(bag: Bag, topic: str, remarks: list[str]) -> Trajectory:
+    """Poses of the body in the world."""
+    bag.require(topic, *POSES)
+    of_message = POSES[bag.types[topic]]
+    t_ns, numbers, _ = _rows(bag, topic, lambda message: _pose(of_message(message)), remarks)
+    if not _are_rotations(numbers[:, 3:]):
+        raise ForeignFileError(bag.path, "holds a quaternion whose norm is not 1", at=topic)
+    return Trajectory(t_ns, _poses(numbers))
+
+
+def _pose(pose: tuple[Any, Any]) -> list[float]:
+    """p and q, x y z w."""
+    p, q = pose
+    return [*_xyz(p), *_xyz(q), float(q.w)]
+
+
+def _poses(numbers: Floats) -> Poses:
+    return Poses(Rotation.from_quat(numbers[:, 3:]).as_matrix(), numbers[:, :3])
+
+
+def _are_rotations(quaternions: Floats) -> bool:
+    norms = np.linalg.norm(quaternions, axis=1)
+    return bool(np.abs(norms - 1).max() <= QUATERNION_NORM_TOLERANCE)
+
+
+# --- rows -----------------------------------------------------------------------------------------
+
+
+def _xyz(vector: Any) -> list[float]:
+    return [float(vector.x), float(vector.y), float(vector.z)]
+
+
+def _rows(bag: Bag, topic: str, row: Callable[[Any], list[float]], remarks: list[str]) -> Rows:
+    """Without messages that tell nothing."""
+    found = progress(bag.written([topic]), f"reading {topic}", bag.count([topic]))
+    stamped, frame = [], ""
+    for one in found:
+        frame = bare(getattr(one.message, "child_frame_id", "") or one.message.header.frame_id)
+        stamped.append((one.t_ns, row(one.message)))
+    require_messages(bag, topic, len(stamped))
+    t_ns = np.array([t for t, _ in stamped], np.int64)
+    numbers = np.array([values for _, values in stamped])
+    good = sound(bag, topic, t_ns, numbers, remarks)
+    t_ns, numbers = t_ns[good], numbers[good]
+    order = in_order(bag, topic, t_ns, numbers, remarks)
+    return Rows(t_ns[order], numbers[order], frame)

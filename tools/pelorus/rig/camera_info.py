@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""ROS's camera_info of two cameras, as messages or as the YAML files of camera_calibration.
+
+K and D are of the pictures as they were taken; R turns a camera into the rectified one, P projects
+there, and the fourth number of the right one's P is -fx times the baseline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pelorus import se3
+from pelorus.foreign import ForeignFileError
+from pelorus.layout import Floats
+from pelorus.named import Named
+from pelorus.rig.kalibr import matrix
+from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
+from pelorus.rig.rig import Rig
+from pelorus.se3 import Poses
+
+LENSES = {
+    "plumb_bob": LensModel.RADTAN,
+    "rational_polynomial": LensModel.RADTAN,
+    "equidistant": LensModel.EQUIDISTANT,
+    "fisheye": LensModel.EQUIDISTANT,
+    "": LensModel.NONE,
+}
+
+
+class Info(NamedTuple):
+    """One camera's; `path` and `at` say where it stands."""
+
+    path: Path
+    at: str
+    K: Floats
+    D: Floats
+    R: Floats
+    P: Floats
+    model: str
+    width_px: int
+    height_px: int
+
+    def lens(self, rectified: bool) -> Lens:
+        """Of the pictures as they were taken, or of those that somebody rectified."""
+        K, P, D = self.K, self.P, self.D
+        if P[0, 0] <= 0 or K[0, 0] <= 0:
+            raise ForeignFileError(
+                self.path,
+                "the camera is not calibrated: K or P is 0",
+                at=self.at,
+                due="--calibration is due",
+            )
+        size = self.width_px, self.height_px
+        if rectified:
+            return Lens(LensModel.NONE, (P[0, 0], P[1, 1], P[0, 2], P[1, 2]), (), *size)
+        model = LENSES.get(self.model, LensModel.NONE) if D.any() else LensModel.NONE
+        if D.any() and (self.model not in LENSES or len(D) not in COEFFICIENTS[model]):
+            raise ForeignFileError(
+                self.path,
+                f"distortion model {self.model!r} with {len(D)} numbers",
+                at=self.at,
+                due=f"{' or '.join(filter(None, LENSES))} is due",
+            )
+        coefficients = tuple(D.tolist()) if D.any() else ()
+        return Lens(model, (K[0, 0], K[1, 1], K[0, 2], K[1, 2]), coefficients, *size)
+
+
+@dataclass(frozen=True)
+class Infos:
+    """Of the left and the right camera; `rectified` where somebody rectified the pictures."""
+
+    left: Info
+    right: Info
+    rectified: bool
+
+    @property
+    def have_baseline(self) -> bool:
+        return bool(self.left.P[0, 3] != self.right.P[0, 3])
+
+    def rig(self, T_RL: Poses | None = None) -> Rig:
+        """`T_RL` is of the cameras themselves, where P has no baseline."""
+        left, right = self.left, self.right
+        lenses = left.lens(self.rectified), right.lens(self.rectified)
+        R_left, R_right = (
+            Poses(se3.nearest_rotation(info.R) if info.R.any() else np.eye(3), np.zeros(3))
+            for info in (left, right)
+        )
+        if T_RL is not None:
+            outer = (R_right, se3.inverse(R_left)) if self.rectified else (se3.IDENTITY,) * 2
+            T_RL = se3.compose(se3.compose(outer[0], T_RL), outer[1])
+        else:
+            shift_m = (right.P[0, 3] - left.P[0, 3]) / right.P[0, 0] if right.P[0, 0] else 0.0
+            T_RL = Poses(np.eye(3), np.array([shift_m, 0.0, 0.0]))  # q_right = q_left + it
+            if not self.rectified:
+                T_RL = se3.compose(se3.compose(se3.inverse(R_right), T_RL), R_left)
+        rig = Rig.of_cameras(right.path, *lenses, T_RL)
+        if not self.rectified:
+            return rig
+        return replace(rig, T_LF=R_right if rig.swapped else R_left)
+
+
+def is_camera_info(content: Named) -> bool:
+    """A file of camera_calibration."""
+    return "camera_matrix" in content and "projection_matrix" in content
+
+
+def read(content: Named) -> Info:
+    """Of one file."""
+    D = _row(content, "distortion_coefficients")
+    model = content.content.get("distortion_model", "plumb_bob")
+    width, height = (content.content.get(name, 0) for name in ("image_width", "image_height"))
+    return Info(
+        content.path,
+        content.at,
+        matrix(content, "camera_matrix", 3, 3),
+        D,
+        matrix(content, "rectification_matrix", 3, 3),
+        matrix(content, "projection_matrix", 3, 4),
+        str(model),
+        int(width),
+        int(height),
+    )
+
+
+def pair(first: Named, second: Named, lens: LensModel | None) -> Rig:
+    """Of two files in any order; `lens` none says that the pictures are rectified already."""
+    infos = Infos(read(first), read(second), lens is LensModel.NONE)
+    if not infos.have_baseline:
+        raise ForeignFileError(
+            second.path,
+            "the projection_matrix of neither camera has a baseline",
+            due="files of a stereo calibration are due: P[3] of the right one is -fx baseline",
+        )
+    return infos.rig()
+
+
+def _row(content: Named, name: str) -> Floats:
+    inner = content.object(name)
+    count = int(inner.number("rows") * inner.number("cols"))
+    return inner.array("data", count)
