@@ -115,10 +115,21 @@ typedef struct plr_core_motion {
 typedef struct plr_watched_point {
     uint32_t id;
     float u_px, v_px;
-    uint32_t used; /* 0: a free place; else what is known of it, src/filter/inertial.c */
+    uint32_t used; /* 0: a free place; else what is known of it, plr_point_watch */
 } plr_watched_point;
 
 enum { PLR_WATCHED_POINTS = 8 };
+
+/* What is known of a watched point. */
+typedef enum plr_point_watch {
+    PLR_POINT_FILLED = 1,
+    PLR_POINT_CONFIRMED = 2, /* seen again where it was */
+    PLR_POINT_MOVED = 4,     /* seen elsewhere last time */
+    PLR_POINT_EARLY = 8,     /* first seen in the first half of the stretch */
+    PLR_POINT_STAYS = 16     /* seen where it was in the second half */
+} plr_point_watch;
+
+enum { PLR_POINTS_LEAST = 3 }; /* fewer say nothing of the body */
 
 /* Readings of an IMU before the filter has started: src/process/alignment.h. */
 typedef struct plr_alignment {
@@ -147,6 +158,8 @@ typedef struct plr_inertial {
     plr_real slow[PLR_POSE_DIM];         /* mean reading of the last half second */
     plr_real spread2[2]; /* mean square difference of readings from `slow`, linear and angular */
     plr_real change2[2]; /* mean square of the difference between successive readings */
+    plr_real change[PLR_POSE_DIM]; /* the last of these differences */
+    plr_real scatter2[2];          /* variance of a reading about the line through its neighbours */
     plr_real usual_s;    /* usual interval between readings */
     plr_real off_usual2; /* mean square difference of intervals from that, s^2 */
     plr_time_ns started_ns;

@@ -131,10 +131,8 @@ static plr_watched_point *watched(plr_alignment *at, uint32_t id) {
     return free;
 }
 
-/* What is known of a watched point. */
-enum { FILLED = 1, CONFIRMED = 2, MOVED = 4 };
-
-static void remember(plr_watched_point *point, const plr_observation *seen) {
+static void remember(plr_watched_point *point, const plr_observation *seen, bool early) {
+    point->used = PLR_POINT_FILLED | (early ? PLR_POINT_EARLY : 0U);
     point->id = seen->id;
     point->u_px = seen->uL_px;
     point->v_px = seen->vL_px;
@@ -142,19 +140,25 @@ static void remember(plr_watched_point *point, const plr_observation *seen) {
 
 /* True if a watched point is seen at another place for the second time in a row: any match can be wrong,
  * the first one too. */
-static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_observation *seen) {
+static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_observation *seen,
+                      bool early) {
     const plr_real du = (plr_real)(seen->uL_px - point->u_px);
     const plr_real dv = (plr_real)(seen->vL_px - point->v_px);
     const bool elsewhere = du * du + dv * dv > MOVED_ABOVE * still2(f);
-    const bool again = elsewhere && (point->used & MOVED);
-    if (elsewhere && !(point->used & CONFIRMED))
-        remember(point, seen);
-    point->used = elsewhere ? point->used | MOVED : FILLED | CONFIRMED;
+    const bool again = elsewhere && (point->used & PLR_POINT_MOVED);
+    if (elsewhere && !(point->used & PLR_POINT_CONFIRMED))
+        remember(point, seen, early);
+    if (elsewhere)
+        point->used |= PLR_POINT_MOVED;
+    else
+        point->used = (point->used & ~(uint32_t)PLR_POINT_MOVED) | PLR_POINT_CONFIRMED |
+                      (early ? 0U : (uint32_t)PLR_POINT_STAYS);
     return again;
 }
 
 void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     unsigned seen = 0, moved = 0;
+    const bool early = plr_alignment_is_early(f);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_watched_point *point = watched(&f->either.alignment, o->id);
@@ -162,13 +166,12 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
             continue;
         if (point->used) {
             seen++;
-            moved += has_moved(f, point, o);
+            moved += has_moved(f, point, o, early);
         } else {
-            remember(point, o);
-            point->used = FILLED;
+            remember(point, o, early);
         }
     }
-    if (seen < 3 || 2 * moved <= seen) /* a few are mismatches, or things that move */
+    if (seen < PLR_POINTS_LEAST || 2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
     plr_alignment_restart(f);
     plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);

@@ -23,8 +23,13 @@
 /* A gyro at rest that shows more than so many sigmas of its bias, and this, is turning. */
 #define BIAS_SIGMAS PLR_R(5)
 #define SLOW_TURN   PLR_R(0.02) /* rad/s */
-/* What is known of velocity at rest, m/s, and of tilt at a start in motion, rad. */
+/* Where the pictures show that it stands, any rate below this is its bias, rad/s: data sheets have up to 20
+ * degrees a second. */
+#define MOST_BIAS PLR_R(0.5)
+/* What is known of velocity at rest, m/s: by readings that are calm, and by pictures that stand, which a body
+ * that hovers hardly moves either; and of tilt at a start in motion, rad. */
 #define REST_VELOCITY PLR_R(0.01)
+#define SEEN_VELOCITY PLR_R(0.1)
 #define TILT          PLR_R(0.2)
 /* Nothing is known better, as a variance: rad^2, m^2. */
 #define LEAST PLR_R(1e-8)
@@ -33,8 +38,8 @@
 /* The measured up and that of the given pose differ by more, rad (as 1 - cos). */
 #define OTHER_TILT PLR_R(0.06)
 /* So long after the start the mean reading is held against gravity. It is at fault if it does not
- * fit in so many frames in a row, for so long: bodies swing, and frames come at any rate. A
- * body that spins faster, rad/s, would be thrown about. */
+ * fit in so many frames in a row, for so long: bodies swing, and frames come at any rate; and no more if it
+ * fits for as long, for it was a shock. A body that spins faster, rad/s, would be thrown about. */
 #define WATCH_NS UINT64_C(10000000000)
 #define DOUBT_NS UINT64_C(850000000)
 #define SPINS    PLR_R(10)
@@ -65,6 +70,15 @@ static void end_stretch(plr_filter *f, plr_time_ns t_ns) {
         plr_alignment_restart(f);
 }
 
+/* True in the first half of a stretch. */
+static bool is_early(const plr_alignment *at, plr_time_ns t_ns) {
+    return at->count == 0 || 2 * (t_ns - at->begin_ns) <= REST_NS;
+}
+
+bool plr_alignment_is_early(const plr_filter *f) {
+    return is_early(&f->either.alignment, f->t_ns);
+}
+
 /* Mean and spread of the readings so far (Welford). */
 static void average(plr_alignment *at, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
     if (at->first_ns == 0)
@@ -79,29 +93,70 @@ static void average(plr_alignment *at, plr_time_ns t_ns, const plr_real reading[
         plr_real *spread = &at->spread2[i / 3];
         *spread = PLR_FMA(off, reading[i] - at->mean[i], *spread);
     }
-    if (2 * (t_ns - at->begin_ns) <= REST_NS)
+    if (is_early(at, t_ns))
         memcpy(at->half_mean, at->mean, sizeof at->half_mean);
 }
 
-/* True if three numbers scatter no more than a body's at rest; `noise`: variance of one reading. */
-static bool is_steady(const plr_alignment *at, unsigned first, plr_real allowed, plr_real noise) {
-    const plr_real readings = (plr_real)at->count, limit = allowed * allowed + PLR_R(4) * noise;
+/* The variance of one reading: as stated, or as they scatter, if that is more. */
+static plr_real variance_of(const plr_alignment *at, unsigned first, plr_real stated) {
+    const plr_real shown = at->spread2[first / 3] / (PLR_R(3) * (plr_real)at->count);
+    return shown > stated ? shown : stated;
+}
+
+/* True if the mean of three numbers is the same in the whole and in its first half, but for `allowed` and the
+ * noise, `variance` of one reading. */
+static bool is_even(const plr_alignment *at, unsigned first, plr_real allowed, plr_real variance) {
     plr_real drift[3];
     for (unsigned i = 0; i < 3; i++)
         drift[i] = at->mean[first + i] - at->half_mean[first + i];
     const plr_real most =
-        DRIFT_SHARE * DRIFT_SHARE * allowed * allowed + PLR_R(36) * noise / readings;
-    return at->spread2[first / 3] <= PLR_R(3) * limit * readings && plr_dot3(drift, drift) <= most;
+        DRIFT_SHARE * DRIFT_SHARE * allowed * allowed + PLR_R(36) * variance / (plr_real)at->count;
+    return plr_dot3(drift, drift) <= most;
 }
 
-static bool is_at_rest(const plr_filter *f, const plr_alignment *at, plr_real interval) {
-    const plr_real sigma = f->bias_prior_sigma[3], turn = BIAS_SIGMAS * sigma + SLOW_TURN;
+/* True if three numbers scatter no more than a body's at rest; `noise`: variance of one reading. */
+static bool is_steady(const plr_alignment *at, unsigned first, plr_real allowed, plr_real noise) {
+    const plr_real limit = allowed * allowed + PLR_R(4) * noise;
+    return at->spread2[first / 3] <= PLR_R(3) * limit * (plr_real)at->count &&
+           is_even(at, first, allowed, noise);
+}
+
+/* True if most of the points that were seen in the first half of the stretch are still where they were. */
+static bool pictures_stand(const plr_alignment *at) {
+    unsigned stay = 0, others = 0;
+    for (unsigned i = 0; i < PLR_WATCHED_POINTS; i++)
+        if (at->points[i].used & PLR_POINT_EARLY) {
+            const bool stays = (at->points[i].used & (PLR_POINT_STAYS | PLR_POINT_MOVED)) ==
+                               PLR_POINT_STAYS;
+            stay += stays;
+            others += !stays;
+        }
+    return stay >= PLR_POINTS_LEAST && stay > others;
+}
+
+/* True if the readings say by themselves that the body rests: an engine may run, no hand may walk. */
+static bool is_calm(const plr_filter *f, const plr_alignment *at, plr_real interval) {
+    return is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval) &&
+           is_steady(at, 3, SPREAD_GYRO, f->par.gyro_density / interval);
+}
+
+/* Whether the body rests, and what speaks against it: MOVES, or a gyro that turns meanwhile. Calm readings say
+ * it alone. Motors that idle shake them more than a hand does: then it takes the pictures, and means that do
+ * not wander. */
+static plr_imu_fault find_unrest(const plr_filter *f, const plr_alignment *at, plr_real interval) {
+    const plr_real noise[2] = {f->par.accel_density / interval, f->par.gyro_density / interval};
+    const plr_real turn = BIAS_SIGMAS * f->bias_prior_sigma[3] + SLOW_TURN;
+    const bool still = is_steady(at, 0, SPREAD_ACCEL, noise[0]), seen = pictures_stand(at);
     plr_real rate[3];
     for (unsigned i = 0; i < 3; i++)
         rate[i] = at->mean[3 + i] - f->bias_prior[3 + i];
-    return is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval) &&
-           is_steady(at, 3, SPREAD_GYRO, f->par.gyro_density / interval) &&
-           plr_dot3(rate, rate) <= turn * turn;
+    const plr_real rate2 = plr_dot3(rate, rate);
+    const bool is_bias = rate2 <= turn * turn || (seen && rate2 <= MOST_BIAS * MOST_BIAS);
+    if (!is_bias)
+        return still || seen ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES;
+    const bool even = is_even(at, 0, SPREAD_ACCEL, variance_of(at, 0, noise[0])) &&
+                      is_even(at, 3, SPREAD_GYRO, variance_of(at, 3, noise[1]));
+    return is_calm(f, at, interval) || (seen && even) ? PLR_IMU_FAULT_NONE : PLR_IMU_FAULT_MOVES;
 }
 
 /* ---------------------------------------------------------------- the start */
@@ -213,16 +268,20 @@ static plr_imu_fault find_fault(const plr_filter *f, const plr_real u[3], plr_re
 static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, const plr_real u[3]) {
     enum { A = 0, G = 3 };
     const plr_alignment *at = &f->either.alignment;
-    const plr_real seconds = interval * (plr_real)at->count;
-    const plr_real measured = f->par.gyro_density / seconds;
-    const plr_real flicker = f->par.accel_density / (seconds * f->par.gravity * f->par.gravity);
+    const plr_real readings = (plr_real)at->count, g2 = f->par.gravity * f->par.gravity;
+    const bool calm = is_calm(f, at, interval); /* else the pictures have said that it rests */
+    const plr_real speed = calm ? REST_VELOCITY : SEEN_VELOCITY;
+    const plr_real measured = variance_of(at, 3, f->par.gyro_density / interval) / readings +
+                              (calm ? PLR_R(0) : SLOW_TURN * SLOW_TURN);
+    const plr_real flicker = variance_of(at, 0, f->par.accel_density / interval) / (readings * g2);
     plr_real L[9], theta[9], cross[PLR_POSE_DIM * PLR_BIAS_DIM] = {0};
     double variance[PLR_BIAS_DIM];
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
     for (unsigned i = 0; i < 3; i++)
         if (variance[G + i] > (double)measured) {
-            f->bias[G + i] = at->mean[G + i];
+            f->bias[G + i] = f->bias_prior[G + i] = at->mean[G + i];
+            f->bias_prior_sigma[G + i] = PLR_SQRT(measured);
             variance[G + i] = (double)measured;
         }
     plr_skew(L, u);
@@ -237,7 +296,7 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
         }
     tilt(f, u);
     plr_covariance_begin_diagonal(f, PLR_BLOCK_BIAS, variance);
-    set_unknown_velocity(f, REST_VELOCITY * REST_VELOCITY);
+    set_unknown_velocity(f, speed * speed);
     set_tilt_covariance(f, u, theta);
     plr_covariance_set(f, PLR_BLOCK_BIAS, PLR_BLOCK_POSE, cross);
     begin(f, t_ns, interval);
@@ -274,9 +333,9 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
     const plr_real interval =
         (plr_real)((double)(t_ns - at->begin_ns) * 1e-9 / (double)(at->count - 1));
     const plr_real length = measured_up(f, at->mean, u);
-    if (at_rest && !is_at_rest(f, at, interval)) {
-        const bool turns = is_steady(at, 0, SPREAD_ACCEL, f->par.accel_density / interval);
-        plr_alignment_does_not_stand(f, turns ? PLR_IMU_FAULT_TURNS : PLR_IMU_FAULT_MOVES);
+    const plr_imu_fault unrest = at_rest ? find_unrest(f, at, interval) : PLR_IMU_FAULT_NONE;
+    if (unrest != PLR_IMU_FAULT_NONE) {
+        plr_alignment_does_not_stand(f, unrest);
         return false;
     }
     const plr_real g = f->par.gravity;
@@ -336,17 +395,21 @@ static plr_imu_fault find_doubt(const plr_filter *f) {
 
 void plr_alignment_watch_gravity(plr_filter *f) {
     plr_inertial *s = &f->inertial;
-    if (!s->started || s->fault != PLR_IMU_FAULT_NONE || f->t_ns - s->started_ns > WATCH_NS)
+    const bool watches = s->fault == PLR_IMU_FAULT_NONE && f->t_ns - s->started_ns <= WATCH_NS;
+    const bool doubts = s->fault > PLR_IMU_FAULT_NONE && s->fault < PLR_IMU_FAULT_TILT;
+    if (!s->started || !(watches || doubts))
         return;
     const plr_imu_fault doubt = find_doubt(f);
-    if (doubt == PLR_IMU_FAULT_NONE)
-        s->doubts = 0;
+    if ((doubt != PLR_IMU_FAULT_NONE) == doubts)
+        s->doubts = 0; /* nothing new */
     else if (s->doubts++ == 0)
         s->doubted_ns = f->t_ns;
-    if (s->doubts >= WATCH_FRAMES && f->t_ns - s->doubted_ns >= DOUBT_NS)
+    if (s->doubts >= WATCH_FRAMES && f->t_ns - s->doubted_ns >= DOUBT_NS) {
         s->fault = (uint8_t)doubt;
-    else if (s->doubts > WATCH_FRAMES)
+        s->doubts = 0;
+    } else if (s->doubts > WATCH_FRAMES) {
         s->doubts = WATCH_FRAMES; /* more are not counted */
+    }
 }
 
 /* ---------------------------------------------------------------- the anchor */

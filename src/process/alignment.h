@@ -17,6 +17,9 @@ void plr_alignment_clear(plr_filter *f);
  * and biases are set, with their covariance. There may be no landmarks. */
 bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]);
 
+/* True in the first half of the stretch that is averaged. */
+bool plr_alignment_is_early(const plr_filter *f);
+
 /* The stretch that is averaged begins anew: the pictures show that the body moves. */
 void plr_alignment_restart(plr_filter *f);
 

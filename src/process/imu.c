@@ -253,12 +253,29 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
     }
 }
 
-/* The densities of the readings' noise, squared. A reading held for longer than usual is wrong by
- * what changes meanwhile: at first as successive readings differ, later as they scatter at all. */
-static void densities(const plr_filter *f, plr_real interval, plr_real density[2]) {
+/* What is unlikely of three numbers of this variance each, once in a million. */
+#define UNLIKELY PLR_R(30)
+
+/* The densities of the readings' noise, squared: as stated, or as they scatter about their neighbours, if
+ * that is more. A specific force beyond what a body does, its own weight and that scatter, is a shock and
+ * not believed. A reading held for longer than usual is wrong by what changes meanwhile: at first as
+ * successive readings differ, later as they scatter at all. */
+static void densities(const plr_filter *f, const plr_imu_step *s, plr_real interval,
+                      plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
-    density[0] = f->par.accel_density;
-    density[1] = f->par.gyro_density;
+    const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
+    const plr_real stated[2] = {f->par.accel_density, f->par.gyro_density};
+    plr_real accelerated[3];
+    for (int i = 0; i < 2; i++) {
+        const plr_real shown = PLR_R(0.25) * at->scatter2[i] * at->usual_s;
+        density[i] = shown > stated[i] ? shown : stated[i];
+    }
+    for (int i = 0; i < 3; i++)
+        accelerated[i] = s->a[i] + s->gamma[i];
+    const plr_real beyond2 =
+        plr_dot3(accelerated, accelerated) - (scatter2 > g * g ? scatter2 : g * g);
+    if (beyond2 > 0)
+        density[0] = PLR_FMA(LASTING_S, beyond2, density[0]);
     if (!(at->usual_s > 0) || interval <= PLR_LONG_INTERVALS * at->usual_s)
         return;
     const plr_real intervals = interval / at->usual_s;
@@ -311,10 +328,11 @@ static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
     put_noise(f, Q);
 }
 
-static void move_noise(plr_filter *f, const plr_real F[MOVED * DIM], plr_real tau,
+static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MOVED * DIM],
                        plr_real interval) {
+    const plr_real tau = s->tau;
     plr_real reading[2];
-    densities(f, interval, reading);
+    densities(f, s, interval, reading);
     reading[0] /= tau;
     reading[1] /= tau;
     transport_noise(f, F, reading);
@@ -332,7 +350,7 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
     integrate(f, reading, seconds, &s);
     transition(&s, F);
     accumulate_derivatives(f, &s, F);
-    move_noise(f, F, seconds, interval);
+    move_noise(f, &s, F, interval);
     plr_pose_move(f, s.E, s.d);
     memcpy(f->inertial.velocity, s.v, sizeof s.v);
     plr_se3_append(m->E, m->p, s.E, s.d);
