@@ -38,15 +38,15 @@ mkdir -p out
 if [ -z "$recording" ]; then
     heading 'Simulating a drive'
     recording=$ROOT/out/demo.plr
-    "$VENV/bin/pelorus" simulate "$recording"
+    "$VENV/bin/pelorus" simulate "$recording" --force
 fi
 
 heading 'Replaying it (float32, what the robot runs)'
 build/bin/pelorus-replay "$recording" --trajectory out/trajectory.tum --out out/log.plr
-"$VENV/bin/pelorus" export out/log.plr --map out/map.ply
+"$VENV/bin/pelorus" export out/log.plr --map out/map.ply --force
 
 heading 'Drawing the report'
-"$VENV/bin/pelorus" report "$recording" --out out
+"$VENV/bin/pelorus" report "$recording" --out out --force
 
 heading 'Done'
 echo 'Report: out/report.html. Its pictures:'

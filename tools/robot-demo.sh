@@ -46,12 +46,12 @@ cd "$ROOT"
 if [ -z "$recording" ]; then
     heading 'Simulating a drive'
     recording=$ROOT/out/robot-demo.plr
-    "$VENV/bin/pelorus" simulate "$recording" --seed 7 --duration 20
+    "$VENV/bin/pelorus" simulate "$recording" --seed 7 --duration 20 --force
 fi
 
 heading "Sending it to the emulated $board"
 "$VENV/bin/pelorus" stream "$recording" --to "qemu:$board" \
-    --record "out/flight-$board.plr" --compare
+    --record "out/flight-$board.plr" --force --compare
 
 heading 'Done'
 echo "What board and host said to each other: out/flight-$board.plr (pelorus info shows it)"

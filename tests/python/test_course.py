@@ -136,7 +136,7 @@ def test_the_course_filter_can_be_changed_to_try_its_claims(
     path, common = recorded(tmp_path, "one", drive(sigma_px=1)), ("--bin", BIN)
     rows = []
     for changes in ((), ("--course", "landmark-sigma=0.001", "--course", "gate=off")):
-        pelorus("course", path, "--out", tmp_path / "out", *common, *changes)
+        pelorus("course", path, "--out", tmp_path / "out", "--force", *common, *changes)
         rows.append((tmp_path / "out" / "table.md").read_text().splitlines()[2:])
     assert rows[0][1] != rows[1][1]  # the course's
     assert rows[0][0] == rows[1][0]
@@ -148,7 +148,7 @@ def test_a_truth_is_taken_for_the_one_recording_that_has_none(
 ) -> None:
     built_programs()
     known, bare = recorded(tmp_path, "known", drive()), recorded(tmp_path, "bare", without_truth())
-    common = ("--out", tmp_path / "out", "--bin", BIN, "--truth")
+    common = ("--force", "--out", tmp_path / "out", "--bin", BIN, "--truth")
     pelorus("course", bare, *common, known)
     cells = (tmp_path / "out" / "table.md").read_text().splitlines()[4].split("|")
     ate = float(cells[5])
@@ -200,7 +200,7 @@ def test_the_course_filter_is_what_the_report_says_on_03(
     kept = tmp_path / "03-ids.plr"
     pelorus("convert", "ece276a", source, kept, "--keep-ids")
     config = ("--config", ROOT / "tools" / "config" / "03.conf")
-    common = ("--out", tmp_path / "out", "--bin", BIN)
+    common = ("--force", "--out", tmp_path / "out", "--bin", BIN)
     pelorus("course", plr_03, *common, *config, "--road", way)
     dead, course, body = map(numbers, (tmp_path / "out" / "table.md").read_text().splitlines()[2:])
     assert float(course["road m"]) <= 5.0

@@ -367,9 +367,9 @@ def test_a_full_disk_is_told_by_its_name(recording: Path, pelorus: Run) -> None:
 
 def test_the_recording_that_is_sent_is_not_written_over(recording: Path, pelorus: Run) -> None:
     before = recording.read_bytes()
-    said = pelorus(
-        "stream", recording, "--to", "tcp:localhost:5000", "--record", recording, status=1
-    )
+    call = ("stream", recording, "--to", "tcp:localhost:5000", "--record", recording)
+    assert "is there already" in pelorus(*call, status=1).err
+    said = pelorus(*call, "--force", status=1)
     assert "--record needs another file" in said.err
     assert recording.read_bytes() == before
 

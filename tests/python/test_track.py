@@ -205,7 +205,7 @@ def test_times_are_those_of_a_file_or_of_names_in_ns(
     for folder in (left, right):
         for path in folder.iterdir():
             path.rename(folder / f"{1403636579763555584 + int(path.stem)}.png")
-    pelorus("track", left, right, out)
+    pelorus("track", left, right, out, "--force")
     assert Table.read(out).times()[0] == 1403636579763555584
 
 

@@ -69,8 +69,15 @@ def write_recording(process: Process, target: Path) -> None:
     parts = []
     for observations, seconds in SECONDS.items():
         part = target.with_suffix(f".{observations}.plr")
-        command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--seed", SEED]
-        command += ["--observations", str(2 * BUSY_OBSERVATIONS), "--duration", seconds]
+        command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--force"]
+        command += [
+            "--seed",
+            SEED,
+            "--observations",
+            str(2 * BUSY_OBSERVATIONS),
+            "--duration",
+            seconds,
+        ]
         command += process.options
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         messages = [frame.message for frame in read_file(part)[0]]

@@ -10,6 +10,7 @@ import typer
 
 from pelorus import __version__
 from pelorus.console import out
+from pelorus.outputs import guard_outputs
 
 
 def application(commands: Iterable[str]) -> typer.Typer:
@@ -19,12 +20,13 @@ def application(commands: Iterable[str]) -> typer.Typer:
         help="Convert, inspect, simulate and evaluate recordings of the Pelorus SLAM filter.",
         epilog="Example:  pelorus simulate drive.plr  &&  pelorus info drive.plr",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         callback=_options,
     )
     for command in commands:
-        app.add_typer(import_module(f"pelorus.commands.{command}").app)
+        added = import_module(f"pelorus.commands.{command}").app
+        guard_outputs(added)
+        app.add_typer(added)
     return app
 
 

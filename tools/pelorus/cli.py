@@ -9,6 +9,7 @@ Nothing is imported here before `main` is there to take a Ctrl-C.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from io import TextIOWrapper
@@ -38,10 +39,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is there: on matrices as small as these threads take more than they give, and
     # wait for each other at full speed.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    signal.signal(signal.SIGTERM, _leave)
     try:
         return _run(words)
     except KeyboardInterrupt:  # while importing; later the application takes it
         return INTERRUPTED
+
+
+def _leave(number: int, _frame: object) -> None:
+    """As at an error: what is not whole, and temporary files, are removed."""
+    sys.exit(128 + number)
 
 
 def _say_what_cannot_be_encoded() -> None:

@@ -55,6 +55,11 @@ out = SafeConsole(highlight=False, soft_wrap=True, emoji=False)
 err = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
+def leave_standard_output() -> None:
+    """Results go where errors go: the standard output is a file's."""
+    out.stderr = True
+
+
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterator[Item]:
     """A bar on a terminal, nothing elsewhere."""
     yield from track(items, what, total, console=err, transient=True, disable=not err.is_terminal)

@@ -6,11 +6,13 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 PART_FOLDER = ".part"  # in a folder: what is not yet whole
+STANDARD_OUTPUT = Path("-")
 
 
 class PelorusError(Exception):
@@ -26,13 +28,34 @@ def writing(path: Path) -> Iterator[None]:
         raise PelorusError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
+class Existing:
+    """What becomes of files that are there already. Under a command they are kept, unless the user
+    said --force; who calls the functions himself knows what he does.
+    """
+
+    overwritten = True
+
+    @classmethod
+    def keep(cls, *paths: Path) -> None:
+        """PelorusError if one of them is a file, and may not be overwritten."""
+        for path in paths:
+            if path.is_file() and not cls.overwritten:
+                raise PelorusError(
+                    f"{path}: is there already: give another name, or --force to overwrite it"
+                )
+
+
 @contextmanager
 def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
     """Where to write files that shall be whole: they get their names when all are written, and if
     that fails nothing of them is left behind. What is there already and is no file, a pipe or
     /dev/null, is written to as it stands: a file that took its name would put an end to it. A link
-    keeps pointing at its file.
+    keeps pointing at its file, and - is the standard output.
     """
+    if paths == (STANDARD_OUTPUT,):
+        with _collected() as part:
+            yield (part,)
+        return
     files = tuple(_file_of(path) for path in paths)
     parts = tuple(_part(file) for file in files)
     try:
@@ -46,6 +69,17 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
             if part != file:
                 with suppress(OSError):
                     part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _collected() -> Iterator[Path]:
+    """A file that goes to the standard output when it is whole."""
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        part = Path(folder) / "out"
+        yield part
+        with part.open("rb") as stream:
+            shutil.copyfileobj(stream, sys.stdout.buffer)
+        sys.stdout.buffer.flush()
 
 
 def _file_of(path: Path) -> Path:

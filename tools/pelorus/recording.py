@@ -161,8 +161,7 @@ class Recording:
     def write(self, path: Path) -> int:
         """Write the whole file; its size in bytes. Nothing is left behind if that fails."""
         self._check(path)
-        write_file(path, self.messages(), len(self))
-        return path.stat().st_size
+        return write_file(path, self.messages(), len(self))
 
     def _check(self, path: Path) -> None:
         for name, times in (

@@ -236,19 +236,17 @@ class Writer:
         self.write(end_of(self._counts, heard))
 
 
-def write_file(path: Path, messages: Iterable[Message], count: int) -> None:
-    """The whole file, packed if its name says so. Nothing is left behind if that fails. `count` of
-    them, for the progress.
+def write_file(path: Path, messages: Iterable[Message], count: int) -> int:
+    """The whole file, packed if its name says so; its size in bytes. Nothing is left behind if that
+    fails. `count` of them, for the progress.
     """
-    with (
-        whole(path) as (part,),
-        writing(path),
-        closing(packed_file.create(part, packed_file.is_packed(path))) as stream,
-    ):
-        writer = Writer(stream)
-        for message in progress(messages, "writing", count):
-            writer.write(message)
-        writer.end()
+    with whole(path) as (part,), writing(path):
+        with closing(packed_file.create(part, packed_file.is_packed(path))) as stream:
+            writer = Writer(stream)
+            for message in progress(messages, "writing", count):
+                writer.write(message)
+            writer.end()
+        return part.stat().st_size
 
 
 def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], Counts]:

@@ -14,7 +14,7 @@ from rich.table import Table
 from pelorus import road
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
-from pelorus.errors import PelorusError, made, write_text
+from pelorus.errors import Existing, PelorusError, made, write_text
 from pelorus.packed_file import bare_name
 from pelorus.replay import find_programs
 from pelorus.report.results import Subject, read_subject
@@ -70,6 +70,7 @@ def course(
     """
     from pelorus.course import trial  # noqa: PLC0415 - matplotlib and scipy load slowly
 
+    Existing.keep(folder / TABLE)
     options = _options(configs, settings, recordings)
     changed = replay_options(None, changes, "--course")
     pairs = _references([read_subject(path) for path in recordings], truth, road_file)

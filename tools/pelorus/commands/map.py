@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
+from pelorus.errors import Existing
 from pelorus.grid import files, occupancy
 from pelorus.grid.occupancy import Band, Grid, Wish
 from pelorus.grid.sightings import sightings
@@ -55,6 +56,7 @@ def map_(
     covariance. The pair map.pgm, map.yaml is what nav2's map_server reads. A recording is
     replayed first.
     """
+    Existing.keep(folder / files.TEXT)
     wish = _wish(resolution, height, range_)
     messages = result_of(source, replay_options(config, settings), programs)
     seen = sightings(source, messages)

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, progress
-from pelorus.errors import made, whole_folder
+from pelorus.errors import Existing, made, whole_folder
 from pelorus.replay import find_programs
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
@@ -56,6 +56,7 @@ def report(
     With --also course the course report's filter stands beside them, with --also world the
     textbook's, both in float64. Without a depth limit in the settings, world gets one of 60 m.
     """
+    Existing.keep(folder / PAGE)
     subject = read_subject(recording)
     require_twists(subject, also)
     options = replay_options(config, settings)
