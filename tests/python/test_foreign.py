@@ -281,7 +281,7 @@ def test_a_recording_that_cannot_be_written_leaves_no_part(tmp_path: Path) -> No
 
 OPENS = re.compile(
     r"\.open\(|(?<![\w.])open\(|\.read_(text|bytes)\(|np\.(load|loadtxt|genfromtxt|fromfile)\b|"
-    r"loadmat|json\.load|csv\.(reader|DictReader)|zipfile"
+    r"AnyReader\(|loadmat|json\.load|csv\.(reader|DictReader)|zipfile"
 )
 # What they open is the project's own: recordings, settings, results of its replay, its build, its
 # devices.

@@ -161,6 +161,19 @@ def test_an_imu_whose_clock_was_set_back_is_refused_whatever_the_bag(
         assert not target.exists()
 
 
+def test_a_stamp_that_was_never_set_is_left_out_and_one_that_begins_a_clock_is_kept() -> None:
+    bag, remarks = Bag.__new__(Bag), list[str]()
+    bag.path = Path("bag")
+    nothing = np.zeros((100, 0))
+    today = 1_700_000_000 * NS + np.arange(100) * 5_000_000
+    today[:3] = 0
+    assert order.sound(bag, "/x", today, nothing, remarks).sum() == 97
+    assert remarks == ["/x: 3 of 100 headers have no time: left out"]
+    assert order.sound(bag, "/x", np.arange(100) * 5_000_000, nothing, remarks).all()
+    with pytest.raises(Exception, match="100 of 100 headers have no time; times in header"):
+        order.sound(bag, "/x", np.zeros(100, np.int64), nothing, remarks)
+
+
 def test_bad_messages_are_left_out_and_counted_and_many_are_refused(
     drive: Recording, tmp_path: Path, pelorus: Run
 ) -> None:
@@ -170,15 +183,13 @@ def test_bad_messages_are_left_out_and_counted_and_many_are_refused(
         for k in range(2400):
             force = (np.nan, 0, 9.8) if k % 300 == 17 or k < bad - 7 else (0.1, 0.2, 9.8)
             recorder.imu("/imu", NS + k * 5_000_000, force, (0, 0, 0.01))
-        recorder.imu("/imu", 0, (0, 0, 9.8), (0, 0, 0.01), "")
         recorder.imu("/imu", NS + 600 * 5_000_000, (9, 9, 9), (1, 1, 1))
         bag = written(recorder, tmp_path / f"{bad}", "mcap")
         outcome = pelorus("convert", "ros", bag, target, *calibration, status=status)
         if status:
-            assert "399 of 2402 messages hold a number that is not finite" in outcome.err
+            assert "399 of 2401 messages hold a number that is not finite" in outcome.err
             continue
-        assert "/imu: 8 of 2402 messages hold a number that is not finite: left out" in outcome.out
-        assert "/imu: 1 of 2402 headers have no time: left out" in outcome.out
+        assert "/imu: 8 of 2401 messages hold a number that is not finite: left out" in outcome.out
         assert "/imu: 1 messages repeat a time and are left out" in outcome.out
         assert sum(len(m.a_B_mps2) for m in messages_of(target, Imu)) == 2392
 

@@ -12,6 +12,7 @@ import csv
 import io
 import json
 import math
+import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable
@@ -338,6 +339,7 @@ def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 # --- YAML -----------------------------------------------------------------------------------------
 
 OPENCV_DIRECTIVE = "%YAML:1.0"  # no YAML: the colon is OpenCV's own
+LACKS_BLANK = re.compile(r"^(\s*[A-Za-z_][\w.]*:)(?=[^\s:/])", re.MULTILINE)
 OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
 
 
@@ -354,12 +356,18 @@ def yaml_object(path: Path) -> dict[str, Any]:
     """An object with names: of Kalibr, of OpenCV, of a data set's sensor.yaml. YAML 1.2: 1e-3 is a
     number.
     """
-    words = text(path, YAML_BYTES_MAX)
+    return yaml_words(path, text(path, YAML_BYTES_MAX))
+
+
+def yaml_words(path: Path, words: str) -> dict[str, Any]:
+    """The same from words that stand in the file."""
+    if len(words) > YAML_BYTES_MAX:
+        raise ForeignFileError(path, "is too long", due=f"at most {YAML_BYTES_MAX} bytes are due")
     _require_shallow(path, words)
     yaml = YAML(typ="safe", pure=True)
     yaml.Constructor = _Constructor
     try:
-        found = yaml.load(words.removeprefix(OPENCV_DIRECTIVE))
+        found = yaml.load(_as_yaml(words))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         at = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""
@@ -371,6 +379,13 @@ def yaml_object(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
         raise ForeignFileError(path, "is YAML without names", due="names with values are due")
     return found
+
+
+def _as_yaml(words: str) -> str:
+    """OpenCV's reader asks for no blank behind a name's colon, and people leave it out."""
+    if not words.startswith(OPENCV_DIRECTIVE):
+        return words
+    return LACKS_BLANK.sub(r"\1 ", words.removeprefix(OPENCV_DIRECTIVE))
 
 
 def _require_shallow(path: Path, words: str) -> None:

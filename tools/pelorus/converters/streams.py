@@ -146,6 +146,12 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
         header, tracks = _tracked(frames, calibrated, settings or Settings())
     else:
         header, tracks = calibrated.header, frames.tracks
+        if calibrated.rig is not None and calibrated.rig.others:
+            raise ForeignFileError(
+                calibrated.rig.path,
+                "is of several resolutions, and tracks do not say of which",
+                due="a file with the sections of one of them is due",
+            )
         if calibrated.rig is not None:
             tracks = _rectified(tracks, calibrated.rig.rectification(), frames.where)
     made = _with_motion(header, streams, t_ns, tracks)
@@ -190,11 +196,12 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
         moved = (motion.t_ns, motion.v_B_mps, motion.w_B_radps)
         inertial, first_ns = NO_READINGS, int(motion.t_ns[0])
     else:
-        told = {name: s for name, s in vars(streams.calibrated.imu).items() if s >= 0}
+        model = streams.calibrated.imu
+        told = {name: s for name, s in vars(model.noise).items() if s >= 0}
         _require_gravity(motion)
         header = replace(header, process=Process.IMU, noise=replace(header.noise, **told))
         moved = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
-        inertial = motion.inertial
+        inertial = model.correction.of(motion.inertial)
         first_ns = int(inertial.t_ns[0])
     # with its first twist or reading the filter begins
     small = [reading for reading in streams.small if reading.t_ns >= first_ns]
@@ -336,13 +343,12 @@ def _tracked(
     first = next(pairs)
     height, width = first[0].shape
     header, rig = calibrated.header, calibrated.rig
-    known = (rig.left.width_px, rig.left.height_px) if rig else _size(header)
-    images.require_size(pictures.where[0], first[0].shape, known)
+    sizes = rig.sizes if rig else [(header.image_width_px, header.image_height_px)]
+    if (width, height) not in sizes:
+        images.require_size(pictures.where[0], first[0].shape, sizes[0])
     show = None
     if rig is not None:
-        whole = replace(
-            rig, left=rig.left.sized(width, height), right=rig.right.sized(width, height)
-        )
+        whole = rig.of_size(width, height)
         rectification = whole.rectification()
         header, show = whole.header(rectification, header.name), rectification.pictures
     header = replace(header, image_width_px=width, image_height_px=height)
@@ -356,10 +362,6 @@ def _tracked(
     return header, track(
         progress(shown(), "tracking", len(pictures.t_ns)), pictures.where, settings
     )
-
-
-def _size(header: Header) -> tuple[int, int]:
-    return header.image_width_px, header.image_height_px
 
 
 # --- truth ----------------------------------------------------------------------------------------

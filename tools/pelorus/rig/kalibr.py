@@ -15,11 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pelorus import se3
+from pelorus import arrays, se3
 from pelorus.foreign import ForeignFileError
 from pelorus.frames import Noise
 from pelorus.layout import Floats
 from pelorus.named import Named, as_numbers, sane
+from pelorus.rig import spheres
+from pelorus.rig.imu_model import Correction, ImuModel
 from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig, rigid
 from pelorus.se3 import Poses
@@ -34,6 +36,7 @@ LENSES = {
 }
 TO_CAMERA, FROM_CAMERA = ("T_cam_imu",), ("T_imu_cam", "T_BS")
 STEP = "T_cn_cnm1"
+MODELS = ("pinhole", *spheres.PARAMETERS)
 FOCAL_MIN_PX = 1.0  # less is in another unit
 AGREE = 1e-3  # m and rad: two ways to the same camera
 NOISE = {
@@ -69,7 +72,7 @@ def camchain(content: Named) -> Rig:
 def pair(first: Named, second: Named) -> Rig:
     """Two cameras of one file, or of one each."""
     T_1B, T_2B = _on_body(first), _on_body(second)
-    steps = rigid(second.path, STEP, matrix(second, STEP, 4, 4)) if STEP in second else None
+    steps = pose(second, STEP) if STEP in second else None
     if steps is None:
         if T_1B is None or T_2B is None:
             raise ForeignFileError(
@@ -87,18 +90,91 @@ def pair(first: Named, second: Named) -> Rig:
     return replace(rig, offset_s=offset, topics=ordered)
 
 
-def imu(content: Named) -> Noise:
-    """What the file says of its noise."""
+# --- the IMU --------------------------------------------------------------------------------------
+
+
+def with_imu(rig: Rig, content: Named) -> Rig:
+    """The rig on the IMU of the file: its noise, its errors, its clock, its place.
+
+    Kalibr's models: a_m = M a, w_m = M C w + A a. Times of IMU i are time_offset before those of
+    imu0, on whose clock and body the camchain is; T_i_b brings points of imu0 to it.
+    """
     own = content.object("imu0") if "imu0" in content else content
     told = {name: own.number(key) for name, key in NOISE.items() if key in own}
     for name, value in told.items():
         if value < 0:
             raise own.error(NOISE[name], value, "a number that is not negative is due")
-    return Noise(**told)
+    correction, remarks = _correction(own)
+    offset_s = own.number("time_offset") if "time_offset" in own else 0.0
+    if offset_s:
+        remarks.append(f"time_offset: the pictures come {offset_s:g} s earlier on the IMU's clock")
+    if "T_i_b" in own and rig.T_LB is not None:
+        T_ib = pose(own, "T_i_b")
+        if np.abs(se3.log(T_ib)).max() > AGREE:
+            remarks.append("T_i_b: the body is this IMU, where it sits on imu0")
+            rig = rig.on_body(se3.compose(rig.T_LB, se3.inverse(T_ib)))
+    said = tuple(f"{content.path}: {remark}" for remark in remarks)
+    model = ImuModel(Noise(**told), correction, said)
+    return rig.with_imu(model, rig.offset_s - offset_s)
+
+
+def _correction(own: Named) -> tuple[Correction, list[str]]:
+    """What undoes the errors that the model knows; and what is said of it."""
+    A, W, G = np.eye(3), np.eye(3), np.zeros((3, 3))
+    remarks = []
+    if "accelerometers" in own:
+        accelerometers = own.object("accelerometers")
+        A = _inverse(accelerometers, "M")
+        unused = [name for name in ("rx_i", "ry_i", "rz_i") if name in accelerometers]
+        if unused:
+            remarks.append(f"{', '.join(unused)}: where each accelerometer sits is not used")
+    if "gyroscopes" in own:
+        gyroscopes = own.object("gyroscopes")
+        W = _inverse(gyroscopes, "M")
+        if "C_gyro_i" in gyroscopes:
+            W = rotation(gyroscopes, "C_gyro_i").T @ W
+        if "A" in gyroscopes:
+            G = -W @ matrix(gyroscopes, "A", 3, 3)
+    found = Correction(A=A, W=W, G=G)
+    if not found.is_none:
+        model = own.content.get("model", "scale-misalignment")
+        remarks.append(f"model {model}: its errors are taken out of the readings")
+    return found, remarks
+
+
+def _inverse(content: Named, name: str) -> Floats:
+    if name not in content:
+        return np.eye(3)
+    M = matrix(content, name, 3, 3)
+    if not 0.5 < np.linalg.det(M) < 2:
+        raise content.error(name, M.tolist(), "a matrix near the identity is due")
+    return np.asarray(np.linalg.inv(M))
+
+
+# --- matrices -------------------------------------------------------------------------------------
+
+
+def pose(content: Named, name: str) -> Poses:
+    """A transform of 4 x 4 or 3 x 4 numbers."""
+    value = content.get(name)
+    rows = value.get("rows") if isinstance(value, dict) else np.size(np.array(value, object)) // 4
+    if rows == 3 or (isinstance(value, list) and len(value) == 3):
+        M = np.vstack((matrix(content, name, 3, 4), [0, 0, 0, 1]))
+    else:
+        M = matrix(content, name, 4, 4)
+    return rigid(content.path, name, M)
+
+
+def rotation(content: Named, name: str) -> Floats:
+    """Of 3 x 3 numbers; files round."""
+    R = arrays.rotation(content.path, name, matrix(content, name, 3, 3))
+    return np.asarray(se3.nearest_rotation(R))
 
 
 def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:
-    """Rows of numbers, or OpenCV's and EuRoC's object with rows, cols and data."""
+    """Rows of numbers, or one list of all (msckf_vio); or the object with rows, cols and data of
+    OpenCV and EuRoC.
+    """
     value = content.get(name)
     if isinstance(value, dict):
         inner = content.object(name)
@@ -107,6 +183,8 @@ def matrix(content: Named, name: str, rows: int, columns: int) -> Floats:
         if size == [rows, columns] and value is not None and value.shape == (rows * columns,):
             value = value.reshape(rows, columns)
     found = as_numbers(value)
+    if found is not None and found.shape == (rows * columns,):
+        found = found.reshape(rows, columns)
     if found is None or found.shape != (rows, columns) or not sane(found):
         raise content.error(name, content.get(name), f"{rows} x {columns} finite numbers are due")
     return found
@@ -120,7 +198,7 @@ def _on_body(camera: Named) -> Poses | None:
         raise ForeignFileError(
             camera.path, f"has {' and '.join(given)}", at=camera.at, due="one of them is due"
         )
-    T = rigid(camera.path, given[0], matrix(camera, given[0], 4, 4))
+    T = pose(camera, given[0])
     return T if given[0] in TO_CAMERA else se3.inverse(T)
 
 
@@ -137,17 +215,22 @@ def _require_same(second: Named, steps: Poses, other: Poses) -> None:
 
 
 def _lens(camera: Named) -> Lens:
-    if "camera_model" in camera:
-        camera.word("camera_model", ("pinhole",))
-    numbers = camera.array("intrinsics", 4).tolist()
+    kind = camera.word("camera_model", MODELS) if "camera_model" in camera else "pinhole"
+    count = spheres.PARAMETERS.get(kind, 0)
+    given = camera.array("intrinsics", count + 4).tolist()
+    sphere, numbers = given[:count], given[count:]
     if min(numbers[:2]) < FOCAL_MIN_PX:
-        raise camera.error("intrinsics", numbers, "[fx, fy, cx, cy] in px is due")
+        raise camera.error("intrinsics", given, "[fx, fy, cx, cy] in px is due")
     model = LENSES[camera.word("distortion_model", tuple(LENSES))]
     if "resolution" not in camera:
         width, height = 0, 0
     else:
         width, height = camera.size("resolution")
-    return Lens(model, tuple(numbers), _coefficients(camera, model), width, height)
+    D = _coefficients(camera, model)
+    if count and (D and (kind != "omni" or model is not LensModel.RADTAN)):
+        raise camera.error("distortion_model", model.value, f"none is due beside {kind}")
+    found = LensModel(kind) if count else model
+    return Lens(found, tuple(numbers), (*sphere, *D), width, height)
 
 
 def _coefficients(camera: Named, model: LensModel) -> tuple[float, ...]:

@@ -4,6 +4,8 @@
 none         no distortion
 radtan       radial and tangential: k1 k2 p1 p2, and of OpenCV k3 and more
 equidistant  fisheye (Kannala and Brandt 2006): k1 k2 k3 k4
+omni         by way of a sphere (spheres): xi, and k1 k2 p1 p2 of the distortion behind it
+eucm, ds     likewise: alpha beta; xi alpha
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import cv2
 import numpy as np
 
 from pelorus.layout import Floats
+from pelorus.rig import spheres
 
 
 class LensModel(StrEnum):
@@ -23,6 +26,9 @@ class LensModel(StrEnum):
     NONE = "none"
     RADTAN = "radtan"
     EQUIDISTANT = "equidistant"
+    OMNI = "omni"
+    EUCM = "eucm"
+    DS = "ds"
 
 
 # How many numbers each may have.
@@ -30,6 +36,9 @@ COEFFICIENTS = {
     LensModel.NONE: (0,),
     LensModel.RADTAN: (4, 5, 8, 12, 14),
     LensModel.EQUIDISTANT: (4,),
+    LensModel.OMNI: (1, 5),
+    LensModel.EUCM: (2,),
+    LensModel.DS: (2,),
 }
 NEWTON_STEPS = 10
 DIFFERENCE = 1e-6  # of a ray, for derivatives
@@ -58,6 +67,8 @@ class Lens:
         """(n, 2) x/z and y/z in the camera -> (n, 2) px."""
         if not len(rays):
             return np.empty((0, 2))
+        if self._sphere:
+            rays = spheres.onto_plane(self.model, self._sphere, rays)
         points = np.column_stack((rays, np.ones(len(rays))))[:, None]
         project = cv2.fisheye.projectPoints if self._is_fisheye else cv2.projectPoints
         zero = np.zeros(3)
@@ -67,7 +78,8 @@ class Lens:
     def undistort(self, pixels: Floats) -> Floats:
         """(n, 2) px -> (n, 2) x/z and y/z; NaN where the lens has no ray for a pixel.
 
-        OpenCV's few iterations to begin with, then Newton's, until a ray meets its pixel.
+        OpenCV's few iterations to begin with (and the way back from the sphere), then Newton's,
+        until a ray meets its pixel.
         """
         if not len(pixels):
             return np.empty((0, 2))
@@ -75,6 +87,8 @@ class Lens:
         rays = np.asarray(
             find(np.ascontiguousarray(pixels[:, None], np.float64), self.K, self._D), np.float64
         ).reshape(-1, 2)
+        if self._sphere:
+            rays = spheres.from_plane(self.model, self._sphere, rays)
         with np.errstate(all="ignore"):
             for _ in range(NEWTON_STEPS):
                 J = self._slope(rays)
@@ -97,5 +111,9 @@ class Lens:
         return self.model is LensModel.EQUIDISTANT
 
     @property
+    def _sphere(self) -> tuple[float, ...]:
+        return self.coefficients[: spheres.PARAMETERS.get(self.model, 0)]
+
+    @property
     def _D(self) -> Floats:
-        return np.array(self.coefficients or (0.0,) * 4)
+        return np.array(self.coefficients[len(self._sphere) :] or (0.0,) * 4)

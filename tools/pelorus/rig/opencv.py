@@ -6,6 +6,10 @@ R and T bring points of the first camera to the second one (stereoCalibrate).
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from pelorus import arrays, se3
@@ -16,18 +20,19 @@ from pelorus.rig.lens import COEFFICIENTS, Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
 
-# How the matrix of camera {} is called, and its lens.
-MATRICES = ("K{}", "M{}", "cameraMatrix{}", "camera_matrix_{}")
-DISTORTIONS = ("D{}", "distCoeffs{}", "dist_coeffs_{}")
+# How the matrix of camera {} is called, and its lens; and what {} may be for the two.
+MATRICES = ("K{}", "M{}", "CM{}", "cameraMatrix{}", "CameraMatrix{}", "camera_matrix{}")
+DISTORTIONS = ("D{}", "distCoeffs{}", "DistCoeffs{}", "dist_coeffs{}", "distortion{}")
+SIDES = (("1", "2"), ("_1", "_2"), ("L", "R"), ("_left", "_right"), ("Left", "Right"))
+LENSES = (LensModel.NONE, LensModel.RADTAN, LensModel.EQUIDISTANT)
 SIZES = ("imageSize", "image_size")
 FISHEYE_OR_NOT = 4  # so many coefficients both have
 
 
 def is_opencv(content: Named) -> bool:
     """Of a stereo calibration the cameras, or where they stand."""
-    return any(pattern.format(1) in content for pattern in MATRICES) or (
-        "R" in content and "T" in content
-    )
+    has_one = any(pattern.format(side[0]) in content for pattern in MATRICES for side in SIDES)
+    return has_one or ("R" in content and "T" in content)
 
 
 def stereo(content: Named, model: LensModel | None) -> Rig:
@@ -74,7 +79,7 @@ def _model(content: Named, name: str, count: int, asked: LensModel | None) -> Le
             f"{name} has 4 numbers, as radtan and a fisheye have",
             due="--lens radtan or --lens equidistant is due",
         )
-    model = asked or LensModel.RADTAN
+    model = asked if asked in LENSES and asked is not None else LensModel.RADTAN
     if count not in COEFFICIENTS[model]:
         due = " or ".join(map(str, COEFFICIENTS[model]))
         raise ForeignFileError(
@@ -94,12 +99,36 @@ def _numbers(content: Named, name: str) -> tuple[float, ...]:
 
 
 def _one_of(content: Named, patterns: tuple[str, ...], number: int) -> str:
-    names = [pattern.format(number) for pattern in patterns]
-    for name in names:
+    for name in (pattern.format(side[number - 1]) for pattern in patterns for side in SIDES):
         if name in content:
             return name
     raise ForeignFileError(
         content.path,
-        f"lacks {' or '.join(names)}",
+        f"lacks {' or '.join(pattern.format(number) for pattern in patterns)}",
         due=f"there are: {', '.join(content.content) or 'none'}",
     )
+
+
+# --- XML ------------------------------------------------------------------------------------------
+
+
+def xml_words(path: Path, words: str) -> dict[str, Any]:
+    """What cv::FileStorage writes as XML: the same names and matrices as in its YAML."""
+    try:
+        root = ET.fromstring(words)
+    except ET.ParseError as error:
+        raise ForeignFileError(path, f"is no XML: {error}") from None
+    if root.tag != "opencv_storage":
+        raise ForeignFileError(path, f"is XML of {root.tag}", due="opencv_storage is due")
+    return {one.tag: _value(one) for one in root}
+
+
+def _value(one: ET.Element) -> Any:
+    if len(one):
+        return {inner.tag: _value(inner) for inner in one}
+    words = (one.text or "").split()
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        return (one.text or "").strip()
+    return numbers[0] if len(numbers) == 1 and one.tag != "data" else numbers

@@ -1,30 +1,28 @@
 # SPDX-License-Identifier: MIT
 """Calibrations of every kind, told apart by what is in them.
 
-JSON            the project's own, of a rectified pair (pelorus.calibration)
-camchain        Kalibr's, with an IMU or without; its IMU file beside it
-OpenCV          stereo calibration, in one file or in two
-sensor.yaml     those of an EuRoC folder's two cameras and of its IMU
+JSON of a rectified pair is the project's own (pelorus.calibration); KINDS lists those of others.
+Beside any of them may stand Kalibr's file of an IMU.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from pelorus import calibration, foreign
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Noise
+from pelorus.frames import Header
 from pelorus.named import Named
-from pelorus.rig import kalibr, opencv
+from pelorus.rig import basalt, camera_info, kalibr, okvis, opencv, orb_slam, vins, zed
+from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import LensModel
 from pelorus.rig.rig import Rig
 
-KNOWN = (
-    "Kalibr's camchain (cam0, cam1), its IMU file (gyroscope_noise_density), OpenCV's stereo "
-    "calibration (K1, D1, K2, D2, R, T), a sensor.yaml (T_BS, intrinsics) or the project's JSON"
-)
+SECTION = re.compile(r"\[\w+\]\s*$")
 
 
 @dataclass(frozen=True)
@@ -33,13 +31,19 @@ class Calibrated:
 
     header: Header
     rig: Rig | None = None
-    imu: Noise = field(default_factory=Noise)
-    remarks: tuple[str, ...] = ()
+    imu: ImuModel = field(default_factory=ImuModel)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        return self.imu.remarks
 
 
 def is_own(paths: Sequence[Path]) -> bool:
     """Whether this is the project's own JSON, of a rectified pair."""
-    return len(paths) == 1 and paths[0].suffix.lower() == ".json"
+    if len(paths) != 1 or paths[0].suffix.lower() != ".json":
+        return False
+    content = _content(paths[0])
+    return not any(kind.is_one(content) for kind in KINDS)
 
 
 def read(
@@ -63,46 +67,89 @@ def of_rig(rig: Rig, name: str, extrinsic: Path | None = None) -> Calibrated:
     if extrinsic is not None:
         rig = rig.on_body(calibration.read_extrinsic(extrinsic))
     header = rig.header(rig.rectification(), name)
-    return Calibrated(header, None if rig.is_rectified else rig, rig.imu)
+    plain = rig.is_rectified and not rig.offset_s and not rig.others
+    return Calibrated(header, None if plain else rig, rig.imu)
 
 
 def read_rig(paths: Sequence[Path], lens: LensModel | None = None) -> Rig:
     """What one file or several say together."""
-    contents = [Named(path, foreign.yaml_object(path)) for path in paths]
-    for content in contents:
-        if not any(is_one(content) for is_one in (*CAMERAS, kalibr.is_imu)):
+    contents = [_content(path) for path in paths]
+    kinds = [next((kind for kind in KINDS if kind.is_one(one)), None) for one in contents]
+    for content, kind in zip(contents, kinds, strict=True):
+        if kind is None and not kalibr.is_imu(content):
             raise ForeignFileError(
                 content.path,
                 "is no calibration that is known",
-                due=f"{KNOWN} is due; there are: {', '.join(content.content) or 'no names'}",
+                due=f"{', '.join(kind.name for kind in KINDS)} or the project's JSON is due; there "
+                f"are: {', '.join(content.content) or 'no names'}",
             )
-    cameras = [content for content in contents if any(is_one(content) for is_one in CAMERAS)]
-    imus = [content for content in contents if content not in cameras]
-    if not cameras:
+    found = [kind for kind in kinds if kind is not None]
+    if not found:
         raise ForeignFileError(paths[0], "is of an IMU alone", due="one of the cameras is due too")
-    rig = _cameras(cameras, lens)
+    if any(kind is not found[0] for kind in found):
+        names = " and ".join(dict.fromkeys(kind.name for kind in found))
+        raise ForeignFileError(paths[0], f"and the others are {names}", due="files of one are due")
+    cameras = [content for content, kind in zip(contents, kinds, strict=True) if kind is not None]
+    if len(cameras) not in found[0].files:
+        due = " or ".join(map(str, found[0].files))
+        raise ForeignFileError(
+            cameras[-1].path,
+            f"{len(cameras)} files of cameras",
+            due=f"{due} of {found[0].name} are due",
+        )
+    rig = found[0].read(cameras, lens)
+    imus = [content for content, kind in zip(contents, kinds, strict=True) if kind is None]
     if len(imus) > 1:
         raise ForeignFileError(imus[1].path, "is the second file of an IMU", due="one is due")
-    return replace(rig, imu=kalibr.imu(imus[0])) if imus else rig
+    return kalibr.with_imu(rig, imus[0]) if imus else rig
 
 
-def _cameras(contents: list[Named], lens: LensModel | None) -> Rig:
-    first = contents[0]
-    if kalibr.is_camchain(first):
-        _require_count(contents, 1, "camchain")
-        return kalibr.camchain(first)
-    if kalibr.is_sensor(first):
-        _require_count(contents, 2, "sensor.yaml of a camera")
-        return kalibr.pair(*contents)
+def _content(path: Path) -> Named:
+    """The names in a file, by what it looks like: JSON, XML, sections, else YAML."""
+    words = foreign.text(path, foreign.JSON_BYTES_MAX).lstrip()
+    if path.suffix.lower() == ".json":
+        return Named(path, foreign.json_words(path, words))
+    if words.startswith("<"):
+        return Named(path, opencv.xml_words(path, words))
+    lines = (line for line in words.splitlines() if line.strip() and line[0] not in "#;")
+    if SECTION.match(next(lines, "")):
+        return zed.sections(path, words)
+    return Named(path, foreign.yaml_words(path, words))
+
+
+class Kind(NamedTuple):
+    """A program's calibration, of so many files."""
+
+    name: str
+    is_one: Callable[[Named], bool]
+    files: tuple[int, ...]
+    read: Callable[[list[Named], LensModel | None], Rig]
+
+
+def _opencv(contents: list[Named], lens: LensModel | None) -> Rig:
     merged = {name: value for content in contents for name, value in content.content.items()}
-    return opencv.stereo(Named(first.path, merged), lens)
+    return opencv.stereo(Named(contents[0].path, merged), lens)
 
 
-def _require_count(contents: list[Named], due: int, what: str) -> None:
-    if len(contents) != due:
-        raise ForeignFileError(
-            contents[-1].path, f"{len(contents)} files of cameras", due=f"{due} {what} is due"
-        )
-
-
-CAMERAS = (kalibr.is_camchain, kalibr.is_sensor, opencv.is_opencv)
+# In this order: a name that several use is asked for last.
+KINDS = (
+    Kind("Kalibr's camchain", kalibr.is_camchain, (1,), lambda c, _: kalibr.camchain(c[0])),
+    Kind("sensor.yaml of a camera", kalibr.is_sensor, (2,), lambda c, _: kalibr.pair(*c)),
+    Kind(
+        "camera_info of ROS",
+        camera_info.is_camera_info,
+        (2,),
+        lambda c, lens: camera_info.pair(c[0], c[1], lens),
+    ),
+    Kind("ORB-SLAM's settings", orb_slam.is_settings, (1,), lambda c, _: orb_slam.read(c[0])),
+    Kind(
+        "VINS-Fusion's configuration",
+        lambda content: vins.is_config(content) or vins.is_camera(content),
+        (1, 2, 3),
+        lambda c, _: vins.read(c),
+    ),
+    Kind("Basalt's calibration", basalt.is_calibration, (1,), lambda c, _: basalt.read(c[0])),
+    Kind("OKVIS's configuration", okvis.is_config, (1,), lambda c, _: okvis.read(c[0])),
+    Kind("a ZED's .conf", zed.is_conf, (1,), lambda c, _: zed.read(c[0])),
+    Kind("OpenCV's stereo calibration", opencv.is_opencv, (1, 2), _opencv),
+)

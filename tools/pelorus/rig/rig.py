@@ -12,11 +12,12 @@ from pelorus import arrays, se3
 from pelorus.errors import PelorusError
 from pelorus.faults.axes import body_axes
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header, Noise, header_name
+from pelorus.frames import Camera, Header, header_name
 from pelorus.layout import Floats
 from pelorus.motion import Times
+from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.lens import Lens, LensModel
-from pelorus.rig.rectification import Rectification
+from pelorus.rig.rectification import Rectification, Side
 from pelorus.se3 import Poses
 
 SAME = 1e-9  # so little off, a pair counts as rectified
@@ -31,13 +32,12 @@ class Rig:
     right: Lens
     T_RL: Poses
     T_LB: Poses | None = None
-    imu: Noise = field(default_factory=Noise)  # of an IMU, where the file tells it
+    imu: ImuModel = field(default_factory=ImuModel)  # where the file tells it
     offset_s: float = 0.0  # the body's clock = the cameras' + offset
     swapped: bool = False  # the file's second camera is the left one
     topics: tuple[str, ...] = ()  # of the left and the right camera, where the file names them
-    T_LF: Poses = (
-        se3.IDENTITY
-    )  # from the frame that the left camera's owner names; it may be turned
+    T_LF: Poses = se3.IDENTITY  # from the frame that its messages name: rectified, it is turned
+    others: tuple[Rig, ...] = ()  # of the same cameras at other resolutions
 
     @classmethod
     def of_cameras(
@@ -54,6 +54,21 @@ class Rig:
     def on_body(self, T_LB: Poses) -> Rig:
         return replace(self, T_LB=T_LB)
 
+    def with_imu(self, imu: ImuModel, offset_s: float) -> Rig:
+        return replace(self, imu=imu, offset_s=offset_s)
+
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """Of the pictures for which it was made, width and height; 0 where it does not say."""
+        return [(rig.left.width_px, rig.left.height_px) for rig in (self, *self.others)]
+
+    def of_size(self, width_px: int, height_px: int) -> Rig:
+        """The one of pictures of this size, else the first."""
+        size = width_px, height_px
+        found = (self, *self.others)[self.sizes.index(size) if size in self.sizes else 0]
+        left, right = found.left.sized(*size), found.right.sized(*size)
+        return replace(self, left=left, right=right, T_RL=found.T_RL, others=())
+
     @property
     def is_rectified(self) -> bool:
         """Whether its pixels are those of a HEADER's camera as they are."""
@@ -63,6 +78,11 @@ class Rig:
         return plain and self.left.intrinsics == self.right.intrinsics and bool(apart < SAME)
 
     def rectification(self) -> Rectification:
+        if self.is_rectified:
+            baseline_m = float(np.linalg.norm(self.T_RL.p))
+            sides = Side(self.left, np.eye(3)), Side(self.right, np.eye(3))
+            size = self.left.width_px, self.left.height_px
+            return Rectification(Camera(*self.left.intrinsics, baseline_m), *sides, *size)
         try:
             return Rectification.of(self.left, self.right, self.T_RL)
         except ValueError as error:

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""What a calibration says of an IMU: its noise, and how its readings become those of a right one.
+
+    a = A a_m + a_0,    w = W w_m + G a + w_0
+
+of the measured a_m, w_m: scales, axes that are not square, a gyro that feels forces, known biases.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pelorus.frames import Noise
+from pelorus.inertial import Inertial
+from pelorus.layout import Floats
+
+
+@dataclass(frozen=True)
+class Correction:
+    """The matrices and offsets of both."""
+
+    A: Floats = field(default_factory=lambda: np.eye(3))
+    a_0: Floats = field(default_factory=lambda: np.zeros(3))
+    W: Floats = field(default_factory=lambda: np.eye(3))
+    G: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    w_0: Floats = field(default_factory=lambda: np.zeros(3))
+
+    def of(self, readings: Inertial) -> Inertial:
+        a = readings.a_B_mps2 @ self.A.T + self.a_0
+        w = readings.w_B_radps @ self.W.T + a @ self.G.T + self.w_0
+        return Inertial(readings.t_ns, a, w)
+
+    @property
+    def is_none(self) -> bool:
+        same = Correction()
+        return all(np.array_equal(getattr(self, k), getattr(same, k)) for k in vars(same))
+
+
+@dataclass(frozen=True)
+class ImuModel:
+    """`remarks` say what of the file is applied, and what is not."""
+
+    noise: Noise = field(default_factory=Noise)
+    correction: Correction = field(default_factory=Correction)
+    remarks: tuple[str, ...] = ()
