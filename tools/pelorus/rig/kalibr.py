@@ -96,7 +96,7 @@ def pair(first: Named, second: Named) -> Rig:
 def with_imu(rig: Rig, content: Named) -> Rig:
     """The rig on the IMU of the file: its noise, its errors, its clock, its place.
 
-    Kalibr's models: a_m = M a, w_m = M C w + A a. Times of IMU i are time_offset before those of
+    Kalibr's models: a_m = M a, w_m = M C w + A C a. Times of IMU i are time_offset before those of
     imu0, on whose clock and body the camchain is; T_i_b brings points of imu0 to it.
     """
     own = content.object("imu0") if "imu0" in content else content
@@ -130,11 +130,10 @@ def _correction(own: Named) -> tuple[Correction, list[str]]:
             remarks.append(f"{', '.join(unused)}: where each accelerometer sits is not used")
     if "gyroscopes" in own:
         gyroscopes = own.object("gyroscopes")
-        W = _inverse(gyroscopes, "M")
-        if "C_gyro_i" in gyroscopes:
-            W = rotation(gyroscopes, "C_gyro_i").T @ W
+        C = rotation(gyroscopes, "C_gyro_i") if "C_gyro_i" in gyroscopes else np.eye(3)
+        W = C.T @ _inverse(gyroscopes, "M")
         if "A" in gyroscopes:
-            G = -W @ matrix(gyroscopes, "A", 3, 3)
+            G = -W @ matrix(gyroscopes, "A", 3, 3) @ C
     found = Correction(A=A, W=W, G=G)
     if not found.is_none:
         model = own.content.get("model", "scale-misalignment")
