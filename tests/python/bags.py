@@ -104,6 +104,23 @@ class Recorder:
         header = self.header(t_ns, frame)
         self.add(topic, kind, t_ns, self.new(kind, header, upright, zeros, *both))
 
+    def fix(
+        self,
+        topic: str,
+        t_ns: int,
+        place: Iterable[float],
+        sigma_m: float = 0.0,
+        status: int = 0,
+        frame: str = "",
+    ) -> None:
+        """Latitude, longitude, altitude."""
+        kind = "sensor_msgs/msg/NavSatFix"
+        state = self.new("sensor_msgs/msg/NavSatStatus", status, 1)
+        covariance = sigma_m**2 * np.eye(3).ravel()
+        of_kind = 2 if sigma_m else 0
+        header = self.header(t_ns, frame)
+        self.add(topic, kind, t_ns, self.new(kind, header, state, *place, covariance, of_kind))
+
     def vector(self, topic: str, t_ns: int, x: Iterable[float]) -> None:
         kind = "geometry_msgs/msg/Vector3Stamped"
         self.add(topic, kind, t_ns, self.new(kind, self.header(t_ns), self.xyz("Vector3", x)))

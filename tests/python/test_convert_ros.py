@@ -16,6 +16,7 @@ from bags import NS, Recorder
 from converted import SHORT, Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
+from pelorus import se3
 from pelorus.converters import ros, ros_frames
 from pelorus.converters.bag import Bag
 from pelorus.converters.streams import Asked, Pictures
@@ -26,7 +27,7 @@ from pelorus.recording import Recording
 from pelorus.se3 import Poses
 from PIL import Image
 from rendered import BEGIN_NS, FRAMES, HEIGHT, SPEED_MPS, WIDTH, Scene
-from rigs import RADTAN, camchain, write_yaml
+from rigs import RADTAN, Cameras, camchain, write_yaml
 from test_convert_csv import csv_files
 from test_convert_euroc import assert_on_surfaces
 
@@ -159,22 +160,9 @@ def test_camera_info_of_raw_pictures_rectifies_them(
     for t_ns, pair in zip(Scene().t_ns, pairs, strict=True):
         for side, picture in zip(("left", "right"), pair, strict=True):
             recorder.image(f"/stereo/{side}/image_raw", t_ns, picture)
-    Ks = []
-    for fx, fy, cx, cy in (cameras.left, cameras.right):
-        Ks.append(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
-    R1, R2, P1, P2, *_ = cv2.stereoRectify(
-        Ks[0],
-        np.array(RADTAN),
-        Ks[1],
-        np.array(RADTAN),
-        (WIDTH, HEIGHT),
-        cameras.T_RL.R,
-        cameras.T_RL.p[:, None],
-    )
-    for side, K, R, P in (("left", Ks[0], R1, P1), ("right", Ks[1], R2, P2)):
-        matrices = {"K": K, "D": np.array([*RADTAN, 0.0]), "R": R, "P": P}
+    for side, info in zip(("left", "right"), infos_of(cameras), strict=True):
         recorder.camera_info(
-            f"/stereo/{side}/camera_info", (WIDTH, HEIGHT), distortion_model="plumb_bob", **matrices
+            f"/stereo/{side}/camera_info", (WIDTH, HEIGHT), distortion_model="plumb_bob", **info
         )
     R_CB, t_CB = cameras.T_LB
     body = tmp_path / "body.json"
@@ -183,6 +171,82 @@ def test_camera_info_of_raw_pictures_rectifies_them(
     bag = written(recorder, tmp_path, "ros1" if ros == 1 else "mcap")
     pelorus("convert", "ros", bag, target, "--extrinsic", body, "--truth-topic", "/odom",
                       "--twist-topic", "/odom", "--fix", "none")  # fmt: skip
+    assert_on_surfaces(target)
+
+
+def infos_of(cameras: Cameras) -> list[dict[str, NDArray[np.float64]]]:
+    """K, D, R, P of the left and the right camera, as OpenCV makes them."""
+    D = np.array([*RADTAN, 0.0])
+    left, right = (
+        np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+        for fx, fy, cx, cy in (cameras.left, cameras.right)
+    )
+    T = cameras.T_RL
+    R1, R2, P1, P2, *_ = cv2.stereoRectify(left, D, right, D, (WIDTH, HEIGHT), T.R, T.p[:, None])
+    return [{"K": left, "D": D, "R": R1, "P": P1}, {"K": right, "D": D, "R": R2, "P": P2}]
+
+
+@pytest.mark.parametrize("baseline_by_tf", [False, True])
+def test_camera_info_and_tf_static_need_no_other_file(
+    baseline_by_tf: bool, pairs: list[Any], tmp_path: Path, pelorus: Run
+) -> None:
+    """And with cameras that call themselves left and right the other way round."""
+    cameras = Scene().cameras
+    recorder = with_odometry(Recorder())
+    T_BL = se3.inverse(cameras.T_LB)
+    recorder.transforms(
+        "/tf_static",
+        NS,
+        {
+            ("base_link", "rig"): Poses(np.eye(3), T_BL.p),
+            ("rig", "a"): Poses(T_BL.R, np.zeros(3)),
+            ("a", "b"): se3.inverse(cameras.T_RL),
+        },
+    )
+    names = ("left", "right") if baseline_by_tf else ("right", "left")
+    for t_ns, pair in zip(Scene().t_ns, pairs, strict=True):
+        for side, picture, frame in zip(names, pair, "ab", strict=True):
+            recorder.image(f"/{side}/image_raw", t_ns, picture, frame=frame)
+    for side, info in zip(names, infos_of(cameras), strict=True):
+        if baseline_by_tf:
+            info["P"][:, 3] = 0
+        recorder.camera_info(
+            f"/{side}/camera_info", (WIDTH, HEIGHT), distortion_model="plumb_bob", **info
+        )
+    bag, target = written(recorder, tmp_path, "mcap"), tmp_path / "out.plr"
+    words = ("--truth-topic", "/odom", "--twist-topic", "/odom", "--fix", "none")
+    said = pelorus("convert", "ros", bag, target, *words).out
+    assert "the left camera sits on the body as /tf_static says: base_link - rig - a" in said
+    assert ("the right camera stands as /tf_static says: a - b" in said) is baseline_by_tf
+    assert ("/left/image_raw stands on the right: taken as" in said) is not baseline_by_tf
+    assert_on_surfaces(target)
+
+
+def test_the_frame_of_rectified_pictures_is_turned_as_camera_info_says(
+    pairs: list[Any], tmp_path: Path, pelorus: Run
+) -> None:
+    """/tf_static has the camera as it was built, not the one that rectification makes of it."""
+    cameras = Scene().cameras
+    infos = infos_of(cameras)
+    recorder = with_odometry(Recorder())
+    recorder.transforms("/tf_static", NS, {("base_link", "a"): se3.inverse(cameras.T_LB)})
+    for t_ns, pair in zip(Scene().t_ns, pairs, strict=True):
+        for side, picture, info in zip(("left", "right"), pair, infos, strict=True):
+            size = (WIDTH, HEIGHT)
+            maps = cv2.initUndistortRectifyMap(
+                info["K"], info["D"], info["R"], info["P"][:, :3], size, cv2.CV_32FC1
+            )
+            made = cv2.remap(picture, *maps, cv2.INTER_LINEAR)
+            recorder.image(f"/{side}/image_rect", t_ns, np.asarray(made, np.uint8), frame="a")
+    for side, info in zip(("left", "right"), infos, strict=True):
+        recorder.camera_info(
+            f"/{side}/camera_info", (WIDTH, HEIGHT), distortion_model="plumb_bob", **info
+        )
+    bag, target = written(recorder, tmp_path, "mcap"), tmp_path / "out.plr"
+    words = ("--truth-topic", "/odom", "--twist-topic", "/odom", "--fix", "none")
+    pelorus("convert", "ros", bag, target, *words)
+    header = messages_of(target, Header)[0]
+    assert np.abs(header.R_CB - infos[0]["R"] @ cameras.T_LB.R).max() < 1e-9
     assert_on_surfaces(target)
 
 

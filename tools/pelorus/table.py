@@ -72,6 +72,10 @@ class Table:
         self._factor[name] = factor
         self._own[name] = column
 
+    def put(self, name: str, numbers: Floats) -> None:
+        """Give the table one more column."""
+        self._columns[name] = [repr(number) for number in numbers.tolist()]
+
     def leave_out_bad(self, *names: str, each_time_once: bool = True) -> None:
         """Without the few rows in which a number of these columns is missing or not finite, or
         time was never set, or repeats; ForeignFileError where they are many.

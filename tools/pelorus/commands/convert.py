@@ -144,6 +144,7 @@ def csv(
     ),
     truth: Path | None = own.TRUTH,
     columns: list[str] = own.COLUMNS,
+    crs: str = own.CRS,
     measured: str = own.MEASURED,
     twist_in: TwistIn = own.TWIST_IN,
     extrinsic: Path | None = own.EXTRINSIC,
@@ -161,7 +162,7 @@ def csv(
         truth,
         extrinsic,
         lens,
-        Columns.of(columns),
+        Columns.of(columns, crs),
     )
     found = csv_converter.read(sources, readings, timing)
     importers.converted(found, timing, fix is Fix.AUTO, target)

@@ -39,6 +39,7 @@ SHARED: dict[str, tuple[Any, Any]] = {
     "imu": (Path | None, own.IMU),
     "truth": (Path | None, own.TRUTH),
     "columns": (list[str], own.COLUMNS),
+    "crs": (str, own.CRS),
     "measured": (str, own.MEASURED),
     "twist_in": (TwistIn, own.TWIST_IN),
     "twist_timing": (Timing | None, own.TIMING),
@@ -92,12 +93,13 @@ def _asked(
     imu: Path | None,
     truth: Path | None,
     columns: list[str],
+    crs: str,
     measured: str,
     twist_in: TwistIn,
     twist_timing: Timing | None,
     fix: Fix,
 ) -> Asked:
-    named = Columns.of(columns)
+    named = Columns.of(columns, crs)
     timing = None if twist_timing is None else twist_timing.value_in_header
     files = csv.MotionFiles(twists, gyro, imu, csv.measured_of(measured), twist_in)
     motion = None
@@ -191,6 +193,12 @@ def _ros(
     truth_topic: str = typer.Option(
         "", help="Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped."
     ),
+    position_topic: str = typer.Option(
+        "", help="NavSatFix of a GNSS receiver, as positions; east, north and up of the first fix."
+    ),
+    position_sigma: float = typer.Option(
+        0.0, metavar="M", help="Of each axis of it; else as its messages say."
+    ),
     body_frame: str = typer.Option(
         "", help="Of what moves the body, for /tf_static; else as its messages say."
     ),
@@ -216,6 +224,8 @@ def _ros(
             body_frame,
             truth_topic,
         ),
+        position_topic,
+        position_sigma,
     )
     with Bag(source, stamps.value) as opened:
         _convert(ros.read(opened, topics, asked), asked, target)

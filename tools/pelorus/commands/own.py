@@ -49,6 +49,12 @@ COLUMNS = typer.Option(
     help="Columns that are called otherwise, with the unit behind the last underscore or a colon: "
     "v=speed_kmh,w=yaw_rate:deg/s,t=stamp_ms; for one file: stereo.t=stamp_ms.",
 )
+CRS = typer.Option(
+    "",
+    metavar="CRS",
+    help="Of places on the earth in a truth or in positions: EPSG:32632 for columns easting_m and "
+    "northing_m (zone 32 north of UTM), and of lat_deg and lon_deg if it is not WGS 84.",
+)
 MEASURED = typer.Option(
     "vx,vy,vz,wx,wy,wz",
     metavar="NAMES",

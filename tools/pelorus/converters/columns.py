@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 
+from pelorus.converters import geodetic
+from pelorus.converters.geodetic import Ground
 from pelorus.errors import PelorusError
 from pelorus.table import TIME_UNITS, Table
 
@@ -22,6 +24,7 @@ VELOCITY = {"mps": 1.0, "m/s": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "km/h": 1 / 
 RATE = {"radps": 1.0, "rad/s": 1.0, "degps": pi / 180, "dps": pi / 180, "deg/s": pi / 180}
 FORCE = {"mps2": 1.0, "m/s2": 1.0, "m/s^2": 1.0, "g": 9.80665}
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+ANGLE = {"deg": 1.0, "rad": 180 / pi, "e7": 1e-7}  # e7: degrees times 10^7
 NUMBER = {"": 1.0}  # a unit is not needed
 
 # What --columns may name, the column that the converters ask for, and units with their factors.
@@ -34,9 +37,13 @@ NAMES: dict[str, tuple[str, Mapping[str, float]]] = {
     **{f"a{a}": (f"a{a}_mps2", FORCE) for a in "xyz"},
     **{f"p{a}": (f"p{a}_m", LENGTH) for a in "xyz"},
     **{f"q{a}": (f"q{a}", NUMBER) for a in "xyzw"},
+    **{name: (f"{name}_deg", ANGLE) for name in ("lat", "lon")},
+    **{name: (f"{name}_m", LENGTH) for name in ("alt", "easting", "northing")},
     "id": ("id", NUMBER),
     **{f"{axis}{side}": (f"{axis}{side}_px", NUMBER) for side in "LR" for axis in "uv"},
 }
+
+PLACES = ("position", "truth")  # files whose places may be on the earth
 
 # A column with the plain name, vx, is taken in the first unit, and that is said.
 PLAIN = {
@@ -65,12 +72,14 @@ class Columns:
     given: list[Column] = field(default_factory=list)
     seen: dict[Path, list[str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)  # of the files that were read
+    ground: Ground = field(default_factory=Ground)
 
     @classmethod
-    def of(cls, words: list[str]) -> Columns:
-        """Of the options' words."""
+    def of(cls, words: list[str], crs: str = "") -> Columns:
+        """Of the words of --columns and of --crs."""
         parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
-        return cls([_column(part) for part in parts if not _says_nothing(part)])
+        given = [_column(part) for part in parts if not _says_nothing(part)]
+        return cls(given, ground=Ground(crs))
 
     def read(self, path: Path, file: str) -> Table:
         """The file's columns under the project's names; `file` is its option's name."""
@@ -85,6 +94,8 @@ class Columns:
                 one.used = True
             else:
                 table.miss(one.column, one.target)
+        if file in PLACES:
+            geodetic.localise(table, self.ground)
         return table
 
     def require_used(self) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from pelorus import se3
-from pelorus.converters import ros_frames, ros_motion
+from pelorus.converters import ros_frames, ros_motion, ros_positions
 from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
 from pelorus.converters.ros_motion import IMU, Moving
@@ -24,6 +24,8 @@ class Topics:
 
     cameras: Cameras
     moving: Moving = field(default_factory=Moving)
+    position: str = ""  # of a GNSS receiver
+    position_sigma_m: float = 0.0  # 0: as its messages say
 
 
 def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
@@ -33,10 +35,15 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     motion = asked.motion or ros_motion.read(bag, topics.moving, asked, tree, remarks)
     calibrated, cameras = _calibrated(bag, topics, asked, motion, tree, remarks)
     frames = ros_frames.read(bag, cameras, calibrated, remarks)
+    small = []
+    if topics.position:
+        body = bare(topics.moving.frame) or motion.frame
+        known = topics.position, topics.position_sigma_m
+        small = ros_positions.read(bag, *known, body, tree, remarks)
     truth = asked.truth
     if truth is None and topics.moving.truth:
         truth = ros_motion.truth(bag, topics.moving.truth, remarks)
-    return Streams(calibrated, frames, motion, truth, remarks=remarks)
+    return Streams(calibrated, frames, motion, truth, small, remarks)
 
 
 # --- cameras --------------------------------------------------------------------------------------

@@ -154,7 +154,7 @@ def _twists(bag: Bag, topic: str, asked: Asked, remarks: list[str]) -> Twists:
         pose = pose if np.isfinite(pose).all() else NO_POSE
         return [*np.where(kept, numbers, 0.0).tolist(), *pose]
 
-    t_ns, numbers, frame = _rows(bag, topic, row, remarks)
+    t_ns, numbers, frame = rows_of(bag, topic, row, remarks)
     where = bag.path / topic.lstrip("/")
     found = Twists(where, t_ns, numbers[:, :3], numbers[:, 3:6], asked.measured, frame)
     remarks.append(
@@ -181,7 +181,7 @@ def _wheels(bag: Bag, wheels: Wheels, remarks: list[str]) -> Twists:
             )
         return [float(message.velocity[message.name.index(name)]) for name in wheels.joints]
 
-    t_ns, turning, frame = _rows(bag, topic, row, remarks)
+    t_ns, turning, frame = rows_of(bag, topic, row, remarks)
     speed = turning * wheels.radius_m
     v, w = np.zeros((2, len(t_ns), 3))
     v[:, 0] = speed.mean(axis=1)
@@ -258,7 +258,7 @@ def _halves(bag: Bag, topic: str, remarks: list[str]) -> Rows:
             return [*_xyz(message.vector), *_xyz(message.vector)]
         return [*_xyz(message.linear_acceleration), *_xyz(message.angular_velocity)]
 
-    return _rows(bag, topic, row, remarks)
+    return rows_of(bag, topic, row, remarks)
 
 
 def _readings(bag: Bag, topic: str, rows: Rows) -> Readings:
@@ -273,7 +273,7 @@ def truth(bag: Bag, topic: str, remarks: list[str]) -> Trajectory:
     """Poses of the body in the world."""
     bag.require(topic, *POSES)
     of_message = POSES[bag.types[topic]]
-    t_ns, numbers, _ = _rows(bag, topic, lambda message: _pose(of_message(message)), remarks)
+    t_ns, numbers, _ = rows_of(bag, topic, lambda message: _pose(of_message(message)), remarks)
     if not _are_rotations(numbers[:, 3:]):
         raise ForeignFileError(bag.path, "holds a quaternion whose norm is not 1", at=topic)
     return Trajectory(t_ns, _poses(numbers))
@@ -301,8 +301,8 @@ def _xyz(vector: Any) -> list[float]:
     return [float(vector.x), float(vector.y), float(vector.z)]
 
 
-def _rows(bag: Bag, topic: str, row: Callable[[Any], list[float]], remarks: list[str]) -> Rows:
-    """Without messages that tell nothing."""
+def rows_of(bag: Bag, topic: str, row: Callable[[Any], list[float]], remarks: list[str]) -> Rows:
+    """Of a topic, a row a message, without messages that tell nothing."""
     found = progress(bag.written([topic]), f"reading {topic}", bag.count([topic]))
     stamped, frame = [], ""
     for one in found:
