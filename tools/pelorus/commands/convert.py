@@ -134,8 +134,8 @@ def csv(
     ),
     calibration: list[Path] = typer.Option(
         ...,
-        help="Kalibr's camchain YAML (and a second time, its IMU file), OpenCV's stereo YAML (one "
-        "file or two), or, of a rectified pair, JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and "
+        help="Of Kalibr (and a second time, its IMU file), ROS, OpenCV, ORB-SLAM3, VINS-Fusion, "
+        "Basalt, OKVIS or ZED (docs/CONVERT.md), or, of a rectified pair, JSON: fx_px, fy_px, cx_px, cy_px, baseline_m, and "
         "R_CB, as three rows of three, with t_CB_m (body to left camera) or R_BC with t_BC_m (the "
         "camera's pose in the body); optional image_width_px, image_height_px, body_axes "
         "(forward-left-up, forward-right-down, other), twist_timing (start, end, mid), name, and "

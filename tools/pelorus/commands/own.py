@@ -19,8 +19,8 @@ FIX = typer.Option(
 CALIBRATION = typer.Option(
     [],
     metavar="FILE",
-    help="Kalibr's camchain YAML (and a second time, its IMU file), or OpenCV's stereo YAML (one "
-    "file or two).",
+    help="What calibrates the cameras: of Kalibr (and a second time, its IMU file), ROS, OpenCV, "
+    "ORB-SLAM3, VINS-Fusion, Basalt, OKVIS, ZED; docs/CONVERT.md has them all.",
 )
 TWISTS = typer.Option(
     None,
@@ -77,5 +77,7 @@ EXTRINSIC = typer.Option(
     "t_BC_m, where the calibration does not say it or is of another body.",
 )
 LENS = typer.Option(
-    None, help="Of an OpenCV calibration whose four numbers may be of a fisheye or not."
+    None,
+    help="Of an OpenCV calibration whose four numbers may be of a fisheye or not; none beside ROS's "
+    "camera_info files: the pictures are rectified already.",
 )
