@@ -78,6 +78,6 @@ EXTRINSIC = typer.Option(
 )
 LENS = typer.Option(
     None,
-    help="Of an OpenCV calibration whose four numbers may be of a fisheye or not; none beside ROS's "
-    "camera_info files: the pictures are rectified already.",
+    help="Of an OpenCV calibration whose four numbers may be of a fisheye or not; none beside "
+    "camera_info files of ROS: the pictures are rectified already.",
 )

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import f as fisher
 
 from pelorus import arrays, foreign
 from pelorus.converters.bag import NS, Bag
@@ -23,6 +24,7 @@ from pelorus.motion import Times
 TWICE = 1.5  # times as many messages as fit into a time that is covered once; covered twice: 2
 TEETH_MIN = 8  # in a stretch, to tell two combs from a stumble of the driver
 SAME_PERIOD = 0.1  # of it, inside and outside of the stretch
+CHANCE = 1e-6  # that one drive looks like two
 COMBS_SIGMA = 5.0  # that the steps differ in turn, and not by chance
 
 
@@ -65,7 +67,8 @@ def in_order(
     found = _written_back(t_ns)
     order = np.argsort(t_ns, kind="stable")
     if found is None:
-        found = _interleaved(t_ns[_without_copies(order, t_ns, numbers)])
+        once = _without_copies(order, t_ns, numbers)
+        found = _interleaved(t_ns[once], None if numbers is None else numbers[once])
     if found is not None:
         raise ForeignFileError(
             bag.path,
@@ -113,8 +116,8 @@ def _without_copies(
     return order[~np.concatenate(([False], same))]
 
 
-def _interleaved(t_ns: Times) -> SetBack | None:
-    """Of sorted stamps: a stretch of two combs, each with the period of all that is outside."""
+def _interleaved(t_ns: Times, numbers: Floats | None) -> SetBack | None:
+    """Of sorted stamps: a stretch twice as dense as the rest, of two combs or of two drives."""
     steps = np.diff(t_ns).astype(np.float64)
     if len(steps) < 2 * TEETH_MIN:
         return None
@@ -125,10 +128,29 @@ def _interleaved(t_ns: Times) -> SetBack | None:
         inside, outside = steps[begin : end + 1], np.delete(steps, slice(begin, end + 1))
         if len(inside) < TEETH_MIN or not len(outside):
             continue
-        even, odd = inside[::2], inside[1::2]
-        period, alone = float(even.mean() + odd.mean()), float(np.median(outside))
-        apart = abs(even.mean() - odd.mean())
-        chance = np.sqrt(even.var() / len(even) + odd.var() / len(odd))
-        if abs(period - alone) < SAME_PERIOD * alone and apart > max(COMBS_SIGMA * chance, 1):
+        period, alone = 2 * float(inside.mean()), float(np.median(outside))
+        if abs(period - alone) > SAME_PERIOD * alone:
+            continue
+        own = None if numbers is None else numbers[begin : end + 2]
+        if _are_combs(inside) or (own is not None and _are_two_drives(own)):
             return SetBack(int(t_ns[end + 1] - t_ns[begin]), begin + (end - begin + 1) // 2)
     return None
+
+
+def _are_combs(steps: Floats) -> bool:
+    """Whether steps are short and long in turn."""
+    even, odd = steps[::2], steps[1::2]
+    chance = np.sqrt(even.var() / len(even) + odd.var() / len(odd))
+    return bool(abs(even.mean() - odd.mean()) > max(COMBS_SIGMA * chance, 1))
+
+
+def _are_two_drives(numbers: Floats) -> bool:
+    """Whether each message is less like the next one than like the one after that.
+
+    Of one drive it is as much like it, by noise alone, or more.
+    """
+    scale = np.maximum(numbers.std(axis=0), np.finfo(float).tiny)
+    near, far = (float(np.sum((np.diff(x, axis=0) / scale) ** 2)) for x in (numbers, numbers[::2]))
+    far += float(np.sum((np.diff(numbers[1::2], axis=0) / scale) ** 2))
+    count = len(numbers)
+    return near > float(fisher.isf(CHANCE, count, count)) * far
