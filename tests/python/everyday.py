@@ -111,7 +111,7 @@ def drive(settings: Settings, seed: int) -> Recording:
     told = Camera(focal, focal, size[0] / 2, size[1] / 2, settings.baseline_m)
     true = replace(told, baseline_m=told.baseline_m * (1 + settings.baseline_error))
     at = np.arange(0, count, FINE_HZ // settings.frame_hz)
-    tracks = _tracks(settings, Poses(way.R[at], way.p[at]), T_CB, true, size, chance)
+    tracks = tracks_of(settings, Poses(way.R[at], way.p[at]), T_CB, true, size, chance)
     noise = Noise(
         settings.pixel_px, settings.velocity_mps, settings.gyro_radps,
         settings.bias_mps, settings.bias_radps,
@@ -125,7 +125,7 @@ def drive(settings: Settings, seed: int) -> Recording:
     return Recording(header, t_ns[::every], v, w, t_ns[at], tracks, t_ns[at], truth)
 
 
-def _waves(t: Floats, rms: float, slowest_s: float, chance: np.random.Generator) -> Floats:
+def waves(t: Floats, rms: float, slowest_s: float, chance: np.random.Generator) -> Floats:
     """Some sines of periods down to a quarter of the slowest."""
     period = slowest_s * chance.uniform(0.25, 1.0, WAVES)
     phase = chance.uniform(0, 2 * np.pi, WAVES)
@@ -137,12 +137,12 @@ def _waves(t: Floats, rms: float, slowest_s: float, chance: np.random.Generator)
 def _way(settings: Settings, count: int, chance: np.random.Generator) -> Poses:
     """Steps at a constant velocity each."""
     t = np.arange(count) / FINE_HZ
-    ahead = settings.speed_mps * (1 + _waves(t, settings.speed_varies, 12.0, chance))
-    across = [_waves(t, settings.across_mps, 6.0, chance) for _ in range(2)]
+    ahead = settings.speed_mps * (1 + waves(t, settings.speed_varies, 12.0, chance))
+    across = [waves(t, settings.across_mps, 6.0, chance) for _ in range(2)]
     v = np.stack((ahead, *across), axis=1)
     w = np.stack(
-        [_waves(t, settings.wobbles_radps, 3.0, chance) for _ in range(2)]
-        + [_waves(t, settings.turns_radps, 15.0, chance)],
+        [waves(t, settings.wobbles_radps, 3.0, chance) for _ in range(2)]
+        + [waves(t, settings.turns_radps, 15.0, chance)],
         axis=1,
     )
     turn = Rotation.from_rotvec(w / FINE_HZ).as_matrix()
@@ -179,7 +179,7 @@ def _readings(
     )
 
 
-def _tracks(
+def tracks_of(
     settings: Settings,
     truth: Poses,
     T_CB: Poses,

@@ -5,6 +5,7 @@ drive: they need no model of the noise, and hold when it is not white.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,11 +17,13 @@ from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 ROUNDS = 8
-BLOCKS_MOST, BLOCK_FRAMES = 40, 10
+BLOCKS_LEAST, BLOCKS_MOST, BLOCK_FRAMES = 8, 40, 10
 SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
 TURN_CLOCK = 19
 PARAMETERS = 20
+NEIGHBOURS = 0.5  # weight of what neighbouring blocks have in common
 TELLS_SIGMAS = 3.0
+RIDGE = 1e-9  # of instruments that say the same
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,9 @@ class Body(Protocol):
 
 
 class Fit:
-    """All unknowns of a design."""
+    """All unknowns of a design, by two-stage least squares: of each column of X counts what the
+    instruments tell of it. Where they tell nothing, what is known beforehand stands, and its sigma.
+    """
 
     def __init__(self, design: Design, blocks_most: int = BLOCKS_MOST) -> None:
         y, X, Z, variance, prior = design.y, design.X, design.Z, design.variance, design.prior
@@ -64,6 +69,8 @@ class Fit:
         for _ in range(ROUNDS):
             trust = weight[:, None] / (variance + extra)
             trusted = Z_rows * trust.reshape(-1, 1)
+            told = np.sum(trusted * X_rows, axis=0) / (np.sum(trusted * Z_rows, axis=0) + 1e-12)
+            trusted *= told  # what the instrument tells of its column
             A = trusted.T @ X_rows + prior
             x = np.linalg.solve(A, trusted.T @ y.ravel())
             left = y - X @ x
@@ -72,26 +79,67 @@ class Fit:
             d2 = np.sum(left**2 / (variance + extra), axis=1) / y.shape[1]
             weight = 1 / (1 + d2 / 9) ** 2
         inverse = np.linalg.inv(A)
-        self._A, self._inverse, self._design, self._trust = A, inverse, design, trust
-        self._blocks_most = blocks_most
+        self._A, self._inverse, self._trust = A, inverse, trust
+        self._y, self._X, self._Z = y, X, Z * told
+        self.blocks = int(np.clip(count // BLOCK_FRAMES, BLOCKS_LEAST, blocks_most))
         self.x = np.asarray(x)
         self.cost = float(np.sum(np.log(spread)))
-        self.covariance = self.covariance_of(left) + inverse @ prior @ inverse.T
+        self._known = inverse @ prior @ inverse.T
+        self.covariance = self.covariance_of(left) + self._known
         self.sigma = np.sqrt(np.diagonal(self.covariance))
         shared = variance / (variance + extra)  # of the variance what the images add
-        middle = (trusted * shared.reshape(-1, 1)).T @ Z_rows
+        of_all = self._Z.reshape(-1, self._Z.shape[2])
+        middle = (of_all * (trust * shared).reshape(-1, 1)).T @ of_all
         images = inverse @ middle @ inverse.T
         self.image_sigma = np.sqrt(np.maximum(np.diagonal(images), 0.0))
 
     def covariance_of(self, left: Floats) -> Floats:
-        """Of the unknowns, by what residuals (k, a) leave in blocks of the drive."""
+        """Of the unknowns, by what residuals (k, a) leave in blocks of the drive, and in neighbours
+        together (Newey and West 1987): what is off for seconds is not new in every block.
+        """
         count = len(left)
-        score = (self._design.Z * (left * self._trust)[..., None]).sum(axis=1)
-        blocks = int(np.clip(count // BLOCK_FRAMES, 8, self._blocks_most))
-        sums = np.zeros((blocks, self._design.Z.shape[2]))
-        np.add.at(sums, np.arange(count) * blocks // count, score)
-        meat = sums.T @ sums * blocks / (blocks - 3)
+        score = (self._Z * (left * self._trust)[..., None]).sum(axis=1)
+        sums = np.zeros((self.blocks, self._Z.shape[2]))
+        np.add.at(sums, np.arange(count) * self.blocks // count, score)
+        both = sums[1:].T @ sums[:-1]
+        meat = sums.T @ sums + NEIGHBOURS * (both + both.T)
+        meat = meat * self.blocks / (self.blocks - 3)
         return np.asarray(self._inverse @ meat @ self._inverse.T)
+
+    def ratio(self, which: Sequence[int], values: Floats, doubt: Floats | float = 0.0) -> float:
+        """2 ln of the likelihood of what was found of some unknowns beside that of these values;
+        `doubt` (m, m) is a variance that counts besides. What is left with the values has nothing
+        to do with the instruments if they are right, and how far it may by chance says the rest
+        that they leave (Anderson and Rubin 1949): true however little a drive tells. With few
+        blocks that is known badly itself, which the logarithm counts (Hotelling 1931).
+        """
+        some = np.asarray(which)
+        others = np.setdiff1d(np.arange(len(self.x)), some)
+        off = self.x[some] - values
+        x = self.x.copy()
+        x[some] = values
+        x[others] += np.linalg.solve(
+            self._A[np.ix_(others, others)], self._A[np.ix_(others, some)] @ off
+        )
+        left = self._y - self._X @ x
+        Z = self._Z.reshape(-1, self._Z.shape[2])
+        trusted = Z * self._trust.reshape(-1, 1)
+        size = np.sqrt(np.sum(trusted * Z, axis=0)) + 1e-12
+        scaled = trusted / size
+        of_Z = scaled.T @ (Z / size) + RIDGE * np.eye(len(size))
+        left = left - (self._Z / size) @ np.linalg.solve(of_Z, scaled.T @ left.ravel())
+        covariance = self.covariance_of(left)[np.ix_(some, some)] + doubt
+        covariance += self._known[np.ix_(some, some)]
+        d2 = float(off @ np.linalg.solve(covariance, off))
+        degrees = self.blocks / (1 + NEIGHBOURS)  # of the variance: neighbours are told together
+        return (degrees - len(off) / 2) * float(np.log1p(max(d2, 0.0) / degrees))
+
+    def known(self, which: int) -> float:
+        """The standard error of an unknown, by how likely it is that there is none of it: the
+        larger of that and its sigma.
+        """
+        ratio = self.ratio([which], np.zeros(1))
+        return max(float(self.sigma[which]), abs(float(self.x[which])) / np.sqrt(ratio + 1e-12))
 
     def tells(self, which: int) -> bool:
         """Whether an unknown's column and its instrument vary together by more than chance, by
@@ -100,7 +148,7 @@ class Fit:
         is noise, and a weak instrument takes least squares back to what noise makes of the unknown,
         with a small standard error.
         """
-        A, X, Z = self._A, self._design.X, self._design.Z
+        A, X, Z = self._A, self._X, self._Z
         others = np.arange(len(A)) != which
         of_x, of_z = -np.ones(len(A)), -np.ones(len(A))
         of_x[others] = np.linalg.solve(A[np.ix_(others, others)], A[others, which])

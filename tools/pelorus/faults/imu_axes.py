@@ -35,7 +35,7 @@ DOUBT = 0.03  # by which an entry of a matrix may be off besides, of its scale
 FREE_SCALE = 0.25  # calibrations are off by less; what is off so little is judged elsewhere
 OFFSETS_S = np.arange(-10, 11) * 0.04
 OFFSET_SURE = 0.05  # of the cost, by which another offset must be better than none
-NOISE_MOST = 0.5  # of what the images show: more than that is no measurement
+TURNS_SIGMAS, PART_LEAST = 6.0, 3.0
 LEVER_M, BIAS_MPS2, MATRIX = 3.0, 1.0, 1e3
 BLOCKS = 20
 ROUNDS = 8
@@ -55,15 +55,19 @@ FORCE_UNITS = {
 
 @dataclass(frozen=True)
 class Matrix:
-    """Measured: M, and the covariance of its nine numbers row by row."""
+    """Measured: M, and the covariance of its nine numbers row by row; beside it that by the noise
+    of the readings, for each unit of what M is taken for.
+    """
 
     M: Floats
     covariance: Floats
+    by_readings: Floats
 
     def held_against(self, N: Floats, free: bool = True) -> float:
         """d^2 of N, at the scale beside its own that fits best."""
         size = float(np.linalg.norm(N) / np.sqrt(3))
-        known = np.linalg.inv(self.covariance + (DOUBT * size) ** 2 * np.eye(9))
+        doubt = self.by_readings + DOUBT**2 * np.eye(9)
+        known = np.linalg.inv(self.covariance + size**2 * doubt)
         n, m = N.ravel(), self.M.ravel()
         scale = 1.0
         if free:
@@ -143,7 +147,9 @@ def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None
     )
     good = seen.usable & np.isfinite(told[0].turn).all(axis=1) & np.isfinite(X).all(axis=(0, 2, 3))
     beside = [BIAS_MPS2] * 3 + [LEVER_M] * 3 + [100.0] * stretches.shape[2]
-    fit = _fit(seen.rates[good, :3], X[:, good], seen.variance[good, :3], beside)
+    one, other = X[:, good]  # of the readings, each with a noise of its own
+    noise = np.sqrt(0.5) * (one - other)[:, :, :9]
+    fit = _fit(seen.rates[good, :3], one, other, noise, seen.variance[good, :3], beside)
     return Measured(turn, fit.matrix)
 
 
@@ -161,33 +167,51 @@ def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
 
 
 def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Found | None:
-    frame_s = body.frame_s(frame_t_ns, offset_s)
-    w = np.stack([mean_rates(body.readings.at(half), frame_s) for half in _halves(body.readings)])
-    good = seen.usable & np.isfinite(w).all(axis=(0, 2))
+    """By what the images tell of the frames beside: in that there is nothing of what a gyro reads
+    without turning, be it noise or a motor. What they do not tell of the readings counts as noise.
+    """
+    w, own = body.mean_turns(frame_t_ns, offset_s), seen.beside()[:, 3:]
+    good = seen.usable & np.isfinite(np.hstack((w, own))).all(axis=1)
     if good.sum() < 0.5 * seen.usable.sum():
         return None
-    X = np.zeros((2, int(good.sum()), 3, 12))
+    y, w, own = seen.rates[good, 3:], w[good], own[good]
+    told = np.hstack((own, np.ones((len(own), 1))))
+    expected = told @ np.linalg.lstsq(told, w, rcond=None)[0]
+    X, Z = np.zeros((2, len(w), 3, 12))
     for i in range(3):
-        X[:, :, i, 3 * i : 3 * i + 3] = w[:, good]
-        X[:, :, i, 9 + i] = 1
-    return _fit(seen.rates[good, 3:], X, seen.variance[good, 3:], [1.0] * 3)
+        X[:, i, 3 * i : 3 * i + 3], Z[:, i, 3 * i : 3 * i + 3] = w, expected
+        X[:, i, 9 + i] = Z[:, i, 9 + i] = 1
+    seen_to_turn = _together(y, own)
+    if seen_to_turn > max(TURNS_SIGMAS, PART_LEAST * _together(w, _foretold(w, told))):
+        Z = X  # the readings have no part in what the images show: 0 is what they say
+    return _fit(y, X, Z, (X - Z)[:, :, :9], seen.variance[good, 3:], [1.0] * 3)
 
 
-def _fit(y: Floats, of_halves: Floats, variance: Floats, beside: list[float]) -> Found:
-    """The one half of the readings is the other's instrument. By their own noise, where the drive
-    does not move them, least squares would find a matrix of 0, and be sure of it. Readings that are
-    nothing but noise are taken as they are: then 0 is what they show.
+def _foretold(w: Floats, told: Floats) -> Floats:
+    """By what goes with it in the other half of the drive."""
+    half = len(w) // 2
+    first, second = (np.linalg.lstsq(told[k], w[k], rcond=None)[0] for k in
+                     (slice(half), slice(half, None)))  # fmt: skip
+    return np.concatenate((told[:half] @ second, told[half:] @ first))
+
+
+def _together(a: Floats, b: Floats) -> float:
+    """By how many standard errors two motions (k, 3) go together."""
+    product = np.sum((a - a.mean(axis=0)) * (b - b.mean(axis=0)), axis=1)
+    sums = np.bincount(np.arange(len(product)) * BLOCKS // len(product), product)
+    return float(np.sum(sums) / (np.sqrt(BLOCKS) * np.std(sums) + 1e-12))
+
+
+def _fit(
+    y: Floats, X: Floats, Z: Floats, noise: Floats, variance: Floats, beside: list[float]
+) -> Found:
+    """By their own noise, where the drive does not move them, least squares would find a matrix of
+    0, and be sure of it.
     """
-    X, Z = of_halves
-    noise = np.sqrt(0.5) * (X - Z)[:, :, :9]
-    most = NOISE_MOST**2 * np.median(np.sum(y**2, axis=1))
-    if np.median(np.sum(noise**2, axis=(1, 2))) > most:
-        X = Z = 0.5 * (X + Z)
-        noise = noise[:, :, :0]
     prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
     fit = Fit(Design(y, X, Z, variance, prior, y), BLOCKS)
-    covariance = sum((fit.covariance_of(part) for part in np.moveaxis(noise, 2, 0)), fit.covariance)
-    return Found(fit, Matrix(fit.x[:9].reshape(3, 3), covariance[:9, :9]))
+    by_readings = np.sum([fit.covariance_of(part)[:9, :9] for part in np.moveaxis(noise, 2, 0)], 0)
+    return Found(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
 
 
 # --- what explains it -----------------------------------------------------------------------------
@@ -275,7 +299,9 @@ def _turned(found: Measured) -> Iterator[Explained]:
 def _nearest(found: Measured, Q: Floats) -> Floats:
     """Gauss and Newton from Q on."""
     matrices = [found.turn, found.force]
-    known = [np.linalg.inv(m.covariance + DOUBT**2 * np.eye(9)) for m in matrices]
+    known = [
+        np.linalg.inv(m.covariance + m.by_readings + DOUBT**2 * np.eye(9)) for m in matrices
+    ]
     for _ in range(ROUNDS):
         J = np.stack([(se3.skew(e) @ Q).ravel() for e in np.eye(3)], axis=1)
         H = sum(J.T @ W @ J for W in known) + 1e-9 * np.eye(3)

@@ -38,6 +38,7 @@ from pelorus.recording import Recording
 
 Flags = NDArray[np.bool_]
 START_MPS, GRAVITY_MPS2 = 100.0, 100.0  # sigmas of what a stretch begins with
+NEAR = 2  # frames from which a slope is taken: pairs that share no picture
 GYRO_SCALE = 0.005  # sigma: better than a focal length is known without it
 
 
@@ -98,8 +99,16 @@ class ImuBody:
         X[:, :, CLOCK] = slope(both, 1, float(np.median(seen.tau_s)))
         X[:, :3, PARAMETERS:] = stretches
         Z = X.copy()
+        own = seen.beside()  # by the images: nothing in it is the readings' noise
+        v, w = own[:, :3], own[:, 3:]
+        Z[:, :3, SCALE] = v
+        Z[:, :3, LEVER : LEVER + 3] = se3.skew(w)
+        Z[:, :3, TILT : TILT + 3] = -se3.skew(v)
+        Z[:, 3:, TILT : TILT + 3] = -se3.skew(w)
+        Z[:, 3:, TURN_SCALE] = w
+        Z[:, :, CLOCK] = slope(seen.rates, NEAR, float(np.median(seen.tau_s)))
         if seen.by_focal is not None:
-            X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, beside(seen.by_focal, 1, 2)
+            X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, beside(seen.by_focal, 2, 3)
         k = good & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
         y = seen.rates - both
         return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, stretches.shape[2]), g[k])

@@ -17,6 +17,17 @@ POINTS_MIN = 6  # of a pair of frames
 LONGER = 0.02  # by which a focal length is changed to see what that does
 
 
+BESIDE = (2, 3)  # frames: the next ones share a picture
+
+
+def _of_neighbours(x: Floats) -> Floats:
+    out = np.zeros_like(x)
+    for lag in BESIDE:
+        out[lag:] += x[:-lag]
+        out[:-lag] += x[lag:]
+    return out
+
+
 @dataclass(frozen=True)
 class Seen:
     """The camera's own v and w in body axes as given, (k, 6), their variances, and which count."""
@@ -39,6 +50,17 @@ class Seen:
         variance = of_axes / tau[:, None] ** 2
         usable = (views.counts >= POINTS_MIN) & np.isfinite(in_body).all(axis=1)
         return cls(in_body, variance, usable, tau)
+
+    def beside(self) -> Floats:
+        """(k, 6) v and w as the frames beside tell them, each as far as it knows; NaN where none
+        does. They have no picture in common with the pair itself, so that neither its noise is in
+        them nor any of the body's sensors.
+        """
+        trust = np.where(self.usable[:, None], 1 / (self.variance + 1e-12), 0.0)
+        told = np.where(self.usable[:, None], self.rates, 0.0) * trust
+        total, weight = (_of_neighbours(x) for x in (told, trust))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(total / np.where(weight > 0, weight, np.nan))
 
     def with_focal(self, recording: Recording, views: TwoViews) -> Seen:
         """And what another focal length would make of it. Neither turns nor ways simply scale with
