@@ -75,21 +75,22 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     if by_imu:
         seen = seen.with_focal(recording, views)
     clocks = two_clocks(recording, seen, offset, bias) if clock_told and not by_imu else UNTOLD
-    at = offset
+    at, clock_sigma = offset, float("inf")
+    if clock_told:
+        clock_sigma = _clock_sigma(Fit(body.design(recording, seen, 0.0, bias)), found, offset)
     if clocks.apart:  # all else is asked of motions that belong together
         body, at, found = TwistBody(recording, clocks.turns_late_s), clocks.ways_s, None
     if found is None:
         found = Fit(body.design(recording, seen, at, bias))
-    none = place = found
+    none = found
     turns_told = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
-        late = clocks.turns_late_s if clocks.apart else None
-        place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
         none = Fit(body.design(recording, seen, at, NO_BIAS_MPS))
     speed = float(np.median(np.linalg.norm(found.g, axis=1)))
     scale, sigma = float(found.x[SCALE]), _sigma(found, by_imu)
-    if not (by_imu or found.tells(SCALE)):  # then the bias is what is known of it beforehand
-        scale, sigma = float(none.x[SCALE]), float(np.hypot(none.sigma[SCALE], bias / speed))
+    by_prior = float(np.hypot(none.known(SCALE), bias / speed))
+    if not by_imu and sigma > by_prior:  # then the bias is what is known of it beforehand
+        scale, sigma = float(none.x[SCALE]), by_prior
     doubt = _doubt_by_depth(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS))
     if not by_imu:
         doubt = float(np.hypot(doubt, _doubt_by_noise(recording, views, body, at, none)))
@@ -100,16 +101,16 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         1 + scale,
         float(np.hypot(sigma, doubt)),
         1 + float(none.x[SCALE]),
-        float(np.hypot(none.sigma[SCALE], doubt)),
-        place.x[lever],
-        place.covariance[lever, lever],
+        float(np.hypot(none.known(SCALE), doubt)),
+        found.x[lever],
+        found.covariance_known(range(LEVER, LEVER + 3)),
         offset,
-        float(found.sigma[CLOCK]) if clock_told else float("inf"),
+        clock_sigma,
         speed,
         1 + float(found.x[TURN_SCALE]),
-        float(found.sigma[TURN_SCALE]) if turns_told else float("inf"),
+        found.known(TURN_SCALE) if turns_told else float("inf"),
         1 - float(found.x[FOCAL]),
-        float(found.sigma[FOCAL]) if by_imu else float("inf"),
+        found.known(FOCAL) if by_imu else float("inf"),
         tilt_rad=tilt[0],
         tilt_covariance=tilt[1],
         clocks=clocks,
@@ -127,11 +128,18 @@ def _tilt(fit: Fit) -> tuple[Floats, Floats]:
     return np.asarray(covariance @ same.T @ known @ fit.x[both]), np.asarray(covariance)
 
 
+def _clock_sigma(as_given: Fit, found: Fit | None, offset_s: float) -> float:
+    """Of the offset: how much likelier it is than none says the fit at none."""
+    d2 = as_given.beside([CLOCK], np.zeros(1))
+    own = as_given if found is None else found
+    return max(float(own.sigma[CLOCK]), abs(offset_s) / float(np.sqrt(d2 + 1e-12)))
+
+
 def _sigma(fit: Fit, by_imu: bool) -> float:
     """Of the scale. With an IMU blocks are shorter than the stretches that share unknowns, and tell
     too little; but the readings' own noise is small, and what the images add is known.
     """
-    return max(fit.sigma[SCALE], fit.image_sigma[SCALE]) if by_imu else float(fit.sigma[SCALE])
+    return max(fit.known(SCALE), fit.image_sigma[SCALE]) if by_imu else fit.known(SCALE)
 
 
 def _body(recording: Recording, seen: Seen) -> tuple[Body, float]:

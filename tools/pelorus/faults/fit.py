@@ -60,7 +60,8 @@ class Fit:
     """
 
     def __init__(self, design: Design, blocks_most: int = BLOCKS_MOST) -> None:
-        y, X, Z, variance, prior = design.y, design.X, design.Z, design.variance, design.prior
+        y, X, variance, prior = design.y, design.X, design.variance, design.prior
+        Z = np.clip(design.Z, X.min(axis=0), X.max(axis=0))  # pictures that hang tell leaps
         self.g, self.frames = design.g, len(y)
         count = len(y)
         extra: Floats = np.median(y**2, axis=0)
@@ -106,12 +107,10 @@ class Fit:
         meat = meat * self.blocks / (self.blocks - 3)
         return np.asarray(self._inverse @ meat @ self._inverse.T)
 
-    def ratio(self, which: Sequence[int], values: Floats, doubt: Floats | float = 0.0) -> float:
-        """2 ln of the likelihood of what was found of some unknowns beside that of these values;
-        `doubt` (m, m) is a variance that counts besides. What is left with the values has nothing
-        to do with the instruments if they are right, and how far it may by chance says the rest
-        that they leave (Anderson and Rubin 1949): true however little a drive tells. With few
-        blocks that is known badly itself, which the logarithm counts (Hotelling 1931).
+    def beside(self, which: Sequence[int], values: Floats) -> float:
+        """d^2 of what was found of some unknowns beside these values. What is left with the values
+        has nothing to do with the instruments if they are right, and how far it may by chance says
+        the rest that they leave (Anderson and Rubin 1949): true however little a drive tells.
         """
         some = np.asarray(which)
         others = np.setdiff1d(np.arange(len(self.x)), some)
@@ -128,18 +127,30 @@ class Fit:
         scaled = trusted / size
         of_Z = scaled.T @ (Z / size) + RIDGE * np.eye(len(size))
         left = left - (self._Z / size) @ np.linalg.solve(of_Z, scaled.T @ left.ravel())
-        covariance = self.covariance_of(left)[np.ix_(some, some)] + doubt
-        covariance += self._known[np.ix_(some, some)]
-        d2 = float(off @ np.linalg.solve(covariance, off))
+        covariance = (self.covariance_of(left) + self._known)[np.ix_(some, some)]
+        return max(float(off @ np.linalg.solve(covariance, off)), 0.0)
+
+    def ratio(self, d2: float, unknowns: int = 1) -> float:
+        """2 ln of the ratio of likelihoods of which d2 is the square of standard errors: with few
+        blocks these are known badly themselves (Hotelling 1931).
+        """
         degrees = self.blocks / (1 + NEIGHBOURS)  # of the variance: neighbours are told together
-        return (degrees - len(off) / 2) * float(np.log1p(max(d2, 0.0) / degrees))
+        return (degrees - unknowns / 2) * float(np.log1p(d2 / degrees))
 
     def known(self, which: int) -> float:
         """The standard error of an unknown, by how likely it is that there is none of it: the
         larger of that and its sigma.
         """
-        ratio = self.ratio([which], np.zeros(1))
-        return max(float(self.sigma[which]), abs(float(self.x[which])) / np.sqrt(ratio + 1e-12))
+        d2 = self.beside([which], np.zeros(1))
+        return max(float(self.sigma[which]), abs(float(self.x[which])) / np.sqrt(d2 + 1e-12))
+
+    def covariance_known(self, which: Sequence[int]) -> Floats:
+        """Likewise of several unknowns."""
+        some = np.asarray(which)
+        covariance = self.covariance[np.ix_(some, some)]
+        x = self.x[some]
+        d2 = float(x @ np.linalg.solve(covariance, x))
+        return np.asarray(covariance * max(1.0, d2 / (self.beside(which, np.zeros(len(x))) + 1e-12)))
 
     def tells(self, which: int) -> bool:
         """Whether an unknown's column and its instrument vary together by more than chance, by
@@ -159,23 +170,3 @@ class Fit:
             if together.sum() < TELLS_SIGMAS * np.linalg.norm(together):
                 return False
         return True
-
-
-def beside(x: Floats, *lags: int) -> Floats:
-    """The mean of the values so many frames before and behind; NaN at the ends."""
-    return np.asarray(sum(_moved(x, k) + _moved(x, -k) for k in lags) / (2 * len(lags)))
-
-
-def slope(x: Floats, lag: int, tau_s: float) -> Floats:
-    """By the time, from the values so many frames before and behind."""
-    return np.asarray((_moved(x, lag) - _moved(x, -lag)) / (2 * lag * tau_s))
-
-
-def _moved(x: Floats, by: int) -> Floats:
-    """x of k + by."""
-    out = np.full_like(x, np.nan)
-    if by > 0:
-        out[:-by] = x[by:]
-    else:
-        out[-by:] = x[:by]
-    return out

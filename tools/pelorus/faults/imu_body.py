@@ -27,18 +27,15 @@ from pelorus.faults.fit import (
     TURN_SCALE,
     Design,
     Fit,
-    beside,
-    slope,
 )
 from pelorus.faults.force import Force, by_gyro, force, mean_rates, rates_of_turn, thinned
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import BESIDE, Seen, beside, slope
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
 Flags = NDArray[np.bool_]
 START_MPS, GRAVITY_MPS2 = 100.0, 100.0  # sigmas of what a stretch begins with
-NEAR = 2  # frames from which a slope is taken: pairs that share no picture
 GYRO_SCALE = 0.005  # sigma: better than a focal length is known without it
 
 
@@ -76,7 +73,7 @@ class ImuBody:
         return mean_rates(self.readings, frame_s)
 
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """As fit.Body. Of what has the images' own noise, the frames beside are the instrument."""
+        """As fit.Body."""
         told = self.force(recording.frame_t_ns, offset_s)
         w = told.turn
         arm = -recording.T_CB.R.T @ recording.T_CB.p
@@ -87,31 +84,30 @@ class ImuBody:
         first = _start(left[good], stretches[good], seen.variance[good, :3])
         g = g + stretches @ first
         both = np.hstack((g, w))
-        X = np.zeros((len(g), 6, PARAMETERS + stretches.shape[2]))
-        X[:, :3, SCALE] = g
-        X[:, :3, BIAS : BIAS + 3] = told.of_bias
-        X[:, :3, LEVER : LEVER + 3] = se3.skew(w)
-        X[:, :3, TILT : TILT + 3] = -se3.skew(g)
-        X[:, 3:, TILT : TILT + 3] = -se3.skew(w)
-        X[:, :3, GYRO : GYRO + 3] = told.of_gyro
-        X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
-        X[:, 3:, TURN_SCALE] = w
-        X[:, :, CLOCK] = slope(both, 1, float(np.median(seen.tau_s)))
-        X[:, :3, PARAMETERS:] = stretches
-        Z = X.copy()
-        own = seen.beside()  # by the images: nothing in it is the readings' noise
-        v, w = own[:, :3], own[:, 3:]
-        Z[:, :3, SCALE] = v
-        Z[:, :3, LEVER : LEVER + 3] = se3.skew(w)
-        Z[:, :3, TILT : TILT + 3] = -se3.skew(v)
-        Z[:, 3:, TILT : TILT + 3] = -se3.skew(w)
-        Z[:, 3:, TURN_SCALE] = w
-        Z[:, :, CLOCK] = slope(seen.rates, NEAR, float(np.median(seen.tau_s)))
+        X = _columns(told, stretches, both, slope(both, 1, float(np.median(seen.tau_s))))
+        Z = _columns(told, stretches, seen.beside(), seen.slope())
         if seen.by_focal is not None:
-            X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, beside(seen.by_focal, 2, 3)
+            X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, beside(seen.by_focal, *BESIDE)
         k = good & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
         y = seen.rates - both
         return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, stretches.shape[2]), g[k])
+
+
+def _columns(told: Force, stretches: Floats, both: Floats, by_time: Floats) -> Floats:
+    """(k, 6, m): what each unknown adds to a motion (v, w) and its slope."""
+    g, w = both[:, :3], both[:, 3:]
+    X = np.zeros((len(g), 6, PARAMETERS + stretches.shape[2]))
+    X[:, :3, SCALE] = g
+    X[:, :3, BIAS : BIAS + 3] = told.of_bias
+    X[:, :3, LEVER : LEVER + 3] = se3.skew(w)
+    X[:, :3, TILT : TILT + 3] = -se3.skew(g)
+    X[:, 3:, TILT : TILT + 3] = -se3.skew(w)
+    X[:, :3, GYRO : GYRO + 3] = told.of_gyro
+    X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
+    X[:, 3:, TURN_SCALE] = w
+    X[:, :, CLOCK] = by_time
+    X[:, :3, PARAMETERS:] = stretches
+    return X
 
 
 def _until(recording: Recording) -> Inertial:

@@ -20,14 +20,6 @@ LONGER = 0.02  # by which a focal length is changed to see what that does
 BESIDE = (2, 3)  # frames: the next ones share a picture
 
 
-def _of_neighbours(x: Floats) -> Floats:
-    out = np.zeros_like(x)
-    for lag in BESIDE:
-        out[lag:] += x[:-lag]
-        out[:-lag] += x[lag:]
-    return out
-
-
 @dataclass(frozen=True)
 class Seen:
     """The camera's own v and w in body axes as given, (k, 6), their variances, and which count."""
@@ -62,6 +54,11 @@ class Seen:
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(total / np.where(weight > 0, weight, np.nan))
 
+    def slope(self) -> Floats:
+        """(k, 6) how fast they change, as the frames beside tell it; NaN where these do not."""
+        usable = np.where(self.usable[:, None], self.rates, np.nan)
+        return slope(usable, BESIDE[0], float(np.median(self.tau_s)))
+
     def with_focal(self, recording: Recording, views: TwoViews) -> Seen:
         """And what another focal length would make of it. Neither turns nor ways simply scale with
         it: of near points the one is mistaken for the other.
@@ -72,3 +69,31 @@ class Seen:
         )
         other = Seen.of(recording, two_views(recording.tracks, longer, views.lag))
         return replace(self, by_focal=(other.rates - self.rates) / LONGER)
+
+
+def beside(x: Floats, *lags: int) -> Floats:
+    """The mean of the values so many frames before and behind; NaN at the ends."""
+    return np.asarray(sum(_moved(x, k) + _moved(x, -k) for k in lags) / (2 * len(lags)))
+
+
+def slope(x: Floats, lag: int, tau_s: float) -> Floats:
+    """By the time, from the values so many frames before and behind."""
+    return np.asarray((_moved(x, lag) - _moved(x, -lag)) / (2 * lag * tau_s))
+
+
+def _moved(x: Floats, by: int) -> Floats:
+    """x of k + by."""
+    out = np.full_like(x, np.nan)
+    if by > 0:
+        out[:-by] = x[by:]
+    else:
+        out[-by:] = x[:by]
+    return out
+
+
+def _of_neighbours(x: Floats) -> Floats:
+    out = np.zeros_like(x)
+    for lag in BESIDE:
+        out[lag:] += x[:-lag]
+        out[:-lag] += x[lag:]
+    return out
