@@ -17,6 +17,8 @@ from pelorus.recording import Recording
 def _verdict(finding: Finding) -> str:
     if not finding.told:
         return "[yellow]cannot tell[/]"
+    if finding.measured:
+        return "[green]measured[/]"
     return "[bold yellow]FOUND[/]" if finding.found else "[green]good[/]"
 
 
@@ -25,7 +27,7 @@ def write(recording: Recording, findings: list[Finding], target: Path) -> None:
     for finding in findings:
         out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
         out.print(f"    -> {escape(finding.action)}")
-    remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found]
+    remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found or f.measured]
     size = replace(recording, remarks=[*recording.remarks, *remarks]).write(target)
     tracks = recording.tracks
     out.print(

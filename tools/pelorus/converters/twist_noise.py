@@ -94,7 +94,7 @@ def _decide(
         action = "no suggestion beyond what is given: else the filter's defaults hold"
         return recording, replace(finding, action=action)
     action = f"the HEADER suggests {' and '.join(said)}; options and a config override it"
-    return recording.with_header(noise=noise), replace(finding, found=True, action=action)
+    return recording.with_header(noise=noise), replace(finding, measured=True, action=action)
 
 
 def _of_reading(recording: Recording) -> float:

@@ -86,7 +86,7 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     turns_told = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
         none = Fit(body.design(recording, seen, at, NO_BIAS_MPS))
-    speed = float(np.median(np.linalg.norm(found.g, axis=1)))
+    speed = float(np.median(np.linalg.norm(found.g, axis=1))) + 1e-12
     scale, sigma = float(found.x[SCALE]), _sigma(found, by_imu)
     by_prior = float(np.hypot(none.known(SCALE), bias / speed))
     if not by_imu and sigma > by_prior:  # then the bias is what is known of it beforehand
@@ -132,7 +132,8 @@ def _clock_sigma(as_given: Fit, found: Fit | None, offset_s: float) -> float:
     """Of the offset: how much likelier it is than none says the fit at none."""
     d2 = as_given.beside([CLOCK], np.zeros(1))
     own = as_given if found is None else found
-    return max(float(own.sigma[CLOCK]), abs(offset_s) / float(np.sqrt(d2 + 1e-12)))
+    by_none = abs(offset_s) / float(np.sqrt(d2 + 1e-12))
+    return own.beyond_doubt * max(float(own.sigma[CLOCK]), by_none)
 
 
 def _sigma(fit: Fit, by_imu: bool) -> float:

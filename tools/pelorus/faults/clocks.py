@@ -71,9 +71,9 @@ def two_clocks(recording: Recording, seen: Seen, offset_s: float, bias: float) -
         fit = Fit(TwistBody(recording, late_s).design(recording, seen, ways_s, bias))
         found = TwoClocks(
             ways_s + float(fit.x[CLOCK]),
-            float(fit.sigma[CLOCK]),
+            fit.known(CLOCK),
             late_s + float(fit.x[TURN_CLOCK]),
-            float(fit.sigma[TURN_CLOCK]),
+            fit.known(TURN_CLOCK),
         )
         steps = _step(fit, CLOCK), _step(fit, TURN_CLOCK)
         if late_s == 0 and abs(found.turns_late_s) < WORTH_SIGMAS * found.turns_late_sigma_s:

@@ -16,6 +16,7 @@ class Fault:
     words: str
     stops: bool = True  # settings tuned in spite of it would be worth nothing
     grave: bool = True  # it spoils the result; else the filter can live with it
+    ratio: float | None = None  # 2 ln of its likelihood beside that of no fault
 
     @property
     def lasts(self) -> bool:

@@ -15,3 +15,4 @@ class Finding:
     evidence: str  # the numbers
     action: str  # what was done, or why nothing
     told: bool = True  # whether there was enough to judge by
+    measured: bool = False  # no fault: something was measured, and written

@@ -23,6 +23,7 @@ TURN_CLOCK = 19
 PARAMETERS = 20
 NEIGHBOURS = 0.5  # weight of what neighbouring blocks have in common
 TELLS_SIGMAS = 3.0
+SURE = 4.0  # standard errors
 RIDGE = 1e-9  # of instruments that say the same
 
 
@@ -130,19 +131,21 @@ class Fit:
         covariance = (self.covariance_of(left) + self._known)[np.ix_(some, some)]
         return max(float(off @ np.linalg.solve(covariance, off)), 0.0)
 
-    def ratio(self, d2: float, unknowns: int = 1) -> float:
-        """2 ln of the ratio of likelihoods of which d2 is the square of standard errors: with few
-        blocks these are known badly themselves (Hotelling 1931).
+    @property
+    def beyond_doubt(self) -> float:
+        """By how much more than 4 standard errors something must be off to be as unlikely as 4 of
+        a normal distribution: of few blocks they are known badly themselves (Student 1908).
         """
         degrees = self.blocks / (1 + NEIGHBOURS)  # of the variance: neighbours are told together
-        return (degrees - unknowns / 2) * float(np.log1p(d2 / degrees))
+        return float(np.sqrt(degrees * np.expm1(SURE**2 / (degrees - 0.5))) / SURE)
 
     def known(self, which: int) -> float:
         """The standard error of an unknown, by how likely it is that there is none of it: the
         larger of that and its sigma.
         """
         d2 = self.beside([which], np.zeros(1))
-        return max(float(self.sigma[which]), abs(float(self.x[which])) / np.sqrt(d2 + 1e-12))
+        by_none = abs(float(self.x[which])) / float(np.sqrt(d2 + 1e-12))
+        return self.beyond_doubt * max(float(self.sigma[which]), by_none)
 
     def covariance_known(self, which: Sequence[int]) -> Floats:
         """Likewise of several unknowns."""
@@ -150,7 +153,8 @@ class Fit:
         covariance = self.covariance[np.ix_(some, some)]
         x = self.x[some]
         d2 = float(x @ np.linalg.solve(covariance, x))
-        return np.asarray(covariance * max(1.0, d2 / (self.beside(which, np.zeros(len(x))) + 1e-12)))
+        by_none = d2 / (self.beside(which, np.zeros(len(x))) + 1e-12)
+        return np.asarray(covariance * self.beyond_doubt**2 * max(1.0, by_none))
 
     def tells(self, which: int) -> bool:
         """Whether an unknown's column and its instrument vary together by more than chance, by

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import se3
+from pelorus.faults.seen import pauses
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.se3 import Poses
@@ -100,7 +101,7 @@ def force(readings: Inertial, R: Floats, frame_s: Floats) -> Force:
     t = seconds(readings)
     turns, at = _attitudes(R, t, frame_s)
     tau = np.diff(frame_s)
-    stretch, begin = _stretches(frame_s)
+    stretch, begin = _stretches(frame_s, t)
     body = _to_body(at, turns) / tau[:, None, None]
 
     def mean(rate: Floats) -> Floats:
@@ -145,18 +146,20 @@ def mean_rates(readings: Inertial, frame_s: Floats) -> Floats:
 
 def _reached(t: Floats, rates: Floats, frame_s: Floats) -> Floats:
     """NaN where the readings do not reach."""
-    rates[(frame_s[:-1] < 0) | (frame_s[1:] > t[-1])] = np.nan
+    out = (frame_s[:-1] < 0) | (frame_s[1:] > t[-1]) | pauses(t, frame_s[:-1], frame_s[1:])
+    rates[out] = np.nan
     return np.asarray(rates)
 
 
-def _stretches(frame_s: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Which stretch an interval is in, and when each begins."""
+def _stretches(frame_s: Floats, t: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Which stretch an interval is in, and when each begins: behind a pause, too."""
     whole = max(frame_s[-1] - frame_s[0], 1e-9)
     count = max(int(np.ceil(whole / STRETCH_S)), 1)
     count = max(min(count, (len(frame_s) - 1) // STRETCH_FRAMES), 1)
     begin = frame_s[0] + np.arange(count) * whole / count
+    begin = np.union1d(begin, t[1:][pauses(t, t[:-1], t[1:])])
     own = np.searchsorted(begin, frame_s[:-1], side="right") - 1
-    return np.clip(own, 0, count - 1), begin
+    return np.clip(own, 0, len(begin) - 1), begin
 
 
 def _attitudes(R: Floats, t: Floats, frame_s: Floats) -> tuple[Floats, Floats]:

@@ -38,6 +38,7 @@ from pelorus.faults.moving import Moving
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews
+from pelorus.faults.world_axes import world_axes
 from pelorus.layout import Floats
 from pelorus.recording import Recording
 
@@ -49,6 +50,7 @@ PITCH_MOST_DEG = 60.0
 MOSTLY, HEADED_SHARE = 0.85, 0.7  # of a turn, what is about one axis, and what the way tells
 PITCH_OFF_DEG, PITCH_SIGMAS = 4.0, 4.0  # where velocities and turns tell it together
 SURE_SIGMAS = 4.0
+MOVES_SIGMAS, WORLD_SURE = 4.0, 16.0  # standard errors; 2 ln of the ratio of likelihoods
 UNIT_NEAR = 0.15
 UNEXPLAINED = ("no-fit", "scene")
 
@@ -71,7 +73,10 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     """`views` of neighbouring frames. Nothing where all is well."""
     by_imu = len(recording.inertial.t_ns) > 0
     ask = cache(lambda: agreement(recording, views))  # it takes longer than all the rest
-    wrong = list(_of_imu(recording, views) if by_imu else _of_twists(recording, views, ask))
+    seen = Seen.of(recording, views)
+    wrong = [*_unfit(int(seen.usable.sum()), share_of_fit(views))] or [*_standing(seen)]
+    if not wrong:
+        wrong = [*(_of_imu(recording, seen) if by_imu else _of_twists(recording, seen, views, ask))]
     unexplained = [fault for fault in wrong if fault.name in UNEXPLAINED]
     if wrong and not unexplained:
         return Judged(wrong)
@@ -81,40 +86,61 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     agreed = ask()
     if not agreed.told:
         return Judged(moves)
-    faults = [*moves, *_pitch(recording, agreed), *of_lever(recording, agreed)]
-    if by_imu and not any(fault.name == "lever" for fault in faults):
-        faults += of_place(recording, agreed)
-    if not moves:  # what moves looks like another scale
+    faults = moves
+    if not moves:  # what moves looks like another scale, or another place of the camera
+        faults = [*_pitch(recording, agreed), *of_lever(recording, agreed)]
+        if by_imu and not any(fault.name == "lever" for fault in faults):
+            faults += of_place(recording, agreed)
         faults += of_scale_by_imu(agreed) if by_imu else of_scale(agreed, bias_mps(recording))
     return Judged([*faults, *of_clock(recording, agreed)], agreed)
 
 
-def _of_twists(recording: Recording, views: TwoViews, ask: Ask) -> Iterator[Fault]:
-    """Too little to tell by, units, axes and the extrinsic's rotation."""
+def _of_twists(
+    recording: Recording, seen: Seen, views: TwoViews, ask: Ask
+) -> Iterator[Fault]:
+    """Units, axes and the extrinsic's rotation."""
     found = hand_eye(recording, views)
-    unfit = [*_unfit(found.frames, found.fit)]
-    if unfit:
-        yield from unfit
+    if not found.told:
+        yield _untold(found.frames)
+        return
+    if not (recording.v_B_mps.any() or recording.w_B_radps.any()):
+        yield Fault(
+            "twists-zero",
+            f"all {len(recording.twist_t_ns)} twists are zero, the pictures move "
+            f"({found.speed_mps:.2g} m/s): is only the pose filled in? Velocities in body axes are "
+            "due, or the twists of that pose's steps",
+        )
         return
     turned = [*_units(found)] or [*_extrinsic(recording, found, views, ask)]
-    if turned:
-        yield from turned
-        return
     if found.way_left > LEFT_MOST and found.speed_mps > MOVES_MPS:
-        yield Fault(
-            "no-fit",
-            f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is "
-            "left unexplained), and no known fault explains why",
+        turned = turned or [
+            Fault(
+                "no-fit",
+                f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is "
+                "left unexplained), and no known fault explains why",
+            )
+        ]
+    if turned:
+        yield from _in_world(recording, seen) or turned
+
+
+def _in_world(recording: Recording, seen: Seen) -> list[Fault]:
+    """Are the velocities those of the body, in axes that do not turn with it?"""
+    ratio = world_axes(recording, seen)
+    if ratio < WORLD_SURE:
+        return []
+    return [
+        Fault(
+            "world-axes",
+            "the velocities are in world axes (odom, map), and not in the body's: so they fit the "
+            "pictures. Turn each by the pose's attitude, v_body = R^T v_world",
+            ratio=ratio,
         )
+    ]
 
 
-def _of_imu(recording: Recording, views: TwoViews) -> Iterator[Fault]:
+def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
     """The same of an IMU's."""
-    seen = Seen.of(recording, views)
-    unfit = [*_unfit(int(seen.usable.sum()), share_of_fit(views))]
-    if unfit:
-        yield from unfit
-        return
     found = imu_axes.measured(recording, seen, ImuBody(recording, seen))
     if found is None:
         yield Fault(
@@ -145,19 +171,26 @@ def _of_imu(recording: Recording, views: TwoViews) -> Iterator[Fault]:
 def _unfit(frames: int, fit: float) -> Iterator[Fault]:
     """Too little to tell by, or points that tell no motion."""
     if frames < FRAMES_ENOUGH:
-        yield Fault(
-            UNTOLD,
-            f"only {frames} frames share points enough with the one before ({FRAMES_ENOUGH} "
-            "are due): axes, units and scale cannot be judged",
-            stops=False,
-            grave=False,
-        )
+        yield _untold(frames)
     elif fit < FIT_LEAST:
         yield Fault(
             "scene",
             f"only {fit:.0%} of the points of two frames agree on one motion: wrong ids, a "
             "wrong calibration, or much of the scene moves",
         )
+
+
+def _untold(frames: int) -> Fault:
+    words = f"only {frames} frames share points enough with the one before ({FRAMES_ENOUGH} are "
+    words += "due): axes, units and scale cannot be judged"
+    return Fault(UNTOLD, words, stops=False, grave=False)
+
+
+def _standing(seen: Seen) -> Iterator[Fault]:
+    """A camera that stands tells noise, whatever is held against it."""
+    if seen.moves < MOVES_SIGMAS:
+        words = "the camera stands all along: axes, units, scale, clock and place cannot be judged"
+        yield Fault(UNTOLD, f"{words}. Drive, with turns", stops=False, grave=False)
 
 
 # --- units ----------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus import se3
+from pelorus.faults.seen import GAP_PERIODS, pauses
 from pelorus.faults.two_views import TwoViews
 from pelorus.layout import Floats
 from pelorus.motion import held
@@ -78,10 +79,11 @@ def hand_eye(recording: Recording, views: TwoViews) -> HandEye:
     tau = np.diff(recording.frame_t_ns) * 1e-9
     # motion maps camera k to k + 1: the body's own motion is its inverse
     of_camera = se3.log(se3.inverse(views.motion)) / tau[:, None]
-    return _fit(recording, of_camera, _mean_twists(recording), views.counts >= POINTS_MIN, fit)
+    usable = (views.counts >= POINTS_MIN) & (tau <= GAP_PERIODS * np.median(tau))
+    return _fit(recording, of_camera, mean_twists(recording), usable, fit)
 
 
-def _mean_twists(recording: Recording) -> Floats:
+def mean_twists(recording: Recording) -> Floats:
     """(k, 6) of the readings from frame to frame: of the motion that they make but for the order of
     turns, and right for degrees as well, which go round between two frames.
     """
@@ -92,7 +94,9 @@ def _mean_twists(recording: Recording) -> Floats:
     way = np.concatenate((np.zeros((1, 6)), np.cumsum(between, axis=0)))
     at = (frames - t_ns[0]) * 1e-9
     reached = np.stack([np.interp(at, own, x) for x in way.T], axis=-1)
-    return np.asarray(np.diff(reached, axis=0) / np.diff(at)[:, None])
+    mean = np.asarray(np.diff(reached, axis=0) / np.diff(at)[:, None])
+    mean[pauses(t_ns, frames[:-1], frames[1:])] = np.nan
+    return mean
 
 
 def share_of_fit(views: TwoViews) -> float:
@@ -164,7 +168,8 @@ def _scale(c: Floats, b: Floats) -> tuple[float, float, float]:
         squared = np.sum(left**2, axis=1)
         weight = 1 / (1 + squared / (4 * np.median(squared) + 1e-12)) ** 2
     score = weight * np.sum(instrument * left, axis=1)
-    sigma = float(np.sqrt(np.sum(score**2)) / abs(np.sum(weight * along)))
+    power = abs(float(np.sum(weight * along)))
+    sigma = float(np.sqrt(np.sum(score**2))) / power if power > 0 else float("inf")
     return s, sigma, float(np.sqrt(np.median(squared) / (np.median(np.sum(c**2, axis=1)) + 1e-12)))
 
 

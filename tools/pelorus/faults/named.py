@@ -9,6 +9,7 @@ where no known fault explains it, that is said instead of a guess. Nothing is ch
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import Judged, geometry
 from pelorus.faults.handeye import first_part
 from pelorus.faults.moving import Moving, moving
+from pelorus.faults.seen import Seen, pauses
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.frames import Imu, Message, Stereo, Twist
 from pelorus.inertial_survey import longest_run, readings_of
@@ -33,6 +35,7 @@ ROW_OFF_PX = 1.0
 FROZEN_FRAMES = 3
 MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 GAP_TIMES = 10.0
+GAP_WAY = 0.02  # of all the way, what may be gone in gaps of twists or readings
 FROM_TIMES, SPANS_APART = 10, 50.0
 TWISTS, READINGS, FRAMES = "twists", "readings", "frames"
 USUAL_MOST_NS, USUAL_LEAST_NS = 20e9, {TWISTS: 5e4, READINGS: 2e4, FRAMES: 5e5}
@@ -76,6 +79,8 @@ def _judged(times_ns: Mapping[str, Times], recording: Recording) -> Judged:
     if ids:
         return Judged([*ids, *times])
     found = geometry(short, views, moved)
+    body_t_ns = next(iter(times_ns.values()))
+    times = [_beside_way(fault, short, views, body_t_ns) for fault in times]
     faults = [*found.faults, *_frozen(recording), *times]
     faults = sorted(faults, key=lambda fault: not fault.grave)
     return Judged(faults, found.agreed, views)
@@ -103,6 +108,26 @@ def _times(name: str, t_ns: Times) -> Iterator[Fault]:
             f"{usual * 1e-9:.3g} s from one of the {name} to the next: is the time in other "
             "units (ms, us)?",
         )
+
+
+def _beside_way(fault: Fault, recording: Recording, views: TwoViews, t_ns: Times) -> Fault:
+    """A gap while the robot stands is no harm: many an odometry is published only while it moves.
+    By the images, as far as they are looked at; t_ns are the times of what moves the body.
+    """
+    frames = recording.frame_t_ns
+    if fault.name != "time-gap" or f"gaps in the {FRAMES}" in fault.words:
+        return fault
+    if len(t_ns) < 2 or t_ns[np.argmax(np.diff(t_ns)) + 1] > frames[-1]:
+        return fault
+    seen = Seen.of(recording, views)
+    within = pauses(t_ns, frames[:-1], frames[1:])
+    way = np.where(seen.usable[:, None], seen.rates[:, :3], 0.0) * seen.tau_s[:, None]
+    which = np.cumsum(np.diff(within, prepend=False) & within)
+    lost = [way[within & (which == k)].sum(axis=0) for k in np.unique(which[within])]
+    lost_m = float(sum(np.linalg.norm(x) for x in lost))
+    words = f"{fault.words}; by the pictures the camera goes {lost_m:.2g} m in them"
+    all_m = float(np.sum(np.linalg.norm(way, axis=1)))
+    return replace(fault, words=words, grave=lost_m > GAP_WAY * all_m)
 
 
 def _spans(body: tuple[str, Times], camera: tuple[str, Times]) -> Iterator[Fault]:

@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.layout import Floats
+from pelorus.motion import Times
 from pelorus.recording import Recording
 
 POINTS_MIN = 6  # of a pair of frames
 LONGER = 0.02  # by which a focal length is changed to see what that does
 
 
+GAP_PERIODS = 5.0  # of a stream: where it pauses for longer nothing is known of the motion
+BLOCKS = 20
 BESIDE = (2, 3)  # frames: the next ones share a picture
 
 
@@ -30,6 +33,17 @@ class Seen:
     tau_s: Floats
     by_focal: Floats | None = None  # (k, 6) by the logarithm of the focal length that is given
 
+    @property
+    def moves(self) -> float:
+        """By how many standard errors the camera moves: what it does lasts, and its noise does not
+        reach the frames beside.
+        """
+        beside = self.beside()
+        good = self.usable & np.isfinite(beside).all(axis=1)
+        own, told, trust = self.rates[good], beside[good], 1 / self.variance[good]
+        noise = np.sum(told * (own - told) * trust, axis=1)
+        return float(np.sum(told * own * trust)) / standard_error(noise)
+
     @classmethod
     def of(cls, recording: Recording, views: TwoViews) -> Seen:
         lag, R = views.lag, recording.T_CB.R
@@ -41,6 +55,7 @@ class Seen:
         of_axes = np.asarray(np.diagonal(covariance, axis1=1, axis2=2), np.float64)
         variance = of_axes / tau[:, None] ** 2
         usable = (views.counts >= POINTS_MIN) & np.isfinite(in_body).all(axis=1)
+        usable &= tau <= GAP_PERIODS * np.median(tau)
         return cls(in_body, variance, usable, tau)
 
     def beside(self) -> Floats:
@@ -97,3 +112,19 @@ def _of_neighbours(x: Floats) -> Floats:
         out[lag:] += x[:-lag]
         out[:-lag] += x[lag:]
     return out
+
+
+def pauses(t: Times | Floats, begin: Times | Floats, end: Times | Floats) -> NDArray[np.bool_]:
+    """Whether a stream pauses from each beginning to its end."""
+    steps = np.diff(t)
+    longer = steps > GAP_PERIODS * np.median(steps) if len(steps) else np.zeros(0, bool)
+    before = np.concatenate(([0], np.cumsum(longer)))
+    first = np.clip(np.searchsorted(t, begin, side="right") - 1, 0, None)
+    last = np.clip(np.searchsorted(t, end), 0, len(t) - 1)
+    return np.asarray(before[last] > before[first])
+
+
+def standard_error(noise: Floats) -> float:
+    """Of the sum over a drive of what chance makes of each frame: by blocks, in which it lasts."""
+    blocks = np.arange(len(noise)) * BLOCKS // max(len(noise), 1)
+    return float(np.linalg.norm(np.bincount(blocks, noise, BLOCKS))) + 1e-12

@@ -26,7 +26,7 @@ from pelorus.faults.fit import (
     TURN_SCALE,
     Design,
 )
-from pelorus.faults.seen import Seen, slope
+from pelorus.faults.seen import Seen, pauses, slope
 from pelorus.layout import Floats
 from pelorus.motion import dead_reckoning
 from pelorus.recording import Recording
@@ -79,6 +79,8 @@ class TwistBody:
         out = np.asarray(se3.log(motion) / tau[:, None])
         end = (self._t_ns[-1] - self._t_ns[0]) * 1e-9
         out[(t[:-lag] < 0) | (t[lag:] > end)] = np.nan
+        at_ns = frame_t_ns + round(offset_s * 1e9)
+        out[pauses(self._t_ns, at_ns[:-lag], at_ns[lag:])] = np.nan
         return out
 
     def turns(self, frame_t_ns: NDArray[np.int64], offset_s: float) -> Floats:
