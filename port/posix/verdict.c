@@ -60,7 +60,15 @@ int verdict_on_recording(const char *path, const plr_session *s, const outcome *
 }
 
 int verdict_on_frames(const char *path, const plr_session *s, const summary *summed) {
+    const plr_session_totals *totals = &s->totals;
     char words[192];
+    if (totals->other_process > 0 && totals->other_process == totals->twists + totals->imus) {
+        snprintf(words, sizeof words,
+                 "nothing moves the body: none of %" PRIu32
+                 " messages is of the setting process; set the other one",
+                 totals->other_process);
+        return verdict_say(path, REPLAY_EXIT_RECORDING, words);
+    }
     if (summed->frames > 0)
         return REPLAY_EXIT_OK;
     snprintf(words, sizeof words,

@@ -24,7 +24,7 @@ int verdict_say(const char *path, int status, const char *words);
 /* REPLAY_EXIT_OK if the filter was started. */
 int verdict_on_recording(const char *path, const plr_session *s, const outcome *run);
 
-/* REPLAY_EXIT_OK if at least one frame was used. */
+/* REPLAY_EXIT_OK if something moved the body, and at least one frame was used. */
 int verdict_on_frames(const char *path, const plr_session *s, const summary *summed);
 
 #endif

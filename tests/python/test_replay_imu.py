@@ -15,6 +15,7 @@ from pelorus.robot.stream import start_from
 from replay_drive import (
     FRAMES,
     RATE,
+    RECORDING,
     SPEED,
     Record,
     header,
@@ -78,6 +79,12 @@ def test_what_does_not_move_the_body_is_told_once(record: Record) -> None:
         assert said.stderr.count(due) == 1
         assert said.stderr.count("refused") == 1
         assert said.summary["other_process"] == FRAMES
+
+
+def test_a_recording_of_which_nothing_moves_the_body_has_failed(record: Record) -> None:
+    path = record([header(), *(m for k in range(FRAMES) for m in (twist(k), stereo(k)))])
+    said = run(path, "--process", "imu", status=RECORDING)
+    assert f"none of {FRAMES} messages is of the setting process" in said.stderr
 
 
 @pytest.mark.parametrize("program", ["pelorus-replay", "pelorus-replay-f64"])
