@@ -36,6 +36,11 @@ def recording_of(messages: Sequence[Message], process: Process | None = None) ->
         raise PelorusError(f"the recording holds no {lacks}: there is nothing to check")
     frame = np.repeat(np.arange(len(frames)), [len(m.ids) for m in frames])
     ids = np.concatenate([m.ids for m in frames]).astype(np.int64)
+    if not len(ids):
+        raise PelorusError(
+            "no frame of the recording shows a point: there is nothing to check; pelorus evaluate "
+            "compares it with a truth"
+        )
     pixels = np.concatenate([m.pixels for m in frames]).astype(np.float64).reshape(-1, 4)
     good = np.isfinite(pixels).all(axis=1)
     return Recording(

@@ -128,12 +128,13 @@ def csv(
     twists: Path | None = own.TWISTS,
     gyro: Path | None = own.GYRO,
     imu: Path | None = own.IMU,
-    stereo: Path = typer.Option(
-        ...,
-        help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame.",
+    stereo: Path | None = typer.Option(
+        None,
+        help="Columns t_s (or t_ns), id, uL_px, vL_px, uR_px, vR_px; rows of one time are a frame. "
+        "Without it another sensor is due, such as --position.",
     ),
     calibration: list[Path] = typer.Option(
-        ...,
+        [],
         help="Of Kalibr (and a second time, its IMU file), ROS, OpenCV, ORB-SLAM3, VINS-Fusion, "
         "Basalt, OKVIS or ZED (docs/CONVERT.md), or, of a rectified pair, JSON: fx_px, fy_px, "
         "cx_px, cy_px, baseline_m, and R_CB, as three rows of three, with t_CB_m (body to "

@@ -31,6 +31,7 @@ from pelorus.motion import Times
 from pelorus.recording import Recording
 from pelorus.rig import read as rig_files
 from pelorus.rig.lens import LensModel
+from pelorus.rig.read import Calibrated
 from pelorus.se3 import Poses
 from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.table import Table
@@ -69,7 +70,7 @@ class Sources:
     """The files of one recording; `calibration`, `extrinsic` and `lens` as rig.read has them."""
 
     motion: MotionFiles
-    stereo: Path
+    stereo: Path | None
     calibration: tuple[Path, ...]
     truth: Path | None = None
     extrinsic: Path | None = None
@@ -97,17 +98,45 @@ def read(
 ) -> Streams:
     """The files as they are."""
     columns = sources.columns
-    calibrated = rig_files.read(
-        sources.calibration, sources.stereo.stem, sources.extrinsic, sources.lens
-    )
+    calibrated = _calibrated(sources)
     timing = calibrated.header.twist_timing if twist_timing is None else twist_timing
     motion = motion_of(sources.motion, columns, timing)
-    frame_t_ns, tracks = _stereo(columns.read(sources.stereo, "stereo"))
     truth = None if sources.truth is None else truth_of(sources.truth, columns)
     small = _readings(readings, motion, columns)
+    if sources.stereo is None:
+        frames = _blind(motion, small, columns.remarks)
+    else:
+        frames = Seen(sources.stereo, *_stereo(columns.read(sources.stereo, "stereo")))
     columns.require_used()
-    frames = Seen(sources.stereo, frame_t_ns, tracks)
     return Streams(calibrated, frames, motion, truth, small, columns.remarks)
+
+
+def _calibrated(sources: Sources) -> Calibrated:
+    paths = sources.calibration
+    if sources.stereo is None:
+        return rig_files.without_cameras(paths, "no camera")
+    if not paths:
+        raise PelorusError(f"{sources.stereo}: of which cameras? --calibration FILE is due")
+    return rig_files.read(paths, sources.stereo.stem, sources.extrinsic, sources.lens)
+
+
+def _blind(motion: Twists | Readings, small: list[Reading], remarks: list[str]) -> Seen:
+    """Frames without a point at the times of the small sensors' readings: there the filter tells
+    its pose, and there it is compared with a truth.
+    """
+    if not small:
+        raise PelorusError(
+            "no --stereo, and no other sensor: the motion alone is summed up to nothing that a "
+            "filter could better; --stereo FILE or --position FILE is due"
+        )
+    t_ns = np.array(sorted({reading.t_ns for reading in small}), np.int64)
+    remarks.append(
+        f"no --stereo: {len(t_ns)} frames without a point, at the times of the other sensors' "
+        "readings; the camera in the HEADER stands for none"
+    )
+    nothing = np.empty(0, np.int64)
+    tracks = Tracks(len(t_ns), nothing.astype(np.intp), nothing, np.empty((0, 4)))
+    return Seen(motion.where, t_ns, tracks)
 
 
 # --- motion ---------------------------------------------------------------------------------------

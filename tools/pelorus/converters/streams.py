@@ -175,7 +175,7 @@ def converted(
     made = recording(found)
     if timing is not None:
         made = made.with_header(twist_timing=timing)
-    if not fix:
+    if not fix or not len(made.tracks):
         return made, []
     if not isinstance(found.motion, Twists):
         return held_to_fit(made, made, [])

@@ -100,11 +100,7 @@ def with_imu(rig: Rig, content: Named) -> Rig:
     imu0, on whose clock and body the camchain is; T_i_b brings points of imu0 to it.
     """
     own = content.object("imu0") if "imu0" in content else content
-    told = {name: own.number(key) for name, key in NOISE.items() if key in own}
-    for name, value in told.items():
-        if value < 0:
-            raise own.error(NOISE[name], value, "a number that is not negative is due")
-    correction, remarks = _correction(own)
+    model, remarks = imu(content), []
     offset_s = own.number("time_offset") if "time_offset" in own else 0.0
     if offset_s:
         remarks.append(f"time_offset: the pictures come {offset_s:g} s earlier on the IMU's clock")
@@ -113,9 +109,19 @@ def with_imu(rig: Rig, content: Named) -> Rig:
         if np.abs(se3.log(T_ib)).max() > AGREE:
             remarks.append("T_i_b: the body is this IMU, where it sits on imu0")
             rig = rig.on_body(se3.compose(rig.T_LB, se3.inverse(T_ib)))
-    said = tuple(f"{content.path}: {remark}" for remark in remarks)
-    model = ImuModel(Noise(**told), correction, said)
-    return rig.with_imu(model, rig.offset_s - offset_s)
+    said = (*model.remarks, *(f"{content.path}: {remark}" for remark in remarks))
+    return rig.with_imu(replace(model, remarks=said), rig.offset_s - offset_s)
+
+
+def imu(content: Named) -> ImuModel:
+    """The IMU by itself."""
+    own = content.object("imu0") if "imu0" in content else content
+    told = {name: own.number(key) for name, key in NOISE.items() if key in own}
+    for name, value in told.items():
+        if value < 0:
+            raise own.error(NOISE[name], value, "a number that is not negative is due")
+    correction, remarks = _correction(own)
+    return ImuModel(Noise(**told), correction, tuple(f"{content.path}: {r}" for r in remarks))
 
 
 def _correction(own: Named) -> tuple[Correction, list[str]]:

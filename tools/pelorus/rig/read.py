@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from pelorus import calibration, foreign
 from pelorus.foreign import ForeignFileError
-from pelorus.frames import Header
+from pelorus.frames import Camera, Header, header_name
 from pelorus.named import Named
 from pelorus.rig import basalt, camera_info, kalibr, okvis, opencv, orb_slam, vins, zed
 from pelorus.rig.imu_model import ImuModel
@@ -23,6 +23,8 @@ from pelorus.rig.lens import LensModel
 from pelorus.rig.rig import Rig
 
 SECTION = re.compile(r"\[\w+\]\s*$")
+
+NO_CAMERA = Camera(fx_px=1.0, fy_px=1.0, cx_px=0.0, cy_px=0.0, baseline_m=1.0)
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,22 @@ def read(
             header = replace(header, R_CB=T.R, t_CB_m=T.p)
         return Calibrated(header)
     return of_rig(read_rig(paths, lens), name, extrinsic)
+
+
+def without_cameras(paths: Sequence[Path], name: str) -> Calibrated:
+    """Of a recording without pictures: an IMU's file, or none; the HEADER's camera stands for none.
+
+    A file with cameras is taken too; they are of no use then.
+    """
+    if is_own(paths):
+        return read(paths, name)
+    contents = [_content(path) for path in paths]
+    if any(kind.is_one(content) for content in contents for kind in KINDS):
+        return read(paths, name)
+    if any(not kalibr.is_imu(content) for content in contents) or len(contents) > 1:
+        raise ForeignFileError(paths[-1], "is no IMU's file, or a second one", due="one is due")
+    imu = kalibr.imu(contents[0]) if contents else ImuModel()
+    return Calibrated(Header(NO_CAMERA, name=header_name(name)), imu=imu)
 
 
 def of_rig(rig: Rig, name: str, extrinsic: Path | None = None) -> Calibrated:
