@@ -219,6 +219,20 @@ def test_a_folder_that_lacks_something_is_told_what_and_where(
     assert not list(tmp_path.glob("out*"))
 
 
+def test_a_folder_of_tum_vi_has_its_calibration_beside_it(
+    folder: Path, tmp_path: Path, pelorus: Run
+) -> None:
+    for name in ("cam0", "cam1", "imu0"):
+        (folder / "mav0" / name / "sensor.yaml").unlink()
+    (folder / "dso").mkdir()
+    write_yaml(folder / "dso/camchain.yaml", camchain(Scene().cameras, (WIDTH, HEIGHT)))
+    write_yaml(folder / "dso/imu_config.yaml", IMU_NOISE)
+    pelorus("convert", "euroc", folder, tmp_path / "out.plr")
+    header = messages_of(tmp_path / "out.plr", Header)[0]
+    assert header.noise.gyro_noise == IMU_NOISE["gyroscope_noise_density"]
+    assert_on_surfaces(tmp_path / "out.plr")
+
+
 # --- what public copies are like ------------------------------------------------------------------
 
 

@@ -37,6 +37,8 @@ from pelorus.trajectory import Trajectory
 CAMERAS = ("cam0", "cam1")
 IMU = "imu0"
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0", "vicon0")
+TUM_VI = "dso"  # beside mav0, with Kalibr's files, where the cameras have no sensor.yaml
+TUM_VI_FILES = ("camchain.yaml", "imu_config.yaml")
 POSITIONS = "leica0"  # of a prism, without attitude
 IMU_COLUMNS = 7
 NS_MAX = 2**63
@@ -77,6 +79,9 @@ def _top(folder: Path) -> Path:
 
 
 def _calibrations(top: Path) -> tuple[Path, ...]:
+    beside = top.parent / TUM_VI
+    if not (top / CAMERAS[0] / "sensor.yaml").is_file() and (beside / "camchain.yaml").is_file():
+        return tuple(path for path in map(beside.joinpath, TUM_VI_FILES) if path.is_file())
     cameras = [top / name / "sensor.yaml" for name in CAMERAS]
     lacking = [path for path in cameras if not path.is_file()]
     if lacking:
