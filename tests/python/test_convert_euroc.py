@@ -201,7 +201,7 @@ def _later(path: Path) -> None:
         (lambda p: (p / "mav0/imu0/data.csv").unlink(), "--twists FILE, or --imu FILE is due"),
         (
             lambda p: (p / f"mav0/cam0/data/{BEGIN_NS}.png").unlink(),
-            f"1 are not there, {{folder}}/mav0/cam0/data/{BEGIN_NS}.png first",
+            f"1 are not there or cut off, {{folder}}/mav0/cam0/data/{BEGIN_NS}.png first",
         ),
         (lambda p: (p / "mav0/cam0/data.csv").write_text("a,b\n"), "a time in ns, a file are due"),
         (lambda p: (p / "mav0/imu0/data.csv").write_text("1,2,3\n"), "has 3 numbers; 7 a row are"),
@@ -251,19 +251,21 @@ def _moved(rows: list[str], by_ns: int) -> list[str]:
 def test_a_listed_picture_that_is_not_there_costs_its_pair_and_is_told(
     folder: Path, tmp_path: Path, pelorus: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lost = Scene().t_ns[3]
+    lost, cut = Scene().t_ns[3:5]
     (folder / f"mav0/cam1/data/{lost}.png").unlink()
+    of_cut = folder / f"mav0/cam1/data/{cut}.png"
+    of_cut.write_bytes(of_cut.read_bytes()[:3000])
     extra = folder / "mav0/cam0/data" / f"{lost + 7}.png"
     shutil.copy(folder / f"mav0/cam0/data/{lost}.png", extra)
     (folder / f"mav0/cam0/data/._{lost}.png").write_bytes(b"of a desktop")
-    monkeypatch.setattr("pelorus.tracking.images.ALONE_MAX", 0.3)
+    monkeypatch.setattr("pelorus.tracking.images.ALONE_MAX", 0.5)
     said = pelorus("convert", "euroc", folder, tmp_path / "out.plr").out
     assert [m.t_ns for m in messages_of(tmp_path / "out.plr", Stereo)] == [
-        t for t in Scene().t_ns if t != lost
+        t for t in Scene().t_ns if t not in (lost, cut)
     ]
-    assert f"cam1/data.csv: 1 pictures are not there, {lost}.png first" in said
+    assert f"cam1/data.csv: 2 pictures are not there or cut off, {lost}.png first" in said
     assert f"cam0/data.csv: does not list 1 pictures, {extra.name} first" in said
-    assert "1 pictures have no partner and are left out" in said
+    assert "2 pictures have no partner and are left out" in said
 
 
 def test_a_picture_of_another_kind_is_the_one_that_is_listed(

@@ -11,6 +11,9 @@ import pytest
 from converted import Run
 from numpy.typing import NDArray
 from pelorus import misread, se3
+from pelorus.converters import csv
+from pelorus.converters.columns import Columns
+from pelorus.foreign import ForeignFileError
 from pelorus.se3 import Poses
 from pelorus.trajectory import read_truth
 from scipy.spatial.transform import Rotation
@@ -155,6 +158,36 @@ def test_poses_that_are_none_are_left_out_if_they_are_few(
     assert f"truth_frames   {COUNT - 7} " in told.out
     refused = pelorus("evaluate", good, "--truth", path_with(40), status=1).err
     assert f"truth.txt: line 11: {said} (40 of {COUNT} rows)" in refused
+
+
+def test_a_truth_with_names_of_its_own_is_read_by_convert_too(tmp_path: Path) -> None:
+    names = "timestamp,tx,ty,tz,q_w,q_x,q_y,q_z\n"
+    path = tmp_path / "truth.csv"
+    path.write_text(names + rows(seconds(T_NS), way().p, w_first(way()), apart=","))
+    found = csv.truth_of(path, Columns())
+    assert np.array_equal(found.t_ns, T_NS)
+    assert np.allclose(found.poses.R, way().R, atol=1e-8)
+    path.write_text(path.read_text().replace("tx", "x_mm"))
+    with pytest.raises(ForeignFileError, match="lacks the column"):
+        csv.truth_of(path, Columns())
+
+
+@pytest.mark.parametrize(
+    ("t_ns", "said"),
+    [
+        (T_NS // 1000, "truth.txt are 1e+03 times too small: are they in us or ms?"),
+        (T_NS + 7_000_000, "most are within 0.007 s: --tolerance 0.007 would take them"),
+        (T_NS + 10**12, "truth.txt (1650001000.400 to 1650001005.160 s); 3 are due\n"),
+    ],
+)
+def test_where_no_times_are_equal_what_would_help_is_told(
+    tmp_path: Path, pelorus: Run, t_ns: NDArray[np.int64], said: str
+) -> None:
+    (tmp_path / "est.txt").write_text(tum(way(), T_NS))
+    truth = tmp_path / "truth.txt"
+    write = vins_loop if t_ns[0] < 10**18 else tum
+    truth.write_text(write(way(), t_ns))
+    assert said in pelorus("evaluate", tmp_path / "est.txt", "--truth", truth, status=1).err
 
 
 # --- what evaluate asks ---------------------------------------------------------------------------

@@ -87,6 +87,16 @@ def beginning(path: Path) -> bytes:
         raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
 
 
+def ending(path: Path, count: int) -> bytes:
+    """The last bytes of a file."""
+    try:
+        with path.open("rb") as stream:
+            stream.seek(max(stream.seek(0, io.SEEK_END) - count, 0))
+            return stream.read()
+    except OSError as error:
+        raise ForeignFileError(path, f"cannot be read: {error.strerror}") from error
+
+
 def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
     """UTF-8, with a byte order mark or without."""
     try:

@@ -15,15 +15,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pelorus import se3
+from pelorus import motion, se3
 from pelorus.consistency import rms
 from pelorus.layout import Floats
+from pelorus.motion import Times
 from pelorus.se3 import Poses
 
 POSES_MIN = 3
 SCALE_MIN = 1.5  # a unit or a monocular camera's; odometry is off by some per cent
 UNITS = {1000.0: "mm", 100.0: "cm", 1 / 0.3048: "feet"}
 UNIT_TOLERANCE = 0.05
+NEAR_S = 0.1  # of poses that are of one time if a tolerance says so
 BETTER = 2.0  # by so much smaller an error has to become
 UNEXPLAINED_MAX = 0.01  # of the positions' variance, where they fit
 
@@ -33,6 +35,20 @@ class Named(NamedTuple):
 
     name: str
     poses: Poses
+
+
+def times_apart(a: tuple[str, Times], b: tuple[str, Times]) -> str:
+    """What to do where no times of the two are equal: another unit, or a larger tolerance."""
+    middle_a, middle_b = float(np.median(a[1])), float(np.median(b[1]))
+    larger = max(middle_a, middle_b) / max(min(middle_a, middle_b), 1.0)
+    if any(abs(larger / factor - 1) < UNIT_TOLERANCE for factor in (1e3, 1e6, 1e9)):
+        small = a[0] if middle_a < middle_b else b[0]
+        return f"the times of {small} are {larger:.3g} times too small: are they in us or ms?"
+    apart_ns = np.abs(b[1][motion.nearest(b[1], a[1])] - a[1])
+    near_s = float(np.percentile(apart_ns, 90)) * 1e-9
+    if near_s > NEAR_S:
+        return ""
+    return f"most are within {near_s:.2g} s: --tolerance {near_s:.1g} would take them"
 
 
 class Fit(NamedTuple):

@@ -35,6 +35,8 @@ KITTI_COLUMNS = 12
 EUROC_COLUMNS = 17  # velocity and biases stand behind; w is first, whatever parts them
 QUATERNION_NORM_TOLERANCE = 1e-2
 TRUTH_GAP_NS = 250_000_000  # between poses so far apart none is made up
+POSITION_NAME = r"(t|p|p_\w+)?_?[xyz]( \[m\])?"
+QUATERNION_NAME = r"q\w*?_?([xyzw])( \[\])?"
 CELL_SHOWN = 40  # characters of a bad one
 
 
@@ -98,11 +100,19 @@ def read_stamped(path: Path, in_ns: bool | None = None) -> Trajectory:
     return Trajectory(t_ns[good], poses, (*remarks, *repeats, *turnless))
 
 
+def names_poses(names: list[str]) -> bool:
+    """Whether columns are called as in such files: tx, p_RS_R_y [m], z, qw and the like."""
+    bare = [name.lower() for name in names]
+    positions = [name for name in bare if re.fullmatch(POSITION_NAME, name)]
+    quaternions = [name for name in bare if re.fullmatch(QUATERNION_NAME, name)]
+    return len(positions) == 3 and len(quaternions) == 4
+
+
 def _order_named(path: Path, names: list[str]) -> tuple[int, int, str] | None:
     """Where position and quaternion begin, and its order: q_RS_w [], qx, q_z and such are known."""
     at: dict[str, int] = {}
     for k, name in enumerate(names):
-        found = re.fullmatch(r"q\w*?_?([xyzw])", name.partition("[")[0].strip().lower())
+        found = re.fullmatch(QUATERNION_NAME, name.lower())
         if found:
             at.setdefault(found[1], k)
     if len(at) != 4:

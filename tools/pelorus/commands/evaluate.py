@@ -47,13 +47,13 @@ def evaluate(
     source: Path = typer.Argument(
         ...,
         metavar="RECORDING|RESULT|TRAJECTORY.tum",
-        help="A recording, or what pelorus-replay --out left of it; or rows t x y z qx qy qz qw, "
-        "s and m.",
+        help="A recording, or what pelorus-replay --out left of it; or a text file of poses: TUM "
+        "(t x y z qx qy qz qw, s and m), ORB-SLAM3, VINS-Fusion, OpenVINS, EuRoC.",
     ),
     truth: Path | None = typer.Option(
         None,
         metavar="FILE",
-        help="The reference: a .plr with TRUTH, a TUM file, or KITTI poses (then give "
+        help="The reference: a .plr with TRUTH, such a text file, or KITTI poses (then give "
         "--recording or --times). Else the TRUTH in the result itself.",
     ),
     road_file: Path | None = typer.Option(
@@ -160,10 +160,11 @@ def _require_something(
                 "its landmarks: there is nothing to compare"
             )
     elif (found["truth_frames"] or 0) < POSES_MIN:
+        hint = misread.times_apart((str(mine[0]), mine[1].t_ns), (str(theirs[0]), theirs[1].t_ns))
         raise PelorusError(
             f"{mine[0]}: {found['truth_frames']} of its {len(mine[1].t_ns)} poses "
             f"({_span(mine[1])}) have a pose of equal time among the {len(theirs[1].t_ns)} of "
-            f"{theirs[0]} ({_span(theirs[1])}); {POSES_MIN} are due"
+            f"{theirs[0]} ({_span(theirs[1])}); {POSES_MIN} are due" + (f"; {hint}" if hint else "")
         )
 
 

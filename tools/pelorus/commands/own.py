@@ -40,8 +40,9 @@ IMU = typer.Option(
 )
 TRUTH = typer.Option(
     None,
-    help="Columns t_s, px_m, py_m, pz_m, qx, qy, qz, qw: body to world; or a file of TUM "
-    "(t x y z qx qy qz qw) or EuRoC (ns, position, quaternion w x y z).",
+    help="Columns t_s, px_m, py_m, pz_m, qx, qy, qz, qw: body to world; or a text file of "
+    "poses as TUM (t x y z qx qy qz qw), EuRoC (ns, position, quaternion w x y z), ORB-SLAM3, "
+    "VINS-Fusion or OpenVINS write it.",
 )
 COLUMNS = typer.Option(
     [],

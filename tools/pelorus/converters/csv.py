@@ -289,6 +289,8 @@ def truth_of(path: Path, columns: Columns) -> Trajectory:
     if not _names_columns(first.split(",")):
         return trajectory.read_stamped(path)
     table = columns.read(path, "truth")
+    if not all(map(table.has, POSITION)) and trajectory.names_poses(table.names):
+        return trajectory.read_stamped(path)
     table.leave_out_bad(*QUATERNION, *POSITION)
     t_ns, p = table.ascending_times(), table.numbers(*POSITION)
     q = table.numbers(*QUATERNION)

@@ -129,7 +129,7 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
         raise PelorusError(
             f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
             f"{images.APART_NS * 1e-6:g} ms; {alone} pictures have no partner"
-            + (f", {len(lost)} are not there, {lost[0]} first" if lost else "")
+            + (f", {len(lost)} are not there or cut off, {lost[0]} first" if lost else "")
             + (_apart(of_left, of_right) if alone > len(lost) else "")
         )
     if len(both) < images.PAIRS_MIN:
@@ -189,12 +189,15 @@ def _listed(camera: Path, remarks: list[str]) -> tuple[dict[int, Path], list[Pat
                 due="a time in ns, a file are due",
             )
         path = data / cells[1]
-        if path.stem in there:  # another kind of file is the same picture
-            named_there[int(cells[0])] = there.pop(path.stem)
+        found = there.pop(path.stem, None)  # another kind of file is the same picture
+        if found is not None and images.is_whole(found):
+            named_there[int(cells[0])] = found
         elif int(cells[0]) not in named_there:  # a line may stand twice
             lost.append(path)
     if lost:
-        remarks.append(f"{listing}: {len(lost)} pictures are not there, {lost[0].name} first")
+        remarks.append(
+            f"{listing}: {len(lost)} pictures are not there or cut off, {lost[0].name} first"
+        )
     if there:
         first = next(iter(there.values()))
         remarks.append(f"{listing}: does not list {len(there)} pictures, {first.name} first")

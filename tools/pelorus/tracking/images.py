@@ -26,6 +26,7 @@ SIDE_MIN_PX = 64  # less shows no track worth having
 IMAGE_BYTES_MAX = 1 << 28
 NAMES_SHOWN = 3
 RATES_HZ = (1e-3, 1e5)
+PNG_END_BYTES = 64  # the last chunk has 12; some programs write a little behind it
 DEPTH_SAMPLES = 16
 NS_DIGITS = (16, 19)  # of a name that is a time in ns: from 1970 to what 63 bits hold
 
@@ -86,6 +87,12 @@ def pictures(folder: Path) -> dict[str, Path]:
 def _is_picture(path: Path) -> bool:
     """Not what a desktop leaves beside one: ._0001.png."""
     return path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
+
+
+def is_whole(path: Path) -> bool:
+    """Not cut off, as by a copy that was broken off: a PNG ends with its last chunk."""
+    end = foreign.ending(path, PNG_END_BYTES)
+    return bool(end) and (path.suffix.lower() != ".png" or b"IEND" in end)
 
 
 def together(left_ns: Times, right_ns: Times, apart_ns: int) -> NDArray[np.intp]:
