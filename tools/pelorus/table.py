@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from decimal import Decimal
@@ -228,9 +227,8 @@ class Table:
 
 
 def _is_none(cell: str) -> bool:
-    """Nothing, or a number that is not finite."""
-    bare = cell.strip()
-    return not bare or (foreign.is_number(bare) and not math.isfinite(float(bare)))
+    """Nothing, or what programs write for a number that is none."""
+    return cell.strip().lstrip("+-").lower() in ("", "nan", "inf", "infinity")
 
 
 def _shown(cell: str) -> str:
