@@ -52,6 +52,14 @@ def fence(left: Gray, right: Gray) -> Pair:
     return left, right
 
 
+def dim(left: Gray, right: Gray) -> Pair:
+    """Pictures of a poor sensor, the right one's darker: half of its corners are not found again."""
+    chance = np.random.default_rng(int(left.sum()))
+    shades = left.astype(float), 40 + 0.6 * right.astype(float)
+    one, other = (np.clip(s + chance.normal(0, 14, s.shape), 0, 255) for s in shades)
+    return one.astype(np.uint8), other.astype(np.uint8)
+
+
 def swapped(left: Gray, right: Gray) -> Pair:
     return right, left
 
@@ -74,7 +82,7 @@ def covered(left: Gray, right: Gray) -> Pair:
     return left, np.full_like(right, 12)
 
 
-@pytest.mark.parametrize("harm", [as_it_is, mostly_hidden, fence])
+@pytest.mark.parametrize("harm", [as_it_is, mostly_hidden, fence, dim])
 @pytest.mark.parametrize("standing", [False, True])
 def test_a_pair_is_taken_however_little_of_it_both_see_and_whether_or_not_it_moves(
     harm: Callable[[Gray, Gray], Pair], standing: bool
@@ -82,7 +90,7 @@ def test_a_pair_is_taken_however_little_of_it_both_see_and_whether_or_not_it_mov
     pixels = track(drive(harm, standing), WHERE, FEW).pixels
     disparity = pixels[:, 0] - pixels[:, 2]
     assert len(pixels) > 3 * FRAMES
-    assert np.median(disparity) == pytest.approx(DISPARITY_PX, abs=0.1) or harm is fence
+    assert np.median(disparity) == pytest.approx(DISPARITY_PX, abs=0.2) or harm is fence
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,16 @@
 """Whether the pictures are those of a rectified pair: left is left, and a point keeps its row.
 
 Corners of some left pictures are looked for in the right ones, in many rows and to both sides, and
-counted by where their one most alike place is; not those that have their like in the left one. The
-same search in the right picture upside down, which shows none of them, says how many are chance.
-Nothing that the tracker did plays a part: how many of its corners find a match depends on the
-scene, and in a standing camera's it asks for the same ones again in every frame.
+counted by where their one most alike place is. Only those that can be known again: which have no
+like in their own picture, and are found in the left one before. The same search in the right
+picture upside down, which shows none of them, says how many are chance. Nothing that the tracker
+did plays a part: how many of its corners find a match depends on the scene, and in a standing
+camera's it asks for the same ones again in every frame.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -25,6 +27,7 @@ CORNERS = 40  # of a picture
 HALF = matching.PATCH_HALF_PX
 ROWS_PX = 32  # up and down; a point of a pair that is nearly rectified is within
 SIGMAS = 3.0
+CHANCE = 1.3e-3  # as far off as three sigma, on one side
 
 
 @dataclass
@@ -54,34 +57,36 @@ class Seen:
 
 @dataclass
 class Evidence:
-    """Of some frames: the first, and each of twice the number, for a scene may stand still."""
+    """Of some frames, each of twice the number of the one before, for a scene may stand still."""
 
     settings: Settings
-    corners: int = 0  # that are like nothing else about them
+    corners: int = 0
     seen: Seen = field(default_factory=Seen)
     chance: Seen = field(default_factory=Seen)
     _frames: int = 0
+    _before: Gray | None = None
+    _share: float = 1.0  # of the places that are searched: those of a rectified pair
 
     def add(self, left: Gray, right: Gray) -> None:
         """The next frame."""
-        if self._frames & (self._frames - 1) == 0:
-            self._look(left, right)
+        if self._before is not None and self._frames & (self._frames - 1) == 0:
+            self._look(self._before, left, right)
+        self._before = left
         self._frames += 1
 
-    def _look(self, left: Gray, right: Gray) -> None:
+    def _look(self, before: Gray, left: Gray, right: Gray) -> None:
         mirrored = np.ascontiguousarray(np.flipud(right))
         rows, columns = left.shape
+        gap_px, reach = self.settings.row_gap_px, matching.disparity_max(left, self.settings)
+        self._share = (2 * int(gap_px) + 1) / (2 * ROWS_PX + 1) * 0.5
         few = replace(self.settings, corners=CORNERS)
-        reach = matching.disparity_max(left, self.settings)
         for u, v in np.round(matching.new_corners(left, matching.none(), few)).astype(int).tolist():
-            if not (HALF <= u < columns - HALF and HALF <= v < rows - HALF):
+            inside = HALF <= u < columns - HALF and HALF <= v < rows - HALF
+            if not inside or not all(_most_alike(left, p, (u, v), reach) for p in (left, before)):
                 continue
-            if _most_alike(left, left, (u, v), reach) is None:
-                continue  # one of many posts, tiles, leaves
             self.corners += 1
             for picture, counts in ((right, self.seen), (mirrored, self.chance)):
-                found = _most_alike(left, picture, (u, v), reach)
-                counts.count(found, self.settings.row_gap_px)
+                counts.count(_most_alike(left, picture, (u, v), reach), gap_px)
 
     def require_rectified(self, where: tuple[Path, Path]) -> None:
         """PelorusError where another relation of the two cameras explains what is seen."""
@@ -100,12 +105,12 @@ class Evidence:
                 "they rectified, is the calibration theirs, is the transform between the cameras "
                 "(T_cn_cnm1; R, T) the inverse?"
             )
-        by_chance = not _more(seen.as_due, chance.as_due)
-        if by_chance and _more(self.corners, seen.as_due + chance.as_due):
+        found = seen.as_due + seen.swapped + seen.elsewhere
+        if _more(self.corners, found) and _tail(seen.as_due, found, self._share) > CHANCE:
             raise PelorusError(
                 f"{shows} {seen.as_due} in the same row, no more than by chance; pictures of a "
                 "rectified pair that were taken together are due (is one camera covered, is the "
-                f"largest disparity too small?)"
+                "largest disparity too small?)"
             )
 
 
@@ -129,3 +134,8 @@ def _most_alike(left: Gray, other: Gray, at: tuple[int, int], reach: int) -> tup
 def _more(count: int, others: int) -> bool:
     """Beyond what chance makes of two equal counts."""
     return count - others > SIGMAS * float(np.sqrt(count + others))
+
+
+def _tail(count: int, of: int, share: float) -> float:
+    """The chance that so many or more of some, each with this chance, are counted."""
+    return sum(math.comb(of, k) * share**k * (1 - share) ** (of - k) for k in range(count, of + 1))
