@@ -156,6 +156,7 @@ def test_poses_that_are_none_are_left_out_if_they_are_few(
     told = pelorus("evaluate", good, "--truth", path_with(7))
     assert f"truth.txt: 7 of {COUNT} rows are left out, line 11 first: {said}" in told.err
     assert f"truth_frames   {COUNT - 7} " in told.out
+    assert "truth.txt: 7 of" in pelorus("evaluate", path_with(7), "--truth", good).err
     refused = pelorus("evaluate", good, "--truth", path_with(40), status=1).err
     assert f"truth.txt: line 11: {said} (40 of {COUNT} rows)" in refused
 
@@ -247,10 +248,11 @@ def test_an_estimate_in_the_wrong_order_is_named_itself(tmp_path: Path, pelorus:
         lambda T: Poses(T.R[::-1].copy(), np.random.default_rng(3).normal(0, 900, T.p.shape)),
         lambda T: Poses(T.R, np.zeros_like(T.p)),
         lambda T: T.at(slice(0, 2)),
+        lambda T: Poses(T.R @ Rotation.from_rotvec([0.05, 0.03, -0.04]).as_matrix(), T.p),
     ],
 )
 def test_where_nothing_else_would_fit_nothing_is_asked(other: Callable[[Poses], Poses]) -> None:
-    """Right; a little longer; of another drive; standing; too short."""
+    """Right; a little longer; of another drive; standing; too short; turned by 4 degrees."""
     theirs = other(way())
     mine = noisy(way()).at(slice(0, len(theirs.p)))
     assert not misread.doubts(misread.Named("a", mine), misread.Named("b", theirs), False)

@@ -27,6 +27,7 @@ UNITS = {1000.0: "mm", 100.0: "cm", 1 / 0.3048: "feet"}
 UNIT_TOLERANCE = 0.05
 NEAR_S = 0.1  # of poses that are of one time if a tolerance says so
 BETTER = 2.0  # by so much smaller an error has to become
+FRAME_MIN_DEG = 10.0  # between axes of another frame; less is an error of a mount or an estimate
 UNEXPLAINED_MAX = 0.01  # of the positions' variance, where they fit
 
 
@@ -113,8 +114,8 @@ def _turned(found: Fit, a: Named, b: Named, fixed: bool) -> list[str]:
             if apart_deg < best_deg:
                 best_deg, best = apart_deg, words.format(other.name)
     if not best:
-        apart_deg, words = _other_frame(a, b)
-        if apart_deg >= best_deg:
+        turn_deg, apart_deg, words = _other_frame(a, b)
+        if apart_deg >= best_deg or turn_deg < FRAME_MIN_DEG:
             return []
         best_deg, best = apart_deg, words
     return [
@@ -144,13 +145,20 @@ def _apart_deg(R_a: Floats, R_b: Floats) -> float:
     return float(np.degrees(rms(Rotation.from_matrix(between).as_rotvec())))
 
 
-def _other_frame(a: Named, b: Named) -> tuple[float, str]:
-    """Poses of another frame that is fixed to the same body: one rotation turns its axes."""
+def _other_frame(a: Named, b: Named) -> tuple[float, float, str]:
+    """Poses of another frame that is fixed to the same body: by how much its axes are turned, what
+    is left of the difference then, in degrees, and what to ask.
+    """
     B = se3.nearest_rotation(_steps(a.poses.R).T @ _steps(b.poses.R))  # a's vectors from b's
     angle_deg = float(np.degrees(Rotation.from_matrix(B).magnitude()))
-    return _apart_deg(a.poses.R, b.poses.R @ B.T), (
-        f"are the poses of {b.name} those of another frame, such as the camera's? Its axes are "
-        f"turned by {angle_deg:.0f} deg."
+    apart_deg = _apart_deg(a.poses.R, b.poses.R @ B.T)
+    return (
+        angle_deg,
+        apart_deg,
+        (
+            f"are the poses of {b.name} those of another frame, such as the camera's? Its axes are "
+            f"turned by {angle_deg:.0f} deg."
+        ),
     )
 
 

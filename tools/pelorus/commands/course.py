@@ -13,7 +13,7 @@ from rich.table import Table
 
 from pelorus import road
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out
+from pelorus.console import err, out
 from pelorus.errors import Existing, PelorusError, made, write_text
 from pelorus.packed_file import bare_name
 from pelorus.replay import find_programs
@@ -129,6 +129,8 @@ def _references(
             out_pairs.append((subject, Reference()))
         elif truth is not None:
             known = read_truth(truth, recording=subject.path)
+            for remark in known.remarks:
+                err.print(escape(remark))
             out_pairs.append((replace(subject, truth=known), Reference()))
         else:
             out_pairs.append((subject, Reference(way)))

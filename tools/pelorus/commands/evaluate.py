@@ -103,7 +103,7 @@ def evaluate(
     else:
         reference = truth_of(source) if truth is None else read_truth(truth, times, recording)
         theirs = messages_of(truth) if truth is not None and is_recording(truth) else []
-        for remark in reference.remarks:
+        for remark in (*estimate.remarks, *reference.remarks):
             err.print(escape(remark))
         reference = _until(reference, estimate, first)
         tolerance_ns = round(tolerance * 1e9)
