@@ -24,11 +24,11 @@ from pelorus.se3 import Poses
 POSES_MIN = 3
 SCALE_MIN = 1.5  # a unit or a monocular camera's; odometry is off by some per cent
 UNITS = {1000.0: "mm", 100.0: "cm", 1 / 0.3048: "feet"}
-UNIT_TOLERANCE = 0.05
+UNIT_TOLERANCE = 0.2  # they are three times or more apart
 NEAR_S = 0.1  # of poses that are of one time if a tolerance says so
 BETTER = 2.0  # by so much smaller an error has to become
 FRAME_MIN_DEG = 10.0  # between axes of another frame; less is an error of a mount or an estimate
-UNEXPLAINED_MAX = 0.01  # of the positions' variance, where they fit
+UNEXPLAINED_MAX = 0.25  # of the positions' variance, where they fit at all
 
 
 class Named(NamedTuple):
@@ -49,7 +49,7 @@ def times_apart(a: tuple[str, Times], b: tuple[str, Times]) -> str:
     near_s = float(np.percentile(apart_ns, 90)) * 1e-9
     if near_s > NEAR_S:
         return ""
-    return f"most are within {near_s:.2g} s: --tolerance {near_s:.1g} would take them"
+    return f"most are within {near_s:.2g} s: --tolerance {1.1 * near_s:.2g} would take them"
 
 
 class Fit(NamedTuple):
@@ -68,8 +68,9 @@ def doubts(a: Named, b: Named, fixed: bool) -> list[str]:
     found = fit(a.poses.p, b.poses.p)
     if found is None:
         return []
-    if found.unexplained > UNEXPLAINED_MAX:
-        return _inverse(a, b)
+    inverse = _inverse(a, b, found)
+    if inverse or found.unexplained > UNEXPLAINED_MAX:
+        return inverse
     return [*_scale(found, a, b), *_turned(found, a, b, fixed)]
 
 
@@ -162,12 +163,13 @@ def _other_frame(a: Named, b: Named) -> tuple[float, float, str]:
     )
 
 
-def _inverse(a: Named, b: Named) -> list[str]:
-    """Where the positions do not fit: those of the inverse transforms."""
+def _inverse(a: Named, b: Named, as_read: Fit) -> list[str]:
+    """Where the positions of the inverse transforms fit, and better."""
     found = fit(a.poses.p, se3.inverse(b.poses).p)
-    if found is None or found.unexplained > UNEXPLAINED_MAX:
+    if found is None or found.unexplained > min(UNEXPLAINED_MAX, as_read.unexplained / BETTER**2):
         return []
     return [
-        f"positions do not fit, but those of the inverse transforms do, to {found.scaled_m:.2g} m: "
+        f"positions fit to {as_read.plain_m:.2g} m, those of the inverse transforms to "
+        f"{found.plain_m:.2g} m: "
         f"are the poses of {b.name} world to body? Body to world is due"
     ]
