@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
@@ -204,6 +205,10 @@ def _ros(
     ),
     camera_frame: str = typer.Option("", help="Likewise, of the left camera; z looks forward."),
     stamps: Stamps = typer.Option(Stamps.HEADER, help="Times of the headers, or of the arrival."),
+    begin: float = typer.Option(
+        0.0, "--from", metavar="S", help="Leave out what arrived before, s since the bag began."
+    ),
+    until: float = typer.Option(math.inf, metavar="S", help="Likewise, what arrived later."),
 ) -> None:
     """A bag of ROS 1 or 2, or MCAP: pictures or tracks, and odometry, an IMU or wheels."""
     topics = ros.Topics(
@@ -227,7 +232,7 @@ def _ros(
         position_topic,
         position_sigma,
     )
-    with Bag(source, stamps.value) as opened:
+    with Bag(source, stamps.value, (begin, until)) as opened:
         _convert(ros.read(opened, topics, asked), asked, target)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from functools import cached_property, partial
@@ -22,6 +23,7 @@ from pelorus.foreign import ForeignFileError
 
 NS = 10**9
 HEADER, LOG = "header", "log"
+WHOLE = (0.0, math.inf)
 
 
 class Stamped(NamedTuple):
@@ -40,9 +42,11 @@ def require_messages(bag: Bag, topic: str, count: int) -> None:
 
 
 class Bag(AbstractContextManager["Bag"]):
-    """`stamps`: whether a message's time is that of its header or of its arrival in the bag."""
+    """`stamps`: whether a message's time is that of its header or of its arrival; `part`: which are
+    given, by their arrival, s since the bag's beginning.
+    """
 
-    def __init__(self, path: Path, stamps: str = HEADER) -> None:
+    def __init__(self, path: Path, stamps: str = HEADER, part: tuple[float, float] = WHOLE) -> None:
         self.path, self.stamps = path, stamps
         if not path.exists():
             raise ForeignFileError(path, "there is no such file or folder")
@@ -56,6 +60,8 @@ class Bag(AbstractContextManager["Bag"]):
         self._open_files = ExitStack()
         self._reader = self._opened()
         self._seconds = max(self._reader.duration, 1) / NS
+        self.begins_ns = int(self._reader.start_time)
+        self._part_ns = [self.begins_ns + s * NS for s in part]
 
     def _opened(self) -> AnyReader:
         try:
@@ -109,9 +115,9 @@ class Bag(AbstractContextManager["Bag"]):
         """Of their messages."""
         return sum(self._reader.topics[topic].msgcount for topic in topics)
 
-    def messages(self, topics: Sequence[str]) -> Iterator[Stamped]:
-        """In the order of their arrival."""
-        return self._messages(self._reader, topics)
+    def messages(self, topics: Sequence[str], whole: bool = False) -> Iterator[Stamped]:
+        """In the order of their arrival; `whole`: of all the bag, as for what is said once."""
+        return self._messages(self._reader, topics, whole)
 
     def written(self, topics: Sequence[str]) -> Iterator[Stamped]:
         """In the order in which they stand in the file, whatever the recorder's clock said."""
@@ -124,10 +130,15 @@ class Bag(AbstractContextManager["Bag"]):
             _keep_order(one)
         return reader
 
-    def _messages(self, reader: AnyReader, topics: Sequence[str]) -> Iterator[Stamped]:
+    def _messages(
+        self, reader: AnyReader, topics: Sequence[str], whole: bool = False
+    ) -> Iterator[Stamped]:
         wanted = [c for c in reader.connections if c.topic in topics]
+        first, last = self._part_ns
         try:
             for connection, arrival_ns, raw in reader.messages(wanted):
+                if not whole and not first <= arrival_ns <= last:
+                    continue
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 t_ns = self._time(message, arrival_ns)
                 yield Stamped(connection.topic, t_ns, message, arrival_ns)

@@ -9,6 +9,7 @@ clock told, they are interleaved like the teeth of two combs, each with the peri
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -29,10 +30,26 @@ COMBS_SIGMA = 5.0  # that the steps differ in turn, and not by chance
 
 
 class SetBack(NamedTuple):
-    """By how much, and at which message."""
+    """By how much, and at which message; what arrived until the one time or from the other on is of
+    one drive.
+    """
 
     by_ns: int
     message: int
+    until_ns: int
+    from_ns: int
+
+
+class Stamps(NamedTuple):
+    """Of messages as they stand in the file; `numbers` are what they hold, where they hold any."""
+
+    t_ns: Times
+    arrival_ns: Times
+    numbers: Floats | None = None
+
+    def at(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Stamps:
+        numbers = None if self.numbers is None else self.numbers[index]
+        return Stamps(self.t_ns[index], self.arrival_ns[index], numbers)
 
 
 def sound(
@@ -58,24 +75,24 @@ def leave_out(
         remarks.append(f"{topic}: {bad} of {count} {wrong}: left out")
 
 
-def in_order(
-    bag: Bag, topic: str, t_ns: Times, numbers: Floats | None, remarks: list[str]
-) -> NDArray[np.intp]:
-    """Which messages are taken, of those whose times and numbers stand so in the file: in the order
-    of time, the first of those of one time. A clock that was set back is refused.
+def in_order(bag: Bag, topic: str, stamps: Stamps, remarks: list[str]) -> NDArray[np.intp]:
+    """Which messages are taken: in the order of time, the first of those of one time. A clock that
+    was set back is refused.
     """
-    found = _written_back(t_ns)
-    order = np.argsort(t_ns, kind="stable")
-    if found is None:
-        once = _without_copies(order, t_ns, numbers)
-        found = _interleaved(t_ns[once], None if numbers is None else numbers[once])
+    t_ns = stamps.t_ns
+    found = _written_back(stamps) or _interleaved(stamps.at(_without_copies(stamps)))
     if found is not None:
+        until, later = (
+            t / NS for t in (found.until_ns - bag.begins_ns, found.from_ns - bag.begins_ns)
+        )
         raise ForeignFileError(
             bag.path,
             f"stamps go back by {found.by_ns / NS:.4g} s at message {found.message}",
             at=topic,
-            due="was a clock set back, or are two recordings in one bag? Each stretch must be "
-            "converted alone; if only the sensor's clock was set, --stamps log is due",
+            due="was a clock set back, or are two recordings in one bag? Each must be converted "
+            f"alone: --until {math.floor(until * 1e3) / 1e3:.3f} takes the first, "
+            f"--from {math.ceil(later * 1e3) / 1e3:.3f} the second; if only the sensor's clock was "
+            "set, --stamps log is due",
         )
     behind = np.maximum.accumulate(t_ns) - t_ns
     if behind.any():
@@ -89,8 +106,9 @@ def in_order(
     return first
 
 
-def _written_back(t_ns: Times) -> SetBack | None:
+def _written_back(stamps: Stamps) -> SetBack | None:
     """Where stamps go back and the time behind is covered a second time."""
+    t_ns, arrival_ns, _ = stamps
     latest = np.maximum.accumulate(t_ns)
     late = t_ns < latest
     starts = np.nonzero(late & ~np.concatenate(([False], late[:-1])))[0]
@@ -100,24 +118,25 @@ def _written_back(t_ns: Times) -> SetBack | None:
         last = int(t_ns[k:end][late[k:end]].max())
         there = int(((t_ns >= t_ns[k]) & (t_ns <= last)).sum())
         if there > TWICE * ((last - t_ns[k]) / period + 1):
-            return SetBack(int(latest[k] - t_ns[k]), k)
+            until, later = int(arrival_ns[k:].min()) - 1, int(arrival_ns[:k].max()) + 1
+            return SetBack(int(latest[k] - t_ns[k]), k, until, later)
     return None
 
 
-def _without_copies(
-    order: NDArray[np.intp], t_ns: Times, numbers: Floats | None
-) -> NDArray[np.intp]:
-    """Without messages that are there twice, as in a bag of two recorders; without numbers to
-    compare, without all that repeat a time.
+def _without_copies(stamps: Stamps) -> NDArray[np.intp]:
+    """In the order of time, without messages that are there twice, as in a bag of two recorders;
+    without numbers to compare, without all that repeat a time.
     """
-    same = np.diff(t_ns[order]) == 0
+    order, numbers = np.argsort(stamps.t_ns, kind="stable"), stamps.numbers
+    same = np.diff(stamps.t_ns[order]) == 0
     if numbers is not None:
         same &= (numbers[order[1:]] == numbers[order[:-1]]).all(axis=1)
     return order[~np.concatenate(([False], same))]
 
 
-def _interleaved(t_ns: Times, numbers: Floats | None) -> SetBack | None:
+def _interleaved(stamps: Stamps) -> SetBack | None:
     """Of sorted stamps: a stretch twice as dense as the rest, of two combs or of two drives."""
+    t_ns, arrival_ns, numbers = stamps
     steps = np.diff(t_ns).astype(np.float64)
     if len(steps) < 2 * TEETH_MIN:
         return None
@@ -133,7 +152,9 @@ def _interleaved(t_ns: Times, numbers: Floats | None) -> SetBack | None:
             continue
         own = None if numbers is None else numbers[begin : end + 2]
         if _are_combs(inside) or (own is not None and _are_two_drives(own)):
-            return SetBack(int(t_ns[end + 1] - t_ns[begin]), begin + (end - begin + 1) // 2)
+            until, later = int(arrival_ns[begin]) - 1, int(arrival_ns[end + 1]) + 1
+            by_ns, at = int(t_ns[end + 1] - t_ns[begin]), begin + (end - begin + 1) // 2
+            return SetBack(by_ns, at, until, later)
     return None
 
 

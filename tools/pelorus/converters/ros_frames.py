@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pelorus import motion
 from pelorus.console import progress
 from pelorus.converters.bag import Bag, require_messages
-from pelorus.converters.order import in_order, leave_out, sound
+from pelorus.converters.order import Stamps, in_order, leave_out, sound
 from pelorus.converters.streams import Pictures, Seen
 from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
@@ -107,10 +107,10 @@ def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str])
 def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     """Pairs by the times of their headers: of each left picture the nearest right one."""
     topics = [cameras.left, cameras.right]
-    stamps: dict[str, list[int]] = {topic: [] for topic in topics}
+    stamps: dict[str, list[tuple[int, int]]] = {topic: [] for topic in topics}
     brightest = 0
     for found in progress(bag.written(topics), "finding pictures", bag.count(topics)):
-        stamps[found.topic].append(found.t_ns)
+        stamps[found.topic].append((found.t_ns, found.arrival_ns))
         if getattr(found.message, "encoding", "") in DEEP:
             grey = _deep(bag.path / found.topic.lstrip("/"), found.message)
             brightest = max(brightest, int(grey.max(initial=0)))
@@ -130,12 +130,20 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     return Pictures(where, pairs[:, 0], pixels)
 
 
-def _times(bag: Bag, topic: str, stamps: list[int], remarks: list[str]) -> Times:
+def _times(bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[str]) -> Times:
     """Of the pictures that have one, in order."""
+    t_ns: Times = np.array([t for t, _ in stamps], np.int64)
+    return t_ns[_chosen(bag, topic, stamps, remarks)]
+
+
+def _chosen(
+    bag: Bag, topic: str, stamps: list[tuple[int, int]], remarks: list[str]
+) -> NDArray[np.intp]:
+    """Which messages have a time, in the order of it, by their stamps and arrivals."""
     require_messages(bag, topic, len(stamps))
-    t_ns = np.array(stamps, np.int64)
-    t_ns = t_ns[sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks)]
-    return t_ns[in_order(bag, topic, t_ns, None, remarks)]
+    t_ns, arrival_ns = np.array(stamps, np.int64).T
+    good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks))[0]
+    return good[in_order(bag, topic, Stamps(t_ns, arrival_ns).at(good), remarks)]
 
 
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
@@ -223,19 +231,16 @@ def _tracks(bag: Bag, topic: str, calibrated: Calibrated, remarks: list[str]) ->
     where = bag.path / topic.lstrip("/")
     stamps, messages = [], []
     for found in progress(bag.written([topic]), f"reading {topic}", bag.count([topic])):
-        stamps.append(found.t_ns)
+        stamps.append((found.t_ns, found.arrival_ns))
         messages.append(_observations(where, found.message, calibrated))
-    require_messages(bag, topic, len(stamps))
-    t_ns = np.array(stamps, np.int64)
-    good = np.nonzero(sound(bag, topic, t_ns, np.zeros((len(t_ns), 0)), remarks))[0]
-    order = good[in_order(bag, topic, t_ns[good], None, remarks)]
+    order = _chosen(bag, topic, stamps, remarks)
     rows = [messages[k] for k in order]
     table = np.concatenate(rows)
     broken = ~np.isfinite(table).all(axis=1)
     if broken.any():
         leave_out(bag, topic, int(broken.sum()), len(table), "observations are not finite", remarks)
     frame = np.repeat(np.arange(len(rows)), [len(one) for one in rows])[~broken]
-    table, times = table[~broken], t_ns[order]
+    table, times = table[~broken], np.array(stamps, np.int64)[order, 0]
     tracks = Tracks.from_rows(len(times), frame, table[:, 0].astype(np.int64), table[:, 1:])
     tracks.check(bag.path)
     if ((np.diff(tracks.frame) == 0) & (np.diff(tracks.id) == 0)).any():
@@ -300,7 +305,7 @@ def _lenses(calibrated: Calibrated) -> tuple[Lens, Lens]:
 
 def camera_frame(bag: Bag, topic: str) -> str:
     """What the messages of a topic call the frame of their sensor."""
-    first = next(bag.messages([topic]), None)
+    first = next(bag.messages([topic], whole=True), None)
     return "" if first is None else bare(first.message.header.frame_id)
 
 
@@ -331,7 +336,7 @@ def _info_topic(bag: Bag, topic: str) -> str:
 
 
 def _info(bag: Bag, topic: str) -> Info:
-    info = next(bag.messages([topic])).message
+    info = next(bag.messages([topic], whole=True)).message
     # ROS 1 has capital letters, ROS 2 small ones
     K, D, R, P = (
         np.array(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pelorus.console import progress
 from pelorus.converters import streams, twist_axes
 from pelorus.converters.bag import Bag, require_messages
-from pelorus.converters.order import in_order, sound
+from pelorus.converters.order import Stamps, in_order, sound
 from pelorus.converters.streams import Asked, Readings, Twists
 from pelorus.converters.transforms import Tree, bare
 from pelorus.errors import PelorusError
@@ -307,11 +307,11 @@ def rows_of(bag: Bag, topic: str, row: Callable[[Any], list[float]], remarks: li
     stamped, frame = [], ""
     for one in found:
         frame = bare(getattr(one.message, "child_frame_id", "") or one.message.header.frame_id)
-        stamped.append((one.t_ns, row(one.message)))
+        stamped.append((one.t_ns, one.arrival_ns, row(one.message)))
     require_messages(bag, topic, len(stamped))
-    t_ns = np.array([t for t, _ in stamped], np.int64)
-    numbers = np.array([values for _, values in stamped])
+    t_ns, arrival_ns = np.array([times for *times, _ in stamped], np.int64).T
+    numbers = np.array([values for *_, values in stamped])
     good = sound(bag, topic, t_ns, numbers, remarks)
-    t_ns, numbers = t_ns[good], numbers[good]
-    order = in_order(bag, topic, t_ns, numbers, remarks)
-    return Rows(t_ns[order], numbers[order], frame)
+    whole = Stamps(t_ns, arrival_ns, numbers).at(good)
+    order = in_order(bag, topic, whole, remarks)
+    return Rows(whole.t_ns[order], numbers[good][order], frame)

@@ -65,7 +65,7 @@ class Tree:
         fixed = [topic for topic in topics if topic.rpartition("/")[2] == STATIC]
         others = [topic for topic in topics if topic not in fixed]
         for topics in (fixed, others):
-            found = bag.messages(topics) if topics else ()
+            found = bag.messages(topics, whole=True) if topics else ()
             for stamped in progress(found, "reading transforms", bag.count(topics)):
                 for one in stamped.message.transforms:
                     tree._add(one, topics is fixed)
