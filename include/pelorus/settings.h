@@ -164,7 +164,9 @@ typedef struct plr_config {
     double bias_velocity_sigma_mps;
 
     /* Setting bias-gyro-sigma [rad/s]: 0 to 10, default 0.01.
-     * The same of the gyro bias: its data sheet's bias after calibration. */
+     * The same of the gyro bias: its data sheet's bias after calibration. For an IMU whose HEADER says
+     * none plr_session takes 0.1: data sheets have up to 20 degrees a second. A start at rest measures it,
+     * and needs no more of this than that it is not far too small. */
     double bias_gyro_sigma_radps;
 
     /* Setting bias-velocity-walk [(m/s)^2/s]: 0 to 1e2, default 1e-8.
@@ -281,8 +283,8 @@ typedef struct plr_config {
 
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
-     * Take several times the data sheet's figure: vibration, scale and timing errors come on top,
-     * and with too small a figure the gate rejects what the camera sees (docs/NUMERICS.md 13). */
+     * It is the least: where the readings scatter by more than twice that, half of their scatter counts,
+     * because vibration comes on top of the data sheet's figure (docs/NUMERICS.md 13). */
     double gyro_noise;
 
     /* Setting accel-noise [m/s^2/sqrt(Hz)]: 0 to 100, default 1e-2.
@@ -297,9 +299,9 @@ typedef struct plr_config {
      * The same of the accelerometer's bias. */
     double accel_walk;
 
-    /* Setting bias-accel-sigma [m/s^2]: 1e-6 to 10, default 0.1.
-     * Standard deviation of the accelerometer's bias at the start. bias-gyro-sigma is that of the
-     * gyro. */
+    /* Setting bias-accel-sigma [m/s^2]: 1e-6 to 10, default 0.3.
+     * Standard deviation of the accelerometer's bias at the start: data sheets have offsets of 20 to 80
+     * mg. bias-gyro-sigma is that of the gyro. */
     double bias_accel_sigma_mps2;
 
     /* Setting gravity [m/s^2]: 0.1 to 30, default 9.81.

@@ -160,8 +160,8 @@ typedef struct plr_inertial {
     plr_real change2[2]; /* mean square of the difference between successive readings */
     plr_real change[PLR_POSE_DIM]; /* the last of these differences */
     plr_real scatter2[2];          /* variance of a reading about the line through its neighbours */
-    plr_real usual_s;    /* usual interval between readings */
-    plr_real off_usual2; /* mean square difference of intervals from that, s^2 */
+    plr_real usual_s;              /* usual interval between readings */
+    plr_real off_usual2;           /* mean square difference of intervals from that, s^2 */
     plr_time_ns started_ns;
     plr_time_ns still_ns;   /* of the last standstill that was measured */
     plr_time_ns doubted_ns; /* since when the mean reading has not fitted gravity: `doubts` */

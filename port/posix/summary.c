@@ -32,6 +32,8 @@ static void add_counts(summary *s, const plr_report *report) {
     s->poor += report->poor;
     s->left_out += report->left_out;
     s->blocks_failed += report->blocks_failed;
+    if (s->before_start == s->frames && report->reasons & PLR_REASON_NOT_STARTED)
+        s->before_start++;
     s->health[report->health]++;
     if (report->reasons & PLR_REASON_RECOVERED) {
         if (s->recoveries == 0)
@@ -64,6 +66,11 @@ void summary_add_frame(summary *s, const plr_frame_result *result) {
     samples_add(&s->compute_us, &us);
     s->compute_ns += result->compute_ns;
     s->frames++;
+}
+
+uint64_t summary_frames_in(const summary *s, plr_health health) {
+    const bool waited = health == PLR_HEALTH_LOST && s->before_start < s->frames;
+    return s->health[health] - (waited ? s->before_start : 0);
 }
 
 void summary_figures_of(summary *s, summary_figures *figures) {
@@ -159,9 +166,12 @@ static void print_counts(const summary *s, const plr_session *session) {
            s->no_room, s->poor, s->refused_observations, s->duplicates, s->left_out);
     print_readings(session);
     printf("health        %" PRIu64 " frames good, %" PRIu64 " degraded, %" PRIu64 " lost, %" PRIu64
-           " diverged\n",
-           s->health[PLR_HEALTH_GOOD], s->health[PLR_HEALTH_DEGRADED], s->health[PLR_HEALTH_LOST],
-           s->health[PLR_HEALTH_DIVERGED]);
+           " diverged",
+           summary_frames_in(s, PLR_HEALTH_GOOD), summary_frames_in(s, PLR_HEALTH_DEGRADED),
+           summary_frames_in(s, PLR_HEALTH_LOST), summary_frames_in(s, PLR_HEALTH_DIVERGED));
+    if (s->before_start > 0 && s->before_start < s->frames)
+        printf(", after %" PRIu64 " before the start", s->before_start);
+    printf("\n");
     if (s->recoveries > 0)
         printf("              diverged and recovered %" PRIu64
                " times, first at %.3f s: the pose was kept,\n"

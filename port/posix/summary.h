@@ -11,7 +11,8 @@ typedef struct summary {
     uint64_t observations, matched, used, gated, created, evicted;
     uint64_t refused_observations, duplicates, no_room, poor, left_out, blocks_failed;
     uint64_t health[PLR_HEALTH_DIVERGED + 1]; /* frames in each */
-    uint64_t recoveries;                      /* from divergence, in the same frame */
+    uint64_t before_start; /* of those lost: waiting for an IMU to start, at first */
+    uint64_t recoveries;   /* from divergence, in the same frame */
     uint64_t warnings;
     plr_time_ns first_ns, last_ns, diverged_ns; /* the first time; 0: never */
     plr_pose last_pose;
@@ -29,6 +30,9 @@ void summary_init(summary *s);
 void summary_free(summary *s);
 
 void summary_add_frame(summary *s, const plr_frame_result *result);
+
+/* Frames of this health since the start; all, if there was none. */
+uint64_t summary_frames_in(const summary *s, plr_health health);
 
 /* Both sort what was collected. `path` is the recording's, `log` that of --out or NULL. */
 void summary_print(summary *s, const plr_session *session, const char *path, const char *log);

@@ -59,10 +59,11 @@ static void put_counts(json_object *o, const summary *s, const plr_session *sess
     json_count(o, "refused_observations", s->refused_observations);
     json_count(o, "duplicates", s->duplicates);
     json_count(o, "blocks_failed", s->blocks_failed);
-    json_count(o, "frames_good", s->health[PLR_HEALTH_GOOD]);
-    json_count(o, "frames_degraded", s->health[PLR_HEALTH_DEGRADED]);
-    json_count(o, "frames_lost", s->health[PLR_HEALTH_LOST]);
-    json_count(o, "frames_diverged", s->health[PLR_HEALTH_DIVERGED]);
+    json_count(o, "frames_good", summary_frames_in(s, PLR_HEALTH_GOOD));
+    json_count(o, "frames_degraded", summary_frames_in(s, PLR_HEALTH_DEGRADED));
+    json_count(o, "frames_lost", summary_frames_in(s, PLR_HEALTH_LOST));
+    json_count(o, "frames_diverged", summary_frames_in(s, PLR_HEALTH_DIVERGED));
+    json_count(o, "frames_before_start", s->before_start);
     json_count(o, "recoveries", s->recoveries);
     json_number(o, "diverged_s", s->diverged_ns > 0 ? (double)s->diverged_ns * 1e-9 : nan(""));
 }

@@ -171,7 +171,8 @@ void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
             remember(point, o, early);
         }
     }
-    if (seen < PLR_POINTS_LEAST || 2 * moved <= seen) /* a few are mismatches, or things that move */
+    if (seen < PLR_POINTS_LEAST ||
+        2 * moved <= seen) /* a few are mismatches, or things that move */
         return;
     plr_alignment_restart(f);
     plr_alignment_does_not_stand(f, PLR_IMU_FAULT_MOVES);

@@ -126,8 +126,8 @@ static bool pictures_stand(const plr_alignment *at) {
     unsigned stay = 0, others = 0;
     for (unsigned i = 0; i < PLR_WATCHED_POINTS; i++)
         if (at->points[i].used & PLR_POINT_EARLY) {
-            const bool stays = (at->points[i].used & (PLR_POINT_STAYS | PLR_POINT_MOVED)) ==
-                               PLR_POINT_STAYS;
+            const bool stays =
+                (at->points[i].used & (PLR_POINT_STAYS | PLR_POINT_MOVED)) == PLR_POINT_STAYS;
             stay += stays;
             others += !stays;
         }
@@ -278,12 +278,15 @@ static void start_at_rest(plr_filter *f, plr_time_ns t_ns, plr_real interval, co
     double variance[PLR_BIAS_DIM];
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
         variance[i] = (double)f->bias_prior_sigma[i] * (double)f->bias_prior_sigma[i];
-    for (unsigned i = 0; i < 3; i++)
-        if (variance[G + i] > (double)measured) {
-            f->bias[G + i] = f->bias_prior[G + i] = at->mean[G + i];
-            f->bias_prior_sigma[G + i] = PLR_SQRT(measured);
-            variance[G + i] = (double)measured;
-        }
+    for (unsigned i = G; i < PLR_BIAS_DIM; i++) {
+        const double off = (double)(at->mean[i] - f->bias_prior[i]);
+        const bool agrees = off * off <= 9 * (variance[i] + (double)measured);
+        if (variance[i] <= (double)measured && agrees)
+            continue;
+        f->bias[i] = f->bias_prior[i] = at->mean[i];
+        f->bias_prior_sigma[i] = PLR_SQRT(measured);
+        variance[i] = (double)measured;
+    }
     plr_skew(L, u);
     for (unsigned i = 0; i < 9; i++)
         L[i] /= f->par.gravity;

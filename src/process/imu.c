@@ -253,27 +253,34 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
     }
 }
 
-/* What is unlikely of three numbers of this variance each, once in a million. */
+/* Of the variance by which readings scatter about their neighbours this much counts as noise: vibration is in
+ * part true motion, and stated sigmas that are right to two times stay as stated. */
+#define NOT_MOTION PLR_R(0.25)
+
+/* The density of the accelerometer's (0) or the gyro's (1) noise, squared: as stated, or as the readings
+ * scatter, if that is more. */
+static plr_real density_of(const plr_filter *f, unsigned which) {
+    const plr_real stated = which == 0 ? f->par.accel_density : f->par.gyro_density;
+    const plr_real shown = NOT_MOTION * f->inertial.scatter2[which] * f->inertial.usual_s;
+    return shown > stated ? shown : stated;
+}
+
+/* What three numbers of this variance each exceed once in a million. */
 #define UNLIKELY PLR_R(30)
 
-/* The densities of the readings' noise, squared: as stated, or as they scatter about their neighbours, if
- * that is more. A specific force beyond what a body does, its own weight and that scatter, is a shock and
- * not believed. A reading held for longer than usual is wrong by what changes meanwhile: at first as
- * successive readings differ, later as they scatter at all. */
+/* The densities of a step's noise. A force that accelerates the body by more than its own weight, and more than
+ * scatter does, is a shock: the reading may be wrong by all of that, for as long as any error lasts. A reading held for longer than usual is wrong by
+ * what changes meanwhile: at first as successive readings differ, later as they scatter at all. */
 static void densities(const plr_filter *f, const plr_imu_step *s, plr_real interval,
                       plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
-    const plr_real stated[2] = {f->par.accel_density, f->par.gyro_density};
-    plr_real accelerated[3];
-    for (int i = 0; i < 2; i++) {
-        const plr_real shown = PLR_R(0.25) * at->scatter2[i] * at->usual_s;
-        density[i] = shown > stated[i] ? shown : stated[i];
-    }
+    plr_real forced[3];
+    for (unsigned i = 0; i < 2; i++)
+        density[i] = density_of(f, i);
     for (int i = 0; i < 3; i++)
-        accelerated[i] = s->a[i] + s->gamma[i];
-    const plr_real beyond2 =
-        plr_dot3(accelerated, accelerated) - (scatter2 > g * g ? scatter2 : g * g);
+        forced[i] = s->a[i] + s->gamma[i];
+    const plr_real beyond2 = plr_dot3(forced, forced) - (scatter2 > g * g ? scatter2 : g * g);
     if (beyond2 > 0)
         density[0] = PLR_FMA(LASTING_S, beyond2, density[0]);
     if (!(at->usual_s > 0) || interval <= PLR_LONG_INTERVALS * at->usual_s)
@@ -421,8 +428,8 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
     plr_gemm_nn(V, D, D, m->V, D, P_dd, D, VP, D);
     plr_gemm_nt(V, V, D, VP, D, m->V, D, P_vv, V);
     bias_covariance(f, P_b);
-    const plr_real per_reading =
-        f->inertial.usual_s > 0 ? f->par.gyro_density / f->inertial.usual_s : f->par.gyro_density;
+    const plr_real density = density_of(f, 1), usual = f->inertial.usual_s;
+    const plr_real per_reading = usual > 0 ? density / usual : density;
     for (unsigned i = 0; i < V; i++)
         for (unsigned j = 0; j < V; j++) {
             P_u[PLR_POSE_DIM * i + j] = P_vv[V * i + j] + m->Q_cc[PLR_REST_DIM * i + j];
@@ -445,6 +452,7 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
     const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);
     const plr_real most = since < PLR_R(0.5) ? since : PLR_R(0.5);
     const plr_real usual = f->inertial.usual_s > 0 ? f->inertial.usual_s : PLR_R(1e-3);
+    const plr_real density = density_of(f, 1);
     /* at the time of the last such row the mean is used up: one reading's worth is granted */
     const plr_real mean_of = most > 0 ? most : usual;
     memset(H, 0, sizeof *H);
@@ -454,8 +462,7 @@ static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H
         const plr_real *M = rows->M + PLR_POSE_DIM * i;
         const bool moves = plr_dot3(M, M) > 0;
         const plr_real *w_m = moves ? f->reading + 3 : f->inertial.slow + 3;
-        const plr_real noise =
-            moves ? f->par.gyro_density / usual : USED_TWICE * f->par.gyro_density / mean_of;
+        const plr_real noise = moves ? density / usual : USED_TWICE * density / mean_of;
         r[i] = rows->z[i];
         R[i] = PLR_FMA(noise, plr_dot3(M + 3, M + 3), rows->R[i]);
         for (unsigned c = 0; c < 3; c++) {

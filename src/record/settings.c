@@ -69,7 +69,7 @@ static const plr_row rows[] = {
     {{34, "accel-noise", "m/s^2/sqrt(Hz)", "noise density of the accelerometer", PLR_SETTING_NUMBER, NULL, 0, 100, 1e-2}, AT(accel_noise), STORE_DOUBLE},
     {{35, "gyro-walk", "rad/s^2/sqrt(Hz)", "random walk of the IMU's gyro bias", PLR_SETTING_NUMBER, NULL, 0, 1, 1e-4}, AT(gyro_walk), STORE_DOUBLE},
     {{36, "accel-walk", "m/s^3/sqrt(Hz)", "random walk of the accelerometer's bias", PLR_SETTING_NUMBER, NULL, 0, 10, 1e-3}, AT(accel_walk), STORE_DOUBLE},
-    {{37, "bias-accel-sigma", "m/s^2", "prior of the accelerometer's bias", PLR_SETTING_NUMBER, NULL, 1e-6, 10, 0.1}, AT(bias_accel_sigma_mps2), STORE_DOUBLE},
+    {{37, "bias-accel-sigma", "m/s^2", "prior of the accelerometer's bias", PLR_SETTING_NUMBER, NULL, 1e-6, 10, 0.3}, AT(bias_accel_sigma_mps2), STORE_DOUBLE},
     {{38, "gravity", "m/s^2", "gravity at the place", PLR_SETTING_NUMBER, NULL, 0.1, 30, 9.81}, AT(gravity_mps2), STORE_DOUBLE},
     {{39, "imu-start", "", "how tilt and velocity are found with an IMU", PLR_SETTING_CHOICE, imu_start_words, 0, 3, PLR_IMU_START_AUTO}, AT(imu_start), STORE_U8},
     {{40, "start-velocity-sigma", "m/s", "velocity at a start in motion", PLR_SETTING_NUMBER, NULL, 1e-6, 100, 3}, AT(start_velocity_sigma_mps), STORE_DOUBLE},

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "session/layers.h"
 
+/* The prior of an IMU's gyro bias, rad/s, where nothing else is said: real parts have so much. The setting's
+ * default is for a gyro beside wheels, which has been calibrated. */
+#define IMU_BIAS_GYRO 0.1
+
 /* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
     const plr_setting *setting = plr_setting_by_name(name);
@@ -60,10 +64,13 @@ static plr_status apply_values(plr_config *config, const plr_wire_setting *value
     return PLR_OK;
 }
 
-static plr_status apply_all(plr_config *config, const plr_layers *layers, bool sigmas_of_a_reading,
-                            const plr_setting **culprit) {
+/* `process` and `noise` are those that all layers come to: some defaults depend on them. */
+static plr_status apply_all(plr_config *config, const plr_layers *layers, uint8_t process,
+                            uint8_t noise, const plr_setting **culprit) {
     plr_config_default(config);
-    apply_header(config, layers->header, sigmas_of_a_reading);
+    if (process == PLR_PROCESS_IMU)
+        config->bias_gyro_sigma_radps = IMU_BIAS_GYRO;
+    apply_header(config, layers->header, noise == PLR_NOISE_TWIST);
     plr_status status =
         apply_values(config, layers->wanted->settings, layers->wanted->count, culprit);
     if (status == PLR_OK)
@@ -74,9 +81,9 @@ static plr_status apply_all(plr_config *config, const plr_layers *layers, bool s
 plr_status plr_layers_compose(plr_config *config, const plr_layers *layers,
                               const plr_setting **culprit) {
     *culprit = NULL;
-    plr_status status = apply_all(config, layers, true, culprit);
-    if (status == PLR_OK && config->noise == PLR_NOISE_STEP)
-        status = apply_all(config, layers, false, culprit);
+    plr_status status = apply_all(config, layers, PLR_PROCESS_TWIST, PLR_NOISE_TWIST, culprit);
+    if (status == PLR_OK)
+        status = apply_all(config, layers, config->process, config->noise, culprit);
     return status == PLR_OK ? plr_config_check(config, culprit) : status;
 }
 

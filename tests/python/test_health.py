@@ -99,3 +99,22 @@ def test_a_single_frame_has_one_time() -> None:
     assert Spell(1, 2500 * MS, 2500 * MS, 1, ("x",)).words(500 * MS) == (
         "degraded at 2.0 s (1 frame): x"
     )
+
+
+def test_frames_before_the_start_are_not_counted() -> None:
+    waits, few = reason("NOT_STARTED"), reason("FEW_OBSERVATIONS")
+    rows = [(50 * k, 2, waits) for k in range(23)]
+    found = line(*rows, (1150, 1, few), *((1200 + 50 * k, 0, 0) for k in range(8)))
+    assert (found.frames, found.before_start, found.spells) == (9, 23, ())
+    assert found.summary() == "good in 8 of 9 frames, degraded in 1, after 23 frames before the start"
+
+
+def test_a_filter_that_never_starts_is_lost() -> None:
+    found = line(*((50 * k, 2, reason("NOT_STARTED")) for k in range(23)))
+    assert found.summary() == "good in 0 of 23 frames, lost in 23"
+
+
+def test_a_filter_that_waits_again_later_is_lost_meanwhile() -> None:
+    waits = reason("NOT_STARTED")
+    found = line((0, 0, 0), *((50 * k, 2, waits) for k in range(1, 5)), (250, 0, 0))
+    assert found.by_health["lost"] == 4

@@ -319,8 +319,17 @@ static double filters_noise(int i, int j) {
     return (double)filter.core_motion.Q_cc[PLR_REST_DIM * (i - 6) + j - 6];
 }
 
+/* The specific force that the body feels where it is, and a push that is less than its weight. */
+static void push_gently(void) {
+    for (unsigned k = 0; k < READINGS; k++)
+        for (int i = 0; i < 3; i++)
+            real.reading[k][i] = gravity * real.T[8 + i] + real.bias[i] + 3 * sin(0.3 * k + i);
+    round_all(&real);
+}
+
 static void test_noise_is_that_of_each_reading_and_of_the_walks(void) {
     double Q[CORE * CORE];
+    push_gently();
     noise_of_all(Q);
     step_all();
     for (int i = 0; i < CORE; i++)
@@ -331,6 +340,35 @@ static void test_noise_is_that_of_each_reading_and_of_the_walks(void) {
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE((3e-5 + 100 * eps) * size, Q[CORE * i + j],
                                               filters_noise(i, j), at);
         }
+}
+
+/* A step of this acceleration along the body's x: what its noise adds to the velocity's variance, as a density
+ * of the readings'. */
+static double density_of_a_step(double mps2) {
+    static plr_filter once;
+    plr_real reading[6];
+    once = filter;
+    memset(once.inertial.velocity, 0, sizeof once.inertial.velocity); /* what a turn adds */
+    double force[6] = {mps2, 0, 0};
+    for (int i = 0; i < 3; i++) {
+        force[i] += gravity * real.T[8 + i] + real.bias[i];
+        force[3 + i] = real.bias[3 + i];
+    }
+    to_reals(reading, force, 6);
+    plr_process_imu.step(&once, once.t_ns + 2500000, reading, PLR_R(0.0025), PLR_R(0.0025));
+    return (double)once.core_motion.Q_cc[0] / tau;
+}
+
+static void test_a_force_of_more_than_the_bodys_weight_is_a_shock_and_not_believed(void) {
+    const double stated = accel_noise * accel_noise;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-2 * stated, stated, density_of_a_step(0.9 * gravity));
+    const double due = stated + 0.5 * (23.0 * 23.0 - gravity * gravity);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3 * due, due, density_of_a_step(23));
+    filter.inertial.scatter2[0] =
+        PLR_R(40); /* a body that is shaken: 30 times that is more than 23^2 */
+    filter.inertial.usual_s = PLR_R(0.0025);
+    const double shaken = 0.25 * 40 * 0.0025;
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3 * shaken, shaken, density_of_a_step(23));
 }
 
 static void test_noise_is_symmetric_to_the_bit(void) {

@@ -30,8 +30,9 @@ static void start(void) {
 static uint32_t reasons_after(unsigned frames, const double a[3], const double w[3]) {
     rng chance = rng_seeded(411);
     plr_report report = {0};
+    const plr_time_ns begin = plr_filter_time(f);
     for (unsigned n = 1; n <= frames * per_frame; n++) {
-        const plr_time_ns t_ns = 1000000000 + n * UINT64_C(2500000);
+        const plr_time_ns t_ns = begin + n * UINT64_C(2500000);
         plr_imu imu;
         for (int i = 0; i < 3; i++) {
             imu.a_B_mps2[i] = a[i] + 0.02 * rng_normal(&chance);
@@ -64,6 +65,15 @@ static void test_an_accelerometer_in_g_is_told(void) {
 static void test_a_force_that_is_not_gravity_is_told(void) {
     demand(PLR_IMU_FAULT_NOT_GRAVITY, (const double[]){0, 0, 0.5 * 9.81}, slow);
     demand(PLR_IMU_FAULT_NOT_GRAVITY, (const double[]){0, 0, 3 * 9.81}, slow);
+}
+
+/* It was a shock. */
+static void test_a_force_that_is_gravity_again_is_no_fault_any_more(void) {
+    const double hit[3] = {11, -7, 33}, up[3] = {0, 0, 9.81};
+    demand(PLR_IMU_FAULT_NOT_GRAVITY, hit, slow);
+    TEST_ASSERT_TRUE(reasons_after(6, up, slow) & PLR_REASON_IMU_FAULT);
+    TEST_ASSERT_FALSE(reasons_after(20, up, slow) & PLR_REASON_IMU_FAULT);
+    TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
 }
 
 static void test_a_wrong_sign_is_told(void) {

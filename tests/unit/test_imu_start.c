@@ -5,94 +5,30 @@
 #include <stdlib.h>
 #include <unity.h>
 
-#include "support/imu_rig.h"
+#include "support/imu_still.h"
 #include "support/specimens.h"
-
-enum { SECOND = 400 }; /* readings */
 
 static const double g = 9.81;
 static plr_filter *const f = &imu_rig.filter;
-static rng chance;
 
 void setUp(void) {
-    imu_rig_set_up();
-    chance = rng_seeded(401);
-}
-
-/* A new filter whose clock has not begun. */
-static void make_filter(void) {
-    plr_calibration calibration;
-    imu_flight_start(&imu_rig.flight, &imu_rig.options);
-    calibration = imu_rig.flight.calibration;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(f, &calibration, &imu_rig.config, NULL));
-}
-
-/* A filter in a pose with this roll, which is given. */
-static void make_filter_at(double roll) {
-    plr_pose pose = {{1, 0, 0, 0, cos(roll), -sin(roll), 0, sin(roll), cos(roll)}, {1, 2, 3}};
-    make_filter();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 1000000000, &pose, NULL));
-}
-
-/* Readings at 400 Hz that a body at rest gives, with noise: of this specific force and rate. */
-static plr_status feed(unsigned count, const double a[3], const double w[3]) {
-    const double root = sqrt(SECOND);
-    plr_time_ns t_ns = plr_filter_time(f) ? plr_filter_time(f) : 1000000000;
-    plr_status status = PLR_OK;
-    for (unsigned k = 0; k < count && status == PLR_OK; k++) {
-        plr_imu imu;
-        for (int i = 0; i < 3; i++) {
-            imu.a_B_mps2[i] = a[i] + imu_rig.options.accel_noise * root * rng_normal(&chance);
-            imu.w_B_radps[i] = w[i] + imu_rig.options.gyro_noise * root * rng_normal(&chance);
-        }
-        t_ns += 2500000;
-        status = plr_filter_inertial(f, t_ns, &imu);
-    }
-    return status;
-}
-
-static void feed_up(unsigned count, double x, double y, double z) {
-    static const double none[3] = {0};
-    const double a[3] = {x, y, z};
-    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(count, a, none));
-}
-
-static uint32_t reasons(void) {
-    plr_health_state health;
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_health(f, plr_filter_time(f), &health));
-    return health.reasons;
-}
-
-static void demand_waiting(plr_imu_fault fault) {
-    plr_health_state health;
-    TEST_ASSERT_EQUAL_UINT8(0, f->inertial.started);
-    TEST_ASSERT_EQUAL_INT(fault, plr_filter_imu_fault(f));
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_health(f, plr_filter_time(f), &health));
-    TEST_ASSERT_TRUE(health.reasons & PLR_REASON_NOT_STARTED);
-    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST, health.health);
-    const bool says = fault != PLR_IMU_FAULT_NONE && fault != PLR_IMU_FAULT_MOVES;
-    TEST_ASSERT_EQUAL_INT(says, (health.reasons & PLR_REASON_IMU_FAULT) != 0);
-}
-
-static void demand_started(void) {
-    TEST_ASSERT_EQUAL_UINT8(1, f->inertial.started);
-    TEST_ASSERT_FALSE(reasons() & PLR_REASON_NOT_STARTED);
+    imu_still_set_up();
 }
 
 /* ---------------------------------------------------------------- at rest */
 
 static void test_a_body_that_stands_for_a_second_starts(void) {
-    make_filter();
-    feed_up(SECOND - 1, 0, 0, g);
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    feed_up(2, 0, 0, g);
-    demand_started();
+    imu_still_begin();
+    imu_still_feed_up(IMU_STILL_SECOND - 1, 0, 0, g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NONE);
+    imu_still_feed_up(2, 0, 0, g);
+    imu_still_demand_started();
     TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
 }
 
 static void test_until_the_start_the_pose_stays(void) {
-    make_filter_at(0);
-    feed_up(SECOND / 2, 0.5, 0, g);
+    imu_still_begin_at(0);
+    imu_still_feed_up(IMU_STILL_SECOND / 2, 0.5, 0, g);
     const plr_pose pose = pose_of(f);
     TEST_ASSERT_EQUAL_DOUBLE(1, pose.p[0]);
     TEST_ASSERT_EQUAL_DOUBLE(1, pose.R[0]);
@@ -104,9 +40,9 @@ static void test_at_rest_tilt_and_gyro_bias_are_measured(void) {
     const double a[3] = {-g * sin(pitch), g * cos(pitch) * sin(roll), g * cos(pitch) * cos(roll)};
     const double w[3] = {0.004, -0.003, 0.006};
     double b[6];
-    make_filter();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(SECOND + 1, a, w));
-    demand_started();
+    imu_still_begin();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, imu_still_feed(IMU_STILL_SECOND + 1, a, w));
+    imu_still_demand_started();
     const plr_pose pose = pose_of(f);
     for (int i = 0; i < 3; i++) /* noise of a second: 1 mm/s^2 in 9.8 m/s^2, 0.06 deg/s */
         TEST_ASSERT_DOUBLE_WITHIN(5e-3, a[i] / g, pose.R[6 + i]);
@@ -124,9 +60,9 @@ static void test_the_tilts_covariance_is_that_of_the_accelerometers_bias(void) {
     const double sigma = 0.2, s2 = sigma * sigma;
     const double roll = 0.4;
     imu_rig.config.bias_accel_sigma_mps2 = sigma;
-    make_filter();
-    feed_up(SECOND + 1, 0, g * sin(roll), g * cos(roll));
-    demand_started();
+    imu_still_begin();
+    imu_still_feed_up(IMU_STILL_SECOND + 1, 0, g * sin(roll), g * cos(roll));
+    imu_still_demand_started();
     const double u[3] = {(double)f->R_WB[6], (double)f->R_WB[7], (double)f->R_WB[8]};
     const double L[9] = {0, -u[2] / g, u[1] / g, u[2] / g, 0, -u[0] / g, -u[1] / g, u[0] / g, 0};
     double *P = specimen_covariance(f);
@@ -150,8 +86,8 @@ static void test_starts_at_rest_are_as_wrong_as_they_believe(void) {
     double orientation = 0, gyro = 0;
     for (uint64_t seed = 1; seed <= STARTS; seed++) {
         imu_rig_begin(IMU_RIG_AT_REST, seed);
-        imu_rig_readings(SECOND + 4);
-        demand_started();
+        imu_rig_readings(IMU_STILL_SECOND + 4);
+        imu_still_demand_started();
         imu_rig_adopt_world();
         const imu_rig_errors e = imu_rig_errors_now();
         orientation += e.orientation / STARTS; /* yaw is as adopted: two degrees of freedom */
@@ -163,36 +99,36 @@ static void test_starts_at_rest_are_as_wrong_as_they_believe(void) {
 
 /* Few readings are no mean, however much time lies between them. */
 static void test_a_pause_between_readings_begins_the_second_anew(void) {
-    make_filter();
-    feed_up(10, 0, 0, g);
+    imu_still_begin();
+    imu_still_feed_up(10, 0, 0, g);
     const plr_imu imu = {{0, 0, g}, {0, 0, 1e-4}};
     TEST_ASSERT_EQUAL_INT(PLR_OK,
                           plr_filter_inertial(f, plr_filter_time(f) + UINT64_C(1500000000), &imu));
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    feed_up(SECOND - 1, 0, 0, g);
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    feed_up(2, 0, 0, g);
-    demand_started();
+    imu_still_demand_waiting(PLR_IMU_FAULT_NONE);
+    imu_still_feed_up(IMU_STILL_SECOND - 1, 0, 0, g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NONE);
+    imu_still_feed_up(2, 0, 0, g);
+    imu_still_demand_started();
 }
 
 /* A pose that is set on another clock: what was averaged belongs to the old one. */
 static void test_on_another_clock_the_start_begins_anew(void) {
     const plr_pose identity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
-    make_filter();
-    feed_up(SECOND / 2, 0, 0, g);
+    imu_still_begin();
+    imu_still_feed_up(IMU_STILL_SECOND / 2, 0, 0, g);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(f, 500000000, &identity, NULL));
-    feed_up(SECOND - 1, 0, 0, g);
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    feed_up(3, 0, 0, g);
-    demand_started();
+    imu_still_feed_up(IMU_STILL_SECOND - 1, 0, 0, g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NONE);
+    imu_still_feed_up(3, 0, 0, g);
+    imu_still_demand_started();
 }
 
 /* ---------------------------------------------------------------- what is no rest */
 
 static void shake(double amplitude, double turn, unsigned seconds) {
     const plr_time_ns begin = plr_filter_time(f) ? plr_filter_time(f) : 1000000000;
-    for (unsigned k = 1; k <= seconds * SECOND; k++) {
-        const double s = 2 * 3.14159265 * 1.3 * k / SECOND;
+    for (unsigned k = 1; k <= seconds * IMU_STILL_SECOND; k++) {
+        const double s = 2 * 3.14159265 * 1.3 * k / IMU_STILL_SECOND;
         const plr_imu imu = {{amplitude * sin(s), amplitude * cos(1.3 * s), g},
                              {turn * sin(s), 0, turn * cos(s) + 1e-6 * k}};
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_inertial(f, begin + UINT64_C(2500000) * k, &imu));
@@ -201,20 +137,20 @@ static void shake(double amplitude, double turn, unsigned seconds) {
 
 static void test_a_body_that_is_shaken_does_not_start_at_rest(void) {
     imu_rig.config.imu_start = PLR_IMU_START_REST;
-    make_filter();
+    imu_still_begin();
     shake(2, 0.3, 5);
-    demand_waiting(PLR_IMU_FAULT_MOVES);
-    feed_up(2 * SECOND + 2, 0, 0, g); /* and then it stands */
-    demand_started();
+    imu_still_demand_waiting(PLR_IMU_FAULT_MOVES);
+    imu_still_feed_up(2 * IMU_STILL_SECOND + 2, 0, 0, g); /* and then it stands */
+    imu_still_demand_started();
     TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
 }
 
 static void test_auto_starts_in_motion_where_the_body_never_stands(void) {
-    make_filter();
+    imu_still_begin();
     shake(2, 0.3, 2);
-    demand_waiting(PLR_IMU_FAULT_MOVES);
+    imu_still_demand_waiting(PLR_IMU_FAULT_MOVES);
     shake(2, 0.3, 3);
-    demand_started();
+    imu_still_demand_started();
     double P_u[36];
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(f, P_u));
     TEST_ASSERT_TRUE(P_u[0] >= 9);
@@ -224,62 +160,62 @@ static void test_a_gyro_in_degrees_turns_while_the_body_stands(void) {
     static const double up[3] = {0, 0, 9.81};
     static const double turn[3] = {0.8, -0.2, 0.3};
     imu_rig.config.imu_start = PLR_IMU_START_REST;
-    make_filter();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(3 * SECOND, up, turn));
-    demand_waiting(PLR_IMU_FAULT_TURNS);
+    imu_still_begin();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, imu_still_feed(3 * IMU_STILL_SECOND, up, turn));
+    imu_still_demand_waiting(PLR_IMU_FAULT_TURNS);
 }
 
 static void test_after_a_turn_at_rest_moving_does_not_start_and_resting_does(void) {
     static const double up[3] = {0, 0, 9.81};
     static const double turn[3] = {0.8, -0.2, 0.3};
-    make_filter();
-    TEST_ASSERT_EQUAL_INT(PLR_OK, feed(3 * SECOND / 2, up, turn));
-    demand_waiting(PLR_IMU_FAULT_TURNS);
+    imu_still_begin();
+    TEST_ASSERT_EQUAL_INT(PLR_OK, imu_still_feed(3 * IMU_STILL_SECOND / 2, up, turn));
+    imu_still_demand_waiting(PLR_IMU_FAULT_TURNS);
     shake(2, 0.3, 5);
-    demand_waiting(PLR_IMU_FAULT_TURNS);
-    feed_up(5 * SECOND / 2, 0, 0, 9.81);
-    demand_started();
+    imu_still_demand_waiting(PLR_IMU_FAULT_TURNS);
+    imu_still_feed_up(5 * IMU_STILL_SECOND / 2, 0, 0, 9.81);
+    imu_still_demand_started();
 }
 
 static void test_an_accelerometer_in_g_is_told(void) {
-    make_filter();
-    feed_up(2 * SECOND, 0, 0, 1);
-    demand_waiting(PLR_IMU_FAULT_IN_G);
-    feed_up(4 * SECOND, 0, 0, 1); /* nor does it start as in motion */
-    demand_waiting(PLR_IMU_FAULT_IN_G);
+    imu_still_begin();
+    imu_still_feed_up(2 * IMU_STILL_SECOND, 0, 0, 1);
+    imu_still_demand_waiting(PLR_IMU_FAULT_IN_G);
+    imu_still_feed_up(4 * IMU_STILL_SECOND, 0, 0, 1); /* nor does it start as in motion */
+    imu_still_demand_waiting(PLR_IMU_FAULT_IN_G);
 }
 
 static void test_a_force_at_rest_that_is_not_gravity_is_told(void) {
     imu_rig.config.imu_start = PLR_IMU_START_REST;
-    make_filter();
-    feed_up(2 * SECOND, 0, 0, g + 2);
-    demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
-    feed_up(SECOND, 0, 0, g - 2);
-    demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
-    feed_up(2 * SECOND, 0, 0, g + 0.5);
-    demand_started();
+    imu_still_begin();
+    imu_still_feed_up(2 * IMU_STILL_SECOND, 0, 0, g + 2);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
+    imu_still_feed_up(IMU_STILL_SECOND, 0, 0, g - 2);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
+    imu_still_feed_up(2 * IMU_STILL_SECOND, 0, 0, g + 0.5);
+    imu_still_demand_started();
 }
 
 static void test_no_force_at_all_does_not_start_at_rest(void) {
     imu_rig.config.imu_start = PLR_IMU_START_REST;
-    make_filter();
-    feed_up(3 * SECOND, 0, 0, 0);
-    demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
+    imu_still_begin();
+    imu_still_feed_up(3 * IMU_STILL_SECOND, 0, 0, 0);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NOT_GRAVITY);
 }
 
 static void test_gravity_that_points_down_in_the_given_pose_is_told(void) {
-    make_filter_at(0);
-    feed_up(2 * SECOND, 0, 0, -g);
-    demand_waiting(PLR_IMU_FAULT_UPSIDE_DOWN);
-    feed_up(4 * SECOND, 0, 0, -g);
-    demand_waiting(PLR_IMU_FAULT_UPSIDE_DOWN);
+    imu_still_begin_at(0);
+    imu_still_feed_up(2 * IMU_STILL_SECOND, 0, 0, -g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_UPSIDE_DOWN);
+    imu_still_feed_up(4 * IMU_STILL_SECOND, 0, 0, -g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_UPSIDE_DOWN);
 }
 
 /* Without a pose any tilt is believed, an IMU upside down too. */
 static void test_without_a_pose_upside_down_is_a_tilt(void) {
-    make_filter();
-    feed_up(SECOND + 1, 0, 0, -g);
-    demand_started();
+    imu_still_begin();
+    imu_still_feed_up(IMU_STILL_SECOND + 1, 0, 0, -g);
+    imu_still_demand_started();
     const plr_pose pose = pose_of(f);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, -1, pose.R[8]);
     double RtR[9] = {0};
@@ -291,11 +227,11 @@ static void test_without_a_pose_upside_down_is_a_tilt(void) {
 }
 
 static void test_another_tilt_than_the_given_poses_is_told_and_taken(void) {
-    make_filter_at(0);
-    feed_up(SECOND + 1, 0, g * sin(0.6), g * cos(0.6));
-    demand_started();
+    imu_still_begin_at(0);
+    imu_still_feed_up(IMU_STILL_SECOND + 1, 0, g * sin(0.6), g * cos(0.6));
+    imu_still_demand_started();
     TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_TILT, plr_filter_imu_fault(f));
-    TEST_ASSERT_TRUE(reasons() & PLR_REASON_IMU_FAULT);
+    TEST_ASSERT_TRUE(imu_still_reasons() & PLR_REASON_IMU_FAULT);
     const plr_pose pose = pose_of(f);
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, sin(0.6), pose.R[7]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1, pose.p[0]);
@@ -303,9 +239,9 @@ static void test_another_tilt_than_the_given_poses_is_told_and_taken(void) {
 
 static void test_a_given_pose_keeps_its_place_and_heading(void) {
     double P[36];
-    make_filter_at(0.1);
-    feed_up(SECOND + 1, 0, g * sin(0.12), g * cos(0.12));
-    demand_started();
+    imu_still_begin_at(0.1);
+    imu_still_feed_up(IMU_STILL_SECOND + 1, 0, g * sin(0.12), g * cos(0.12));
+    imu_still_demand_started();
     TEST_ASSERT_EQUAL_INT(PLR_IMU_FAULT_NONE, plr_filter_imu_fault(f));
     const plr_pose pose = pose_of(f);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, pose.R[0]);
@@ -318,11 +254,11 @@ static void test_a_given_pose_keeps_its_place_and_heading(void) {
 
 static void test_a_start_in_motion_takes_a_tenth_of_a_second(void) {
     imu_rig.config.imu_start = PLR_IMU_START_MOTION;
-    make_filter();
-    feed_up(SECOND / 10 - 1, 0, 0, g);
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    feed_up(3, 0, 0, g);
-    demand_started();
+    imu_still_begin();
+    imu_still_feed_up(IMU_STILL_SECOND / 10 - 1, 0, 0, g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NONE);
+    imu_still_feed_up(3, 0, 0, g);
+    imu_still_demand_started();
 }
 
 /* Until the anchor what the first second did to the pose is believed; then position and yaw are where
@@ -355,107 +291,13 @@ static void test_the_anchor_lays_position_and_yaw_anew_two_seconds_after_a_start
 
 static void test_a_given_start_waits_for_nothing_but_its_pose(void) {
     imu_rig.config.imu_start = PLR_IMU_START_GIVEN;
-    make_filter();
-    feed_up(2 * SECOND, 0, 0, g);
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    make_filter_at(0);
-    feed_up(1, 0, 0, g);
-    demand_started();
+    imu_still_begin();
+    imu_still_feed_up(2 * IMU_STILL_SECOND, 0, 0, g);
+    imu_still_demand_waiting(PLR_IMU_FAULT_NONE);
+    imu_still_begin_at(0);
+    imu_still_feed_up(1, 0, 0, g);
+    imu_still_demand_started();
     double P_u[36];
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_velocity_covariance(f, P_u));
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 9, P_u[0]);
-}
-
-/* ---------------------------------------------------------------- pictures before the start */
-
-static plr_observation points[5];
-
-static plr_report look(double shift_px) {
-    plr_report report;
-    for (unsigned i = 0; i < 5; i++) {
-        const float u = (float)(100 + 90 * i + shift_px);
-        points[i] = (plr_observation){i + 1, u, 200, u - 12, 200};
-    }
-    const plr_frame frame = {plr_filter_time(f), PLR_NO_BUDGET, 5, points};
-    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(f, &frame, &report));
-    return report;
-}
-
-static void test_frames_before_the_start_are_taken_and_make_no_landmarks(void) {
-    make_filter();
-    for (unsigned k = 0; k < 3; k++) {
-        feed_up(SECOND / 4, 0, 0, g);
-        const plr_report report = look(0);
-        TEST_ASSERT_EQUAL_UINT16(0, report.active);
-        TEST_ASSERT_EQUAL_UINT16(0, report.used);
-        TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST, report.health);
-        TEST_ASSERT_TRUE(report.reasons & PLR_REASON_NOT_STARTED);
-    }
-    feed_up(SECOND / 4 + 2, 0, 0, g);
-    demand_started();
-    const plr_report report = look(0);
-    TEST_ASSERT_EQUAL_UINT16(5, report.created);
-    TEST_ASSERT_FALSE(report.reasons & PLR_REASON_NOT_STARTED);
-    feed_up(10, 0, 0, g);
-    TEST_ASSERT_EQUAL_INT(PLR_HEALTH_GOOD, look(0).health);
-}
-
-static void test_in_dead_reckoning_too_the_start_ends_the_waiting(void) {
-    imu_rig.config.mode = PLR_MODE_DEAD_RECKONING;
-    make_filter();
-    feed_up(SECOND / 2, 0, 0, g);
-    (void)look(0);
-    demand_waiting(PLR_IMU_FAULT_NONE);
-    feed_up(SECOND / 2 + 2, 0, 0, g);
-    demand_started();
-    (void)look(0);
-    feed_up(SECOND / 10, 0, 0, g);
-    TEST_ASSERT_EQUAL_HEX32(0, reasons());
-}
-
-/* A steady flight feels like rest: the pictures know better. */
-static void test_pictures_that_move_keep_the_filter_from_a_start_at_rest(void) {
-    imu_rig.config.imu_start = PLR_IMU_START_REST;
-    make_filter();
-    for (unsigned k = 0; k < 16; k++) {
-        feed_up(SECOND / 4, 0, 0, g);
-        (void)look(30.0 * k);
-    }
-    demand_waiting(PLR_IMU_FAULT_MOVES);
-    for (unsigned k = 0; k < 6; k++) {
-        feed_up(SECOND / 4, 0, 0, g);
-        (void)look(450);
-    }
-    demand_started();
-}
-
-/* Any match may be wrong, the first one of a point too. */
-static void test_wrong_matches_do_not_keep_it_from_a_start_at_rest(void) {
-    imu_rig.config.imu_start = PLR_IMU_START_REST;
-    make_filter();
-    for (unsigned k = 0; k < 6; k++) { /* two frames show nothing but other points */
-        feed_up(SECOND / 6, 0, 0, g);
-        (void)look(k == 2 || k == 4 ? 50 : 0);
-    }
-    feed_up(SECOND / 6, 0, 0, g);
-    demand_started();
-}
-
-/* A tracker that wanders shows points elsewhere while the body stands. */
-static void test_tracks_that_wander_do_not_keep_it_from_a_start_at_rest(void) {
-    const double drift_px[2] = {6, 0};
-    imu_rig.config.imu_start = PLR_IMU_START_REST;
-    for (unsigned k = 0; k < 2; k++) {
-        imu_rig.config.track_drift_px = drift_px[k];
-        make_filter();
-        for (unsigned frame = 0; frame < 6; frame++) {
-            feed_up(SECOND / 6, 0, 0, g);
-            (void)look(frame < 3 ? 0 : 7);
-        }
-        feed_up(SECOND / 6, 0, 0, g);
-        if (drift_px[k] > 0)
-            demand_started();
-        else
-            demand_waiting(PLR_IMU_FAULT_MOVES);
-    }
 }

@@ -98,6 +98,11 @@ static void test_the_header_says_the_process_and_what_an_imu_needs(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0.0625, config.accel_walk);
     TEST_ASSERT_EQUAL_DOUBLE(0.75, config.bias_accel_sigma_mps2);
     TEST_ASSERT_EQUAL_DOUBLE(9.75, config.gravity_mps2);
+    TEST_ASSERT_EQUAL_DOUBLE(0.1,
+                             config.bias_gyro_sigma_radps); /* a real part's, where none is said */
+    header.bias_gyro_sigma_radps = 0.002;
+    TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
+    TEST_ASSERT_EQUAL_DOUBLE(0.002, config.bias_gyro_sigma_radps);
     override("process", PLR_PROCESS_TWIST);
     TEST_ASSERT_EQUAL_INT(PLR_OK, compose());
     TEST_ASSERT_EQUAL_UINT8(PLR_PROCESS_TWIST, config.process);

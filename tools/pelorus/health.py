@@ -4,7 +4,8 @@
 A result holds a REPORT for each frame. Frames in a row with the same health are a spell; spells of
 the same health with less than a second between them are one, for a filter that says DEGRADED in
 every third frame is degraded all the time. Where no frame came there is no REPORT either: a pause
-of more than a second is a spell of its own.
+of more than a second is a spell of its own. Frames before an IMU's start are none of it: nothing is
+lost before it is known. A filter that never starts is LOST all the time.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ SHORT = {
 SYMPTOMS = tuple(
     SHORT[name] for name in ("POSE_MAY_BE_WRONG", "FEW_OBSERVATIONS", "NO_OBSERVATIONS")
 )
+NOT_STARTED = schema.number("reason", "NOT_STARTED")
 HARMLESS = schema.LIMITS["harmless_reasons"]  # they leave the estimate as good as it should be
 
 
@@ -74,11 +76,12 @@ class Spell:
 
 @dataclass(frozen=True)
 class TimeLine:
-    """All spells in the order of time, and how many frames had which health."""
+    """All spells in the order of time, and how many frames had which health, since the start."""
 
     frames: int
     by_health: dict[str, int]
     spells: tuple[Spell, ...]
+    before_start: int = 0  # frames that are not counted
 
     def summary(self) -> str:
         """`good in 380 of 410 frames, lost in 30`."""
@@ -88,7 +91,9 @@ class TimeLine:
             for name, count in self.by_health.items()
             if count and name != schema.HEALTHS[GOOD]
         ]
-        return ", ".join((f"good in {good} of {self.frames} frames", *others))
+        waited = self.before_start
+        start = f", after {waited} frames before the start" if waited else ""
+        return ", ".join((f"good in {good} of {self.frames} frames", *others)) + start
 
     def told(self, origin_ns: int) -> list[str]:
         """The summary, and each spell."""
@@ -100,13 +105,15 @@ def time_line(messages: Iterable[Message]) -> TimeLine | None:
     answers = [m for m in messages if isinstance(m, Report) and m.subject == Kind.STEREO]
     if not answers:
         return None
+    waited = next((k for k, a in enumerate(answers) if not a.reasons & NOT_STARTED), 0)
+    answers = answers[waited:]
     counts = Counter(answer.health for answer in answers)
     by_health = {words: counts[number] for number, words in schema.HEALTHS.items()}
     told = answers[1:] if _why(answers[0]) == (SHORT["FEW_OBSERVATIONS"],) else answers
     spells = sorted(  # the first frame makes landmarks, and has none to use yet
         (*_of_frames(told), *_pauses(answers)), key=lambda spell: (spell.from_ns, spell.to_ns)
     )
-    return TimeLine(len(answers), by_health, tuple(spells))
+    return TimeLine(len(answers), by_health, tuple(spells), waited)
 
 
 def reasons(bits: int) -> tuple[str, ...]:

@@ -95,6 +95,7 @@ def _imu(imu: ImuSurvey, origin_ns: int) -> dict[str, Any]:
 def _health(health: TimeLine, origin_ns: int) -> dict[str, Any]:
     return {
         "frames": health.frames,
+        "before_start": health.before_start,
         **health.by_health,
         "spells": [
             {
