@@ -62,6 +62,13 @@ extern "C" {
 #define PLR_SUPERVISE 1
 #endif
 
+/* Most parameters of the camera's calibration that can be estimated (setting calibrate): 0 to 11,
+ * default 11. Up to 5 cost no memory beside the errors of the calibration that are considered in any
+ * case; beyond, each four take so many rows of numbers as the state has (docs/SIZES.md). */
+#ifndef PLR_MAX_CALIBRATION
+#define PLR_MAX_CALIBRATION 11
+#endif
+
 /* 1 (default) or 0. 0: without src/known_map, which is then not compiled: the map source is never asked. */
 #ifndef PLR_KNOWN_MAP
 #define PLR_KNOWN_MAP 1
@@ -103,6 +110,10 @@ extern "C" {
 #endif
 #if PLR_BLOCK_OBSERVATIONS < 1 || PLR_BLOCK_OBSERVATIONS > 16
 #error "PLR_BLOCK_OBSERVATIONS must be 1 to 16."
+#endif
+
+#if PLR_MAX_CALIBRATION < 0 || PLR_MAX_CALIBRATION > 11
+#error "PLR_MAX_CALIBRATION must be 0 to 11."
 #endif
 
 #if PLR_REAL == 32
@@ -156,13 +167,18 @@ enum {
     PLR_LD_OF_6 = (PLR_MAX_STATE + 5) / 6 * 6,
     PLR_MAX_LD = PLR_LD_OF_16 > PLR_LD_OF_6 ? PLR_LD_OF_16 : PLR_LD_OF_6,
     PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond the end of a matrix */
-    PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2
+    PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2,
+    /* Errors of the calibration that can be considered or estimated together: with the seven other
+     * columns of a correction they make whole tiles of four. */
+    PLR_CALIBRATIONS = PLR_MAX_CALIBRATION <= 5   ? 5
+                       : PLR_MAX_CALIBRATION <= 9 ? 9
+                                                  : 13
 };
 
 /* What the memory layout of a filter or session depends on in one translation unit, and its size in
  * bytes. Every init passes the caller's to the library, which refuses others than its own. */
 typedef struct plr_sizes {
-    uint32_t bytes, real, landmarks, observations, block;
+    uint32_t bytes, real, landmarks, observations, block, calibration;
 } plr_sizes;
 
 /* The sizes of the translation unit that calls this, for a struct of so many bytes. */
@@ -173,12 +189,14 @@ static inline plr_sizes plr_sizes_here(uint32_t bytes) {
     sizes.landmarks = PLR_MAX_LANDMARKS;
     sizes.observations = PLR_MAX_OBSERVATIONS;
     sizes.block = PLR_BLOCK_OBSERVATIONS;
+    sizes.calibration = PLR_MAX_CALIBRATION;
     return sizes;
 }
 
 static inline int plr_sizes_agree(const plr_sizes *a, const plr_sizes *b) {
     return a->bytes == b->bytes && a->real == b->real && a->landmarks == b->landmarks &&
-           a->observations == b->observations && a->block == b->block;
+           a->observations == b->observations && a->block == b->block &&
+           a->calibration == b->calibration;
 }
 
 #ifdef __cplusplus

@@ -273,6 +273,10 @@ plr_status plr_filter_resume(plr_filter *f, plr_time_ns t_ns, const double *P_mo
  * PLR_E_DAMAGED, PLR_E_NOT_READY: `health` is filled too and says DIVERGED. */
 plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health);
 
+/* The calibration as it is estimated (setting calibrate), with sigmas; what is not estimated as init was
+ * told. */
+plr_status plr_filter_calibration(const plr_filter *f, plr_calibration_result *result);
+
 /* What the supervisor saw in the last frame and decided on it, for a log or for a supervisor of the caller's
  * own. Call it before the next frame. PLR_E_NOT_READY before the first one. */
 plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *supervision);

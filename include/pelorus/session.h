@@ -177,6 +177,7 @@ typedef struct plr_session {
     bool start_pending;        /* `start` sets the pose when its time has come */
     plr_start start;
     uint32_t start_resets;
+    plr_time_ns calibration_ns; /* when the calibration was told last */
     plr_held_steps held;
     plr_held_readings held_readings;
     plr_held_frames held_frames;

@@ -70,6 +70,16 @@ typedef enum plr_landmark_prior {
                                  report does (its Sigma_m) */
 } plr_landmark_prior;
 
+/* Parts of the camera's calibration, as bits. */
+typedef enum plr_calibrate {
+    PLR_CALIBRATE_FOCAL = 1,    /* focal-sigma */
+    PLR_CALIBRATE_BASELINE = 2, /* baseline-sigma */
+    PLR_CALIBRATE_TURN = 4,     /* camera-turn-sigma, about three axes */
+    PLR_CALIBRATE_CENTRE = 8,   /* centre-sigma, u and v */
+    PLR_CALIBRATE_PLACE = 16,   /* camera-place-sigma, along three axes */
+    PLR_CALIBRATE_CLOCK = 32    /* camera-clock-sigma */
+} plr_calibrate;
+
 /* The settings of a filter. Fill it by plr_config_default and change what your robot needs: usually
  * the three noise sigmas and twist_timing.
  *
@@ -79,7 +89,8 @@ typedef enum plr_landmark_prior {
  * Within the limits some combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
  * in the model `body`; the independent landmark_prior without landmark_sigma_m; track_drift_px
- * in the model `world`; the process IMU in the model `world`, or without `bias`. */
+ * in the model `world`; the process IMU in the model `world`, or without `bias`; a part of
+ * the calibration in `calibrate` whose sigma is 0, or more parts than the build has room for. */
 typedef struct plr_config {
     /* Setting model: one of plr_model_kind, default PLR_MODEL_BODY. */
     uint8_t model;
@@ -101,6 +112,14 @@ typedef struct plr_config {
      * 1: constant errors of the twists (6 numbers) are estimated as well. 0 saves time and memory;
      * choose it only where the twists have no such errors. An IMU needs 1. */
     uint8_t bias;
+
+    /* Setting calibrate: 0 to 63, default 0.
+     * Which parts of the camera's calibration are estimated on the way: bits of plr_calibrate. Each
+     * begins as the calibration says, with the sigma of its own setting, and is learnt as far as the
+     * drive shows it: with an IMU a minute of walking with turns shows all of them, at rest and at
+     * constant speed nothing shows. Parts that are not listed are considered: covariances contain
+     * their sigma, and estimates do not depend on it. */
+    uint8_t calibrate;
 
     /* Setting known-map: 0 or 1, default 0.
      * 1: in the mode slam, an unknown id is first looked up in the map source, and a pose that is lost is
@@ -258,8 +277,8 @@ typedef struct plr_config {
     /* Setting focal-sigma: 0 to 0.1, default 0.005.
      * The relative error of the focal length, one sigma. Such an error does not average out: each
      * turn is wrong by the same share, and at constant speed and turn nothing shows it. The reported
-     * covariances of pose, velocity, biases and landmarks contain it; estimates do not depend on it.
-     * 0: the camera is exact, as a simulated one is. */
+     * covariances of pose, velocity, biases and landmarks contain it; estimates do not depend on it,
+     * unless `calibrate` has it learnt. 0: the camera is exact, as a simulated one is. */
     double focal_sigma;
 
     /* Setting baseline-sigma: 0 to 0.1, default 0.005.
@@ -272,6 +291,18 @@ typedef struct plr_config {
      * speed that looks like a bias. The default is what a careful calibration leaves, and covers half
      * a degree; 0.01 for a mount that was measured by hand. Otherwise as focal-sigma. */
     double camera_turn_sigma_rad;
+
+    /* Setting centre-sigma [px]: 0 to 100, default 0.
+     * The error of the principal point, cx and cy, one sigma of each. Otherwise as focal-sigma. */
+    double centre_sigma_px;
+
+    /* Setting camera-place-sigma [m]: 0 to 1, default 0.
+     * The error of the camera's position (in T_CB), one sigma along each of its axes. */
+    double camera_place_sigma_m;
+
+    /* Setting camera-clock-sigma [s]: 0 to 0.1, default 0.
+     * The error of the time of every frame, one sigma: of what camera-offset does not make up for. */
+    double camera_clock_sigma_s;
 
     /* Setting track-drift [px/sqrt(s)]: 0 to 100, default 0.
      * How far tracks wander off their points: sigma after a second, growing as the root of time. A
@@ -334,7 +365,8 @@ typedef enum plr_setting_kind {
     PLR_SETTING_NUMBER,
     PLR_SETTING_COUNT,  /* a whole number */
     PLR_SETTING_SWITCH, /* off, on */
-    PLR_SETTING_CHOICE  /* one of .choices */
+    PLR_SETTING_CHOICE, /* one of .choices */
+    PLR_SETTING_LIST    /* some of .choices, as bits: off, or words between commas */
 } plr_setting_kind;
 
 /* One row of the table. */
@@ -344,7 +376,7 @@ typedef struct plr_setting {
     const char *unit;  /* "px"; "" where there is none */
     const char *about; /* one line for a help text */
     plr_setting_kind kind;
-    const char *const *choices;        /* words, ended by NULL, for SWITCH and CHOICE; else NULL */
+    const char *const *choices; /* words, ended by NULL, for SWITCH, CHOICE and LIST; else NULL */
     double minimum, maximum, standard; /* limits, both included, and the default */
 } plr_setting;
 

@@ -195,16 +195,31 @@ typedef struct plr_velocities {
     plr_real bias_eta[PLR_BIAS_DIM];
 } plr_velocities;
 
-/* Errors of the camera's calibration that covariances take into account: two relative ones, and
- * three angles, rad, by which it is turned about its own axes. src/state/sensitivity.h. */
-typedef enum plr_calibration_error {
-    PLR_BASELINE,
-    PLR_FOCAL_LENGTH,
-    PLR_CAMERA_TURN_X,
-    PLR_CAMERA_TURN_Y,
-    PLR_CAMERA_TURN_Z,
-    PLR_CALIBRATIONS
-} plr_calibration_error;
+/* The errors of the calibration that have a column of S: first those that are estimated, then those
+ * that are considered. */
+typedef struct plr_calibrated {
+    uint8_t kind[PLR_CALIBRATIONS]; /* plr_calibration_error */
+    uint8_t count, estimated;
+    plr_real variance[PLR_CALIBRATIONS]; /* of the prior */
+} plr_calibrated;
+
+/* What has become of the calibration: src/state/calibration.h. */
+typedef struct plr_calibration_estimate {
+    /* Information about the errors, each in units of its prior's sigma, prior included: rows of those
+     * that are estimated by all columns. */
+    double information[PLR_CALIBRATIONS * PLR_CALIBRATIONS];
+    plr_camera
+        eye; /* the camera as estimated; R_CB, t_CB: from the axes that par.camera gives it to
+                       where it was at the time of the last frame */
+    plr_real R[9], t[3];             /* the same without the clock's part */
+    plr_real twist[PLR_POSE_DIM];    /* of the camera at the last frame, m/s and rad/s */
+    plr_real rate[3], rate_variance; /* of the gyro, smoothed, bias included, rad/s; of an axis */
+    uint32_t moves; /* 0: by all that is known the body rests, and nothing is learnt */
+    plr_real moved[PLR_CALIBRATIONS]; /* by how much each has been corrected */
+    /* Of the errors' covariance G D G^T: G, a lower triangle of ones on its diagonal, row k the column
+     * of error k; and D beside the prior's variances. */
+    plr_real factor[PLR_CALIBRATIONS * PLR_CALIBRATIONS], told[PLR_CALIBRATIONS];
+} plr_calibration_estimate;
 
 /* Settings and camera in the filter's precision; of sigmas the squares. */
 typedef struct plr_parameters {
@@ -218,7 +233,7 @@ typedef struct plr_parameters {
     plr_real landmark_variance;
     plr_real track_drift; /* variance by which tracks wander in a second, px^2/s */
     plr_real min_inverse_range;
-    plr_real calibration_variance[PLR_CALIBRATIONS]; /* by plr_calibration_error; 0: exact */
+    plr_calibrated calibrated;
     plr_time_ns max_gap_ns;
     plr_real R_BI[9], imu_arm[3]; /* the IMU on the body; the camera above is seen from the arm */
     plr_real gravity;             /* m/s^2 */
@@ -240,6 +255,11 @@ typedef struct plr_noise {
         range_shift[PLR_MAX_LANDMARKS]; /* linearisation point minus estimate, inverse range, 1/m */
     uint8_t open;                       /* 1: W belongs to the covariance and is not in P yet */
 } plr_noise;
+
+/* What a correction says of the calibration's errors s: J s = eta, J of the estimated by all. */
+typedef struct plr_learnt {
+    plr_real J[PLR_CALIBRATIONS * PLR_CALIBRATIONS], eta[PLR_CALIBRATIONS];
+} plr_learnt;
 
 /* The observation of a landmark, linearised once in a frame and kept until the correction: three
  * rows r = H x + noise (src/sensor/measurement.h). */
@@ -263,6 +283,7 @@ typedef struct plr_workspace {
     plr_real Vt[PLR_WORK_ROWS * PLR_MAX_LD + PLR_KERNEL_MARGIN];
     plr_real dx[PLR_MAX_LD];
     plr_noise noise;                        /* of the motion that this frame applies */
+    plr_learnt learnt;                      /* what this correction says of the calibration */
     plr_kept_measurements kept;             /* those of `used`, by slot */
     plr_frame_evidence evidence;            /* of this frame, for the supervisor */
     plr_real gain[PLR_MAX_LANDMARKS];       /* by slot: det S of an accepted observation */
@@ -305,6 +326,7 @@ typedef struct plr_filter {
                                 since; packed lower triangle */
     plr_real reading[PLR_POSE_DIM]; /* the last one: (v, w) of a twist, (a, w) of an IMU */
     plr_motion motion;
+    plr_calibration_estimate calibration;
 
     unsigned count; /* active slots, dense from 0 */
     plr_slot slots[PLR_MAX_LANDMARKS];

@@ -269,6 +269,31 @@ typedef struct plr_calibration {
     plr_pose T_CB; /* body to left camera: a point s_B of the body is R s_B + p in the camera */
 } plr_calibration;
 
+/* What may be wrong in it: two shares, and the rest in the left camera's axes. */
+typedef enum plr_calibration_error {
+    PLR_BASELINE,
+    PLR_FOCAL_LENGTH,
+    PLR_CAMERA_TURN_X, /* T_CB <- Exp(0, turn) T_CB, rad */
+    PLR_CAMERA_TURN_Y,
+    PLR_CAMERA_TURN_Z,
+    PLR_CENTRE_X, /* px */
+    PLR_CENTRE_Y,
+    PLR_CAMERA_PLACE_X, /* T_CB <- Exp(place, 0) T_CB, m */
+    PLR_CAMERA_PLACE_Y,
+    PLR_CAMERA_PLACE_Z,
+    PLR_CAMERA_CLOCK, /* to be added to the time of a frame, s */
+    PLR_CALIBRATION_ERRORS
+} plr_calibration_error;
+
+/* The calibration as the filter has estimated it: plr_filter_calibration. */
+typedef struct plr_calibration_result {
+    plr_time_ns t_ns;
+    uint16_t estimated;     /* bits 1 << plr_calibration_error: the others are as init was told */
+    plr_calibration camera; /* with all corrections; the clock's goes to camera-offset */
+    double corrected[PLR_CALIBRATION_ERRORS]; /* by how much, since init or reset */
+    double sigma[PLR_CALIBRATION_ERRORS];     /* what may be left; 0: taken for exact */
+} plr_calibration_result;
+
 /* What happened to one stereo frame. */
 typedef struct plr_report {
     plr_time_ns t_ns;

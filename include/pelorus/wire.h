@@ -34,13 +34,14 @@ typedef enum plr_kind {
     PLR_KIND_STATE = 12,
     PLR_KIND_READING = 13,
     PLR_KIND_IMU = 14,
-    PLR_KIND_EVIDENCE = 15
+    PLR_KIND_EVIDENCE = 15,
+    PLR_KIND_CALIBRATION = 16
 } plr_kind;
 
 enum {
     PLR_WIRE_VERSION_MAJOR = 1,
-    PLR_WIRE_VERSION_MINOR = 5,
-    PLR_WIRE_KINDS = 15,     /* kinds are 1 to this */
+    PLR_WIRE_VERSION_MINOR = 6,
+    PLR_WIRE_KINDS = 16,     /* kinds are 1 to this */
     PLR_WIRE_OVERHEAD = 7,   /* kind, sequence, CRC */
     PLR_WIRE_NAME_SIZE = 64, /* with the closing zero */
     PLR_WIRE_MAX_SETTINGS = 64,
@@ -242,6 +243,7 @@ typedef struct plr_message {
         plr_reading reading;
         plr_imu_message imu;
         plr_supervision evidence;
+        plr_calibration_result calibration;
     } as;
 } plr_message;
 

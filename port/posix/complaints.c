@@ -17,6 +17,7 @@ static const char *const kind_names[COMPLAINT_KINDS] = {
     [PLR_KIND_TEXT] = "TEXT",     [PLR_KIND_END] = "END",
     [PLR_KIND_STATE] = "STATE",   [PLR_KIND_READING] = "READING",
     [PLR_KIND_IMU] = "IMU",       [PLR_KIND_EVIDENCE] = "EVIDENCE",
+    [PLR_KIND_CALIBRATION] = "CALIBRATION",
 };
 
 static const char *const skip_words[COMPLAINT_SKIPS] = {

@@ -48,6 +48,7 @@ static void print_row(const char *name, const char *value, const char *about) {
 
 /* The words joined by |, or the unit. */
 static void value_hint(const plr_setting *setting, char *text, size_t size) {
+    const char *between = setting->kind == PLR_SETTING_LIST ? "," : "|";
     text[0] = '\0';
     if (setting->choices == NULL) {
         const char *number = setting->kind == PLR_SETTING_COUNT ? "N" : "X";
@@ -57,7 +58,7 @@ static void value_hint(const plr_setting *setting, char *text, size_t size) {
     }
     for (unsigned i = 0; setting->choices[i] != NULL; i++) {
         const size_t at = strlen(text);
-        snprintf(text + at, size - at, "%s%s", i > 0 ? "|" : "", setting->choices[i]);
+        snprintf(text + at, size - at, "%s%s", i > 0 ? between : "", setting->choices[i]);
     }
 }
 

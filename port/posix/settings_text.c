@@ -17,6 +17,8 @@ bool text_to_number(const char *text, double *number) {
     return true;
 }
 
+static bool next_word(const char **text, char *word, size_t size);
+
 static bool choice_from_text(const char *const *choices, const char *text, double *value) {
     for (unsigned i = 0; choices[i] != NULL; i++)
         if (strcmp(choices[i], text) == 0) {
@@ -26,8 +28,26 @@ static bool choice_from_text(const char *const *choices, const char *text, doubl
     return false;
 }
 
+/* "off", or words between commas, as bits. */
+static bool list_from_text(const char *const *choices, const char *text, double *value) {
+    unsigned bits = 0;
+    char word[64];
+    double index;
+    if (*text == '\0' || text[strlen(text) - 1] == ',')
+        return false;
+    while (strcmp(text, "off") != 0 && *text != '\0') {
+        if (!next_word(&text, word, sizeof word) || !choice_from_text(choices, word, &index))
+            return false;
+        bits |= 1U << (unsigned)index;
+    }
+    *value = bits;
+    return true;
+}
+
 bool setting_value_from_text(const plr_setting *setting, const char *text, double *value) {
     double parsed;
+    if (setting->kind == PLR_SETTING_LIST)
+        return list_from_text(setting->choices, text, value);
     if (setting->choices != NULL)
         return choice_from_text(setting->choices, text, value);
     if (!text_to_number(text, &parsed))
@@ -53,8 +73,24 @@ static void number_to_text(double value, char *text, size_t size) {
     }
 }
 
+static void append(char *text, size_t size, const char *more) {
+    const size_t at = strlen(text);
+    snprintf(text + at, size - at, "%s", more);
+}
+
+static void list_to_text(const char *const *choices, unsigned bits, char *text, size_t size) {
+    snprintf(text, size, "%s", bits == 0 ? "off" : "");
+    for (unsigned i = 0; choices[i] != NULL; i++)
+        if ((bits >> i & 1) != 0) {
+            append(text, size, text[0] != '\0' ? "," : "");
+            append(text, size, choices[i]);
+        }
+}
+
 void setting_value_to_text(const plr_setting *setting, double value, char *text, size_t size) {
-    if (setting->choices != NULL)
+    if (setting->kind == PLR_SETTING_LIST)
+        list_to_text(setting->choices, (unsigned)value, text, size);
+    else if (setting->choices != NULL)
         snprintf(text, size, "%s", setting->choices[(unsigned)value]);
     else if (setting->kind == PLR_SETTING_COUNT)
         snprintf(text, size, "%.0f", value);
@@ -96,11 +132,6 @@ bool setting_values_from_text(const plr_setting *setting, const char *text, doub
     return true;
 }
 
-static void append(char *text, size_t size, const char *more) {
-    const size_t at = strlen(text);
-    snprintf(text + at, size - at, "%s", more);
-}
-
 void setting_in_force_to_text(const plr_setting *setting, const plr_config *config, char *text,
                               size_t size) {
     const double x = plr_config_get(config, setting);
@@ -132,6 +163,8 @@ void setting_allowed_text(const plr_setting *setting, char *text, size_t size) {
     char low[32], high[32];
     if (setting->choices != NULL) {
         choices_to_text(setting->choices, text, size);
+        if (setting->kind == PLR_SETTING_LIST)
+            append(text, size, ", several with commas, or off");
         return;
     }
     setting_value_to_text(setting, setting->minimum, low, sizeof low);

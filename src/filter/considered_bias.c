@@ -22,7 +22,7 @@ void plr_bias_consider(const plr_filter *f, bool hold, plr_considered_bias *befo
     before->seconds = f->motion.seconds;
     memcpy(before->bias, f->bias, sizeof before->bias);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         memcpy(before->S_b[k], f->S[k] + plr_row_of(f, PLR_BLOCK_BIAS), sizeof before->S_b[k]);
 }
 
@@ -31,7 +31,7 @@ void plr_bias_restore(plr_filter *f, const plr_considered_bias *before) {
     if (!before->considered)
         return;
     memcpy(f->bias, before->bias, sizeof before->bias);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         memcpy(f->S[k] + plr_row_of(f, PLR_BLOCK_BIAS), before->S_b[k], sizeof before->S_b[k]);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, lost);
     for (unsigned i = 0; i < PLR_BIAS_DIM * PLR_BIAS_DIM; i++)

@@ -10,6 +10,7 @@
 #include "process/velocity.h"
 #include "sensor/stereo.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -90,19 +91,25 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
     }
 }
 
+/* Columns of a batch's E, in whole tiles: those behind the sensitivity's are zero. */
+static unsigned whole_tiles(const plr_filter *f) {
+    return ((unsigned)OF_S + f->par.calibrated.count + TILE - 1) / TILE * TILE;
+}
+
 /* A column of the sensitivity (state/sensitivity.h) is corrected as dx is, with -H_s in the place of
  * the residual: by how much the error of the calibration changes what is predicted. */
 static void stack_sensitivity(const plr_filter *f, const plr_sensed *sensed, unsigned i,
                               const plr_rows *H, plr_batch *batch, unsigned first) {
-    plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS] = {{0}}, column[PLR_ROWS];
-    if (i < sensed->seen)
+    plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS], column[PLR_ROWS];
+    memset(H_s, 0, f->par.calibrated.count * sizeof *H_s);
+    if (i < sensed->seen && f->par.calibrated.count > 0)
         plr_stereo_by_calibration(f, f->work.slot_of[f->work.used[i]], H_s);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        const bool considers = plr_considers(f, k);
-        if (considers)
+    for (unsigned k = 0; OF_S + k < whole_tiles(f); k++) {
+        const bool has_column = k < f->par.calibrated.count;
+        if (has_column)
             plr_rows_apply(H, f->S[k], column);
         for (unsigned r = 0; r < PLR_ROWS; r++)
-            batch->E[WIDE * (first + r) + OF_S + k] = considers ? H_s[k][r] + column[r] : PLR_R(0);
+            batch->E[WIDE * (first + r) + OF_S + k] = has_column ? H_s[k][r] + column[r] : PLR_R(0);
     }
 }
 
@@ -157,9 +164,8 @@ static void add_noise_information(plr_filter *f, const plr_batch *batch) {
         plr_upper6_add(sum, batch->E + WIDE * r + OF_W, batch->E + WIDE * r + OF_W);
     memcpy(noise->Lambda, sum, sizeof sum);
     project_on_noise(batch, OF_DX, noise->eta);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
-        if (plr_considers(f, k))
-            project_on_noise(batch, OF_S + k, noise->eta_of_S[k]);
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+        project_on_noise(batch, OF_S + k, noise->eta_of_S[k]);
 }
 
 /* W -= V E, dx += V y and S += V y, each column of S with its own y: the rows of one product with E.
@@ -167,15 +173,12 @@ static void add_noise_information(plr_filter *f, const plr_batch *batch) {
 static void update_estimate(plr_filter *f, const plr_batch *batch) {
     plr_workspace *w = &f->work;
     plr_real *rows[WIDE];
-    unsigned used = OF_S; /* an exact camera's columns of S are zero, and stay so */
+    const unsigned used = whole_tiles(f);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         rows[OF_W + k] = w->noise.Wt + k * batch->ld;
     rows[OF_DX] = w->dx;
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
         rows[OF_S + k] = f->S[k];
-        if (plr_considers(f, k))
-            used = OF_S + k + 1;
-    }
     for (unsigned k = w->noise.open ? 0 : TILE; k < used; k += TILE)
         plr_subtract_four_rows(batch->ld, batch->rows, batch->E + k, WIDE, w->Vt, batch->ld,
                                rows + k);
@@ -190,11 +193,12 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
     if (!*factorised)
         return false;
     plr_solve_upper_transposed(batch->rows, batch->ld, batch->S, w->Vt, batch->ld);
-    plr_solve_upper_transposed(batch->rows, WIDE, batch->S, batch->E, WIDE);
+    plr_solve_upper_transposed(batch->rows, whole_tiles(f), batch->S, batch->E, WIDE);
     if (!plr_covariance_subtract(f, batch->rows))
         return false;
     if (w->noise.open)
         add_noise_information(f, batch);
+    plr_calibration_add(f, batch->rows, batch->E + OF_S, batch->E + OF_DX, WIDE);
     update_estimate(f, batch);
     return true;
 }
@@ -263,6 +267,7 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
         memset(f->work.dx, 0, n * sizeof *f->work.dx);
         memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
+    plr_calibration_begin(f);
     plr_evidence evidence = {0, plr_log_product_one(), 0};
     const unsigned all = sensed.count + (plr_velocity_informs_bias(f) ? BIAS_MEASUREMENTS : 0);
     unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
@@ -275,6 +280,7 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
     result.moved = f->work.noise.open;
     memcpy(result.Lambda, f->work.noise.Lambda, sizeof result.Lambda);
     plr_covariance_close_noise(f, result.nu);
+    plr_calibration_learn(f);
     if (result.moved)
         add_evidence_of_motion(&evidence, &f->work.noise, result.nu);
     result.innovation.d2 = evidence.d2;

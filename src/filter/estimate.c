@@ -10,6 +10,7 @@
 #include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/sensitivity.h"
@@ -151,6 +152,13 @@ plr_status plr_filter_bias(const plr_filter *f, double *b, double *P_b) {
     }
     to_double(b, f->bias, PLR_POSE_DIM);
     return PLR_OK;
+}
+
+plr_status plr_filter_calibration(const plr_filter *f, plr_calibration_result *result) {
+    const plr_status sound = result ? plr_guard_check(f) : PLR_E_ARGUMENT;
+    if (sound == PLR_OK)
+        plr_calibration_tell(f, result);
+    return sound;
 }
 
 double plr_filter_trace(const plr_filter *f) {

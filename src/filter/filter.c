@@ -16,6 +16,7 @@
 #include "process/process.h"
 #include "process/velocity.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -79,10 +80,7 @@ static void set_parameters(plr_parameters *par, const plr_calibration *calibrati
     par->landmark_variance = squared(c->landmark_sigma_m);
     par->track_drift = squared(c->track_drift_px);
     par->min_inverse_range = (plr_real)(1 / c->max_range_m);
-    par->calibration_variance[PLR_FOCAL_LENGTH] = squared(c->focal_sigma);
-    par->calibration_variance[PLR_BASELINE] = squared(c->baseline_sigma);
-    for (unsigned axis = 0; axis < 3; axis++)
-        par->calibration_variance[PLR_CAMERA_TURN_X + axis] = squared(c->camera_turn_sigma_rad);
+    plr_calibration_lay_out(par, c);
     par->gravity = (plr_real)c->gravity_mps2;
     par->accel_density = squared(c->accel_noise);
     par->gyro_density = squared(c->gyro_noise);
@@ -192,6 +190,7 @@ plr_status plr_filter_reset(plr_filter *f) {
     memset(&f->totals, 0, sizeof f->totals);
     plr_mat3_identity(f->R_WB);
     memset(&f->core_motion, 0, sizeof f->core_motion);
+    plr_calibration_reset(f);
     plr_motion_clear(f);
     plr_velocity_forget(f);
     plr_alignment_clear(f);

@@ -93,7 +93,7 @@ static uint64_t large_sum(const plr_filter *f) {
     add(&sum, f->slots, f->count * sizeof *f->slots);
     add_between(&sum, f, offsetof(plr_filter, supervisor), offsetof(plr_filter, either));
     add(&sum, plr_covariance_elements(f), plr_covariance_size(f, f->count) * sizeof(plr_real));
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         add(&sum, f->S[k], plr_covariance_dim(f) * sizeof *f->S[k]);
     return mixed(&sum);
 }

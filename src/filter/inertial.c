@@ -14,6 +14,7 @@
 #include "process/alignment.h"
 #include "process/process.h"
 #include "process/statistics.h"
+#include "state/calibration.h"
 #include "state/seconds.h"
 
 enum {
@@ -98,6 +99,7 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
     plr_statistics_learn(f, t_ns, reading, planned.interval, change2);
+    plr_calibration_note_rate(f, reading + 3);
     if (f->inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
     (void)plr_alignment_add(f, t_ns, reading);

@@ -16,7 +16,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 11 };
+enum { STATE_VERSION = 12 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -74,7 +74,7 @@ uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
            SIZE(time) + SIZE(pose) + SIZE(filter) + landmarks * SIZE(slot) +
-           (elements(f, landmarks) + PLR_CALIBRATIONS * rows(f, landmarks)) *
+           (elements(f, landmarks) + f->par.calibrated.count * rows(f, landmarks)) *
                (uint32_t)sizeof(plr_real);
 }
 
@@ -143,7 +143,7 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
         PASS(&c, &f->slots[slot], slot);
     plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f),
                       elements(f, f->count));
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)f->S[k], rows(f, f->count));
     if (c.status == PLR_OK && !flush(&out))
         c.status = PLR_E_IO;
@@ -186,7 +186,7 @@ static plr_status as_stored(const plr_codec *c) {
 }
 
 /* Checks covariance and sensitivity without storing them: finite numbers, variances not negative. */
-static plr_status check_covariance(plr_codec *c, unsigned dim) {
+static plr_status check_covariance(plr_codec *c, unsigned dim, unsigned columns) {
     for (unsigned i = 0; i < dim && c->status == PLR_OK; i++) {
         plr_real variance = 0;
         plr_codec_numbers(c, PLR_FIELD_REAL, NULL, i);
@@ -194,7 +194,7 @@ static plr_status check_covariance(plr_codec *c, unsigned dim) {
         if (c->status == PLR_OK && !(variance >= 0))
             return PLR_E_CORRUPT;
     }
-    plr_codec_numbers(c, PLR_FIELD_REAL, NULL, PLR_CALIBRATIONS * dim);
+    plr_codec_numbers(c, PLR_FIELD_REAL, NULL, columns * dim);
     return as_stored(c);
 }
 
@@ -254,9 +254,10 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     if (status != PLR_OK)
         return status;
     if (!f)
-        return check_covariance(c, plr_covariance_row(like, count.landmarks));
+        return check_covariance(c, plr_covariance_row(like, count.landmarks),
+                                like->par.calibrated.count);
     plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
     return as_stored(c);
 }

@@ -28,6 +28,7 @@
 #include "process/velocity.h"
 #include "sensor/sensor.h"
 #include "sensor/stereo.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -361,6 +362,15 @@ static void count(plr_filter *f, const plr_report *report) {
     t->evicted += report->evicted;
 }
 
+/* How the camera moves, should its clock be off. */
+static void note_twist(plr_filter *f) {
+    plr_real twist[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
+    if (!plr_calibration_needs_twist(f))
+        return;
+    plr_process_of(f)->now(f, twist, P_u);
+    plr_calibration_at_frame(f, twist, P_u);
+}
+
 static plr_status refuse_damaged(plr_filter *f, plr_report *report) {
     if (report->status == PLR_E_DAMAGED) {
         f->totals.damaged++; /* the sums stay wrong */
@@ -394,6 +404,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     f->frame_number++;
     f->totals.frames++;
     plr_evidence_begin(f);
+    note_twist(f);
     if (!plr_process_has_started(f)) {
         wait_for_start(f, frame, r);
     } else if (f->config.mode != PLR_MODE_DEAD_RECKONING) {

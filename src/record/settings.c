@@ -14,6 +14,8 @@ static const char *const prior_words[] = {"correlated", "independent", NULL};
 static const char *const process_words[] = {"twist", "imu", NULL};
 static const char *const imu_start_words[] = {"auto", "rest", "motion", "given", NULL};
 static const char *const scene_words[] = {"stands", "may-move", NULL};
+static const char *const calibrate_words[] = {"focal", "baseline", "turn", "centre",
+                                              "place", "clock",    NULL};
 static const char *const switch_words[] = {"off", "on", NULL};
 
 /* How a field of plr_config is stored. */
@@ -88,6 +90,10 @@ static const plr_row rows[] = {
     {{53, "camera-turn-sigma", "rad", "by how much the camera may be turned on the body; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.2, 0.003}, AT(camera_turn_sigma_rad), STORE_DOUBLE},
     {{54, "track-drift", "px/sqrt(s)", "how far tracks wander off their points in a second", PLR_SETTING_NUMBER, NULL, 0, 100, 0}, AT(track_drift_px), STORE_DOUBLE},
     {{55, "scene", "", "may most of what is seen move as one?", PLR_SETTING_CHOICE, scene_words, 0, 1, PLR_SCENE_STANDS}, AT(scene), STORE_U8},
+    {{56, "calibrate", "", "parts of the calibration that are estimated on the way", PLR_SETTING_LIST, calibrate_words, 0, 63, 0}, AT(calibrate), STORE_U8},
+    {{57, "centre-sigma", "px", "by how much the principal point may be wrong; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 100, 0}, AT(centre_sigma_px), STORE_DOUBLE},
+    {{58, "camera-place-sigma", "m", "by how much the camera's place on the body may be wrong; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 1, 0}, AT(camera_place_sigma_m), STORE_DOUBLE},
+    {{59, "camera-clock-sigma", "s", "by how much the time of frames may be wrong; 0 = exact", PLR_SETTING_NUMBER, NULL, 0, 0.1, 0}, AT(camera_clock_sigma_s), STORE_DOUBLE},
 };
 /* clang-format on */
 
@@ -227,6 +233,34 @@ static plr_status refuse(const plr_setting **culprit, const plr_setting *setting
     return PLR_E_CONFIG;
 }
 
+/* A part of the calibration that shall be estimated and counts as exact; or the list itself, where it
+ * is longer than the build allows. */
+static const plr_setting *refused_calibration(const plr_config *config) {
+    static const struct {
+        plr_calibrate bit;
+        const char *sigma;
+        unsigned numbers;
+    } parts[] = {{PLR_CALIBRATE_FOCAL, "focal-sigma", 1},
+                 {PLR_CALIBRATE_BASELINE, "baseline-sigma", 1},
+                 {PLR_CALIBRATE_TURN, "camera-turn-sigma", 3},
+                 {PLR_CALIBRATE_CENTRE, "centre-sigma", 2},
+                 {PLR_CALIBRATE_PLACE, "camera-place-sigma", 3},
+                 {PLR_CALIBRATE_CLOCK, "camera-clock-sigma", 1}};
+    unsigned estimated = 0, all = 0;
+    for (unsigned i = 0; i < sizeof parts / sizeof *parts; i++) {
+        const plr_setting *setting = plr_setting_by_name(parts[i].sigma);
+        const bool listed = (config->calibrate & parts[i].bit) != 0;
+        const bool exact = plr_config_get(config, setting) <= 0;
+        if (listed && exact)
+            return setting;
+        estimated += listed ? parts[i].numbers : 0;
+        all += exact ? 0 : parts[i].numbers;
+    }
+    return estimated > PLR_MAX_CALIBRATION || all > PLR_CALIBRATIONS
+               ? plr_setting_by_name("calibrate")
+               : NULL;
+}
+
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit) {
     if (culprit)
         *culprit = NULL;
@@ -247,6 +281,9 @@ plr_status plr_config_check(const plr_config *config, const plr_setting **culpri
     }
     if (config->process == PLR_PROCESS_IMU && (config->model != PLR_MODEL_BODY || !config->bias))
         return refuse(culprit, plr_setting_by_name("process"));
+    const plr_setting *calibrated = refused_calibration(config);
+    if (calibrated)
+        return refuse(culprit, calibrated);
     if (config->min_depth_m >= config->max_range_m)
         return refuse(culprit, plr_setting_by_name("min-depth"));
     if (config->max_depth_m > 0 && config->min_depth_m >= config->max_depth_m)

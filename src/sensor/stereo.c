@@ -4,9 +4,9 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
+#include "state/camera.h"
 #include "state/covariance.h"
 #include "state/polar.h"
-#include "state/sensitivity.h"
 
 /* ---------------------------------------------------------------- the pair of cameras */
 
@@ -75,30 +75,59 @@ static plr_real residual_norm2(const plr_observation *seen, const plr_real z[3])
 }
 
 plr_real plr_stereo_max_variance(const plr_filter *f) {
-    return f->par.camera.fx * f->par.camera.fx;
+    return f->calibration.eye.fx * f->calibration.eye.fx;
 }
 
 plr_real plr_stereo_max_bearing_variance(const plr_filter *f) {
-    return PLR_R(0.4) * PLR_SQRT(f->par.pixel_variance) / f->par.camera.fx;
+    return PLR_R(0.4) * PLR_SQRT(f->par.pixel_variance) / f->calibration.eye.fx;
+}
+
+/* A point q of the axes that par.camera gives the camera, by the camera as it is estimated. */
+typedef struct plr_eye_view {
+    plr_real q[3];  /* in that camera, m */
+    plr_real Dz[9]; /* derivative of the pixels by the point before */
+    plr_real
+        Dt[3]; /* of them by going along t, the shift between both: Dz q = (0, fx baseline, 0) / z -
+                       Dt. From Dz and q it would be a difference of rounded numbers. */
+} plr_eye_view;
+
+/* False if it would be too near. */
+static bool look_by_eye(const plr_filter *f, const plr_real q[3], plr_eye_view *view) {
+    const plr_camera *eye = &f->calibration.eye;
+    plr_real Dz[9];
+    if (f->par.calibrated.estimated == 0) { /* it is where par.camera has it */
+        memcpy(view->q, q, sizeof view->q);
+        plr_stereo_jacobian(view->Dz, eye, q);
+        memset(view->Dt, 0, sizeof view->Dt);
+        return q[2] >= f->par.min_depth;
+    }
+    plr_camera_from_body(view->q, eye, q);
+    if (!(view->q[2] >= f->par.min_depth))
+        return false;
+    plr_stereo_jacobian(Dz, eye, view->q);
+    plr_mat3_mul(view->Dz, Dz, eye->R_CB);
+    plr_mat3_vec(view->Dt, Dz, eye->t_CB);
+    return true;
 }
 
 bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observation *seen,
                         plr_measurement *m) {
-    const plr_camera *camera = &f->par.camera;
-    /* along a point's own ray only its right image moves: Dz q = (0, fx baseline, 0) / z */
-    const plr_real along[3] = {0, camera->fx * camera->baseline, 0};
-    plr_real z[3], Dz[9];
+    const plr_camera *eye = &f->calibration.eye;
+    plr_real z[3], along[3];
+    plr_eye_view by_eye;
     plr_view view;
     memset(m, 0, sizeof *m);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m->R[i] = plr_stereo_variance(f, i);
-    if (!plr_model_of(f)->look(f, slot, &view)) {
+    if (!plr_model_of(f)->look(f, slot, &view) || !look_by_eye(f, view.q, &by_eye)) {
         (void)plr_rows_add(&m->H, plr_covariance_row(f, slot), PLR_LANDMARK_DIM);
         return false;
     }
-    plr_stereo_project(z, camera, view.q);
-    plr_stereo_jacobian(Dz, camera, view.q);
-    plr_model_of(f)->derive(f, slot, &view, Dz, along, z, &m->H);
+    plr_stereo_project(z, eye, by_eye.q);
+    for (unsigned i = 0; i < PLR_ROWS; i++) /* only the right image moves: Dz q q_z */
+        along[i] = (i == 1 ? eye->fx * eye->baseline * (view.q[2] / by_eye.q[2]) : PLR_R(0)) -
+                   by_eye.Dt[i] * view.q[2];
+    plr_model_of(f)->derive(f, slot, &view, by_eye.Dz, along, z, &m->H);
     plr_stereo_rows(m->r, seen);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         m->r[i] -= z[i];
@@ -108,30 +137,42 @@ bool plr_stereo_measure(const plr_filter *f, unsigned slot, const plr_observatio
     return true;
 }
 
-/* How the point that a pair of pixels shows would change: with a longer baseline along its ray,
- * with a longer focal length in its depth alone. If the camera is turned by a small phi, pixels
- * that show q mean q - phi x q in the axes that T_CB gives the camera. */
-static void point_by_calibration(const plr_real q[3], plr_real q_s[PLR_CALIBRATIONS][3]) {
-    const plr_real changes[PLR_CALIBRATIONS][3] = {
-        [PLR_BASELINE] = {q[0], q[1], q[2]},    [PLR_FOCAL_LENGTH] = {0, 0, q[2]},
-        [PLR_CAMERA_TURN_X] = {0, q[2], -q[1]}, [PLR_CAMERA_TURN_Y] = {-q[2], 0, q[0]},
-        [PLR_CAMERA_TURN_Z] = {q[1], -q[0], 0},
+/* How the point q that a pair of pixels shows would change with each error of the calibration: with a
+ * longer baseline along its ray, with a longer focal length in its depth alone. If the camera is turned
+ * by a small phi, pixels that show q mean q - phi x q in the axes before; if its picture is later, the
+ * camera has gone on with its twist. q_eye is the same point in the camera as it is estimated. */
+static void point_by_calibration(const plr_filter *f, const plr_real q[3], const plr_real q_eye[3],
+                                 plr_real q_s[PLR_CALIBRATIONS][3]) {
+    const plr_camera *eye = &f->calibration.eye;
+    const plr_real *p = q_eye, *u = f->calibration.twist;
+    const plr_real in_eye[PLR_CALIBRATION_ERRORS][3] = {
+        [PLR_BASELINE] = {p[0], p[1], p[2]},      [PLR_FOCAL_LENGTH] = {0, 0, p[2]},
+        [PLR_CAMERA_TURN_X] = {0, p[2], -p[1]},   [PLR_CAMERA_TURN_Y] = {-p[2], 0, p[0]},
+        [PLR_CAMERA_TURN_Z] = {p[1], -p[0], 0},   [PLR_CENTRE_X] = {-p[2] / eye->fx, 0, 0},
+        [PLR_CENTRE_Y] = {0, -p[2] / eye->fy, 0}, [PLR_CAMERA_PLACE_X] = {-1, 0, 0},
+        [PLR_CAMERA_PLACE_Y] = {0, -1, 0},        [PLR_CAMERA_PLACE_Z] = {0, 0, -1},
     };
-    memcpy(q_s, changes, sizeof changes);
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
+        const unsigned kind = f->par.calibrated.kind[k];
+        plr_mat3_tvec(q_s[k], eye->R_CB, in_eye[kind]);
+        if (kind != PLR_CAMERA_CLOCK)
+            continue;
+        plr_cross3(q_s[k], u + 3, q);
+        for (unsigned i = 0; i < 3; i++)
+            q_s[k][i] += u[i];
+    }
 }
 
 void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
                                plr_real H_s[PLR_CALIBRATIONS][PLR_ROWS]) {
     plr_view view;
-    plr_real Dz[9], q_s[PLR_CALIBRATIONS][3];
-    if (!plr_model_of(f)->look(f, slot, &view))
+    plr_eye_view by_eye;
+    plr_real q_s[PLR_CALIBRATIONS][3];
+    if (!plr_model_of(f)->look(f, slot, &view) || !look_by_eye(f, view.q, &by_eye))
         return;
-    plr_stereo_jacobian(Dz, &f->par.camera, view.q);
-    point_by_calibration(view.q, q_s);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        if (!plr_considers(f, k))
-            continue;
-        plr_mat3_vec(H_s[k], Dz, q_s[k]);
+    point_by_calibration(f, view.q, by_eye.q, q_s);
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
+        plr_mat3_vec(H_s[k], by_eye.Dz, q_s[k]);
         for (unsigned r = 0; r < PLR_ROWS; r++)
             H_s[k][r] = -H_s[k][r]; /* so that pixels which stay show the point that changes */
     }
@@ -140,12 +181,13 @@ void plr_stereo_by_calibration(const plr_filter *f, unsigned slot,
 /* ---------------------------------------------------------------- during the motion's search */
 
 /* J = Dz R^T Ji(q0), without what vanishes, as in model_body.c: Dz q in the rows uL and v. */
-static void differentiate(const plr_camera *camera, const plr_polar *chart, const plr_real R[9],
-                          const plr_real p[3], plr_stereo_prediction *sight) {
+static void differentiate(const plr_camera *eye, const plr_eye_view *by_eye, const plr_polar *chart,
+                          const plr_real R[9], const plr_real p[3], plr_stereo_prediction *sight) {
     plr_real DzRt[9];
     plr_mat3_mul_nt(DzRt, sight->Dz, R);
     for (int row = 0; row < 3; row++) {
-        const plr_real along = row == 1 ? camera->fx * camera->baseline / sight->q[2] : PLR_R(0);
+        const plr_real along =
+            (row == 1 ? eye->fx * eye->baseline / by_eye->q[2] : PLR_R(0)) - by_eye->Dt[row];
         for (int column = 0; column < 2; column++)
             sight->J[3 * row + column] = chart->r * plr_dot3(DzRt + 3 * row, chart->N[column]);
         sight->J[3 * row + 2] = -chart->r * (along + plr_dot3(DzRt + 3 * row, p));
@@ -155,16 +197,18 @@ static void differentiate(const plr_camera *camera, const plr_polar *chart, cons
 bool plr_stereo_predict_after(const plr_filter *f, const plr_slot *slot,
                               const plr_observation *seen, const plr_real E[9], const plr_real R[9],
                               const plr_real p[3], plr_stereo_prediction *sight) {
+    const plr_camera *eye = &f->calibration.eye;
     plr_polar chart;
     plr_real z[3];
+    plr_eye_view by_eye;
     memcpy(sight->q, slot->x, sizeof sight->q);
     plr_se3_move_back(sight->q, E, p);
-    if (!(sight->q[2] >= f->par.min_depth))
+    if (!(sight->q[2] >= f->par.min_depth) || !look_by_eye(f, sight->q, &by_eye))
         return false;
     plr_polar_at(&chart, slot->x);
-    plr_stereo_project(z, &f->par.camera, sight->q);
-    plr_stereo_jacobian(sight->Dz, &f->par.camera, sight->q);
-    differentiate(&f->par.camera, &chart, R, p, sight);
+    plr_stereo_project(z, eye, by_eye.q);
+    memcpy(sight->Dz, by_eye.Dz, sizeof sight->Dz);
+    differentiate(eye, &by_eye, &chart, R, p, sight);
     plr_stereo_rows(sight->r, seen);
     for (unsigned i = 0; i < PLR_ROWS; i++)
         sight->r[i] -= z[i];
@@ -182,7 +226,7 @@ plr_real plr_stereo_residual2(const plr_observation *seen, const plr_real r[3]) 
 }
 
 plr_real plr_stereo_inverse_range_variance(const plr_filter *f) {
-    const plr_real by_range = f->par.camera.fx * f->par.camera.baseline;
+    const plr_real by_range = f->calibration.eye.fx * f->calibration.eye.baseline;
     return PLR_R(2) * f->par.pixel_variance / (by_range * by_range);
 }
 
@@ -197,7 +241,7 @@ static plr_real least_disparity(const plr_filter *f) {
  * of a single observation would be lost by rounding in float32. */
 static plr_real farthest_disparity(const plr_filter *f) {
     const plr_real by_range =
-        f->par.camera.fx * f->par.camera.baseline * f->par.min_inverse_range * PLR_R(1.5);
+        f->calibration.eye.fx * f->calibration.eye.baseline * f->par.min_inverse_range * PLR_R(1.5);
     return by_range > PLR_R(0.05) ? by_range : PLR_R(0.05);
 }
 
@@ -212,7 +256,7 @@ bool plr_stereo_makes_landmark(const plr_filter *f, const plr_observation *seen)
     const bool any_depth = f->config.model == PLR_MODEL_BODY && f->par.max_depth <= 0;
     if (any_depth && disparity < farthest_disparity(f))
         return true;
-    const plr_real depth = f->par.camera.fx * f->par.camera.baseline / disparity;
+    const plr_real depth = f->calibration.eye.fx * f->calibration.eye.baseline / disparity;
     return disparity > 0 && depth >= f->par.min_depth &&
            (f->par.max_depth <= 0 || depth <= f->par.max_depth) &&
            depth * f->par.min_inverse_range < 1;
@@ -238,15 +282,18 @@ static void initial_factor(const plr_filter *f, const plr_real Dq[9], plr_real S
 
 plr_real plr_stereo_initialise(const plr_filter *f, const plr_observation *seen,
                                plr_new_landmark *landmark) {
-    plr_real z[3], q[3], Dq[9], S_q[9], q_s[PLR_CALIBRATIONS][3];
+    const plr_camera *eye = &f->calibration.eye;
+    plr_real z[3], q[3], q_eye[3], Dq[9], S_eye[9], S_q[9], q_s[PLR_CALIBRATIONS][3];
     plr_stereo_rows(z, seen);
     const plr_real missing = limit_disparity(f, z);
-    plr_stereo_back_project(q, Dq, &f->par.camera, z);
-    initial_factor(f, Dq, S_q);
+    plr_stereo_back_project(q_eye, Dq, eye, z);
+    plr_camera_to_body(q, eye, q_eye);
+    initial_factor(f, Dq, S_eye);
+    plr_mat3_mul_tn(S_q, eye->R_CB, S_eye);
     plr_model_of(f)->initialise(f, q, S_q, landmark);
-    point_by_calibration(q, q_s);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    point_by_calibration(f, q, q_eye, q_s);
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_mat3_vec(landmark->by_calibration[k], landmark->J_q, q_s[k]);
     /* inverse range is disparity over focal length and baseline, along the ray */
-    return missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (f->par.camera.fx * f->par.camera.baseline);
+    return missing * q[2] / PLR_SQRT(plr_dot3(q, q)) / (eye->fx * eye->baseline);
 }

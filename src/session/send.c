@@ -6,6 +6,8 @@
 #include "session/layers.h"
 #include "session/line.h"
 
+#define TOLD_EVERY_NS UINT64_C(1000000000) /* the calibration */
+
 static void put(plr_session *s, uint32_t bit, const plr_message *message) {
     if (s->port.write == NULL || (s->options.output & bit) == 0)
         return;
@@ -98,8 +100,19 @@ static void put_report(plr_session *s, plr_kind subject, const plr_report *repor
     put(s, PLR_OUTPUT_REPORT, &s->out);
 }
 
+void plr_send_calibration(plr_session *s) {
+    plr_calibration_result *told = &s->out.as.calibration;
+    s->out.kind = PLR_KIND_CALIBRATION;
+    if (plr_filter_calibration(&s->filter, told) == PLR_OK && told->estimated != 0) {
+        s->calibration_ns = told->t_ns;
+        put(s, PLR_OUTPUT_REPORT, &s->out);
+    }
+}
+
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns) {
     put_report(s, PLR_KIND_STEREO, report, compute_ns, PLR_NOTICE_NONE);
+    if (report->t_ns - s->calibration_ns >= TOLD_EVERY_NS)
+        plr_send_calibration(s);
     if ((s->options.output & PLR_OUTPUT_EVIDENCE) == 0 || report->status != PLR_OK)
         return;
     s->out.kind = PLR_KIND_EVIDENCE;

@@ -23,6 +23,9 @@ void plr_send_resets_become(plr_session *s, uint32_t number);
 /* Sends the report of a frame. */
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns);
 
+/* Sends the calibration, if it is estimated. */
+void plr_send_calibration(plr_session *s);
+
 /* Answers a message other than a STEREO: a REPORT with the last frame's health, and the notice. */
 void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                      plr_notice notice);

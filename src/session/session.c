@@ -295,6 +295,7 @@ void plr_session_finish(plr_session *s) {
         plr_steps_apply_held(s, UINT64_MAX);
         if ((s->options.output & PLR_OUTPUT_STATE) != 0)
             plr_saving_save(s, plr_filter_time(&s->filter));
+        plr_send_calibration(s);
         for (unsigned slot = 0; slot < plr_filter_landmark_count(&s->filter); slot++)
             if (plr_filter_landmark(&s->filter, slot, &landmark) == PLR_OK)
                 plr_send_landmark(s, PLR_LANDMARK_FINAL, &landmark);

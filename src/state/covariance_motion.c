@@ -6,6 +6,7 @@
 #include "math/dense.h"
 #include "math/small.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/elements.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
@@ -257,6 +258,7 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta, 1);
     plr_combine_rows(n, PLR_POSE_DIM, noise->eta, 1, Xt, ld, f->work.dx);
     plr_sensitivity_close_noise(f, Xt, ld);
+    plr_calibration_marginalise(f);
     for (unsigned i = 0; i < PLR_POSE_DIM * ld; i++)
         minus[i] = -Xt[i];
     plr_packed_subtract(n, PLR_POSE_DIM, minus, Xt, ld, f->P);

@@ -10,6 +10,7 @@
 #include "state/model.h"
 #include "state/polar.h"
 #include "state/rigid_fit.h"
+#include "state/sensitivity.h"
 
 #include "math/dense.h"
 #include "math/se3.h"
@@ -122,6 +123,7 @@ static plr_real move_to_linearisation_point(plr_filter *f, unsigned slot) {
     const plr_real step = (PLR_R(1) - ratio) / ratio;
     for (int i = 0; i < 3; i++)
         s->x[i] = PLR_FMA(step, s->x[i], s->x[i]);
+    plr_sensitivity_move_range(f, slot, ratio);
     return s->beyond - (ratio - PLR_R(1)) / range;
 }
 
@@ -297,6 +299,7 @@ static unsigned body_retract(plr_filter *f, const plr_real *dx) {
         chart_jacobian(rigid, &there, common->R, common->p, &from);
         turn_rest(w, rigid, &there, &from);
         cut += plr_polar_retract(&to, M, &there, w, f->par.min_inverse_range, s->x, &s->beyond);
+        plr_sensitivity_move_range(f, slot, there.r / to.r);
         plr_real *own = F + 9 * slot;
         for (int k = 0; k < 3; k++) {
             own[k] = PLR_FMA(M[1], rigid[3 + k], M[0] * rigid[k]);

@@ -12,13 +12,13 @@
 /* ---------------------------------------------------------------- as P changes */
 
 void plr_sensitivity_clear(plr_filter *f, unsigned row, unsigned rows) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         memset(f->S[k] + row, 0, rows * sizeof *f->S[k]);
 }
 
 void plr_sensitivity_append(plr_filter *f, unsigned row, const plr_new_landmark *landmark) {
     const unsigned pose = plr_row_of(f, PLR_BLOCK_POSE);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_real *S = f->S[k];
         for (unsigned i = 0; i < PLR_LANDMARK_DIM; i++) {
             S[row + i] = landmark->by_calibration[k][i];
@@ -30,12 +30,12 @@ void plr_sensitivity_append(plr_filter *f, unsigned row, const plr_new_landmark 
 }
 
 void plr_sensitivity_remove(plr_filter *f, unsigned to, unsigned from) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         memcpy(f->S[k] + to, f->S[k] + from, PLR_LANDMARK_DIM * sizeof *f->S[k]);
 }
 
 void plr_sensitivity_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE]) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_real *S_xi = f->S[k] + plr_row_of(f, PLR_BLOCK_POSE), turned[PLR_POSE_DIM];
         plr_mat6_vec(turned, A, S_xi);
         memcpy(S_xi, turned, sizeof turned);
@@ -43,13 +43,25 @@ void plr_sensitivity_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE])
 }
 
 void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        if (!plr_considers(f, k))
-            continue;
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_real *S = f->S[k] + plr_covariance_row(f, 0), turned[PLR_LANDMARK_DIM];
         for (unsigned slot = 0; slot < f->count; slot++, S += PLR_LANDMARK_DIM) {
             plr_mat3_vec(turned, F + 9 * slot, S);
             memcpy(S, turned, sizeof turned);
+        }
+    }
+}
+
+void plr_sensitivity_move_range(plr_filter *f, unsigned slot, plr_real ratio) {
+    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+        plr_real *w = f->S[k] + plr_covariance_row(f, slot);
+        w[2] *= ratio;
+        if (f->par.calibrated.kind[k] < PLR_CAMERA_PLACE_X)
+            continue;
+        w[2] *= ratio; /* a way moves a point by its inverse range */
+        if (f->par.calibrated.kind[k] != PLR_CAMERA_CLOCK) {
+            w[0] *= ratio;
+            w[1] *= ratio;
         }
     }
 }
@@ -76,7 +88,7 @@ static void combine(plr_filter *f, unsigned parameter, const plr_real a[PLR_POSE
 }
 
 void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_real v[PLR_VELOCITY_DIM];
         by_drivers(f, k, PLR_VELOCITY_DIM, V, v);
         set_velocity(f, k, v);
@@ -85,10 +97,8 @@ void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V) {
 
 void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const plr_real *V,
                           const plr_real *Wt, size_t ld) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_real nu[PLR_POSE_DIM], v[PLR_VELOCITY_DIM];
-        if (!plr_considers(f, k))
-            continue;
         by_drivers(f, k, PLR_POSE_DIM, K, nu);
         by_drivers(f, k, V ? PLR_VELOCITY_DIM : 0, V, v);
         combine(f, k, nu, Wt, ld);
@@ -99,16 +109,14 @@ void plr_sensitivity_move(plr_filter *f, const plr_real K[PLR_MOTION_BY], const 
 
 void plr_sensitivity_close_noise(plr_filter *f, const plr_real *Xt, size_t ld) {
     plr_noise *noise = &f->work.noise;
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        if (!plr_considers(f, k))
-            continue;
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_solve_upper_transposed(PLR_POSE_DIM, 1, noise->Lambda, noise->eta_of_S[k], 1);
         combine(f, k, noise->eta_of_S[k], Xt, ld);
     }
 }
 
 void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         plr_real *S_xi = f->S[k] + plr_row_of(f, PLR_BLOCK_POSE), n[PLR_POSE_DIM];
         by_drivers(f, k, PLR_POSE_DIM, B, n);
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
@@ -118,62 +126,71 @@ void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]) {
 
 /* ---------------------------------------------------------------- what is told */
 
-/* C (n x n) += variance s s^T */
-static void add_outer(unsigned n, plr_real variance, const plr_real *s, plr_real *C) {
-    for (unsigned i = 0; i < n; i++)
-        for (unsigned j = 0; j < n; j++)
-            C[n * i + j] = PLR_FMA(variance * s[i], s[j], C[n * i + j]);
+/* A linear function of the state, of at most six numbers, by each error. */
+typedef plr_real plr_by_error[PLR_CALIBRATIONS][PLR_POSE_DIM];
+
+/* C (n x n) += y Sigma y^T, Sigma = G D G^T the covariance of the errors. */
+static void add_told(const plr_filter *f, unsigned n, plr_by_error y, plr_real *C) {
+    const plr_calibrated *errors = &f->par.calibrated;
+    for (unsigned k = 0; k < errors->count; k++) {
+        const plr_real *G = f->calibration.factor + PLR_CALIBRATIONS * k;
+        const plr_real variance = errors->variance[k] * f->calibration.told[k];
+        plr_real s[PLR_POSE_DIM];
+        memcpy(s, y[k], sizeof s);
+        for (unsigned j = 0; j < k && j < errors->estimated; j++)
+            for (unsigned i = 0; i < n; i++)
+                s[i] = PLR_FMA(G[j], y[j][i], s[i]);
+        for (unsigned i = 0; i < n; i++)
+            for (unsigned j = 0; j < n; j++)
+                C[n * i + j] = PLR_FMA(variance * s[i], s[j], C[n * i + j]);
+    }
 }
 
 void plr_sensitivity_add_to(const plr_filter *f, unsigned row, unsigned rows, plr_real *C) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
-        if (plr_considers(f, k))
-            add_outer(rows, f->par.calibration_variance[k], f->S[k] + row, C);
+    plr_by_error y;
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+        memcpy(y[k], f->S[k] + row, rows * sizeof **y);
+    add_told(f, rows, y, C);
 }
 
 void plr_sensitivity_add_to_pose(const plr_filter *f, plr_real P_xi[PLR_POSE_SQUARE]) {
     const plr_motion *m = &f->motion;
-    plr_real A[PLR_POSE_SQUARE], R[9];
+    plr_real A[PLR_POSE_SQUARE], R[9], n[PLR_POSE_DIM];
+    plr_by_error y;
     plr_se3_rotation(R, m->E);
     plr_se3_adjoint_inverse(A, R, m->p);
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        plr_real turned[PLR_POSE_DIM], n[PLR_POSE_DIM];
-        if (!plr_considers(f, k))
-            continue;
-        plr_mat6_vec(turned, A, f->S[k] + plr_row_of(f, PLR_BLOCK_POSE));
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
+        plr_mat6_vec(y[k], A, f->S[k] + plr_row_of(f, PLR_BLOCK_POSE));
         by_drivers(f, k, PLR_POSE_DIM, m->B, n);
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
-            n[i] += turned[i];
-        add_outer(PLR_POSE_DIM, f->par.calibration_variance[k], n, P_xi);
+            y[k][i] += n[i];
     }
+    add_told(f, PLR_POSE_DIM, y, P_xi);
 }
 
 void plr_sensitivity_add_to_velocity(const plr_filter *f, plr_real P_u[PLR_POSE_SQUARE]) {
     const unsigned bias = plr_row_of(f, PLR_BLOCK_BIAS);
+    plr_by_error y;
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        plr_real u[PLR_POSE_DIM];
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         for (unsigned i = 0; i < PLR_POSE_DIM; i++)
-            u[i] = -f->S[k][bias + i];            /* reading less bias */
+            y[k][i] = -f->S[k][bias + i];         /* reading less bias */
         if (plr_has_block(f, PLR_BLOCK_VELOCITY)) /* after the motion that is pending */
-            by_drivers(f, k, PLR_VELOCITY_DIM, f->core_motion.V, u);
-        add_outer(PLR_POSE_DIM, f->par.calibration_variance[k], u, P_u);
+            by_drivers(f, k, PLR_VELOCITY_DIM, f->core_motion.V, y[k]);
     }
+    add_told(f, PLR_POSE_DIM, y, P_u);
 }
 
 void plr_sensitivity_add_to_rows(const plr_filter *f, const plr_rows *J, plr_real C[9]) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++) {
-        plr_real s[PLR_ROWS];
-        if (!plr_considers(f, k))
-            continue;
-        plr_rows_apply(J, f->S[k], s);
-        add_outer(PLR_ROWS, f->par.calibration_variance[k], s, C);
-    }
+    plr_by_error y;
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+        plr_rows_apply(J, f->S[k], y[k]);
+    add_told(f, PLR_ROWS, y, C);
 }
 
 bool plr_sensitivity_is_finite(const plr_filter *f) {
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
         for (unsigned i = 0; i < plr_core_dim(f); i++)
             if (!plr_is_finite(f->S[k][i]))
                 return false;

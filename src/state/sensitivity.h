@@ -4,12 +4,12 @@
  *
  * Focal length, baseline and T_CB of a real camera are off by a part of a percent or degree. No
  * frame shows it, and being the same in all frames it does not average out as noise does. The
- * state's error is therefore x + S s: x as P says, and s ~ N(0, diag(par.calibration_variance)) the
+ * state's error is therefore x + S s: x as P says, and s ~ N(0, diag(par.calibrated.variance)) the
  * errors of the calibration. S, a column for each, is carried along beside P through motions and
- * corrections, whose gains take no notice of it, and what is told of covariances contains S
- * diag(...) S^T: a consider covariance analysis (Tapley, Schutz and Born, Statistical Orbit
- * Determination, chapter 6; docs/MATH.md 20). A parameter whose sigma is zero costs next to
- * nothing.
+ * corrections, whose gains take no notice of it, and what is told of covariances contains S Sigma
+ * S^T, Sigma the covariance of s: that of the prior, a consider covariance analysis (Tapley, Schutz
+ * and Born, Statistical Orbit Determination, chapter 6; docs/MATH.md 20), but for what calibration.h
+ * estimates.
  */
 #ifndef PLR_STATE_SENSITIVITY_H
 #define PLR_STATE_SENSITIVITY_H
@@ -19,10 +19,6 @@
 
 #include "pelorus/state.h"
 #include "state/model.h"
-
-static inline bool plr_considers(const plr_filter *f, unsigned parameter) {
-    return f->par.calibration_variance[parameter] > 0;
-}
 
 /* ---------------------------------------------------------------- as P changes */
 
@@ -41,6 +37,10 @@ void plr_sensitivity_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE])
 /* The rows of each landmark <- F (3x3, one after the other) times them. */
 void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F);
 
+/* A landmark is linearised elsewhere on its ray, where its inverse range is `ratio` times what it was:
+ * so is its derivative by those errors that are estimated. */
+void plr_sensitivity_move_range(plr_filter *f, unsigned slot, plr_real ratio);
+
 /* The rows of the velocity <- V S_d, of the drivers d. */
 void plr_sensitivity_carry_velocity(plr_filter *f, const plr_real *V);
 
@@ -57,7 +57,7 @@ void plr_sensitivity_move_pose(plr_filter *f, const plr_real B[PLR_MOTION_BY]);
 
 /* ---------------------------------------------------------------- what is told */
 
-/* C (rows x rows) += S diag(calibration_variance) S^T of `rows` rows from `row` on; at most six. */
+/* C (rows x rows) += S Sigma S^T of `rows` rows from `row` on; at most six. */
 void plr_sensitivity_add_to(const plr_filter *f, unsigned row, unsigned rows, plr_real *C);
 
 /* The same of the pose after the motion that has not been applied yet. */
@@ -66,7 +66,7 @@ void plr_sensitivity_add_to_pose(const plr_filter *f, plr_real P_xi[PLR_POSE_SQU
 /* The same of the body's velocity (v, w). */
 void plr_sensitivity_add_to_velocity(const plr_filter *f, plr_real P_u[PLR_POSE_SQUARE]);
 
-/* The same of a linear function of the state: C = J P J^T (3x3) gains J S diag(...) S^T J^T. */
+/* The same of a linear function of the state: C = J P J^T (3x3) gains J S Sigma S^T J^T. */
 void plr_sensitivity_add_to_rows(const plr_filter *f, const plr_rows *J, plr_real C[9]);
 
 /* False after a correction that went wrong. */

@@ -94,7 +94,7 @@ static uint32_t crc_of_bias(void) {
 static uint32_t crc_of_sensitivity(void) {
     const unsigned n = plr_covariance_dim(&filter);
     uint32_t sum = 0;
-    for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
+    for (unsigned k = 0; k < filter.par.calibrated.count; k++)
         sum = plr_crc32(sum, (const uint8_t *)filter.S[k], n * sizeof *filter.S[k]);
     return sum;
 }

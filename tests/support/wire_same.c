@@ -120,6 +120,14 @@ static void same_report(const plr_report_message *e, const plr_report_message *a
     SAME(report.nis);
 }
 
+static void same_calibration(const plr_calibration_result *e, const plr_calibration_result *a) {
+    SAME(t_ns);
+    SAME(estimated);
+    SAME(camera);
+    SAME(corrected);
+    SAME(sigma);
+}
+
 static void same_evidence(const plr_supervision *e, const plr_supervision *a) {
     SAME(t_ns);
     SAME(nu);
@@ -208,6 +216,9 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         break;
     case PLR_KIND_REPORT:
         same_report(&e->as.report, &a->as.report);
+        break;
+    case PLR_KIND_CALIBRATION:
+        same_calibration(&e->as.calibration, &a->as.calibration);
         break;
     case PLR_KIND_EVIDENCE:
         same_evidence(&e->as.evidence, &a->as.evidence);

@@ -277,6 +277,18 @@ static void make_evidence(plr_supervision *m, unsigned variant) {
     }
 }
 
+static void make_calibration(plr_calibration_result *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    m->estimated = whole16(variant, 1 << PLR_FOCAL_LENGTH);
+    fill(&m->camera.fx_px, 5, variant, 0);
+    fill(m->camera.T_CB.R, 9, variant, 5);
+    fill(m->camera.T_CB.p, 3, variant, 14);
+    for (unsigned i = 0; i < PLR_CALIBRATION_ERRORS; i++) {
+        m->corrected[i] = (double)real_of_f32(variant, i);
+        m->sigma[i] = (double)real_of_f32(variant, 20 + i);
+    }
+}
+
 plr_message wire_sample(plr_kind kind, unsigned variant) {
     plr_message m;
     memset(&m, 0, sizeof m);
@@ -310,6 +322,9 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         break;
     case PLR_KIND_REPORT:
         make_report(&m.as.report, variant);
+        break;
+    case PLR_KIND_CALIBRATION:
+        make_calibration(&m.as.calibration, variant);
         break;
     case PLR_KIND_EVIDENCE:
         make_evidence(&m.as.evidence, variant);

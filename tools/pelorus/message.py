@@ -31,6 +31,7 @@ class Kind(IntEnum):
     READING = schema.kind("READING")
     IMU = schema.kind("IMU")
     EVIDENCE = schema.kind("EVIDENCE")
+    CALIBRATION = schema.kind("CALIBRATION")
 
 
 class BodyAxes(IntEnum):

@@ -46,6 +46,7 @@ class Setting:
     name: str
     unit: str = ""
     words: tuple[str, ...] = ()
+    is_list: bool = False  # some of the words, as bits
     of_axis: int = 0  # id of the setting that sets this one too, the sigma of a single axis
 
 
@@ -55,7 +56,8 @@ def _message(row: dict[str, Any]) -> MessageTable:
 
 
 def _setting(row: dict[str, Any]) -> Setting:
-    return Setting(row["name"], row["unit"], tuple(row.get("words", ())), row.get("of_axis", 0))
+    words = tuple(row.get("words", ()))
+    return Setting(row["name"], row["unit"], words, row.get("list", False), row.get("of_axis", 0))
 
 
 def _words(of: str) -> dict[int, str]:

@@ -21,12 +21,22 @@ __all__ = [
 IDS = {setting.name: id for id, setting in SETTINGS.items()}
 
 # What the covariances contain of errors of the camera; 0: it is exact.
-CALIBRATION_SIGMAS = ("focal-sigma", "baseline-sigma", "camera-turn-sigma")
+CALIBRATION_SIGMAS = (
+    "focal-sigma",
+    "baseline-sigma",
+    "camera-turn-sigma",
+    "centre-sigma",
+    "camera-place-sigma",
+    "camera-clock-sigma",
+)
 
 
 def describe(id: int, value: float) -> tuple[str, str]:
     """Name and value with its unit; an id of a later version shows as its number."""
     setting = SETTINGS.get(id, Setting(f"setting {id}"))
+    if setting.is_list:
+        listed = [word for bit, word in enumerate(setting.words) if int(value) >> bit & 1]
+        return setting.name, ",".join(listed) or "off"
     words = dict(enumerate(setting.words))
     if value in words:  # 1.0 finds the key 1
         return setting.name, words[int(value)]

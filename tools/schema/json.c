@@ -133,6 +133,8 @@ static void print_setting(const plr_setting *s) {
     print_pair("unit", s->unit);
     if (s->choices)
         print_words(s);
+    if (s->kind == PLR_SETTING_LIST)
+        printf(", \"list\": true");
     if (s->kind != PLR_SETTING_COUNT) /* that one's are the build's */
         print_range(s);
     const plr_setting *whole = plr_setting_of_axis(s);

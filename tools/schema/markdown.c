@@ -117,7 +117,8 @@ static void print_kinds(void) {
 
 static void print_values(const plr_setting *s) {
     for (unsigned i = 0; s->choices && s->choices[i]; i++)
-        printf("%s%u %s", i > 0 ? ", " : "", i, s->choices[i]);
+        printf("%s%u %s", i > 0 ? ", " : "", s->kind == PLR_SETTING_LIST ? 1U << i : i,
+               s->choices[i]);
     if (s->kind == PLR_SETTING_COUNT)
         printf("1 to the build's capacity");
     else if (!s->choices)
@@ -127,6 +128,8 @@ static void print_values(const plr_setting *s) {
 static void print_standard(const plr_setting *s) {
     if (s->kind == PLR_SETTING_COUNT)
         printf("100, or the capacity");
+    else if (s->kind == PLR_SETTING_LIST)
+        printf("%s", s->standard > 0 ? "all" : "off");
     else if (s->choices)
         printf("%s", s->choices[(unsigned)s->standard]);
     else

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+/*
+ * The camera's calibration, estimated on the way (docs/MATH.md 20).
+ *
+ * The state's error is x + S s: x as P says, s the errors of the calibration, S the sensitivity. x is
+ * filtered as if s were zero, and what a correction leaves of its residuals tells s: the two-stage
+ * filter of Friedland (Treatment of Bias in Recursive Filtering, 1969), which for errors that are
+ * constant gives what one filter of x and s together gives. So the calibration has no rows in P. What
+ * is not in the setting `calibrate` is considered: it has a column in S, and nothing is learnt of it.
+ */
+#ifndef PLR_STATE_CALIBRATION_H
+#define PLR_STATE_CALIBRATION_H
+
+#include <stdbool.h>
+
+#include "pelorus/state.h"
+
+/* Lays out the columns of S by the settings. */
+void plr_calibration_lay_out(plr_parameters *par, const plr_config *config);
+
+/* The calibration as it was given to init. */
+void plr_calibration_reset(plr_filter *f);
+
+/* A reading of the gyro, body axes, bias included. By its own noise a body at rest would seem to turn, and
+ * the camera's clock to show: the rate is smoothed as the readings' statistics allow. */
+void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]);
+
+/* True if a part is estimated, or the camera's clock considered. */
+bool plr_calibration_needs_twist(const plr_filter *f);
+
+/* Notes how the camera moves at the time of this frame, and where that puts it by its clock. twist_B is
+ * the body's with its covariance as the process has it. What is not beyond three of its sigmas counts as
+ * rest: noise moves the prediction, and it would seem as if the pictures told something of that motion.
+ * A frame at rest teaches nothing. */
+void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM],
+                              const plr_real P_u[PLR_POSE_SQUARE]);
+
+/* Nothing learnt yet from the correction that begins. */
+void plr_calibration_begin(plr_filter *f);
+
+/* A batch's rows of E = U^-T (H_s + H S) and e = -U^-T (r - H dx), ld between the rows of both: J += E^T
+ * E, eta -= E^T e. */
+void plr_calibration_add(plr_filter *f, unsigned rows, const plr_real *E, const plr_real *e,
+                         unsigned ld);
+
+/* Takes off what the same rows say of the motion's noise, once eta_of_S and eta are multiplied by
+ * U^-T, Lambda = U^T U. */
+void plr_calibration_marginalise(plr_filter *f);
+
+/* Corrects the calibration by what was learnt, and the state with it: dx += S ds. */
+void plr_calibration_learn(plr_filter *f);
+
+/* The calibration with its sigmas. */
+void plr_calibration_tell(const plr_filter *f, plr_calibration_result *told);
+
+/* How far the most unlikely of the estimated errors is from its prior, in its sigmas. */
+plr_real plr_calibration_beyond(const plr_filter *f);
+
+#endif
