@@ -157,14 +157,19 @@ typedef enum plr_reason {
      * count in units of what is usual, so health stays GOOD; but the sigmas are too small: velocity-sigma
      * and gyro-sigma for odometry whose errors last longer than a reading, gyro-noise and accel-noise for an
      * IMU; or the calibration is off. `pelorus check` measures them. */
-    PLR_REASON_NOISE_MISFIT = 1 << 27
+    PLR_REASON_NOISE_MISFIT = 1 << 27,
+    /* A part of the calibration that is estimated (setting calibrate) is more than four sigmas of its
+     * prior from what init was told. If the drive is right about it, take what plr_filter_calibration
+     * tells as the calibration; if the sigma was too small, enlarge it. A wrong IMU (axes, scale, clock)
+     * can look like it. */
+    PLR_REASON_CALIBRATION_OFF = 1 << 28
 } plr_reason;
 
 /* Reasons that leave health GOOD: the estimate is as good as it should be, and the settings could be
  * better. */
 enum {
-    PLR_REASONS_HARMLESS =
-        PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW | PLR_REASON_NOISE_MISFIT
+    PLR_REASONS_HARMLESS = PLR_REASON_GATE_INERT | PLR_REASON_NO_ROOM | PLR_REASON_NIS_LOW |
+                           PLR_REASON_NOISE_MISFIT | PLR_REASON_CALIBRATION_OFF
 };
 
 /* What is wrong with an IMU: plr_filter_imu_fault. Before its start the filter waits for better

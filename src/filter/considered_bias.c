@@ -15,10 +15,11 @@ static bool may_be_considered(const plr_filter *f) {
            !plr_velocity_informs_bias(f);
 }
 
-void plr_bias_consider(const plr_filter *f, bool hold, plr_considered_bias *before) {
+void plr_bias_consider(plr_filter *f, bool hold, plr_considered_bias *before) {
     before->considered = hold && may_be_considered(f);
     if (!before->considered)
         return;
+    f->calibration.moves = 0; /* nor is anything learnt of it */
     before->seconds = f->motion.seconds;
     memcpy(before->bias, f->bias, sizeof before->bias);
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, before->P_bb);

@@ -18,8 +18,9 @@ typedef struct plr_considered_bias {
     bool considered;
 } plr_considered_bias;
 
-/* Notes the biases before a frame's motion is applied, if it shall not change them. */
-void plr_bias_consider(const plr_filter *f, bool hold, plr_considered_bias *before);
+/* Notes the biases before a frame's motion is applied, if it shall not change them, nor the
+ * calibration. */
+void plr_bias_consider(plr_filter *f, bool hold, plr_considered_bias *before);
 
 /* After the correction: puts them back as they were, and lets them walk. */
 void plr_bias_restore(plr_filter *f, const plr_considered_bias *before);

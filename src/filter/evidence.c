@@ -10,6 +10,7 @@
 #include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
@@ -104,6 +105,7 @@ static void add_biases(plr_filter *f, plr_bias_evidence *e) {
 void plr_evidence_complete(plr_filter *f) {
     plr_frame_evidence *e = &f->work.evidence;
     add_biases(f, &e->bias);
+    e->events.miscalibrated = plr_calibration_is_off(f);
     e->has_gate = f->par.gate_d2 > 0 || f->par.gate_residual2 > 0;
     e->readings = plr_filter_readings_at(f, f->t_ns);
 }

@@ -9,6 +9,7 @@
 #include "math/small.h"
 #include "process/process.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/sensitivity.h"
@@ -105,5 +106,6 @@ void plr_filter_recover(plr_filter *f) {
     f->diverged = 0;
     f->totals.recoveries++;
     plr_filter_begin_anew(f, P, false);
+    plr_calibration_doubt(f);
     plr_filter_begin_prior_bias(f); /* what is known of them may be what has broken down */
 }

@@ -87,14 +87,27 @@ static void place_eye(plr_filter *f) {
         c->eye.t_CB[i] = c->t[i] + turned[i];
 }
 
+static void forget_information(plr_calibration_estimate *c) {
+    memset(c->information, 0, sizeof c->information);
+    memset(c->factor, 0, sizeof c->factor);
+    for (unsigned k = 0; k < K; k++)
+        c->information[(K + 1) * k] = c->factor[(K + 1) * k] = c->told[k] = 1;
+}
+
 void plr_calibration_reset(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     memset(c, 0, sizeof *c);
     c->eye = f->par.camera;
     plr_mat3_identity(c->R);
-    for (unsigned k = 0; k < K; k++)
-        c->information[(K + 1) * k] = c->factor[(K + 1) * k] = c->told[k] = 1;
+    forget_information(c);
     place_eye(f);
+}
+
+void plr_calibration_doubt(plr_filter *f) {
+    if (plr_calibration_is_off(f))
+        plr_calibration_reset(f);
+    else
+        forget_information(&f->calibration);
 }
 
 /* The gain of a Kalman filter in its steady state: the rate walks by so much in a step that it scatters in
@@ -301,13 +314,13 @@ void plr_calibration_learn(plr_filter *f) {
     correct_camera(f, ds);
 }
 
-plr_real plr_calibration_beyond(const plr_filter *f) {
-    plr_real most = 0;
+bool plr_calibration_is_off(const plr_filter *f) {
     for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
-        const plr_real off = plr_abs(f->calibration.moved[k]) / (plr_real)sigma_of(f, k);
-        most = off > most ? off : most;
+        const plr_real moved = f->calibration.moved[k];
+        if (moved * moved > PLR_R(16) * f->par.calibrated.variance[k])
+            return true;
     }
-    return most;
+    return false;
 }
 
 /* ---------------------------------------------------------------- what is told */

@@ -35,6 +35,10 @@ bool plr_calibration_needs_twist(const plr_filter *f);
 void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM],
                               const plr_real P_u[PLR_POSE_SQUARE]);
 
+/* After a divergence: what is known of it may be what has broken down. The estimate stays if its prior
+ * allows it, as well known as it was at first. */
+void plr_calibration_doubt(plr_filter *f);
+
 /* Nothing learnt yet from the correction that begins. */
 void plr_calibration_begin(plr_filter *f);
 
@@ -53,7 +57,7 @@ void plr_calibration_learn(plr_filter *f);
 /* The calibration with its sigmas. */
 void plr_calibration_tell(const plr_filter *f, plr_calibration_result *told);
 
-/* How far the most unlikely of the estimated errors is from its prior, in its sigmas. */
-plr_real plr_calibration_beyond(const plr_filter *f);
+/* True if an estimated error is beyond four sigmas of its prior. */
+bool plr_calibration_is_off(const plr_filter *f);
 
 #endif

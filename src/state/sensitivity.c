@@ -53,16 +53,15 @@ void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F) {
 }
 
 void plr_sensitivity_move_range(plr_filter *f, unsigned slot, plr_real ratio) {
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
+        const unsigned kind = f->par.calibrated.kind[k];
+        const bool is_way = kind >= PLR_CAMERA_PLACE_X; /* it moves a point by its inverse range */
         plr_real *w = f->S[k] + plr_covariance_row(f, slot);
-        w[2] *= ratio;
-        if (f->par.calibrated.kind[k] < PLR_CAMERA_PLACE_X)
+        if (k >= f->par.calibrated.estimated && !is_way)
             continue;
-        w[2] *= ratio; /* a way moves a point by its inverse range */
-        if (f->par.calibrated.kind[k] != PLR_CAMERA_CLOCK) {
-            w[0] *= ratio;
-            w[1] *= ratio;
-        }
+        w[2] *= is_way ? ratio * ratio : ratio;
+        for (unsigned i = 0; i < 2 && is_way && kind != PLR_CAMERA_CLOCK; i++)
+            w[i] *= ratio;
     }
 }
 

@@ -38,7 +38,8 @@ void plr_sensitivity_turn_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE])
 void plr_sensitivity_turn_landmarks(plr_filter *f, const plr_real *F);
 
 /* A landmark is linearised elsewhere on its ray, where its inverse range is `ratio` times what it was:
- * so is its derivative by those errors that are estimated. */
+ * so is its derivative by those errors that are estimated; by a shift of the camera the square of it. Of
+ * what has always been considered it stays as it is, to the bit. */
 void plr_sensitivity_move_range(plr_filter *f, unsigned slot, plr_real ratio);
 
 /* The rows of the velocity <- V S_d, of the drivers d. */

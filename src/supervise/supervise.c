@@ -117,6 +117,8 @@ static uint32_t reasons_of_events(const plr_frame_events *events, const plr_repo
         reasons |= PLR_REASON_NOT_POSITIVE | PLR_REASON_RECOVERED;
     if (events->relocated)
         reasons |= PLR_REASON_RELOCATED;
+    if (events->miscalibrated)
+        reasons |= PLR_REASON_CALIBRATION_OFF;
     return reasons;
 }
 

@@ -8,7 +8,7 @@
 #include "pelorus/filter.h"
 #include "pelorus/wire.h"
 
-enum { LAST_STATUS = PLR_E_SIZE, REASONS = 28, FREE = 17 };
+enum { LAST_STATUS = PLR_E_SIZE, REASONS = 29, FREE = 17 };
 
 /* Texts are there, say something, and each says something else. */
 static void demand_distinct(const char *const *texts, unsigned count) {
@@ -35,7 +35,7 @@ static void test_every_reason_has_a_phrase_of_its_own(void) {
     TEST_ASSERT_EQUAL_STRING(texts[REASONS], texts[FREE]);
     texts[FREE] = "the free one";
     demand_distinct(texts, REASONS + 1);
-    TEST_ASSERT_EQUAL_INT(1 << (REASONS - 1), PLR_REASON_NOISE_MISFIT);
+    TEST_ASSERT_EQUAL_INT(1 << (REASONS - 1), PLR_REASON_CALIBRATION_OFF);
     TEST_ASSERT_EQUAL_STRING(texts[REASONS],
                              plr_reason_text(PLR_REASON_BUDGET | PLR_REASON_NIS_HIGH));
 }
@@ -66,15 +66,16 @@ static void test_version_is_the_number_of_the_header_as_text(void) {
 /* FNV-1a of what bits depend on, little-endian. */
 static uint32_t fingerprint(uint32_t real_bits, uint32_t landmarks, uint32_t observations,
                             uint32_t block) {
-    const uint32_t parts[7] = {PLR_VERSION_NUMBER,
+    const uint32_t parts[8] = {PLR_VERSION_NUMBER,
                                PLR_ARITHMETIC,
                                real_bits,
                                landmarks,
                                observations,
                                block,
+                               PLR_CALIBRATIONS,
                                2 * PLR_SUPERVISE + PLR_KNOWN_MAP};
     uint32_t hash = 2166136261U;
-    for (unsigned i = 0; i < 28; i++)
+    for (unsigned i = 0; i < 32; i++)
         hash = (hash ^ (parts[i / 4] >> (8 * (i % 4)) & 0xFF)) * 16777619U;
     return hash;
 }
