@@ -10,6 +10,8 @@ set(PELORUS_DESKTOP_OBSERVATIONS 1024 CACHE STRING
   "Most observations in one frame of pelorus-replay, 1 to 4096")
 set(PLR_BLOCK_OBSERVATIONS 8 CACHE STRING
   "Observations processed at once, 1 to 16; results depend on it in their last bits")
+set(PLR_MAX_CALIBRATION 5 CACHE STRING
+  "Most numbers of the calibration that can be estimated, 0 to 11; on the desk 11")
 option(PLR_SUPERVISE "With src/supervise; OFF: the estimator alone, for who has a supervisor of his own" ON)
 option(PLR_KNOWN_MAP "With src/known_map; OFF: the map source is never asked" ON)
 option(PLR_PORTABLE

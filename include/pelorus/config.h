@@ -62,11 +62,12 @@ extern "C" {
 #define PLR_SUPERVISE 1
 #endif
 
-/* Most parameters of the camera's calibration that can be estimated (setting calibrate): 0 to 11,
- * default 11. Up to 5 cost no memory beside the errors of the calibration that are considered in any
- * case; beyond, each four take so many rows of numbers as the state has (docs/SIZES.md). */
+/* Most numbers of the camera's calibration that can be estimated (setting calibrate): 0 to 11, default
+ * 5, for focal length, baseline and turn. Up to 5 take no more memory than to consider these does, which
+ * every build can; up to 9, and up to 11, four numbers more for each row of the state. No bit of what is
+ * computed without them depends on it. */
 #ifndef PLR_MAX_CALIBRATION
-#define PLR_MAX_CALIBRATION 11
+#define PLR_MAX_CALIBRATION 5
 #endif
 
 /* 1 (default) or 0. 0: without src/known_map, which is then not compiled: the map source is never asked. */

@@ -95,6 +95,9 @@ function(cortexm_library result cpu capacity bits)
     target_compile_definitions(${name} PUBLIC PLR_REAL=${bits} PLR_MAX_LANDMARKS=${capacity}
       PLR_MAX_OBSERVATIONS=${observations} PLR_BLOCK_OBSERVATIONS=8 PLR_PORTABLE=0
       PLR_TILE_COLUMNS=6)
+    if(DEFINED PLR_MAX_CALIBRATION)
+      target_compile_definitions(${name} PUBLIC PLR_MAX_CALIBRATION=${PLR_MAX_CALIBRATION})
+    endif()
     foreach(option PLR_SUPERVISE PLR_KNOWN_MAP)
       if(DEFINED ${option})
         target_compile_definitions(${name} PUBLIC ${option}=$<BOOL:${${option}}>)
