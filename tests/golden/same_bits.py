@@ -33,6 +33,7 @@ TWISTS = {
 IMU = {
     "start given": ["--slots", "50"],
     "start in motion": ["--slots", "50", "--imu-start", "motion"],
+    "calibrated": ["--slots", "50", "--calibrate", "focal,baseline,turn"],
 }
 SIMULATED = ("simulate", "--seed", "11", "--duration", "20")
 BY_IMU = ("--imu-rate", "400", "--wheel-rate", "20")

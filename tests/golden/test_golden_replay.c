@@ -28,16 +28,21 @@ typedef struct scenario {
     double max_depth_m;
     bool slips;          /* the wheels slip: from 3 to 6 s twists are half of what they were */
     plr_imu_start start; /* of the recording of an IMU; AUTO: that of twists */
+    unsigned calibrate;  /* the setting */
 } scenario;
 
 static const scenario scenarios[] = {
-    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_AUTO},
-    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20, false, PLR_IMU_START_AUTO},
-    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0, false, PLR_IMU_START_AUTO},
-    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0, false, PLR_IMU_START_AUTO},
-    {"slip", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, true, PLR_IMU_START_AUTO},
-    {"imu-rest", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_REST},
-    {"imu-motion", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_MOTION},
+    {"body", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_AUTO, 0},
+    {"world", PLR_MODEL_WORLD, PLR_MODE_SLAM, false, 20, 20, false, PLR_IMU_START_AUTO, 0},
+    {"localization", PLR_MODEL_BODY, PLR_MODE_LOCALIZATION, true, 25, 0, false, PLR_IMU_START_AUTO,
+     0},
+    {"mapping", PLR_MODEL_BODY, PLR_MODE_MAPPING, false, 25, 0, false, PLR_IMU_START_AUTO, 0},
+    {"slip", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, true, PLR_IMU_START_AUTO, 0},
+    {"imu-rest", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_REST, 0},
+    {"imu-motion", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_MOTION, 0},
+    {"calibrated", PLR_MODEL_BODY, PLR_MODE_SLAM, true, 25, 0, false, PLR_IMU_START_REST,
+     PLR_CALIBRATE_FOCAL | PLR_CALIBRATE_TURN | PLR_CALIBRATE_CENTRE | PLR_CALIBRATE_PLACE |
+         PLR_CALIBRATE_CLOCK},
 };
 
 static bool is_by_imu(const scenario *s) {
@@ -96,6 +101,9 @@ static uint32_t crc_of_sensitivity(void) {
     uint32_t sum = 0;
     for (unsigned k = 0; k < filter.par.calibrated.count; k++)
         sum = plr_crc32(sum, (const uint8_t *)filter.S[k], n * sizeof *filter.S[k]);
+    if (filter.par.calibrated.estimated > 0)
+        sum =
+            plr_crc32(sum, (const uint8_t *)&filter.calibration.eye, sizeof filter.calibration.eye);
     return sum;
 }
 
@@ -192,6 +200,12 @@ static void begin(const scenario *s, const plr_header *header) {
     config.max_depth_m = s->max_depth_m;
     config.twist_timing = header->twist_timing;
     config.pixel_sigma_px = header->pixel_sigma_px;
+    config.calibrate = (uint8_t)s->calibrate;
+    if (s->calibrate != 0) { /* the baseline is considered */
+        config.centre_sigma_px = 1;
+        config.camera_place_sigma_m = 0.01;
+        config.camera_clock_sigma_s = 0.003;
+    }
     if (is_by_imu(s))
         suggest_for_imu(&config, s, header);
     else
@@ -328,7 +342,8 @@ static const char *renewal_folder(void) {
 static void check(const scenario *s) {
     char path[1024], line[LINE];
     const char *folder = renewal_folder();
-    if (PLR_BLOCK_OBSERVATIONS != 8 || PLR_MAX_LANDMARKS < 25)
+    if (PLR_BLOCK_OBSERVATIONS != 8 || PLR_MAX_LANDMARKS < 25 ||
+        (s->calibrate != 0 && PLR_MAX_CALIBRATION < 11))
         TEST_IGNORE_MESSAGE("the bits of this build's blocks or capacity are others");
     snprintf(path, sizeof path, "%s/%s.f%d.txt",
              folder ? folder : PELORUS_SOURCE_DIR "/tests/golden", s->name, PLR_REAL);
@@ -386,4 +401,11 @@ static void test_an_imu_that_starts_at_rest_computes_the_committed_bits(void) {
 static void test_an_imu_that_starts_in_motion_computes_the_committed_bits(void) {
     check(&scenarios[6]);
     TEST_ASSERT_TRUE(filter.inertial.anchored);
+}
+
+/* The same start, and all but the baseline is estimated on the way. */
+static void test_an_estimated_calibration_computes_the_committed_bits(void) {
+    check(&scenarios[7]);
+    TEST_ASSERT_EQUAL_UINT(10, filter.par.calibrated.estimated);
+    TEST_ASSERT_TRUE(filter.calibration.told[0] < PLR_R(0.9));
 }
