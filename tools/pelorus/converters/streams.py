@@ -43,7 +43,9 @@ BLIND_VELOCITY_MPS = (
 )
 MOVES_SIGMA = 10.0  # of a pixel: 7 of the difference of two of them
 PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
-BLIND_GYRO_RADPS = 0.5  # about one: the pictures find the rotation
+# What no robot turns faster than while its tracks hold, about an axis that nothing measures: the pictures
+# find the rotation. It is wrong by one constant from frame to frame, in all readings between them.
+BLIND_TURN_RADPS = 3.0
 
 
 class TwistIn(StrEnum):
@@ -195,7 +197,8 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
     remarks = [Text(words[:TEXT_BYTES_MAX]) for words in streams.told]
     motion = streams.motion
     if isinstance(motion, Twists):
-        header = replace(header, noise=_with_blind_axes(header.noise, motion.measured))
+        in_frame = max(_interval_s(t_ns) / _interval_s(motion.t_ns), 1.0)
+        header = replace(header, noise=_with_blind_axes(header.noise, motion.measured, in_frame))
         moved = (motion.t_ns, motion.v_B_mps, motion.w_B_radps)
         inertial, first_ns = NO_READINGS, int(motion.t_ns[0])
     else:
@@ -249,11 +252,20 @@ def _require_gravity(readings: Readings) -> None:
         )
 
 
-def _with_blind_axes(noise: Noise, measured: frozenset[str]) -> Noise:
-    """Sigmas for what nobody measured, unless the calibration tells some."""
+def _interval_s(t_ns: Times) -> float:
+    return float(np.median(np.diff(t_ns))) * 1e-9 if len(t_ns) > 1 else 1.0
+
+
+def _with_blind_axes(noise: Noise, measured: frozenset[str], in_frame: float) -> Noise:
+    """Sigmas for what nobody measured, unless the calibration tells some.
+
+    Of `in_frame` readings from frame to frame, whose noises average, each has the root of that many times
+    the sigma of the turn.
+    """
+    turn_radps = BLIND_TURN_RADPS * float(np.sqrt(in_frame))
     given = {
         **{f"velocity_sigma_{a}_mps": BLIND_VELOCITY_MPS for a in "xyz" if f"v{a}" not in measured},
-        **{f"gyro_sigma_{a}_radps": BLIND_GYRO_RADPS for a in "xyz" if f"w{a}" not in measured},
+        **{f"gyro_sigma_{a}_radps": turn_radps for a in "xyz" if f"w{a}" not in measured},
     }
     told = vars(noise)
     return replace(noise, **{name: s for name, s in given.items() if told[name] <= 0})
