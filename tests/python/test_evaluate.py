@@ -188,6 +188,27 @@ def test_kitti_poses_are_brought_to_the_body_of_the_recording(tmp_path: Path, pe
     assert "101 poses, but" in outcome.err
 
 
+@pytest.mark.parametrize("waits", [0, 7])
+def test_a_filter_that_was_told_no_pose_is_compared_from_its_start_on(waits: int) -> None:
+    """Until its IMU shows the vertical it stands at identity; the truth's heading is another."""
+    tilt = Rotation.from_rotvec([0.3, -1.9, 0.1]).as_matrix()
+    body = moved(winding(), Poses(tilt, np.zeros(3)))  # the world's vertical is known, by the tilt
+    R, p = body.R.copy(), body.p - body.p[waits]
+    R[:waits], p[:waits] = np.eye(3), 0.0
+    P = np.tile(np.eye(6) * 1e-6, (COUNT, 1, 1))
+    P[:waits] = np.eye(6) * 1e-8
+    P[waits:, 5, 4] = P[waits:, 4, 5] = P[waits:, 0, 3] = P[waits:, 3, 0] = 1e-7
+    standing = body.p.copy()
+    standing[:waits] = body.p[waits]
+    by = Poses(Rotation.from_rotvec([0, 0, 2.2]).as_matrix(), np.array([40.0, -3, 8]))
+    truth = Trajectory(TIMES, moved(Poses(body.R, standing), by))
+    found = assess(Trajectory(TIMES, Poses(R, p)), truth, P, upright=True)
+    assert found is not None
+    assert found.rot_deg < 1e-5
+    assert found.err0_m < 1e-9
+    assert len(found.t_ns) == COUNT - waits
+
+
 # --- the road -------------------------------------------------------------------------------------
 
 

@@ -12,6 +12,8 @@ map_*         of e = m^ - A m over the landmarks of equal id; NEES e^T P^-1 e / 
 With an IMU gravity shows the vertical, so A turns about it alone, and is taken at the frame at
 which the world was laid for good: where the filter's position is known as it was set, at the start,
 or some seconds after a start in motion (docs/MATH.md, the anchor). Frames before it do not count.
+A filter that has not started yet tells the pose that it was given, if only that of nobody: then
+the heading is compared at the first frame after it.
 What the filter knows besides is judged too, each state by its NEES (inertial_evaluation.py).
 
 A figure that cannot be had is None: without truth or covariance, and the poses' own where they
@@ -120,11 +122,16 @@ def assess(
         return None
     unknown = np.full((len(estimate.t_ns), 6, 6), np.nan)
     P = (unknown if covariance is None else covariance)[mine]
-    if upright:
-        laid = slice(world_laid(P), None)
-        mine, theirs, P = mine[laid], theirs[laid], P[laid]
     T, T_true = estimate.poses.at(mine), truth.poses.at(theirs)
-    A = about_vertical(T.at(0), T_true.at(0)) if upright else _onto(T.at(0), T_true.at(0))
+    if upright:
+        laid = world_laid(P)
+        begun = slice(laid + int(laid + 1 < len(P) and is_as_set(P[laid])), None)
+        T_laid, T_true_laid = T.at(laid), T_true.at(laid)
+        mine, P, T, T_true = mine[begun], P[begun], T.at(begun), T_true.at(begun)
+        A = about_vertical(T.at(0), T_true.at(0))
+        A = Poses(A.R, T_laid.p - A.R @ T_true_laid.p)
+    else:
+        A = _onto(T.at(0), T_true.at(0))
     aligned = se3.compose(A, T_true)
     error = se3.log(se3.compose(se3.inverse(T), aligned))
     sigma = np.sqrt(np.clip(np.diagonal(P, axis1=1, axis2=2), 0, None))
@@ -157,6 +164,13 @@ def world_laid(P: Floats) -> int:
     alike = (rho == rho[:, :1, :1] * np.eye(3)).all(axis=(1, 2))
     as_set = np.nonzero(alike & (cross == 0).all(axis=(1, 2)))[0]
     return int(as_set[-1]) if len(as_set) and as_set[-1] < len(P) - 1 else 0
+
+
+def is_as_set(P: Floats) -> bool:
+    """Whether a pose is known as it was set, with one sigma of m and rad: before the filter starts,
+    or where nothing has moved yet.
+    """
+    return np.array_equal(P, P[0, 0] * np.eye(len(P)))
 
 
 def match(
