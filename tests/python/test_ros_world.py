@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from bags import NS, Recorder
@@ -229,18 +230,22 @@ def test_a_lost_picture_leaves_its_partner_out_however_wide_the_pairing(
     assert remarks == ["3 pictures have no partner and are left out"]
 
 
-@pytest.mark.parametrize(("bits", "big"), [(10, False), (12, True), (16, False), (8, False)])
+@pytest.mark.parametrize("packing", ["<u2", ">u2", "png"])
+@pytest.mark.parametrize("bits", [8, 10, 12, 16])
 def test_pictures_of_16_bits_are_scaled_by_the_bits_that_all_of_them_use(
-    bits: int, big: bool, tmp_path: Path
+    bits: int, packing: str, tmp_path: Path
 ) -> None:
     top = (1 << bits) - 1
     recorder = Recorder()
     for k in range(4):
         grey = np.linspace(0, top * (k + 1) / 4, 64 * 80).reshape(64, 80)
-        packed = grey.astype(">u2" if big else "<u2")
         for topic in ("/left", "/right"):
-            recorder.image(topic, NS + k * 50_000_000, packed, "mono16")
-            recorder.found[-1][3].is_bigendian = int(big)
+            if packing == "png":
+                png = cv2.imencode(".png", grey.astype(np.uint16))[1].tobytes()
+                recorder.compressed(topic, NS + k * 50_000_000, png)
+                continue
+            recorder.image(topic, NS + k * 50_000_000, grey.astype(packing), "mono16")
+            recorder.found[-1][3].is_bigendian = int(packing == ">u2")
     with Bag(written(recorder, tmp_path, "mcap")) as bag:
         remarks: list[str] = []
         calibrated: Any = None
@@ -249,8 +254,8 @@ def test_pictures_of_16_bits_are_scaled_by_the_bits_that_all_of_them_use(
         )
         brightest = [int(left.max()) for left, _ in pictures.read()]
     assert brightest == [(top * (k + 1) // 4) >> (bits - 8) for k in range(4)]
-    told = f"pictures of 16 bits hold {bits} (the brightest pixel is {top})"
-    assert remarks == ([told] if bits < 16 else [])
+    told = f"pictures of 16 bits hold {bits} (the brightest pixel is {top} of 65535)"
+    assert [remark.partition(": ")[2] for remark in remarks] == ([told] if bits < 16 else [])
 
 
 # --- gyro and accelerometer apart -----------------------------------------------------------------

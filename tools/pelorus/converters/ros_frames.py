@@ -64,7 +64,7 @@ class Cameras:
     left: str = ""
     right: str = ""
     tracks: str = ""
-    apart_ns: int = 2_000_000
+    apart_ns: int = images.APART_NS
     left_info: str = ""
     right_info: str = ""
     frame: str = ""  # of the left one, in place of what its messages say
@@ -108,15 +108,13 @@ def _pictures(bag: Bag, cameras: Cameras, remarks: list[str]) -> Pictures:
     """Pairs by the times of their headers: of each left picture the nearest right one."""
     topics = [cameras.left, cameras.right]
     stamps: dict[str, list[tuple[int, int]]] = {topic: [] for topic in topics}
-    brightest = 0
+    brightest: int | None = None  # of those of 16 bits
     for found in progress(bag.written(topics), "finding pictures", bag.count(topics)):
         stamps[found.topic].append((found.t_ns, found.arrival_ns))
-        if getattr(found.message, "encoding", "") in DEEP:
-            grey = _deep(bag.path / found.topic.lstrip("/"), found.message)
-            brightest = max(brightest, int(grey.max(initial=0)))
-    bits = max(brightest.bit_length(), 8)
-    if brightest and bits < 16:
-        remarks.append(f"pictures of 16 bits hold {bits} (the brightest pixel is {brightest})")
+        deep = _of_16_bits(bag, found.topic, found.message, len(stamps[found.topic]))
+        if deep is not None:
+            brightest = max(brightest or 0, int(deep.max(initial=0)))
+    bits = 16 if brightest is None else images.bits_up_to(brightest, bag.path, remarks)
     left, right = (_times(bag, topic, stamps[topic], remarks) for topic in topics)
     pairs = _paired(bag, cameras, left, right)
     alone = len(left) + len(right) - 2 * len(pairs)
@@ -146,21 +144,31 @@ def _chosen(
     return good[in_order(bag, topic, Stamps(t_ns, arrival_ns).at(good), remarks)]
 
 
+def _of_16_bits(bag: Bag, topic: str, message: Any, count: int) -> NDArray[Any] | None:
+    """Its pixels if it is such a picture; of packed ones the first, second, fourth, ... alone, for
+    it takes time.
+    """
+    where = bag.path / topic.lstrip("/")
+    if getattr(message, "encoding", "") in DEEP:
+        return _deep(where, message)
+    if not hasattr(message, "format") or count & (count - 1):
+        return None
+    pixels = images.unpacked(where, bytes(message.data))
+    return None if pixels.dtype == np.uint8 else pixels
+
+
 def _paired(bag: Bag, cameras: Cameras, left: Times, right: Times) -> Times:
     """(n, 2) times: two pictures of which each is the nearest to the other."""
-    partner = motion.nearest(right, left)
-    nearest = right[partner]
-    mutual = motion.nearest(left, right)[partner] == np.arange(len(left))
-    near = mutual & (np.abs(nearest - left) <= cameras.apart_ns)
-    alone = len(left) + len(right) - 2 * int(near.sum())
-    if images.too_many_alone(int(near.sum()), alone) or near.sum() < images.PAIRS_MIN:
-        apart_ms = np.median(np.abs(nearest - left)) * 1e-6
+    pairs = images.together(left, right, cameras.apart_ns)
+    alone = len(left) + len(right) - 2 * len(pairs)
+    if images.too_many_alone(len(pairs), alone) or len(pairs) < images.PAIRS_MIN:
+        apart_ms = np.median(np.abs(right[motion.nearest(right, left)] - left)) * 1e-6
         raise PelorusError(
-            f"{bag.path}: of {len(left)} pictures of {cameras.left} {int(near.sum())} have one of "
+            f"{bag.path}: of {len(left)} pictures of {cameras.left} {len(pairs)} have one of "
             f"the {len(right)} of {cameras.right} within {cameras.apart_ns * 1e-6:g} ms (median "
             f"{apart_ms:.3g} ms); cameras that are triggered together are due, or --pair-within MS"
         )
-    return np.stack((left[near], nearest[near]), axis=-1)
+    return np.stack((left[pairs[:, 0]], right[pairs[:, 1]]), axis=-1)
 
 
 def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[tuple[Gray, Gray]]:
@@ -189,7 +197,7 @@ def _in_pairs(bag: Bag, cameras: Cameras, pairs: Times, bits: int) -> Iterator[t
 def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     """(rows, columns) of 8 bits; of a picture of 16 bits the upper eight of those that are used."""
     if hasattr(message, "format"):
-        return images.decoded(where, bytes(message.data))
+        return images.decoded(where, bytes(message.data), bits)
     encoding = message.encoding
     channels = CHANNELS.get(encoding, 1)
     if encoding not in (*PLAIN, *DEEP, *TO_GRAY):

@@ -170,15 +170,20 @@ def bits_of(found: Sequence[Pair], remarks: list[str]) -> int:
     brightest = 0
     for k in np.unique(np.linspace(0, len(found) - 1, DEPTH_SAMPLES).astype(int)).tolist():
         for path in found[k]:
-            pixels = _pixels(path, foreign.content(path, IMAGE_BYTES_MAX))
+            pixels = unpacked(path, foreign.content(path, IMAGE_BYTES_MAX))
             if pixels.dtype == np.uint8:
                 return 16
             brightest = max(brightest, int(pixels.max()))
+    return bits_up_to(brightest, found[0].left.parent, remarks)
+
+
+def bits_up_to(brightest: int, where: Path, remarks: list[str]) -> int:
+    """Of pictures of 16 bits with this brightest pixel."""
     bits = min(max(brightest.bit_length(), 8), 16)
     if bits < 16:
         remarks.append(
-            f"{found[0].left.parent}: pictures of 16 bits hold {bits} (the brightest pixel is "
-            f"{brightest} of 65535)"
+            f"{where}: pictures of 16 bits hold {bits} (the brightest pixel is {brightest} of "
+            "65535)"
         )
     return bits
 
@@ -245,13 +250,13 @@ def gray(path: Path, bits: int = 16) -> Gray:
 
 def decoded(path: Path, packed: bytes, bits: int = 16) -> Gray:
     """The same of the bytes of a picture's file; `path` is for those who read of an error."""
-    pixels = _pixels(path, packed)
+    pixels = unpacked(path, packed)
     if pixels.dtype != np.uint8:
         pixels = np.clip(pixels >> (bits - 8), 0, 255)
     return np.ascontiguousarray(pixels, np.uint8)
 
 
-def _pixels(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
+def unpacked(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
     """Of 8 bits, or of 16 in a wider type."""
     try:
         parser = ImageFile.Parser()
