@@ -209,6 +209,27 @@ def test_times_are_those_of_a_file_or_of_names_in_ns(
     assert Table.read(out).times()[0] == 1403636579763555584
 
 
+def test_a_picture_without_a_partner_is_left_out_where_names_are_times(
+    frames: Frames, tmp_path: Path, pelorus: Run
+) -> None:
+    left, right = write(tmp_path, [frames[k % FRAMES] for k in range(24)])
+    for folder in (left, right):
+        for path in folder.iterdir():
+            path.rename(folder / f"{1403636579763555584 + int(path.stem) * 10**8}.png")
+    lost = 1403636579763555584 + 5 * 10**8
+    (right / f"{lost}.png").unlink()
+    out = tmp_path / "stereo.csv"
+    said = pelorus("track", left, right, out).out
+    assert "1 pictures have no partner and are left out" in said
+    times = set(Table.read(out).times().tolist())
+    assert lost not in times
+    assert max(times) == 1403636579763555584 + 23 * 10**8
+    (right / f"{lost + 10**8}.png").unlink()
+    (right / f"{lost + 2 * 10**8}.png").unlink()
+    refused = pelorus("track", left, right, tmp_path / "no.csv", status=1).err
+    assert f"right: lacks the partner of {lost}.png" in refused
+
+
 def test_a_picture_of_16_bits_or_in_colour_is_the_same_in_grey(tmp_path: Path) -> None:
     grey = texture(4)[:HEIGHT, :WIDTH].astype(np.uint8)
     deep = grey.astype(np.uint16) << 8

@@ -83,10 +83,10 @@ def track(
     if times is not None and rate is not None:
         raise typer.BadParameter("one of them, not both", param_hint="--times / --rate")
     _require_places(target, sheet_file)
-    pairs = images.pairs(left, right)
+    remarks: list[str] = []
+    pairs = images.pairs(left, right, remarks if times is None and rate is None else None)
     t_ns = images.times(pairs, times, rate)
     shown: dict[int, Gray] = {}
-    remarks: list[str] = []
     bits = images.bits_of(pairs, remarks)
     for remark in remarks:
         out.print(escape(remark))

@@ -41,13 +41,20 @@ class Pair(NamedTuple):
 # --- which belong together ------------------------------------------------------------------------
 
 
-def pairs(left: Path, right: Path) -> list[Pair]:
-    """By equal names, sorted; the files' endings may differ."""
+def pairs(left: Path, right: Path, remarks: list[str] | None = None) -> list[Pair]:
+    """By equal names, sorted; the files' endings may differ. With `remarks` a few may lack their
+    partner, and that is said: for names that are times, so that the others keep theirs.
+    """
     if left.resolve() == right.resolve():
         raise PelorusError(f"{left}: is given as the left and as the right folder; two are due")
     lefts, rights = pictures(left), pictures(right)
-    _require_partners(left, lefts, right, rights)
-    _require_partners(right, rights, left, lefts)
+    alone = lefts.keys() ^ rights.keys()
+    if remarks is None or too_many_alone(len(lefts.keys() & rights.keys()), len(alone)):
+        _require_partners(left, lefts, right, rights)
+        _require_partners(right, rights, left, lefts)
+    elif alone:
+        remarks.append(f"{len(alone)} pictures have no partner and are left out")
+        lefts = {name: path for name, path in lefts.items() if name in rights}
     if len(lefts) < PAIRS_MIN:
         raise PelorusError(
             f"{left}: has {len(lefts)} pictures; at least {PAIRS_MIN} are due, for a track is "
