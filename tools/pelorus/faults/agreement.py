@@ -26,6 +26,7 @@ from pelorus.tracks import Tracks
 NO_BIAS_MPS = 1e-4
 BIAS_MPS = 0.1  # sigma of the velocity's bias, as the filter's setting
 BIAS_MPS2 = 0.3  # and of an accelerometer's, where the HEADER tells none: a cheap one's
+HALVED_MIN = 0.8  # of the frames, to be told by half of their points
 CHANCE = 2.0  # standard errors that near and far may differ by
 
 
@@ -66,14 +67,13 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
             nan, nan,
         )  # fmt: skip
     body, bias = _body(recording, seen)
-    offset = offset_of(recording, body, seen, bias)
     by_imu = len(recording.inertial.t_ns) > 0
+    seen = seen.with_halves(recording, views.lag, int(HALVED_MIN * seen.usable.sum()), by_imu)
+    offset = offset_of(recording, body, seen, bias)
     found = None if by_imu else Fit(body.design(recording, seen, offset, bias))
     clock_told = found is None or found.tells(CLOCK)
     if not clock_told:
         offset, found = 0.0, None
-    if by_imu:
-        seen = seen.with_focal(recording, views)
     clocks = two_clocks(recording, seen, offset, bias) if clock_told and not by_imu else UNTOLD
     at, clock_sigma = offset, float("inf")
     if clock_told:

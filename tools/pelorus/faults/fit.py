@@ -6,7 +6,7 @@ drive: they need no model of the noise, and hold when it is not white.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pelorus.faults.seen import Seen
 from pelorus.layout import Floats
 from pelorus.recording import Recording
+from pelorus.tracks import Indices
 
 ROUNDS = 8
 BLOCKS_LEAST, BLOCKS_MOST, BLOCK_FRAMES = 8, 40, 10
@@ -24,13 +25,14 @@ PARAMETERS = 20
 NEIGHBOURS = 0.5  # weight of what neighbouring blocks have in common
 TELLS_SIGMAS = 3.0
 SURE = 4.0  # standard errors
+WITHIN = (0.01, 0.99)  # of a column, where its instrument stays: pictures that hang tell leaps
 RIDGE = 1e-9  # of instruments that say the same
 
 
 @dataclass(frozen=True)
 class Design:
     """y = X x + noise by pairs of frames, (k, 6): v and w. `Z` are instruments: X but for what
-    shares the noise of y. `g` is the camera's velocity as the body has it.
+    shares the noise of y. `g` is the camera's velocity as the body has it, `at` ascends with time.
     """
 
     y: Floats
@@ -39,6 +41,15 @@ class Design:
     variance: Floats  # what the images add
     prior: Floats  # (m, m), inverse variances
     g: Floats
+    at: Indices
+
+
+def joined(*parts: Design) -> Design:
+    """Rows of all in the order of time."""
+    order = np.argsort(np.concatenate([part.at for part in parts]), kind="stable")
+    names = ("y", "X", "Z", "variance", "g", "at")
+    rows = {n: np.concatenate([getattr(part, n) for part in parts])[order] for n in names}
+    return replace(parts[0], **rows)
 
 
 class Body(Protocol):
@@ -62,8 +73,8 @@ class Fit:
 
     def __init__(self, design: Design, blocks_most: int = BLOCKS_MOST) -> None:
         y, X, variance, prior = design.y, design.X, design.variance, design.prior
-        Z = np.clip(design.Z, X.min(axis=0), X.max(axis=0))  # pictures that hang tell leaps
-        self.g, self.frames = design.g, len(y)
+        Z = np.where(design.Z == X, X, np.clip(design.Z, *np.quantile(X, WITHIN, axis=0)))
+        self.g, self.frames = design.g, len(np.unique(design.at))
         count = len(y)
         extra: Floats = np.median(y**2, axis=0)
         weight = np.ones(count)
@@ -71,8 +82,8 @@ class Fit:
         for _ in range(ROUNDS):
             trust = weight[:, None] / (variance + extra)
             trusted = Z_rows * trust.reshape(-1, 1)
-            told = np.sum(trusted * X_rows, axis=0) / (np.sum(trusted * Z_rows, axis=0) + 1e-12)
-            trusted *= told  # what the instrument tells of its column
+            stage = _first_stage(trusted, Z_rows, X_rows)
+            trusted = trusted @ stage
             A = trusted.T @ X_rows + prior
             x = np.linalg.solve(A, trusted.T @ y.ravel())
             left = y - X @ x
@@ -82,8 +93,8 @@ class Fit:
             weight = 1 / (1 + d2 / 9) ** 2
         inverse = np.linalg.inv(A)
         self._A, self._inverse, self._trust = A, inverse, trust
-        self._y, self._X, self._Z = y, X, Z * told
-        self.blocks = int(np.clip(count // BLOCK_FRAMES, BLOCKS_LEAST, blocks_most))
+        self._y, self._X, self._Z = y, X, Z @ stage
+        self.blocks = int(np.clip(self.frames // BLOCK_FRAMES, BLOCKS_LEAST, blocks_most))
         self.x = np.asarray(x)
         self.cost = float(np.sum(np.log(spread)))
         self._known = inverse @ prior @ inverse.T
@@ -174,3 +185,16 @@ class Fit:
             if together.sum() < TELLS_SIGMAS * np.linalg.norm(together):
                 return False
         return True
+
+
+def _first_stage(trusted: Floats, Z: Floats, X: Floats) -> Floats:
+    """(m, m) that makes of the instruments what they tell of each column of X; of a column that is
+    its own instrument, itself.
+    """
+    others = np.flatnonzero((Z != X).any(axis=0))
+    stage = np.eye(X.shape[1])
+    size = np.sqrt(np.sum(trusted[:, others] * Z[:, others], axis=0)) + 1e-12
+    of_Z = (trusted[:, others] / size).T @ (Z[:, others] / size) + RIDGE * np.eye(len(others))
+    told = np.linalg.solve(of_Z, (trusted[:, others] / size).T @ X[:, others])
+    stage[np.ix_(others, others)] = told / size[:, None]
+    return stage

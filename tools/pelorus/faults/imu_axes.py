@@ -209,7 +209,7 @@ def _fit(
     0, and be sure of it.
     """
     prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
-    fit = Fit(Design(y, X, Z, variance, prior, y), BLOCKS)
+    fit = Fit(Design(y, X, Z, variance, prior, y, np.arange(len(y))), BLOCKS)
     by_readings = np.sum([fit.covariance_of(part)[:9, :9] for part in np.moveaxis(noise, 2, 0)], 0)
     return Found(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
 

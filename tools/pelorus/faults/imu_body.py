@@ -27,9 +27,10 @@ from pelorus.faults.fit import (
     TURN_SCALE,
     Design,
     Fit,
+    joined,
 )
 from pelorus.faults.force import Force, by_gyro, force, mean_rates, rates_of_turn, thinned
-from pelorus.faults.seen import BESIDE, Seen, beside, slope
+from pelorus.faults.seen import Motions, Seen, slope
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -75,22 +76,25 @@ class ImuBody:
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
         """As fit.Body."""
         told = self.force(recording.frame_t_ns, offset_s)
-        w = told.turn
         arm = -recording.T_CB.R.T @ recording.T_CB.p
-        stretches = told.of_stretches()
-        g = told.way + np.cross(w, arm)
-        good = seen.usable & np.isfinite(w).all(axis=1)
-        left = np.where(good[:, None], seen.rates[:, :3] - g, 0.0)
-        first = _start(left[good], stretches[good], seen.variance[good, :3])
-        g = g + stretches @ first
-        both = np.hstack((g, w))
-        X = _columns(told, stretches, both, slope(both, 1, float(np.median(seen.tau_s))))
-        Z = _columns(told, stretches, seen.beside(), seen.slope())
-        if seen.by_focal is not None:
-            X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, beside(seen.by_focal, *BESIDE)
-        k = good & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
-        y = seen.rates - both
-        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, stretches.shape[2]), g[k])
+        return joined(*(_design(told, arm, own, others, bias) for own, others in seen.pairs()))
+
+
+def _design(told: Force, arm: Floats, seen: Seen, others: Motions, bias: float) -> Design:
+    """`others` are the instruments."""
+    stretches = told.of_stretches()
+    g = told.way + np.cross(told.turn, arm)
+    good = seen.usable & np.isfinite(told.turn).all(axis=1)
+    left = np.where(good[:, None], seen.rates[:, :3] - g, 0.0)
+    g = g + stretches @ _start(left[good], stretches[good], seen.variance[good, :3])
+    both = np.hstack((g, told.turn))
+    X = _columns(told, stretches, both, slope(both, 1, float(np.median(seen.tau_s))))
+    Z = _columns(told, stretches, others.rates, others.slope)
+    if seen.by_focal is not None and others.by_focal is not None:
+        X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, others.by_focal
+    k = np.flatnonzero(good & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2)))
+    y, prior = seen.rates - both, _prior(bias, stretches.shape[2])
+    return Design(y[k], X[k], Z[k], seen.variance[k], prior, g[k], k)
 
 
 def _columns(told: Force, stretches: Floats, both: Floats, by_time: Floats) -> Floats:
@@ -125,7 +129,7 @@ def _until(recording: Recording) -> Inertial:
 def _start(y: Floats, X: Floats, variance: Floats) -> Floats:
     """What the stretches begin with, robustly, as if all else were right."""
     sigma = np.resize([START_MPS] * 3 + [GRAVITY_MPS2] * 3, X.shape[2])
-    fit = Fit(Design(y, X, X, variance, np.diag(sigma**-2), y))
+    fit = Fit(Design(y, X, X, variance, np.diag(sigma**-2), y, np.arange(len(y))))
     return fit.x
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.recording import Recording
+from pelorus.tracks import Tracks
 
 POINTS_MIN = 6  # of a pair of frames
 LONGER = 0.02  # by which a focal length is changed to see what that does
@@ -32,6 +34,7 @@ class Seen:
     usable: NDArray[np.bool_]
     tau_s: Floats
     by_focal: Floats | None = None  # (k, 6) by the logarithm of the focal length that is given
+    halves: tuple[Seen, Seen] | None = None  # by every other point: noises of their own
 
     @property
     def moves(self) -> float:
@@ -74,16 +77,61 @@ class Seen:
         usable = np.where(self.usable[:, None], self.rates, np.nan)
         return slope(usable, BESIDE[0], float(np.median(self.tau_s)))
 
-    def with_focal(self, recording: Recording, views: TwoViews) -> Seen:
-        """And what another focal length would make of it. Neither turns nor ways simply scale with
-        it: of near points the one is mistaken for the other.
+    def itself(self) -> Motions:
+        """Of one half of the points, for the other one: at the same time, and with other noise."""
+        usable = np.where(self.usable[:, None], self.rates, np.nan)
+        return Motions(usable, slope(usable, 1, float(np.median(self.tau_s))), self.by_focal)
+
+    def of_others(self) -> Motions:
+        """Where points are too few to be halved."""
+        focal = None if self.by_focal is None else beside(self.by_focal, *BESIDE)
+        return Motions(self.beside(), self.slope(), focal)
+
+    def pairs(self) -> list[tuple[Seen, Motions]]:
+        """What is to be explained, and what tells the same motion with other noise."""
+        if self.halves is None:
+            return [(self, self.of_others())]
+        one, other = self.halves
+        return [(one, other.itself()), (other, one.itself())]
+
+    def with_halves(self, recording: Recording, lag: int, frames_least: int, focal: bool) -> Seen:
+        """And what each half of the points tells, where it tells enough; if asked, with another
+        focal length as well. Neither turns nor ways simply scale with it: of near points the one is
+        mistaken for the other.
         """
         camera = recording.header.camera
         longer = replace(
             camera, fx_px=(1 + LONGER) * camera.fx_px, fy_px=(1 + LONGER) * camera.fy_px
         )
-        other = Seen.of(recording, two_views(recording.tracks, longer, views.lag))
-        return replace(self, by_focal=(other.rates - self.rates) / LONGER)
+        found = []
+        for tracks in by_turns(recording.tracks):
+            own = Seen.of(recording, two_views(tracks, camera, lag))
+            if own.usable.sum() < frames_least:
+                return self
+            if focal:
+                other = Seen.of(recording, two_views(tracks, longer, lag))
+                own = replace(own, by_focal=(other.rates - own.rates) / LONGER)
+            found.append(own)
+        return replace(self, halves=(found[0], found[1]))
+
+
+class Motions(NamedTuple):
+    """What of a motion is told otherwise: rates and slopes (k, 6), and how a focal length changes
+    them.
+    """
+
+    rates: Floats
+    slope: Floats
+    by_focal: Floats | None
+
+
+def by_turns(tracks: Tracks) -> list[Tracks]:
+    """Every other point, each point as a whole."""
+    _, number = np.unique(tracks.id, return_inverse=True)
+    return [
+        Tracks(tracks.frame_count, tracks.frame[k], tracks.id[k], tracks.pixels[k])
+        for k in (number % 2 == 0, number % 2 == 1)
+    ]
 
 
 def beside(x: Floats, *lags: int) -> Floats:

@@ -25,8 +25,9 @@ from pelorus.faults.fit import (
     TURN_CLOCK,
     TURN_SCALE,
     Design,
+    joined,
 )
-from pelorus.faults.seen import Seen, pauses, slope
+from pelorus.faults.seen import Motions, Seen, pauses, slope
 from pelorus.layout import Floats
 from pelorus.motion import dead_reckoning
 from pelorus.recording import Recording
@@ -89,18 +90,22 @@ class TwistBody:
 
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
         """As fit.Body."""
-        rates = self.rates(recording.frame_t_ns, 1, offset_s)
+        told = self.rates(recording.frame_t_ns, 1, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
-        w = rates[:, 3:]
-        g = rates[:, :3] + np.cross(w, arm)
-        usable = seen.usable & np.isfinite(rates).all(axis=1)
-        told = np.hstack((g, w))
-        y = seen.rates - told
-        X = _columns(told, slope(told, 1, float(np.median(seen.tau_s))))
-        Z = _columns(seen.beside(), seen.slope())
-        k = usable & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
+        told[:, :3] += np.cross(told[:, 3:], arm)
         own = ONE_CLOCK_S if self._turns_late_s is None else OWN_CLOCK_S
-        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, own), g[k])
+        return joined(*(_design(told, seen, z, _prior(bias, own)) for seen, z in seen.pairs()))
+
+
+def _design(told: Floats, seen: Seen, others: Motions, prior: Floats) -> Design:
+    """`others` are the instruments."""
+    X = _columns(told, slope(told, 1, float(np.median(seen.tau_s))))
+    Z = _columns(others.rates, others.slope)
+    usable = seen.usable & np.isfinite(told).all(axis=1)
+    k = np.flatnonzero(usable & np.isfinite(X + Z).all(axis=(1, 2)))
+    return Design(
+        (seen.rates - told)[k], X[k], Z[k], seen.variance[k], prior, told[k, :3], k
+    )
 
 
 def _prior(bias: float, turns_late: float) -> Floats:
