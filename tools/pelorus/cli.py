@@ -20,6 +20,7 @@ COMMANDS = (
     "info",
     "check",
     "evaluate",
+    "explain",
     "export",
     "simulate",
     "report",

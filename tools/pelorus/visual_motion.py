@@ -28,6 +28,7 @@ PAIRS_MIN = 10  # with fewer a motion is not trusted
 ITERATIONS = 12
 WIDE_ITERATIONS = 6  # the first ones accept larger residuals
 WIDE_PX, NARROW_PX = 10.0, 2.0
+RIGID_ITERATIONS = 8
 RIDGE = 1e-3  # keeps frames without observations solvable
 STEP_MAX = 1.0  # m and rad an iteration
 CHI2_4_MEDIAN = 3.3567  # of chi-square with four degrees of freedom
@@ -86,14 +87,49 @@ def seen_pairs(tracks: Tracks, camera: Camera, lag: int) -> SeenPairs:
     )
 
 
-def estimate(seen: SeenPairs, camera: Camera) -> Poses:
-    """For each k the motion that brings coordinates in camera k to camera k + lag."""
-    motion = Poses(np.tile(np.eye(3), (seen.frame_count, 1, 1)), np.zeros((seen.frame_count, 3)))
+def estimate(seen: SeenPairs, camera: Camera, first: Poses | None = None) -> Poses:
+    """For each k the motion that brings coordinates in camera k to camera k + lag. The search
+    begins at rest, or with `first`: it finds what lies within some tens of pixels.
+    """
+    at_rest = Poses(np.tile(np.eye(3), (seen.frame_count, 1, 1)), np.zeros((seen.frame_count, 3)))
+    motion = at_rest if first is None else first
     for iteration in progress(range(ITERATIONS), "camera motion", ITERATIONS):
         scale_px = WIDE_PX if iteration < WIDE_ITERATIONS else NARROW_PX
         step = se3.exp(*_gauss_newton(seen, camera, motion, scale_px))
         motion = se3.compose(step, motion)
     return Poses(se3.nearest_rotation(motion.R), motion.p)
+
+
+def rigid(seen: SeenPairs, camera: Camera) -> Poses:
+    """For each k the motion that fits the points in space, roughly: where to begin a search that
+    may have to go far. Points weigh by the square of their disparity, and less the less they fit.
+    """
+    u_left, u_right = seen.pixels[:, 0], seen.pixels[:, 2]
+    here, there = seen.q_C, triangulate(camera, seen.pixels)
+    sure = (np.minimum(seen.first_pixels[:, 0] - seen.first_pixels[:, 2], u_left - u_right)) ** 2
+    # what one pixel of disparity makes of a depth
+    blur_m = here[:, 2] ** 2 / (camera.fx_px * camera.baseline_m)
+    weight = np.minimum(sure, np.quantile(sure, 0.9)) if len(sure) else sure
+    for _ in range(RIGID_ITERATIONS):
+        motion = _fit(seen, here, there, weight)
+        moved = np.einsum("nij,nj->ni", motion.R[seen.frame], here) + motion.p[seen.frame]
+        off = np.linalg.norm(moved - there, axis=1) / blur_m
+        weight = sure / (1 + (off / WIDE_PX) ** 2) ** 2
+    return motion
+
+
+def _fit(seen: SeenPairs, here: Floats, there: Floats, weight: Floats) -> Poses:
+    """Weighted, of each frame: there = R here + p (Kabsch 1976)."""
+
+    def total(values: Floats) -> Floats:
+        return sum_by_frame(seen.frame, seen.frame_count, values)
+
+    w = np.maximum(total(weight), 1e-12)[:, None]
+    a, b = (total(weight[:, None] * q) / w for q in (here, there))
+    out, back = here - a[seen.frame], there - b[seen.frame]
+    M = total(weight[:, None, None] * back[:, :, None] * out[:, None, :])
+    R = se3.nearest_rotation(M + 1e-9 * np.eye(3))
+    return Poses(R, b - np.einsum("nij,nj->ni", R, a))
 
 
 def _gauss_newton(
@@ -135,6 +171,14 @@ def _residuals(seen: SeenPairs, camera: Camera, motion: Poses) -> _Residuals:
     nearest_px = camera.fx_px * camera.baseline_m / DEPTH_MIN_M
     ahead = (h[2] > 0) & (h[2] < nearest_px)
     return _Residuals(e, J, W, np.sum(e * apply(W, e), axis=0) + of_rows, ahead)
+
+
+def distance2(seen: SeenPairs, camera: Camera, motion: Poses) -> Floats:
+    """Squared distance of each pair from the motion, in pixels' unit noise: chi-square of four, and
+    infinite behind the camera. A depth that is hardly known makes no distance.
+    """
+    pairs = _residuals(seen, camera, motion)
+    return np.where(pairs.ahead, pairs.d2, np.inf)
 
 
 def pixel_sigma(seen: SeenPairs, camera: Camera, motion: Poses) -> float:

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus explain`: first causes with their times, silence where nothing happened, bad logs.
+
+tests/recordings/explain.py does the same with many drives, real ones too, and prints shares.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from converted import Run as Command
+from pelorus.errors import PelorusError
+from pelorus.evidence import Evidence
+from pelorus.explain import Explanation, explain
+from pelorus.explain.explanation import LINES
+from pelorus.explain.finding import Cause
+from pelorus.explain.log import runs
+from pelorus.frames import Message, Stereo, Twist
+from pelorus.simulation.imu import Imu
+from pelorus.simulation.mishaps import Mishaps
+from pelorus.simulation.settings import Span
+from pelorus.simulation.simulate import Options, simulate
+from pelorus.wire import messages_of
+from replay_drive import ROOT, drive, encode, run
+
+sys.path.insert(0, str(ROOT / "tests" / "recordings"))
+from injected_events import EVENTS, S, moving
+
+DRIVE = Options(seed=11, duration_s=30.0, speed_mps=2.5, lap_s=25.0)
+WITHIN_S = 1.0
+
+
+@cache
+def simulated(by_imu: bool = False, **mishaps: Any) -> list[Message]:
+    options = replace(DRIVE, mishaps=Mishaps(**mishaps))
+    if by_imu:
+        options = replace(options, imu=Imu(imu_rate_hz=200))
+    return list(simulate(options).recording.messages())
+
+
+def log_of(messages: list[Message], folder: Path, *options: str) -> list[Message]:
+    recording, log = folder / "in.plr", folder / "log.plr"
+    recording.write_bytes(encode(messages))
+    run(recording, "--quiet", *options, "--out", log)
+    return messages_of(log)
+
+
+def explained(messages: list[Message], folder: Path, *options: str) -> Explanation:
+    return explain(log_of(messages, folder, *options))
+
+
+# --- what happened --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("by_imu", [False, True])
+def test_of_a_clean_drive_it_is_said_that_nothing_happened(tmp_path: Path, by_imu: bool) -> None:
+    found = explained(simulated(by_imu), tmp_path)
+    assert found.first is None
+    assert found.lines()[0].startswith("nothing happened in ")
+    assert len(found.lines()) == 1
+
+
+@pytest.mark.parametrize("by_imu", [False, True], ids=["twists", "imu"])
+@pytest.mark.parametrize("event", [e for e in EVENTS if not e.whole], ids=lambda e: e.name)
+def test_the_first_cause_of_an_event_is_named_with_its_time(
+    tmp_path: Path, event: Any, by_imu: bool
+) -> None:
+    if event.wheels is not None and event.wheels == by_imu:
+        pytest.skip("an event of wheels")
+    chance = np.random.default_rng(5)
+    messages = simulated(by_imu)
+    t = int(chance.choice(list(moving(messages))))
+    changed = event.into(messages, t, chance)
+    assert changed is not None
+    found = explained(changed, tmp_path).first
+    assert found is not None
+    assert found.cause in event.told
+    assert abs(found.from_ns - t) <= WITHIN_S * S
+
+
+@pytest.mark.parametrize(
+    ("mishap", "cause", "at_s"),
+    [
+        ({"slip": 0.4, "slip_span": Span(17.0, 3.0)}, Cause.SLIP, 17.0),
+        ({"slip": 1.8, "slip_span": Span(12.0, 4.0)}, Cause.SLIP, 12.0),
+        ({"dead_encoder": Span(14.0, 6.0)}, Cause.DEAD_ODOMETRY, 14.0),
+        ({"frozen": Span(19.0, 3.0)}, Cause.FROZEN_PICTURE, 19.0),
+        ({"jump_m": 1.5, "jump_at_s": 16.0}, Cause.JUMP, 16.0),
+    ],
+)
+def test_mishaps_of_the_simulation_are_named(
+    tmp_path: Path, mishap: dict[str, Any], cause: Cause, at_s: float
+) -> None:
+    found = explained(simulated(**mishap), tmp_path)
+    assert found.first is not None
+    assert found.first.cause is cause
+    assert abs(found.seconds(found.first.from_ns) - at_s) <= WITHIN_S
+
+
+def test_a_camera_that_pauses_and_odometry_that_pauses_are_told_apart(tmp_path: Path) -> None:
+    from_ns, to_ns = 12 * S, 15 * S
+
+    def without(kind: type) -> list[Message]:
+        return [
+            m
+            for m in simulated()
+            if not (isinstance(m, kind) and from_ns < getattr(m, "t_ns", 0) < to_ns)
+        ]
+
+    for kind, cause in ((Stereo, Cause.NO_FRAMES), (Twist, Cause.NO_READINGS)):
+        found = explained(without(kind), tmp_path)
+        assert found.first is not None
+        assert found.first.cause is cause
+        assert abs(found.seconds(found.first.from_ns) - 12.0) <= WITHIN_S
+
+
+def test_wheels_that_stand_are_no_dead_encoder(tmp_path: Path) -> None:
+    options = replace(DRIVE, stop=Span(15.0, 10.0), bias_velocity_sigma_mps=0.0)
+    messages = simulate(options).recording.messages()
+
+    def at_rest(m: Message) -> Message:
+        if not isinstance(m, Twist) or not 16 * S <= m.t_ns < 24 * S:
+            return m
+        return replace(m, v_B_mps=np.zeros(3))
+
+    assert explained([at_rest(m) for m in messages], tmp_path).first is None
+
+
+def test_settings_that_do_not_fit_are_told_as_such_and_not_as_an_event(tmp_path: Path) -> None:
+    found = explained(simulated(), tmp_path, "--pixel-sigma", "0.08")
+    assert found.episodes == ()
+    assert found.first is not None
+    assert found.first.cause is Cause.SETTINGS
+    assert "pixel-sigma too small" in found.setup[0]
+
+
+# --- how it is told -------------------------------------------------------------------------------
+
+
+def test_a_log_full_of_events_is_told_in_twenty_lines(tmp_path: Path) -> None:
+    messages = simulated()
+    dark = [
+        replace(m, ids=m.ids[:0], pixels=m.pixels[:0])
+        if isinstance(m, Stereo) and m.t_ns % (11 * S) < 2 * S and m.t_ns > 5 * S
+        else m
+        for m in messages
+    ]
+    found = explained(dark, tmp_path)
+    assert len(found.episodes) == 2
+    many = replace(found, episodes=found.episodes * 30, setup=("settings",) * 3)
+    assert len(many.lines()) <= LINES
+    assert "more: --json has all of them" in many.lines()[-1]
+    assert len(many.json()["episodes"]) == 60
+
+
+def test_the_command_tells_a_log_and_replays_a_recording(pelorus: Command, tmp_path: Path) -> None:
+    messages = simulated(slip=0.4, slip_span=Span(17.0, 3.0))
+    log_of(messages, tmp_path)
+    lines = pelorus("explain", tmp_path / "log.plr").out.splitlines()
+    assert lines[0].startswith("one event in ")
+    assert lines[1].startswith("1. 17.")
+    assert "the odometry says" in lines[1]
+    assert lines[2].startswith("   before: health good, ")
+    said = json.loads(pelorus("explain", tmp_path / "in.plr", "--json").out)
+    assert said["first_cause"]["cause"] == "slip"
+    assert said["first_cause"]["from_s"] == pytest.approx(17.0, abs=WITHIN_S)
+
+
+def test_a_log_without_evidence_or_end_or_readings_says_so(tmp_path: Path) -> None:
+    log = log_of(drive(), tmp_path)
+    whole = explain(log)
+    assert whole.remarks == ()
+    bare = explain([m for m in log if not isinstance(m, Evidence)])
+    assert "no EVIDENCE" in bare.remarks[0]
+    cut = explain(log[: len(log) // 2])
+    assert "cut short" in cut.remarks[0]
+    assert "no twists" in explain([m for m in log if not isinstance(m, Twist)]).remarks[0]
+
+
+def test_logs_that_tell_nothing_are_refused(pelorus: Command, tmp_path: Path) -> None:
+    with pytest.raises(PelorusError, match="no answer of a filter"):
+        explain(drive())
+    empty = tmp_path / "empty.plr"
+    empty.write_bytes(b"")
+    assert "the file is empty" in pelorus("explain", empty, status=1).err
+    assert "there is no such file" in pelorus("explain", tmp_path / "no.plr", status=1).err
+
+
+def test_runs_are_first_and_last_of_each_stretch() -> None:
+    flags = np.array([True, True, False, True, False, False, True])
+    assert runs(flags) == [(0, 1), (3, 3), (6, 6)]
+    assert runs(np.zeros(3, bool)) == []

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""All that is found in a log, put together: episodes with their first cause, what followed, and
+what was seen before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pelorus import schema
+from pelorus.explain.contradiction import contradictions
+from pelorus.explain.finding import Cause, Finding, S
+from pelorus.explain.inputs import of_inputs
+from pelorus.explain.log import FEW, Flags, Log, log_of
+from pelorus.explain.setup import of_setup
+from pelorus.frames import Kind, Message
+from pelorus.health import LOST, Spell, TimeLine, time_line
+
+APART_NS = S  # what begins later than that after the end of another is an episode of its own
+TOGETHER_NS = S  # what begins within is told in the order of causes
+BEFORE_NS = S  # what was seen before: the last second
+LINES = 20
+EPISODES_TOLD = 4
+
+
+@dataclass(frozen=True)
+class Episode:
+    """`first` is the cause, `others` what else went wrong, `spells` the health meanwhile."""
+
+    first: Finding
+    others: tuple[Finding, ...]
+    spells: tuple[Spell, ...]
+    before: str
+
+    @property
+    def from_ns(self) -> int:
+        return self.first.from_ns
+
+    @property
+    def to_ns(self) -> int:
+        """When its last finding ends, and health is good again."""
+        ends = [f.to_ns for f in (self.first, *self.others)] + [s.to_ns for s in self.spells]
+        return max(ends)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Of a whole log."""
+
+    origin_ns: int
+    end_ns: int
+    episodes: tuple[Episode, ...]
+    setup: tuple[str, ...]
+    health: TimeLine
+    remarks: tuple[str, ...] = ()  # what the log lacks
+
+    @property
+    def first(self) -> Finding | None:
+        """The first cause of the first episode, else what is wrong all along."""
+        if self.episodes:
+            return self.episodes[0].first
+        if self.setup:
+            return Finding(Cause.SETTINGS, self.origin_ns, self.end_ns, self.setup[0])
+        return None
+
+    def seconds(self, t_ns: int) -> float:
+        """Since the first frame."""
+        return (t_ns - self.origin_ns) / S
+
+    def lines(self) -> list[str]:
+        """At most twenty."""
+        out = list(self._head())
+        out += [f"log: {words}" for words in self.remarks]
+        out += [f"setup: {words}" for words in self.setup]
+        told = min(len(self.episodes), EPISODES_TOLD)
+        room = (LINES - 1 - len(out)) // max(told, 1)
+        for number, episode in enumerate(self.episodes[:told], 1):
+            out += self._episode(number, episode, room)
+        hidden = len(self.episodes) - EPISODES_TOLD
+        if hidden > 0:
+            out.append(f"{hidden} more: --json has all of them")
+        return out[:LINES]
+
+    def _head(self) -> Iterator[str]:
+        count = len(self.episodes)
+        what = "nothing happened" if not count else "one event" if count == 1 else f"{count} events"
+        whole = self.seconds(self.end_ns)
+        yield f"{what} in {whole:.1f} s; health: {self.health.summary()}"
+
+    def _episode(self, number: int, episode: Episode, room: int) -> list[str]:
+        first = episode.first
+        span = f"{self.seconds(first.from_ns):.2f} to {self.seconds(episode.to_ns):.2f} s"
+        lines = [f"{number}. {span}: {first.cause}: {first.words}"]
+        lines.append(f"   before: {episode.before}")
+        then = [(f.from_ns, f"{f.cause}: {f.words}") for f in episode.others]
+        then += [(s.from_ns, s.words(self.origin_ns)) for s in episode.spells]
+        lines += [f"   {self.seconds(t):.2f} s {words}" for t, words in sorted(then)]
+        return lines[: max(room, 2)]
+
+    def json(self) -> dict[str, Any]:
+        """Times in seconds since the first frame, and in ns as in the log."""
+        return {
+            "happened": bool(self.episodes),
+            "first_cause": None if self.first is None else self._finding(self.first),
+            "episodes": [
+                {
+                    "from_s": self.seconds(e.from_ns),
+                    "to_s": self.seconds(e.to_ns),
+                    "first": self._finding(e.first),
+                    "before": e.before,
+                    "then": [self._finding(f) for f in e.others],
+                    "health": [s.words(self.origin_ns) for s in e.spells],
+                }
+                for e in self.episodes
+            ],
+            "setup": list(self.setup),
+            "remarks": list(self.remarks),
+            "health": self.health.by_health,
+            "origin_ns": self.origin_ns,
+            "duration_s": self.seconds(self.end_ns),
+        }
+
+    def _finding(self, found: Finding) -> dict[str, Any]:
+        return {
+            "cause": found.cause,
+            "from_s": self.seconds(found.from_ns),
+            "to_s": self.seconds(found.to_ns),
+            "from_ns": found.from_ns,
+            "words": found.words,
+        }
+
+
+def explain(messages: Sequence[Message]) -> Explanation:
+    """Of the messages of a log; PelorusError where no filter answered."""
+    log = log_of(messages)
+    health = time_line(messages)
+    assert health is not None  # log_of has refused a log without answers
+    inputs = list(of_inputs(log))
+    found = sorted((*inputs, *(_behind(one, inputs) for one in contradictions(log))), key=_order)
+    begin = found[0].from_ns if found else None
+    setup = tuple(of_setup(log, _calm(log, begin)))
+    if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
+        found = sorted((*found, *_unexplained(log, health, found)), key=_order)
+    episodes = tuple(_episode(log, group, health) for group in _grouped(found))
+    end_ns = int(log.t_ns.max())
+    return Explanation(
+        log.origin_ns, end_ns, episodes, setup, health, tuple(_remarks(log, messages))
+    )
+
+
+def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:
+    if not any(log.evidence):
+        yield (
+            "it holds no EVIDENCE, so it is not known what the supervisor saw: it comes from an "
+            "older pelorus-replay, or from a robot that is not asked for it"
+        )
+    if not any(m.kind == Kind.END for m in messages):
+        yield "it has no END: it was cut short, and what came later is not told"
+    if not len(log.readings):
+        yield "it holds no twists and no readings of an IMU: pictures are compared with nothing"
+
+
+def _behind(found: Finding, inputs: Sequence[Finding]) -> Finding:
+    """What the filter noticed when an input failed came of that, whatever looked odd before."""
+    if found.noticed_ns is None:
+        return found
+    near = [f for f in inputs if abs(f.from_ns - found.noticed_ns) <= TOGETHER_NS]
+    begin = max((f.from_ns for f in near), default=found.from_ns)
+    return found._replace(from_ns=max(begin, found.from_ns))
+
+
+def _order(found: Finding) -> tuple[int, int]:
+    return found.from_ns, found.rank
+
+
+def _calm(log: Log, begin_ns: int | None) -> Flags:
+    """Frames before the first event; all of them where there are too few, or no event."""
+    if begin_ns is None:
+        return np.ones(len(log.t_ns), bool)
+    return np.asarray(log.t_ns < begin_ns)
+
+
+def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterator[Finding]:
+    """Where the filter was lost and nothing that is found tells why."""
+    for spell in health.spells:
+        near = (
+            f.from_ns - APART_NS <= spell.to_ns and spell.from_ns <= f.to_ns + APART_NS
+            for f in found
+        )
+        if spell.health < LOST or any(near):
+            continue
+        meanwhile = (log.t_ns >= spell.from_ns) & (log.t_ns <= spell.to_ns)
+        seen = log.column("observations")[meanwhile]
+        if len(seen) and np.median(seen) < FEW:
+            words = f"{np.median(seen):.0f} points in sight: darkness, or nothing to see"
+            yield Finding(Cause.LOST_TRACKS, spell.from_ns, spell.to_ns, words)
+        else:
+            words = f"the filter was lost: {', '.join(spell.why)}"
+            yield Finding(Cause.LOST, spell.from_ns, spell.to_ns, words)
+
+
+def _grouped(found: Sequence[Finding]) -> list[list[Finding]]:
+    groups: list[list[Finding]] = []
+    end = 0
+    for one in found:
+        if groups and one.from_ns <= end + APART_NS:
+            groups[-1].append(one)
+            end = max(end, one.to_ns)
+        else:
+            groups.append([one])
+            end = one.to_ns
+    return groups
+
+
+def _episode(log: Log, group: Sequence[Finding], health: TimeLine) -> Episode:
+    begin = group[0].from_ns
+    together = [f for f in group if f.from_ns <= begin + TOGETHER_NS]
+    first = min(together, key=lambda f: (f.rank, f.from_ns))
+    others = tuple(f for f in group if f is not first)
+    end = max(f.to_ns for f in group)
+    spells = tuple(
+        s for s in health.spells if s.from_ns <= end + APART_NS and s.to_ns >= begin - TOGETHER_NS
+    )
+    return Episode(first, others, spells, _before(log, first.from_ns))
+
+
+def _before(log: Log, t_ns: int) -> str:
+    """The last second before it, in figures."""
+    rows = (log.arrived_ns < t_ns) & (log.arrived_ns >= t_ns - BEFORE_NS)
+    if not rows.any():
+        return "it began with it"
+    matched, used = (log.column(name)[rows] for name in ("matched", "used"))
+    dof = log.column("nis_dof")[rows].sum()
+    nis = sum(r.nis for r, row in zip(log.reports, rows, strict=True) if row)
+    health = int(log.column("health")[rows].max())
+    words = f"health {schema.HEALTHS[health]}, {np.median(matched):.0f} points matched and "
+    words += f"{np.median(used):.0f} used a frame"
+    return words + (f", NIS {nis / dof:.2f} (1 is due)" if dof else "")

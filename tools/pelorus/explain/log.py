@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+"""A filter's log by column: each stereo frame beside what the filter and its supervisor said of it,
+and every reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pelorus.errors import PelorusError
+from pelorus.evidence import Evidence, EvidenceFlag
+from pelorus.frames import Header, Imu, Kind, Message, Pose, Report, Stereo, Twist
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.schema import number
+from pelorus.settings import in_force
+from pelorus.wire import header_of_messages
+
+Flags = NDArray[np.bool_]
+Counts = NDArray[np.int64]
+Pixels = NDArray[np.float32]
+FEW = 3  # points: fewer fix no pose
+NO_READING = -1
+CONTRADICTED = number("reason", "TWIST_CONTRADICTED") | number("reason", "POSE_MAY_BE_WRONG")
+ODD_FLAGS = EvidenceFlag.OUTRIGHT | EvidenceFlag.WAITS | EvidenceFlag.LOCKED
+
+
+@dataclass(frozen=True)
+class Log:
+    """`frames` in the order of arrival, each with its answer, and with its evidence where the log
+    has some. `behind_ns` is the stamp of the newest reading that had arrived before the frame.
+    """
+
+    header: Header
+    frames: list[Stereo]
+    reports: list[Report]
+    poses: list[Pose | None]
+    evidence: list[Evidence | None]
+    behind_ns: Times
+    reading_ns: Times
+    readings: Floats  # (n, 6): v, w of twists; a, w of an IMU
+    by_imu: bool
+    refused: list[Report]  # of readings
+    sigma: Floats  # (6,) of a twist reading as the filter had it; zeros where it says nothing
+
+    @cached_property
+    def t_ns(self) -> Times:
+        return np.array([frame.t_ns for frame in self.frames], np.int64)
+
+    @cached_property
+    def arrived_ns(self) -> Times:
+        """When a frame came, by the readings' clock; by its own stamp where there are none."""
+        return np.where(self.behind_ns == NO_READING, self.t_ns, self.behind_ns)
+
+    @property
+    def origin_ns(self) -> int:
+        return int(self.t_ns[0])
+
+    def column(self, name: str) -> Counts:
+        """Of REPORT."""
+        return np.array([getattr(report, name) for report in self.reports], np.int64)
+
+    @cached_property
+    def reasons(self) -> Counts:
+        return self.column("reasons")
+
+    def said(self, bits: int) -> Flags:
+        """Frames of which a reason is one of these; a refused one has those of the frame before."""
+        return np.asarray(((self.reasons & bits) != 0) & (self.column("status") == 0))
+
+    @cached_property
+    def shared(self) -> Counts:
+        """How many points of each frame stood in the frame before."""
+        return np.array([len(first) for first, _ in self._pairs], np.int64)
+
+    @cached_property
+    def repeated(self) -> Counts:
+        """How many of these have the very pixels that they had there."""
+        return np.array([_repeated(first, second) for first, second in self._pairs], np.int64)
+
+    @cached_property
+    def flow_px(self) -> Floats:
+        """Median way of the shared points in the left picture; NaN where they are few."""
+        return np.array([_flow(first, second) for first, second in self._pairs])
+
+    @cached_property
+    def _pairs(self) -> list[tuple[Pixels, Pixels]]:
+        nothing = np.zeros((0, 4), np.float32)
+        out = [(nothing, nothing)]
+        for before, now in pairwise(self.frames):
+            _, i, j = np.intersect1d(before.ids, now.ids, return_indices=True)
+            out.append((before.pixels[i], now.pixels[j]))
+        return out
+
+
+def _repeated(first: Pixels, second: Pixels) -> int:
+    return int((first == second).all(axis=1).sum())
+
+
+def _flow(first: Pixels, second: Pixels) -> float:
+    if len(first) < FEW:
+        return np.nan
+    return float(np.median(np.hypot(*(second - first)[:, :2].T.astype(np.float64))))
+
+
+def log_of(messages: Sequence[Message]) -> Log:
+    """PelorusError where no frame was answered."""
+    frames: list[Stereo] = []
+    reports: dict[int, Report] = {}
+    poses: dict[int, Pose] = {}
+    evidence: dict[int, Evidence] = {}
+    behind: list[int] = []
+    stamps: list[int] = []
+    rows: list[Floats] = []
+    refused: list[Report] = []
+    by_imu = any(isinstance(m, Imu) for m in messages)
+    for m in messages:
+        if isinstance(m, Stereo):
+            frames.append(m)
+            behind.append(stamps[-1] if stamps else NO_READING)
+        elif isinstance(m, Report) and m.subject == Kind.STEREO:
+            reports.setdefault(len(frames) - 1, m)
+        elif isinstance(m, Report) and m.subject in (Kind.TWIST, Kind.IMU) and m.status:
+            refused.append(m)
+        elif isinstance(m, Pose) and m.after_stereo:
+            poses[len(frames) - 1] = m
+        elif isinstance(m, Evidence):
+            evidence[len(frames) - 1] = m
+        elif isinstance(m, Imu):
+            stamps += m.times_ns
+            rows.append(np.hstack((m.a_B_mps2, m.w_B_radps)))
+        elif isinstance(m, Twist) and not by_imu:
+            stamps.append(m.t_ns)
+            rows.append(np.concatenate((m.v_B_mps, m.w_B_radps))[None])
+    answered = [k for k in range(len(frames)) if k in reports]
+    if not answered:
+        raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
+    return Log(
+        header_of_messages(messages),
+        [frames[k] for k in answered],
+        [reports[k] for k in answered],
+        [poses.get(k) for k in answered],
+        [evidence.get(k) for k in answered],
+        np.array([behind[k] for k in answered], np.int64),
+        np.array(stamps, np.int64),
+        np.concatenate(rows).astype(np.float64) if rows else np.zeros((0, 6)),
+        by_imu,
+        refused,
+        _sigma(messages),
+    )
+
+
+def _sigma(messages: Sequence[Message]) -> Floats:
+    names = [f"{name}-sigma" for name in ("velocity", "gyro")]
+    return np.repeat([in_force(messages, name) or 0.0 for name in names], 3)
+
+
+def suspect(log: Log) -> Flags:
+    """Frames that the supervisor or the gate found odd."""
+    flags = np.array([0 if e is None else e.flags for e in log.evidence], np.int64)
+    matched, gated = log.column("matched"), log.column("gated")
+    rejected = (matched >= FEW) & (2 * gated > matched)
+    return np.asarray(log.said(CONTRADICTED) | ((flags & ODD_FLAGS) != 0) | rejected)
+
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
+    """First and last index of each stretch of yes."""
+    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
+    return list(
+        zip(
+            np.nonzero(edges == 1)[0].tolist(),
+            (np.nonzero(edges == -1)[0] - 1).tolist(),
+            strict=True,
+        )
+    )

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""What is wrong all along: settings that do not fit, a front end that loses its tracks.
+
+It is no event: nothing happened. But a filter whose sigmas are wrong rejects, doubts and locks, and
+who reads its log must know that first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pelorus.explain.inputs import is_habit, losses
+from pelorus.explain.log import Flags, Log
+from pelorus.schema import number
+
+MISFIT, BIAS_OFF, CONTRADICTED = (
+    number("reason", name) for name in ("NOISE_MISFIT", "BIAS_OFF_PRIOR", "TWIST_CONTRADICTED")
+)
+GATED_MOST = 0.2  # of the matches: as sigmas say, the gate rejects one of a hundred
+FRAMES_LEAST = 20  # to say so of
+ALL_ALONG = 0.5  # of the frames
+DIRECTIONS = ("forward", "sideways", "upward", "roll", "pitch", "yaw")
+
+
+def of_setup(log: Log, calm: Flags) -> Iterator[str]:
+    """In words; `calm` are the frames to judge by: those before the first event."""
+    if np.count_nonzero(calm) < FRAMES_LEAST:
+        return
+    yield from (gate := list(_gate(log, calm)))
+    yield from _noise(log, calm, bool(gate))
+    if _share(log, BIAS_OFF, calm) > ALL_ALONG:
+        yield (
+            "a bias is far from its prior: do pictures and odometry disagree in scale, or is "
+            "bias-velocity-sigma or bias-gyro-sigma too small?"
+        )
+    lost = losses(log)
+    if lost and is_habit(log, lost, 0):
+        whole_s = float(np.ptp(log.t_ns)) * 1e-9
+        yield f"the front end loses all tracks every {whole_s / len(lost):.1f} s, and begins anew"
+
+
+def _share(log: Log, bits: int, calm: Flags) -> float:
+    return float(log.said(bits)[calm].mean())
+
+
+def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
+    if log.said(MISFIT)[calm].any():
+        last = [e for e, c in zip(log.evidence, calm, strict=True) if c and e is not None]
+        usual = np.sqrt(last[-1].usual) if last else np.ones(6)
+        worst = int(np.argmax(usual))
+        names = "the IMU's noises" if log.by_imu else "velocity-sigma or gyro-sigma"
+        yield (
+            f"pictures and odometry differ all along by {usual[worst]:.1f} times their sigmas "
+            f"({DIRECTIONS[worst]}): {names} too small, or the calibration is off"
+        )
+    elif not gate_told and _share(log, CONTRADICTED, calm) > GATED_MOST:
+        yield (
+            f"pictures and odometry disagree in {_share(log, CONTRADICTED, calm):.0%} of the "
+            "frames and no one moment shows why: settings, calibration or clocks; `pelorus check`"
+        )
+
+
+def _gate(log: Log, calm: Flags) -> Iterator[str]:
+    matched = int(log.column("matched")[calm].sum())
+    gated = int(log.column("gated")[calm].sum())
+    if matched and gated > GATED_MOST * matched:
+        yield (
+            f"the gate rejects {gated / matched:.0%} of the matches: pixel-sigma too small, wrong "
+            "tracks, or a wrong calibration; `pelorus check`"
+        )
