@@ -227,6 +227,12 @@ plr_status plr_filter_move_to(plr_filter *f, plr_time_ns t_ns, const plr_pose *T
 }
 
 /* The textbook trusts: it has no supervisor, and no rules to leave out. */
+plr_status plr_filter_calibration(const plr_filter *f, plr_calibration_result *result) {
+    (void)f;
+    (void)result;
+    return PLR_E_MODE;
+}
+
 plr_status plr_filter_supervision(const plr_filter *f, plr_supervision *supervision) {
     (void)f;
     memset(supervision, 0, sizeof *supervision);
