@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pelorus.converters.streams import Readings, Seen, Streams, Twists
 from pelorus.frames import Camera, Header, Noise, TwistTiming
 from pelorus.inertial import GRAVITY_MPS2, Inertial
+from pelorus.rig.imu_model import ImuModel
 from pelorus.rig.read import Calibrated
 from pelorus.se3 import Poses
 from pelorus.trajectory import Trajectory
@@ -93,7 +94,7 @@ def drive(kind: str, by: str, seed: int) -> Drive:
     if by == BY_IMU:
         noise, readings = _imu(kind, t_ns, v, w, way, chance)
         return Drive(
-            kind, by, Streams(Calibrated(header, imu=noise), seen, Readings(here, readings), told),
+            kind, by, Streams(Calibrated(header, imu=ImuModel(noise)), seen, Readings(here, readings), told),
             told,
         )  # fmt: skip
     moved = _twists(settings, by, t_ns, v, w, chance)

@@ -116,7 +116,7 @@ def test_odometry_takes_its_turns_from_the_gyro_that_is_named(
     for k in range(-20, 200):
         recorder.imu("/imu", BEGIN_NS + k * 5_000_000, (0, 0, 9.81), (0.1, 0.2, 0.3))
     bag, target = written(recorder, tmp_path, "mcap"), tmp_path / "out.plr"
-    words = ("--calibration", kalibr, "--fix", "none")
+    words = ("--calibration", kalibr, "--fix", "none", "--force")
     outcome = pelorus("convert", "ros", bag, target, *words)
     assert "/imu: not used; --imu-topic or --gyro-topic would use it" in outcome.out
     pelorus("convert", "ros", bag, target, *words, "--gyro-topic", "/imu")
@@ -133,7 +133,7 @@ def test_wheels_give_the_speed_and_with_a_track_width_the_turn(
     for t_ns in Scene().t_ns:
         recorder.joints("/joints", t_ns, {"arm": 99.0, "left": 9.0, "right": 11.0})
     bag, target = written(recorder, tmp_path, "sqlite3"), tmp_path / "out.plr"
-    words = ["--calibration", kalibr, "--joint-topic", "/joints", "--joint", "left"]
+    words = ["--force", "--calibration", kalibr, "--joint-topic", "/joints", "--joint", "left"]
     words += ["--joint", "right", "--wheel-radius", "0.2"]
     pelorus("convert", "ros", bag, target, *words)
     twists, noise = messages_of(target, Twist), messages_of(target, Header)[0].noise

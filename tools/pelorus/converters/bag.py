@@ -61,7 +61,7 @@ class Bag(AbstractContextManager["Bag"]):
         self._reader = self._opened()
         self._seconds = max(self._reader.duration, 1) / NS
         self.begins_ns = int(self._reader.start_time)
-        self._part_ns = [self.begins_ns + s * NS for s in part]
+        self._part_s = part
 
     def _opened(self) -> AnyReader:
         try:
@@ -134,10 +134,10 @@ class Bag(AbstractContextManager["Bag"]):
         self, reader: AnyReader, topics: Sequence[str], whole: bool = False
     ) -> Iterator[Stamped]:
         wanted = [c for c in reader.connections if c.topic in topics]
-        first, last = self._part_ns
+        first_s, last_s = self._part_s
         try:
             for connection, arrival_ns, raw in reader.messages(wanted):
-                if not whole and not first <= arrival_ns <= last:
+                if not whole and not first_s <= (arrival_ns - self.begins_ns) / NS <= last_s:
                     continue
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 t_ns = self._time(message, arrival_ns)

@@ -41,7 +41,6 @@ FORCES_MPS2 = (5.0, 15.0)
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
-MOVES_SIGMA = 10.0  # of a pixel: 7 of the difference of two of them
 PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
 # What no robot turns faster than while its tracks hold, about an axis that nothing measures: the pictures
 # find the rotation. It is wrong by one constant from frame to frame, in all readings between them.
@@ -157,8 +156,6 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
             )
         if calibrated.rig is not None:
             tracks = _rectified(tracks, calibrated.rig.rectification(), frames.where)
-    if isinstance(streams.motion, Twists):
-        _require_filled(streams.motion, tracks)
     made = _with_motion(header, streams, t_ns, tracks)
     if streams.truth is None:
         return made
@@ -214,30 +211,6 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
     return Recording(
         header, *moved, t_ns, tracks, readings=small, remarks=remarks, inertial=inertial
     )
-
-
-def _require_filled(twists: Twists, tracks: Tracks) -> None:
-    """Twists that are all zero are those of a body that stands: so do its points, within noise."""
-    if twists.v_B_mps.any() or twists.w_B_radps.any():
-        return
-    order = np.lexsort((tracks.frame, tracks.id))
-    id, pixels = tracks.id[order], tracks.pixels[order]
-    first, again = np.unique(id, return_index=True)[1], np.unique(id[::-1], return_index=True)[1]
-    last = len(id) - 1 - again
-    lasting = last > first
-    if not lasting.any():
-        return
-    moved = np.linalg.norm(pixels[last, :2] - pixels[first, :2], axis=1)[lasting]
-    moved_px, gap = float(np.median(moved)), pixels[:, 1] - pixels[:, 3]
-    sigma_px = 1.4826 * float(np.median(np.abs(gap - np.median(gap)))) / np.sqrt(2)
-    if moved_px > MOVES_SIGMA * sigma_px:
-        raise ForeignFileError(
-            twists.where,
-            f"all {len(twists.t_ns)} twists are zero, and the pictures move: points by "
-            f"{moved_px:.3g} px while they are seen",
-            due="is only the pose filled in? --twist-in poses makes twists of odometry's poses (in "
-            "CSV: of the columns px_m, py_m, pz_m, qx, qy, qz, qw beside them)",
-        )
 
 
 def _require_gravity(readings: Readings) -> None:

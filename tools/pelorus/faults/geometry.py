@@ -108,7 +108,7 @@ def _of_twists(
             "twists-zero",
             f"all {len(recording.twist_t_ns)} twists are zero, the pictures move "
             f"({found.speed_mps:.2g} m/s): is only the pose filled in? Velocities in body axes are "
-            "due, or the twists of that pose's steps",
+            "due, or --twist-in poses when it is converted",
         )
         return
     turned = [*_units(found)] or [*_extrinsic(recording, found, views, ask)]
