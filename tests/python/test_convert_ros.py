@@ -122,7 +122,7 @@ def test_odometry_takes_its_turns_from_the_gyro_that_is_named(
     pelorus("convert", "ros", bag, target, *words, "--gyro-topic", "/imu")
     assert np.allclose([m.w_B_radps for m in messages_of(target, Twist)], [0.1, 0.2, 0.3])
     outcome = pelorus("convert", "ros", bag, target, "--imu-topic", "/imu", "--gyro-topic", "/imu",
-                      "--calibration", kalibr, status=1)  # fmt: skip
+                      "--force", "--calibration", kalibr, status=1)  # fmt: skip
     assert "--imu-topic and --gyro-topic: /imu is named twice" in outcome.err
 
 
