@@ -11,7 +11,7 @@ from pelorus.converters.bag import Bag
 from pelorus.converters.ros_frames import CAMERA_INFO, Cameras
 from pelorus.converters.ros_motion import IMU, Moving
 from pelorus.converters.streams import Asked, Readings, Streams, Twists
-from pelorus.converters.transforms import Chain, Tree, bare
+from pelorus.converters.transforms import TF, Chain, Tree, bare
 from pelorus.errors import PelorusError
 from pelorus.rig import read as rig_files
 from pelorus.rig.read import Calibrated
@@ -31,7 +31,7 @@ class Topics:
 def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     """What of the bag becomes a recording; its pictures are read later, so it must stay open."""
     remarks: list[str] = []
-    tree = Tree.of(bag)
+    tree = Tree(bag)
     motion = asked.motion or ros_motion.read(bag, topics.moving, asked, tree, remarks)
     calibrated, cameras = _calibrated(bag, topics, asked, motion, tree, remarks)
     frames = ros_frames.read(bag, cameras, calibrated, remarks)
@@ -114,7 +114,7 @@ def _on_body(
             return rig
         remarks.append(f"the IMU of the calibration sits as /tf_static says: {chain.words}")
         return rig.on_body(se3.compose(rig.T_LB, chain.T))
-    if not tree.frames:
+    if not bag.of_type(*TF):
         return rig
     frame = bare(cameras.frame) or ros_frames.camera_frame(bag, cameras.tracks or cameras.left)
     if not body:
@@ -141,6 +141,6 @@ def _on_body(
 def _by_way_of_imu(bag: Bag, body: str, tree: Tree) -> Chain | None:
     """From the frame of the twists to the bag's IMU, if both are known and the IMU is but one."""
     frames = {ros_frames.camera_frame(bag, topic) for topic in bag.of_type(IMU)} - {""}
-    if len(frames) != 1 or body not in tree.frames or not frames <= tree.frames:
+    if len(frames) != 1 or not tree.knows(body, *frames):
         return None
     return None if frames == {body} else tree.chain(body, frames.pop())

@@ -98,7 +98,7 @@ def read(
 
 def _turned(w: Floats, topic: str, frame: str, body: str, tree: Tree, remarks: list[str]) -> Floats:
     """A gyro's rates in the axes of the body, as far as the transforms know both."""
-    if not {frame, body} <= tree.frames:
+    if not tree.knows(frame, body):
         remarks.append(f"{topic}: of the frame {frame!r}, taken as having the axes of {body!r}")
         return w
     chain = tree.chain(frame, body)

@@ -60,7 +60,7 @@ def read(
 
 
 def _arm(topic: str, frame: str, body: str, tree: Tree, remarks: list[str]) -> Floats:
-    if not {frame, body} <= tree.frames:
+    if not tree.knows(frame, body):
         remarks.append(f"{topic}: the antenna is taken as sitting at the body's origin")
         return np.zeros(3)
     chain = tree.chain(frame, body)

@@ -7,7 +7,6 @@ parent, so two frames are joined by one chain or by none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,27 +48,33 @@ def bare(frame: str) -> str:
     return frame.strip().lstrip("/")
 
 
-@dataclass
 class Tree:
-    """The links by child; `moving` and `double` are those of which no chain may be made."""
+    """The links by child; `moving` and `double` are those of which no chain may be made.
 
-    bag: Bag
-    links: dict[str, Link] = field(default_factory=dict)
-    moving: dict[str, str] = field(default_factory=dict)
-    double: dict[str, set[str]] = field(default_factory=dict)
+    /tf is long, and read only where /tf_static does not do.
+    """
 
-    @classmethod
-    def of(cls, bag: Bag) -> Tree:
-        tree = cls(bag)
+    def __init__(self, bag: Bag) -> None:
+        self.bag = bag
+        self.links: dict[str, Link] = {}
+        self.moving: dict[str, str] = {}
+        self.double: dict[str, set[str]] = {}
         topics = bag.of_type(*TF)
-        fixed = [topic for topic in topics if topic.rpartition("/")[2] == STATIC]
-        others = [topic for topic in topics if topic not in fixed]
-        for topics in (fixed, others):
-            found = bag.messages(topics, whole=True) if topics else ()
-            for stamped in progress(found, "reading transforms", bag.count(topics)):
-                for one in stamped.message.transforms:
-                    tree._add(one, topics is fixed)
-        return tree
+        self._unread = [topic for topic in topics if topic.rpartition("/")[2] != STATIC]
+        self._read([topic for topic in topics if topic not in self._unread], is_static=True)
+
+    def _read(self, topics: list[str], is_static: bool) -> None:
+        found = self.bag.messages(topics, whole=True) if topics else ()
+        for stamped in progress(found, "reading transforms", self.bag.count(topics)):
+            for one in stamped.message.transforms:
+                self._add(one, is_static)
+
+    def knows(self, *frames: str) -> bool:
+        """Whether all these are there."""
+        if not self.frames.issuperset(frames) and self._unread:
+            unread, self._unread = self._unread, []
+            self._read(unread, is_static=False)
+        return self.frames.issuperset(frames)
 
     def _add(self, stamped: Any, is_static: bool) -> None:
         child, parent = bare(stamped.child_frame_id), bare(stamped.header.frame_id)
@@ -91,6 +96,9 @@ class Tree:
     def chain(self, first: str, last: str) -> Chain:
         """From one frame to the other; a sentence says why there is none."""
         up, down = self._ancestors(first), self._ancestors(last)
+        if up[-1] != down[-1] and self._unread:
+            self.knows("")  # reads the rest
+            up, down = self._ancestors(first), self._ancestors(last)
         meeting = next((frame for frame in up if frame in down), None)
         if meeting is None:
             raise PelorusError(
@@ -109,7 +117,7 @@ class Tree:
         return Chain(T, (*up, *reversed(down)))
 
     def _ancestors(self, frame: str) -> list[str]:
-        if frame not in self.frames:
+        if not self.knows(frame):
             raise PelorusError(
                 f"{self.bag.path}: no transform of /tf_static has the frame {frame!r}; --extrinsic "
                 f"FILE is due, or --body-frame and --camera-frame, one of {self.listing}"
