@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,16 @@ from bags import NS, Recorder
 from converted import SHORT, Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
+from pelorus.converters import earth_start
 from pelorus.converters.columns import Columns
 from pelorus.converters.csv import truth_of
 from pelorus.converters.geodetic import Ground
 from pelorus.errors import PelorusError
-from pelorus.frames import Reading
+from pelorus.frames import BodyAxes, Reading
+from pelorus.recording import Recording
 from pelorus.se3 import Poses
+from replay_drive import run
+from scipy.spatial.transform import Rotation
 from test_convert_csv import csv_files
 from test_convert_ros import written
 from test_ros_world import NAMES, links, odometry, of_cameras, on_body, with_tracks
@@ -164,3 +169,54 @@ def test_fixes_of_a_bag_become_positions_of_the_antenna(tmp_path: Path, pelorus:
     said = pelorus("convert", "ros", bag, target, *words, status=1).err
     assert "/fix: messages tell no covariance; --position-sigma M is due" in said
     pelorus("convert", "ros", bag, target, *words, "--position-sigma", "2.5")
+
+
+# --- the start ------------------------------------------------------------------------------------
+
+
+def on_earth(drive: Recording, yaw: float, sigma_m: float, F: Floats) -> tuple[Recording, Poses]:
+    """The drive of a body with axes turned by F, its truth turned by yaw and moved; positions."""
+    turn = Rotation.from_euler("z", yaw).as_matrix()
+    truth = Poses(turn @ drive.truth.R @ F, drive.truth.p @ turn.T + [40.0, -7.0, 3.0])
+    chance, arm = np.random.default_rng(4), np.array([0.3, -0.2, 0.9])
+    places = truth.p + truth.R @ arm + sigma_m * chance.standard_normal(truth.p.shape)
+    readings = [
+        Reading(t, 3, 7, place, np.full(3, sigma_m), arm)
+        for t, place in zip(drive.truth_t_ns.tolist(), places, strict=True)
+    ]
+    T = drive.T_CB
+    made = replace(
+        drive,
+        v_B_mps=drive.v_B_mps @ F,
+        w_B_radps=drive.w_B_radps @ F,
+        truth=truth,
+        readings=readings[::3],
+    )
+    axes = BodyAxes.FORWARD_LEFT_UP if F[1, 1] > 0 else BodyAxes.FORWARD_RIGHT_DOWN
+    return made.with_extrinsic(Poses(T.R @ F, T.p)).with_header(body_axes=axes), truth
+
+
+@pytest.mark.parametrize("yaw", [0.3, -2.8, 1.9])
+@pytest.mark.parametrize("F", [np.eye(3), np.diag([1.0, -1.0, -1.0])])
+def test_the_heading_at_the_start_is_found_by_the_way_and_the_filter_takes_positions(
+    yaw: float, F: Floats, tmp_path: Path
+) -> None:
+    drive, truth = on_earth(clean(seed=5, duration_s=40.0), yaw, 0.4, F)
+    made, finding = earth_start.started(replace(drive, truth_t_ns=drive.truth_t_ns[:0]))
+    assert finding.told
+    assert made.start is not None
+    off = truth.R[0].T @ made.start.R_WB
+    assert np.linalg.norm(Rotation.from_matrix(off).as_rotvec()) < 0.1
+    assert np.linalg.norm(made.start.p_WB_m - truth.p[0]) < 0.6
+    path = tmp_path / "d.plr"
+    replace(made, truth_t_ns=drive.truth_t_ns[:0], truth=truth.at(slice(0, 0))).write(path)
+    summary = run(path, "--json").summary
+    assert summary["readings_used"] > 0.95 * len(made.readings)
+
+
+def test_a_heading_that_the_way_does_not_tell_is_said() -> None:
+    drive, _ = on_earth(clean(**SHORT), 1.0, 50.0, np.eye(3))
+    made, finding = earth_start.started(drive)
+    assert made.start is None
+    assert not finding.told
+    assert "the way is too short: it is known to" in finding.evidence

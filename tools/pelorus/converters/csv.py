@@ -108,7 +108,8 @@ def read(
     else:
         frames = Seen(sources.stereo, *_stereo(columns.read(sources.stereo, "stereo")))
     columns.require_used()
-    return Streams(calibrated, frames, motion, truth, small, columns.remarks)
+    on_earth = columns.ground.origin_m is not None
+    return Streams(calibrated, frames, motion, truth, small, columns.remarks, on_earth)
 
 
 def _calibrated(sources: Sources) -> Calibrated:

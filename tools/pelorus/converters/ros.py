@@ -43,7 +43,7 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     truth = asked.truth
     if truth is None and topics.moving.truth:
         truth = ros_motion.truth(bag, topics.moving.truth, remarks)
-    return Streams(calibrated, frames, motion, truth, small, remarks)
+    return Streams(calibrated, frames, motion, truth, small, remarks, bool(small))
 
 
 # --- cameras --------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from pelorus.console import progress
-from pelorus.converters import twist_noise
+from pelorus.converters import earth_start, twist_noise
 from pelorus.errors import PelorusError
 from pelorus.faults import stale
 from pelorus.faults.finding import Finding
@@ -129,6 +129,7 @@ class Streams:
     truth: Trajectory | None = None
     small: list[Reading] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    on_earth: bool = False  # its positions are east, north and up of a place
 
     @property
     def told(self) -> list[str]:
@@ -174,17 +175,21 @@ def converted(
     made = recording(found)
     if timing is not None:
         made = made.with_header(twist_timing=timing)
+    placed = []
+    if found.on_earth and found.truth is None:
+        made, finding = earth_start.started(made)
+        placed = [finding]
     if not fix or not len(made.tracks):
-        return made, []
+        return made, placed
     if not isinstance(found.motion, Twists):
-        return held_to_fit(made, made, [])
+        return held_to_fit(made, made, placed)
     if not found.motion.is_whole:
         made, finding = stale.mend(made)
-        return made, [finding]
+        return made, [*placed, finding]
     given = made
     made, findings = mend(made)
     made, finding = twist_noise.suggest(made)
-    return held_to_fit(given, made, [*findings, finding])
+    return held_to_fit(given, made, [*placed, *findings, finding])
 
 
 # --- motion ---------------------------------------------------------------------------------------
