@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pelorus import se3
+from pelorus.converters.streams import Seen, Streams, Twists, recording
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.inertial import Inertial
@@ -23,6 +24,7 @@ from pelorus.rig import read as rig_files
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.rig import Rig
 from pelorus.se3 import Poses
+from pelorus.tracks import Tracks, project
 from rigs import (
     IMU_NOISE,
     SIZE,
@@ -311,6 +313,24 @@ def test_files_without_a_body_say_the_rest(written: Writer, tmp_path: Path) -> N
         assert rig.of_size(672, 376).left.intrinsics == pytest.approx(cameras.left)
         rig = rig.of_size(672, 376)
     assert_rectifies(rig.on_body(cameras.T_LB), cameras)
+
+
+def test_tracks_are_of_the_resolution_that_holds_their_pixels(tmp_path: Path) -> None:
+    cameras = Cameras()
+    q_L = points()
+    q_L = q_L[(cameras.see(q_L).reshape(-1, 2, 2) < [672, 376]).all(axis=(1, 2))]
+    tracks = Tracks(1, np.zeros(len(q_L), np.intp), np.arange(len(q_L)), cameras.see(q_L))
+    rig = rig_files.read_rig(zed(cameras, tmp_path)).on_body(cameras.T_LB)
+    calibrated = rig_files.of_rig(rig, "x")
+    t_ns = np.array([10**9])
+    twists = Twists(Path("t"), np.array([0, 2 * 10**9]), *np.zeros((2, 2, 3)))
+    made = recording(Streams(calibrated, Seen(Path("s"), t_ns, tracks), twists))
+    s_B = se3.apply(se3.inverse(cameras.T_LB), q_L)
+    due = project(made.header.camera, se3.apply(made.T_CB, s_B))
+    assert np.abs(made.tracks.pixels - due).max() < 1e-3
+    beyond = replace(tracks, pixels=tracks.pixels + 3000)
+    with pytest.raises(ForeignFileError, match="beyond every resolution"):
+        recording(Streams(calibrated, Seen(Path("s"), t_ns, beyond), twists))
 
 
 def rectified(cameras: Cameras, folder: Path, before: bool) -> list[Path]:

@@ -142,6 +142,9 @@ def test_what_is_late_repeated_or_uneven_is_no_clock_that_was_set() -> None:
     twice = np.sort(np.concatenate((even, even[200:900])))
     numbers = np.sin(twice * 1e-9)[:, None]
     assert judged(twice, numbers) == ["/x: 700 messages repeat a time and are left out"]
+    coarse = even // 10_000_000 * 10_000_000
+    with pytest.raises(Exception, match="1500 of 3000 messages have other numbers at the time of"):
+        judged(coarse, np.arange(3000, dtype=np.float64)[:, None])
     with pytest.raises(Exception, match=r"stamps go back by 3\.5\d* s"):
         judged(twice, np.arange(len(twice), dtype=np.float64)[:, None])
 

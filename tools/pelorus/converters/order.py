@@ -101,6 +101,15 @@ def in_order(bag: Bag, topic: str, stamps: Stamps, remarks: list[str]) -> NDArra
             f"{behind.max() * 1e-6:.3g} ms: put in the order of their stamps"
         )
     times, first = np.unique(t_ns, return_index=True)
+    if stamps.numbers is not None:
+        other = len(_without_copies(stamps)) - len(times)
+        if other > foreign.BAD_ROWS_MAX * len(t_ns):
+            raise ForeignFileError(
+                bag.path,
+                f"{other} of {len(t_ns)} messages have other numbers at the time of the one before",
+                at=topic,
+                due="a stamp for each reading is due, or --stamps log",
+            )
     if len(times) < len(t_ns):
         remarks.append(f"{topic}: {len(t_ns) - len(times)} messages repeat a time and are left out")
     return first

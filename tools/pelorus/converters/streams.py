@@ -31,6 +31,7 @@ from pelorus.recording import Recording
 from pelorus.rig.lens import LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray, Rectification
+from pelorus.rig.rig import Rig
 from pelorus.tracking import images
 from pelorus.tracking.settings import Settings
 from pelorus.tracking.tracker import track
@@ -148,15 +149,12 @@ def recording(streams: Streams, settings: Settings | None = None) -> Recording:
     if isinstance(frames, Pictures):
         header, tracks = _tracked(frames, calibrated, settings or Settings())
     else:
-        header, tracks = calibrated.header, frames.tracks
-        if calibrated.rig is not None and calibrated.rig.others:
-            raise ForeignFileError(
-                calibrated.rig.path,
-                "is of several resolutions, and tracks do not say of which",
-                due="a file with the sections of one of them is due",
-            )
-        if calibrated.rig is not None:
-            tracks = _rectified(tracks, calibrated.rig.rectification(), frames.where)
+        header, tracks, rig = calibrated.header, frames.tracks, calibrated.rig
+        if rig is not None:
+            rig = _of_pixels(rig, tracks)
+            rectification = rig.rectification()
+            header = rig.header(rectification, header.name)
+            tracks = _rectified(tracks, rectification, frames.where)
     made = _with_motion(header, streams, t_ns, tracks)
     if streams.truth is None:
         return made
@@ -337,6 +335,21 @@ def _require_overlap(frames: Pictures | Seen, t_ns: Times, motion: Twists | Read
 
 
 # --- frames ---------------------------------------------------------------------------------------
+
+
+def _of_pixels(rig: Rig, tracks: Tracks) -> Rig:
+    """Of a calibration for several resolutions the smallest one that holds all pixels."""
+    if not rig.others or not len(tracks):
+        return rig
+    most = tracks.pixels.max(axis=0).reshape(2, 2).max(axis=0)
+    holding = [size for size in rig.sizes if (most < size).all()]
+    if not holding:
+        raise ForeignFileError(
+            rig.path,
+            f"pixels reach ({most[0]:.0f}, {most[1]:.0f}), beyond every resolution",
+            due="the calibration of these pictures is due",
+        )
+    return rig.of_size(*min(holding, key=np.prod))
 
 
 def _rectified(tracks: Tracks, rectification: Rectification, source: Path) -> Tracks:
