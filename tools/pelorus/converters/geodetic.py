@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pyproj import CRS, Transformer
-from pyproj.exceptions import CRSError, ProjError
 
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.table import Table
+
+if TYPE_CHECKING:
+    from pyproj import CRS
 
 DEGREES, GRID, HEIGHT = ("lon_deg", "lat_deg"), ("easting_m", "northing_m"), "alt_m"
 LOCAL = ("px_m", "py_m", "pz_m")
@@ -36,6 +38,8 @@ class Ground:
 
     def local(self, path: Path, places: Floats, remarks: list[str]) -> Floats:
         """(n, 3) longitude, latitude, height, or easting, northing, height -> m, east north up."""
+        from pyproj import Transformer  # noqa: PLC0415 - a quarter of a second, and few need it
+
         crs = self.system()
         to_centre = Transformer.from_crs(crs.to_3d(), GEOCENTRIC, always_xy=True)
         centred = np.stack(to_centre.transform(*places.T), axis=-1)
@@ -61,6 +65,9 @@ class Ground:
 
     def system(self) -> CRS:
         """What the numbers are of."""
+        from pyproj import CRS  # noqa: PLC0415
+        from pyproj.exceptions import CRSError, ProjError  # noqa: PLC0415
+
         try:
             return CRS.from_user_input(self.crs or WGS84)
         except (CRSError, ProjError):
