@@ -139,7 +139,7 @@ def test_wheels_give_the_speed_and_with_a_track_width_the_turn(
     twists, noise = messages_of(target, Twist), messages_of(target, Header)[0].noise
     assert np.allclose([m.v_B_mps for m in twists], [2.0, 0, 0])
     assert np.allclose([m.w_B_radps for m in twists], 0)
-    assert noise.gyro_sigma_z_radps == 0.5
+    assert noise.gyro_sigma_z_radps == 3.0
     pelorus("convert", "ros", bag, target, *words, "--track-width", "0.5")
     twists, noise = messages_of(target, Twist), messages_of(target, Header)[0].noise
     assert np.allclose([m.w_B_radps for m in twists], [0, 0, 0.8])
