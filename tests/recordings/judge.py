@@ -9,7 +9,7 @@ The recordings are those of $PELORUS_DATA, by default ../shared/data; absent one
 ATE, err0   m, as `pelorus evaluate` has them; of 03 the RMS distance to the road
 reckoned    ATE of the odometry alone, m; ratio: ATE beside it
 NEES/6      mean; 1 is due
-good        share of the frames GOOD
+good        share of the frames GOOD, since the start
 false       share not GOOD though all of the error is within 2 sigma and three points are used
 silent      share GOOD though a component is beyond 5 sigma
 """
@@ -28,7 +28,9 @@ from pathlib import Path
 import numpy as np
 from pelorus.evaluation import assess, by_imu
 from pelorus.frames import Kind, Message, Report
+from pelorus.health import time_line
 from pelorus.road import compare, read_road
+from pelorus.schema import HEALTHS
 from pelorus.trajectory import estimate_in, filled, truth_in
 from pelorus.wire import messages_of
 
@@ -107,8 +109,9 @@ def figures(messages: list[Message]) -> Figures:
     reports = {m.t_ns: m for m in answers if m.status == 0}
     found, truth = estimate_in(messages), truth_in(messages)
     out: Figures = {}
-    if any(m.matched for m in reports.values()):
-        out["good"] = float(np.mean([m.health == 0 for m in reports.values()]))
+    line = time_line(list(reports.values()))
+    if line is not None and any(m.matched for m in reports.values()):
+        out["good"] = line.by_health[HEALTHS[0]] / line.frames
     if found is None:
         return out
     if truth is None:  # 03
