@@ -106,7 +106,9 @@ def test_frames_before_the_start_are_not_counted() -> None:
     rows = [(50 * k, 2, waits) for k in range(23)]
     found = line(*rows, (1150, 1, few), *((1200 + 50 * k, 0, 0) for k in range(8)))
     assert (found.frames, found.before_start, found.spells) == (9, 23, ())
-    assert found.summary() == "good in 8 of 9 frames, degraded in 1, after 23 frames before the start"
+    assert (
+        found.summary() == "good in 8 of 9 frames, degraded in 1, after 23 frames before the start"
+    )
 
 
 def test_a_filter_that_never_starts_is_lost() -> None:

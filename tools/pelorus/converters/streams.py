@@ -43,8 +43,8 @@ BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
 PAUSE_STEPS = 5.0  # periods without a reading are a pause, across which nothing is interpolated
-# What no robot turns faster than while its tracks hold, about an axis that nothing measures: the pictures
-# find the rotation. It is wrong by one constant from frame to frame, in all readings between them.
+# What no robot turns faster than while its tracks hold, about an axis that nothing measures: the
+# pictures find the rotation. It is one constant from frame to frame, in all readings between them.
 BLIND_TURN_RADPS = 3.0
 
 
@@ -235,8 +235,8 @@ def _interval_s(t_ns: Times) -> float:
 def _with_blind_axes(noise: Noise, measured: frozenset[str], in_frame: float) -> Noise:
     """Sigmas for what nobody measured, unless the calibration tells some.
 
-    Of `in_frame` readings from frame to frame, whose noises average, each has the root of that many times
-    the sigma of the turn.
+    Of `in_frame` readings from frame to frame, whose noises average, each has the root of that many
+    times the sigma of the turn.
     """
     turn_radps = BLIND_TURN_RADPS * float(np.sqrt(in_frame))
     given = {
