@@ -80,9 +80,9 @@ def _judge(gyro: float, accel: float, gyro_noise: float, accel_noise: float) -> 
         found,
         f"from one true pose to the next the gyro is off by {gyro:.2f} and the accelerometer by "
         f"{accel:.2f} times what calib tells",
-        "the HEADER has what calib tells: a filter that believes it will refuse good pixels; "
-        f"--set gyro-noise={gyro * gyro_noise:.2g} accel-noise={accel * accel_noise:.2g} or more "
-        "would be honest (tools/config/imu-*.conf)"
+        "the HEADER has what calib tells; the filter adds what the readings scatter, and no more: "
+        f"if it says TWIST_CONTRADICTED, --set gyro-noise={gyro * gyro_noise:.2g} "
+        f"accel-noise={accel * accel_noise:.2g} or more (tools/config/imu-*.conf)"
         if found
         else "none: the HEADER has what calib tells",
     )
