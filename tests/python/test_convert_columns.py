@@ -184,7 +184,7 @@ def test_frames_between_two_true_poses_get_one_between_them(tmp_path: Path, pelo
     assert [m.t_ns for m in found] == drive.truth_t_ns.tolist()
     assert np.abs(np.array([m.p_WB_m for m in found]) - drive.truth.p).max() < 0.02
     path.write_text("\n".join([names, *rows[::8], ""]))  # 0.8 s: too far apart to make one up
-    pelorus("convert", "csv", *options, target)
+    pelorus("convert", "csv", *options, target, "--force")
     assert len(messages_of(target, Truth)) == len(rows[::8])
 
 
@@ -319,7 +319,8 @@ def test_the_name_that_the_project_asks_for_names_its_unit(tmp_path: Path, pelor
     assert np.allclose([m.v_B_mps[0] for m in found], drive.v_B_mps[:, 0])
     assert np.allclose([m.w_B_radps[2] for m in found], np.radians(drive.w_B_radps[:, 2]))
     for wrong in ("vx_kg=vx", "mps=vx"):
-        said = pelorus("convert", "csv", *files, target, "--columns", wrong, status=1).err
+        again = (*files, tmp_path / "no.plr", "--columns", wrong)
+        said = pelorus("convert", "csv", *again, status=1).err
         assert f"--columns {wrong}: NAME=COLUMN is due" in said
 
 
