@@ -164,7 +164,7 @@ def test_wheels_and_a_camchain_in_place_of_the_folders_imu_and_sensor_yaml(
     assert np.allclose([m.v_B_mps for m in twists], [SPEED_MPS, 0, 0])
     assert header.noise.velocity_sigma_x_mps < 0
     assert header.noise.velocity_sigma_y_mps == header.noise.velocity_sigma_z_mps == 0.2
-    assert header.noise.gyro_sigma_z_radps == 0.5
+    assert header.noise.gyro_sigma_z_radps == pytest.approx(3.0)
     assert_on_surfaces(target)
 
 
@@ -204,6 +204,10 @@ def _later(path: Path) -> None:
             f"1 are not there or cut off, {{folder}}/mav0/cam0/data/{BEGIN_NS}.png first",
         ),
         (lambda p: (p / "mav0/cam0/data.csv").write_text("a,b\n"), "a time in ns, a file are due"),
+        (
+            lambda p: (p / "mav0/cam0/data.csv").write_text("7,7.png\n"),
+            "0 pairs, taken within 2 ms; 6 pictures have no partner, 1 are not there or cut off",
+        ),
         (lambda p: (p / "mav0/imu0/data.csv").write_text("1,2,3\n"), "has 3 numbers; 7 a row are"),
         (lambda p: (p / "mav0/imu0/data.csv").write_bytes(b""), "imu0/data.csv: the file is empty"),
         (_small, f"188 x 120 pixels; {WIDTH} x {HEIGHT} are due, for which the calibration"),

@@ -130,7 +130,7 @@ def _pictures(top: Path, ordered: Sequence[str], remarks: list[str]) -> Pictures
             f"{where[0]} and {where[1]}: {len(both)} pairs, taken within "
             f"{images.APART_NS * 1e-6:g} ms; {alone} pictures have no partner"
             + (f", {len(lost)} are not there or cut off, {lost[0]} first" if lost else "")
-            + (_apart(of_left, of_right) if alone > len(lost) else "")
+            + (_apart(of_left, of_right) if len(of_left) and len(of_right) and not lost else "")
         )
     if len(both) < images.PAIRS_MIN:
         raise PelorusError(f"{top}: {len(both)} pairs; at least {images.PAIRS_MIN} are due")

@@ -104,6 +104,8 @@ def is_whole(path: Path) -> bool:
 
 def together(left_ns: Times, right_ns: Times, apart_ns: int) -> NDArray[np.intp]:
     """(n, 2) indices of pictures that are each other's nearest in time, and near enough."""
+    if not len(left_ns) or not len(right_ns):
+        return np.empty((0, 2), np.intp)
     left = np.arange(len(left_ns))
     right = motion.nearest(right_ns, left_ns)
     mutual = motion.nearest(left_ns, right_ns)[right] == left
