@@ -68,7 +68,8 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         )  # fmt: skip
     body, bias = _body(recording, seen)
     by_imu = len(recording.inertial.t_ns) > 0
-    seen = seen.with_halves(recording, views.lag, int(HALVED_MIN * seen.usable.sum()), by_imu)
+    if by_imu:
+        seen = seen.with_halves(recording, views.lag, int(HALVED_MIN * seen.usable.sum()))
     offset = offset_of(recording, body, seen, bias)
     found = None if by_imu else Fit(body.design(recording, seen, offset, bias))
     clock_told = found is None or found.tells(CLOCK)

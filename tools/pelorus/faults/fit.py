@@ -32,12 +32,12 @@ RIDGE = 1e-9  # of instruments that say the same
 @dataclass(frozen=True)
 class Design:
     """y = X x + noise by pairs of frames, (k, 6): v and w. `Z` are instruments: X but for what
-    shares the noise of y. `g` is the camera's velocity as the body has it, `at` ascends with time.
+    shares the noise of y, and more of them behind. `g` is the camera's velocity as the body has it, `at` ascends with time.
     """
 
     y: Floats
     X: Floats  # (k, 6, m), the first PARAMETERS as named above
-    Z: Floats
+    Z: Floats  # (k, 6, q), q >= m
     variance: Floats  # what the images add
     prior: Floats  # (m, m), inverse variances
     g: Floats
@@ -45,11 +45,11 @@ class Design:
 
 
 def joined(*parts: Design) -> Design:
-    """Rows of all in the order of time."""
+    """Rows of all in the order of time, with instruments that stay where their columns do."""
     order = np.argsort(np.concatenate([part.at for part in parts]), kind="stable")
     names = ("y", "X", "Z", "variance", "g", "at")
     rows = {n: np.concatenate([getattr(part, n) for part in parts])[order] for n in names}
-    return replace(parts[0], **rows)
+    return replace(parts[0], **rows | {"Z": _within(rows["Z"], rows["X"])})
 
 
 class Body(Protocol):
@@ -72,17 +72,17 @@ class Fit:
     """
 
     def __init__(self, design: Design, blocks_most: int = BLOCKS_MOST) -> None:
-        y, X, variance, prior = design.y, design.X, design.variance, design.prior
-        Z = np.where(design.Z == X, X, np.clip(design.Z, *np.quantile(X, WITHIN, axis=0)))
+        y, X, Z, variance, prior = design.y, design.X, design.Z, design.variance, design.prior
         self.g, self.frames = design.g, len(np.unique(design.at))
         count = len(y)
         extra: Floats = np.median(y**2, axis=0)
         weight = np.ones(count)
         X_rows, Z_rows = (c.reshape(-1, c.shape[2]) for c in (X, Z))
+        exact = np.flatnonzero((Z_rows[:, : X.shape[2]] == X_rows).all(axis=0))
         for _ in range(ROUNDS):
             trust = weight[:, None] / (variance + extra)
             trusted = Z_rows * trust.reshape(-1, 1)
-            stage = _first_stage(trusted, Z_rows, X_rows)
+            stage = _first_stage(trusted, Z_rows, X_rows, exact)
             trusted = trusted @ stage
             A = trusted.T @ X_rows + prior
             x = np.linalg.solve(A, trusted.T @ y.ravel())
@@ -187,14 +187,28 @@ class Fit:
         return True
 
 
-def _first_stage(trusted: Floats, Z: Floats, X: Floats) -> Floats:
-    """(m, m) that makes of the instruments what they tell of each column of X; of a column that is
+def _within(Z: Floats, X: Floats) -> Floats:
+    """Instruments where their columns stay: where pictures hang they tell leaps. A column that is
+    its own instrument stays as it is; those behind are of the first ones in their order.
+    """
+    low, high = np.quantile(X, WITHIN, axis=0)
+    of = np.arange(Z.shape[2]) % X.shape[2]
+    own = Z == X[:, :, of]
+    return np.where(own, Z, np.clip(Z, low[:, of], high[:, of]))
+
+
+def _first_stage(
+    trusted: Floats, Z: Floats, X: Floats, exact: NDArray[np.intp]
+) -> Floats:
+    """(q, m) that makes of the instruments what they tell of each column of X; of a column that is
     its own instrument, itself.
     """
-    others = np.flatnonzero((Z != X).any(axis=0))
-    stage = np.eye(X.shape[1])
-    size = np.sqrt(np.sum(trusted[:, others] * Z[:, others], axis=0)) + 1e-12
-    of_Z = (trusted[:, others] / size).T @ (Z[:, others] / size) + RIDGE * np.eye(len(others))
-    told = np.linalg.solve(of_Z, (trusted[:, others] / size).T @ X[:, others])
-    stage[np.ix_(others, others)] = told / size[:, None]
+    others = np.setdiff1d(np.arange(X.shape[1]), exact)
+    told_by = np.setdiff1d(np.arange(Z.shape[1]), exact)
+    stage = np.zeros((Z.shape[1], X.shape[1]))
+    stage[exact, exact] = 1.0
+    size = np.sqrt(np.sum(trusted[:, told_by] * Z[:, told_by], axis=0)) + 1e-12
+    half = trusted[:, told_by] / size
+    of_Z = half.T @ (Z[:, told_by] / size) + RIDGE * np.eye(len(told_by))
+    stage[np.ix_(told_by, others)] = np.linalg.solve(of_Z, half.T @ X[:, others]) / size[:, None]
     return stage

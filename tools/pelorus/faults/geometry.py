@@ -74,7 +74,7 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     by_imu = len(recording.inertial.t_ns) > 0
     ask = cache(lambda: agreement(recording, views))  # it takes longer than all the rest
     seen = Seen.of(recording, views)
-    wrong = [*_unfit(int(seen.usable.sum()), share_of_fit(views))] or [*_standing(seen)]
+    wrong = [*_unfit(int(seen.usable.sum()), share_of_fit(views))] or [*_standing(seen, moved)]
     if not wrong:
         wrong = [*(_of_imu(recording, seen) if by_imu else _of_twists(recording, seen, views, ask))]
     unexplained = [fault for fault in wrong if fault.name in UNEXPLAINED]
@@ -186,9 +186,9 @@ def _untold(frames: int) -> Fault:
     return Fault(UNTOLD, words, stops=False, grave=False)
 
 
-def _standing(seen: Seen) -> Iterator[Fault]:
+def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
     """A camera that stands tells noise, whatever is held against it."""
-    if seen.moves < MOVES_SIGMAS:
+    if seen.moves < MOVES_SIGMAS and not moved().more_than_usual:
         words = "the camera stands all along: axes, units, scale, clock and place cannot be judged"
         yield Fault(UNTOLD, f"{words}. Drive, with turns", stops=False, grave=False)
 

@@ -80,7 +80,7 @@ class ImuBody:
         return joined(*(_design(told, arm, own, others, bias) for own, others in seen.pairs()))
 
 
-def _design(told: Force, arm: Floats, seen: Seen, others: Motions, bias: float) -> Design:
+def _design(told: Force, arm: Floats, seen: Seen, others: list[Motions], bias: float) -> Design:
     """`others` are the instruments."""
     stretches = told.of_stretches()
     g = told.way + np.cross(told.turn, arm)
@@ -89,12 +89,19 @@ def _design(told: Force, arm: Floats, seen: Seen, others: Motions, bias: float) 
     g = g + stretches @ _start(left[good], stretches[good], seen.variance[good, :3])
     both = np.hstack((g, told.turn))
     X = _columns(told, stretches, both, slope(both, 1, float(np.median(seen.tau_s))))
-    Z = _columns(told, stretches, others.rates, others.slope)
-    if seen.by_focal is not None and others.by_focal is not None:
-        X[:, :, FOCAL], Z[:, :, FOCAL] = seen.by_focal, others.by_focal
+    if seen.by_focal is not None:
+        X[:, :, FOCAL] = seen.by_focal
+    Z = np.concatenate([_instruments(told, stretches, z) for z in others], axis=2)
     k = np.flatnonzero(good & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2)))
     y, prior = seen.rates - both, _prior(bias, stretches.shape[2])
     return Design(y[k], X[k], Z[k], seen.variance[k], prior, g[k], k)
+
+
+def _instruments(told: Force, stretches: Floats, z: Motions) -> Floats:
+    out = _columns(told, stretches, z.rates, z.slope)
+    if z.by_focal is not None:
+        out[:, :, FOCAL] = z.by_focal
+    return out
 
 
 def _columns(told: Force, stretches: Floats, both: Floats, by_time: Floats) -> Floats:

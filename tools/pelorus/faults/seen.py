@@ -83,36 +83,35 @@ class Seen:
         return Motions(usable, slope(usable, 1, float(np.median(self.tau_s))), self.by_focal)
 
     def of_others(self) -> Motions:
-        """Where points are too few to be halved."""
+        """Of all points, by the frames beside."""
         focal = None if self.by_focal is None else beside(self.by_focal, *BESIDE)
         return Motions(self.beside(), self.slope(), focal)
 
-    def pairs(self) -> list[tuple[Seen, Motions]]:
+    def pairs(self) -> list[tuple[Seen, list[Motions]]]:
         """What is to be explained, and what tells the same motion with other noise."""
+        beside = self.of_others()
         if self.halves is None:
-            return [(self, self.of_others())]
+            return [(self, [beside])]
         one, other = self.halves
-        return [(one, other.itself()), (other, one.itself())]
+        return [(one, [other.itself(), beside]), (other, [one.itself(), beside])]
 
-    def with_halves(self, recording: Recording, lag: int, frames_least: int, focal: bool) -> Seen:
-        """And what each half of the points tells, where it tells enough; if asked, with another
-        focal length as well. Neither turns nor ways simply scale with it: of near points the one is
-        mistaken for the other.
+    def with_halves(self, recording: Recording, lag: int, frames_least: int) -> Seen:
+        """And what each half of the points tells, where it tells enough, also with another focal
+        length. Neither turns nor ways simply scale with it: of near points the one is mistaken for
+        the other.
         """
         camera = recording.header.camera
         longer = replace(
             camera, fx_px=(1 + LONGER) * camera.fx_px, fy_px=(1 + LONGER) * camera.fy_px
         )
-        found = []
-        for tracks in by_turns(recording.tracks):
-            own = Seen.of(recording, two_views(tracks, camera, lag))
-            if own.usable.sum() < frames_least:
-                return self
-            if focal:
-                other = Seen.of(recording, two_views(tracks, longer, lag))
-                own = replace(own, by_focal=(other.rates - own.rates) / LONGER)
-            found.append(own)
-        return replace(self, halves=(found[0], found[1]))
+        parts = by_turns(recording.tracks)
+        own, other = ([Seen.of(recording, two_views(part, c, lag)) for part in parts]
+                      for c in (camera, longer))  # fmt: skip
+        if min(int(half.usable.sum()) for half in own) < frames_least:
+            return self
+        focal = [(b.rates - a.rates) / LONGER for a, b in zip(own, other, strict=True)]
+        one, two = (replace(half, by_focal=x) for half, x in zip(own, focal, strict=True))
+        return replace(self, halves=(one, two), by_focal=np.mean(focal, axis=0))
 
 
 class Motions(NamedTuple):

@@ -97,12 +97,14 @@ class TwistBody:
         return joined(*(_design(told, seen, z, _prior(bias, own)) for seen, z in seen.pairs()))
 
 
-def _design(told: Floats, seen: Seen, others: Motions, prior: Floats) -> Design:
+def _design(told: Floats, seen: Seen, others: list[Motions], prior: Floats) -> Design:
     """`others` are the instruments."""
     X = _columns(told, slope(told, 1, float(np.median(seen.tau_s))))
-    Z = _columns(others.rates, others.slope)
+    Z = np.concatenate([_columns(z.rates, z.slope) for z in others], axis=2)
     usable = seen.usable & np.isfinite(told).all(axis=1)
-    k = np.flatnonzero(usable & np.isfinite(X + Z).all(axis=(1, 2)))
+    k = np.flatnonzero(
+        usable & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
+    )
     return Design(
         (seen.rates - told)[k], X[k], Z[k], seen.variance[k], prior, told[k, :3], k
     )
