@@ -38,6 +38,9 @@ def check(
         None, metavar="FILE", help="Your settings, which the search begins with."
     ),
     settings: list[str] = SETTINGS,
+    page: Path | None = typer.Option(
+        None, "--page", metavar="FILE.html", help="The verdict with curves, way and map of the run."
+    ),
     as_json: bool = typer.Option(False, "--json", help="The verdict as one JSON object."),
     programs: Path | None = PROGRAMS,
 ) -> None:
@@ -54,6 +57,8 @@ def check(
     program = find_programs(programs).float32
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         found = checked.check(program, recording, given, Path(folder))
+        if page is not None:
+            _write(page, found, recording, program, Path(folder))
     if found.tuned is not None:
         write_text(tuned, checked.config_text(found, recording))
     if as_json:
@@ -62,6 +67,27 @@ def check(
         _tell(found, tuned)
     if found.tuned is None:
         raise typer.Exit(1)
+
+
+def _write(page: Path, found: Checked, recording: Path, program: Path, folder: Path) -> None:
+    """With curves of a run with the settings that were found; without them, where a fault stopped
+    the search.
+    """
+    from pelorus import wire  # noqa: PLC0415
+    from pelorus.check.options import options_of  # noqa: PLC0415
+    from pelorus.explain import explain  # noqa: PLC0415
+    from pelorus.replay import Outputs, replay  # noqa: PLC0415
+    from pelorus.report import answers  # noqa: PLC0415
+    from pelorus.report.curves import Curves  # noqa: PLC0415
+    from pelorus.report.page import write  # noqa: PLC0415
+
+    if found.tuned is None:
+        write(page, answers.of_check(found, recording.name, None))
+        return
+    outputs = Outputs.named(folder, "page")
+    replay(program, recording, options_of(found.tuned.settings), outputs)
+    messages = wire.messages_of(outputs.log)
+    write(page, answers.of_check(found, recording.name, explain(messages)), Curves(messages))
 
 
 def _tell(found: Checked, tuned: Path) -> None:

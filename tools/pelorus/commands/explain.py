@@ -23,6 +23,9 @@ def explain(
         help="What `pelorus-replay --out` or `pelorus stream --record` wrote; a recording is "
         "replayed first.",
     ),
+    page: Path | None = typer.Option(
+        None, "--page", metavar="FILE.html", help="The same with curves, way and map, to look into."
+    ),
     as_json: bool = typer.Option(False, "--json", help="All of it as one JSON object."),
     config: Path | None = typer.Option(
         None, metavar="FILE", help="Settings for a recording, as pelorus-replay takes them."
@@ -38,7 +41,13 @@ def explain(
     """
     from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
 
-    found = explained(result_of(source, replay_options(config, settings), programs))
+    messages = result_of(source, replay_options(config, settings), programs)
+    found = explained(messages)
+    if page is not None:
+        from pelorus.report import answers, curves  # noqa: PLC0415
+        from pelorus.report.page import write  # noqa: PLC0415
+
+        write(page, answers.of_explanation(found, source.name), curves.Curves(messages))
     if as_json:
         out.print(json.dumps(found.json(), indent=2), markup=False)
         return

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from pelorus.report.comparison import Comparison
 
 PAGE = "report.html"
+OLDER = (  # pictures of earlier versions, which would be taken for this report's
+    *("error-yours", "error-world", "error-course", "nees", "bias", "observations", "time"),
+)
 
 
 class Also(StrEnum):
@@ -51,7 +54,10 @@ def report(
     also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
     programs: Path | None = PROGRAMS,
 ) -> None:
-    """Replay a recording with your settings and by dead reckoning, and draw what came out.
+    """Replay a recording with your settings and by dead reckoning, and show what came out.
+
+    report.html opens from the file: verdict and events above, then one time cursor through health
+    with its reasons, errors, innovations, biases and evidence, and the map beside.
 
     With --also course the course report's filter stands beside them, with --also world the
     textbook's, both in float64. Without a depth limit in the settings, world gets one of 60 m.
@@ -77,22 +83,33 @@ def _remove_pictures(folder: Path) -> None:
     """Of an earlier report: not every recording has all of them."""
     from pelorus.report import pictures  # noqa: PLC0415 - as above
 
-    for name in pictures.NAMES:
+    for name in (*pictures.NAMES, *OLDER):
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 
 def _draw(compared: Comparison, folder: Path) -> list[str]:
     """The pictures and the page; the verdicts on it."""
     from pelorus import style  # noqa: PLC0415 - as above
-    from pelorus.report import page, pictures  # noqa: PLC0415 - as above
+    from pelorus.explain import explain  # noqa: PLC0415 - as above
+    from pelorus.report import answers, page, pictures  # noqa: PLC0415 - as above
+    from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
 
-    drawn = []
+    shown = []
     for picture in progress(pictures.pictures(compared), "drawing"):
         path = folder / f"{picture.name}.png"
         style.save(picture.draw, path)
-        drawn.append((picture, path))
+        if picture.caption:
+            shown.append((picture.title, picture.caption, path))
     lines = words.verdicts(compared)
-    page.write(folder / PAGE, compared, lines, drawn)
+    main = compared.main
+    others = {
+        run.name: Other(run.trajectory, compared.accuracy.get(run.name))
+        for run in compared.runs
+        if run is not main
+    }
+    curves = Curves(main.messages, compared.subject.truth, others)
+    answer = answers.of_comparison(compared, lines, explain(main.messages), shown)
+    page.write(folder / PAGE, answer, curves)
     return lines
 
 

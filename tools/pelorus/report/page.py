@@ -1,105 +1,177 @@
 # SPDX-License-Identifier: MIT
-"""The report as one HTML file that can be sent: pictures inside, no script, nothing fetched."""
+"""The page that answers: one HTML file that opens from anywhere, nothing fetched.
+
+What was found stands first, as text, and needs no script: verdict, settings to change, events.
+Below, one time cursor and one zoom run through health with its reasons, curves, way and map.
+`report`, `check` and `explain` write it. Names and words of a recording are escaped here, and only
+ever set as text by the script; the JSON that it reads holds no `<`.
+
+uPlot 1.6.32 (MIT, (c) 2022 Leon Sorokin) draws the curves: assets/uPlot.LICENSE.
+"""
 
 from __future__ import annotations
 
 import base64
-import shlex
+import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from pelorus.errors import write_text
-from pelorus.report import words
-from pelorus.report.comparison import Comparison
-from pelorus.report.pictures import Picture
-from pelorus.report.results import Run
+from pelorus.report.curves import Curves
 
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 1040px; margin: 2em auto; padding: 0 1em;
-  color: #1a1a1a; background: #fff; }
-h1 { font-size: 1.6em; } h2 { font-size: 1.2em; margin-top: 2em; }
-table { border-collapse: collapse; } .wide { overflow-x: auto; }
-th, td { padding: .3em .8em; text-align: right; border-bottom: 1px solid #ddd; }
-th:first-child, td:first-child { text-align: left; }
-img { max-width: 100%; height: auto; } figure { margin: 1em 0; }
-figcaption { color: #444; } code { font-size: .9em; overflow-wrap: anywhere; }
-"""
-
-MEANING = (
-    "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
-    "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
-    "and gated: observations. Map: RMS distance of the landmarks from where the recording knows "
-    "them to be, with its NEES an axis; poses that were given, in mode mapping, have no error. The "
-    "last column: time of the recording over time of the computing. "
-    "Yours is the filter with the settings that were given, in float32 like dead reckoning, which "
-    "is the twists alone. Where they were asked for: world is the textbook's EKF with landmarks in "
-    "world coordinates, and course the same with the settings of the course report that Pelorus "
-    "grew from, whatever settings the others have; both in float64."
-)
+GRADES = ("good", "care", "bad")
 
 
-def write(
-    path: Path, compared: Comparison, lines: Sequence[str], drawn: Sequence[tuple[Picture, Path]]
-) -> None:
-    """Write the page; `drawn` are the pictures with their files."""
-    title = f"Pelorus report: {compared.subject.title}"
+@dataclass(frozen=True)
+class Event:
+    """Times in seconds since the first frame; `lines` tell it, the first one most of it."""
+
+    from_s: float
+    to_s: float
+    lines: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as text, the first row its head."""
+
+    title: str
+    rows: Sequence[Sequence[str]]
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What stands above the curves. `grade` is one of GRADES."""
+
+    title: str
+    grade: str
+    verdict: str
+    facts: str = ""
+    lines: Sequence[str] = ()
+    changes: Sequence[str] = ()  # settings, as they stand in a config file
+    events: Sequence[Event] = ()
+    tables: Sequence[Table] = ()
+    pictures: Sequence[tuple[str, str, Path]] = ()  # title, caption, PNG
+    commands: Sequence[str] = ()
+    lists: Sequence[tuple[str, Sequence[str]]] = ()  # to unfold: what stands before, and the rest
+
+
+def write(path: Path, answer: Answer, curves: Curves | None = None) -> None:
+    """The whole page; without curves it is what stands above them."""
     parts = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width">',
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>",
-        f"<h1>{escape(title)}</h1>",
-        f"<p>{escape(_facts(compared))}</p>",
-        _table(compared),
-        f"<p>{escape(MEANING)}</p>",
-        _list("What is off", lines),
-        _list("Health", compared.main.health.told(compared.origin_ns)),
-        *(_figure(picture, file) for picture, file in drawn if picture.caption),
-        _commands(compared.runs),
-        "</body>\n</html>\n",
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        "script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:\">",
+        f"<title>{escape(answer.title)}</title>",
+        f"<style>{_asset('uPlot.min.css')}\n{_asset('page.css')}</style>\n</head>\n<body>",
+        *_above(answer),
     ]
+    if curves is not None:
+        content = curves.json()  # before what it has left out is told
+        parts += [_asset("body.html"), *_below(answer, curves), *_scripts(content, curves)]
+    else:
+        parts += ["<main>", *_pictures(answer), "</main>", *_commands(answer)]
+    parts.append("</body>\n</html>\n")
     write_text(path, "\n".join(parts))
 
 
-def _facts(compared: Comparison) -> str:
-    summary = compared.main.summary
-    header = compared.subject.header
-    return (
-        f"{compared.subject.path.name}: {summary['duration_s']:.1f} s, "
-        f"{summary['frames'] + summary['frames_refused']} stereo frames with "
-        f"{summary['observations']} observations, {summary['twists']} twists; "
-        f"path {summary['path_m']:.1f} m; body axes "
-        f"{header.body_axes.name.lower().replace('_', '-')}."
-    )
+def _asset(name: str) -> str:
+    return (files("pelorus.report") / "assets" / name).read_text(encoding="utf-8")
 
 
-def _table(compared: Comparison) -> str:
-    head = "".join(f"<th>{escape(title)}</th>" for title in words.titles(compared))
-    rows = "\n".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in words.row(compared, run)) + "</tr>"
-        for run in compared.runs
-    )
-    return f'<div class="wide"><table>\n<tr>{head}</tr>\n{rows}\n</table></div>'
+def _above(answer: Answer) -> list[str]:
+    assert answer.grade in GRADES
+    out = ["<header>", f"<h1>{escape(answer.title)}</h1>"]
+    if answer.facts:
+        out.append(f'<p class="soft">{escape(answer.facts)}</p>')
+    out.append(f'<div class="verdict {answer.grade}"><strong>{escape(answer.verdict)}</strong>')
+    out += [_list(answer.lines), "</div>"]
+    if answer.changes:
+        settings = escape("\n".join(answer.changes))
+        out.append(f"<h2>Settings to change</h2>\n<pre>{settings}</pre>")
+    if answer.events:
+        out.append("<h2>What happened</h2>")
+        out += [_event(event) for event in answer.events]
+    for title, lines in answer.lists:
+        summary = f"<summary>{escape(title)}: {escape(lines[0])}</summary>"
+        out.append(f"<details>{summary}{_list(lines[1:])}</details>")
+    out += [_table(table) for table in answer.tables]
+    return [*out, "</header>"]
 
 
-def _list(title: str, lines: Sequence[str]) -> str:
+def _list(lines: Sequence[str]) -> str:
     items = "\n".join(f"<li>{escape(line)}</li>" for line in lines)
-    return f"<h2>{escape(title)}</h2>\n<ul>\n{items}\n</ul>"
+    return f"<ul>\n{items}\n</ul>" if lines else ""
 
 
-def _figure(picture: Picture, file: Path) -> str:
-    data = base64.b64encode(file.read_bytes()).decode("ascii")
+def _event(event: Event) -> str:
+    head, *rest = event.lines
+    more = "".join(f'<br><span class="soft">{escape(line)}</span>' for line in rest)
     return (
-        f"<h2>{escape(picture.title)}</h2>\n<figure>"
-        f'<img alt="{escape(picture.title)}" src="data:image/png;base64,{data}">\n'
-        f"<figcaption>{escape(picture.caption)}</figcaption></figure>"
+        f'<button class="event" data-from="{event.from_s:.3f}" data-to="{event.to_s:.3f}">'
+        f"<b>{event.from_s:.2f} s</b> {escape(head)}{more}</button>"
     )
 
 
-def _commands(runs: Sequence[Run]) -> str:
-    commands = [
-        f"<li><code>{escape(shlex.join((run.plan.program.name, 'IN.plr', *run.plan.options)))}"
-        "</code></li>"
-        for run in runs
+def _table(table: Table) -> str:
+    head, *rows = table.rows
+    cells = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    body = "\n".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    about = (
+        f"<details><summary>What the columns mean</summary><p>{escape(table.about)}</p></details>"
+        if table.about
+        else ""
+    )
+    return (
+        f'<h2>{escape(table.title)}</h2>\n<div class="wide"><table>\n<tr>{cells}</tr>\n{body}\n'
+        f"</table></div>{about}"
+    )
+
+
+_KEYS = (
+    "Drag over a curve to zoom, double-click for all. Keys: left and right one frame, with shift "
+    "ten; + and - zoom, 0 all; n and p next and previous event; d dark or light."
+)
+
+
+def _below(answer: Answer, curves: Curves) -> list[str]:
+    out = [*_pictures(answer), f'<p class="soft">{escape(_KEYS)}</p>']
+    if curves.left_out:
+        words = "; ".join(curves.left_out)
+        out.append(f'<p class="soft">Left out, to keep the page small: {escape(words)}.</p>')
+    return [*out, "</main>", *_commands(answer)]
+
+
+def _pictures(answer: Answer) -> list[str]:
+    return [
+        f"<h2>{escape(title)}</h2>\n"
+        f'<img alt="{escape(title)}" src="data:image/png;base64,'
+        f'{base64.b64encode(picture.read_bytes()).decode("ascii")}">\n'
+        f'<p class="soft">{escape(caption)}</p>'
+        for title, caption, picture in answer.pictures
     ]
-    return "<h2>Runs</h2>\n<ul>\n" + "\n".join(commands) + "\n</ul>"
+
+
+def _commands(answer: Answer) -> list[str]:
+    if not answer.commands:
+        return []
+    items = "\n".join(f"<li><code>{escape(line)}</code></li>" for line in answer.commands)
+    return [f"<footer><h2>Runs</h2>\n<ul>\n{items}\n</ul></footer>"]
+
+
+def _scripts(content: dict[str, Any], curves: Curves) -> list[str]:
+    told = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return [
+        f'<script type="application/json" id="data">{told}</script>',
+        f'<script type="application/octet-stream" id="columns">{curves.packer.text()}</script>',
+        f"<script>{_asset('uPlot.min.js')}</script>",
+        f"<script>{_asset('page.js')}</script>",
+    ]

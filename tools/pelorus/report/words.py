@@ -56,6 +56,7 @@ GATE_LOCKED, GATE_INERT, NIS_HIGH, NOT_POSITIVE = (
     schema.number("reason", name)
     for name in ("GATE_LOCKED", "GATE_INERT", "NIS_HIGH", "NOT_POSITIVE")
 )
+NOTHING_OFF = ["Nothing is off."]
 NEES_HIGH, NEES_LOW = 2.0, 0.3
 FRAMES_ENOUGH = 20  # below, a mean NEES says nothing
 GATED_MANY = 0.2  # of the matched observations
@@ -70,7 +71,7 @@ def verdicts(compared: Comparison) -> list[str]:
     dead_reckoning = compared.run("dead-reckoning")
     lines = [line for run in compared.runs for line in _of_run(run, dead_reckoning, compared)]
     lines += _of_recording(compared)
-    return lines or ["Nothing is off."]
+    return lines or NOTHING_OFF
 
 
 def _of_recording(compared: Comparison) -> Iterator[str]:

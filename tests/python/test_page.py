@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: MIT
+"""The page of `report`, `explain` and `check`: what it says as text, what its script shows in
+Chromium at two widths, and that nothing of a recording is taken for markup.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zlib
+from base64 import b64decode
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from chromium import Tab, tab
+from converted import Run as Command
+from pelorus.evidence import Evidence
+from pelorus.explain import explain
+from pelorus.frames import Header, Message, Truth
+from pelorus.report import answers, page
+from pelorus.report.curves import Curves
+from pelorus.report.packed import Packer
+from pelorus.report.page import Answer
+from pelorus.simulation.mishaps import Mishaps
+from pelorus.simulation.settings import Span
+from pelorus.simulation.simulate import Options, simulate
+from pelorus.wire import messages_of
+from replay_drive import drive, encode, run
+
+WIDTHS = {"desktop": 1280, "phone": 390}
+EVIL = '</script><img src=x onerror="window.evil=1"><b>&'
+SLIPPED_S = 12.0
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> list[Message]:
+    """Of a drive that slips."""
+    folder = tmp_path_factory.mktemp("page")
+    mishaps = Mishaps(slip=0.5, slip_span=Span(SLIPPED_S, 3.0))
+    recording = simulate(Options(seed=4, duration_s=25.0, mishaps=mishaps)).recording
+    recording.with_header(name=EVIL).write(folder / "in.plr")
+    run(folder / "in.plr", "--quiet", "--out", folder / "log.plr")
+    return messages_of(folder / "log.plr")
+
+
+@pytest.fixture
+def written(tmp_path: Path, log: list[Message]) -> Path:
+    path = tmp_path / "page.html"
+    page.write(path, answers.of_explanation(explain(log), EVIL), Curves(log))
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Tab]:
+    with tab() as opened:
+        yield opened
+
+
+def data_of(path: Path) -> Any:
+    found = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
+    assert found is not None
+    return json.loads(found.group(1))
+
+
+# --- without a browser ----------------------------------------------------------------------------
+
+
+def test_columns_are_read_back_as_exactly_as_a_screen_shows() -> None:
+    chance = np.random.default_rng(1)
+    values = np.cumsum(chance.normal(size=5000))
+    values[[0, 17, 4999]] = np.nan
+    packer = Packer()
+    first = packer.add(np.zeros(3))
+    column = packer.add(values)
+    packed = zlib.decompress(b64decode(packer.text()))
+    high, low = np.frombuffer(packed, np.uint8)[column["at"] :][: 2 * 5000].reshape(2, -1)
+    whole = np.cumsum((high.astype(np.int64) << 8) + low) % (1 << 16)
+    back = np.where(whole > 0, column["low"] + (whole - 1) * column["step"], np.nan)
+    assert np.isnan(back).tolist() == np.isnan(values).tolist()
+    assert np.nanmax(np.abs(back - values)) <= np.ptp(values[1:-1][~np.isnan(values[1:-1])]) / 1e5
+    assert first == {"at": 0, "count": 3, "low": 0.0, "step": 0.0}
+    nothing = packer.add(np.full(2, np.nan))
+    assert nothing["low"] == 0.0
+
+
+def test_a_column_beyond_doubles_is_a_gap_there() -> None:
+    column = Packer().add(np.array([1.0, -1.7e308, 1.7e308, 3.0]))
+    assert (column["low"], column["count"]) == (1.0, 4)
+    assert column["step"] > 0
+
+
+def test_the_page_is_whole_says_it_first_and_fetches_nothing(written: Path) -> None:
+    text = written.read_text(encoding="utf-8")
+    assert text.index("What happened") < text.index('id="bar"')
+    assert "the odometry says" in text
+    assert not re.search(r'(src|href)="(?!data:|#)', text)
+    assert 'http-equiv="Content-Security-Policy" content="default-src \'none\'' in text
+    assert "uPlot (v1.6.32)" in text
+    assert text.count("</script>") == 4
+
+
+def test_names_of_a_recording_are_no_markup(written: Path) -> None:
+    text = written.read_text(encoding="utf-8")
+    assert EVIL not in text
+    assert "<img" not in text
+
+
+def test_a_log_without_truth_or_evidence_has_a_page_too(tmp_path: Path, log: list[Message]) -> None:
+    bare = [m for m in log if not isinstance(m, Truth | Evidence)]
+    path = tmp_path / "bare.html"
+    page.write(path, answers.of_explanation(explain(bare), "bare"), Curves(bare))
+    titles = [chart["title"] for chart in data_of(path)["charts"]]
+    assert titles[:2] == ["Position uncertainty", "Rotation uncertainty"]
+    assert not {"Doubt", "Weight", "NEES / 6"} & set(titles)
+    assert "no EVIDENCE" in path.read_text(encoding="utf-8")
+
+
+def test_what_a_page_leaves_out_it_says(
+    tmp_path: Path, log: list[Message], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pelorus.report.curves.LANDMARKS_MOST", 5)
+    monkeypatch.setattr("pelorus.report.curves.REJECTIONS_MOST", 7)
+    path = tmp_path / "less.html"
+    page.write(path, answers.of_explanation(explain(log), "less"), Curves(log))
+    data = data_of(path)
+    assert data["landmarks"]["id"]["count"] == 5
+    assert data["landmarks"]["rejected"]["id"]["count"] <= 7
+    text = path.read_text(encoding="utf-8")
+    assert re.search(r"Left out, to keep the page small: \d+ of \d+ landmarks", text)
+    assert "rejections" in text
+
+
+def test_a_verdict_without_a_run_is_a_page_without_a_script(tmp_path: Path) -> None:
+    path = tmp_path / "stopped.html"
+    page.write(path, Answer("check", "bad", "do not use it", lines=["axes < turned"]))
+    text = path.read_text(encoding="utf-8")
+    assert "axes &lt; turned" in text
+    assert "<script" not in text
+
+
+def test_explain_and_check_write_it(pelorus: Command, tmp_path: Path) -> None:
+    recording, explained, checked = (tmp_path / n for n in ("in.plr", "e.html", "c.html"))
+    recording.write_bytes(encode(drive(60)))
+    pelorus("explain", recording, "--page", explained)
+    assert data_of(explained)["t"]["count"] == 60
+    wrong = tmp_path / "no" / "e.html"
+    assert "cannot be written" in pelorus("explain", recording, "--page", wrong, status=1).err
+    done = tmp_path / "tuned.conf"
+    pelorus("check", recording, "--out", done, "--page", checked, status=None)
+    text = checked.read_text(encoding="utf-8")
+    assert "Pelorus check: in.plr" in text
+    assert ("Settings to change" in text) is done.exists()
+
+
+# --- in a browser ---------------------------------------------------------------------------------
+
+
+def state(browser: Tab) -> Any:
+    return browser.does("window.pelorus.view")
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS.keys())
+def test_the_page_shows_the_event_and_fits_the_screen(
+    browser: Tab, written: Path, width: int, dark: bool
+) -> None:
+    browser.troubles.clear()
+    browser.open(written, width, dark=dark)
+    browser.settle()
+    assert browser.troubles == []
+    assert browser.does("document.documentElement.scrollWidth") <= width
+    assert browser.does("window.evil === undefined && document.title") == EVIL
+    assert browser.does("document.getElementById('now').textContent").startswith("1")
+    seen = state(browser)
+    assert seen["from"] < SLIPPED_S < seen["to"]
+    small = "[...document.querySelectorAll('button, input')].filter((b) => b.offsetHeight < 30)"
+    assert browser.does(f"{small}.length") == 0
+    sizes = "[...document.querySelectorAll('body *')].filter((e) => e.childNodes.length && "
+    sizes += "parseFloat(getComputedStyle(e).fontSize) < 12).map((e) => e.tagName)"
+    assert browser.does(sizes) == []
+    paper = browser.does("getComputedStyle(document.body).backgroundColor")
+    assert (paper == "rgb(255, 255, 255)") is not dark
+
+
+def test_cursor_and_zoom_go_through_all_of_the_page(browser: Tab, written: Path) -> None:
+    browser.open(written, 1280)
+    box = "(() => { const b = document.querySelectorAll('.u-over')[4].getBoundingClientRect(); "
+    box += "window.scrollTo(0, b.top + window.scrollY - 300); "
+    box += "const c = document.querySelectorAll('.u-over')[4].getBoundingClientRect(); "
+    box += "return [c.left, c.top, c.width, c.height] })()"
+    left, top, width, height = browser.does(box)
+    before = state(browser)
+    y = top + height / 2
+    browser.mouse((left + 0.25 * width, y), (left + 0.5 * width, y), (left + 0.75 * width, y))
+    after = state(browser)
+    span = before["to"] - before["from"]
+    assert after["from"] == pytest.approx(before["from"] + 0.25 * span, abs=0.03 * span)
+    assert after["to"] == pytest.approx(before["from"] + 0.75 * span, abs=0.03 * span)
+    legends = "[...document.querySelectorAll('.u-legend')].map((l) => "
+    legends += "l.querySelector('.u-value').textContent)"
+    browser.does("window.pelorus.go(150)")
+    browser.settle()
+    now = browser.does("document.getElementById('now').textContent")
+    t = browser.does("window.pelorus.t[150]")
+    assert now.startswith(f"{t:.2f} s")
+    assert set(browser.does(legends)) == {f"{t:.2f}"}
+
+
+def test_keys_reach_everything(browser: Tab, written: Path) -> None:
+    browser.open(written, 1280)
+    browser.press("0")
+    whole = state(browser)
+    assert whole["from"] == 0
+    browser.press("+")
+    browser.settle()
+    nearer = state(browser)
+    assert nearer["to"] - nearer["from"] == pytest.approx((whole["to"] - whole["from"]) / 2, 0.01)
+    browser.press("Home")
+    assert state(browser)["at"] == 0
+    browser.press("ArrowRight")
+    assert state(browser)["at"] == 1
+    browser.press("n")
+    at = browser.does("window.pelorus.t[window.pelorus.view.at]")
+    assert at == pytest.approx(SLIPPED_S, abs=1.0)
+    paper = "getComputedStyle(document.body).backgroundColor"
+    light = browser.does(paper)
+    browser.press("d")
+    assert browser.does(paper) != light
+    focus = "(() => { const all = [...document.querySelectorAll('button, input, a, summary')]; "
+    focus += "return all.filter((e) => e.offsetParent && e.tabIndex < 0).length })()"
+    assert browser.does(focus) == 0
+
+
+def test_a_landmark_tells_its_history(browser: Tab, written: Path, log: list[Message]) -> None:
+    rejected = [m.rejected for m in log if isinstance(m, Evidence) and len(m.rejected)]
+    ids, counts = np.unique(np.concatenate(rejected)["id"], return_counts=True)
+    data = data_of(written)
+    browser.open(written, 390)
+    told = ""
+    for id in ids[np.argsort(-counts)][:40].tolist():
+        browser.does(
+            f"(() => {{ const i = document.getElementById('id'); i.value = {id}; "
+            "i.dispatchEvent(new Event('change')) })()"
+        )
+        told = browser.does("document.getElementById('landmark').textContent")
+        if "rejected by the gate" in told:
+            break
+    assert data["landmarks"]["id"]["count"] > 0
+    assert re.search(r"Landmark \d+ at \(", told)
+    assert re.search(r"seen in \d+ frames, from [\d.]+ to [\d.]+ s", told)
+    assert re.search(r"rejected by the gate.*: \d+ times", told)
+    browser.does("document.querySelector('#landmark button').click()")
+    browser.settle()
+    assert state(browser)["at"] > 0
+
+
+def test_a_page_without_its_data_says_so_and_keeps_its_text(
+    browser: Tab, tmp_path: Path, written: Path
+) -> None:
+    cut = tmp_path / "cut.html"
+    text = written.read_text(encoding="utf-8")
+    cut.write_text(re.sub(r'(id="columns">.{200}).*?<', r"\1<", text, flags=re.DOTALL))
+    browser.open(cut, 390)
+    assert "missing or damaged" in browser.does("document.getElementById('now').textContent")
+    assert "slip" in browser.does("document.body.textContent")
+
+
+def test_a_log_of_two_frames_has_a_page(browser: Tab, tmp_path: Path) -> None:
+    recording, log = tmp_path / "in.plr", tmp_path / "log.plr"
+    recording.write_bytes(
+        encode([replace(m, name="two") if isinstance(m, Header) else m for m in drive(2)])
+    )
+    run(recording, "--quiet", "--out", log)
+    messages = messages_of(log)
+    path = tmp_path / "two.html"
+    page.write(path, answers.of_explanation(explain(messages), "two"), Curves(messages))
+    browser.troubles.clear()
+    browser.open(path, 390)
+    browser.settle()
+    assert browser.troubles == []
+    assert state(browser)["at"] == 0

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""What `report`, `explain` and `check` found, as the page tells it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pelorus.explain.explanation import Episode, Explanation
+from pelorus.report.page import GRADES, Answer, Event, Table
+
+if TYPE_CHECKING:
+    from pelorus.check.checked import Checked
+    from pelorus.report.comparison import Comparison
+
+MEANING = (
+    "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
+    "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
+    "and gated: observations. Map, where it has columns: RMS distance of the landmarks from where "
+    "the recording knows them to be, with its NEES an axis. Poses that were given, in mode "
+    "mapping, have no error. The last column: time of the recording over time of the computing. "
+    "Yours is the filter with the settings that were given, in float32 like dead reckoning, which "
+    "is the twists alone."
+)
+ALSO = (
+    " World is the textbook's EKF with landmarks in world coordinates; course is the same with the "
+    "settings of the course report that Pelorus grew from, whatever settings the others have; both "
+    "in float64."
+)
+
+
+def of_explanation(found: Explanation, title: str) -> Answer:
+    """Of a log."""
+    first = found.first
+    grade = "bad" if found.episodes else "care" if first is not None else "good"
+    head = found.lines()[0]
+    return Answer(
+        title,
+        grade,
+        head[0].upper() + head[1:],
+        lines=[*found.remarks, *found.setup],
+        events=_events(found),
+    )
+
+
+def _events(found: Explanation) -> list[Event]:
+    return [_event(found, episode) for episode in found.episodes]
+
+
+def _event(found: Explanation, episode: Episode) -> Event:
+    then = [f"{found.seconds(f.from_ns):.2f} s {f.cause}: {f.words}" for f in episode.others]
+    then += [spell.words(found.origin_ns) for spell in episode.spells]
+    head = f"{episode.first.cause}: {episode.first.words}"
+    lines = (head, f"before: {episode.before}", *then)
+    return Event(found.seconds(episode.from_ns), found.seconds(episode.to_ns), lines)
+
+
+def of_comparison(
+    compared: Comparison,
+    lines: Sequence[str],
+    found: Explanation,
+    pictures: Sequence[tuple[str, str, Path]],
+) -> Answer:
+    """Of a report; `lines` are its verdicts."""
+    from pelorus.report import words  # noqa: PLC0415 - it looks at runs, which load slowly
+
+    calm = not found.episodes and list(lines) == words.NOTHING_OFF
+    meaning = MEANING + (ALSO if len(compared.runs) > 2 else "")
+    rows = [words.titles(compared), *(words.row(compared, run) for run in compared.runs)]
+    commands = [
+        shlex.join((run.plan.program.name, "IN.plr", *run.plan.options)) for run in compared.runs
+    ]
+    head = found.lines()[0]
+    return Answer(
+        f"Pelorus report: {compared.subject.title}",
+        "good" if calm else "bad" if found.episodes else "care",
+        head[0].upper() + head[1:],
+        _facts(compared),
+        [*lines, *found.setup],
+        events=_events(found),
+        tables=[Table("Runs", rows, meaning)],
+        pictures=pictures,
+        commands=commands,
+        lists=[("Health", compared.main.health.told(compared.origin_ns))],
+    )
+
+
+def _facts(compared: Comparison) -> str:
+    summary = compared.main.summary
+    header = compared.subject.header
+    return (
+        f"{compared.subject.path.name}: {summary['duration_s']:.1f} s, "
+        f"{summary['frames'] + summary['frames_refused']} stereo frames with "
+        f"{summary['observations']} observations, {summary['twists']} twists; "
+        f"path {summary['path_m']:.1f} m; body axes "
+        f"{header.body_axes.name.lower().replace('_', '-')}."
+    )
+
+
+def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer:
+    """Of a check; `found_in` explains the log of the settings that it proposes."""
+    tuned = {} if found.tuned is None else found.tuned.settings
+    settings = [f"{name} = {value}" for name, value in tuned.items()]
+    rows = [("", "before", "after"), *found.rows]
+    return Answer(
+        f"Pelorus check: {title}",
+        GRADES[found.grade],
+        found.verdict,
+        lines=[*(remark.text for remark in found.remarks), *found.changes],
+        changes=settings,
+        events=[] if found_in is None else _events(found_in),
+        tables=[Table("Before and after", rows)] if found.rows else [],
+        lists=[("Health", ["with these settings", *found.spells])] if found.spells else [],
+    )

@@ -1,0 +1,501 @@
+// SPDX-License-Identifier: MIT
+// The report's page: one time cursor and one zoom for ribbons, curves and map. What a recording says
+// is only ever set as text.
+"use strict";
+(async function () {
+  const $ = (id) => document.getElementById(id);
+  const node = (name, className, text) => {
+    const made = document.createElement(name);
+    if (className) made.className = className;
+    if (text !== undefined) made.textContent = text;
+    return made;
+  };
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const fail = (words) => { $("now").textContent = words; };
+
+  // --- data --------------------------------------------------------------------------------------
+
+  let data, bytes;
+  try {
+    data = JSON.parse($("data").textContent);
+    const packed = Uint8Array.from(atob($("columns").textContent), (c) => c.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+    bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  } catch (error) {
+    fail("The curves of this page are missing or damaged: was it saved whole? " +
+         "What stands above is complete; write the page again for the rest.");
+    return;
+  }
+  const TYPES = { u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, f4: Float32Array };
+  const exact = (c) => new TYPES[c.kind](bytes.buffer, c.at, c.count);
+  const unpack = (c) => { // see packed.py
+    const out = new Array(c.count);
+    for (let k = 0, whole = 0; k < c.count; k++) {
+      whole = (whole + (bytes[c.at + k] << 8) + bytes[c.at + c.count + k]) & 0xffff;
+      out[k] = whole ? c.low + (whole - 1) * c.step : null;
+    }
+    return out;
+  };
+  const t = Array.from(exact(data.t), (ms) => ms / 1e3);
+  const health = exact(data.health), reasons = exact(data.reasons), status = exact(data.status);
+  const count = t.length, end = t[count - 1] || 1;
+  const view = { from: 0, to: end, at: 0 };
+  const nearest = (time) => {
+    let low = 0, high = count - 1;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (t[middle] < time) low = middle + 1; else high = middle;
+    }
+    return low && time - t[low - 1] < t[low] - time ? low - 1 : low;
+  };
+
+  // --- what a frame says -------------------------------------------------------------------------
+
+  const COLOURS = ["--good", "--degraded", "--lost", "--diverged"];
+  const harmless = new Set(data.words.harmless);
+  const said = (k) => {
+    const out = [];
+    for (let bit = 0; bit < 32; bit++) {
+      if (reasons[k] >>> bit & 1 && !harmless.has(bit)) out.push(data.words.reasons[bit] || `reason ${bit}`);
+    }
+    return out;
+  };
+  const tell = () => {
+    const k = view.at, refused = status[k] - 128;
+    const words = refused ? `frame refused: ${data.words.status[refused] || refused}` : said(k).join(", ");
+    $("now").replaceChildren(
+      node("b", "", `${t[k].toFixed(2)} s `),
+      document.createTextNode(`frame ${k + 1} of ${count}: ${data.words.health[health[k]]}${words ? ": " + words : ""}`));
+  };
+
+  // --- curves ------------------------------------------------------------------------------------
+
+  const charts = [];
+  let busy = false;
+  const font = "12px system-ui, sans-serif";
+  const short = (x) => x == null ? "" : Math.abs(x) >= 1e5 || (x && Math.abs(x) < 1e-4) ? x.toExponential(1)
+    : String(Number(x.toPrecision(4)));
+  const axis = (unit, more) => Object.assign({
+    stroke: () => css("--soft"), font, labelFont: font, grid: { stroke: () => css("--line"), width: 1 },
+    ticks: { stroke: () => css("--line"), width: 1 },
+  }, more);
+
+  const whole = (u, ticks) => ticks.map((x) => x > 0 && Math.abs(Math.log10(x) % 1) < 1e-6 ? x : null);
+  const decades = { size: 62, filter: whole, values: (u, ticks) => ticks.map((x) => x == null ? "" : short(x)),
+    grid: { stroke: () => css("--line"), width: 1, filter: whole }, ticks: { stroke: () => css("--line"), width: 1, filter: whole } };
+
+  const levels = (chart) => (u) => { // lines at fixed values
+    u.ctx.save();
+    u.ctx.strokeStyle = css("--level");
+    u.ctx.setLineDash([6, 5]);
+    for (const level of chart.levels || []) {
+      const y = u.valToPos(level, "y", true);
+      if (y < u.bbox.top || y > u.bbox.top + u.bbox.height) continue;
+      u.ctx.beginPath();
+      u.ctx.moveTo(u.bbox.left, y);
+      u.ctx.lineTo(u.bbox.left + u.bbox.width, y);
+      u.ctx.stroke();
+    }
+    u.ctx.restore();
+  };
+
+  function range(chart, columns) { // of the main lines: a band may leave the picture
+    const main = columns.filter((_, k) => !(chart.band || []).includes(k));
+    return (u, low, high) => {
+      low = Infinity; high = -Infinity;
+      const [from, to] = [nearest(view.from), nearest(view.to)];
+      for (const column of main) for (let k = from; k <= to; k++) {
+        const x = column[k];
+        if (x != null && (!chart.log || x > 0)) { if (x < low) low = x; if (x > high) high = x; }
+      }
+      if (low > high) return chart.log ? [0.1, 10] : [-1, 1];
+      if (chart.log) return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
+      if (chart.levels) { low = Math.min(low, ...chart.levels); high = Math.max(high, ...chart.levels); }
+      if (chart.band) { // it is seen where the error fills a sixth of the picture and more
+        const reach = 6 * Math.max(Math.abs(low), Math.abs(high));
+        for (const b of chart.band) for (let k = from; k <= to; k++) {
+          const x = columns[b][k];
+          if (x != null && Math.abs(x) <= reach) { if (x < low) low = x; if (x > high) high = x; }
+        }
+      }
+      const room = (high - low) * 0.06 || Math.abs(high) * 0.1 || 1;
+      return [low - room, high + room];
+    };
+  }
+
+  function draw(chart) {
+    const place = node("section", "chart");
+    const title = chart.title + (chart.unit ? ` (${chart.unit})` : "");
+    place.append(node("h3", "", title));
+    if (chart.about) place.append(node("p", "soft", chart.about));
+    $("charts").append(place);
+    const columns = chart.lines.map(unpack);
+    const series = chart.lines.map((line, k) => {
+      const inBand = (chart.band || []).includes(k);
+      return {
+        label: line.name, width: inBand ? 1 : 1.5, spanGaps: false, points: { show: count < 60 },
+        stroke: () => css(inBand ? "--l3" : `--l${k % 4}`), dash: k > 3 ? [5, 4] : undefined, value: (u, x) => short(x),
+      };
+    });
+    const u = new uPlot({
+      width: place.clientWidth, height: 170, legend: { live: true }, padding: [8, 8, 0, 0],
+      cursor: { sync: { key: "time", setSeries: false }, drag: { x: true, y: false }, y: false, points: { size: 6 } },
+      scales: { x: { time: false }, y: { distr: chart.log ? 3 : 1, range: range(chart, columns) } },
+      axes: [axis("s", { size: 30 }), axis("", chart.log ? decades : { size: 62, values: (v, ticks) => ticks.map(short) })],
+      series: [{ label: "s", value: (v, x) => x == null ? "" : x.toFixed(2) }, ...series],
+      bands: chart.band ? [{ series: [chart.band[1] + 1, chart.band[0] + 1], fill: () => css("--band") }] : [],
+      hooks: {
+        draw: [levels(chart)],
+        setScale: [(v, key) => { if (key === "x" && !busy) zoom(v.scales.x.min, v.scales.x.max); }],
+        setCursor: [(v) => { if (!busy && v.cursor.idx != null && v.cursor.event) go(v.cursor.idx); }],
+      },
+    }, [t, ...columns], place);
+    u.root.setAttribute("role", "img");
+    u.root.setAttribute("aria-label", `${title}. ${chart.about}`);
+    u.over.addEventListener("dblclick", () => zoom(0, end));
+    charts.push(u);
+  }
+
+  // --- ribbons -----------------------------------------------------------------------------------
+
+  const ribbons = [];
+  function ribbon(label, colour, holds) {
+    const row = node("div", "row"), canvas = node("canvas", "ribbon");
+    row.append(node("span", "", label), canvas);
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `${label}, over time`);
+    canvas.addEventListener("pointerdown", (e) => go(nearest(timeAt(canvas, e))));
+    $("ribbons").append(row);
+    ribbons.push({ canvas, colour, holds });
+  }
+  const plot = () => { // where curves have their time axis, css px from the left
+    const u = charts[0], ratio = window.devicePixelRatio || 1;
+    return u ? { left: u.bbox.left / ratio, width: u.bbox.width / ratio } : { left: 0, width: 300 };
+  };
+  const timeAt = (canvas, e) => {
+    const { left, width } = plot();
+    const share = (e.clientX - canvas.getBoundingClientRect().left - left) / width;
+    return view.from + Math.max(0, Math.min(1, share)) * (view.to - view.from);
+  };
+  function size(canvas) {
+    const ratio = window.devicePixelRatio || 1, box = canvas.getBoundingClientRect();
+    canvas.width = Math.round(box.width * ratio);
+    canvas.height = Math.round(box.height * ratio);
+    const pen = canvas.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return { pen, width: box.width, height: box.height };
+  }
+  function paintRibbon({ canvas, colour, holds }) {
+    const { pen, height } = size(canvas), { left, width } = plot();
+    const x = (time) => left + (time - view.from) / (view.to - view.from) * width;
+    pen.fillStyle = css("--panel");
+    pen.fillRect(left, 0, width, height);
+    const first = Math.max(nearest(view.from) - 1, 0), last = Math.min(nearest(view.to) + 1, count - 1);
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, 0, width, height);
+    pen.clip();
+    for (let k = first; k <= last; k++) {
+      if (!holds(k)) continue;
+      let next = k + 1;
+      while (next <= last && holds(next) && colour(next) === colour(k)) next++;
+      const until = next < count ? Math.min(t[next], t[next - 1] + 1) : t[count - 1];
+      pen.fillStyle = css(colour(k));
+      pen.fillRect(x(t[k]), 0, Math.max(x(until) - x(t[k]), 2), height); // one frame is seen, too
+      k = next - 1;
+    }
+    pen.restore();
+    pen.fillStyle = css("--ink");
+    pen.fillRect(x(t[view.at]) - 0.75, 0, 1.5, height);
+  }
+  function makeRibbons() {
+    const names = [...data.words.health.entries()].filter(([h]) => health.includes(h));
+    for (const [h, name] of names) {
+      const item = node("span"), box = node("i");
+      box.style.background = `var(${COLOURS[h]})`;
+      item.append(box, document.createTextNode(name));
+      $("key").append(item);
+    }
+    ribbon("health", (k) => status[k] === 128 ? COLOURS[health[k]] : "--refused", () => true);
+    let seen = 0;
+    for (const bits of reasons) seen |= bits;
+    for (let bit = 0; bit < 32; bit++) {
+      if (seen >>> bit & 1 && !harmless.has(bit)) {
+        ribbon(data.words.reasons[bit] || `reason ${bit}`, () => "--l1", (k) => reasons[k] >>> bit & 1);
+      }
+    }
+  }
+
+  // --- the map -----------------------------------------------------------------------------------
+
+  const marks = data.landmarks, ids = exact(marks.id), p = marks.p.map(exact), sigma = exact(marks.sigma);
+  const firstSeen = exact(marks.first), lastSeen = exact(marks.last), seen = exact(marks.seen);
+  const rejected = {};
+  for (const name of ["t", "id", "why", "in_succession", "mean2"]) rejected[name] = exact(marks.rejected[name]);
+  const tracks = data.map.tracks.map((track) => ({
+    name: track.name, p: track.p.map(unpack), t: exact(track.t),
+  }));
+  const map = { axes: data.map.axes.slice(), signs: (data.map.signs || [1, 1]).slice(), x: 0, y: 0, scale: 1, chosen: -1 };
+  const PENS = { estimate: ["--l0", []], truth: ["--truth", [2, 3]] };
+  const OTHERS = [["--l1", [7, 4]], ["--l2", [9, 3, 2, 3]], ["--l3", [3, 3]]]; // as in the curves of all runs
+  const runs = tracks.map((track) => track.name).filter((name) => !(name in PENS));
+  const penOf = (name) => PENS[name] || OTHERS[runs.indexOf(name) % OTHERS.length];
+  const flat = (q, k) => [map.signs[0] * q[map.axes[0]][k], map.signs[1] * q[map.axes[1]][k]];
+
+  function fit() {
+    const box = $("map").getBoundingClientRect(), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    for (const track of tracks.slice(0, 2)) for (let k = 0; k < track.t.length; k++) {
+      flat(track.p, k).forEach((x, i) => { if (x < low[i]) low[i] = x; if (x > high[i]) high[i] = x; });
+    }
+    if (low[0] > high[0]) return;
+    const side = Math.max(high[0] - low[0], high[1] - low[1], 1e-3);
+    map.scale = 0.8 * Math.min(box.width / Math.max(high[0] - low[0], side * 0.2), box.height / Math.max(high[1] - low[1], side * 0.2));
+    [map.x, map.y] = [0, 1].map((i) => (low[i] + high[i]) / 2);
+  }
+  function paintMap() {
+    const { pen, width, height } = size($("map"));
+    const at = ([a, b]) => [width / 2 + (a - map.x) * map.scale, height / 2 - (b - map.y) * map.scale];
+    pen.clearRect(0, 0, width, height);
+    pen.font = font;
+    const now = Math.round(t[view.at] * 1e3);
+    pen.fillStyle = css("--dot");
+    pen.globalAlpha = 0.55;
+    for (let k = 0; k < ids.length; k++) {
+      const [x, y] = at(flat(p, k));
+      if (x > 0 && y > 0 && x < width && y < height) pen.fillRect(x - 1.5, y - 1.5, 3, 3);
+    }
+    pen.globalAlpha = 1;
+    tracks.forEach((track) => {
+      const [colour, dashes] = penOf(track.name);
+      pen.strokeStyle = css(colour);
+      pen.setLineDash(dashes);
+      pen.lineWidth = 1.8;
+      pen.beginPath();
+      const step = Math.max(1, Math.floor(track.t.length / 20000));
+      for (let k = 0; k < track.t.length; k += step) pen.lineTo(...at(flat(track.p, k)));
+      pen.stroke();
+    });
+    pen.setLineDash([]);
+    const own = tracks[0];
+    if (own) {
+      let k = 0;
+      while (k < own.t.length - 1 && own.t[k + 1] <= now) k++;
+      const [x, y] = at(flat(own.p, k));
+      pen.fillStyle = css("--accent");
+      pen.strokeStyle = css("--paper");
+      pen.lineWidth = 2;
+      pen.beginPath();
+      pen.arc(x, y, 6, 0, 7);
+      pen.fill();
+      pen.stroke();
+    }
+    const of = (id) => ids.indexOf(id);
+    pen.strokeStyle = css("--lost");
+    for (let k = lower(rejected.t, now); k < rejected.t.length && rejected.t[k] === now; k++) {
+      const mark = of(rejected.id[k]);
+      if (mark < 0) continue;
+      const [x, y] = at(flat(p, mark));
+      pen.strokeRect(x - 4, y - 4, 8, 8);
+    }
+    if (map.chosen >= 0) {
+      const [x, y] = at(flat(p, map.chosen));
+      pen.strokeStyle = css("--ink");
+      pen.beginPath();
+      pen.arc(x, y, Math.max(8, 3 * sigma[map.chosen] * map.scale), 0, 7);
+      pen.stroke();
+    }
+    scaleBar(pen, height);
+    const box = { paint: at, width, height };
+    map.at = box.paint;
+  }
+  function scaleBar(pen, height) {
+    const wanted = 90 / map.scale, power = 10 ** Math.floor(Math.log10(wanted));
+    const metres = [5, 2, 1].find((n) => n * power <= wanted) * power;
+    const names = map.axes.map((a, i) => (map.signs[i] < 0 ? "-" : "") + "xyz"[a]);
+    pen.fillStyle = pen.strokeStyle = css("--ink");
+    pen.lineWidth = 2;
+    pen.beginPath();
+    pen.moveTo(12, height - 14);
+    pen.lineTo(12 + metres * map.scale, height - 14);
+    pen.stroke();
+    pen.fillText(`${metres} m; right ${names[0]}, up ${names[1]}`, 12, height - 22);
+  }
+  function lower(column, value) {
+    let low = 0, high = column.length;
+    while (low < high) { const m = (low + high) >> 1; if (column[m] < value) low = m + 1; else high = m; }
+    return low;
+  }
+  function choose(mark) {
+    map.chosen = mark;
+    const place = $("landmark");
+    if (mark < 0) { place.replaceChildren(node("p", "soft", "No such landmark in this page.")); return; }
+    const id = ids[mark], s = (ms) => (ms / 1e3).toFixed(2);
+    const where = p.map((column) => column[mark].toFixed(2)).join(", ");
+    const lines = [
+      `Landmark ${id} at (${where}) m, sigma ${sigma[mark].toPrecision(2)} m`,
+      seen[mark] ? `seen in ${seen[mark]} frames, from ${s(firstSeen[mark])} to ${s(lastSeen[mark])} s` : "never seen in this log",
+    ];
+    const why = new Map(), times = [];
+    for (let k = 0; k < rejected.id.length; k++) {
+      if (rejected.id[k] !== id) continue;
+      const words = Object.entries(data.words.why).filter(([bit]) => rejected.why[k] & bit).map(([, w]) => w).join(", ");
+      why.set(words, (why.get(words) || 0) + 1);
+      times.push(rejected.t[k]);
+    }
+    for (const [words, n] of why) lines.push(`${words || "not used"}: ${n} times`);
+    if (!times.length) lines.push("never rejected");
+    place.replaceChildren(...lines.map((line) => node("p", "", line)));
+    for (const ms of times.slice(0, 12)) {
+      const button = node("button", "", `${s(ms)} s`);
+      button.addEventListener("click", () => go(nearest(ms / 1e3), true));
+      place.append(button);
+    }
+    if (times.length > 12) place.append(node("span", "soft", ` and ${times.length - 12} more`));
+    $("id").value = id;
+    later();
+  }
+  function mapTools() {
+    const canvas = $("map");
+    tracks.forEach((track) => {
+      const item = node("span"), line = node("i");
+      line.style.background = `var(${penOf(track.name)[0]})`;
+      item.append(line, document.createTextNode(track.name));
+      $("pens").append(item);
+    });
+    let from = null;
+    canvas.addEventListener("pointerdown", (e) => { from = { x: e.offsetX, y: e.offsetY, moved: false }; });
+    canvas.addEventListener("pointermove", (e) => {
+      if (!from || e.buttons !== 1) return;
+      const [dx, dy] = [e.offsetX - from.x, e.offsetY - from.y];
+      if (!from.moved && Math.hypot(dx, dy) < 4) return;
+      map.x -= dx / map.scale;
+      map.y += dy / map.scale;
+      from = { x: e.offsetX, y: e.offsetY, moved: true };
+      later();
+    });
+    canvas.addEventListener("pointerup", (e) => {
+      if (from && !from.moved) {
+        let best = -1, least = 20;
+        for (let k = 0; k < ids.length; k++) {
+          const [x, y] = map.at(flat(p, k)), far = Math.hypot(x - e.offsetX, y - e.offsetY);
+          if (far < least) { least = far; best = k; }
+        }
+        if (best >= 0) choose(best);
+      }
+      from = null;
+    });
+    canvas.addEventListener("wheel", (e) => { e.preventDefault(); closer(e.deltaY < 0 ? 1.25 : 0.8); }, { passive: false });
+    $("closer").addEventListener("click", () => closer(1.4));
+    $("farther").addEventListener("click", () => closer(1 / 1.4));
+    $("whole").addEventListener("click", () => { fit(); later(); });
+    $("side").addEventListener("click", () => {
+      const [a, b] = map.axes, third = 3 - a - b;
+      map.axes = [a, third].includes(b) ? map.axes : [a, third];
+      map.signs = [map.signs[0], 1];
+      fit();
+      later();
+    });
+    $("id").addEventListener("change", (e) => choose(ids.indexOf(Number(e.target.value))));
+  }
+  const closer = (by) => { map.scale *= by; later(); };
+
+  // --- one cursor, one zoom ----------------------------------------------------------------------
+
+  let waiting = false;
+  function later() { // once a picture of the screen
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; ribbons.forEach(paintRibbon); paintMap(); tell(); });
+  }
+  function go(k, show) {
+    view.at = Math.max(0, Math.min(count - 1, k));
+    if (show && (t[view.at] < view.from || t[view.at] > view.to)) {
+      const half = (view.to - view.from) / 2;
+      zoom(t[view.at] - half, t[view.at] + half);
+    }
+    busy = true;
+    for (const u of charts) {
+      const left = u.valToPos(t[view.at], "x");
+      if (Math.abs((u.cursor.left ?? -10) - left) > 0.5) u.setCursor({ left, top: 10 }, false);
+    }
+    busy = false;
+    later();
+  }
+  function zoom(from, to) {
+    const least = Math.min(end, 0.2);
+    if (to - from < least) { const middle = (from + to) / 2; from = middle - least / 2; to = middle + least / 2; }
+    if (from < 0) { to -= from; from = 0; }
+    if (to > end) { from = Math.max(0, from - (to - end)); to = end; }
+    if (from === view.from && to === view.to && charts.every((u) => u.scales.x.min === from)) return;
+    view.from = from;
+    view.to = to;
+    busy = true;
+    for (const u of charts) u.setScale("x", { min: from, max: to });
+    setTimeout(() => { busy = false; go(view.at); }); // uPlot commits its scales in a microtask
+    later();
+  }
+  const scale = (by) => {
+    const half = (view.to - view.from) / 2 * by, middle = t[view.at];
+    zoom(middle - half, middle + half);
+  };
+  const events = [...document.querySelectorAll("button.event")];
+  function event(k) {
+    if (!events.length) return;
+    const { from, to } = events[k].dataset, [a, b] = [Number(from), Number(to)];
+    const room = Math.max((b - a) * 0.3, 2);
+    zoom(a - room, b + room);
+    go(nearest(a));
+  }
+  const next = (by) => {
+    const begins = events.map((e) => Number(e.dataset.from));
+    const now = t[view.at];
+    const found = by > 0 ? begins.findIndex((x) => x > now + 0.05) : begins.findLastIndex((x) => x < now - 0.05);
+    if (found >= 0) event(found);
+  };
+  const theme = () => {
+    const root = document.documentElement;
+    const dark = root.classList.contains("dark") ||
+      (!root.classList.contains("light") && matchMedia("(prefers-color-scheme: dark)").matches);
+    root.classList.remove("dark", "light");
+    root.classList.add(dark ? "light" : "dark");
+    repaint();
+  };
+  function repaint() { for (const u of charts) u.redraw(false, true); later(); }
+  const KEYS = {
+    ArrowLeft: (e) => go(view.at - (e.shiftKey ? 10 : 1), true),
+    ArrowRight: (e) => go(view.at + (e.shiftKey ? 10 : 1), true),
+    Home: () => go(0, true), End: () => go(count - 1, true),
+    "+": () => scale(0.5), "=": () => scale(0.5), "-": () => scale(2), 0: () => zoom(0, end),
+    n: () => next(1), p: () => next(-1), d: theme,
+  };
+  document.addEventListener("keydown", (e) => {
+    if (e.target.matches("input, textarea, select") || e.ctrlKey || e.metaKey || e.altKey) return;
+    const act = KEYS[e.key];
+    if (act) { e.preventDefault(); act(e); }
+  });
+  $("in").addEventListener("click", () => scale(0.5));
+  $("out").addEventListener("click", () => scale(2));
+  $("all").addEventListener("click", () => zoom(0, end));
+  $("back").addEventListener("click", () => go(view.at - 1, true));
+  $("on").addEventListener("click", () => go(view.at + 1, true));
+  $("previous").addEventListener("click", () => next(-1));
+  $("next").addEventListener("click", () => next(1));
+  $("theme").addEventListener("click", theme);
+  events.forEach((button, k) => button.addEventListener("click", () => event(k)));
+
+  makeRibbons();
+  data.charts.forEach(draw);
+  mapTools();
+  fit();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  new ResizeObserver(() => {
+    for (const u of charts) {
+      const width = u.root.parentElement.clientWidth;
+      if (width && width !== u.width) u.setSize({ width, height: 170 });
+    }
+    later();
+  }).observe($("charts"));
+  if (events.length) event(0); else go(0);
+  document.documentElement.dataset.ready = "yes";
+  window.pelorus = { view, go, zoom, count, t }; // for tests, and for the console
+})();

@@ -1,0 +1,379 @@
+# SPDX-License-Identifier: MIT
+"""What the page draws of one log: curves over time, health with its reasons, the way and the map,
+what became of each landmark, and the evidence.
+
+Curves are whole. Of landmarks and rejections there may be too many for a page: the oldest and least
+seen are left out, and `left_out` says how many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from pelorus import schema
+from pelorus.evaluation import Accuracy, assess, by_imu, made_in, on_its_clock, sigmas_m
+from pelorus.evidence import Evidence
+from pelorus.frame_table import frame_table
+from pelorus.frames import Message, Stereo, Truth, TruthKnows
+from pelorus.grid.plane import AXES, choose
+from pelorus.health import SHORT
+from pelorus.layout import Floats
+from pelorus.motion import Times
+from pelorus.report.packed import Packer
+from pelorus.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
+from pelorus.wire import header_of_messages
+
+SIGMAS = 3.0
+BAND = 0.95
+LANDMARKS_MOST = 20_000
+REJECTIONS_MOST = 60_000
+INSIDE = (
+    "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
+    "filter stays inside."
+)
+WHY = {1: "rejected by the gate", 2: "far off", 4: "it moves"}  # EVIDENCE's `why`
+RHO_THETA = tuple(f"var_{part}_{axis}" for part in ("rho", "theta") for axis in AXES)
+
+
+class Other(NamedTuple):
+    """Another run over the same recording, drawn beside."""
+
+    trajectory: Trajectory
+    accuracy: Accuracy | None
+
+
+class Curves:
+    """Builds what the page reads, as JSON that refers to columns in a Packer."""
+
+    def __init__(
+        self,
+        messages: Sequence[Message],
+        truth: Trajectory | None = None,
+        others: Mapping[str, Other] | None = None,
+    ) -> None:
+        self.packer = Packer()
+        self.left_out: list[str] = []
+        self._others = others or {}
+        self._messages = messages
+        self._frames = frame_table(messages)
+        self._t = self._seconds(self._frames.t_ns)
+        found = estimate_in(messages)
+        self._found = found
+        truth = truth_in(messages) if truth is None else truth
+        self._accuracy = _accuracy(messages, found, truth)
+
+    @property
+    def origin_ns(self) -> int:
+        return int(self._frames.t_ns[0])
+
+    def _seconds(self, t_ns: Times) -> Floats:
+        """Since the first frame; a clock that went back stands still."""
+        return np.asarray(np.maximum.accumulate((t_ns - self.origin_ns) * 1e-9))
+
+    def json(self) -> dict[str, Any]:
+        """All of it but the columns."""
+        return {
+            "t": self.packer.add_exactly(np.round(self._t * 1e3), "u4"),  # ms
+            "health": self.packer.add_exactly(self._frames["health"], "u1"),
+            "reasons": self.packer.add_exactly(self._frames.reasons, "u4"),
+            "status": self.packer.add_exactly(self._frames["status"] + 128, "u1"),
+            "words": _words(),
+            "charts": list(self._charts()),
+            "map": self._map(),
+            "landmarks": self._landmarks(),
+        }
+
+    # --- curves -----------------------------------------------------------------------------------
+
+    def _charts(self) -> Iterator[dict[str, Any]]:
+        yield from self._errors()
+        yield self._innovations()
+        yield from self._biases()
+        yield from self._observations()
+        yield self._timing()
+        yield from self._evidence()
+
+    def _chart(
+        self, title: str, unit: str, about: str, lines: Sequence[tuple[str, Floats]], **more: Any
+    ) -> dict[str, Any]:
+        columns = [{"name": name, **self.packer.add(values)} for name, values in lines]
+        return {"title": title, "unit": unit, "about": about, "lines": columns, **more}
+
+    def _errors(self) -> Iterator[dict[str, Any]]:
+        sigma = np.sqrt(self._frames.stack(*RHO_THETA))
+        accuracy = self._accuracy
+        if accuracy is None:
+            p, r = (SIGMAS * np.linalg.norm(sigma[:, part], axis=1) for part in _PARTS)
+            about = "Three sigma of the filter's own covariance, all axes; the log has no truth."
+            yield self._chart("Position uncertainty", "m", about, [("3 sigma", p)])
+            about = "The same of the rotation."
+            yield self._chart("Rotation uncertainty", "deg", about, [("3 sigma", np.degrees(r))])
+            return
+        error = self._spread(accuracy.t_ns, accuracy.error)
+        for k, axis in enumerate(AXES):
+            about = "" if k else INSIDE
+            band = SIGMAS * sigma[:, k]
+            lines = [("error", error[:, k]), ("- 3 sigma", -band), ("+ 3 sigma", band)]
+            yield self._chart(f"Position error, {axis}", "m", about, lines, band=[1, 2])
+        turn = np.degrees(np.linalg.norm(error[:, 3:], axis=1))
+        bound = np.degrees(SIGMAS * np.linalg.norm(sigma[:, 3:], axis=1))
+        about = "Angle of the rotation between estimate and truth, and three sigma of it."
+        lines = [("error", turn), ("3 sigma", bound)]
+        yield self._chart("Rotation error", "deg", about, lines)
+        low, high = np.array(chi2.interval(BAND, POSE_SIZE)) / POSE_SIZE
+        about = (
+            "Normalised estimation error squared, a degree of freedom: 1 on average for an honest "
+            "filter; 95 % of its frames are in the band."
+        )
+        nees = self._spread(accuracy.t_ns, accuracy.nees[:, None])[:, 0]
+        own = [("NEES", nees)]
+        lines = own + [(name, x[:, 0]) for name, x in self._of_others(lambda a: a.nees[:, None])]
+        yield self._chart("NEES / 6", "", about, lines, log=True, levels=[low, high])
+        if self._others:
+            here = np.linalg.norm(error[:, :3], axis=1)
+            there = self._of_others(lambda a: np.linalg.norm(a.error[:, :3], axis=1)[:, None])
+            lines = [("this", here), *((name, x[:, 0]) for name, x in there)]
+            about = "Distance from the truth, first poses aligned."
+            yield self._chart("Position error of each run", "m", about, lines)
+
+    def _of_others(self, values: Callable[[Accuracy], Floats]) -> list[tuple[str, Floats]]:
+        return [
+            (name, self._spread(other.accuracy.t_ns, values(other.accuracy)))
+            for name, other in self._others.items()
+            if other.accuracy is not None
+        ]
+
+    def _spread(self, t_ns: Times, values: Floats) -> Floats:
+        """At all frames: NaN where there is no truth."""
+        out = np.full((len(self._frames.t_ns), values.shape[1]), np.nan)
+        order = np.argsort(t_ns, kind="stable")
+        at = np.searchsorted(t_ns[order], self._frames.t_ns)
+        at = np.minimum(at, len(t_ns) - 1)
+        same = t_ns[order][at] == self._frames.t_ns
+        out[same] = values[order[at[same]]]
+        return out
+
+    def _innovations(self) -> dict[str, Any]:
+        dof = self._frames["nis_dof"]
+        known = dof > 0
+        safe = np.where(known, dof, 1)
+        nis, low, high = (
+            np.where(known, values, np.nan)
+            for values in (
+                self._frames["nis"] / safe,
+                chi2.ppf((1 - BAND) / 2, safe) / safe,
+                chi2.ppf((1 + BAND) / 2, safe) / safe,
+            )
+        )
+        about = (
+            "Innovations squared in their own sigmas, a degree of freedom (NIS): 1 is due, and "
+            "95 % of the frames in the band if noise is as set. Above: pixel-sigma is too small."
+        )
+        lines = [("NIS", nis), ("low", low), ("high", high)]
+        return self._chart("Innovations", "NIS / dof", about, lines, band=[1, 2], levels=[1.0])
+
+    def _biases(self) -> Iterator[dict[str, Any]]:
+        frames = self._frames
+        kinds = (
+            (("v", "Accelerometer bias", "m/s²"), ("w", "Gyro bias", "rad/s"))
+            if frames.by_imu
+            else (("v", "Velocity bias", "m/s"), ("w", "Turn rate bias", "rad/s"))
+        )
+        for letter, title, unit in kinds:
+            values = frames.stack(*(f"bias_{letter}{axis}" for axis in AXES))
+            if not np.nan_to_num(values).any():
+                continue  # they are not estimated
+            variance = frames.stack(*(f"var_bias_{letter}{axis}" for axis in AXES))
+            lines = [(axis, values[:, k]) for k, axis in enumerate(AXES)]
+            sigma = np.sqrt(np.clip(variance, 0, None)).max(axis=1)
+            lines.append(("largest sigma", sigma))
+            about = "As estimated, and the largest of its sigmas."
+            true = self._true_biases()["vw".index(letter)]
+            if np.isfinite(true).any():
+                about = "As estimated, as the recording knows it, and the largest of its sigmas."
+                lines += [(f"{axis} true", true[:, k]) for k, axis in enumerate(AXES)]
+            yield self._chart(title, unit, about, lines)
+
+    def _true_biases(self) -> tuple[Floats, Floats]:
+        known = [m for m in self._messages if isinstance(m, Truth) and m.knows & TruthKnows.BIAS]
+        if not known:
+            nothing = np.full((len(self._t), 3), np.nan)
+            return nothing, nothing
+        t_ns = np.array([m.t_ns for m in known], np.int64)
+        true = self._spread(t_ns, np.array([m.bias for m in known], np.float64).reshape(-1, 6))
+        return true[:, :3], true[:, 3:]
+
+    def _observations(self) -> Iterator[dict[str, Any]]:
+        frames = self._frames
+        about = "Points in the frame, those of landmarks in the state, and those that were used."
+        names = ("observations", "matched", "used")
+        lines = [(name, frames[name]) for name in names]
+        yield self._chart("Points", "a frame", about, lines)
+        matched = frames["matched"]
+        share = np.divide(
+            100 * frames["gated"], matched, out=np.full(len(matched), np.nan), where=matched > 0
+        )
+        about = "Of the matches, by the gate. As the sigmas say it is one of a hundred."
+        yield self._chart("Rejected", "%", about, [("rejected", share)])
+
+    def _timing(self) -> dict[str, Any]:
+        ms = self._frames["update_us"] * 1e-3
+        period = np.diff(self._t, prepend=np.nan) * 1e3
+        lines = [("period of the frames", np.where(period > 0, period, np.nan))]
+        if ms.any():
+            lines.append(("computing", np.where(ms > 0, ms, np.nan)))
+        about = "Time between frames, and the time that each took to compute."
+        return self._chart("Timing", "ms", about, lines, log=True)
+
+    def _evidence(self) -> Iterator[dict[str, Any]]:
+        evidence = {m.t_ns: m for m in self._messages if isinstance(m, Evidence)}
+        if not evidence:
+            return
+        rows = [evidence.get(t) for t in self._frames.t_ns.tolist()]
+        statistic, weight, agreement = (
+            np.array([np.nan if e is None else getattr(e, name) for e in rows])
+            for name in ("statistic", "weight", "agreement")
+        )
+        about = (
+            "Why: the sum of the differences between pictures and odometry, chi-square of six in "
+            "what is usual on this drive. Above 32 the pose is doubted."
+        )
+        lines = [("statistic", np.maximum(statistic, 1e-2))]
+        yield self._chart("Doubt", "chi-square", about, lines, log=True, levels=[32.0])
+        about = "Why: by how much the odometry's sigmas are widened; 1 is as stated."
+        yield self._chart("Weight", "times sigma", about, [("weight", weight)], log=True)
+        nu = np.array([np.full(6, np.nan) if e is None else np.abs(e.nu) for e in rows])
+        lines = [
+            ("translation", np.linalg.norm(nu[:, :3], axis=1)),
+            ("rotation", np.linalg.norm(nu[:, 3:], axis=1)),
+            ("agreement", agreement),
+        ]
+        about = (
+            "Why: pictures less odometry in the odometry's stated sigmas, and the share of the "
+            "last frames in which both agreed."
+        )
+        yield self._chart("Pictures less odometry", "sigma", about, lines, log=True)
+
+    # --- the way and the map ----------------------------------------------------------------------
+
+    def _map(self) -> dict[str, Any]:
+        if self._found is None:
+            return {"tracks": [], "axes": [0, 1]}
+        trajectory = self._found[0]
+        plane = choose(header_of_messages(self._messages).body_axes, trajectory.poses)
+        tracks = [self._track("estimate", trajectory.t_ns, trajectory.poses.p)]
+        if self._accuracy is not None:
+            tracks.append(self._track("truth", self._accuracy.t_ns, self._accuracy.truth.p))
+        tracks += [
+            self._track(name, other.trajectory.t_ns, other.trajectory.poses.p)
+            for name, other in self._others.items()
+        ]
+        return {
+            "tracks": tracks,
+            "axes": [plane.right.number, plane.up.number],
+            "signs": [plane.right.sign, plane.up.sign],
+        }
+
+    def _track(self, name: str, t_ns: Times, p: Floats) -> dict[str, Any]:
+        columns = [self.packer.add(p[:, k]) for k in range(3)]
+        t = self.packer.add_exactly(np.round(self._seconds(t_ns) * 1e3), "u4")
+        return {"name": name, "p": columns, "t": t}
+
+    def _landmarks(self) -> dict[str, Any]:
+        """What the filter left behind, and the history of each id that the log shows."""
+        made = {m.id: m for m in made_in(self._messages)}
+        kept = sorted(made.values(), key=lambda m: -m.times_seen)[:LANDMARKS_MOST]
+        if len(made) > len(kept):
+            self.left_out.append(
+                f"{len(made) - len(kept)} of {len(made)} landmarks, those seen least often"
+            )
+        ids = np.array([m.id for m in kept], np.int64)
+        first, last, seen = self._sightings(ids)
+        p = np.array([m.p_W_m for m in kept]).reshape(-1, 3)
+        exactly = self.packer.add_exactly
+        return {
+            "id": exactly(ids, "u4"),
+            "p": [exactly(p[:, k], "f4") for k in range(3)],
+            "sigma": exactly(sigmas_m(kept), "f4"),
+            "first": exactly(first, "u4"),
+            "last": exactly(last, "u4"),
+            "seen": exactly(seen, "u4"),
+            "rejected": self._rejections(),
+        }
+
+    def _sightings(self, ids: Any) -> tuple[Any, Any, Any]:
+        """First and last frame in which each was seen, ms, and in how many."""
+        frames = [m for m in self._messages if isinstance(m, Stereo)]
+        if not frames or not len(ids):
+            nothing = np.zeros(len(ids), np.int64)
+            return nothing, nothing, nothing
+        t_ms = np.array([max(m.t_ns - self.origin_ns, 0) // 1_000_000 for m in frames])
+        when = np.repeat(t_ms, [len(m.ids) for m in frames])
+        every = np.concatenate([m.ids for m in frames]).astype(np.int64)
+        known, at = np.unique(every, return_inverse=True)
+        first = np.full(len(known), np.iinfo(np.int64).max)
+        last, seen = np.zeros(len(known), np.int64), np.bincount(at, minlength=len(known))
+        np.minimum.at(first, at, when)
+        np.maximum.at(last, at, when)
+        where = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+        there = known[where] == ids
+        return tuple(np.where(there, x[where], 0) for x in (first, last, seen))  # type: ignore[return-value]
+
+    def _rejections(self) -> dict[str, Any]:
+        rows = [
+            (max(m.t_ns - self.origin_ns, 0) // 1_000_000, m.rejected)
+            for m in self._messages
+            if isinstance(m, Evidence) and len(m.rejected)
+        ]
+        when = np.repeat([t for t, _ in rows], [len(r) for _, r in rows]).astype(np.int64)
+        names = ("id", "why", "in_succession", "mean2")
+        columns = [
+            np.concatenate([r[name] for _, r in rows]) if rows else np.zeros(0) for name in names
+        ]
+        count = len(when)
+        if count > REJECTIONS_MOST:
+            self.left_out.append(
+                f"{count - REJECTIONS_MOST} of {count} rejections, all but every "
+                f"{-(-count // REJECTIONS_MOST)}th"
+            )
+            every = slice(None, None, -(-count // REJECTIONS_MOST))
+            when, columns = when[every], [x[every] for x in columns]
+        exactly = self.packer.add_exactly
+        kinds = ("u4", "u1", "u2", "f4")
+        found = {
+            name: exactly(x, kind) for name, x, kind in zip(names, columns, kinds, strict=True)
+        }
+        return found | {"t": exactly(when, "u4")}
+
+
+_PARTS = (slice(0, 3), slice(3, 6))
+
+
+def _words() -> dict[str, Any]:
+    reasons = {
+        str(bit.bit_length() - 1): SHORT.get(name, schema.REASONS[bit])
+        for bit, name in schema.REASON_NAMES.items()
+    }
+    harmless = [k for k in range(32) if schema.LIMITS["harmless_reasons"] >> k & 1]
+    return {
+        "health": list(schema.HEALTHS.values()),
+        "reasons": reasons,
+        "harmless": harmless,
+        "status": {str(k): words.partition(":")[0] for k, words in schema.STATUSES.items()},
+        "why": {str(k): words for k, words in WHY.items()},
+    }
+
+
+def _accuracy(
+    messages: Sequence[Message],
+    found: tuple[Trajectory, Floats] | None,
+    truth: Trajectory | None,
+) -> Accuracy | None:
+    if found is None or truth is None:
+        return None
+    on_clock = on_its_clock(messages, truth, found[0])
+    return assess(found[0], on_clock, found[1], upright=by_imu(messages))
