@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -22,7 +23,10 @@ from pelorus.explain import Explanation, explain
 from pelorus.explain.explanation import LINES
 from pelorus.explain.finding import Cause
 from pelorus.explain.log import runs
-from pelorus.frames import Message, Stereo, Twist
+from pelorus.frames import Header, Message, Pose, Report, Stereo, Twist
+from pelorus.frames import Imu as ImuReadings
+from pelorus.report import answers, page
+from pelorus.report.curves import Curves
 from pelorus.simulation.imu import Imu
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
@@ -191,6 +195,51 @@ def test_logs_that_tell_nothing_are_refused(pelorus: Command, tmp_path: Path) ->
     empty.write_bytes(b"")
     assert "the file is empty" in pelorus("explain", empty, status=1).err
     assert "there is no such file" in pelorus("explain", tmp_path / "no.plr", status=1).err
+
+
+def test_a_robot_that_answers_late_is_explained_alike(tmp_path: Path) -> None:
+    log = log_of(simulated(slip=0.4, slip_span=Span(17.0, 3.0)), tmp_path)
+    late, held = list[Message](), list[Message]()
+    for m in log:  # answers stand behind the next frame
+        if isinstance(m, Pose | Report | Evidence):
+            held.append(m)
+            continue
+        late.append(m)
+        if isinstance(m, Stereo):
+            late[-1:] = [m, *held[:-3]] if len(held) > 3 else [m]
+            held = held[-3:]
+    found, due = explain([*late, *held]), explain(log)
+    assert found.first == due.first
+    assert [e.first for e in found.episodes] == [e.first for e in due.episodes]
+
+
+@pytest.mark.parametrize("by_imu", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_stands_in_a_log_no_number_warns(tmp_path: Path, seed: int, by_imu: bool) -> None:
+    chance = np.random.default_rng(seed)
+    wild = np.array([np.nan, np.inf, -np.inf, 1e38, -1e38, 0.0, 1e7])
+
+    def spoilt(m: Message) -> Message:
+        if chance.random() > 0.05:
+            return m
+        if isinstance(m, Stereo) and len(m.ids):
+            pixels = m.pixels.copy()
+            pixels[chance.integers(len(pixels), size=5)] = chance.choice(wild, (5, 4))
+            return replace(m, pixels=pixels)
+        if isinstance(m, Twist):
+            return replace(m, v_B_mps=chance.choice(wild * 1e200, 3))
+        if isinstance(m, ImuReadings):
+            return replace(m, w_B_radps=chance.choice(wild, m.w_B_radps.shape))
+        return m
+
+    log = log_of([spoilt(m) for m in simulated(by_imu)], tmp_path)
+    chosen = [m for m in log if chance.random() > 0.01 or isinstance(m, Header)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = explain(chosen)
+        json.dumps(found.json(), allow_nan=False)
+        assert 1 <= len(found.lines()) <= LINES
+        page.write(tmp_path / "p.html", answers.of_explanation(found, "x"), Curves(chosen))
 
 
 def test_runs_are_first_and_last_of_each_stretch() -> None:

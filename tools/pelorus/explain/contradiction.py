@@ -207,7 +207,7 @@ def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Fla
     frame = np.repeat(np.arange(count), [len(m.ids) for m in frames])
     ids = np.concatenate([m.ids for m in frames]).astype(np.int64)
     pixels = np.concatenate([m.pixels for m in frames]).astype(np.float64).reshape(-1, 4)
-    good = (np.abs(pixels) < PIXEL_MOST_PX).all(axis=1)
+    good = (np.abs(pixels) < PIXEL_MOST_PX).all(axis=1)  # and finite
     camera = log.header.camera
     seen = seen_pairs(Tracks.from_rows(count, frame[good], ids[good], pixels[good]), camera, 1)
     T_CB = Poses(np.asarray(log.header.R_CB), np.asarray(log.header.t_CB_m))

@@ -5,6 +5,7 @@ and every reading.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus import schema
 from pelorus.errors import PelorusError
 from pelorus.evidence import Evidence, EvidenceFlag
 from pelorus.frames import Header, Imu, Kind, Message, Pose, Report, Stereo, Twist
@@ -85,11 +87,6 @@ class Log:
         return np.array([_repeated(first, second) for first, second in self._pairs], np.int64)
 
     @cached_property
-    def flow_px(self) -> Floats:
-        """Median way of the shared points in the left picture; NaN where they are few."""
-        return np.array([_flow(first, second) for first, second in self._pairs])
-
-    @cached_property
     def _pairs(self) -> list[tuple[Pixels, Pixels]]:
         nothing = np.zeros((0, 4), np.float32)
         out = [(nothing, nothing)]
@@ -103,57 +100,85 @@ def _repeated(first: Pixels, second: Pixels) -> int:
     return int((first == second).all(axis=1).sum())
 
 
-def _flow(first: Pixels, second: Pixels) -> float:
-    if len(first) < FEW:
-        return np.nan
-    return float(np.median(np.hypot(*(second - first)[:, :2].T.astype(np.float64))))
-
-
 def log_of(messages: Sequence[Message]) -> Log:
     """PelorusError where no frame was answered."""
-    frames: list[Stereo] = []
-    reports: dict[int, Report] = {}
-    poses: dict[int, Pose] = {}
-    evidence: dict[int, Evidence] = {}
-    behind: list[int] = []
-    stamps: list[int] = []
-    rows: list[Floats] = []
-    refused: list[Report] = []
-    by_imu = any(isinstance(m, Imu) for m in messages)
-    for m in messages:
-        if isinstance(m, Stereo):
-            frames.append(m)
-            behind.append(stamps[-1] if stamps else NO_READING)
-        elif isinstance(m, Report) and m.subject == Kind.STEREO:
-            reports.setdefault(len(frames) - 1, m)
-        elif isinstance(m, Report) and m.subject in (Kind.TWIST, Kind.IMU) and m.status:
-            refused.append(m)
-        elif isinstance(m, Pose) and m.after_stereo:
-            poses[len(frames) - 1] = m
-        elif isinstance(m, Evidence):
-            evidence[len(frames) - 1] = m
-        elif isinstance(m, Imu):
-            stamps += m.times_ns
-            rows.append(np.hstack((m.a_B_mps2, m.w_B_radps)))
-        elif isinstance(m, Twist) and not by_imu:
-            stamps.append(m.t_ns)
-            rows.append(np.concatenate((m.v_B_mps, m.w_B_radps))[None])
-    answered = [k for k in range(len(frames)) if k in reports]
+    frames, reports, poses, evidence = _answers(messages)
+    answered = sorted(reports)
     if not answered:
         raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
+    behind, stamps, readings = _readings(messages)
     return Log(
         header_of_messages(messages),
         [frames[k] for k in answered],
         [reports[k] for k in answered],
         [poses.get(k) for k in answered],
         [evidence.get(k) for k in answered],
-        np.array([behind[k] for k in answered], np.int64),
-        np.array(stamps, np.int64),
-        np.concatenate(rows).astype(np.float64) if rows else np.zeros((0, 6)),
-        by_imu,
-        refused,
+        behind[answered],
+        stamps,
+        readings,
+        any(isinstance(m, Imu) for m in messages),
+        [
+            m
+            for m in messages
+            if isinstance(m, Report) and m.subject in (Kind.TWIST, Kind.IMU) and m.status
+        ],
         _sigma(messages),
     )
+
+
+def _answers(
+    messages: Sequence[Message],
+) -> tuple[list[Stereo], dict[int, Report], dict[int, Pose], dict[int, Evidence]]:
+    """All frames, and what answers each, by its number. A robot's answer comes when it is ready, so
+    it is known by its time; a pose stands before the report, evidence behind it.
+    """
+    frames: list[Stereo] = []
+    waiting: dict[int, deque[int]] = {}
+    reports: dict[int, Report] = {}
+    poses: dict[int, Pose] = {}
+    evidence: dict[int, Evidence] = {}
+    pose: Pose | None = None
+    last: int | None = None
+    for m in messages:
+        if isinstance(m, Stereo):
+            waiting.setdefault(m.t_ns, deque()).append(len(frames))
+            frames.append(m)
+        elif isinstance(m, Pose) and m.after_stereo:
+            pose = m
+        elif isinstance(m, Report) and m.subject == Kind.STEREO:
+            last = waiting[m.t_ns].popleft() if waiting.get(m.t_ns) else None
+            if last is not None:
+                reports[last] = m
+                if pose is not None:
+                    poses[last] = pose
+            pose = None
+        elif isinstance(m, Evidence) and last is not None:
+            evidence[last] = m
+    return frames, reports, poses, evidence
+
+
+def _readings(messages: Sequence[Message]) -> tuple[Times, Times, Floats]:
+    """For each frame the newest stamp before it; stamps and readings that a filter may use. What is
+    no number, or none that a sensor gives, was refused: it is no part of the motion.
+    """
+    by_imu = any(isinstance(m, Imu) for m in messages)
+    behind: list[int] = []
+    stamps: list[int] = []
+    rows: list[Floats] = []
+    for m in messages:
+        if isinstance(m, Stereo):
+            behind.append(stamps[-1] if stamps else NO_READING)
+        elif isinstance(m, Imu):
+            stamps += m.times_ns
+            rows.append(np.hstack((m.a_B_mps2, m.w_B_radps)).astype(np.float64))
+        elif isinstance(m, Twist) and not by_imu:
+            stamps.append(m.t_ns)
+            rows.append(np.concatenate((m.v_B_mps, m.w_B_radps))[None])
+    readings = np.concatenate(rows) if rows else np.zeros((0, 6))
+    most = schema.PLAUSIBLE["ACCELERATION" if by_imu else "SPEED"]
+    bounds = np.repeat([most, schema.PLAUSIBLE["RATE"]], 3)
+    good = (np.abs(readings) <= bounds).all(axis=1)
+    return np.array(behind, np.int64), np.array(stamps, np.int64)[good], readings[good]
 
 
 def _sigma(messages: Sequence[Message]) -> Floats:
