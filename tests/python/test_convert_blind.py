@@ -82,7 +82,7 @@ def test_wheels_and_positions_need_no_camera_either(tmp_path: Path, pelorus: Run
     twists, target = write_csv(tmp_path / "twists.csv", rows), tmp_path / "out.plr"
     files = ("--twists", twists, "--position", positions(tmp_path, drive, 5))
     said = pelorus("convert", "csv", *files, target).out
-    assert "vx is taken in mps" in said
+    assert "taken vx, vy, vz in mps; wx, wy, wz in radps. In another unit" in said
     assert len(messages_of(target, Reading)) == len(messages_of(target, Stereo)) == 12
     assert "12 frames" in pelorus("info", target).out
 

@@ -297,7 +297,7 @@ def test_files_with_plain_names_and_a_few_bad_rows_are_converted_and_that_is_sai
             rows[4] = rows[4].rpartition(",")[0] + ",nan"
         path.write_text("\n".join([names, *rows, ""]))
     said = pelorus("convert", "csv", *files, target, "--fix", "none").out
-    for words in ("vx is taken in mps", "wz is taken in radps", "px is taken in m;"):
+    for words in ("vx, vy, vz in mps; wx, wy, wz in radps.", "taken px, py, pz in m. In another"):
         assert words in said
     for words in ("twists.csv: 1 of 61 rows are left out, row 6", "truth.csv: 1 of 61 rows"):
         assert words in said

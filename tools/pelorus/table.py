@@ -31,6 +31,7 @@ class Table:
         self.first_row = first_row  # of the numbers, counted as messages do: from 1
         self.rows = np.arange(first_row, first_row + len(next(iter(columns.values()), [])))
         self.remarks: list[str] = []  # what is to be said of how the file was read
+        self._taken: dict[str, list[str]] = {}  # of them, by unit
         self.plain: Mapping[str, tuple[str, str]] = {}  # by column, its name without unit; a unit
         self._columns = columns
         self._factor: dict[str, float] = {}
@@ -146,11 +147,20 @@ class Table:
 
     def _take(self, short: str, name: str, unit: str) -> None:
         self.rename(short, name, 1.0)
-        if unit:
-            self.remarks.append(
-                f"{self.path}: {short} is taken in {unit}; if it is not: --columns "
-                f"{short}={short}:UNIT"
-            )
+        if not unit:
+            return
+        if self._taken:
+            self.remarks.remove(self._taken_words)
+        self._taken.setdefault(unit, []).append(short)
+        self.remarks.append(self._taken_words)
+
+    @property
+    def _taken_words(self) -> str:
+        each = [f"{', '.join(names)} in {unit}" for unit, names in self._taken.items()]
+        first = next(iter(self._taken.values()))[0]
+        return (
+            f"{self.path}: taken {'; '.join(each)}. In another unit: --columns {first}={first}:UNIT"
+        )
 
     def words(self, name: str) -> list[str]:
         """The cells of a column, without the blanks around them."""
