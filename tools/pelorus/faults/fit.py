@@ -18,7 +18,7 @@ from pelorus.recording import Recording
 from pelorus.tracks import Indices
 
 ROUNDS = 8
-BLOCKS_LEAST, BLOCKS_MOST, BLOCK_FRAMES = 8, 40, 10
+BLOCKS_LEAST, BLOCKS_MOST, BLOCK_FRAMES = 8, 60, 5
 SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10, 11, 14, 17, 18
 TURN_CLOCK = 19
 PARAMETERS = 20
