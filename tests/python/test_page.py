@@ -20,7 +20,7 @@ from chromium import Tab, tab
 from converted import Run as Command
 from pelorus.evidence import Evidence
 from pelorus.explain import explain
-from pelorus.frames import Header, Message, Truth
+from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Truth
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.report.packed import Packer
@@ -29,7 +29,8 @@ from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
 from pelorus.wire import messages_of
-from replay_drive import drive, encode, run
+from replay_drive import SECOND as S
+from replay_drive import drive, encode, header, run
 
 WIDTHS = {"desktop": 1280, "phone": 390}
 EVIL = '</script><img src=x onerror="window.evil=1"><b>&'
@@ -134,6 +135,32 @@ def test_what_a_page_leaves_out_it_says(
     assert "rejections" in text
 
 
+def test_six_minutes_at_20_Hz_are_a_tenth_of_six_megabytes(tmp_path: Path) -> None:
+    chance = np.random.default_rng(2)
+    count, period = 7_200, 50_000_000
+    messages: list[Message] = [header()]
+    bias, nu = chance.normal(size=(count, 6)), chance.normal(size=(count, 6))
+    p, nis = np.cumsum(chance.normal(size=(count, 3)), axis=0), chance.chisquare(200, count)
+    for k in range(count):  # whose every number is as new as noise can be
+        t = S + k * period
+        variance = np.diag(np.exp(chance.normal(size=6)))
+        pose = Pose(
+            t, p[k], covariance=variance[np.tril_indices(6)], bias=bias[k], after_stereo=True
+        )
+        messages.append(replace(pose, bias_variance=bias[k] ** 2))
+        points, gated, us = (int(chance.integers(most)) for most in (200, 20, 5000))
+        report = Report(t, Kind.STEREO, matched=points, used=points, nis=nis[k], nis_dof=200)
+        messages.append(replace(report, gated=gated, update_us=us))
+        messages.append(Evidence(t, nu[k], statistic=nis[k], weight=1 + abs(nu[k, 0])))
+    messages += [Landmark(k, nu[k, :3], bias[k] ** 2, Role.EVICTED, t, k) for k in range(2000)]
+    path = tmp_path / "hour.html"
+    page.write(path, Answer("hour", "good", "nothing happened"), Curves(messages))
+    assert data_of(path)["t"]["count"] == count
+    alone = tmp_path / "alone.html"
+    page.write(alone, Answer("two", "good", "nothing happened"), Curves(messages[:7]))
+    assert path.stat().st_size - alone.stat().st_size <= 0.6e6
+
+
 def test_a_verdict_without_a_run_is_a_page_without_a_script(tmp_path: Path) -> None:
     path = tmp_path / "stopped.html"
     page.write(path, Answer("check", "bad", "do not use it", lines=["axes < turned"]))
@@ -153,7 +180,7 @@ def test_explain_and_check_write_it(pelorus: Command, tmp_path: Path) -> None:
     pelorus("check", recording, "--out", done, "--page", checked, status=None)
     text = checked.read_text(encoding="utf-8")
     assert "Pelorus check: in.plr" in text
-    assert ("Settings to change" in text) is done.exists()
+    assert ("Settings to use" in text) is done.exists()
 
 
 # --- in a browser ---------------------------------------------------------------------------------

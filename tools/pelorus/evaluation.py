@@ -221,7 +221,8 @@ def known_in(messages: Sequence[Message]) -> list[Landmark]:
 def sigmas_m(landmarks: Sequence[Landmark]) -> Floats:
     """(n,): root of the mean variance of an axis."""
     packed = np.array([m.covariance for m in landmarks]).reshape(-1, 6)
-    return np.asarray(np.sqrt(np.trace(unpack_symmetric(packed, 3), axis1=1, axis2=2) / 3))
+    trace = np.trace(unpack_symmetric(packed, 3), axis1=1, axis2=2)
+    return np.asarray(np.sqrt(np.where(trace >= 0, trace, np.nan) / 3))
 
 
 def map_figures(

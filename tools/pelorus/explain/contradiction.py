@@ -168,7 +168,8 @@ def _part(log: Log, steps: Steps, k: int, times: Floats, stretch: tuple[int, int
     seen, told = (
         float(np.nanmedian(x[near, axis])) for x in (steps.by_pictures, steps.by_odometry)
     )
-    begin, noticed = int(log.t_ns[steps.first + k]), int(log.t_ns[stretch[0]])
+    noticed = int(log.t_ns[stretch[0]])
+    begin = min(int(log.t_ns[steps.first + k]), noticed)
     end = max(begin, int(log.t_ns[stretch[1]]))
     if axis < 3:
         words = (

@@ -107,7 +107,7 @@ def of_check(found: Checked, title: str, found_in: Explanation | None) -> Answer
     return Answer(
         f"Pelorus check: {title}",
         GRADES[found.grade],
-        found.verdict,
+        found.verdict[0].upper() + found.verdict[1:],
         lines=[*(remark.text for remark in found.remarks), *found.changes],
         changes=settings,
         events=[] if found_in is None else _events(found_in),

@@ -94,7 +94,7 @@ def _above(answer: Answer) -> list[str]:
     out += [_list(answer.lines), "</div>"]
     if answer.changes:
         settings = escape("\n".join(answer.changes))
-        out.append(f"<h2>Settings to change</h2>\n<pre>{settings}</pre>")
+        out.append(f"<h2>Settings to use</h2>\n<pre>{settings}</pre>")
     if answer.events:
         out.append("<h2>What happened</h2>")
         out += [_event(event) for event in answer.events]

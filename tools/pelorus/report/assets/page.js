@@ -185,9 +185,35 @@
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     return { pen, width: box.width, height: box.height };
   }
-  function paintRibbon({ canvas, colour, holds }) {
-    const { pen, height } = size(canvas), { left, width } = plot();
+  // What does not follow the cursor is painted once, and copied as long as its key holds.
+  let style = 0; // counts changes of dark and light
+  function still(holder, canvas, key, paint) {
+    const { pen, width, height } = size(canvas);
+    const whole = [key, width, height, canvas.width, style].join();
+    if (holder.key !== whole) {
+      holder.key = whole;
+      holder.copy = holder.copy || document.createElement("canvas");
+      [holder.copy.width, holder.copy.height] = [canvas.width, canvas.height];
+      const there = holder.copy.getContext("2d");
+      there.setTransform(pen.getTransform());
+      paint(there, width, height);
+    }
+    pen.save();
+    pen.resetTransform();
+    pen.drawImage(holder.copy, 0, 0);
+    pen.restore();
+    return { pen, width, height };
+  }
+  function paintRibbon(row) {
+    const { left, width } = plot();
     const x = (time) => left + (time - view.from) / (view.to - view.from) * width;
+    const key = [view.from, view.to, left, width].join();
+    const { pen, height } = still(row, row.canvas, key, (there, _, high) => spans(there, row, x, high));
+    pen.fillStyle = css("--ink");
+    pen.fillRect(x(t[view.at]) - 0.75, 0, 1.5, height);
+  }
+  function spans(pen, { colour, holds }, x, height) {
+    const { left, width } = plot();
     pen.fillStyle = css("--panel");
     pen.fillRect(left, 0, width, height);
     const first = Math.max(nearest(view.from) - 1, 0), last = Math.min(nearest(view.to) + 1, count - 1);
@@ -205,8 +231,6 @@
       k = next - 1;
     }
     pen.restore();
-    pen.fillStyle = css("--ink");
-    pen.fillRect(x(t[view.at]) - 0.75, 0, 1.5, height);
   }
   function makeRibbons() {
     const names = [...data.words.health.entries()].filter(([h]) => health.includes(h));
@@ -252,12 +276,10 @@
     map.scale = 0.8 * Math.min(box.width / Math.max(high[0] - low[0], side * 0.2), box.height / Math.max(high[1] - low[1], side * 0.2));
     [map.x, map.y] = [0, 1].map((i) => (low[i] + high[i]) / 2);
   }
-  function paintMap() {
-    const { pen, width, height } = size($("map"));
-    const at = ([a, b]) => [width / 2 + (a - map.x) * map.scale, height / 2 - (b - map.y) * map.scale];
-    pen.clearRect(0, 0, width, height);
+  const at = ([a, b]) => [map.width / 2 + (a - map.x) * map.scale, map.height / 2 - (b - map.y) * map.scale];
+  function paintWays(pen, width, height) {
+    [map.width, map.height] = [width, height];
     pen.font = font;
-    const now = Math.round(t[view.at] * 1e3);
     pen.fillStyle = css("--dot");
     pen.globalAlpha = 0.55;
     for (let k = 0; k < ids.length; k++) {
@@ -265,7 +287,7 @@
       if (x > 0 && y > 0 && x < width && y < height) pen.fillRect(x - 1.5, y - 1.5, 3, 3);
     }
     pen.globalAlpha = 1;
-    tracks.forEach((track) => {
+    [...tracks].sort((a, b) => (a.name === "estimate") - (b.name === "estimate")).forEach((track) => {
       const [colour, dashes] = penOf(track.name);
       pen.strokeStyle = css(colour);
       pen.setLineDash(dashes);
@@ -276,11 +298,15 @@
       pen.stroke();
     });
     pen.setLineDash([]);
+    scaleBar(pen, height);
+  }
+  function paintMap() {
+    const key = [map.x, map.y, map.scale, map.axes, map.signs].join();
+    const { pen } = still(map, $("map"), key, paintWays);
+    const now = Math.round(t[view.at] * 1e3);
     const own = tracks[0];
     if (own) {
-      let k = 0;
-      while (k < own.t.length - 1 && own.t[k + 1] <= now) k++;
-      const [x, y] = at(flat(own.p, k));
+      const [x, y] = at(flat(own.p, Math.max(lower(own.t, now + 1) - 1, 0)));
       pen.fillStyle = css("--accent");
       pen.strokeStyle = css("--paper");
       pen.lineWidth = 2;
@@ -304,9 +330,6 @@
       pen.arc(x, y, Math.max(8, 3 * sigma[map.chosen] * map.scale), 0, 7);
       pen.stroke();
     }
-    scaleBar(pen, height);
-    const box = { paint: at, width, height };
-    map.at = box.paint;
   }
   function scaleBar(pen, height) {
     const wanted = 90 / map.scale, power = 10 ** Math.floor(Math.log10(wanted));
@@ -318,7 +341,11 @@
     pen.moveTo(12, height - 14);
     pen.lineTo(12 + metres * map.scale, height - 14);
     pen.stroke();
-    pen.fillText(`${metres} m; right ${names[0]}, up ${names[1]}`, 12, height - 22);
+    const words = `${metres} m; right ${names[0]}, up ${names[1]}`;
+    pen.fillStyle = css("--paper");
+    pen.fillRect(8, height - 36, pen.measureText(words).width + 8, 19);
+    pen.fillStyle = css("--ink");
+    pen.fillText(words, 12, height - 22);
   }
   function lower(column, value) {
     let low = 0, high = column.length;
@@ -377,7 +404,7 @@
       if (from && !from.moved) {
         let best = -1, least = 20;
         for (let k = 0; k < ids.length; k++) {
-          const [x, y] = map.at(flat(p, k)), far = Math.hypot(x - e.offsetX, y - e.offsetY);
+          const [x, y] = at(flat(p, k)), far = Math.hypot(x - e.offsetX, y - e.offsetY);
           if (far < least) { least = far; best = k; }
         }
         if (best >= 0) choose(best);
@@ -460,7 +487,7 @@
     root.classList.add(dark ? "light" : "dark");
     repaint();
   };
-  function repaint() { for (const u of charts) u.redraw(false, true); later(); }
+  function repaint() { style++; for (const u of charts) u.redraw(false, true); later(); }
   const KEYS = {
     ArrowLeft: (e) => go(view.at - (e.shiftKey ? 10 : 1), true),
     ArrowRight: (e) => go(view.at + (e.shiftKey ? 10 : 1), true),
