@@ -15,8 +15,13 @@ endif()
 #   -ffp-contract=off   a*b + c is two roundings unless fused multiply-add is written out
 #   -fno-math-errno     sqrt is the processor's instruction; changes no result, only errno
 #   -march              the fused multiply-add of float32 kernels is an instruction
+# And -O3 where neither a build type nor the user's flags say how to optimise, as in a project that has
+# not thought of it: unoptimised, a frame takes twenty times as long.
 function(pelorus_arithmetic target)
   target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno)
+  if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES AND NOT CMAKE_C_FLAGS MATCHES "(^| )-O")
+    target_compile_options(${target} PRIVATE -O3)
+  endif()
   if(PELORUS_ARCH AND NOT PLR_PORTABLE)
     check_c_compiler_flag("-march=${PELORUS_ARCH}" PELORUS_HAS_MARCH_${PELORUS_ARCH})
     if(NOT PELORUS_HAS_MARCH_${PELORUS_ARCH})

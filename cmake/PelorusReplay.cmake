@@ -14,6 +14,12 @@ else()
   set(PELORUS_ZSTD_LIBRARY "")
 endif()
 
+if(WIN32)
+  list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/system_posix\\.c$")
+else()
+  list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/system_windows\\.c$")
+endif()
+
 # pelorus_replay(NAME LIBRARY): the program, and NAME-parts, all of it but main, for the tests.
 function(pelorus_replay name library)
   set(parts ${PELORUS_POSIX_SOURCES})
@@ -26,7 +32,7 @@ function(pelorus_replay name library)
   foreach(target ${name}-parts ${name})
     target_compile_options(${target} PRIVATE -ffp-contract=off)
     target_compile_definitions(${target} PRIVATE
-      _POSIX_C_SOURCE=200809L
+      _XOPEN_SOURCE=700
       PELORUS_NAME="${name}"
       PELORUS_ARCH="$<$<NOT:$<BOOL:${PLR_PORTABLE}>>:${PELORUS_ARCH}>")
     pelorus_warnings(${target})

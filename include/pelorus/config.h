@@ -89,8 +89,10 @@ extern "C" {
  * compiler optimises, else in C. It changes no bit either. */
 #if defined(__thumb2__) && defined(__ARM_FEATURE_FMA) && defined(__OPTIMIZE__) &&                  \
     PLR_REAL == 32 && PLR_TILE_COLUMNS == 6 && !PLR_PORTABLE
+#define PLR_TILE_CORTEX_M 1
 #define PLR_TILE_FILE "math/tile_cortex_m.h"
 #else
+#define PLR_TILE_CORTEX_M 0
 #define PLR_TILE_FILE "math/tile_in_c.h"
 #endif
 

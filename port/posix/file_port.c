@@ -2,11 +2,12 @@
 #include "posix/file_port.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
+
+#include "posix/system.h"
 
 /* Do these bytes begin a zstd file? Fewer than four do not. */
 static bool is_compressed(const uint8_t *bytes, size_t n) {
@@ -26,7 +27,7 @@ static bool is_open(file_port *port) {
         return false;
     }
     uint8_t head[4];
-    const bool packed = S_ISREG(about.st_mode) && pread(port->input, head, sizeof head, 0) == 4 &&
+    const bool packed = S_ISREG(about.st_mode) && system_read_at(port->input, head, 4, 0) == 4 &&
                         is_compressed(head, sizeof head);
     if (S_ISREG(about.st_mode) && !packed)
         port->size = (uint64_t)about.st_size;
@@ -35,7 +36,7 @@ static bool is_open(file_port *port) {
 
 bool file_port_open(file_port *port, const char *path) {
     memset(port, 0, sizeof *port);
-    port->input = strcmp(path, "-") == 0 ? STDIN_FILENO : open(path, O_RDONLY);
+    port->input = strcmp(path, "-") == 0 ? STDIN_FILENO : system_open_to_read(path);
     return is_open(port);
 }
 
@@ -61,13 +62,10 @@ static long fetch_raw(void *context, uint8_t *bytes, size_t n) {
         port->head_at += count;
         return (long)count;
     }
-    ssize_t count;
-    do
-        count = read(port->input, bytes, n);
-    while (count < 0 && errno == EINTR);
+    const long count = system_read(port->input, bytes, n);
     if (count < 0)
         port->read_error = errno;
-    return (long)count;
+    return count;
 }
 
 /* Looks at the first bytes: is it compressed? A pipe may give them one by one. */

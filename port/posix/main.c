@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "posix/replay.h"
+#include "posix/system.h"
 
 #if defined(__x86_64__)
 
@@ -43,5 +44,6 @@ int main(int argc, char **argv) {
                 missing);
         return REPLAY_EXIT_CPU;
     }
+    system_begin();
     return replay_main(argc, argv);
 }

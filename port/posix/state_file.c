@@ -2,14 +2,13 @@
 #include "posix/state_file.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "pelorus/state_store.h"
+#include "posix/system.h"
 
 enum { BLOCK = 4096, LEAST = PLR_STORE_SLOTS * BLOCK, LARGEST = 1 << 30, ERASED = 0xFF };
 
@@ -30,7 +29,7 @@ static bool synced(state_file *file) {
         errno = file->error;
         return false;
     }
-    file->lost = fsync(file->fd) != 0;
+    file->lost = !system_sync(file->fd);
     file->unsynced = file->lost;
     return !file->lost;
 }
@@ -44,9 +43,7 @@ static int read_bytes(void *context, uint32_t offset, uint8_t *bytes, uint32_t n
     if (!synced(file))
         return failed(file);
     for (uint32_t done = 0; done < n;) {
-        const ssize_t piece = pread(file->fd, bytes + done, n - done, (off_t)offset + (off_t)done);
-        if (piece < 0 && errno == EINTR)
-            continue;
+        const long piece = system_read_at(file->fd, bytes + done, n - done, offset + done);
         if (piece <= 0)
             return failed(file);
         done += (uint32_t)piece;
@@ -59,9 +56,7 @@ static int program_bytes(void *context, uint32_t offset, const uint8_t *bytes, u
     errno = file->fd < 0 ? EBADF : 0;
     file->unsynced = true;
     for (uint32_t done = 0; done < n;) {
-        const ssize_t piece = pwrite(file->fd, bytes + done, n - done, (off_t)offset + (off_t)done);
-        if (piece < 0 && errno == EINTR)
-            continue;
+        const long piece = system_write_at(file->fd, bytes + done, n - done, offset + done);
         if (piece <= 0)
             return failed(file);
         done += (uint32_t)piece;
@@ -157,34 +152,18 @@ bool state_file_open_to_load(state_file *file, const char *path, char problem[PR
     static const char instead[] = "give one that --save-state has written";
     struct stat about;
     state_file_none(file);
-    file->fd = open(path, O_RDONLY);
+    file->fd = system_open_to_read(path);
     if (file->fd < 0 || fstat(file->fd, &about) != 0)
         return refuse(file, problem, path, strerror(errno), instead);
     const char *why = trouble(file, &about);
     return why == NULL || refuse(file, problem, path, why, instead);
 }
 
-/* A file's name is on the disk when its folder is. Not every file system can be asked for that. */
-static bool sync_folder_of(const char *path) {
-    char folder[PATH_MAX] = ".";
-    const char *name = strrchr(path, '/');
-    if (name != NULL)
-        snprintf(folder, sizeof folder, "%.*s", (int)(name - path + 1), path);
-    const int fd = open(folder, O_RDONLY | O_DIRECTORY);
-    if (fd < 0)
-        return false;
-    const bool done = fsync(fd) == 0 || errno == EINVAL;
-    const int why = errno;
-    close(fd);
-    errno = why;
-    return done;
-}
-
 /* A new file: blank, and as long as it will ever be. */
 static bool make(state_file *file, const char *path, uint32_t slot_bytes) {
     const uint32_t slot = (slot_bytes + BLOCK - 1) / BLOCK * BLOCK;
     prepare(file, file->fd, PLR_STORE_SLOTS * slot);
-    return ftruncate(file->fd, (off_t)file->device.size) == 0 && sync_folder_of(path);
+    return ftruncate(file->fd, (off_t)file->device.size) == 0 && system_sync_name(path);
 }
 
 bool state_file_open_to_save(state_file *file, const char *path, uint32_t slot_bytes,
@@ -192,7 +171,7 @@ bool state_file_open_to_save(state_file *file, const char *path, uint32_t slot_b
     static const char instead[] = "it is left as it is: give another path";
     struct stat about;
     state_file_none(file);
-    file->fd = open(path, O_RDWR | O_CREAT, 0666);
+    file->fd = system_open_to_change(path);
     if (file->fd < 0 || fstat(file->fd, &about) != 0)
         return refuse(file, problem, path, strerror(errno), "give a path that can be written");
     if (S_ISREG(about.st_mode) && about.st_size == 0)

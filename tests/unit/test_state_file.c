@@ -9,6 +9,7 @@
 static int model_fsync(int fd);
 
 #define fsync model_fsync
+#include "../../port/posix/system_posix.c"
 #include "../../port/posix/state_file.c"
 #include "posix/state_file.h"
 

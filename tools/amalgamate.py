@@ -1,0 +1,185 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Makes two files of the library, to drop into a project: pelorus.h and pelorus.c.
+
+usage: amalgamate.py FOLDER
+
+The options of include/pelorus/config.h are those of the two files. Compile pelorus.c like this; the
+result has the same bits as the library's:
+
+    cc -std=c99 -O3 -march=x86-64-v3 -ffp-contract=off -fno-math-errno -c pelorus.c
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_TILE_FILE))[^\n]*\n', re.M)
+COMMENT_OR_TEXT = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.S)
+SPDX = re.compile(r"^// SPDX[^\n]*\n")
+# What a source keeps to itself, and another one may call by the same name.
+STATIC = re.compile(r"^static\b[^;{=()]*?(\w+)(?:\[[^\]]*\])*[ ]*(?=[(;=])", re.M)
+TYPE = re.compile(
+    r"^(?:typedef )?(?:static )?(?:const )?(?:struct|union|enum)\b[^;{}]*\{([^{}]*)\}[ ]*(\w*)[^;]*;", re.M
+)
+CONSTANT = re.compile(r"(\w+)\s*(?:=[^,]*)?(?:,|$)")
+MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)
+# Rooms that a build may leave out, and the option that says so.
+ROOMS = {"supervise": "PLR_SUPERVISE", "known_map": "PLR_KNOWN_MAP"}
+TILES = "#if PLR_TILE_CORTEX_M\n{cortex_m}#else\n{in_c}#endif\n"
+
+HEAD = """\
+// SPDX-License-Identifier: MIT
+/* Pelorus {version}, {what}, made of its sources by tools/amalgamate.py: do not edit. */
+"""
+GUARD = """\
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("no-fast-math", "fp-contract=off")
+#elif defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#endif
+"""
+
+
+def read(path: Path) -> str:
+    """A file's text without the licence line: one is enough."""
+    return SPDX.sub("", path.read_text(encoding="utf-8"))
+
+
+def without_comments(text: str) -> str:
+    """The code alone."""
+    return COMMENT_OR_TEXT.sub(" ", text)
+
+
+def names_of(text: str) -> set[str]:
+    """What a source defines at file level for itself alone."""
+    code = without_comments(text)
+    names = set(STATIC.findall(code))
+    for body, name in TYPE.findall(code):
+        names |= {name} if name else set()
+        if ";" not in body:
+            names |= set(CONSTANT.findall(body))
+    return {name for name in names if not name.startswith("plr_")}
+
+
+def renamed(text: str, names: set[str], prefix: str) -> str:
+    """The text with these names behind a prefix; members, comments and texts keep theirs."""
+    if not names:
+        return text
+    word = re.compile(r"(?<![\w.>])(?:" + "|".join(sorted(names)) + r")\b(?!\s*\")")
+
+    def in_code(code: str) -> str:
+        return word.sub(lambda match: f"{prefix}_{match[0]}", code)
+
+    parts, at = [], 0
+    for skipped in COMMENT_OR_TEXT.finditer(text):
+        parts += [in_code(text[at : skipped.start()]), skipped[0]]
+        at = skipped.end()
+    return "".join([*parts, in_code(text[at:])])
+
+
+@dataclass
+class Amalgamation:
+    """Files of a source tree put behind each other, each header once."""
+
+    folders: Sequence[Path]  # where what is included is looked for
+    done: set[Path]  # headers that are in already
+
+    def find(self, name: str) -> Path:
+        for folder in self.folders:
+            if (folder / name).is_file():
+                return folder / name
+        raise SystemExit(f'"{name}" is in none of {", ".join(map(str, self.folders))}')
+
+    def insides(self, text: str) -> str:
+        """A file's text with what it includes in the include's place."""
+
+        def included(match: re.Match[str]) -> str:
+            if match[2]:
+                tiles = (self.header(self.find(f"math/tile_{n}.h")) for n in ("cortex_m", "in_c"))
+                return TILES.format(cortex_m=next(tiles), in_c=next(tiles))
+            found = self.find(match[1])
+            return self.insides(read(found)) if found.suffix == ".def" else self.header(found)
+
+        return INCLUDE.sub(included, text)
+
+    def header(self, path: Path) -> str:
+        """The same of a header, at its first include; nothing later."""
+        if path in self.done:
+            return ""
+        self.done.add(path)
+        return self.insides(read(path))
+
+    def headers(self, paths: Sequence[Path]) -> str:
+        return "".join(self.header(path) for path in paths)
+
+    def sources(self, paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
+        """Each source, its own names made distinct, its macros ended where it ends."""
+        texts = {path: read(path) for path in paths}
+        shared = Counter(name for text in texts.values() for name in names_of(text))
+        for path, text in texts.items():
+            mine = {name for name in names_of(text) if shared[name] > 1}
+            ends = "".join(f"#undef {name}\n" for name in sorted(set(MACRO.findall(text))))
+            yield path, self.insides(renamed(text, mine, f"own_{path.stem}")) + ends
+
+
+def own_header_files(folder: Path) -> list[Path]:
+    """Headers that stand for themselves: the tile's two halves are included by a condition."""
+    found = sorted(folder.rglob("*.h"))
+    return [path for path in found if path.stem not in {"tile_cortex_m", "tile_in_c"}]
+
+
+def library(root: Path) -> tuple[str, str]:
+    """pelorus.h and pelorus.c."""
+    include, src = root / "include", root / "src"
+    amalgamation = Amalgamation((include, src), set())
+    version = re.search(r'plr_version\(void\) \{\s*return "([^"]+)"', all_text(src))
+    shown = version[1] if version else "of an unknown version"
+    header = HEAD.format(version=shown, what="its whole interface")
+    header += amalgamation.headers(sorted((include / "pelorus").glob("*.h")))
+    source = [HEAD.format(version=shown, what="the whole library"), '#include "pelorus.h"\n', GUARD]
+    source.append(amalgamation.headers(own_header_files(src)))
+    for path, text in amalgamation.sources(sorted(src.glob("*/*.c"))):
+        option = ROOMS.get(path.parent.name)
+        if path.parent.name == "absent":
+            option = f"!{ROOMS[path.stem]}"
+        source += [f"#if {option}\n{text}#endif\n" if option else text]
+    return header, "".join(source)
+
+
+def program(root: Path, paths: Sequence[Path]) -> str:
+    """One source of a program's: it includes pelorus.h."""
+    amalgamation = Amalgamation((root / "include", root / "port"), set())
+    amalgamation.headers(sorted((root / "include/pelorus").glob("*.h")))
+    folders = sorted({path.parent for path in paths})
+    headers = "".join(amalgamation.headers(own_header_files(folder)) for folder in folders)
+    texts = (text for _, text in amalgamation.sources(paths))
+    return "".join(['#include "pelorus.h"\n', headers, *texts])
+
+
+def all_text(folder: Path) -> str:
+    """All sources of a folder, for a search."""
+    return "\n".join(path.read_text(encoding="utf-8") for path in sorted(folder.rglob("*.c")))
+
+
+def main() -> int:
+    """Writes both; the exit status."""
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        print(__doc__, file=sys.stderr)
+        return 2
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in zip(("pelorus.h", "pelorus.c"), library(ROOT), strict=True):
+        (folder / name).write_text(text, encoding="utf-8")
+        print(f"{folder / name}: {len(text.splitlines())} lines, {len(text) // 1024} KB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
