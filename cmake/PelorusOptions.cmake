@@ -33,6 +33,15 @@ option(PLR_ASSERTIONS "Every library checks its own assumptions, as the tests' l
 # CMake 3.21's PROJECT_IS_TOP_LEVEL: inside another project only the library is wanted.
 option(PELORUS_BUILD_REPLAY "Build pelorus-replay" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_BUILD_TESTS "Build the tests and benches" ${PROJECT_IS_TOP_LEVEL})
+option(PELORUS_PYTHON "Install what the Python package holds, and nothing else (pip does)" OFF)
+if(PELORUS_PYTHON)
+  set(PELORUS_BUILD_TESTS OFF)
+  set(PELORUS_INSTALL OFF)
+endif()
+if(PELORUS_BUILD_TESTS OR (PELORUS_BUILD_REPLAY AND NOT PELORUS_PYTHON))
+  set(PELORUS_BUILD_TEXTBOOK ON)
+endif()
+option(PELORUS_ZSTD "pelorus-replay reads and writes .plr.zst, if libzstd is here" ON)
 option(PELORUS_INSTALL "Make install rules" ${PROJECT_IS_TOP_LEVEL})
 option(PELORUS_WERROR "Take warnings as errors (the project's own tests do)" OFF)
 option(PELORUS_REQUIRE_ORACLE "Stop if OpenBLAS or LAPACKE is missing, instead of testing against plain loops"

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
 # The desktop replay. Built for the processor family's baseline, not for PELORUS_ARCH: it looks at
-# the processor and says what is missing before it calls the library.
+# the processor and says what is missing before it calls the library (port/posix/processor.c).
 
 # Compressed recordings, where libzstd is: chosen by file.
 find_path(PELORUS_ZSTD_INCLUDE zstd.h)
 find_library(PELORUS_ZSTD_LIBRARY zstd)
-if(PELORUS_ZSTD_INCLUDE AND PELORUS_ZSTD_LIBRARY)
+if(PELORUS_ZSTD AND PELORUS_ZSTD_INCLUDE AND PELORUS_ZSTD_LIBRARY)
   list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/compressed_none\\.c$")
 else()
-  message(STATUS "libzstd is missing: .plr.zst are not read or written "
+  message(STATUS "Without libzstd: .plr.zst are not read or written "
     "(on Debian and Ubuntu: apt-get install libzstd-dev)")
   list(FILTER PELORUS_POSIX_SOURCES EXCLUDE REGEX "/compressed_zstd\\.c$")
   set(PELORUS_ZSTD_LIBRARY "")

@@ -55,7 +55,7 @@ target_link_libraries(pelorus-textbook PRIVATE
   pelorus-textbook-filter ${PELORUS_ZSTD_LIBRARY} m)
 target_compile_options(pelorus-textbook PRIVATE -ffp-contract=off)
 target_compile_definitions(pelorus-textbook PRIVATE
-  _POSIX_C_SOURCE=200809L
+  _XOPEN_SOURCE=700
   PELORUS_NAME="pelorus-textbook"
   PELORUS_ARCH=""
   PLR_REAL=64 PLR_PORTABLE=0

@@ -26,7 +26,9 @@ SPDX = re.compile(r"^// SPDX[^\n]*\n")
 # What a source keeps to itself, and another one may call by the same name.
 STATIC = re.compile(r"^static\b[^;{=()]*?(\w+)(?:\[[^\]]*\])*[ ]*(?=[(;=])", re.M)
 TYPE = re.compile(
-    r"^(?:typedef )?(?:static )?(?:const )?(?:struct|union|enum)\b[^;{}]*\{([^{}]*)\}[ ]*(\w*)[^;]*;", re.M
+    r"^(?:typedef )?(?:static )?(?:const )?(?:struct|union|enum)\b"
+    r"[^;{}]*\{([^{}]*)\}[ ]*(\w*)[^;]*;",
+    re.M,
 )
 CONSTANT = re.compile(r"(\w+)\s*(?:=[^,]*)?(?:,|$)")
 MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)

@@ -210,9 +210,9 @@ def check_session_table(root: Path) -> Iterator[Breach]:
 
 
 def check_conditions(root: Path) -> Iterator[Breach]:
-    """`#if` stands where the build is configured, in config.h, for PLR_ASSERT in assertions.h, around
-    what stands in for a room, and in fma.c, which refuses a processor without the instruction;
-    elsewhere only include guards and `extern "C"`."""
+    """`#if` stands where the build is configured, in config.h, for PLR_ASSERT in assertions.h,
+    around what stands in for a room, and in fma.c, which refuses a processor without the
+    instruction; elsewhere only include guards and `extern "C"`."""
     configuration = {root / "include/pelorus" / name for name in ("assertions.h", "config.h")}
     configuration |= {root / "src/math/fma.c", *(root / "src/absent").glob("*.c")}
     paths = [*(root / "src").rglob("*.[ch]"), *(root / "include").rglob("*.h")]

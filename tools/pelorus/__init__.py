@@ -1,5 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""Tools around Pelorus: convert, inspect, simulate and evaluate recordings."""
+"""Pelorus: the filter from Python (`pelorus.Filter`), and tools that convert, inspect, simulate and
+evaluate recordings.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 ARITHMETIC = 21  # PLR_ARITHMETIC of the library that these tools belong to
+
+__all__ = ["Calibration", "Filter", "FilterError", "KnownLandmark", "PelorusError", "observations"]
+
+if TYPE_CHECKING:
+    from pelorus.errors import PelorusError
+    from pelorus.filter import Calibration, Filter, FilterError, KnownLandmark, observations
+
+
+def __getattr__(name: str) -> Any:
+    """Of `__all__` at its first use: the commands need no filter, and most of them no numpy."""
+    if name not in __all__:
+        raise AttributeError(f"module 'pelorus' has no attribute {name!r}")
+    from pelorus import filter as found  # noqa: PLC0415
+
+    return getattr(found, name)

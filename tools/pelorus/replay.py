@@ -14,14 +14,13 @@ from typing import Any
 
 from rich.markup import escape
 
-from pelorus import packed_file
+from pelorus import native, packed_file
 from pelorus.console import err, waiting
 from pelorus.errors import PelorusError, write_text, writing
 from pelorus.frames import Kind, Message, Pose
 from pelorus.wire import Writer, messages_of
 
-SOURCE_ROOT = Path(__file__).resolve().parents[2]
-USUAL_FOLDER = Path("build/bin")
+EXE = ".exe" if os.name == "nt" else ""
 SETTINGS_MAX_DEPTH = "max-depth"
 
 
@@ -34,22 +33,19 @@ class Programs:
 
 
 def find_programs(folder: Path | None) -> Programs:
-    """From the folder given, else from $PELORUS_BIN, else from build/bin."""
-    chosen = folder or _environment()
-    candidates = [chosen] if chosen else [USUAL_FOLDER, SOURCE_ROOT / USUAL_FOLDER]
+    """From the folder given, else from $PELORUS_BIN, else from the package or build/bin."""
+    candidates = native.folders(folder)
     for candidate in candidates:
-        programs = Programs(candidate / "pelorus-replay", candidate / "pelorus-replay-f64")
+        programs = Programs(
+            candidate / f"pelorus-replay{EXE}", candidate / f"pelorus-replay-f64{EXE}"
+        )
         if programs.float32.is_file() and programs.float64.is_file():
             return programs
     raise PelorusError(
-        f"{candidates[0]}: holds no pelorus-replay and pelorus-replay-f64; "
-        "build them, or name their folder with --bin or PELORUS_BIN"
+        f"{', '.join(map(str, candidates))}: holds no pelorus-replay and pelorus-replay-f64: this "
+        "package was installed without them, or for another system; install one that has them, "
+        "or build them and name their folder with --bin or PELORUS_BIN"
     )
-
-
-def _environment() -> Path | None:
-    value = os.environ.get("PELORUS_BIN")
-    return Path(value) if value else None
 
 
 @dataclass(frozen=True)

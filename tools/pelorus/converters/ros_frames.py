@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +25,7 @@ from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.motion import Times
+from pelorus.opencv import cv2
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated
@@ -38,16 +38,16 @@ CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 CLOUD2, CLOUD = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud"
 FIELDS = ("id", "uL", "vL", "uR", "vR")
 RAYS = ("id", "u0", "v0", "u1", "v1")
-TO_GRAY = {
-    "rgb8": cv2.COLOR_RGB2GRAY,
-    "bgr8": cv2.COLOR_BGR2GRAY,
-    "8UC3": cv2.COLOR_BGR2GRAY,
-    "rgba8": cv2.COLOR_RGBA2GRAY,
-    "bgra8": cv2.COLOR_BGRA2GRAY,
-    "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
-    "bayer_bggr8": cv2.COLOR_BayerBGGR2GRAY,
-    "bayer_gbrg8": cv2.COLOR_BayerGBRG2GRAY,
-    "bayer_grbg8": cv2.COLOR_BayerGRBG2GRAY,
+TO_GRAY = {  # names of OpenCV
+    "rgb8": "COLOR_RGB2GRAY",
+    "bgr8": "COLOR_BGR2GRAY",
+    "8UC3": "COLOR_BGR2GRAY",
+    "rgba8": "COLOR_RGBA2GRAY",
+    "bgra8": "COLOR_BGRA2GRAY",
+    "bayer_rggb8": "COLOR_BayerRGGB2GRAY",
+    "bayer_bggr8": "COLOR_BayerBGGR2GRAY",
+    "bayer_gbrg8": "COLOR_BayerGBRG2GRAY",
+    "bayer_grbg8": "COLOR_BayerGRBG2GRAY",
 }
 CHANNELS = {"rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
 PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
@@ -209,7 +209,7 @@ def gray(where: Path, message: Any, bits: int = 16) -> Gray:
     if encoding in PLAIN:
         return plain
     shaped = plain.reshape(len(plain), -1, channels) if channels > 1 else plain
-    return np.asarray(cv2.cvtColor(shaped, TO_GRAY[encoding]), np.uint8)
+    return np.asarray(cv2.cvtColor(shaped, getattr(cv2, TO_GRAY[encoding])), np.uint8)
 
 
 def _lines(where: Path, message: Any, pixel_bytes: int) -> NDArray[np.uint8]:

@@ -13,10 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-import cv2
 import numpy as np
 
 from pelorus.layout import Floats
+from pelorus.opencv import cv2
 from pelorus.rig import spheres
 
 

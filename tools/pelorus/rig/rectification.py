@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.frames import Camera
 from pelorus.layout import Floats
+from pelorus.opencv import cv2
 from pelorus.rig.lens import Lens
 from pelorus.se3 import Poses
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.opencv import cv2
 from pelorus.tracking.images import Gray
 from pelorus.tracking.settings import Settings
 
@@ -19,7 +19,7 @@ Points = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 LEVELS = 4  # of the pyramid: motion up to some 15 % of the width between two frames
-CRITERIA = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005)
+STEPS, STEP_PX = 30, 0.005  # that end the refinement of a place
 CELLS_ACROSS, CELLS_DOWN = 12, 4
 QUALITY = 0.01  # of the strongest corner: in the shade too there shall be some
 SEARCH_ROWS_PX, SEARCH_LEFT_PX = 1, 3  # room of the row search for errors of the rectification
@@ -115,7 +115,7 @@ def _lucas_kanade(
         start.reshape(-1, 1, 2),
         winSize=(settings.window_px, settings.window_px),
         maxLevel=LEVELS if guess is None else 1,
-        criteria=CRITERIA,
+        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, STEPS, STEP_PX),
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     return Found(np.asarray(there, np.float32).reshape(-1, 2), status.ravel() == 1)

@@ -15,9 +15,9 @@ import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 
+from pelorus.opencv import cv2
 from pelorus.errors import PelorusError
 from pelorus.tracking import matching
 from pelorus.tracking.images import Gray

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
+from pelorus.opencv import cv2
 from pelorus.tracking.images import Gray
 from pelorus.tracks import Tracks
 
@@ -19,7 +19,6 @@ FRAMES_MAX, ACROSS = 12, 2
 WIDTH_PX = 800  # of one frame
 TAIL_FRAMES = 5
 GAP_PX, CAPTION_PX = 6, 26
-FONT = cv2.FONT_HERSHEY_SIMPLEX
 WHITE = (255, 255, 255)
 
 
@@ -62,7 +61,7 @@ def _tile(image: Gray, frame: int, name: str, tracks: Tracks, nearest: float) ->
         cv2.circle(tile, (int(way[-1, 0]), int(way[-1, 1])), 3, colour, -1, cv2.LINE_AA)
     caption = np.zeros((CAPTION_PX, WIDTH_PX, 3), np.uint8)
     words = f"{name}: {len(now)} tracks; warm is near, cold is far; line: last {TAIL_FRAMES} frames"
-    cv2.putText(caption, words, (6, 18), FONT, 0.5, WHITE, 1, cv2.LINE_AA)
+    cv2.putText(caption, words, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, WHITE, 1, cv2.LINE_AA)
     framed = np.vstack((caption, tile))
     return np.asarray(np.pad(framed, ((0, GAP_PX), (0, GAP_PX), (0, 0))), np.uint8)
 

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include "python/binding.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "pelorus/pelorus.h"
+#include "posix/processor.h"
+
+#define SIZE(type)                                                                                 \
+    { #type, sizeof(type) }
+
+void plr_binding_sizes(plr_sizes *sizes) {
+    *sizes = plr_sizes_here(sizeof(plr_filter));
+}
+
+uint32_t plr_binding_size_of(const char *name) {
+    static const struct {
+        const char *name;
+        uint32_t size;
+    } table[] = {
+        SIZE(plr_calibration),
+        SIZE(plr_config),
+        SIZE(plr_frame),
+        SIZE(plr_health_state),
+        SIZE(plr_imu),
+        SIZE(plr_landmark),
+        SIZE(plr_map),
+        SIZE(plr_observation),
+        SIZE(plr_pose),
+        SIZE(plr_reading),
+        SIZE(plr_reading_result),
+        SIZE(plr_report),
+        SIZE(plr_setting),
+        SIZE(plr_supervision),
+        SIZE(plr_totals),
+        SIZE(plr_twist),
+    };
+    for (unsigned i = 0; i < sizeof table / sizeof table[0]; i++)
+        if (strcmp(table[i].name, name) == 0)
+            return table[i].size;
+    return 0;
+}
+
+const char *plr_binding_processor_lacks(void) {
+    return processor_lacks();
+}

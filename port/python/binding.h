@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+/* What Python has to ask the library before it calls it: tools/pelorus/native.py. */
+#ifndef PELORUS_PYTHON_BINDING_H
+#define PELORUS_PYTHON_BINDING_H
+
+#include <stdint.h>
+
+#include "pelorus/config.h"
+
+/* The sizes that the library was built with; `bytes` is that of a plr_filter. */
+void plr_binding_sizes(plr_sizes *sizes);
+
+/* sizeof a struct of the interface, by its name; 0 where there is none of that name. */
+uint32_t plr_binding_size_of(const char *name);
+
+/* An instruction that the library was built for and this processor lacks; NULL: none. */
+const char *plr_binding_processor_lacks(void);
+
+#endif

@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: MIT
+"""The filter from Python: the replay's bits, its errors, and what it makes of anything at all."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from pelorus import Calibration, Filter, FilterError, KnownLandmark, PelorusError, native
+from pelorus import observations as frame_of
+from pelorus.cli import main
+from pelorus.frames import Config, Header, Message, Pose, Stereo, Truth, Twist
+from pelorus.layout import Floats
+from pelorus.native import Precision
+from pelorus.schema import SETTINGS
+from pelorus.wire import messages_of
+from replay_drive import BIN
+
+ROOT = Path(__file__).resolve().parents[2]
+DRIVE = ROOT / "tests/golden/drive.plr"
+CAMERA = Calibration(410.0, 405.0, 330.0, 236.0, 0.17)
+PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
+BUSY = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture(autouse=True)
+def built(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PELORUS_BIN", str(BIN))
+
+
+def bits(R: Floats, p: Floats, triangle: Floats, precision: Precision) -> bytes:
+    """A pose and its covariance as a log has them, the position in float64."""
+    return R.astype(precision).tobytes() + p.tobytes() + triangle.astype(precision).tobytes()
+
+
+def driven(filter: Filter, messages: list[Message], seconds: float = np.inf) -> list[bytes]:
+    """The poses and covariances after each frame, as bytes."""
+    found = []
+    begin = next(m.t_ns for m in messages if isinstance(m, Twist))
+    for message in messages:
+        if isinstance(message, Truth) and message.t_ns == begin:  # where the session starts
+            filter.set_pose(message.t_ns, message.R_WB, message.p_WB_m)
+        elif isinstance(message, (Twist, Stereo)) and message.t_ns - begin > seconds * 1e9:
+            break
+        elif isinstance(message, Twist):
+            filter.predict(message.t_ns, message.v_B_mps, message.w_B_radps)
+        elif isinstance(message, Stereo):
+            filter.update(message.t_ns, frame_of(message.ids, message.pixels))
+            pose = filter.pose()
+            triangle = filter.pose_covariance()[np.tril_indices(6)]
+            found.append(bits(pose.R, pose.p, triangle, filter.precision))
+    return found
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_the_bits_are_those_of_the_replay(precision: Precision, tmp_path: Path) -> None:
+    recording, log = tmp_path / "d.plr", tmp_path / "log.plr"
+    assert main(["simulate", "--seed", "29", "--duration", "12", str(recording)]) == 0
+    program = BIN / ("pelorus-replay" if precision == "float32" else "pelorus-replay-f64")
+    options = ["--slots=40", "--pixel-sigma=1.5", "--scene=may-move", "--out", str(log)]
+    subprocess.run([program, recording, *options], check=True, capture_output=True)
+    expected = [
+        bits(m.R_WB, m.p_WB_m, m.covariance, precision)
+        for m in messages_of(log)
+        if isinstance(m, Pose) and m.after_stereo
+    ]
+    messages = messages_of(recording)
+    header = next(m for m in messages if isinstance(m, Header))
+    filter = Filter(Calibration.of_header(header), in_force(log), precision=precision)
+    found = driven(filter, messages)
+    assert len(found) > 100
+    assert found == expected
+
+
+def in_force(log: Path) -> dict[str, float]:
+    """The settings of a replay, by name."""
+    config = next(m for m in messages_of(log) if isinstance(m, Config) and m.build_fingerprint)
+    return {SETTINGS[id].name: value for id, value in config.settings.items()}
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_restored_filter_goes_on_with_the_same_bits(precision: Precision) -> None:
+    messages = messages_of(DRIVE)
+    header = Calibration.of_header(next(m for m in messages if isinstance(m, Header)))
+    one = Filter(header, {"slots": 20}, precision=precision)
+    driven(one, messages, 1.0)
+    saved, begin = one.save(), one.time_ns
+    later = [m for m in messages if isinstance(m, (Twist, Stereo)) and m.t_ns > begin]
+    straight = driven(one, later)
+    assert len(straight) > 10
+    other = Filter(header, {"slots": 20}, precision=precision)
+    other.restore(saved)
+    assert driven(other, later) == straight
+    with pytest.raises(FilterError, match="another version or build"):
+        Filter(header, {"slots": 21}, precision=precision).restore(saved)
+    with pytest.raises(FilterError):
+        other.restore(saved[:-7])
+
+
+def test_the_structs_are_those_of_the_headers(tmp_path: Path) -> None:
+    """Each field's offset, as a C compiler has it."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    native.library()
+    members = {"linear": "v_B_mps", "angular": "w_B_radps"}
+    lines = []
+    expected = []
+    for struct in native.STRUCTS:
+        for field in struct._fields_:
+            member = members.get(field[0], field[0]) if struct is native.Twist else field[0]
+            lines.append(f'printf("%zu\\n", offsetof({struct.c_name}, {member}));')
+            expected.append(getattr(struct, field[0]).offset)
+    source = tmp_path / "offsets.c"
+    source.write_text(
+        '#include <stddef.h>\n#include <stdio.h>\n#include "pelorus/pelorus.h"\n'
+        f"int main(void) {{ {' '.join(lines)} return 0; }}\n"
+    )
+    command = [compiler, "-std=c99", f"-I{ROOT / 'include'}", source, "-o", tmp_path / "offsets"]
+    subprocess.run(command, check=True)
+    said = subprocess.run([tmp_path / "offsets"], check=True, capture_output=True, text=True)
+    assert [int(word) for word in said.stdout.split()] == expected
+
+
+ZEROS = (0.0, 0.0, 0.0)
+EYE = np.eye(3)
+MANY = frame_of(range(1025), np.ones((1025, 4)))
+REFUSED: tuple[tuple[str, Callable[[Filter], Any]], ...] = (
+    (r"v_B_mps: int64 of shape \(2,\); numbers .*\(3,\)", lambda f: f.predict(7, [1, 2], ZEROS)),
+    (r"w_B_radps: <U1 of shape \(3,\)", lambda f: f.predict(7, [1, 2, 3], list("abc"))),
+    (r"w_B_radps: .*inhomogeneous", lambda f: f.predict(7, [1, 2, 3], [[1], [2, 3], 4])),
+    (r"t_ns: 1.5 is no whole number", lambda f: f.predict(cast(int, 1.5), ZEROS, ZEROS)),
+    (r"t_ns: -3; 0 to ", lambda f: f.predict(-3, [1, 2, 3], [0, 0, 0])),
+    (r"predict: .*NaN", lambda f: f.predict(7, [1, np.nan, 3], [0, 0, 0])),
+    (r"predict: .*infinite", lambda f: f.predict(7, [1, np.inf, 3], [0, 0, 0])),
+    (r"observations: an array as pelorus.observations", lambda f: f.update(7, np.zeros((3, 5)))),
+    (r"observations: shape \(1025,\); \(n,\) .* 1024", lambda f: f.update(7, MANY)),
+    (r"pixels: .* \(2, 3\); numbers .* \(2, 4\)", lambda _: frame_of([1, 2], np.ones((2, 3)))),
+    (r"ids: -1 to 4; 0 to 4294967295", lambda _: frame_of([4, -1], np.ones((2, 4)))),
+    (r"ids: float64 of shape", lambda _: frame_of([4.5, 1.0], np.ones((2, 4)))),
+    (r"sensor 'sonar': one of wheel", lambda f: f.measure(7, "sonar", [0, 0, 0], [1, 1, 1])),
+    (r"set_pose: ", lambda f: f.set_pose(7, 2 * np.eye(3), [0, 0, 0])),
+    (r"covariance: .*\(3, 3\); numbers of shape \(6, 6\)", lambda f: f.set_pose(7, EYE, ZEROS, EYE)),
+    (r"inertial: .*mode", lambda f: f.inertial(7, [0, 0, 9.8], [0, 0, 0])),
+    (r"supervision: ", lambda f: f.supervision()),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "call"), REFUSED, ids=[words for words, _ in REFUSED])
+def test_a_wrong_argument_is_named_and_changes_nothing(
+    words: str, call: Callable[[Filter], Any]
+) -> None:
+    filter = Filter(CAMERA)
+    before = filter.pose(), filter.landmarks().tobytes()
+    with pytest.raises(PelorusError, match=words):
+        call(filter)
+    after = filter.pose(), filter.landmarks().tobytes()
+    assert np.array_equal(before[0].p, after[0].p)
+    assert before[1] == after[1]
+
+
+CONFIGS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("no setting pixel-sigmas; there are .*pixel-sigma,", {"pixel-sigmas": 2}),
+    ("pixel-sigma 0: 0.001 to 1000 px are possible", {"pixel-sigma": 0}),
+    ("slots 257: 1 to 256 are possible", {"slots": 257}),
+    ("scene 'stays': one of stands, may-move", {"scene": "stays"}),
+    ("gate-d2 'wide': a number", {"gate-d2": "wide"}),
+    ("pixel-sigma is one number, not three", {"pixel-sigma": (1, 2, 3)}),
+    ("velocity-sigma: .* of shape .2,.; numbers of shape .3,.", {"velocity-sigma": (1, 2)}),
+    ("process: it contradicts another setting", {"process": "imu", "bias": False}),
+)
+
+
+@pytest.mark.parametrize(("words", "config"), CONFIGS, ids=[words for words, _ in CONFIGS])
+def test_a_wrong_setting_is_named(words: str, config: dict[str, Any]) -> None:
+    with pytest.raises(PelorusError, match=words):
+        Filter(CAMERA, config)
+
+
+def test_settings_take_words_numbers_and_three_axes() -> None:
+    filter = Filter(
+        CAMERA, {"scene": "may-move", "bias": False, "velocity-sigma": np.array([0.3, 0.2, 0.1])}
+    )
+    assert filter.setting("scene") == 1
+    assert filter.setting("bias") == 0
+    axes = [filter.setting(f"velocity-sigma{end}") for end in ("", "-y", "-z")]
+    assert axes == [0.3, 0.2, 0.1]
+
+
+def test_a_calibration_that_cannot_be_is_refused() -> None:
+    with pytest.raises(FilterError, match=r"init: .*baseline") as refused:
+        Filter(Calibration(400, 400, 320, 240, -0.1))
+    assert refused.value.status < 0
+
+
+def test_a_package_without_its_library_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    native.library.cache_clear()
+    try:
+        monkeypatch.setenv("PELORUS_BIN", str(tmp_path))
+        with pytest.raises(PelorusError, match=r"is in none of .*installed without it"):
+            Filter(CAMERA)
+        name = f"pelorus-filter{native.SUFFIXES.get('', '.so')}"
+        (tmp_path / name).write_bytes(b"\x7fELF of another machine")
+        with pytest.raises(PelorusError, match=re.escape(name) + ": cannot be loaded"):
+            Filter(CAMERA)
+        with pytest.raises(PelorusError, match="precision 'float16': one of float32, float64"):
+            Filter(CAMERA, precision="float16")  # type: ignore[arg-type]
+    finally:
+        native.library.cache_clear()
+
+
+def test_a_library_of_other_structs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = native.library()._library._name
+    monkeypatch.setattr(native.Report, "c_name", "plr_frame")
+    with pytest.raises(PelorusError, match=r"with another plr_frame.*build it anew"):
+        native.Library(Path(path))
+
+
+def seen(points_C: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Pixels (n, 4) of points in the camera."""
+    x, y, z = points_C.T
+    u, v = CAMERA.fx_px * x / z + CAMERA.cx_px, CAMERA.fy_px * y / z + CAMERA.cy_px
+    return np.stack([u, v, u - CAMERA.fx_px * CAMERA.baseline_m / z, v], axis=1)
+
+
+def test_landmarks_known_and_evicted_pass_through_the_map() -> None:
+    rng = np.random.default_rng(5)
+    points = rng.uniform([-3, -2, 4], [3, 2, 9], (30, 3))
+    known = {i: KnownLandmark(p, 1e-4 * np.eye(3)) for i, p in enumerate(points)}
+    filter = Filter(CAMERA, {"mode": "localization", "start-sigma": 0.1}, known=known)
+    filter.predict(0, [0, 0, 0], [0, 0, 0])
+    for step in range(1, 6):
+        report = filter.update(step * 10**8, frame_of(range(30), seen(points - [0.05, 0, 0])))
+    assert report.used > 20
+    np.testing.assert_allclose(filter.pose().p, [0.05, 0, 0], atol=0.02)
+    mapper = Filter(CAMERA)
+    mapper.predict(0, [0, 0, 0], [0, 0, 0])
+    mapper.update(1, frame_of(range(30), seen(points)))
+    landmarks = mapper.landmarks()
+    assert set(landmarks["id"]) == set(range(30))
+    np.testing.assert_allclose(landmarks["p_W_m"], points[landmarks["id"]], rtol=1e-4)
+    mapper.flush_map()
+    assert len(mapper.landmarks()) == 0
+    assert set(mapper.evicted) == set(range(30))
+    np.testing.assert_allclose(mapper.evicted[7].p_W_m, points[7], rtol=1e-4)
+
+
+NUMBERS = st.floats(width=64) | st.sampled_from([0.0, -0.0, 1e-310, 1e300, np.inf, -np.inf, np.nan])
+THREE = arrays.arrays(np.float64, 3, elements=NUMBERS)
+PIXEL = st.floats(-2000, 4000, width=32) | st.sampled_from([0.0, 1e30, np.inf, np.nan])
+FRAMES = st.integers(0, 40).flatmap(
+    lambda n: st.tuples(
+        arrays.arrays(np.uint32, n, elements=st.integers(0, 60)),
+        arrays.arrays(np.float32, (n, 4), elements=PIXEL.map(np.float32)),
+    )
+)
+STEPS = st.lists(
+    st.tuples(st.just("predict"), st.integers(0, 2 * 10**9), THREE, THREE)
+    | st.tuples(st.just("update"), st.integers(0, 2 * 10**9), FRAMES, st.integers(0, 65535))
+    | st.tuples(st.just("measure"), st.integers(0, 2 * 10**9), THREE, THREE)
+    | st.tuples(st.just("save"), st.just(0), st.just(None), st.just(None)),
+    max_size=25,
+)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+@BUSY
+@given(steps=STEPS)
+def test_whatever_comes_the_state_stays_finite_and_its_covariance_positive(
+    precision: Precision, steps: list[tuple[str, int, Any, Any]]
+) -> None:
+    """A call is carried out or refused by name; what it leaves is an estimate."""
+    filter = Filter(CAMERA, {"slots": 15}, precision=precision)
+    now, refused = 0, []
+    for what, ahead, one, other in steps:
+        now += ahead
+        try:
+            if what == "predict":
+                filter.predict(now, one, other)
+            elif what == "update":
+                filter.update(now, frame_of(*one), budget=other)
+            elif what == "measure":
+                filter.measure(now, "position", one, np.abs(other))
+            else:
+                filter.restore(filter.save())
+        except FilterError as error:
+            refused.append(error.status)
+        pose, P = filter.pose(), filter.pose_covariance()
+        assert np.isfinite(pose.R).all()
+        assert np.isfinite(pose.p).all()
+        np.testing.assert_allclose(pose.R @ pose.R.T, np.eye(3), atol=1e-5)
+        assert (P == P.T).all()
+        assert (np.linalg.eigvalsh(P) > 0).all()
+    assert all(status < 0 for status in refused)

@@ -1,0 +1,507 @@
+# SPDX-License-Identifier: MIT
+"""The filter, from Python: the same library that the robot runs, the same bits.
+
+    from pelorus import Calibration, Filter, observations
+
+    filter = Filter(Calibration(fx_px=450, fy_px=450, cx_px=320, cy_px=240, baseline_m=0.12))
+    filter.predict(t_ns, v_B_mps, w_B_radps)          # at every twist
+    report = filter.update(t_ns, observations(ids, pixels))  # at every stereo pair
+    R_WB, p_WB_m = filter.pose()
+
+Frames: W world, B body, C left camera (x right, y down, z forward). Times are whole nanoseconds,
+angles radians, lengths metres. Arrays are float64 of the stated shapes, pixels float32. What the
+filter refuses is a FilterError with the status's text, and changes nothing but counts. One filter
+is not thread-safe; several filters are independent.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pelorus import native, schema
+from pelorus.errors import PelorusError
+from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
+
+__all__ = [
+    "OBSERVATION",
+    "Calibration",
+    "Filter",
+    "FilterError",
+    "Health",
+    "KnownLandmark",
+    "Pose",
+    "Report",
+    "Supervision",
+    "observations",
+]
+
+Floats = NDArray[np.float64]
+Value = float | bool | str
+
+# One landmark in a rectified stereo pair, as the library has it: id and four pixels.
+OBSERVATION = np.dtype(
+    [("id", "<u4"), ("uL_px", "<f4"), ("vL_px", "<f4"), ("uR_px", "<f4"), ("vR_px", "<f4")]
+)
+LANDMARK = np.dtype(
+    [("id", "<u4"), ("times_seen", "<u4"), ("times_gated", "<u4"), ("last_seen_ns", "<u8"),
+     ("known", "?"), ("p_W_m", "<f8", 3), ("P_W_m2", "<f8", (3, 3))], align=True
+)  # fmt: skip
+NO_BUDGET = schema.LIMITS["no_budget"]
+MOST_NS = 2**64 - 1
+MOST_ID = 2**32 - 1
+
+
+class FilterError(PelorusError):
+    """The filter refused a call. `status` is its number, negative, `call` the function."""
+
+    def __init__(self, call: str, status: int, text: str) -> None:
+        super().__init__(f"{call}: {text}")
+        self.call, self.status = call, status
+
+
+class Pose(NamedTuple):
+    """A rigid motion x -> R x + p: R (3, 3), p (3,) in metres."""
+
+    R: Floats
+    p: Floats
+
+
+class KnownLandmark(NamedTuple):
+    """A landmark of a map: position in the world (3,), m, and its covariance (3, 3), m^2."""
+
+    p_W_m: ArrayLike
+    P_W_m2: ArrayLike
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A rectified stereo camera and its place on the body: a point s_B of the body is
+    R_CB s_B + t_CB_m in the left camera; R_CB (3, 3), t_CB_m (3,)."""
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    baseline_m: float
+    R_CB: ArrayLike = field(default_factory=lambda: np.eye(3))
+    t_CB_m: ArrayLike = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Self:
+        """Of a calibration.json, as `pelorus convert` takes it."""
+        from pelorus import calibration  # noqa: PLC0415 - reads files, which most callers do not
+
+        return cls.of_header(calibration.read(Path(path)))
+
+    @classmethod
+    def of_header(cls, header: Any) -> Self:
+        """Of a recording's HEADER."""
+        return cls(**vars(header.camera), R_CB=header.R_CB, t_CB_m=header.t_CB_m)
+
+
+def observations(ids: ArrayLike, pixels: ArrayLike) -> NDArray[np.void]:
+    """Observations of a frame: ids (n,), 0 to 2^32 - 1; pixels (n, 4) of (uL, vL, uR, vR)."""
+    numbers, places = np.asarray(ids), np.asarray(pixels)
+    if numbers.ndim != 1 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
+        raise PelorusError(f"ids: {_is(numbers)}; whole numbers of shape (n,) are wanted")
+    if numbers.size and not (numbers.min() >= 0 and numbers.max() <= MOST_ID):
+        raise PelorusError(f"ids: {numbers.min()} to {numbers.max()}; 0 to {MOST_ID} are possible")
+    frame = np.empty(len(numbers), OBSERVATION)
+    frame["id"] = numbers
+    pixel = _array("pixels", places, (len(numbers), 4), np.float32)
+    for column, name in enumerate(OBSERVATION.names[1:] if OBSERVATION.names else ()):
+        frame[name] = pixel[:, column]
+    return frame
+
+
+def _is(array: NDArray[Any]) -> str:
+    return f"{array.dtype} of shape {array.shape}"
+
+
+def _array(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.float64) -> Any:
+    """The value as an array of this shape, without a copy where it is one."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:  # rows of different length
+        raise PelorusError(f"{name}: {error}; numbers of shape {shape} are wanted") from error
+    if array.shape != shape or array.dtype.kind not in "fiu":
+        raise PelorusError(f"{name}: {_is(array)}; numbers of shape {shape} are wanted")
+    if array.dtype == type and array.flags.c_contiguous:
+        return array
+    with np.errstate(over="ignore"):  # becomes infinite, which the filter refuses by name
+        return np.ascontiguousarray(array, type)
+
+
+def _whole(name: str, value: int, most: int) -> int:
+    number = value if type(value) is int else _as_int(name, value)
+    if not 0 <= number <= most:
+        raise PelorusError(f"{name}: {number}; 0 to {most} are possible")
+    return number
+
+
+def _as_int(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise PelorusError(f"{name}: {value!r} is no whole number")
+    return int(value)
+
+
+def _pose(name: str, R: ArrayLike, p: ArrayLike) -> native.Pose:
+    pose = native.Pose()
+    pose.R[:] = _array(f"{name}: R", R, (3, 3)).ravel()
+    pose.p[:] = _array(f"{name}: p", p, (3,))
+    return pose
+
+
+def _address(array: NDArray[Any] | None) -> int | None:
+    return None if array is None else array.ctypes.data
+
+
+class Filter:
+    """A stereo visual-inertial SLAM filter: twists or readings of an IMU, and stereo observations
+    in; pose and landmarks with covariance out.
+
+    `config` names settings as the command line does, {"pixel-sigma": 1.5, "process": "imu"}: a
+    number, or the word of a choice; the sigmas of twists, imu-turn and imu-arm also take three
+    numbers. All of them: include/pelorus/settings.h. `known` is a map for known-map and
+    localization. Landmarks that leave the filter are collected in `evicted`, by id.
+    """
+
+    def __init__(
+        self,
+        calibration: Calibration,
+        config: Mapping[str, Value | Iterable[float]] | None = None,
+        *,
+        precision: Precision = "float32",
+        known: Mapping[int, KnownLandmark] | None = None,
+    ) -> None:
+        self._c = native.library(precision)
+        self.precision: Precision = precision
+        self.known = dict(known or {})
+        self.evicted: dict[int, KnownLandmark] = {}
+        sizes = self._c.sizes
+        self._memory = c.create_string_buffer(sizes.bytes + 63)
+        self._f = (c.addressof(self._memory) + 63) // 64 * 64
+        self._config = c.create_string_buffer(self._c.size_of("plr_config"))
+        self._c.config_default(self._config)
+        for name, value in (config or {}).items():
+            self._set(name, value)
+        self._check_config()
+        self._callbacks = native.Map(None, native.Sink(self._take), native.Source(self._find))
+        given = native.Calibration(
+            *(float(getattr(calibration, name)) for name, _ in native.Calibration._fields_[:5]),
+            _pose("calibration", calibration.R_CB, calibration.t_CB_m),
+        )
+        pointers = (c.byref(part) for part in (given, self._config, self._callbacks, sizes))
+        self._checked("init", self._c.filter_init_sized(self._f, *pointers))
+        # Made once: a frame makes no object but its report.
+        self._twist, self._frame, self._report = native.Twist(), native.Frame(), native.Report()
+        self._twist_at, self._frame_at = c.addressof(self._twist), c.addressof(self._frame)
+        self._linear = np.ctypeslib.as_array(self._twist.linear)
+        self._angular = np.ctypeslib.as_array(self._twist.angular)
+        self._report_at = c.addressof(self._report)
+        self._predict, self._inertial = self._c.filter_predict, self._c.filter_inertial
+        self._update = self._c.filter_update
+
+    # --- settings
+
+    def _set(self, name: str, value: Value | Iterable[float]) -> None:
+        row = self._c.setting_by_name(name.encode())
+        if not row:
+            known = ", ".join(sorted(setting.name for setting in schema.SETTINGS.values()))
+            raise PelorusError(f"config: no setting {name}; there are {known}")
+        number = _number_of(name, value)
+        if isinstance(number, tuple):
+            for axis, one in zip(("", "-y", "-z"), number, strict=True):
+                self._set(f"{name}{axis}", one)
+        elif self._c.config_set(self._config, row, number) != 0:
+            unit = row[0].unit.decode()
+            raise PelorusError(
+                f"config: {name} {value}: {row[0].minimum:g} to {row[0].maximum:g} {unit}".rstrip()
+                + " are possible"
+            )
+
+    def _check_config(self) -> None:
+        culprit = c.POINTER(native.Setting)()
+        status = self._c.config_check(self._config, c.byref(culprit))
+        if status != 0:
+            raise PelorusError(
+                f"config: {culprit[0].name.decode()}: it contradicts another setting; which ones "
+                "cannot stand together is said above plr_config in include/pelorus/settings.h"
+            )
+
+    def setting(self, name: str) -> float:
+        """The value in force; of a choice its number."""
+        row = self._c.setting_by_name(name.encode())
+        if not row:
+            raise PelorusError(f"no setting {name}")
+        return float(self._c.config_get(self._config, row))
+
+    # --- the map, called by the library
+
+    def _take(self, _context: object, landmark: Any) -> int:
+        found = landmark[0]
+        covariance = np.array(found.P_W_m2).reshape(3, 3)
+        self.evicted[found.id] = KnownLandmark(np.array(found.p_W_m), covariance)
+        return 0
+
+    def _find(self, _context: object, id: int, landmark: Any) -> bool:
+        known = self.known.get(id)
+        if known is not None:
+            landmark[0] = _landmark(id, known)
+        return known is not None
+
+    # --- calls
+
+    def _checked(self, call: str, status: int) -> None:
+        if status != 0:
+            raise FilterError(call, status, self._c.text(status))
+
+    def reset(self) -> None:
+        """As after the beginning, all counts zero."""
+        self._checked("reset", self._c.filter_reset(self._f))
+
+    def set_pose(
+        self, t_ns: int, R_WB: ArrayLike, p_WB_m: ArrayLike, covariance: ArrayLike | None = None
+    ) -> None:
+        """Sets pose and time, at the start or later; landmarks are dropped. `covariance` (6, 6) of
+        (rho, theta), m and rad in the body's axes; None: start-sigma."""
+        P = None if covariance is None else _array("covariance", covariance, (6, 6))
+        pose = _pose("pose", R_WB, p_WB_m)
+        time = _whole("t_ns", t_ns, MOST_NS)
+        self._checked(
+            "set_pose", self._c.filter_set_pose(self._f, time, c.byref(pose), _address(P))
+        )
+
+    def set_bias(self, mean: ArrayLike, variance: ArrayLike) -> None:
+        """The prior of the biases, each (6,): of twists (v, w), m/s and rad/s; of an IMU (a, w)."""
+        b, V = _array("mean", mean, (6,)), _array("variance", variance, (6,))
+        self._checked("set_bias", self._c.filter_set_bias(self._f, _address(b), _address(V)))
+
+    def set_velocity(self, v_B_mps: ArrayLike, variance: ArrayLike) -> None:
+        """With an IMU: its velocity in the body's axes, and variances; each (3,)."""
+        v, V = _array("v_B_mps", v_B_mps, (3,)), _array("variance", variance, (3,))
+        status = self._c.filter_set_velocity(self._f, _address(v), _address(V))
+        self._checked("set_velocity", status)
+
+    def move_to(self, t_ns: int, R_WB: ArrayLike, p_WB_m: ArrayLike) -> None:
+        """In the mode mapping: the body's pose at t_ns, which is taken as exact."""
+        pose = _pose("pose", R_WB, p_WB_m)
+        time = _whole("t_ns", t_ns, MOST_NS)
+        self._checked("move_to", self._c.filter_move_to(self._f, time, c.byref(pose)))
+
+    def predict(self, t_ns: int, v_B_mps: ArrayLike, w_B_radps: ArrayLike) -> None:
+        """A twist taken at t_ns: velocity (3,), m/s, and rate (3,), rad/s, in the body's axes."""
+        self._linear[:] = _array("v_B_mps", v_B_mps, (3,))
+        self._angular[:] = _array("w_B_radps", w_B_radps, (3,))
+        status = self._predict(self._f, _whole("t_ns", t_ns, MOST_NS), self._twist_at)
+        if status != 0:
+            self._checked("predict", status)
+
+    def inertial(self, t_ns: int, a_B_mps2: ArrayLike, w_B_radps: ArrayLike) -> None:
+        """A reading of an IMU at t_ns: specific force (3,), m/s^2, at rest upwards; rate (3,)."""
+        self._linear[:] = _array("a_B_mps2", a_B_mps2, (3,))
+        self._angular[:] = _array("w_B_radps", w_B_radps, (3,))
+        status = self._inertial(self._f, _whole("t_ns", t_ns, MOST_NS), self._twist_at)
+        if status != 0:
+            self._checked("inertial", status)
+
+    def update(self, t_ns: int, observations: NDArray[np.void], budget: int = NO_BUDGET) -> Report:
+        """A stereo frame: what `observations` makes, (n,) of OBSERVATION, read without a copy. At
+        most `budget` of them are used."""
+        if not isinstance(observations, np.ndarray) or observations.dtype != OBSERVATION:
+            raise PelorusError("observations: an array as pelorus.observations makes it is wanted")
+        seen = np.ascontiguousarray(observations)
+        if seen.ndim != 1 or len(seen) > self.most_observations:
+            raise PelorusError(
+                f"observations: shape {seen.shape}; (n,) with n up to {self.most_observations}"
+            )
+        frame = self._frame
+        frame.t_ns, frame.budget = (
+            _whole("t_ns", t_ns, MOST_NS),
+            _whole("budget", budget, NO_BUDGET),
+        )
+        frame.count, frame.observations = len(seen), seen.ctypes.data
+        status = self._update(self._f, self._frame_at, self._report_at)
+        if status != 0:
+            self._checked("update", status)
+        return Report.from_buffer_copy(self._report)
+
+    def measure(
+        self,
+        t_ns: int,
+        sensor: str,
+        value: ArrayLike,
+        sigma: ArrayLike,
+        at_B_m: ArrayLike = (0, 0, 0),
+    ) -> ReadingResult:
+        """A reading of a small sensor: `wheel` (velocity of a point of the body, m/s),
+        `standstill` (value zeros; sigma[0] m/s, sigma[1] rad/s) or `position` (in the world, m).
+        Each (3,); an axis whose sigma is 0 was not measured. at_B_m: where on the body."""
+        kinds = schema.SENSORS
+        if sensor not in kinds:
+            raise PelorusError(f"sensor {sensor!r}: one of {', '.join(kinds)}")
+        sigmas = _array("sigma", sigma, (3,))
+        reading = native.Reading(_whole("t_ns", t_ns, MOST_NS), kinds[sensor])
+        still = sensor == "standstill"
+        reading.axes = 7 if still else sum(1 << i for i in range(3) if sigmas[i] != 0)
+        reading.value[:], reading.sigma[:] = _array("value", value, (3,)), sigmas
+        reading.at_B_m[:] = _array("at_B_m", at_B_m, (3,))
+        result = ReadingResult()
+        self._checked("measure", self._c.filter_measure(self._f, c.byref(reading), c.byref(result)))
+        return result
+
+    # --- the estimate
+
+    @property
+    def time_ns(self) -> int:
+        """Time of the estimate."""
+        return int(self._c.filter_time(self._f))
+
+    def _doubles(self, function: str, shape: tuple[int, ...]) -> Floats:
+        """What a function writes as an array of doubles."""
+        result = np.empty(shape)
+        self._checked(function, getattr(self._c, f"filter_{function}")(self._f, _address(result)))
+        return result
+
+    def pose(self) -> Pose:
+        """The pose of the body in the world, T_WB: R (3, 3), p (3,), m."""
+        numbers = self._doubles("pose", (12,))
+        return Pose(numbers[:9].reshape(3, 3), numbers[9:])
+
+    def pose_covariance(self) -> Floats:
+        """(6, 6), of (rho, theta), m and rad in the body's axes; truth is T_WB Exp(rho, theta)."""
+        return self._doubles("pose_covariance", (6, 6))
+
+    def velocity(self) -> Floats:
+        """(6,): velocity, m/s, and rate, rad/s, of the body in its own axes."""
+        return self._doubles("velocity", (6,))
+
+    def velocity_covariance(self) -> Floats:
+        """(6, 6), in the same order."""
+        return self._doubles("velocity_covariance", (6, 6))
+
+    def bias(self) -> tuple[Floats, Floats]:
+        """(6,) and its covariance (6, 6): (b_v, b_w) of twists, (b_a, b_g) of an IMU."""
+        b, P = np.empty(6), np.empty((6, 6))
+        self._checked("bias", self._c.filter_bias(self._f, _address(b), _address(P)))
+        return b, P
+
+    def landmarks(self) -> NDArray[np.void]:
+        """All landmarks in the state, (n,) of LANDMARK: id, p_W_m (3,), P_W_m2 (3, 3) ..."""
+        count = int(self._c.filter_landmark_count(self._f))
+        found = np.zeros(count, LANDMARK)
+        for slot in range(count):
+            address = found.ctypes.data + slot * LANDMARK.itemsize
+            self._checked("landmark", self._c.filter_landmark(self._f, slot, address))
+        return found
+
+    def insert_known(self, id: int, p_W_m: ArrayLike, P_W_m2: ArrayLike) -> None:
+        """Puts a landmark of known position (3,), m, and covariance (3, 3), m^2, into the state."""
+        landmark = _landmark(_whole("id", id, MOST_ID), KnownLandmark(p_W_m, P_W_m2))
+        self._checked("insert_known", self._c.filter_insert_known(self._f, c.byref(landmark)))
+
+    def flush_map(self) -> None:
+        """Moves every landmark to `evicted`."""
+        self._checked("flush_map", self._c.filter_flush_map(self._f))
+
+    # --- what happened
+
+    def health(self, t_ns: int | None = None) -> Health:
+        """The filter's health at t_ns; None: at the time of the estimate."""
+        time = self.time_ns if t_ns is None else _whole("t_ns", t_ns, MOST_NS)
+        health = Health()
+        self._checked("health", self._c.filter_health(self._f, time, c.byref(health)))
+        return health
+
+    def supervision(self) -> Supervision:
+        """What the supervisor saw in the last frame, and decided on it."""
+        seen = Supervision()
+        self._checked("supervision", self._c.filter_supervision(self._f, c.byref(seen)))
+        return seen
+
+    def totals(self) -> dict[str, int]:
+        """Counts since the beginning, by name."""
+        counts = native.Totals()
+        self._checked("totals", self._c.filter_totals(self._f, c.byref(counts)))
+        return {name: int(getattr(counts, name)) for name in (*native.COUNTS_32, *native.COUNTS_64)}
+
+    # --- saved state
+
+    def save(self) -> bytes:
+        """The whole state. A filter that restores it goes on with the same bits."""
+        saved = bytearray()
+
+        def take(_context: object, data: int, n: int) -> int:
+            saved.extend(c.string_at(data, n))
+            return 0
+
+        self._checked("save", self._c.filter_save(self._f, native.StateSink(take), None))
+        return bytes(saved)
+
+    def restore(self, saved: bytes) -> None:
+        """Goes on from a saved state of the same calibration, settings and build."""
+
+        def give(_context: object, offset: int, data: int, n: int) -> int:
+            c.memmove(data, saved[offset : offset + n], n)
+            return 0
+
+        source = native.StateSource(give)
+        self._checked("restore", self._c.filter_restore(self._f, len(saved), source, None))
+
+    def resume(self, t_ns: int, moved: ArrayLike | None = None) -> None:
+        """Continues at t_ns, of any clock, after a pause; `moved` (6, 6) is the covariance of
+        how far the body may have moved meanwhile, as of a pose; None: not at all."""
+        P = None if moved is None else _array("moved", moved, (6, 6))
+        time = _whole("t_ns", t_ns, MOST_NS)
+        self._checked("resume", self._c.filter_resume(self._f, time, _address(P)))
+
+    # --- the library
+
+    @property
+    def most_landmarks(self) -> int:
+        """How many the library has room for; the setting `slots` may use fewer."""
+        return int(self._c.sizes.landmarks)
+
+    @property
+    def most_observations(self) -> int:
+        """In one frame."""
+        return int(self._c.sizes.observations)
+
+    @property
+    def fingerprint(self) -> int:
+        """Differs between builds whose bits may differ."""
+        return int(self._c.build_fingerprint())
+
+
+def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float, float, float]:
+    """A setting's value as the library takes it; of three axes three."""
+    if isinstance(value, str):
+        words = schema.SETTINGS[_ids()[name]].words
+        if value not in words:
+            expected = f"one of {', '.join(words)}" if words else "a number"
+            raise PelorusError(f"config: {name} {value!r}: {expected}")
+        return float(words.index(value))
+    if isinstance(value, bool | int | float | np.number):
+        return float(value)
+    numbers = tuple(float(one) for one in _array(f"config: {name}", np.asarray(value), (3,)))
+    if f"{name}-y" not in _ids():
+        raise PelorusError(f"config: {name} is one number, not three")
+    return numbers[0], numbers[1], numbers[2]
+
+
+def _ids() -> dict[str, int]:
+    return {setting.name: id for id, setting in schema.SETTINGS.items()}
+
+
+def _landmark(id: int, known: KnownLandmark) -> native.Landmark:
+    landmark = native.Landmark(id=id, known=True)
+    landmark.p_W_m[:] = _array(f"landmark {id}: p_W_m", known.p_W_m, (3,))
+    landmark.P_W_m2[:] = _array(f"landmark {id}: P_W_m2", known.P_W_m2, (3, 3)).ravel()
+    return landmark
