@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -42,7 +42,7 @@ def bits(R: Floats, p: Floats, triangle: Floats, precision: Precision) -> bytes:
     return R.astype(precision).tobytes() + p.tobytes() + triangle.astype(precision).tobytes()
 
 
-def driven(filter: Filter, messages: list[Message], seconds: float = np.inf) -> list[bytes]:
+def driven(filter: Filter, messages: Sequence[Message], seconds: float = np.inf) -> list[bytes]:
     """The poses and covariances after each frame, as bytes."""
     found = []
     begin = next(m.t_ns for m in messages if isinstance(m, Twist))
@@ -125,8 +125,8 @@ def test_the_structs_are_those_of_the_headers(tmp_path: Path) -> None:
         '#include <stddef.h>\n#include <stdio.h>\n#include "pelorus/pelorus.h"\n'
         f"int main(void) {{ {' '.join(lines)} return 0; }}\n"
     )
-    command = [compiler, "-std=c99", f"-I{ROOT / 'include'}", source, "-o", tmp_path / "offsets"]
-    subprocess.run(command, check=True)
+    command = [compiler, "-std=c99", f"-I{ROOT / 'include'}", str(source)]
+    subprocess.run([*command, "-o", str(tmp_path / "offsets")], check=True)
     said = subprocess.run([tmp_path / "offsets"], check=True, capture_output=True, text=True)
     assert [int(word) for word in said.stdout.split()] == expected
 
@@ -137,19 +137,19 @@ MANY = frame_of(range(1025), np.ones((1025, 4)))
 REFUSED: tuple[tuple[str, Callable[[Filter], Any]], ...] = (
     (r"v_B_mps: int64 of shape \(2,\); numbers .*\(3,\)", lambda f: f.predict(7, [1, 2], ZEROS)),
     (r"w_B_radps: <U1 of shape \(3,\)", lambda f: f.predict(7, [1, 2, 3], list("abc"))),
-    (r"w_B_radps: .*inhomogeneous", lambda f: f.predict(7, [1, 2, 3], [[1], [2, 3], 4])),
+    (r"w_B_radps: .*inhomogeneous", lambda f: f.predict(7, [1, 2, 3], [[1], [2, 3]])),
     (r"t_ns: 1.5 is no whole number", lambda f: f.predict(cast(int, 1.5), ZEROS, ZEROS)),
     (r"t_ns: -3; 0 to ", lambda f: f.predict(-3, [1, 2, 3], [0, 0, 0])),
     (r"predict: .*NaN", lambda f: f.predict(7, [1, np.nan, 3], [0, 0, 0])),
     (r"predict: .*infinite", lambda f: f.predict(7, [1, np.inf, 3], [0, 0, 0])),
-    (r"observations: an array as pelorus.observations", lambda f: f.update(7, np.zeros((3, 5)))),
+    (r"observations: an array as pelorus.obs", lambda f: f.update(7, cast(Any, np.zeros((3, 5))))),
     (r"observations: shape \(1025,\); \(n,\) .* 1024", lambda f: f.update(7, MANY)),
     (r"pixels: .* \(2, 3\); numbers .* \(2, 4\)", lambda _: frame_of([1, 2], np.ones((2, 3)))),
     (r"ids: -1 to 4; 0 to 4294967295", lambda _: frame_of([4, -1], np.ones((2, 4)))),
     (r"ids: float64 of shape", lambda _: frame_of([4.5, 1.0], np.ones((2, 4)))),
     (r"sensor 'sonar': one of wheel", lambda f: f.measure(7, "sonar", [0, 0, 0], [1, 1, 1])),
     (r"set_pose: ", lambda f: f.set_pose(7, 2 * np.eye(3), [0, 0, 0])),
-    (r"covariance: .*\(3, 3\); numbers of shape \(6, 6\)", lambda f: f.set_pose(7, EYE, ZEROS, EYE)),
+    (r"covariance: .*\(3, 3\); numbers .* \(6, 6\)", lambda f: f.set_pose(7, EYE, ZEROS, EYE)),
     (r"inertial: .*mode", lambda f: f.inertial(7, [0, 0, 9.8], [0, 0, 0])),
     (r"supervision: ", lambda f: f.supervision()),
 )  # fmt: skip
@@ -253,7 +253,7 @@ def test_landmarks_known_and_evicted_pass_through_the_map() -> None:
     mapper.flush_map()
     assert len(mapper.landmarks()) == 0
     assert set(mapper.evicted) == set(range(30))
-    np.testing.assert_allclose(mapper.evicted[7].p_W_m, points[7], rtol=1e-4)
+    np.testing.assert_allclose(np.asarray(mapper.evicted[7].p_W_m), points[7], rtol=1e-4)
 
 
 NUMBERS = st.floats(width=64) | st.sampled_from([0.0, -0.0, 1e-310, 1e300, np.inf, -np.inf, np.nan])

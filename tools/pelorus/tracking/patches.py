@@ -14,10 +14,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from cv2 import GaussianBlur
 from numpy.typing import NDArray
 
 from pelorus.layout import Floats
+from pelorus.opencv import cv2
 from pelorus.tracking.images import Gray
 from pelorus.tracking.matching import Mask, Points
 
@@ -53,7 +53,7 @@ class Refined(NamedTuple):
 
 def smooth(image: Gray) -> Floats:
     """What patches are cut from and found in."""
-    return np.asarray(GaussianBlur(image, (0, 0), SMOOTH_PX).astype(np.float64))
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTH_PX).astype(np.float64))
 
 
 def grid(window_px: int) -> Floats:
