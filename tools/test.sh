@@ -213,7 +213,7 @@ ensure_python # there by now; if not, it says why and ends this
 # --- form, beside the first build -----------------------------------------------------------------
 
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tools/firmware tools/example_robot.py tests/python tests/layering tests/golden tests/fuzz tests/recordings
+    tools/pelorus tools/firmware tools/*.py tests/python tests/layering tests/golden tests/fuzz tests/recordings
 beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
 beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
@@ -243,6 +243,7 @@ if [ $extent != quick ]; then
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
     beside 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
+    beside 'same bits on other systems' "$VENV/bin/python" tools/cross.py
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then
         step 'fuzz the reader' fuzz 120 fuzz_reader tests/fuzz/corpus 4096
         step 'fuzz the session' fuzz 300 fuzz_session tests/fuzz/corpus_session 8192

@@ -1,0 +1,215 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Builds pelorus-replay for other systems, runs what this machine can run, and compares the bits.
+
+usage: cross.py [--out FOLDER] [TARGET...]
+
+The compiler is the one of the package ziglang. It is given the library as one file (amalgamate.py)
+and the replay as another. Each program that can be run here, by qemu-user, by the package wasmtime
+or by wine, replays a simulated recording of twists and one of an IMU; the SHA-256 of the
+trajectories must be that of build/bin/pelorus-replay, or of the first target where there is none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import amalgamate
+
+ROOT = Path(__file__).resolve().parents[1]
+NATIVE = ROOT / "build/bin/pelorus-replay"
+COMMON = (
+    *("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=all", "-g0"),
+    *("-DPLR_MAX_LANDMARKS=256", "-DPLR_MAX_OBSERVATIONS=1024"),
+)
+WARNINGS = ("-Wall", "-Wextra", "-Werror")
+RECORDINGS = {
+    "twists": ("--seed", "3", "--duration", "4", "--observations", "25"),
+    "imu": ("--seed", "4", "--duration", "4", "--observations", "25", "--imu-rate", "200"),
+}
+SETTINGS = ("--slots", "20", "--quiet")
+
+Run = Callable[[Path, Sequence[str], Path], None]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A system: zig's name of it, the library's flags, and who can run it here."""
+
+    triple: str
+    library: tuple[str, ...] = ()
+    program: str = "pelorus-replay"
+    runner: str = ""  # a program that runs it; empty: it runs as it is
+
+    @property
+    def windows(self) -> bool:
+        return "windows" in self.triple
+
+
+X86_64_V3 = ("-mcpu=x86_64_v3",)
+PORTABLE = ("-DPLR_PORTABLE=1", "-msimd128")
+TARGETS = {
+    "linux-x86_64": Target("x86_64-linux-gnu.2.17", X86_64_V3),
+    "linux-aarch64": Target("aarch64-linux-musl", runner="qemu-aarch64-static"),
+    "linux-riscv64": Target("riscv64-linux-musl", runner="qemu-riscv64-static"),
+    "windows-x86_64": Target("x86_64-windows-gnu", X86_64_V3, "pelorus-replay.exe", "wine64"),
+    "macos-x86_64": Target("x86_64-macos", X86_64_V3, runner="-"),
+    "macos-aarch64": Target("aarch64-macos", runner="-"),
+    "wasi": Target("wasm32-wasi", PORTABLE, "pelorus-replay.wasm", "wasmtime"),
+}
+
+
+def compile_to(output: Path, source: Path, target: Target, flags: Sequence[str]) -> None:
+    """One file, linked where the output is no object."""
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target.triple, *COMMON, *flags]
+    done = subprocess.run(
+        [*command, str(source), "-o", str(output)], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise SystemExit(f"{target.triple}: {source.name} does not compile:\n{done.stderr[:4000]}")
+
+
+def replay_sources(target: Target) -> list[Path]:
+    """Of pelorus-replay, without libzstd, for this system."""
+    other = "posix" if target.windows else "windows"
+    left_out = {"compressed_zstd.c", f"system_{other}.c"}
+    return sorted(p for p in (ROOT / "port/posix").glob("*.c") if p.name not in left_out)
+
+
+def build(target: Target, folder: Path) -> Path:
+    """The program, in the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    header, library = amalgamate.library(ROOT)
+    (folder / "pelorus.h").write_text(header, encoding="utf-8")
+    (folder / "pelorus.c").write_text(library, encoding="utf-8")
+    replay = amalgamate.program(ROOT, replay_sources(target))
+    (folder / "replay.c").write_text(replay, encoding="utf-8")
+    compile_to(
+        folder / "pelorus.o", folder / "pelorus.c", target, [*WARNINGS, *target.library, "-c"]
+    )
+    arch = "x86-64-v3" if X86_64_V3[0] in target.library else ""
+    names = ['-DPELORUS_NAME="pelorus-replay"', f'-DPELORUS_ARCH="{arch}"', "-D_XOPEN_SOURCE=700"]
+    large = ["-D_FILE_OFFSET_BITS=64"] if target.windows else []
+    objects = [str(folder / "pelorus.o"), *([] if target.windows else ["-lm"]), "-s"]
+    program = folder / target.program
+    compile_to(program, folder / "replay.c", target, [*WARNINGS, *names, *large, *objects])
+    return program
+
+
+def runner_of(target: Target) -> str | None:
+    """The program that runs it, where there is one; Debian keeps wine out of the way."""
+    return shutil.which(target.runner, path=f"{os.environ.get('PATH', '')}:/usr/lib/wine")
+
+
+def run_program(target: Target, program: Path, words: Sequence[str], folder: Path) -> None:
+    """Runs it in the folder."""
+    if target.runner == "wasmtime":
+        run_wasm(program, words, folder)
+        return
+    command = [found] if (found := runner_of(target)) else []
+    subprocess.run(
+        [*command, str(program), *words],
+        cwd=folder, check=True, stdout=subprocess.DEVNULL, env=os.environ | {"WINEDEBUG": "-all"},
+    )  # fmt: skip
+
+
+def run_wasm(program: Path, words: Sequence[str], folder: Path) -> None:
+    """The same by wasmtime, which lends it the folder."""
+    import wasmtime  # noqa: PLC0415 - only where it is needed
+
+    engine = wasmtime.Engine()
+    linker = wasmtime.Linker(engine)
+    linker.define_wasi()
+    system = wasmtime.WasiConfig()
+    system.argv = ["pelorus-replay", *words]
+    system.preopen_dir(str(folder), ".")
+    system.inherit_stderr()
+    store = wasmtime.Store(engine)
+    store.set_wasi(system)
+    instance = linker.instantiate(store, wasmtime.Module.from_file(engine, str(program)))
+    start = instance.exports(store)["_start"]
+    try:
+        start(store)  # type: ignore[operator]
+    except wasmtime.ExitTrap as ended:
+        if ended.code != 0:
+            raise SystemExit(f"wasmtime: pelorus-replay ended with status {ended.code}") from ended
+
+
+def can_run(target: Target) -> bool:
+    """Whether this machine has what runs it."""
+    if target.runner == "wasmtime":
+        return subprocess.run(
+            [sys.executable, "-c", "import wasmtime"], capture_output=True, check=False
+        ).returncode == 0  # fmt: skip
+    return not target.runner or runner_of(target) is not None
+
+
+def digest(run: Callable[[Sequence[str]], None], folder: Path) -> str:
+    """SHA-256 over the trajectories of all recordings."""
+    sums = hashlib.sha256()
+    for name in RECORDINGS:
+        run([f"{name}.plr", *SETTINGS, "--trajectory", f"{name}.tum"])
+        text = (folder / f"{name}.tum").read_bytes()
+        if (poses := len(text.splitlines())) < 20:
+            raise SystemExit(f"{name}: a trajectory of {poses} poses proves nothing")
+        sums.update(text)
+        (folder / f"{name}.tum").unlink()
+    return sums.hexdigest()
+
+
+def simulate(folder: Path) -> None:
+    """The recordings, made anew."""
+    for name, words in RECORDINGS.items():
+        command = [sys.executable, "-m", "pelorus", "simulate", *words, str(folder / f"{name}.plr")]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def main() -> int:
+    """Builds, runs, compares; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=ROOT / "build/cross", help="where to build")
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
+    given = parser.parse_args()
+    if unknown := sorted(set(given.targets) - TARGETS.keys()):
+        parser.error(f"no target {', '.join(unknown)}; there are {', '.join(TARGETS)}")
+    differ = 0
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
+        folder = Path(temporary)
+        simulate(folder)
+        wanted = ""
+        if NATIVE.is_file():
+            native = Target("this machine's")
+            wanted = digest(lambda words: run_program(native, NATIVE, words, folder), folder)
+            print(f"{'build/bin':15} {wanted[:16]}...")
+        for name in given.targets or TARGETS:
+            target, begun = TARGETS[name], time.monotonic()
+            program = build(target, given.out.resolve() / name)
+            built = f"{program.stat().st_size // 1024} KB in {time.monotonic() - begun:.0f} s"
+            if not can_run(target):
+                why = "no such system here" if target.runner == "-" else f"no {target.runner} here"
+                print(f"skipped: {name} is built, {built}, and not run: {why}")
+                continue
+
+            def run(words: Sequence[str], target: Target = target, program: Path = program) -> None:
+                run_program(target, program, words, folder)
+
+            found = digest(run, folder)
+            wanted = wanted or found
+            differ += found != wanted
+            said = "the same" if found == wanted else "NOT the same"
+            print(f"{name:15} {found[:16]}... {said}; {built}", flush=True)
+    return 1 if differ else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
