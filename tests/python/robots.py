@@ -202,9 +202,7 @@ def _summed(x: Floats) -> Floats:
     return np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
 
 
-def _only_while_moving(
-    twists: Twists, t_ns: NDArray[np.int64], v: Floats, w: Floats
-) -> Twists:
+def _only_while_moving(twists: Twists, t_ns: NDArray[np.int64], v: Floats, w: Floats) -> Twists:
     """As some drivers publish it: nothing while the robot stands."""
     moves = np.linalg.norm(np.hstack((v, w)), axis=1)[np.searchsorted(t_ns, twists.t_ns)] > 1e-3
     return replace(

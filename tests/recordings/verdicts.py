@@ -144,7 +144,9 @@ def verdict_of(name: str, path: Path, program: Path) -> tuple[bool, bool]:
         found = checked.check(program, path, {}, Path(folder))
     figures = {title: after for title, _, after in found.rows}
     truth = truth_in(wire.messages_of(path))
-    way = 0.0 if truth is None else float(np.sum(np.linalg.norm(np.diff(truth[1].p, axis=0), axis=1)))
+    way = (
+        0.0 if truth is None else float(np.sum(np.linalg.norm(np.diff(truth[1].p, axis=0), axis=1)))
+    )
     ate = figures.get("ATE m (truth, to compare)", "-")
     # what was not tuned has no figures; of clean drives it is the verdict that is wrong
     right = ate == "-" or float(ate) <= max(RIGHT_SHARE * way, RIGHT_M)
@@ -173,7 +175,12 @@ def verdicts(
         if path_of is not None:
             rows[case.name] = [verdict_of(case.name, path_of, program)]
     return [
-        (name, len(said), sum(right for right, _ in said), sum(right and bad for right, bad in said))
+        (
+            name,
+            len(said),
+            sum(right for right, _ in said),
+            sum(right and bad for right, bad in said),
+        )
         for name, said in rows.items()
     ]
 
@@ -188,7 +195,9 @@ def table(title: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--drives", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="")

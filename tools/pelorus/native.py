@@ -224,7 +224,7 @@ class Supervision(_Struct):
     statistic: float
     usual: c.Array[c.c_float]
     agreement: float
-    weight: c.Array[c.c_float]
+    weight: float
     difference: c.Array[c.c_float]
     doubt: int
     applied: bool
@@ -248,7 +248,7 @@ class Supervision(_Struct):
         ("statistic", c.c_float),
         ("usual", _floats(6)),
         ("agreement", c.c_float),
-        ("weight", _floats(2)),
+        ("weight", c.c_float),
         ("difference", _floats(6)),
         ("doubt", c.c_uint8),
         ("applied", c.c_bool),

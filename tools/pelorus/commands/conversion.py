@@ -27,7 +27,9 @@ def write(recording: Recording, findings: list[Finding], target: Path) -> None:
     for finding in findings:
         out.print(f"{finding.subject}: {_verdict(finding)}: {escape(finding.evidence)}")
         out.print(f"    -> {escape(finding.action)}")
-    remarks = [Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found or f.measured]
+    remarks = [
+        Text(f"{f.subject}: {f.action}"[:TEXT_BYTES_MAX]) for f in findings if f.found or f.measured
+    ]
     size = replace(recording, remarks=[*recording.remarks, *remarks]).write(target)
     tracks = recording.tracks
     out.print(

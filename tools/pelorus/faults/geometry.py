@@ -95,9 +95,7 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
     return Judged([*faults, *of_clock(recording, agreed)], agreed)
 
 
-def _of_twists(
-    recording: Recording, seen: Seen, views: TwoViews, ask: Ask
-) -> Iterator[Fault]:
+def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> Iterator[Fault]:
     """Units, axes and the extrinsic's rotation."""
     found = hand_eye(recording, views)
     if not found.told:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pelorus import se3
 from pelorus.faults.axes import ways
 from pelorus.faults.fit import Design, Fit
-from pelorus.faults.force import by_images, force, mean_rates
+from pelorus.faults.force import by_images, force
 from pelorus.faults.imu_body import ImuBody
 from pelorus.faults.seen import Seen
 from pelorus.inertial import Inertial
@@ -299,9 +299,7 @@ def _turned(found: Measured) -> Iterator[Explained]:
 def _nearest(found: Measured, Q: Floats) -> Floats:
     """Gauss and Newton from Q on."""
     matrices = [found.turn, found.force]
-    known = [
-        np.linalg.inv(m.covariance + m.by_readings + DOUBT**2 * np.eye(9)) for m in matrices
-    ]
+    known = [np.linalg.inv(m.covariance + m.by_readings + DOUBT**2 * np.eye(9)) for m in matrices]
     for _ in range(ROUNDS):
         J = np.stack([(se3.skew(e) @ Q).ravel() for e in np.eye(3)], axis=1)
         H = sum(J.T @ W @ J for W in known) + 1e-9 * np.eye(3)

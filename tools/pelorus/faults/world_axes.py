@@ -41,7 +41,9 @@ def world_axes(recording: Recording, seen: Seen) -> float:
     size = np.sum((own - other) ** 2, axis=1)
     weight = 1 / (1 + size / (4 * np.median(size) + 1e-12))
     power = float(np.sum(weight * np.sum(apart**2, axis=1))) + 1e-12
-    share = float(np.sum(weight * np.sum(apart * off, axis=1))) / power  # 0 as given, 1 in the world
+    share = (
+        float(np.sum(weight * np.sum(apart * off, axis=1))) / power
+    )  # 0 as given, 1 in the world
     left = weight * np.sum(apart * (off - share * apart), axis=1)
     sigma = standard_error(left) / power
     return (2 * share - 1) / sigma**2
