@@ -20,6 +20,19 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/pelorusConfigVersion.cma
 install(FILES
   "${PROJECT_BINARY_DIR}/pelorusConfig.cmake" "${PROJECT_BINARY_DIR}/pelorusConfigVersion.cmake"
   DESTINATION "${pelorus_package_dir}")
+
+# pkg-config --cflags --libs pelorus (or pelorus_f64): the definitions are those that the library has.
+foreach(PELORUS_PC_NAME pelorus pelorus_f64)
+  get_target_property(definitions ${PELORUS_PC_NAME} INTERFACE_COMPILE_DEFINITIONS)
+  list(TRANSFORM definitions PREPEND "-D")
+  list(JOIN definitions " " PELORUS_PC_DEFINITIONS)
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/pelorus.pc.in"
+    "${PROJECT_BINARY_DIR}/${PELORUS_PC_NAME}.pc.generated" @ONLY)
+  file(GENERATE OUTPUT "${PROJECT_BINARY_DIR}/${PELORUS_PC_NAME}.pc"
+    INPUT "${PROJECT_BINARY_DIR}/${PELORUS_PC_NAME}.pc.generated")
+  install(FILES "${PROJECT_BINARY_DIR}/${PELORUS_PC_NAME}.pc"
+    DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+endforeach()
 if(TARGET pelorus-replay)
   install(TARGETS pelorus-replay pelorus-replay-f64 RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
 endif()

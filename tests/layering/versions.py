@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The version stands in three places, of which each is the first that somebody reads: CMake's, the
-library's and the Python package's; the number of the arithmetic in two. They must agree.
+"""The version stands in several places, of which each is the first that somebody reads: CMake's, the
+library's, the Python package's, and what other build systems are told; the number of the arithmetic
+in two. They must agree.
 
 usage: versions.py PROJECT_ROOT
 """
@@ -14,6 +15,9 @@ from pathlib import Path
 
 VERSION = {
     "CMakeLists.txt": r"project\(pelorus VERSION ([0-9.]+)",
+    "library.json": r'"version": "([0-9.]+)"',
+    "idf_component.yml": r'version: "([0-9.]+)"',
+    "conanfile.py": r'version = "([0-9.]+)"',
     "src/record/words.c": r'plr_version\(void\) {\s*return "([0-9.]+)"',
     "tools/pelorus/__init__.py": r'__version__ = "([0-9.]+)"',
 }
