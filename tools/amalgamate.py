@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_TILE_FILE))[^\n]*\n', re.M)
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_TILE_FILE|PLR_ROW_FILE))[^\n]*\n', re.M)
 COMMENT_OR_TEXT = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.S)
 SPDX = re.compile(r"^// SPDX[^\n]*\n")
 # What a source keeps to itself, and another one may call by the same name.
@@ -34,7 +34,11 @@ CONSTANT = re.compile(r"(\w+)\s*(?:=[^,]*)?(?:,|$)")
 MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)
 # Rooms that a build may leave out, and the option that says so.
 ROOMS = {"supervise": "PLR_SUPERVISE", "known_map": "PLR_KNOWN_MAP"}
-TILES = "#if PLR_TILE_CORTEX_M\n{cortex_m}#else\n{in_c}#endif\n"
+# Files that config.h chooses between: the condition, the file if it holds, and if not.
+CHOICES = {
+    "PLR_TILE_FILE": ("PLR_TILE_CORTEX_M", "math/tile_cortex_m.h", "math/tile_in_c.h"),
+    "PLR_ROW_FILE": ("PLR_WASM_FMA", "math/row_wasm.h", "math/row_in_c.h"),
+}
 
 HEAD = """\
 // SPDX-License-Identifier: MIT
@@ -107,8 +111,9 @@ class Amalgamation:
 
         def included(match: re.Match[str]) -> str:
             if match[2]:
-                tiles = (self.header(self.find(f"math/tile_{n}.h")) for n in ("cortex_m", "in_c"))
-                return TILES.format(cortex_m=next(tiles), in_c=next(tiles))
+                condition, *names = CHOICES[match[2]]
+                one, other = (self.header(self.find(name)) for name in names)
+                return f"#if {condition}\n{one}#else\n{other}#endif\n"
             found = self.find(match[1])
             return self.insides(read(found)) if found.suffix == ".def" else self.header(found)
 
@@ -135,9 +140,9 @@ class Amalgamation:
 
 
 def own_header_files(folder: Path) -> list[Path]:
-    """Headers that stand for themselves: the tile's two halves are included by a condition."""
-    found = sorted(folder.rglob("*.h"))
-    return [path for path in found if path.stem not in {"tile_cortex_m", "tile_in_c"}]
+    """Headers that stand for themselves: some are included by a choice alone."""
+    chosen = {Path(name).name for _, *names in CHOICES.values() for name in names}
+    return [path for path in sorted(folder.rglob("*.h")) if path.name not in chosen]
 
 
 def library(root: Path) -> tuple[str, str]:

@@ -76,10 +76,12 @@ extern "C" {
 #endif
 
 /* Columns of the tile that the update's kernel keeps in registers: a divisor of 16 or 6, default 16
- * with AVX, else 4. It changes the speed, and no bit of a result. */
+ * with AVX, 8 with WebAssembly's relaxed SIMD, else 4. It changes the speed, and no bit of a result. */
 #ifndef PLR_TILE_COLUMNS
 #if defined(__AVX__)
 #define PLR_TILE_COLUMNS 16
+#elif defined(__wasm_relaxed_simd__)
+#define PLR_TILE_COLUMNS 8
 #else
 #define PLR_TILE_COLUMNS 4
 #endif
@@ -90,10 +92,19 @@ extern "C" {
 #if defined(__thumb2__) && defined(__ARM_FEATURE_FMA) && defined(__OPTIMIZE__) &&                  \
     PLR_REAL == 32 && PLR_TILE_COLUMNS == 6 && !PLR_PORTABLE
 #define PLR_TILE_CORTEX_M 1
-#define PLR_TILE_FILE "math/tile_cortex_m.h"
+#define PLR_TILE_FILE     "math/tile_cortex_m.h"
 #else
 #define PLR_TILE_CORTEX_M 0
-#define PLR_TILE_FILE "math/tile_in_c.h"
+#define PLR_TILE_FILE     "math/tile_in_c.h"
+#endif
+
+/* A row of it: by the vectors of WebAssembly's relaxed SIMD, else in C. */
+#if defined(__wasm_relaxed_simd__) && PLR_REAL == 32 && !PLR_PORTABLE
+#define PLR_WASM_FMA 1
+#define PLR_ROW_FILE "math/row_wasm.h"
+#else
+#define PLR_WASM_FMA 0
+#define PLR_ROW_FILE "math/row_in_c.h"
 #endif
 
 #if defined(__FAST_MATH__)
@@ -124,6 +135,15 @@ typedef float plr_real;
 /* a b + c with a single rounding, in float32. */
 #if PLR_PORTABLE
 #define PLR_FMA(a, b, c) plr_fmaf_exact((a), (b), (c))
+#elif PLR_WASM_FMA
+/* Whether this is fused is the machine's choice, once for all: who runs such a program asks it first
+ * (docs/PORTING.md), and takes a portable one where it is not. */
+typedef float plr_four __attribute__((vector_size(16)));
+static inline float plr_fmaf_wasm(float a, float b, float c) {
+    const plr_four four_a = {a, a, a, a}, four_b = {b, b, b, b}, four_c = {c, c, c, c};
+    return __builtin_wasm_relaxed_madd_f32x4(four_a, four_b, four_c)[0];
+}
+#define PLR_FMA(a, b, c) plr_fmaf_wasm((a), (b), (c))
 #else
 #define PLR_FMA(a, b, c) __builtin_fmaf((a), (b), (c))
 #endif

@@ -7,7 +7,7 @@
 /* Without the instruction compilers call the C library's fmaf, which this library does not link: said
  * here, once, and not by the linker. */
 #if PLR_REAL == 32 && !PLR_PORTABLE && !defined(__FP_FAST_FMAF) && !defined(__FMA__) &&            \
-    !defined(__ARM_FEATURE_FMA) && !defined(__aarch64__) && !defined(__riscv_f)
+    !PLR_WASM_FMA && !defined(__ARM_FEATURE_FMA) && !defined(__aarch64__) && !defined(__riscv_f)
 #error                                                                                             \
     "Pelorus in float32 needs fused multiply-add: compile for a processor that has it (-march=x86-64-v3, -mcpu=cortex-m4 -mfloat-abi=hard ...), or with -DPLR_PORTABLE=1, which is slower and gives the same bits."
 #endif

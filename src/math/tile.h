@@ -20,32 +20,7 @@ enum { PLR_TILE_ROWS = 4 };
 /* A row of a tile. */
 typedef plr_real plr_tile_row[PLR_TILE_COLUMNS];
 
-/* to[c] = u w[c] + from[c] */
-static inline void plr_tile_add(plr_real *restrict to, plr_real u, const plr_real *restrict w,
-                                const plr_real *restrict from) {
-    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
-        to[c] = PLR_FMA(u, w[c], from[c]);
-}
-
-/* to[c] += u w[c] */
-static inline void plr_tile_accumulate(plr_real *restrict to, plr_real u,
-                                       const plr_real *restrict w) {
-    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
-        to[c] = PLR_FMA(u, w[c], to[c]);
-}
-
-/* to[c] = from[c] - u w[c] */
-static inline void plr_tile_less(plr_real *restrict to, plr_real u, const plr_real *restrict w,
-                                 const plr_real *restrict from) {
-    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
-        to[c] = PLR_FMA(u, -w[c], from[c]);
-}
-
-/* to[c] -= u w[c] */
-static inline void plr_tile_reduce(plr_real *restrict to, plr_real u, const plr_real *restrict w) {
-    for (int c = 0; c < PLR_TILE_COLUMNS; c++)
-        to[c] = PLR_FMA(u, -w[c], to[c]);
-}
+#include PLR_ROW_FILE
 
 /* to[c] = u w[c] */
 static inline void plr_tile_scale(plr_real *restrict to, plr_real u, const plr_real *restrict w) {
