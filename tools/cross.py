@@ -57,7 +57,9 @@ class Target:
 
 
 X86_64_V3 = ("-mcpu=x86_64_v3",)
-PORTABLE = ("-DPLR_PORTABLE=1", "-msimd128")
+PORTABLE = ("-DPLR_PORTABLE=1",)
+RELAXED = ("-mcpu=generic+simd128+relaxed_simd",)
+WASM = "pelorus-replay.wasm"
 TARGETS = {
     "linux-x86_64": Target("x86_64-linux-gnu.2.17", X86_64_V3),
     "linux-aarch64": Target("aarch64-linux-musl", runner="qemu-aarch64-static"),
@@ -65,7 +67,8 @@ TARGETS = {
     "windows-x86_64": Target("x86_64-windows-gnu", X86_64_V3, "pelorus-replay.exe", "wine64"),
     "macos-x86_64": Target("x86_64-macos", X86_64_V3, runner="-"),
     "macos-aarch64": Target("aarch64-macos", runner="-"),
-    "wasi": Target("wasm32-wasi", PORTABLE, "pelorus-replay.wasm", "wasmtime"),
+    "wasi": Target("wasm32-wasi", PORTABLE, WASM, "wasmtime"),
+    "wasi-relaxed": Target("wasm32-wasi", RELAXED, WASM, "wasmtime"),
 }
 
 

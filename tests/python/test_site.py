@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: MIT
+"""The page that replays in a browser, in headless Chromium: the sample, other recordings and
+settings, and what it refuses.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pelorus.cli import main
+from replay_drive import BIN
+
+ROOT = Path(__file__).resolve().parents[2]
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+PATIENCE_S = 120.0
+
+
+class Page:
+    """A page in a browser of its own, spoken to by the DevTools protocol over two pipes."""
+
+    def __init__(self, url: str, folder: Path, *options: str) -> None:
+        theirs, self._to = os.pipe()
+        self._from, answers = os.pipe()
+        browser = [str(CHROMIUM), "--headless=new", "--no-sandbox", "--disable-gpu", *options]
+        browser += [f"--user-data-dir={folder}", "--remote-debugging-pipe"]
+        script = f'exec "$@" 3<&{theirs} 4>&{answers}'
+        self._process = subprocess.Popen(
+            ["bash", "-c", script, "bash", *browser],
+            pass_fds=(theirs, answers), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        os.close(theirs)
+        os.close(answers)
+        self._read, self._count, self._session = b"", 0, ""
+        target = self.call("Target.createTarget", url=url)["targetId"]
+        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
+        self._session = attached["sessionId"]
+        self.until("document.readyState === 'complete'")
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        self._count += 1
+        message = {"id": self._count, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._to, json.dumps(message).encode() + b"\0")
+        while True:
+            while b"\0" not in self._read:
+                piece = os.read(self._from, 1 << 16)
+                assert piece, "the browser has gone"
+                self._read += piece
+            answer, self._read = self._read.split(b"\0", 1)
+            found = json.loads(answer)
+            if found.get("id") == self._count:
+                assert "error" not in found, found
+                return found["result"]
+
+    def does(self, expression: str) -> Any:
+        found = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
+        assert "exceptionDetails" not in found, found
+        return found["result"].get("value")
+
+    def until(self, expression: str) -> Any:
+        begun = time.monotonic()
+        while not (found := self.does(expression)):
+            assert time.monotonic() - begun < PATIENCE_S, f"never: {expression}"
+            time.sleep(0.1)
+        return found
+
+    def text(self, id: str) -> str:
+        return str(self.does(f"document.getElementById('{id}').textContent"))
+
+    def drops(self, name: str, content: bytes) -> None:
+        """A file is taken, as one that is dropped is."""
+        packed = base64.b64encode(content).decode()
+        self.does(
+            f"takeFile(new File([Uint8Array.from(atob('{packed}'), c => c.charCodeAt(0))], '{name}'))"
+        )
+
+    def replays(self, words: str = "") -> None:
+        self.does("document.body.dataset.done = ''")
+        self.does(f"document.getElementById('more').value = {json.dumps(words)}")
+        self.does("document.getElementById('run').click()")
+        self.until(
+            "document.body.dataset.done === 'yes' || !document.getElementById('err').hidden"
+        )
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            os.close(self._to)
+            os.close(self._from)
+        self._process.terminate()
+        self._process.wait()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("ziglang")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, str(ROOT / "tools/site.py"), "--out", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "index.html"
+
+
+@pytest.fixture
+def page(site: Path, tmp_path: Path) -> Iterator[Page]:
+    found = Page(site.as_uri(), tmp_path)
+    yield found
+    found.close()
+
+
+def desk(recording: Path, *words: str) -> str:
+    """The sum of the path that pelorus-replay makes of it."""
+    path = recording.with_suffix(".tum")
+    command = [str(BIN / "pelorus-replay"), str(recording), *words, "--trajectory", str(path)]
+    subprocess.run(command, check=True, capture_output=True)
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_the_sample_has_the_desks_sum(page: Page) -> None:
+    page.does("document.getElementById('sample').click()")
+    page.replays()
+    assert page.text("err") == ""
+    assert re.fullmatch("[0-9a-f]{64}", page.text("sum"))
+    assert page.text("desk").endswith(": the same")
+    assert "594 used" in page.text("out")
+    assert re.match(r"[0-9.]+ s", page.text("state"))
+
+
+def test_another_recording_and_settings_have_theirs(page: Page, tmp_path: Path) -> None:
+    recording = tmp_path / "other.plr"
+    words = ("--seed", "8", "--duration", "10", "--imu-rate", "100")
+    assert main(["simulate", *words, str(recording)]) == 0
+    page.drops("other.plr", recording.read_bytes())
+    page.replays("--slots 25 --pixel-sigma 1.3")
+    assert page.text("err") == ""
+    assert page.text("sum") == desk(recording, "--slots", "25", "--pixel-sigma", "1.3")
+    assert "On a desk" not in page.text("desk")  # nothing is claimed of it
+
+
+def test_what_cannot_be_replayed_is_said_and_no_sum_shown(page: Page, tmp_path: Path) -> None:
+    recording = tmp_path / "cut.plr"
+    assert main(["simulate", "--duration", "5", str(recording)]) == 0
+    whole = recording.read_bytes()
+    shown = "!document.getElementById('result').hidden"
+    for name, content, words, said in (
+        ("empty.plr", b"", "", "empty"),
+        ("notes.plr", b"these are no frames at all " * 40, "", "no "),
+        ("drive.plr.zst", b"\x28\xb5\x2f\xfd" + bytes(60), "", "compressed by zstd"),
+        ("good.plr", whole, "--pixel-sigma -4", "pixel-sigma"),
+        ("good.plr", whole, "--slotz 4", "slotz"),
+    ):
+        page.does("document.getElementById('err').textContent = ''")
+        page.drops(name, content)
+        if not page.does("document.getElementById('run').disabled"):
+            page.replays(words)
+        assert said in page.text("err"), (name, words)
+        assert not page.does(shown), name
+    page.drops("cut.plr", whole[: len(whole) * 2 // 3])
+    page.replays()
+    assert page.does(shown)  # a recording that is cut is replayed as far as it goes, and that is said
+    assert "cut" in page.text("out") or "END" in page.text("out")
+
+
+def test_without_relaxed_simd_the_portable_program_gives_the_same(
+    site: Path, tmp_path: Path
+) -> None:
+    recording = tmp_path / "short.plr"
+    assert main(["simulate", "--seed", "9", "--duration", "3", str(recording)]) == 0
+    page = Page(site.as_uri(), tmp_path / "profile")
+    try:
+        worker = "document.getElementById('worker')"
+        page.does(f"{worker}.textContent = {worker}.textContent.replace('return f(', 'return 0 * f(')")
+        page.drops("short.plr", recording.read_bytes())
+        page.replays("--slots 12")
+        assert page.text("err") == ""
+        assert "portable program ran" in page.text("state")
+        assert page.text("sum") == desk(recording, "--slots", "12")
+    finally:
+        page.close()
