@@ -20,7 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_TILE_FILE|PLR_ROW_FILE))[^\n]*\n', re.M)
+INCLUDE = re.compile(
+    r'^[ \t]*#[ \t]*include[ \t]+(?:"([^"]+)"|(PLR_TILE_FILE|PLR_ROW_FILE))[^\n]*\n', re.M
+)
 COMMENT_OR_TEXT = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', re.S)
 SPDX = re.compile(r"^// SPDX[^\n]*\n")
 # What a source keeps to itself, and another one may call by the same name.

@@ -4,8 +4,8 @@
 
 usage: site.py [--out FOLDER]
 
-docs/site has its parts. Beside them it holds the replay as WebAssembly, once with relaxed SIMD and once
-for any browser, a simulated drive of a minute, and the SHA-256 of the trajectory that
+docs/site has its parts. Beside them it holds the replay as WebAssembly, once with relaxed SIMD and
+once for any browser, a simulated drive of a minute, and the SHA-256 of the trajectory that
 build/bin/pelorus-replay makes of it.
 """
 

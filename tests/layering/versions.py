@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The version stands in several places, of which each is the first that somebody reads: CMake's, the
-library's, the Python package's, and what other build systems are told; the number of the arithmetic
-in two. They must agree.
+"""The version stands in several places, of which each is the first that somebody reads: CMake's,
+the library's, the Python package's, and what other build systems are told; the number of the
+arithmetic in two. They must agree.
 
 usage: versions.py PROJECT_ROOT
 """
