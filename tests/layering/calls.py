@@ -20,6 +20,7 @@ from pathlib import Path
 
 SKIPPED = 77
 FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-fno-math-errno", "-fcallgraph-info=su"]
+FLAGS += ["-DPLR_PORTABLE=1"]  # for any processor
 NODE = re.compile(r'node: { title: "([^"]+)" label: "[^"]*?(\d+) bytes \(([a-z,]+)\)')
 EDGE = re.compile(r'edge: { sourcename: "([^"]+)" targetname: "([^"]+)"')
 
