@@ -97,13 +97,15 @@ def test_a_walk_through_a_corridor_drifts_by_centimetres(
         assert 0.3 < found[f"nees_{name}"] < 2, name
 
 
-def test_real_readings_need_the_noises_of_a_real_IMU(
+def test_real_readings_are_as_good_with_the_noises_of_a_data_sheet(
     plr_imu: Callable[[str], Path], pelorus: Run
 ) -> None:
+    """By which the filter was overconfident by ten sigmas before it saw how they scatter."""
     recording, options = plr_imu("euroc-V102-real-imu"), ("--set", "slots=60", "--config")
     honest = figures(pelorus, recording, *options, CONFIG / "imu-adis16448.conf")
     told = figures(pelorus, recording, *options, CONFIG / "imu.conf")
     assert honest["err0_m"] < 0.005 * honest["path_m"]
-    assert 0.5 < honest["nees_per_dof"] < 2
-    assert told["nees_velocity"] > 10, "the data sheet's noise is not that of the real readings"
-    assert told["err0_m"] > honest["err0_m"]
+    assert told["err0_m"] < 1.5 * honest["err0_m"]
+    for found in (honest, told):
+        assert 0.3 < found["nees_per_dof"] < 2
+        assert found["nees_velocity"] < 2

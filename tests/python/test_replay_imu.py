@@ -30,6 +30,7 @@ from replay_drive import (
 )
 
 BATCH, PERIOD_NS = 10, 10_000_000
+BIAS_RADPS = np.array([0.006, -0.004, 0.009])  # 0.7 degrees a second, more than any part in radians
 OFFSET_NS = 30_000_000
 
 
@@ -144,7 +145,7 @@ def test_what_is_wrong_with_an_imu_is_told_in_words(
     messages: list[Message] = [header(process=Process.IMU), Start(readings(0).t_ns)]
     for k in range(FRAMES):
         imu = readings(k)
-        still = replace(imu, w_B_radps=imu.w_B_radps - [0, 0, RATE])
+        still = replace(imu, w_B_radps=imu.w_B_radps - [0, 0, RATE] + BIAS_RADPS)
         messages += [broken(still), replace(stereo(0), t_ns=t_ns(k))]
     path = record(messages)
     log = tmp_path / "log.plr"
