@@ -179,6 +179,36 @@ static void print_counts(const summary *s, const plr_session *session) {
                s->recoveries, (double)s->diverged_ns * 1e-9);
 }
 
+/* What was estimated of the calibration: pelorus info has it in full. */
+static void print_calibration(const plr_session *session) {
+    static const struct {
+        const char *name, *unit;
+        double scale;
+    } parts[PLR_CALIBRATION_ERRORS] = {{"baseline", "%", 100},
+                                       {"focal length", "%", 100},
+                                       {"turn x", "deg", 57.29578},
+                                       {"turn y", "deg", 57.29578},
+                                       {"turn z", "deg", 57.29578},
+                                       {"cx", "px", 1},
+                                       {"cy", "px", 1},
+                                       {"place x", "mm", 1000},
+                                       {"place y", "mm", 1000},
+                                       {"place z", "mm", 1000},
+                                       {"clock", "ms", 1000}};
+    plr_calibration_result told;
+    const char *between = "calibration   corrected by ";
+    if (plr_filter_calibration(&session->filter, &told) != PLR_OK || told.estimated == 0)
+        return;
+    for (unsigned k = 0; k < PLR_CALIBRATION_ERRORS; k++)
+        if ((told.estimated >> k & 1) != 0) {
+            printf("%s%s %+.3f (+- %.3f) %s", between, parts[k].name,
+                   told.corrected[k] * parts[k].scale, told.sigma[k] * parts[k].scale,
+                   parts[k].unit);
+            between = ", ";
+        }
+    printf("\n");
+}
+
 static void print_damage(const summary *s, const plr_session *session) {
     const plr_reader_counts *c = &session->reader.counts;
     const uint32_t skipped = c->damaged + c->unknown + c->malformed + c->too_long;
@@ -223,6 +253,7 @@ void summary_print(summary *s, const plr_session *session, const char *path, con
     print_filter(session);
     print_counts(s, session);
     printf("path          %.1f m\n", s->path_m);
+    print_calibration(session);
     printf("time a frame  median %.0f us, p99 %.0f us, max %.0f us; %.0f times real time; the "
            "replay took %.2f s\n",
            figures.update_us_median, figures.update_us_p99, figures.update_us_max,

@@ -236,25 +236,19 @@ static plr_status refuse(const plr_setting **culprit, const plr_setting *setting
 /* A part of the calibration that shall be estimated and counts as exact; or the list itself, where it
  * is longer than the build allows. */
 static const plr_setting *refused_calibration(const plr_config *config) {
-    static const struct {
-        plr_calibrate bit;
-        const char *sigma;
-        unsigned numbers;
-    } parts[] = {{PLR_CALIBRATE_FOCAL, "focal-sigma", 1},
-                 {PLR_CALIBRATE_BASELINE, "baseline-sigma", 1},
-                 {PLR_CALIBRATE_TURN, "camera-turn-sigma", 3},
-                 {PLR_CALIBRATE_CENTRE, "centre-sigma", 2},
-                 {PLR_CALIBRATE_PLACE, "camera-place-sigma", 3},
-                 {PLR_CALIBRATE_CLOCK, "camera-clock-sigma", 1}};
+    static const char *const sigmas[] = {"focal-sigma",        "baseline-sigma",
+                                         "camera-turn-sigma",  "centre-sigma",
+                                         "camera-place-sigma", "camera-clock-sigma"};
+    static const uint8_t numbers[] = {1, 1, 3, 2, 3, 1}; /* by the bits of plr_calibrate */
     unsigned estimated = 0, all = 0;
-    for (unsigned i = 0; i < sizeof parts / sizeof *parts; i++) {
-        const plr_setting *setting = plr_setting_by_name(parts[i].sigma);
-        const bool listed = (config->calibrate & parts[i].bit) != 0;
+    for (unsigned i = 0; i < sizeof numbers; i++) {
+        const plr_setting *setting = plr_setting_by_name(sigmas[i]);
+        const bool listed = (config->calibrate >> i & 1) != 0;
         const bool exact = plr_config_get(config, setting) <= 0;
         if (listed && exact)
             return setting;
-        estimated += listed ? parts[i].numbers : 0;
-        all += exact ? 0 : parts[i].numbers;
+        estimated += listed ? numbers[i] : 0U;
+        all += exact ? 0U : numbers[i];
     }
     return estimated > PLR_MAX_CALIBRATION || all > PLR_CALIBRATIONS
                ? plr_setting_by_name("calibrate")

@@ -183,6 +183,12 @@ static void same_imu(const plr_imu_message *e, const plr_imu_message *a) {
         SAME(readings[i]);
 }
 
+static void same_state(const plr_state_message *e, const plr_state_message *a) {
+    SAME(t_ns);
+    SAME(action);
+    SAME(moved_variance);
+}
+
 void wire_assert_same(const plr_message *e, const plr_message *a) {
     TEST_ASSERT_EQUAL_INT(e->kind, a->kind);
     switch (e->kind) {
@@ -231,9 +237,7 @@ void wire_assert_same(const plr_message *e, const plr_message *a) {
         same_end(&e->as.end, &a->as.end);
         break;
     case PLR_KIND_STATE:
-        SAME(as.state.t_ns);
-        SAME(as.state.action);
-        SAME(as.state.moved_variance);
+        same_state(&e->as.state, &a->as.state);
         break;
     case PLR_KIND_READING:
         same_reading(&e->as.reading, &a->as.reading);

@@ -289,6 +289,18 @@ static void make_calibration(plr_calibration_result *m, unsigned variant) {
     }
 }
 
+static void make_twist(plr_twist_message *m, unsigned variant) {
+    m->t_ns = time_of(variant);
+    fill(m->twist.v_B_mps, 3, variant, 0);
+    fill(m->twist.w_B_radps, 3, variant, 3);
+}
+
+static void make_end(plr_end *m, unsigned variant) {
+    m->differs = whole8(variant, UINT8_MAX, 1U << PLR_COUNTED_READING);
+    for (unsigned i = 0; i < PLR_COUNTED; i++)
+        m->arrived[i] = whole32(variant, 70 + i);
+}
+
 plr_message wire_sample(plr_kind kind, unsigned variant) {
     plr_message m;
     memset(&m, 0, sizeof m);
@@ -304,9 +316,7 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         make_start(&m.as.start, variant);
         break;
     case PLR_KIND_TWIST:
-        m.as.twist.t_ns = time_of(variant);
-        fill(m.as.twist.twist.v_B_mps, 3, variant, 0);
-        fill(m.as.twist.twist.w_B_radps, 3, variant, 3);
+        make_twist(&m.as.twist, variant);
         break;
     case PLR_KIND_STEREO:
         make_stereo(&m.as.stereo, variant);
@@ -343,9 +353,7 @@ plr_message wire_sample(plr_kind kind, unsigned variant) {
         make_imu(&m.as.imu, variant);
         break;
     case PLR_KIND_END:
-        m.as.end.differs = whole8(variant, UINT8_MAX, 1U << PLR_COUNTED_READING);
-        for (unsigned i = 0; i < PLR_COUNTED; i++)
-            m.as.end.arrived[i] = whole32(variant, 70 + i);
+        make_end(&m.as.end, variant);
         break;
     case PLR_KIND_NONE:
         break;

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from pelorus.consistency import Figures
 from pelorus.frames import Camera, Kind, Message, identity, zeros
 from pelorus.layout import Floats
 
@@ -16,19 +17,28 @@ from pelorus.layout import Floats
 class Part(NamedTuple):
     """One number of the calibration, in the order of the message."""
 
+    key: str
     name: str
     unit: str
     scale: float  # from SI
 
 
 PARTS = (
-    Part("baseline", "%", 100),
-    Part("focal length", "%", 100),
-    *(Part(f"camera turned about its {axis}", "deg", 180 / np.pi) for axis in "xyz"),
-    *(Part(f"principal point, {axis}", "px", 1) for axis in "uv"),
-    *(Part(f"camera shifted along its {axis}", "mm", 1000) for axis in "xyz"),
-    Part("clock of the camera", "ms", 1000),
+    Part("baseline", "baseline", "%", 100),
+    Part("focal", "focal length", "%", 100),
+    *(
+        Part(f"turn_{axis}", f"turn of the camera about its {axis}", "deg", 180 / np.pi)
+        for axis in "xyz"
+    ),
+    *(Part(f"centre_{axis}", f"principal point {axis}", "px", 1) for axis in "uv"),
+    *(Part(f"place_{axis}", f"place of the camera along its {axis}", "mm", 1000) for axis in "xyz"),
+    Part("clock", "camera's clock", "ms", 1000),
 )
+MEANING = {
+    f"calibrated_{part.key}{end}": f"{what} of the {part.name}, {part.unit}"
+    for part in PARTS
+    for end, what in (("", "estimated correction"), ("_sigma", "its sigma, in the end,"))
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +62,26 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
         camera = Camera(**{part.name: values.pop(part.name) for part in fields(Camera)})
         return cls(camera=camera, **values)
+
+    def parts(self) -> Iterator[tuple[Part, float, float]]:
+        """Of what is estimated: by how much it has been corrected, and what may be left."""
+        for k, part in enumerate(PARTS):
+            if self.estimated >> k & 1:
+                yield part, self.corrected[k] * part.scale, self.sigma[k] * part.scale
+
+    @property
+    def figures(self) -> Figures:
+        """By the keys of MEANING."""
+        return {
+            f"calibrated_{part.key}{end}": float(x)
+            for part, value, sigma in self.parts()
+            for end, x in (("", value), ("_sigma", sigma))
+        }
+
+    @property
+    def offset_s(self) -> float:
+        """What the setting camera-offset should be larger by."""
+        return float(self.corrected[-1]) if self.estimated >> len(PARTS) - 1 & 1 else 0.0
 
 
 def last_calibrated(messages: Iterable[Message]) -> Calibrated | None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pelorus import arrivals, inertial_survey, wire
+from pelorus.calibrated import Calibrated, last_calibrated
 from pelorus.errors import PelorusError
 from pelorus.frames import (
     Config,
@@ -87,6 +88,7 @@ class Survey:
     texts: list[Text]
     streams: dict[Kind, Stream]
     sensors: dict[str, SmallSensor]
+    calibrated: Calibrated | None  # as a filter's result says last
     imu: ImuSurvey | None
     tracks: Tracks | None
     end: End | None
@@ -129,6 +131,7 @@ def survey(path: Path) -> Survey:
         texts=[m for m in messages if isinstance(m, Text)],
         streams=streams,
         sensors=_sensors([m for m in messages if isinstance(m, Reading)]),
+        calibrated=last_calibrated(messages),
         imu=inertial_survey.survey(inertial_survey.readings_of(imus)) if imus else None,
         tracks=_tracks(stereos) if stereos else None,
         end=end,

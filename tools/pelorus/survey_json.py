@@ -38,6 +38,7 @@ def of(found: Survey) -> dict[str, Any]:
             name: _stream(sensor.stream, origin) | {"axes": sensor.axes, "sigma": sensor.sigma}
             for name, sensor in found.sensors.items()
         },
+        "calibrated": found.calibrated.figures if found.calibrated else None,
         "imu": None if found.imu is None else _imu(found.imu, origin),
         "tracks": None if found.tracks is None else asdict(found.tracks),
         "health": None if found.health is None else _health(found.health, origin),

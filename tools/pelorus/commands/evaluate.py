@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus import evaluation, misread, road
+from pelorus import calibrated, evaluation, misread, road
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.consistency import Figures
 from pelorus.console import err, out
@@ -30,12 +30,16 @@ from pelorus.trajectory import (
 from pelorus.wire import messages_of
 
 POSES_MIN = 3  # three points fix a rigid fit
-MEANING = evaluation.MEANING | {
-    "road_m": "RMS distance to the road",
-    "out_of_plane_m": "RMS distance out of the trajectory's plane",
-    "tilt_deg": "tilt of that plane against the first pose's z",
-    "step_change_m": "RMS change of the step from pose to pose: how erratic it is",
-}
+MEANING = (
+    evaluation.MEANING
+    | calibrated.MEANING
+    | {
+        "road_m": "RMS distance to the road",
+        "out_of_plane_m": "RMS distance out of the trajectory's plane",
+        "tilt_deg": "tilt of that plane against the first pose's z",
+        "step_change_m": "RMS change of the step from pose to pose: how erratic it is",
+    }
+)
 
 app = typer.Typer()
 
@@ -114,6 +118,8 @@ def evaluate(
             found |= accuracy.figures if accuracy else {"truth_frames": 0}
         asked = _doubts(truth, (source, estimate), reference, tolerance_ns, bool(messages))
         _require_something(found, (source, estimate), (truth or source, reference), messages)
+    told = calibrated.last_calibrated(messages)
+    found |= told.figures if told else {}
     found["path_m"] = evaluation.path_m(estimate.poses)
     found["step_change_m"] = evaluation.step_change(estimate.poses)
     if as_json:

@@ -12,10 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus import survey_json
+from pelorus.calibrated import Calibrated
 from pelorus.console import one_line, out
 from pelorus.frames import Config, Header, Kind, Process
 from pelorus.inertial_survey import ImuSurvey
-from pelorus.settings import describe
+from pelorus.settings import IDS, describe
 from pelorus.small_sensors import SMALL_SENSORS
 from pelorus.survey import Survey, Tracks, require_useful, survey
 
@@ -57,6 +58,8 @@ def info(
     for text in found.texts:
         severity = SEVERITIES[text.severity] if text.severity < len(SEVERITIES) else "?"
         out.print(f"{severity}: {escape(one_line(text.text))}")
+    if found.calibrated is not None:
+        _show_calibrated(found.calibrated, found.configs)
     _show_health(found)
     _show_damage(found)
     require_useful(found)
@@ -97,6 +100,24 @@ def _show_config(config: Config, count: int) -> None:
     for id, value in config.settings.items():
         table.add_row(*describe(id, value))
     out.print(table)
+
+
+def _show_calibrated(told: Calibrated, configs: list[Config]) -> None:
+    """What was estimated, and the calibration with it, to be taken over."""
+    table = Table("calibration, estimated", "corrected by", "+-", "", box=None, pad_edge=False)
+    for part, value, sigma in told.parts():
+        table.add_row(part.name, f"{value:+.4f}", f"{sigma:.4f}", part.unit)
+    out.print(table)
+    c = told.camera
+    out.print(
+        f"    -> fx {c.fx_px:.3f}, fy {c.fy_px:.3f}, cx {c.cx_px:.3f}, cy {c.cy_px:.3f} px, "
+        f"baseline {c.baseline_m:.6f} m"
+    )
+    for label, row, t in zip(("T_CB", "", ""), told.R_CB, told.t_CB_m, strict=True):
+        out.print(f"       {label:5}" + "  ".join(f"{x:10.7f}" for x in (*row, t)))
+    if told.offset_s:
+        before = next((m.settings.get(IDS["camera-offset"], 0.0) for m in reversed(configs)), 0.0)
+        out.print(f"       camera-offset = {before + told.offset_s:.5f}")
 
 
 def _show_counts(found: Survey) -> None:
