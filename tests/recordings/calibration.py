@@ -119,7 +119,8 @@ def spoiled(recording: Path, wrong: Wrong, folder: Path) -> Path:
 def options_of(name: str, listed: str) -> list[str]:
     """`known` is exact; all others have the same sigmas, estimated or considered."""
     if name == "known":
-        return [*conf("imu"), *(v for part in EXACT for v in (f"--{part}-sigma", "0"))]
+        exact = [v for part in EXACT for v in (f"--{part}-sigma", "0")]
+        return [*conf("imu"), "--calibrate", "off", *exact]
     clock = () if listed == "off" else CLOCK
     return [*conf("imu"), *SIGMAS, *clock, "--calibrate", listed, "--twist-delay", "0.1"]
 
