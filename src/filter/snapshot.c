@@ -10,6 +10,7 @@
 #include "filter/guard.h"
 #include "process/velocity.h"
 #include "record/codec.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "supervise/supervise.h"
 
@@ -69,13 +70,28 @@ static uint32_t rows(const plr_filter *f, unsigned landmarks) {
     return (uint32_t)plr_covariance_row(f, landmarks);
 }
 
+/* Behind the sensitivity: by how much each error has been corrected, and the information, rows of those
+ * that are estimated by all. `f` NULL: it is skipped. */
+static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *errors) {
+    plr_calibration_estimate *to = f ? &f->calibration : NULL;
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->moved : NULL, errors->count);
+    for (unsigned k = 0; k < errors->estimated; k++)
+        plr_codec_numbers(c, PLR_FIELD_F64, to ? to->information + PLR_CALIBRATIONS * k : NULL,
+                          errors->count);
+}
+
+static uint32_t calibration_size(const plr_calibrated *errors) {
+    return errors->count * (uint32_t)(sizeof(plr_real) + errors->estimated * sizeof(double));
+}
+
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
     if (plr_guard_check(f) != PLR_OK || landmarks > f->config.slots)
         return 0;
     return SIZE(origin) + plr_setting_count() * SIZE(setting) + SIZE(camera) + SIZE(count) +
            SIZE(time) + SIZE(pose) + SIZE(filter) + landmarks * SIZE(slot) +
            (elements(f, landmarks) + f->par.calibrated.count * rows(f, landmarks)) *
-               (uint32_t)sizeof(plr_real);
+               (uint32_t)sizeof(plr_real) +
+           calibration_size(&f->par.calibrated);
 }
 
 /* What the state belongs to: build, settings, camera. */
@@ -145,6 +161,7 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
                       elements(f, f->count));
     for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)f->S[k], rows(f, f->count));
+    pass_calibration(&c, (plr_filter *)f, &f->par.calibrated);
     if (c.status == PLR_OK && !flush(&out))
         c.status = PLR_E_IO;
     return c.status;
@@ -186,7 +203,7 @@ static plr_status as_stored(const plr_codec *c) {
 }
 
 /* Checks covariance and sensitivity without storing them: finite numbers, variances not negative. */
-static plr_status check_covariance(plr_codec *c, unsigned dim, unsigned columns) {
+static plr_status check_covariance(plr_codec *c, unsigned dim, const plr_calibrated *errors) {
     for (unsigned i = 0; i < dim && c->status == PLR_OK; i++) {
         plr_real variance = 0;
         plr_codec_numbers(c, PLR_FIELD_REAL, NULL, i);
@@ -194,7 +211,8 @@ static plr_status check_covariance(plr_codec *c, unsigned dim, unsigned columns)
         if (c->status == PLR_OK && !(variance >= 0))
             return PLR_E_CORRUPT;
     }
-    plr_codec_numbers(c, PLR_FIELD_REAL, NULL, columns * dim);
+    plr_codec_numbers(c, PLR_FIELD_REAL, NULL, errors->count * dim);
+    pass_calibration(c, NULL, errors);
     return as_stored(c);
 }
 
@@ -255,11 +273,13 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         return status;
     if (!f)
         return check_covariance(c, plr_covariance_row(like, count.landmarks),
-                                like->par.calibrated.count);
+                                &like->par.calibrated);
     plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));
     for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
-    return as_stored(c);
+    plr_calibration_forget(f);
+    pass_calibration(c, f, &f->par.calibrated);
+    return plr_calibration_take_up(f) ? as_stored(c) : PLR_E_CORRUPT;
 }
 
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,

@@ -87,7 +87,8 @@ static void place_eye(plr_filter *f) {
         c->eye.t_CB[i] = c->t[i] + turned[i];
 }
 
-static void forget_information(plr_calibration_estimate *c) {
+void plr_calibration_forget(plr_filter *f) {
+    plr_calibration_estimate *c = &f->calibration;
     memset(c->information, 0, sizeof c->information);
     memset(c->factor, 0, sizeof c->factor);
     for (unsigned k = 0; k < K; k++)
@@ -99,7 +100,7 @@ void plr_calibration_reset(plr_filter *f) {
     memset(c, 0, sizeof *c);
     c->eye = f->par.camera;
     plr_mat3_identity(c->R);
-    forget_information(c);
+    plr_calibration_forget(f);
     place_eye(f);
 }
 
@@ -107,7 +108,7 @@ void plr_calibration_doubt(plr_filter *f) {
     if (plr_calibration_is_off(f))
         plr_calibration_reset(f);
     else
-        forget_information(&f->calibration);
+        plr_calibration_forget(f);
 }
 
 /* The gain of a Kalman filter in its steady state: the rate walks by so much in a step that it scatters in
@@ -287,6 +288,14 @@ static void factor_covariance(plr_filter *f, const double *U) {
         for (unsigned j = 0; j < k && j < n; j++)
             c->factor[K * k + j] = (plr_real)(x[j] * sigma_of(f, j) / sigma_of(f, k));
     }
+}
+
+bool plr_calibration_take_up(plr_filter *f) {
+    double U[K * K];
+    const bool good = factorise(f->par.calibrated.estimated, f->calibration.information, U);
+    if (good)
+        factor_covariance(f, U);
+    return good;
 }
 
 void plr_calibration_learn(plr_filter *f) {

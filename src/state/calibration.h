@@ -35,6 +35,12 @@ bool plr_calibration_needs_twist(const plr_filter *f);
 void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM],
                               const plr_real P_u[PLR_POSE_SQUARE]);
 
+/* Nothing is known but the prior; the estimate stays. */
+void plr_calibration_forget(plr_filter *f);
+
+/* The covariance of the information as it stands, from a saved state. False if it is none. */
+bool plr_calibration_take_up(plr_filter *f);
+
 /* After a divergence: what is known of it may be what has broken down. The estimate stays if its prior
  * allows it, as well known as it was at first. */
 void plr_calibration_doubt(plr_filter *f);

@@ -14,6 +14,7 @@
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/rigid.h"
+#include "support/state_bytes.h"
 
 enum { RUNS = PELORUS_SHORT_FORM ? 3 : 12, FRAMES = PELORUS_SHORT_FORM ? 100 : 200 };
 enum { REST = 4000 };
@@ -142,6 +143,22 @@ static void test_errors_of_calibration_and_state_stay_within_their_covariance(vo
     printf("calibration %.3f\n", calibration);
     chi_square_demand("calibration", calibration, RUNS * ERRORS);
     imu_rig_demand_consistent("state", &sum, RUNS, true);
+}
+
+static void test_a_saved_state_goes_on_with_what_was_learnt(void) {
+    static plr_filter other;
+    static state_bytes state;
+    plr_filter *f = &imu_rig.filter;
+    imu_rig.config.slots = 12;
+    begin(IMU_RIG_GIVEN, 2);
+    fly(40);
+    const plr_calibration told = spoiled(&imu_rig.flight.calibration);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&other, &told, &imu_rig.config, NULL));
+    state_bytes_save(&state, f);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));
+    TEST_ASSERT_TRUE(f->calibration.told[0] < 1);
+    TEST_ASSERT_EQUAL_MEMORY(&f->calibration, &other.calibration, sizeof other.calibration);
+    TEST_ASSERT_TRUE(state_bytes_same_filter(f, &other));
 }
 
 /* The told sigmas beside those of the prior, and how far the estimates have gone, in the latter. */

@@ -106,10 +106,14 @@ static void test_words_of_choices_have_their_numbers(void) {
     TEST_ASSERT_EQUAL_STRING("on", bias->choices[1]);
     for (unsigned i = 0; i < plr_setting_count(); i++) {
         const plr_setting *row = plr_setting_at(i);
-        const bool has_words = row->kind == PLR_SETTING_CHOICE || row->kind == PLR_SETTING_SWITCH;
-        TEST_ASSERT_EQUAL(has_words, row->choices != NULL);
-        if (has_words)
-            TEST_ASSERT_NULL(row->choices[(unsigned)row->maximum + 1]);
+        const bool is_list = row->kind == PLR_SETTING_LIST;
+        const bool is_one = row->kind == PLR_SETTING_CHOICE || row->kind == PLR_SETTING_SWITCH;
+        unsigned words = 0;
+        TEST_ASSERT_EQUAL(is_one || is_list, row->choices != NULL);
+        while (row->choices != NULL && row->choices[words] != NULL)
+            words++;
+        if (is_one || is_list)
+            TEST_ASSERT_EQUAL_UINT((unsigned)row->maximum + 1, is_list ? 1U << words : words);
     }
 }
 

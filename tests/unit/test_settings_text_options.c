@@ -6,6 +6,7 @@
 
 #include "posix/config_file.h"
 #include "posix/options.h"
+#include "posix/settings_text.h"
 
 static replay_options options;
 static char problem[PROBLEM_SIZE];
@@ -67,10 +68,10 @@ static void test_both_ways_of_giving_a_value_are_the_same(void) {
 static void test_every_row_of_the_table_is_an_option(void) {
     for (unsigned i = 0; i < plr_setting_count(); i++) {
         const plr_setting *s = plr_setting_at(i);
-        char name[80], text[64];
+        char name[80], text[128];
         snprintf(name, sizeof name, "--%s", s->name);
         if (s->choices != NULL)
-            snprintf(text, sizeof text, "%s", s->choices[(int)s->maximum]);
+            setting_value_to_text(s, s->maximum, text, sizeof text);
         else
             snprintf(text, sizeof text, "%.17g", s->maximum);
         TEST_ASSERT_TRUE_MESSAGE(PARSE("in.plr", name, text), name);
