@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pelorus import cobs, schema, wire
+from pelorus.calibrated import Calibrated
 from pelorus.errors import PelorusError
 from pelorus.evidence import Evidence, EvidenceFlag
 from pelorus.frames import (
@@ -77,6 +78,7 @@ MESSAGES: list[Message] = [
     Reading(10, SENSORS["wheel"], 5, CHANCE.normal(size=3), np.ones(3), np.arange(3.0)),
     Imu(11, CHANCE.normal(size=(1, 3)), CHANCE.normal(size=(1, 3))),
     Imu(11, CHANCE.normal(size=(20, 3)), CHANCE.normal(size=(20, 3)), 2_500_000),
+    Calibrated(12, 5, Camera(1.5, 2.5, 3.5, 4.5, 0.1), R, np.ones(3), np.arange(11.0), np.ones(11)),
 ]
 SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 settings
     Kind.HEADER: [299 + 9],
@@ -94,6 +96,7 @@ SIZES = {  # of the format's page; a HEADER's name has 9 bytes, a CONFIG 3 setti
     Kind.STATE: [57],
     Kind.READING: [58],
     Kind.IMU: [13 + 24 * n for n in (1, 20)],
+    Kind.CALIBRATION: [234],
 }
 
 
@@ -145,7 +148,7 @@ def test_a_frame_is_these_bytes() -> None:
 
 def test_fields_stand_where_the_page_puts_them() -> None:
     header = MESSAGES[0].pack()
-    assert header[:10] == bytes([1, 5, 2, 0, 0, 9, 0, 0, 0, 0])
+    assert header[:10] == bytes([1, 6, 2, 0, 0, 9, 0, 0, 0, 0])
     assert header[202:211] == "Straße 7".encode()
     assert np.array_equal(np.frombuffer(header, "<f8", 6, 211), np.full(6, -1.0))
     assert header[259] == Process.TWIST
@@ -370,7 +373,7 @@ def test_a_frame_without_end_is_given_up_once_and_reading_goes_on() -> None:
 def test_the_writer_counts_and_closes_with_end() -> None:
     stream = io.BytesIO()
     writer = Writer(stream)
-    header, landmark, imu = MESSAGES[0], MESSAGES[8], MESSAGES[-1]
+    header, landmark, imu = MESSAGES[0], MESSAGES[8], MESSAGES[-2]
     for message in (header, Twist(1), Twist(2), Truth(2), stereo(3), landmark, imu):
         writer.write(message)
     writer.end()
