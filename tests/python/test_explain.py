@@ -125,6 +125,32 @@ def test_a_camera_that_pauses_and_odometry_that_pauses_are_told_apart(tmp_path: 
         assert abs(found.seconds(found.first.from_ns) - 12.0) <= WITHIN_S
 
 
+@pytest.mark.parametrize("by_s", [0.06, -0.07])
+def test_a_step_of_less_than_a_frame_is_seen(tmp_path: Path, by_s: float) -> None:
+    def stepped(m: Message) -> Message:
+        later = isinstance(m, Stereo) and m.t_ns >= 14 * S
+        return replace(m, t_ns=m.t_ns + round(by_s * S)) if later else m
+
+    found = explained([stepped(m) for m in simulated()], tmp_path)
+    assert found.first is not None
+    assert found.first.cause is Cause.CLOCK_STEP
+    assert abs(found.seconds(found.first.from_ns) - 14.0) <= 0.2
+    assert ("forward" if by_s > 0 else "back") in found.first.words
+
+
+def test_frames_that_are_sorted_by_stamps_that_stepped_are_no_pause(tmp_path: Path) -> None:
+    messages = simulated()
+    late = [m for m in messages if isinstance(m, Stereo) and m.t_ns >= 14 * S]
+    data = [replace(m, t_ns=m.t_ns + 2 * S) if m in late else m for m in messages]
+    head, rest = data[:1], [m for m in data[1:] if hasattr(m, "t_ns")]
+    end_ns = max(m.t_ns for m in messages if isinstance(m, Twist))
+    rest = [m for m in rest if m.t_ns <= end_ns]
+    found = explained([*head, *sorted(rest, key=lambda m: m.t_ns)], tmp_path)
+    assert found.first is not None
+    assert found.first.cause is Cause.CLOCK_STEP
+    assert "as if no time had passed" in found.first.words
+
+
 def test_wheels_that_stand_are_no_dead_encoder(tmp_path: Path) -> None:
     options = replace(DRIVE, stop=Span(15.0, 10.0), bias_velocity_sigma_mps=0.0)
     messages = simulate(options).recording.messages()

@@ -80,6 +80,23 @@ def dead_gyro(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: 
     return _each(messages, MOTION, change)
 
 
+def dead_axis(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
+    """The gyro's axis that turns most sticks at what it read, to the end."""
+    turns = [np.abs(np.atleast_2d(m.w_B_radps)) for m in messages if m.kind in MOTION]
+    axis = int(np.argmax(np.concatenate(turns).mean(axis=0)))
+    held: list[float] = []
+
+    def change(m: Any) -> Message:
+        if m.t_ns < t:
+            return m  # type: ignore[no-any-return]
+        rates = np.array(m.w_B_radps)
+        held.append(float(np.atleast_2d(rates)[0, axis]))
+        rates[..., axis] = held[0]
+        return replace(m, w_B_radps=rates)  # type: ignore[no-any-return]
+
+    return _each(messages, MOTION, change)
+
+
 def frozen(messages: Messages, t: int, chance: Chance) -> Messages:
     """The camera repeats its picture for some seconds."""
     until = t + round(chance.uniform(2, 5) * S)
@@ -100,6 +117,29 @@ def clock_step(messages: Messages, t: int, chance: Chance) -> Messages:
 
     def change(m: Stereo) -> Message:
         return replace(m, t_ns=m.t_ns + by) if m.t_ns >= t else m
+
+    return _each(messages, (Kind.STEREO,), change)
+
+
+def all_clocks_step(messages: Messages, t: int, chance: Chance) -> Messages:
+    """The clock that stamps everything steps forward by some seconds."""
+    by = round(chance.uniform(1.5, 20) * S)
+
+    def change(m: Any) -> Message:
+        return replace(m, t_ns=m.t_ns + by) if m.t_ns >= t else m  # type: ignore[no-any-return]
+
+    return _each(messages, DATA, change)
+
+
+def blur(messages: Messages, t: int, chance: Chance) -> Messages:
+    """Most points lie elsewhere for half a second and more, in both images alike."""
+    until = t + round(chance.uniform(0.5, 0.9) * S)
+
+    def change(m: Stereo) -> Message:
+        if not t <= m.t_ns < until:
+            return m
+        off = chance.normal(scale=12.0, size=(len(m.ids), 2)).astype(np.float32)
+        return replace(m, pixels=m.pixels + off[:, [0, 1, 0, 1]])
 
     return _each(messages, (Kind.STEREO,), change)
 
@@ -188,8 +228,11 @@ EVENTS = (
     Event("slip", ("slip",), slip, True),
     Event("dead encoder", ("dead-odometry",), dead_encoder, True),
     Event("dead gyro", ("dead-gyro",), dead_gyro),
+    Event("dead axis", ("dead-gyro",), dead_axis),
     Event("frozen picture", ("frozen-picture",), frozen),
     Event("clock step", ("clock-step",), clock_step),
+    Event("all clocks step", ("clock-step",), all_clocks_step),
+    Event("wrong matches", ("wrong-matches",), blur),
     Event("lost tracks", ("lost-tracks",), lost_tracks),
     Event("jump", ("jump",), jump),
     Event("shock", ("shock",), shock),

@@ -229,7 +229,7 @@ def _by_pictures(log: Log, low: int, high: int, told: Poses) -> tuple[Poses, Fla
             np.where(better[:, None, None], found.R, best.R),
             np.where(better[:, None], found.p, best.p),
         )
-    enough = (most >= PAIRS_MIN) & (2 * most >= seen.counts())
+    enough = (most >= PAIRS_MIN) & (3 * most >= 2 * seen.counts())  # else it is not known
     return turned(there, best, T_CB), np.asarray(enough)
 
 

@@ -14,9 +14,10 @@ import numpy as np
 from pelorus import schema
 from pelorus.explain.contradiction import contradictions
 from pelorus.explain.finding import Cause, Finding, S
-from pelorus.explain.inputs import of_inputs
+from pelorus.explain.inputs import of_inputs, rejected
 from pelorus.explain.log import FEW, Flags, Log, log_of
 from pelorus.explain.setup import of_setup
+from pelorus.explain.stamps import of_stamps
 from pelorus.frames import Kind, Message
 from pelorus.health import LOST, Spell, TimeLine, time_line
 
@@ -139,11 +140,12 @@ def explain(messages: Sequence[Message]) -> Explanation:
     log = log_of(messages)
     health = time_line(messages)
     assert health is not None  # log_of has refused a log without answers
-    inputs = list(of_inputs(log))
+    inputs = [*of_stamps(log), *of_inputs(log)]
     found = sorted((*inputs, *(_behind(one, inputs) for one in contradictions(log))), key=_order)
     begin = found[0].from_ns if found else None
     setup = tuple(of_setup(log, _calm(log, begin)))
     if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
+        found += [one for one in rejected(log) if not _near(one, found)]
         found = sorted((*found, *_unexplained(log, health, found)), key=_order)
     episodes = tuple(_episode(log, group, health) for group in _grouped(found))
     end_ns = int(log.t_ns.max())
@@ -187,11 +189,7 @@ def _calm(log: Log, begin_ns: int | None) -> Flags:
 def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterator[Finding]:
     """Where the filter was lost and nothing that is found tells why."""
     for spell in health.spells:
-        near = (
-            f.from_ns - APART_NS <= spell.to_ns and spell.from_ns <= f.to_ns + APART_NS
-            for f in found
-        )
-        if spell.health < LOST or any(near):
+        if spell.health < LOST or _near(spell, found):
             continue
         meanwhile = (log.t_ns >= spell.from_ns) & (log.t_ns <= spell.to_ns)
         seen = log.column("observations")[meanwhile]
@@ -201,6 +199,12 @@ def _unexplained(log: Log, health: TimeLine, found: Sequence[Finding]) -> Iterat
         else:
             words = f"the filter was lost: {', '.join(spell.why)}"
             yield Finding(Cause.LOST, spell.from_ns, spell.to_ns, words)
+
+
+def _near(one: Finding | Spell, found: Sequence[Finding]) -> bool:
+    return any(
+        f.from_ns - APART_NS <= one.to_ns and one.from_ns <= f.to_ns + APART_NS for f in found
+    )
 
 
 def _grouped(found: Sequence[Finding]) -> list[list[Finding]]:

@@ -25,6 +25,7 @@ class Cause(StrEnum):
     SLIP = "slip"
     TURN_CONTRADICTED = "turn-contradicted"
     CONTRADICTED = "contradicted"
+    WRONG_MATCHES = "wrong-matches"
     LOST = "lost"
     SETTINGS = "settings"
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with the inputs themselves: stamps, readings, pictures, tracks. Nothing of it needs
-the filter's opinion but whether the body moved.
+"""What is wrong with readings, pictures and tracks themselves. Nothing of it needs the filter's
+opinion but whether the body moved.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from pelorus.explain.finding import Cause, Finding, S
-from pelorus.explain.log import CONTRADICTED, FEW, NO_READING, Flags, Log, runs, suspect
+from pelorus.explain.log import CONTRADICTED, FEW, Flags, Log, period, runs, suspect
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.schema import number
@@ -22,132 +22,63 @@ AXES = "xyz"
 
 def of_inputs(log: Log) -> Iterator[Finding]:
     """All of it."""
-    yield from clock_steps(log)
-    yield from pauses(log)
     yield from stuck(log)
     yield from shocks(log)
     yield from frozen(log)
     yield from lost_tracks(log)
 
 
-# --- stamps ---------------------------------------------------------------------------------------
-
-BEFORE, AFTER = 10, 5  # frames whose median tells how stamps stood, and stand
-
-
-def clock_steps(log: Log) -> Iterator[Finding]:
-    """Frames come between readings as before, and their stamps have moved against the readings'.
-
-    By how much a frame's stamp is ahead of the newest reading varies by a period at most, of frames
-    or of readings. A step is more, and lasts.
-    """
-    known = np.nonzero(log.behind_ns != NO_READING)[0]
-    if len(known) < BEFORE:
-        return
-    ahead = (log.t_ns - log.behind_ns)[known]
-    frame_step, reading_step = np.diff(log.t_ns[known]), np.diff(log.behind_ns[known])
-    usual = float(np.median(np.abs(frame_step)))
-    period = max(usual, _period(log.reading_ns))
-    for k in np.nonzero(np.abs(np.diff(ahead)) > period)[0] + 1:
-        before, after = ahead[max(k - BEFORE, 0) : k], ahead[k : k + AFTER]
-        by = float(np.median(after) - np.median(before))
-        if abs(by) <= period or np.ptp(before) > abs(by) / 2 or np.ptp(after) > abs(by) / 2:
-            continue
-        of_frames = abs(frame_step[k - 1] - usual) > abs(reading_step[k - 1] - usual)
-        whose = "frames" if of_frames else "readings"
-        which = "forward" if (by > 0) == of_frames else "back"
-        at = int(log.arrived_ns[known[k]] if of_frames else log.t_ns[known[k]])
-        yield Finding(
-            Cause.CLOCK_STEP,
-            at,
-            at,
-            f"the stamps of the {whose} step {which} by {abs(by) / S:.3f} s against the "
-            f"{'readings' if of_frames else 'frames'}'",
-        )
-
-
-PAUSE_S = 1.0  # after so long without a frame the filter says so
-PERIODS = 10  # that fail: one or two are lost on any bus
-
-
-def pauses(log: Log) -> Iterator[Finding]:
-    """No frame, or no reading, for long."""
-    both = log.reading_ns, log.t_ns
-    names = ("IMU reading" if log.by_imu else "twist"), "frame"
-    for cause, t, other, name in (
-        (Cause.NO_READINGS, *both, names[0]),
-        (Cause.NO_FRAMES, *both[::-1], names[1]),
-    ):
-        if not len(t):
-            continue
-        step = np.diff(t)
-        long = step > max(PAUSE_S * S, PERIODS * _period(t))
-        for k in np.nonzero(long)[0]:
-            begin, end = int(t[k]), int(t[k + 1])
-            meanwhile = int(np.count_nonzero((other > begin) & (other < end)))
-            if cause is Cause.NO_READINGS and not meanwhile:
-                continue  # neither came: it is told of the frames
-            words = f"no {name} for {(end - begin) / S:.1f} s"
-            if not meanwhile:
-                words = f"neither frames nor readings for {(end - begin) / S:.1f} s: a pause, or "
-                words += "a step of the clock of both"
-            yield Finding(cause, begin, end, words)
-        back = np.nonzero(step < 0)[0]
-        if len(back) and (cause is Cause.NO_READINGS or not _steps_back_known(log)):
-            at = int(t[back[0]])
-            words = f"the stamps of the {name}s go back by {-step[back[0]] / S:.3f} s"
-            yield Finding(Cause.CLOCK_STEP, at, at, words)
-
-
-def _steps_back_known(log: Log) -> bool:
-    """A frame's stamp that goes back against the readings is told as a step."""
-    return bool((log.behind_ns != NO_READING).any())
-
-
-def _period(t_ns: Times) -> float:
-    return float(np.median(np.abs(np.diff(t_ns)))) if len(t_ns) > 1 else 0.0
-
-
 # --- readings -------------------------------------------------------------------------------------
 
 STUCK_S, STUCK_READINGS = 0.5, 5
-REPEATS_MOST = 0.05  # of the other readings: a sensor that repeats itself often says nothing so
+BY_CHANCE = 1e-6  # expected number of such stretches in the drive, if readings repeat by chance
 
 
 def stuck(log: Log) -> Iterator[Finding]:
-    """A vector that else changes with every reading reads the very same numbers for long.
+    """An axis that else changes from reading to reading reads the very same number for long.
 
     Zeros are what wheels at rest read: they are told where the pictures contradict them, and of a
     turn rate where the body goes on.
     """
     blocks = (
-        (Cause.DEAD_ACCELEROMETER, "accelerometer", slice(0, 3))
+        (Cause.DEAD_ACCELEROMETER, "accelerometer", 0)
         if log.by_imu
-        else (Cause.DEAD_ODOMETRY, "velocity of the odometry", slice(0, 3)),
-        (Cause.DEAD_GYRO, "turn rate", slice(3, 6)),
+        else (Cause.DEAD_ODOMETRY, "velocity of the odometry", 0),
+        (Cause.DEAD_GYRO, "turn rate", 3),
     )
-    for cause, name, block in blocks:
-        values = log.readings[:, block]
-        if len(values) < 2 * STUCK_READINGS:
-            continue
-        same = (np.diff(values, axis=0) == 0).all(axis=1)
-        for first, last in runs(same):
-            begin, end = int(log.reading_ns[first]), int(log.reading_ns[last + 1])
-            if last - first + 1 < STUCK_READINGS or end - begin < STUCK_S * S:
-                continue
-            others = np.delete(same, slice(first, last + 1))
-            varies = len(others) and others.mean() < REPEATS_MOST
-            value = values[first]
+    for cause, name, begins in blocks:
+        together: dict[tuple[int, int], list[int]] = {}
+        for axis in range(begins, begins + 3):
+            for stretch in _repeats(log, axis):
+                together.setdefault(stretch, []).append(axis)
+        for (first, last), axes in sorted(together.items()):
+            begin, end = int(log.reading_ns[first]), int(log.reading_ns[last])
+            value = log.readings[first, axes]
             goes = cause is Cause.DEAD_GYRO and not log.by_imu and _goes(log, first, last)
-            if varies and (value.any() or log.by_imu or goes or _contradicted(log, begin, end)):
-                numbers = " ".join(f"{x:.3g}" for x in value)
-                at = "at zero" if not value.any() else f"at ({numbers})"
-                words = f"the {name} is stuck {at} for {last - first + 2} readings, all axes"
+            if value.any() or log.by_imu or goes or _contradicted(log, begin, end):
+                numbers = ", ".join(
+                    f"{AXES[axis % 3]} at {x:.3g}" for axis, x in zip(axes, value, strict=True)
+                )
+                words = f"the {name} is stuck for {last - first + 1} readings: {numbers}"
                 yield Finding(cause, begin, end, words)
 
 
+def _repeats(log: Log, axis: int) -> Iterator[tuple[int, int]]:
+    """First and last reading of each long stretch of one number, which chance does not make."""
+    same = np.diff(log.readings[:, axis]) == 0
+    for first, last in runs(same):
+        length = last - first + 1
+        lasts = log.reading_ns[last + 1] - log.reading_ns[first] >= STUCK_S * S
+        if length < STUCK_READINGS or not lasts:
+            continue
+        others = np.delete(same, slice(first, last + 1))
+        share = (np.count_nonzero(others) + 1) / (len(others) + 2)
+        if len(same) * share**length < BY_CHANCE:
+            yield first, last + 1
+
+
 def _goes(log: Log, first: int, last: int) -> bool:
-    return bool(log.readings[first : last + 2, :3].any(axis=1).mean() > 0.5)
+    return bool(log.readings[first : last + 1, :3].any(axis=1).mean() > 0.5)
 
 
 def _contradicted(log: Log, begin: int, end: int) -> bool:
@@ -164,7 +95,7 @@ def shocks(log: Log) -> Iterator[Finding]:
     """Readings far from the median of their neighbourhood, for less than a second."""
     if len(log.readings) < 2 * STUCK_READINGS:
         return
-    window = max(round(NEIGHBOURHOOD_S * S / max(_period(log.reading_ns), 1.0)), STUCK_READINGS)
+    window = max(round(NEIGHBOURHOOD_S * S / max(period(log.reading_ns), 1.0)), STUCK_READINGS)
     window = min(window, len(log.readings)) | 1
     off = np.abs(log.readings - median_filter(log.readings, (window, 1), mode="nearest"))
     usual = np.quantile(off, 0.95, axis=0)
@@ -223,6 +154,7 @@ def frozen(log: Log) -> Iterator[Finding]:
             yield Finding(Cause.FROZEN_PICTURE, int(log.t_ns[first]), int(log.t_ns[last]), words)
 
 
+BEFORE = 10  # frames that tell how many points are usually followed
 HABIT_S = 10.0  # what happens more often than that is no event, it is how the front end works
 TRACKED = 2 * FEW  # points that a frame mostly shares with the one before, where tracks can be lost
 
@@ -257,3 +189,22 @@ def lost_tracks(log: Log) -> Iterator[Finding]:
         frames = f"{last - first + 1} frames" if last > first else "one frame"
         words = f"tracks lost, {what}: {frames}; {before} points were followed before"
         yield Finding(Cause.LOST_TRACKS, int(log.t_ns[first]), int(log.t_ns[last]), words)
+
+
+REJECTED_FRAMES = 2  # one is no event
+
+
+def rejected(log: Log) -> Iterator[Finding]:
+    """The gate rejects most of what is seen, for some frames."""
+    matched, gated = log.column("matched"), log.column("gated")
+    most = (matched >= TRACKED) & (2 * gated > matched)
+    for first, last in runs(most):
+        count = last - first + 1
+        if count < REJECTED_FRAMES:
+            continue
+        share = gated[first : last + 1].sum() / matched[first : last + 1].sum()
+        words = (
+            f"the gate rejects {share:.0%} of the matches for {count} frames: blur, wrong matches, "
+            "or much that moves by itself"
+        )
+        yield Finding(Cause.WRONG_MATCHES, int(log.t_ns[first]), int(log.t_ns[last]), words)

@@ -87,6 +87,11 @@ class Log:
         return np.array([_repeated(first, second) for first, second in self._pairs], np.int64)
 
     @cached_property
+    def flow_px(self) -> Floats:
+        """Median way of the shared points in the left picture; NaN where they are few."""
+        return np.array([_flow(first, second) for first, second in self._pairs])
+
+    @cached_property
     def _pairs(self) -> list[tuple[Pixels, Pixels]]:
         nothing = np.zeros((0, 4), np.float32)
         out = [(nothing, nothing)]
@@ -98,6 +103,12 @@ class Log:
 
 def _repeated(first: Pixels, second: Pixels) -> int:
     return int((first == second).all(axis=1).sum())
+
+
+def _flow(first: Pixels, second: Pixels) -> float:
+    way = (second.astype(np.float64) - first)[:, :2]
+    way = way[np.isfinite(way).all(axis=1)]
+    return float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
 
 
 def log_of(messages: Sequence[Message]) -> Log:
@@ -192,6 +203,11 @@ def suspect(log: Log) -> Flags:
     matched, gated = log.column("matched"), log.column("gated")
     rejected = (matched >= FEW) & (2 * gated > matched)
     return np.asarray(log.said(CONTRADICTED) | ((flags & ODD_FLAGS) != 0) | rejected)
+
+
+def period(t_ns: Times) -> float:
+    """What mostly lies between two, ns."""
+    return float(np.median(np.abs(np.diff(t_ns)))) if len(t_ns) > 1 else 0.0
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:
