@@ -185,7 +185,6 @@ fi
 
 heading 'Set-up'
 [ $extent = long ] && PACKAGES_WANTED+=(libclang-rt-14-dev) # libFuzzer
-[ $extent = quick ] || PACKAGES_WANTED+=(chromium) # opens the page of a report
 if [ $extent = quick ]; then
     ensure_packages "${PACKAGES_BUILD[@]}" g++ libopenblas-dev liblapacke-dev
 else

@@ -123,15 +123,18 @@ def test_a_log_without_truth_or_evidence_has_a_page_too(tmp_path: Path, log: lis
 def test_what_a_page_leaves_out_it_says(
     tmp_path: Path, log: list[Message], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("pelorus.report.curves.FRAMES_MOST", 200)
     monkeypatch.setattr("pelorus.report.curves.LANDMARKS_MOST", 5)
     monkeypatch.setattr("pelorus.report.curves.REJECTIONS_MOST", 7)
     path = tmp_path / "less.html"
     page.write(path, answers.of_explanation(explain(log), "less"), Curves(log))
     data = data_of(path)
+    assert 100 <= data["t"]["count"] <= 201
     assert data["landmarks"]["id"]["count"] == 5
     assert data["landmarks"]["rejected"]["id"]["count"] <= 7
     text = path.read_text(encoding="utf-8")
-    assert re.search(r"Left out, to keep the page small: \d+ of \d+ landmarks", text)
+    assert re.search(r"Left out, to keep the page small: \d+ of \d+ frames, all but every", text)
+    assert re.search(r"\d+ of \d+ landmarks", text)
     assert "rejections" in text
 
 

@@ -17,10 +17,10 @@ from scipy.stats import chi2
 from pelorus import schema
 from pelorus.evaluation import Accuracy, assess, by_imu, made_in, on_its_clock, sigmas_m
 from pelorus.evidence import Evidence
-from pelorus.frame_table import frame_table
+from pelorus.frame_table import FrameTable, frame_table
 from pelorus.frames import Message, Stereo, Truth, TruthKnows
 from pelorus.grid.plane import AXES, choose
-from pelorus.health import SHORT
+from pelorus.health import GOOD, SHORT
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.report.packed import Packer
@@ -29,6 +29,7 @@ from pelorus.wire import header_of_messages
 
 SIGMAS = 3.0
 BAND = 0.95
+FRAMES_MOST = 150_000  # two hours at 20 Hz
 LANDMARKS_MOST = 20_000
 REJECTIONS_MOST = 60_000
 INSIDE = (
@@ -59,7 +60,7 @@ class Curves:
         self.left_out: list[str] = []
         self._others = others or {}
         self._messages = messages
-        self._frames = frame_table(messages)
+        self._frames = self._thinned(frame_table(messages))
         self._t = self._seconds(self._frames.t_ns)
         found = estimate_in(messages)
         self._found = found
@@ -69,6 +70,22 @@ class Curves:
     @property
     def origin_ns(self) -> int:
         return int(self._frames.t_ns[0])
+
+    def _thinned(self, frames: FrameTable) -> FrameTable:
+        """Of more frames than a browser holds every nth, and those that were not good."""
+        count = len(frames.t_ns)
+        if count <= FRAMES_MOST:
+            return frames
+        every = -(-2 * count // FRAMES_MOST)
+        kept = np.arange(count) % every == 0
+        trouble = np.flatnonzero((frames["health"] != GOOD) | (frames["status"] != 0))
+        kept[trouble[: FRAMES_MOST // 2]] = True
+        self.left_out.append(
+            f"{count - np.count_nonzero(kept)} of {count} frames, all but every {every}th and the "
+            "first that were not good"
+        )
+        columns = {name: values[kept] for name, values in frames.columns.items()}
+        return FrameTable(frames.t_ns[kept], columns, frames.by_imu)
 
     def _seconds(self, t_ns: Times) -> Floats:
         """Since the first frame; a clock that went back stands still."""
@@ -279,8 +296,9 @@ class Curves:
         }
 
     def _track(self, name: str, t_ns: Times, p: Floats) -> dict[str, Any]:
-        columns = [self.packer.add(p[:, k]) for k in range(3)]
-        t = self.packer.add_exactly(np.round(self._seconds(t_ns) * 1e3), "u4")
+        some = slice(None, None, -(-len(p) // FRAMES_MOST))
+        columns = [self.packer.add(p[some, k]) for k in range(3)]
+        t = self.packer.add_exactly(np.round(self._seconds(t_ns)[some] * 1e3), "u4")
         return {"name": name, "p": columns, "t": t}
 
     def _landmarks(self) -> dict[str, Any]:

@@ -269,6 +269,7 @@
   function fit() {
     const box = $("map").getBoundingClientRect(), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
     for (const track of tracks.slice(0, 2)) for (let k = 0; k < track.t.length; k++) {
+      if (track.p[0][k] == null) continue; // of a filter that diverged
       flat(track.p, k).forEach((x, i) => { if (x < low[i]) low[i] = x; if (x > high[i]) high[i] = x; });
     }
     if (low[0] > high[0]) return;
@@ -294,7 +295,9 @@
       pen.lineWidth = 1.8;
       pen.beginPath();
       const step = Math.max(1, Math.floor(track.t.length / 20000));
-      for (let k = 0; k < track.t.length; k += step) pen.lineTo(...at(flat(track.p, k)));
+      for (let k = 0; k < track.t.length; k += step) {
+        if (track.p[0][k] != null) pen.lineTo(...at(flat(track.p, k)));
+      }
       pen.stroke();
     });
     pen.setLineDash([]);
