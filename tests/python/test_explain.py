@@ -7,6 +7,7 @@ tests/recordings/explain.py does the same with many drives, real ones too, and p
 from __future__ import annotations
 
 import json
+import re
 import sys
 import warnings
 from dataclasses import replace
@@ -212,6 +213,17 @@ def test_a_log_without_evidence_or_end_or_readings_says_so(tmp_path: Path) -> No
     cut = explain(log[: len(log) // 2])
     assert "cut short" in cut.remarks[0]
     assert "no twists" in explain([m for m in log if not isinstance(m, Twist)]).remarks[0]
+
+
+def test_damaged_frames_of_a_log_are_told(pelorus: Command, tmp_path: Path) -> None:
+    log_of(drive(), tmp_path)
+    spoilt = bytearray((tmp_path / "log.plr").read_bytes())
+    spoilt[len(spoilt) // 2] ^= 0x55
+    (tmp_path / "spoilt.plr").write_bytes(spoilt)
+    said = pelorus("explain", tmp_path / "spoilt.plr")
+    assert re.search(r"spoilt.plr: (one frame is|\d frames are) damaged and left out", said.err)
+    assert "in 3.9 s" in said.out.splitlines()[0]
+    assert "damaged" not in pelorus("explain", tmp_path / "log.plr").err
 
 
 def test_logs_that_tell_nothing_are_refused(pelorus: Command, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from pelorus import native, packed_file
 from pelorus.console import err, waiting
 from pelorus.errors import PelorusError, write_text, writing
 from pelorus.frames import Kind, Message, Pose
-from pelorus.wire import Writer, messages_of
+from pelorus.wire import Writer, counted_messages_of, messages_of
 
 EXE = ".exe" if os.name == "nt" else ""
 SETTINGS_MAX_DEPTH = "max-depth"
@@ -97,7 +97,11 @@ def replayed(program: Path, inputs: Iterable[Message], options: Sequence[str]) -
 
 def result_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
     """The messages of a result as they are; of a recording those of a replay in float32."""
-    messages = messages_of(source)
+    messages, counts = counted_messages_of(source)
+    lost = counts.damaged + counts.malformed + counts.too_long
+    if lost:
+        frames = f"{lost} frames are" if lost > 1 else "one frame is"
+        err.print(f"[bold yellow]warning:[/] {escape(str(source))}: {frames} damaged and left out")
     if any(isinstance(m, Pose) and m.after_stereo for m in messages):
         if options:
             raise PelorusError(

@@ -289,11 +289,16 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
 
 def messages_of(path: Path) -> list[Message]:
     """What a recording holds, without its damaged frames; it must have a HEADER."""
+    return counted_messages_of(path)[0]
+
+
+def counted_messages_of(path: Path) -> tuple[list[Message], Counts]:
+    """The same, and what was left out."""
     if not path.exists():
         raise PelorusError(f"{path}: there is no such file")
-    received, _ = read_file(path)
+    received, counts = read_file(path)
     header_of(received, path)
-    return [frame.message for frame in received]
+    return [frame.message for frame in received], counts
 
 
 def header_of_messages(messages: Iterable[Message]) -> Header:

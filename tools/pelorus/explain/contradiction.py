@@ -92,8 +92,7 @@ def _looked_at(log: Log, first: int, last: int) -> Finding | None:
     lasting = _lasting(np.where(known[:, None], off, np.nan))
     begun = np.flatnonzero((lasting > SIGMAS).any(axis=1) & ~learn)
     if len(begun):
-        times = lasting[begun[0] : begun[0] + MEDIAN_OF].max(axis=0)
-        return _part(log, steps, int(begun[0]), times, (first, last))
+        return _part(log, steps, int(begun[0]), lasting, (first, last))
     single = np.where(known[:, None], np.abs(off), 0.0)
     odd = np.flatnonzero((single > SIGMAS).any(axis=1) & ~learn)
     return _jump(log, steps, int(odd[0])) if len(odd) else None
@@ -160,11 +159,14 @@ def _jump(log: Log, steps: Steps, k: int) -> Finding:
     return Finding(Cause.JUMP, int(t[k + 1]), int(t[k + 1]), words)
 
 
-def _part(log: Log, steps: Steps, k: int, times: Floats, stretch: tuple[int, int]) -> Finding:
-    """Pictures and odometry differ from step k on."""
+def _part(log: Log, steps: Steps, k: int, lasting: Floats, stretch: tuple[int, int]) -> Finding:
+    """Pictures and odometry differ from step k on; told where they differ most, soon after."""
+    soon = lasting[k : k + MEDIAN_OF]
+    times = soon.max(axis=0)
     along = times[:3] > SIGMAS  # wheels that slip turn wrongly, too
     axis = int(np.argmax(times[:3] if along.any() and not log.by_imu else times))
-    near = slice(k, k + 2 * MEDIAN_OF)
+    worst = k + int(np.argmax(soon[:, axis]))
+    near = slice(max(worst - MEDIAN_OF // 2, 0), worst + MEDIAN_OF // 2 + 1)
     seen, told = (
         float(np.nanmedian(x[near, axis])) for x in (steps.by_pictures, steps.by_odometry)
     )

@@ -511,6 +511,7 @@
   $("previous").addEventListener("click", () => next(-1));
   $("next").addEventListener("click", () => next(1));
   $("theme").addEventListener("click", theme);
+  $("previous").hidden = $("next").hidden = !events.length;
   events.forEach((button, k) => button.addEventListener("click", () => event(k)));
 
   makeRibbons();
