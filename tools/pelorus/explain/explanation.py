@@ -16,7 +16,7 @@ from pelorus.explain.contradiction import contradictions
 from pelorus.explain.finding import Cause, Finding, S
 from pelorus.explain.inputs import of_inputs, rejected
 from pelorus.explain.log import FEW, Flags, Log, log_of
-from pelorus.explain.setup import of_setup
+from pelorus.explain.setup import GATED_MOST, gated_share, of_setup
 from pelorus.explain.stamps import of_stamps
 from pelorus.frames import Kind, Message
 from pelorus.health import LOST, Spell, TimeLine, time_line
@@ -143,11 +143,14 @@ def explain(messages: Sequence[Message]) -> Explanation:
     inputs = [*of_stamps(log), *of_inputs(log)]
     found = sorted((*inputs, *(_behind(one, inputs) for one in contradictions(log))), key=_order)
     begin = found[0].from_ns if found else None
-    setup = tuple(of_setup(log, _calm(log, begin)))
-    if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
+    calm = _calm(log, begin)
+    setup = tuple(of_setup(log, calm))
+    if gated_share(log, calm) <= GATED_MOST:
         found += [one for one in rejected(log) if not _near(one, found)]
-        found = sorted((*found, *_unexplained(log, health, found)), key=_order)
-    episodes = tuple(_episode(log, group, health) for group in _grouped(found))
+    if not setup:  # a filter whose sigmas are wrong is lost now and then, and nothing happened
+        found += list(_unexplained(log, health, found))
+    groups = _grouped(sorted(found, key=_order))
+    episodes = tuple(_episode(log, group, health) for group in groups)
     end_ns = int(log.t_ns.max())
     return Explanation(
         log.origin_ns, end_ns, episodes, setup, health, tuple(_remarks(log, messages))

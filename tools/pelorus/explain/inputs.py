@@ -15,6 +15,7 @@ from pelorus.explain.log import CONTRADICTED, FEW, Flags, Log, period, runs, sus
 from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.schema import number
+from pelorus.visual_motion import PAIRS_MIN
 
 FROZEN_IMAGE = number("reason", "FROZEN_IMAGE")
 AXES = "xyz"
@@ -197,7 +198,7 @@ REJECTED_FRAMES = 2  # one is no event
 def rejected(log: Log) -> Iterator[Finding]:
     """The gate rejects most of what is seen, for some frames."""
     matched, gated = log.column("matched"), log.column("gated")
-    most = (matched >= TRACKED) & (2 * gated > matched)
+    most = (matched >= PAIRS_MIN) & (2 * gated > matched)
     for first, last in runs(most):
         count = last - first + 1
         if count < REJECTED_FRAMES:

@@ -62,11 +62,15 @@ def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
         )
 
 
+def gated_share(log: Log, calm: Flags) -> float:
+    """Of all matches."""
+    matched, gated = (int(log.column(name)[calm].sum()) for name in ("matched", "gated"))
+    return gated / matched if matched else 0.0
+
+
 def _gate(log: Log, calm: Flags) -> Iterator[str]:
-    matched = int(log.column("matched")[calm].sum())
-    gated = int(log.column("gated")[calm].sum())
-    if matched and gated > GATED_MOST * matched:
+    if (share := gated_share(log, calm)) > GATED_MOST:
         yield (
-            f"the gate rejects {gated / matched:.0%} of the matches: pixel-sigma too small, wrong "
+            f"the gate rejects {share:.0%} of the matches: pixel-sigma too small, wrong "
             "tracks, or a wrong calibration; `pelorus check`"
         )
