@@ -14,8 +14,8 @@ class Pelorus(ConanFile):  # type: ignore[misc]
     description = "Stereo visual-inertial SLAM filter in plain C99, no heap"
     topics = ("slam", "vio", "kalman", "robotics")
     settings = ("os", "arch", "compiler", "build_type")
-    options = {"landmarks": ["ANY"], "observations": ["ANY"], "portable": [True, False]}  # noqa: RUF012
-    default_options = {"landmarks": 32, "observations": 128, "portable": False}  # noqa: RUF012
+    options = {"landmarks": ["ANY"], "observations": ["ANY"], "calibration": ["ANY"], "portable": [True, False]}  # noqa: RUF012
+    default_options = {"landmarks": 32, "observations": 128, "calibration": 5, "portable": False}  # noqa: RUF012
     exports_sources = ("CMakeLists.txt", "cmake/*", "src/*", "include/*", "LICENSE")
 
     def configure(self) -> None:
@@ -33,6 +33,7 @@ class Pelorus(ConanFile):  # type: ignore[misc]
         toolchain.cache_variables |= {
             "PLR_MAX_LANDMARKS": str(self.options.landmarks),
             "PLR_MAX_OBSERVATIONS": str(self.options.observations),
+            "PLR_MAX_CALIBRATION": str(self.options.calibration),
             "PLR_PORTABLE": bool(self.options.portable),
             "PELORUS_BUILD_REPLAY": False,
             "PELORUS_BUILD_TESTS": False,

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[1]
 NATIVE = ROOT / "build/bin/pelorus-replay"
 COMMON = (
     *("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=all", "-g0"),
-    *("-DPLR_MAX_LANDMARKS=256", "-DPLR_MAX_OBSERVATIONS=1024"),
+    *("-DPLR_MAX_LANDMARKS=256", "-DPLR_MAX_OBSERVATIONS=1024", "-DPLR_MAX_CALIBRATION=11"),
 )
 WARNINGS = ("-Wall", "-Wextra", "-Werror")
 RECORDINGS = {

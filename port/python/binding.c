@@ -32,6 +32,7 @@ uint32_t plr_binding_size_of(const char *name) {
         SIZE(plr_reading_result),
         SIZE(plr_report),
         SIZE(plr_setting),
+        SIZE(plr_sizes),
         SIZE(plr_supervision),
         SIZE(plr_totals),
         SIZE(plr_twist),

@@ -17,7 +17,11 @@ from replay_drive import BIN
 ROOT = Path(__file__).resolve().parents[2]
 COMPILERS = [name for name in ("gcc", "clang-14") if shutil.which(name)]
 WARNINGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-SIZES = ("-DPLR_MAX_LANDMARKS=256", "-DPLR_MAX_OBSERVATIONS=1024")
+SIZES = (
+    "-DPLR_MAX_LANDMARKS=256",
+    "-DPLR_MAX_OBSERVATIONS=1024",
+    "-DPLR_MAX_CALIBRATION=11",
+)
 
 
 @pytest.fixture(scope="module")

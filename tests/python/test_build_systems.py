@@ -53,6 +53,7 @@ set(CONFIG_PELORUS_PORTABLE y)
 set(CONFIG_PELORUS_KNOWN_MAP y) # and the supervisor is left out
 set(CONFIG_PELORUS_MAX_LANDMARKS 24)
 set(CONFIG_PELORUS_MAX_OBSERVATIONS 64)
+set(CONFIG_PELORUS_MAX_CALIBRATION 0)
 macro(zephyr_library_named name)
   add_library(${name} STATIC)
   add_library(component ALIAS ${name})

@@ -88,7 +88,8 @@ class Page:
         """A file is taken, as one that is dropped is."""
         packed = base64.b64encode(content).decode()
         self.does(
-            f"takeFile(new File([Uint8Array.from(atob('{packed}'), c => c.charCodeAt(0))], '{name}'))"
+            f"takeFile(new File([Uint8Array.from(atob('{packed}'), "
+            f"letter => letter.charCodeAt(0))], '{name}'))"
         )
 
     def replays(self, words: str = "") -> None:

@@ -12,6 +12,8 @@ from pelorus import __version__
 from pelorus.console import out
 from pelorus.outputs import guard_outputs
 
+MODULES = {"try": "first_try"}  # whose file cannot be called as the command is
+
 
 def application(commands: Iterable[str]) -> typer.Typer:
     """With these commands, which are imported here."""
@@ -24,7 +26,7 @@ def application(commands: Iterable[str]) -> typer.Typer:
         callback=_options,
     )
     for command in commands:
-        added = import_module(f"pelorus.commands.{command}").app
+        added = import_module(f"pelorus.commands.{MODULES.get(command, command)}").app
         guard_outputs(added)
         app.add_typer(added)
     return app

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from io import TextIOWrapper
 
 COMMANDS = (
+    "try",
     "convert",
     "track",
     "info",

@@ -338,8 +338,14 @@ class Sizes(_Struct):
     landmarks: int
     observations: int
     block: int
-    _fields_ = tuple(
-        (name, c.c_uint32) for name in ("bytes", "real", "landmarks", "observations", "block")
+    calibration: int
+    _fields_ = (
+        ("bytes", c.c_uint32),
+        ("real", c.c_uint32),
+        ("landmarks", c.c_uint32),
+        ("observations", c.c_uint32),
+        ("block", c.c_uint32),
+        ("calibration", c.c_uint32),
     )
 
 
@@ -358,7 +364,7 @@ class Map(_Struct):
 
 STRUCTS: tuple[type[_Struct], ...] = (
     *(Pose, Twist, Calibration, Frame, Landmark, Reading, ReadingResult, Report, Supervision),
-    *(Health, Totals, Setting, Map),
+    *(Health, Totals, Setting, Sizes, Map),
 )
 
 _VOID = c.c_void_p
@@ -406,9 +412,9 @@ class Library:
                 "pip install --no-binary pelorus -C cmake.define.PLR_PORTABLE=ON pelorus "
                 "builds one for any processor: slower, the same bits"
             )
+        self._check(path)
         self.sizes = Sizes()
         self._library.plr_binding_sizes(c.byref(self.sizes))
-        self._check(path)
 
     def _declare(self, path: Path) -> None:
         """Tells ctypes the functions' types."""

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""`pelorus try SAMPLE`: from what somebody has to a verdict."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import typer
+from rich.markup import escape
+
+from pelorus.console import out
+from pelorus.errors import Existing, PelorusError, made
+
+RECORDINGS = (".plr", ".plr.zst")
+BAGS = (".bag", ".mcap", ".db3")
+
+app = typer.Typer()
+
+
+def _has(*names: str) -> Callable[[Path], bool]:
+    """Whether a folder holds one of them."""
+    return lambda source: source.is_dir() and any((source / name).exists() for name in names)
+
+
+def _archive_with(name: str) -> Callable[[Path], bool]:
+    """Whether a .npz holds this array."""
+
+    def holds(source: Path) -> bool:
+        if source.suffix != ".npz" or not zipfile.is_zipfile(source):
+            return False
+        with zipfile.ZipFile(source) as archive:
+            return f"{name}.npy" in archive.namelist()
+
+    return holds
+
+
+# What a source is, by what is in it, and what `pelorus convert` calls it. The first counts.
+FORMATS: tuple[tuple[str, str, Callable[[Path], bool]], ...] = (
+    ("ros", f"a bag ({', '.join(BAGS)})", lambda source: source.suffix in BAGS),
+    ("ros", "a bag's folder (metadata.yaml)", _has("metadata.yaml")),
+    ("euroc", "a folder like EuRoC's (mav0)", _has("mav0", "cam0")),
+    ("kitti", "a drive of KITTI (oxts, or calib.txt)", _has("oxts", "calib.txt")),
+    ("ece276a", "a .npz of ECE276A", _archive_with("features")),
+    ("imu-npz", "a .npz with an IMU", _archive_with("stereo_px")),
+)
+
+
+def _format_of(source: Path) -> str:
+    """What `pelorus convert` calls it; empty for a recording."""
+    if source.is_file() and source.name.endswith(RECORDINGS):
+        return ""
+    for name, _, fits in FORMATS:
+        if fits(source):
+            return name
+    if not source.exists():
+        raise PelorusError(f"{source}: is not there")
+    known = "; ".join(what for _, what, _ in FORMATS)
+    raise PelorusError(
+        f"{source}: is nothing that is known by its looks: a recording (.plr), {known}. For other "
+        "data pelorus convert has a command for each format: docs/CONVERT.md"
+    )
+
+
+def _run(*words: str) -> int:
+    """Another command, as the user could give it; its exit status."""
+    from pelorus.application import application  # noqa: PLC0415 - it imports the commands
+
+    out.print(f"[bold]$ pelorus {escape(' '.join(words))}[/]")
+    status = application(words[:1])(args=list(words), standalone_mode=False)
+    return status if isinstance(status, int) else 0
+
+
+@app.command(
+    name="try",
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    epilog="Example:  pelorus try V1_01_easy --calibration camchain.yaml",
+)
+def first_try(
+    context: typer.Context,
+    source: Path = typer.Argument(
+        ..., metavar="SAMPLE", help="A recording, a bag, or a folder of a known data set."
+    ),
+    folder: Path | None = typer.Option(
+        None, "--out", metavar="DIR", help="Where all goes; else try-NAME here."
+    ),
+) -> None:
+    """Convert a sample if need be, check it, and draw the report: to see what is to be had of it.
+
+    Options that are not known here are for the conversion. The exit status is 1 if a fault stands
+    in the way: then the report is drawn with the settings as they are.
+    """
+    force = ("--force",) if Existing.overwritten else ()  # each command asks for itself
+    kind = _format_of(source)
+    name = source.name.removesuffix(".zst").removesuffix(".plr") or source.resolve().name
+    into = made(folder or Path(f"try-{name}"))
+    recording = source
+    if kind:
+        recording = into / f"{name}.plr"
+        if status := _run("convert", kind, str(source), str(recording), *context.args, *force):
+            raise typer.Exit(status)
+    elif context.args:
+        raise PelorusError(f"{' '.join(context.args)}: {source} needs no conversion")
+    tuned = into / "tuned.conf"
+    status = _run("check", str(recording), "--out", str(tuned), *force)
+    settings = ("--config", str(tuned)) if status == 0 and tuned.is_file() else ()
+    _run("report", str(recording), "--out", str(into), *settings, *force)
+    if status:
+        raise typer.Exit(status)
