@@ -70,14 +70,8 @@ def write_recording(process: Process, target: Path) -> None:
     for observations, seconds in SECONDS.items():
         part = target.with_suffix(f".{observations}.plr")
         command = [sys.executable, "-m", "pelorus", "simulate", str(part), "--force"]
-        command += [
-            "--seed",
-            SEED,
-            "--observations",
-            str(2 * BUSY_OBSERVATIONS),
-            "--duration",
-            seconds,
-        ]
+        command += ["--seed", SEED, "--duration", seconds]
+        command += ["--observations", str(2 * BUSY_OBSERVATIONS)]
         command += process.options
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         messages = [frame.message for frame in read_file(part)[0]]

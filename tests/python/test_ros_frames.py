@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Frames of a bag: what /tf_static says of the camera and of a gyro."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bags import NS, Recorder
+from converted import Run, messages_of
+from drives import clean
+from numpy.typing import NDArray
+from pelorus import se3
+from pelorus.frames import Header
+from pelorus.recording import Recording
+from pelorus.se3 import Poses
+from scipy.spatial.transform import Rotation
+from test_convert_ros import written
+from test_ros_world import DRIVE, odometry, of_cameras, twists_of, with_tracks
+
+Floats = NDArray[np.float64]
+
+
+@pytest.fixture
+def drive() -> Recording:
+    return clean(**DRIVE)
+
+
+# --- frames ---------------------------------------------------------------------------------------
+
+
+def links(drive: Recording, names: Iterable[str]) -> dict[tuple[str, str], Poses]:
+    """base - mast - plate - the camera's optical frame, so that it is where the drive has it."""
+    base, mast, plate, optical = names
+    T_BM = Poses(Rotation.from_rotvec([0, 0, 0.4]).as_matrix(), np.array([0.2, -0.1, 0.6]))
+    T_BP = Poses(Rotation.from_rotvec([0, -0.7, 0]).as_matrix(), np.array([-0.5, 0.0, 0.9]))
+    T_BC = se3.inverse(drive.T_CB)
+    return {
+        (base, mast): T_BM,
+        (plate, base): se3.inverse(T_BP),  # a tree whose root lies on the way
+        (plate, optical): se3.compose(se3.inverse(T_BP), T_BC),
+    }
+
+
+NAMES = ("base_link", "mast", "plate", "left_optical")
+
+
+def assert_on_body(target: Path, drive: Recording) -> None:
+    header = messages_of(target, Header)[0]
+    assert np.abs(header.R_CB - drive.header.R_CB).max() < 1e-9
+    assert np.abs(header.t_CB_m - drive.header.t_CB_m).max() < 1e-9
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_tf_static_tells_where_the_camera_sits_and_the_chain_is_said(
+    ros: int, drive: Recording, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_tracks(Recorder(ros), drive, "/left_optical" if ros == 1 else "left_optical")
+    odometry(recorder, drive, drive.v_B_mps, drive.w_B_radps)
+    for k in range(3):  # latched, and said again
+        recorder.transforms("/tf_static", NS + k, links(drive, NAMES))
+    bag = written(recorder, tmp_path, "ros1" if ros == 1 else "mcap")
+    target = tmp_path / "out.plr"
+    said = pelorus("convert", "ros", bag, target, *of_cameras(tmp_path, drive)).out
+    assert "as /tf_static says: base_link - plate - left_optical" in said
+    assert_on_body(target, drive)
+
+
+def test_chains_that_lack_move_or_are_told_twice_end_in_a_sentence(
+    drive: Recording, tmp_path: Path, pelorus: Run
+) -> None:
+    whole = links(drive, NAMES)
+    turned = {("base_link", "plate"): Poses(np.eye(3), np.array([0.0, 0.0, 1.0]))}
+    optical = {("left_optical", "left_optical_frame"): Poses(np.eye(3)[[1, 2, 0]], np.zeros(3))}
+    cut = {pair: T for pair, T in whole.items() if pair != ("plate", "base_link")}
+    parts: list[tuple[dict[Any, Any], dict[Any, Any], str]] = [
+        (cut, {}, "no chain of transforms joins 'base_link' and 'left_optical': they end at "
+                  "'base_link' and at 'plate'; --extrinsic FILE is due"),
+        (cut, whole, ""),
+        (whole | optical, {}, "which has the optical frame left_optical_frame: in which does"),
+        ({("gimbal", "left_optical"): whole["plate", "left_optical"]},
+         {("base_link", "gimbal"): whole["base_link", "mast"]},
+         "'base_link' to 'gimbal' moves (/tf), so it tells no mounting; --extrinsic FILE is due"),
+        ({("a", "b"): whole["base_link", "mast"]}, {}, "no transform of /tf_static has the frame "
+         "'base_link'; --extrinsic FILE is due, or --body-frame and --camera-frame, one of a, b"),
+    ]  # fmt: skip
+    target, calibration = tmp_path / "out.plr", of_cameras(tmp_path, drive)
+    for k, (static, dynamic, said) in enumerate(parts):
+        recorder = with_tracks(Recorder(), drive, "left_optical")
+        odometry(recorder, drive, drive.v_B_mps, drive.w_B_radps)
+        recorder.transforms("/tf_static", NS, static)
+        for t in range(2 if dynamic else 0):
+            moved = {pair: Poses(T.R, T.p + t * ("gimbal" in pair)) for pair, T in dynamic.items()}
+            recorder.transforms("/tf", (1 + t) * NS, moved)
+        bag = written(recorder, tmp_path / str(k), "mcap")
+        outcome = pelorus("convert", "ros", bag, target, *calibration, status=1 if said else 0)
+        assert said in outcome.err, outcome.err
+    recorder = with_tracks(Recorder(), drive, "left_optical")
+    odometry(recorder, drive, drive.v_B_mps, drive.w_B_radps)
+    recorder.transforms("/tf_static", NS, whole)
+    recorder.transforms("/tf_static", NS, {("base_link", "left_optical"): turned.popitem()[1]})
+    bag = written(recorder, tmp_path / "twice", "mcap")
+    outcome = pelorus("convert", "ros", bag, target, *calibration, status=1)
+    assert "says twice, and differently, where 'left_optical' stands" in outcome.err
+
+
+def test_frames_that_nobody_names_are_asked_for_and_may_be_given(
+    drive: Recording, tmp_path: Path, pelorus: Run
+) -> None:
+    recorder = with_tracks(Recorder(), drive)
+    odometry(recorder, drive, drive.v_B_mps, drive.w_B_radps, child="")
+    recorder.transforms("/tf_static", NS, links(drive, NAMES))
+    bag = written(recorder, tmp_path, "mcap")
+    target, calibration = tmp_path / "out.plr", of_cameras(tmp_path, drive)
+    said = pelorus("convert", "ros", bag, target, *calibration, status=1).err
+    assert "the left camera's messages do not name their frame; --camera-frame NAME is due" in said
+    camera = ("--camera-frame", "left_optical", "--body-frame", "base_link")
+    pelorus("convert", "ros", bag, target, *calibration, *camera)
+    assert_on_body(target, drive)
+
+
+def test_a_gyro_on_another_frame_is_turned_into_the_body(
+    drive: Recording, tmp_path: Path, pelorus: Run
+) -> None:
+    R_BI = Rotation.from_rotvec([0.3, -1.2, 2.0]).as_matrix()
+    recorder = with_tracks(Recorder(), drive, "left_optical")
+    odometry(recorder, drive, drive.v_B_mps, drive.w_B_radps)
+    for t in range(0, 14 * NS, 5_000_000):
+        recorder.imu("/imu", NS // 2 + t, (0, 0, 9.8), R_BI.T @ (0.1, 0.2, 0.3), "imu_link")
+    both = links(drive, NAMES) | {("base_link", "imu_link"): Poses(R_BI, np.ones(3))}
+    recorder.transforms("/tf_static", NS, both)
+    bag = written(recorder, tmp_path, "mcap")
+    target, calibration = tmp_path / "out.plr", of_cameras(tmp_path, drive)
+    said = pelorus("convert", "ros", bag, target, *calibration, "--gyro-topic", "/imu").out
+    assert "its rates are turned into 'base_link' as /tf_static says: imu_link - base_link" in said
+    assert np.allclose(twists_of(target)[:, 3:], [0.1, 0.2, 0.3])
