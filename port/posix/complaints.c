@@ -9,14 +9,22 @@
 enum { TOLD = 3 }; /* of each sort */
 
 static const char *const kind_names[COMPLAINT_KINDS] = {
-    [PLR_KIND_NONE] = "frame",    [PLR_KIND_HEADER] = "HEADER",
-    [PLR_KIND_CONFIG] = "CONFIG", [PLR_KIND_START] = "START",
-    [PLR_KIND_TWIST] = "TWIST",   [PLR_KIND_STEREO] = "STEREO",
-    [PLR_KIND_TRUTH] = "TRUTH",   [PLR_KIND_LANDMARK] = "LANDMARK",
-    [PLR_KIND_POSE] = "POSE",     [PLR_KIND_REPORT] = "REPORT",
-    [PLR_KIND_TEXT] = "TEXT",     [PLR_KIND_END] = "END",
-    [PLR_KIND_STATE] = "STATE",   [PLR_KIND_READING] = "READING",
-    [PLR_KIND_IMU] = "IMU",       [PLR_KIND_EVIDENCE] = "EVIDENCE",
+    [PLR_KIND_NONE] = "frame",
+    [PLR_KIND_HEADER] = "HEADER",
+    [PLR_KIND_CONFIG] = "CONFIG",
+    [PLR_KIND_START] = "START",
+    [PLR_KIND_TWIST] = "TWIST",
+    [PLR_KIND_STEREO] = "STEREO",
+    [PLR_KIND_TRUTH] = "TRUTH",
+    [PLR_KIND_LANDMARK] = "LANDMARK",
+    [PLR_KIND_POSE] = "POSE",
+    [PLR_KIND_REPORT] = "REPORT",
+    [PLR_KIND_TEXT] = "TEXT",
+    [PLR_KIND_END] = "END",
+    [PLR_KIND_STATE] = "STATE",
+    [PLR_KIND_READING] = "READING",
+    [PLR_KIND_IMU] = "IMU",
+    [PLR_KIND_EVIDENCE] = "EVIDENCE",
     [PLR_KIND_CALIBRATION] = "CALIBRATION",
 };
 

@@ -91,8 +91,10 @@ void plr_calibration_forget(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     memset(c->information, 0, sizeof c->information);
     memset(c->factor, 0, sizeof c->factor);
-    for (unsigned k = 0; k < K; k++)
-        c->information[(K + 1) * k] = c->factor[(K + 1) * k] = c->told[k] = 1;
+    for (unsigned k = 0; k < K; k++) {
+        c->information[(K + 1) * k] = 1;
+        c->factor[(K + 1) * k] = c->told[k] = 1;
+    }
 }
 
 void plr_calibration_reset(plr_filter *f) {
