@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from judge import DATA, Case, conf, converted, figures, parser_of, run
+from judge import Case, conf, converted, figures, parser_of, run
 from pelorus import se3
 from pelorus.calibrated import PARTS, last_calibrated
 from pelorus.frames import End, Header, Message, Stereo, Truth
@@ -64,7 +64,6 @@ class Wrong:
         if isinstance(message, Stereo):
             return replace(message, t_ns=message.t_ns + round(self.late_s * 1e9))
         return message
-
 
     def due(self) -> Floats:
         """What the filter should correct: plr_calibration_error."""

@@ -193,13 +193,11 @@ def _within(Z: Floats, X: Floats) -> Floats:
     """
     low, high = np.quantile(X, WITHIN, axis=0)
     of = np.arange(Z.shape[2]) % X.shape[2]
-    own = Z == X[:, :, of]
+    own = X[:, :, of] == Z
     return np.where(own, Z, np.clip(Z, low[:, of], high[:, of]))
 
 
-def _first_stage(
-    trusted: Floats, Z: Floats, X: Floats, exact: NDArray[np.intp]
-) -> Floats:
+def _first_stage(trusted: Floats, Z: Floats, X: Floats, exact: NDArray[np.intp]) -> Floats:
     """(q, m) that makes of the instruments what they tell of each column of X; of a column that is
     its own instrument, itself.
     """

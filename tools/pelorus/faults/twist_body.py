@@ -102,12 +102,8 @@ def _design(told: Floats, seen: Seen, others: list[Motions], prior: Floats) -> D
     X = _columns(told, slope(told, 1, float(np.median(seen.tau_s))))
     Z = np.concatenate([_columns(z.rates, z.slope) for z in others], axis=2)
     usable = seen.usable & np.isfinite(told).all(axis=1)
-    k = np.flatnonzero(
-        usable & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2))
-    )
-    return Design(
-        (seen.rates - told)[k], X[k], Z[k], seen.variance[k], prior, told[k, :3], k
-    )
+    k = np.flatnonzero(usable & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2)))
+    return Design((seen.rates - told)[k], X[k], Z[k], seen.variance[k], prior, told[k, :3], k)
 
 
 def _prior(bias: float, turns_late: float) -> Floats:
