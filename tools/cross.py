@@ -120,9 +120,10 @@ def run_program(target: Target, program: Path, words: Sequence[str], folder: Pat
         run_wasm(program, words, folder)
         return
     command = [found] if (found := runner_of(target)) else []
+    home = {"WINEPREFIX": str(program.parent / "wine"), "WINEDEBUG": "-all"}  # where it needs them
     subprocess.run(
         [*command, str(program), *words],
-        cwd=folder, check=True, stdout=subprocess.DEVNULL, env=os.environ | {"WINEDEBUG": "-all"},
+        cwd=folder, check=True, stdout=subprocess.DEVNULL, env=os.environ | home,
     )  # fmt: skip
 
 

@@ -462,8 +462,6 @@ class Filter:
         time = _whole("t_ns", t_ns, MOST_NS)
         self._checked("resume", self._c.filter_resume(self._f, time, _address(P)))
 
-    # --- the library
-
     @property
     def most_landmarks(self) -> int:
         """How many the library has room for; the setting `slots` may use fewer."""
@@ -473,11 +471,6 @@ class Filter:
     def most_observations(self) -> int:
         """In one frame."""
         return int(self._c.sizes.observations)
-
-    @property
-    def fingerprint(self) -> int:
-        """Differs between builds whose bits may differ."""
-        return int(self._c.build_fingerprint())
 
 
 def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float, float, float]:
