@@ -137,7 +137,7 @@ typedef float plr_real;
 #define PLR_FMA(a, b, c) plr_fmaf_exact((a), (b), (c))
 #elif PLR_WASM_FMA
 /* Whether this is fused is the machine's choice, once for all: who runs such a program asks it first
- * (docs/PORTING.md), and takes a portable one where it is not. */
+ * (docs/INSTALL.md), and takes a portable one where it is not. */
 typedef float plr_four __attribute__((vector_size(16)));
 static inline float plr_fmaf_wasm(float a, float b, float c) {
     const plr_four four_a = {a, a, a, a}, four_b = {b, b, b, b}, four_c = {c, c, c, c};
