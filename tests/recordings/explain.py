@@ -6,8 +6,8 @@ usage: explain.py [--bin build/bin] [--only TEXT] [--seeds 2] [--event NAME]
 
 Twenty recordings and more: simulated drives by twists and by IMU, and windows of real ones from
 $PELORUS_DATA. Into each one every event is put that fits it, at a time drawn where the robot moves.
-Right is the first cause of the first episode, and its time within a second. A clean drive is one in
-which the filter itself is GOOD in 95 of 100 frames; others have troubles of their own, which are told.
+Right is the first cause of the first episode, and its time within a second. A clean drive is one
+in which the filter itself is GOOD in 95 of 100 frames; others have troubles of their own.
 """
 
 from __future__ import annotations
