@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pelorus import native, schema
+from pelorus.arguments import address, checked, kind_of, whole_number
 from pelorus.errors import PelorusError
 from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
 
@@ -110,57 +111,22 @@ def observations(ids: ArrayLike, pixels: ArrayLike) -> NDArray[np.void]:
     """Observations of a frame: ids (n,), 0 to 2^32 - 1; pixels (n, 4) of (uL, vL, uR, vR)."""
     numbers, places = np.asarray(ids), np.asarray(pixels)
     if numbers.ndim != 1 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
-        raise PelorusError(f"ids: {_is(numbers)}; whole numbers of shape (n,) are wanted")
+        raise PelorusError(f"ids: {kind_of(numbers)}; whole numbers of shape (n,) are wanted")
     if numbers.size and not (numbers.min() >= 0 and numbers.max() <= MOST_ID):
         raise PelorusError(f"ids: {numbers.min()} to {numbers.max()}; 0 to {MOST_ID} are possible")
     frame = np.empty(len(numbers), OBSERVATION)
     frame["id"] = numbers
-    pixel = _array("pixels", places, (len(numbers), 4), np.float32)
+    pixel = checked("pixels", places, (len(numbers), 4), np.float32)
     for column, name in enumerate(OBSERVATION.names[1:] if OBSERVATION.names else ()):
         frame[name] = pixel[:, column]
     return frame
 
 
-def _is(array: NDArray[Any]) -> str:
-    return f"{array.dtype} of shape {array.shape}"
-
-
-def _array(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.float64) -> Any:
-    """The value as an array of this shape, without a copy where it is one."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:  # rows of different length
-        raise PelorusError(f"{name}: {error}; numbers of shape {shape} are wanted") from error
-    if array.shape != shape or array.dtype.kind not in "fiu":
-        raise PelorusError(f"{name}: {_is(array)}; numbers of shape {shape} are wanted")
-    if array.dtype == type and array.flags.c_contiguous:
-        return array
-    with np.errstate(over="ignore"):  # becomes infinite, which the filter refuses by name
-        return np.ascontiguousarray(array, type)
-
-
-def _whole(name: str, value: int, most: int) -> int:
-    number = value if type(value) is int else _as_int(name, value)
-    if not 0 <= number <= most:
-        raise PelorusError(f"{name}: {number}; 0 to {most} are possible")
-    return number
-
-
-def _as_int(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise PelorusError(f"{name}: {value!r} is no whole number")
-    return int(value)
-
-
 def _pose(name: str, R: ArrayLike, p: ArrayLike) -> native.Pose:
     pose = native.Pose()
-    pose.R[:] = _array(f"{name}: R", R, (3, 3)).ravel()
-    pose.p[:] = _array(f"{name}: p", p, (3,))
+    pose.R[:] = checked(f"{name}: R", R, (3, 3)).ravel()
+    pose.p[:] = checked(f"{name}: p", p, (3,))
     return pose
-
-
-def _address(array: NDArray[Any] | None) -> int | None:
-    return None if array is None else array.ctypes.data
 
 
 class Filter:
@@ -272,43 +238,41 @@ class Filter:
     ) -> None:
         """Sets pose and time, at the start or later; landmarks are dropped. `covariance` (6, 6) of
         (rho, theta), m and rad in the body's axes; None: start-sigma."""
-        P = None if covariance is None else _array("covariance", covariance, (6, 6))
+        P = None if covariance is None else checked("covariance", covariance, (6, 6))
         pose = _pose("pose", R_WB, p_WB_m)
-        time = _whole("t_ns", t_ns, MOST_NS)
-        self._checked(
-            "set_pose", self._c.filter_set_pose(self._f, time, c.byref(pose), _address(P))
-        )
+        time = whole_number("t_ns", t_ns, MOST_NS)
+        self._checked("set_pose", self._c.filter_set_pose(self._f, time, c.byref(pose), address(P)))
 
     def set_bias(self, mean: ArrayLike, variance: ArrayLike) -> None:
         """The prior of the biases, each (6,): of twists (v, w), m/s and rad/s; of an IMU (a, w)."""
-        b, V = _array("mean", mean, (6,)), _array("variance", variance, (6,))
-        self._checked("set_bias", self._c.filter_set_bias(self._f, _address(b), _address(V)))
+        b, V = checked("mean", mean, (6,)), checked("variance", variance, (6,))
+        self._checked("set_bias", self._c.filter_set_bias(self._f, address(b), address(V)))
 
     def set_velocity(self, v_B_mps: ArrayLike, variance: ArrayLike) -> None:
         """With an IMU: its velocity in the body's axes, and variances; each (3,)."""
-        v, V = _array("v_B_mps", v_B_mps, (3,)), _array("variance", variance, (3,))
-        status = self._c.filter_set_velocity(self._f, _address(v), _address(V))
+        v, V = checked("v_B_mps", v_B_mps, (3,)), checked("variance", variance, (3,))
+        status = self._c.filter_set_velocity(self._f, address(v), address(V))
         self._checked("set_velocity", status)
 
     def move_to(self, t_ns: int, R_WB: ArrayLike, p_WB_m: ArrayLike) -> None:
         """In the mode mapping: the body's pose at t_ns, which is taken as exact."""
         pose = _pose("pose", R_WB, p_WB_m)
-        time = _whole("t_ns", t_ns, MOST_NS)
+        time = whole_number("t_ns", t_ns, MOST_NS)
         self._checked("move_to", self._c.filter_move_to(self._f, time, c.byref(pose)))
 
     def predict(self, t_ns: int, v_B_mps: ArrayLike, w_B_radps: ArrayLike) -> None:
         """A twist taken at t_ns: velocity (3,), m/s, and rate (3,), rad/s, in the body's axes."""
-        self._linear[:] = _array("v_B_mps", v_B_mps, (3,))
-        self._angular[:] = _array("w_B_radps", w_B_radps, (3,))
-        status = self._predict(self._f, _whole("t_ns", t_ns, MOST_NS), self._twist_at)
+        self._linear[:] = checked("v_B_mps", v_B_mps, (3,))
+        self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
+        status = self._predict(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
         if status != 0:
             self._checked("predict", status)
 
     def inertial(self, t_ns: int, a_B_mps2: ArrayLike, w_B_radps: ArrayLike) -> None:
         """A reading of an IMU at t_ns: specific force (3,), m/s^2, at rest upwards; rate (3,)."""
-        self._linear[:] = _array("a_B_mps2", a_B_mps2, (3,))
-        self._angular[:] = _array("w_B_radps", w_B_radps, (3,))
-        status = self._inertial(self._f, _whole("t_ns", t_ns, MOST_NS), self._twist_at)
+        self._linear[:] = checked("a_B_mps2", a_B_mps2, (3,))
+        self._angular[:] = checked("w_B_radps", w_B_radps, (3,))
+        status = self._inertial(self._f, whole_number("t_ns", t_ns, MOST_NS), self._twist_at)
         if status != 0:
             self._checked("inertial", status)
 
@@ -324,8 +288,8 @@ class Filter:
             )
         frame = self._frame
         frame.t_ns, frame.budget = (
-            _whole("t_ns", t_ns, MOST_NS),
-            _whole("budget", budget, NO_BUDGET),
+            whole_number("t_ns", t_ns, MOST_NS),
+            whole_number("budget", budget, NO_BUDGET),
         )
         frame.count, frame.observations = len(seen), seen.ctypes.data
         status = self._update(self._f, self._frame_at, self._report_at)
@@ -347,12 +311,12 @@ class Filter:
         kinds = schema.SENSORS
         if sensor not in kinds:
             raise PelorusError(f"sensor {sensor!r}: one of {', '.join(kinds)}")
-        sigmas = _array("sigma", sigma, (3,))
-        reading = native.Reading(_whole("t_ns", t_ns, MOST_NS), kinds[sensor])
+        sigmas = checked("sigma", sigma, (3,))
+        reading = native.Reading(whole_number("t_ns", t_ns, MOST_NS), kinds[sensor])
         still = sensor == "standstill"
         reading.axes = 7 if still else sum(1 << i for i in range(3) if sigmas[i] != 0)
-        reading.value[:], reading.sigma[:] = _array("value", value, (3,)), sigmas
-        reading.at_B_m[:] = _array("at_B_m", at_B_m, (3,))
+        reading.value[:], reading.sigma[:] = checked("value", value, (3,)), sigmas
+        reading.at_B_m[:] = checked("at_B_m", at_B_m, (3,))
         result = ReadingResult()
         self._checked("measure", self._c.filter_measure(self._f, c.byref(reading), c.byref(result)))
         return result
@@ -367,7 +331,7 @@ class Filter:
     def _doubles(self, function: str, shape: tuple[int, ...]) -> Floats:
         """What a function writes as an array of doubles."""
         result = np.empty(shape)
-        self._checked(function, getattr(self._c, f"filter_{function}")(self._f, _address(result)))
+        self._checked(function, getattr(self._c, f"filter_{function}")(self._f, address(result)))
         return result
 
     def pose(self) -> Pose:
@@ -390,7 +354,7 @@ class Filter:
     def bias(self) -> tuple[Floats, Floats]:
         """(6,) and its covariance (6, 6): (b_v, b_w) of twists, (b_a, b_g) of an IMU."""
         b, P = np.empty(6), np.empty((6, 6))
-        self._checked("bias", self._c.filter_bias(self._f, _address(b), _address(P)))
+        self._checked("bias", self._c.filter_bias(self._f, address(b), address(P)))
         return b, P
 
     def landmarks(self) -> NDArray[np.void]:
@@ -404,7 +368,7 @@ class Filter:
 
     def insert_known(self, id: int, p_W_m: ArrayLike, P_W_m2: ArrayLike) -> None:
         """Puts a landmark of known position (3,), m, and covariance (3, 3), m^2, into the state."""
-        landmark = _landmark(_whole("id", id, MOST_ID), KnownLandmark(p_W_m, P_W_m2))
+        landmark = _landmark(whole_number("id", id, MOST_ID), KnownLandmark(p_W_m, P_W_m2))
         self._checked("insert_known", self._c.filter_insert_known(self._f, c.byref(landmark)))
 
     def flush_map(self) -> None:
@@ -415,7 +379,7 @@ class Filter:
 
     def health(self, t_ns: int | None = None) -> Health:
         """The filter's health at t_ns; None: at the time of the estimate."""
-        time = self.time_ns if t_ns is None else _whole("t_ns", t_ns, MOST_NS)
+        time = self.time_ns if t_ns is None else whole_number("t_ns", t_ns, MOST_NS)
         health = Health()
         self._checked("health", self._c.filter_health(self._f, time, c.byref(health)))
         return health
@@ -458,9 +422,9 @@ class Filter:
     def resume(self, t_ns: int, moved: ArrayLike | None = None) -> None:
         """Continues at t_ns, of any clock, after a pause; `moved` (6, 6) is the covariance of
         how far the body may have moved meanwhile, as of a pose; None: not at all."""
-        P = None if moved is None else _array("moved", moved, (6, 6))
-        time = _whole("t_ns", t_ns, MOST_NS)
-        self._checked("resume", self._c.filter_resume(self._f, time, _address(P)))
+        P = None if moved is None else checked("moved", moved, (6, 6))
+        time = whole_number("t_ns", t_ns, MOST_NS)
+        self._checked("resume", self._c.filter_resume(self._f, time, address(P)))
 
     @property
     def most_landmarks(self) -> int:
@@ -483,7 +447,7 @@ def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float
         return float(words.index(value))
     if isinstance(value, bool | int | float | np.number):
         return float(value)
-    numbers = tuple(float(one) for one in _array(f"config: {name}", np.asarray(value), (3,)))
+    numbers = tuple(float(one) for one in checked(f"config: {name}", np.asarray(value), (3,)))
     if f"{name}-y" not in _ids():
         raise PelorusError(f"config: {name} is one number, not three")
     return numbers[0], numbers[1], numbers[2]
@@ -495,6 +459,6 @@ def _ids() -> dict[str, int]:
 
 def _landmark(id: int, known: KnownLandmark) -> native.Landmark:
     landmark = native.Landmark(id=id, known=True)
-    landmark.p_W_m[:] = _array(f"landmark {id}: p_W_m", known.p_W_m, (3,))
-    landmark.P_W_m2[:] = _array(f"landmark {id}: P_W_m2", known.P_W_m2, (3, 3)).ravel()
+    landmark.p_W_m[:] = checked(f"landmark {id}: p_W_m", known.p_W_m, (3,))
+    landmark.P_W_m2[:] = checked(f"landmark {id}: P_W_m2", known.P_W_m2, (3, 3)).ravel()
     return landmark

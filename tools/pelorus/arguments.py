@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""What is given to the filter from Python, checked before the library sees it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pelorus.errors import PelorusError
+
+
+def kind_of(array: NDArray[Any]) -> str:
+    """Type and shape, in words."""
+    return f"{array.dtype} of shape {array.shape}"
+
+
+def checked(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.float64) -> Any:
+    """The value as an array of this shape, without a copy where it is one."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:  # rows of different length
+        raise PelorusError(f"{name}: {error}; numbers of shape {shape} are wanted") from error
+    if array.shape != shape or array.dtype.kind not in "fiu":
+        raise PelorusError(f"{name}: {kind_of(array)}; numbers of shape {shape} are wanted")
+    if array.dtype == type and array.flags.c_contiguous:
+        return array
+    with np.errstate(over="ignore"):  # becomes infinite, which the filter refuses by name
+        return np.ascontiguousarray(array, type)
+
+
+def whole_number(name: str, value: int, most: int) -> int:
+    """From 0 to `most`."""
+    number = value if type(value) is int else integer(name, value)
+    if not 0 <= number <= most:
+        raise PelorusError(f"{name}: {number}; 0 to {most} are possible")
+    return number
+
+
+def integer(name: str, value: Any) -> int:
+    """A whole number of Python or numpy."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise PelorusError(f"{name}: {value!r} is no whole number")
+    return int(value)
+
+
+def address(array: NDArray[Any] | None) -> int | None:
+    """Of its first number; NULL for none."""
+    return None if array is None else array.ctypes.data
