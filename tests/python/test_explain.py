@@ -129,8 +129,9 @@ def test_a_camera_that_pauses_and_odometry_that_pauses_are_told_apart(tmp_path: 
 @pytest.mark.parametrize("by_s", [0.06, -0.07])
 def test_a_step_of_less_than_a_frame_is_seen(tmp_path: Path, by_s: float) -> None:
     def stepped(m: Message) -> Message:
-        later = isinstance(m, Stereo) and m.t_ns >= 14 * S
-        return replace(m, t_ns=m.t_ns + round(by_s * S)) if later else m
+        if not isinstance(m, Stereo) or m.t_ns < 14 * S:
+            return m
+        return replace(m, t_ns=m.t_ns + round(by_s * S))
 
     found = explained([stepped(m) for m in simulated()], tmp_path)
     assert found.first is not None
@@ -140,13 +141,15 @@ def test_a_step_of_less_than_a_frame_is_seen(tmp_path: Path, by_s: float) -> Non
 
 
 def test_frames_that_are_sorted_by_stamps_that_stepped_are_no_pause(tmp_path: Path) -> None:
-    messages = simulated()
-    late = [m for m in messages if isinstance(m, Stereo) and m.t_ns >= 14 * S]
-    data = [replace(m, t_ns=m.t_ns + 2 * S) if m in late else m for m in messages]
-    head, rest = data[:1], [m for m in data[1:] if hasattr(m, "t_ns")]
-    end_ns = max(m.t_ns for m in messages if isinstance(m, Twist))
-    rest = [m for m in rest if m.t_ns <= end_ns]
-    found = explained([*head, *sorted(rest, key=lambda m: m.t_ns)], tmp_path)
+    head, *rest = simulated()
+    twists = [m for m in rest if isinstance(m, Twist)]
+    frames = [
+        replace(m, t_ns=m.t_ns + 2 * S) if m.t_ns >= 14 * S else m
+        for m in rest
+        if isinstance(m, Stereo)
+    ]
+    data: list[Twist | Stereo] = [*twists, *(m for m in frames if m.t_ns <= twists[-1].t_ns)]
+    found = explained([head, *sorted(data, key=lambda m: m.t_ns)], tmp_path)
     assert found.first is not None
     assert found.first.cause is Cause.CLOCK_STEP
     assert "as if no time had passed" in found.first.words

@@ -82,7 +82,8 @@ def dead_gyro(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: 
 
 def dead_axis(messages: Messages, t: int, chance: Chance) -> Messages:  # noqa: ARG001
     """The gyro's axis that turns most sticks at what it read, to the end."""
-    turns = [np.abs(np.atleast_2d(m.w_B_radps)) for m in messages if m.kind in MOTION]
+    readings = [m for m in messages if isinstance(m, Twist | Imu)]
+    turns = [np.abs(np.atleast_2d(m.w_B_radps)) for m in readings]
     axis = int(np.argmax(np.concatenate(turns).mean(axis=0)))
     held: list[float] = []
 
