@@ -93,10 +93,8 @@ def drive(kind: str, by: str, seed: int) -> Drive:
     told = Trajectory(t_ns[at], truth)
     if by == BY_IMU:
         noise, readings = _imu(kind, t_ns, v, w, way, chance)
-        return Drive(
-            kind, by, Streams(Calibrated(header, imu=ImuModel(noise)), seen, Readings(here, readings), told),
-            told,
-        )  # fmt: skip
+        calibrated = Calibrated(header, imu=ImuModel(noise))
+        return Drive(kind, by, Streams(calibrated, seen, Readings(here, readings), told), told)
     moved = _twists(settings, by, t_ns, v, w, chance)
     if kind == "stop and go" and by == WHOLE and seed % 3 == 0:
         moved = _only_while_moving(moved, t_ns, v, w)
@@ -114,7 +112,7 @@ def chosen(count: int, first_seed: int) -> list[tuple[str, str, int]]:
 
 
 def _rover(t: Floats, chance: np.random.Generator) -> tuple[Floats, Floats]:
-    """On a level floor: it goes ahead and turns about the vertical, and nothing else, to the bit."""
+    """On a level floor: it goes ahead and turns about the vertical, and nothing else."""
     speed = float(np.exp(chance.uniform(np.log(0.4), np.log(2.5))))
     ahead = speed * (1 + waves(t, float(chance.choice([0.0, 0.1, 0.3])), 12.0, chance))
     turns = waves(t, float(chance.uniform(0.1, 0.6)), 12.0, chance)

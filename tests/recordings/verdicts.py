@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Is `pelorus check` right in both directions? Clean drives, of which it must accuse none, and drives
-with a fault put in, which it must name: one program, one set of thresholds, one run.
+"""Is `pelorus check` right in both directions? Clean drives, of which it must accuse none, and
+drives with a fault put in, which it must name: one program, one set of thresholds, one run.
 
 usage: verdicts.py [--drives N] [--seed S] [--only TEXT] [--injected] [--verdicts] [--bin build/bin]
 
@@ -77,12 +77,8 @@ def opened(case: Real, folder: Path) -> Path | None:
     if not source.exists():
         return None
     path = folder / f"{case.name.replace(' ', '-')}.plr"
-    return path if pelorus([*_quiet("convert", *case.convert), str(source), str(path),
-                            *case.options]) == 0 else None  # fmt: skip
-
-
-def _quiet(*words: str) -> list[str]:
-    return [*words]
+    words = ["convert", *case.convert, str(source), str(path), *case.options]
+    return path if pelorus(words) == 0 else None
 
 
 # --- clean drives ---------------------------------------------------------------------------------
@@ -195,6 +191,7 @@ def table(title: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
 
 
 def main() -> None:
+    """Print the tables that are asked for."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

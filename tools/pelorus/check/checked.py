@@ -20,6 +20,7 @@ from pelorus.check.verdict import Grade, Remark, Run
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
+from pelorus.faults.mend import CANNOT, known_words
 from pelorus.faults.named import judged_of
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
@@ -40,6 +41,16 @@ class Checked:
     rows: list[tuple[str, str, str]]
     tuned: Tuned | None  # None where a fault must be mended first
     share: float = 0.0  # of the way, by which positions may be off, if more than was given
+    lines: tuple[str, ...] = ()  # of a config: what should be set otherwise
+
+    def next_step(self, tuned: Path) -> str:
+        """What to do now."""
+        if self.tuned is None:
+            worst = max(self.remarks, key=lambda remark: remark.grade)
+            return f"mend this first, and convert again: {worst.text.partition(':')[0]}"
+        if not self.lines:
+            return "nothing need be changed"
+        return f"run with --config {tuned}, or set {'; '.join(self.lines)}"
 
     @property
     def verdict(self) -> str:
@@ -55,7 +66,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     messages = wire.messages_of(recording)
     judged = judged_of(messages, bench.examined)
     named = judged.faults
-    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.words) for f in named]
+    faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in named]
     if any(fault.stops for fault in named):
         return Checked(Grade.BAD, faults, [], [], [], None)
     found = tune(bench, given, all(fault.name != "clock-turns" for fault in named))
@@ -86,8 +97,12 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if len(spells) > SPELLS_SHOWN:
         spells = [*spells[:SPELLS_SHOWN], f"and {len(spells) - SPELLS_SHOWN} more: pelorus report"]
     changed = verdict.changes(given, bench.header, tuned, bench.by_imu)
+    if judged.agreed is not None:
+        words = f"{known_words(judged.agreed)}; {CANNOT}"
+        remarks.append(Remark(Grade.GOOD, words))
     grade = verdict.overall(remarks)
-    return Checked(grade, remarks, spells, changed, [cost, *rows], tuned, camera.share)
+    lines = tuple(verdict.lines(given, bench.header, tuned, bench.by_imu))
+    return Checked(grade, remarks, spells, changed, [cost, *rows], tuned, camera.share, lines)
 
 
 def _whole(

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import takewhile
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
 from pelorus.check.tracks_noise import DRIFT
 from pelorus.frame_table import BIASES, FrameTable, frame_table
-from pelorus.frames import Header, Message, Report
-from pelorus.health import TimeLine, time_line
+from pelorus.frames import Header, Kind, Message, Report
+from pelorus.health import LOST, TimeLine, time_line
 from pelorus.schema import HEALTHS, number
 from pelorus.settings import in_force
 
@@ -31,6 +32,7 @@ NIS_LOW, NIS_HIGH = 0.6, 1.6
 BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
 OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
+ALIGN_NS = 3_000_000_000  # in so long a start in motion is told
 SHARE_MANY = 0.01  # of the way, that a bias may hide
 
 
@@ -70,8 +72,23 @@ class Run:
         return cls(messages, frame_table(messages), time_line(messages) or TimeLine(0, {}, ()))
 
     @property
+    def aligning(self) -> int:
+        """Frames of its beginning in which a filter with an IMU has yet to find the vertical."""
+        answers = [m for m in self.messages if isinstance(m, Report) and m.subject == Kind.STEREO]
+        until_ns = answers[0].t_ns + ALIGN_NS if answers and self.frames.by_imu else 0
+        first = takewhile(lambda m: m.health == LOST and m.t_ns <= until_ns, answers)
+        return sum(1 for _ in first)
+
+    @property
     def good_share(self) -> float:
-        return self.health.by_health.get(GOOD, 0) / max(self.health.frames, 1)
+        return self.health.by_health.get(GOOD, 0) / max(self.health.frames - self.aligning, 1)
+
+    @property
+    def lost_share(self) -> float:
+        lost = self.health.frames - sum(
+            self.health.by_health.get(HEALTHS[k], 0) for k in range(LOST)
+        )
+        return (lost - self.aligning) / max(self.health.frames - self.aligning, 1)
 
     @property
     def gated_share(self) -> float:
@@ -117,10 +134,21 @@ def of_length(frames: int) -> Iterator[Remark]:
 
 
 def _health(run: Run) -> Iterator[Remark]:
-    lost = 1 - sum(run.health.by_health.get(HEALTHS[k], 0) for k in (0, 1)) / run.health.frames
+    """But for the first seconds of an IMU, which are no loss."""
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
-    grade = Grade.BAD if lost > LOST_MANY or run.good_share < GOOD_HALF else grade
-    yield Remark(grade, f"health {run.health.summary()}")
+    grade = Grade.BAD if run.lost_share > LOST_MANY or run.good_share < GOOD_HALF else grade
+    words = f"health {run.health.summary()}"
+    if run.aligning:
+        words += f" (the first {run.aligning} until the IMU has shown where up is: no fault)"
+    yield Remark(grade, words)
+    misfit = number("reason", "NOISE_MISFIT")
+    if any(isinstance(m, Report) and m.reasons & misfit for m in run.messages):
+        yield Remark(
+            Grade.CARE,
+            "pictures and odometry (or IMU) differ by more than twice their sigmas all along, and "
+            "no noise of single readings explains it (NOISE_MISFIT): a scale, a clock or a "
+            "calibration is off a little; the covariance covers it",
+        )
 
 
 def _order(run: Run) -> Iterator[Remark]:
@@ -163,17 +191,31 @@ def _used(run: Run) -> Iterator[Remark]:
 
 
 def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
-    words = f"innovations are {run.nis:.2f} times what the noise says, 1 is due"
+    words = f"what frames show differs from what was expected (innovations) by {run.nis:.2f} times "
+    words += "the variance that the settings say"
     if tuned.noise.drifts:
-        yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for drift as well")
+        yield Remark(
+            Grade.GOOD, f"{words}; less than once, for pixel-sigma stands for drift as well"
+        )
     elif run.nis < NIS_LOW and tuned.halves is not None and tuned.halves.is_larger:
-        yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for what points share")
+        yield Remark(
+            Grade.GOOD, f"{words}; less than once, for pixel-sigma stands for what points share"
+        )
     elif run.nis < NIS_LOW and tuned.noise.rows_px > 0:
-        yield Remark(Grade.GOOD, f"{words}; below it, for pixel-sigma stands for the rectification")
+        yield Remark(
+            Grade.GOOD, f"{words}; less than once, for pixel-sigma stands for the rectification"
+        )
     elif NIS_LOW <= run.nis <= NIS_HIGH:
         yield Remark(Grade.GOOD, words)
     else:
-        yield Remark(Grade.CARE, f"{words}: the noise is not what these settings describe")
+        due = starting_pixel(run) * float(np.sqrt(run.nis))
+        words += ": the noise is not what these settings describe"
+        yield Remark(Grade.CARE, f"{words}; pixel-sigma = {due:.2g} would be about right")
+
+
+def starting_pixel(run: Run) -> float:
+    """The pixel-sigma of a run."""
+    return in_force(run.messages, "pixel-sigma") or 1.0
 
 
 def _biases(run: Run) -> Iterator[Remark]:
@@ -225,21 +267,20 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
     found = tuned.halves
     if found is None or not np.isfinite(found.before.ratio):
         return
-    ratio = f"{found.before.ratio:.2g} times as much (squared) as noise that is new in every frame"
     if not found.before.ratio > found.before.by_chance:
-        yield Remark(
-            Grade.GOOD,
-            f"motions by halves of the points differ {ratio} would make them; up to "
-            f"{found.before.by_chance:.2g} may be chance",
-        )
+        yield Remark(Grade.GOOD, "each half of the points alone leads where all of them lead")
         return
-    words = f"motions by halves of the points ({found.before.way}) differ {ratio} of "
-    words += f"{found.was_px:.2g} px would make them: points share errors, of lens, rectification, "
-    words += "tracker or things that move"
+    farther = f"{np.sqrt(found.before.ratio):.2g} times as far"
+    words = f"half of the points alone ({found.before.way}) leads {farther} from where all of them "
+    words += (
+        f"lead as a pixel-sigma of {found.was_px:.2g} px allows: points share errors, of lens, "
+    )
+    words += "rectification, tracker or things that move"
     if found.is_larger:
         words += f"; in pixel-sigma, {found.sigma_px:.2g} px stand for that"
     if found.after.ratio > found.after.by_chance:
-        words += f"; no pixel-sigma brings them together (still {found.after.ratio:.2g} times)"
+        still = float(np.sqrt(found.after.ratio))
+        words += f"; no pixel-sigma brings them together (still {still:.2g} times as far)"
     yield Remark(Grade.CARE, words)
 
 
@@ -293,9 +334,23 @@ def of_scale(doubt: Doubt) -> Iterator[Remark]:
 
 def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
     """`pixel-sigma 2 should be 1`: what differs by more than a fifth, or in words."""
+    return [
+        f"{' '.join(filter(None, (name, was)))} should be {due}"
+        for name, was, due in _changed(given, header, tuned, by_imu)
+    ]
+
+
+def lines(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool) -> list[str]:
+    """The same as lines of a config."""
+    return [f"{name} = {due}" for name, _, due in _changed(given, header, tuned, by_imu)]
+
+
+def _changed(
+    given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
+) -> Iterator[tuple[str, str, str]]:
+    """Name, what it was if that is a number, and what it should be."""
     parameters = of_process(by_imu)
     before = starting(header, given, parameters)
-    said = []
     for name, parameter in parameters.items():
         written = tuned.settings.get(parameter.setting, "")
         after = [float(part) for part in written.split(",") if part]
@@ -304,22 +359,22 @@ def changes(given: Mapping[str, str], header: Header, tuned: Tuned, by_imu: bool
         pairs = zip(was * (count // len(was)), after * (count // max(len(after), 1)), strict=False)
         ratios = [max(x / y, y / x) for x, y in pairs if x > 0]
         if ratios and max(ratios) > OTHER_SIGMA:
-            words = ",".join(f"{x:.3g}" for x in was)
-            said.append(f"{parameter.setting} {words} should be {written}")
-    kept = (
-        "twist-timing",
-        "imu-timing",
-        "bias",
-        "camera-offset",
-        "baseline-sigma",
-        CAMERA_TURN,
-        DRIFT,
-    )
-    for setting in kept:
+            yield parameter.setting, ",".join(f"{x:.3g}" for x in was), written
+    for setting in KEPT:
         value = tuned.settings.get(setting)
         if value is not None and value != given.get(setting, _usual(setting, header)):
-            said.append(f"{setting} should be {value}")
-    return said
+            yield setting, "", value
+
+
+KEPT = (
+    "twist-timing",
+    "imu-timing",
+    "bias",
+    "camera-offset",
+    "baseline-sigma",
+    CAMERA_TURN,
+    DRIFT,
+)
 
 
 def _usual(setting: str, header: Header) -> str:

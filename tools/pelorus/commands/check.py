@@ -92,10 +92,11 @@ def _write(page: Path, found: Checked, recording: Path, program: Path, folder: P
 
 def _tell(found: Checked, tuned: Path) -> None:
     out.print(f"[bold {COLOURS[found.grade]}]{found.verdict}[/]")
+    out.print(f"[bold]next[/]  {escape(found.next_step(tuned))}")
     for remark in found.remarks:
         out.print(f"  [{COLOURS[remark.grade]}]{MARKS[remark.grade]}[/]  {escape(remark.text)}")
     if found.tuned is None:
-        out.print("mend this first: nothing was tuned, and no settings were written")
+        out.print("nothing was tuned, and no settings were written")
         return
     for spell in found.spells:
         out.print(f"        {escape(spell)}")
@@ -113,6 +114,7 @@ def _tell(found: Checked, tuned: Path) -> None:
 def _json(found: Checked, tuned: Path) -> dict[str, Any]:
     return {
         "verdict": found.verdict,
+        "next": found.next_step(tuned),
         "grade": MARKS[found.grade],
         "remarks": [{"grade": MARKS[r.grade], "text": r.text} for r in found.remarks],
         "health": found.spells,

@@ -76,9 +76,9 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     if not clock_told:
         offset, found = 0.0, None
     clocks = two_clocks(recording, seen, offset, bias) if clock_told and not by_imu else UNTOLD
-    at, clock_sigma = offset, float("inf")
-    if clock_told:
-        clock_sigma = _clock_sigma(Fit(body.design(recording, seen, 0.0, bias)), found, offset)
+    at = offset
+    own = found or Fit(body.design(recording, seen, at, bias))
+    clock_sigma = own.known(CLOCK) if clock_told else float("inf")
     if clocks.apart:  # all else is asked of motions that belong together
         body, at, found = TwistBody(recording, clocks.turns_late_s), clocks.ways_s, None
     if found is None:
@@ -127,14 +127,6 @@ def _tilt(fit: Fit) -> tuple[Floats, Floats]:
     same = np.vstack((np.eye(3), np.eye(3)))
     covariance = np.linalg.inv(same.T @ known @ same)
     return np.asarray(covariance @ same.T @ known @ fit.x[both]), np.asarray(covariance)
-
-
-def _clock_sigma(as_given: Fit, found: Fit | None, offset_s: float) -> float:
-    """Of the offset: how much likelier it is than none says the fit at none."""
-    d2 = as_given.beside([CLOCK], np.zeros(1))
-    own = as_given if found is None else found
-    by_none = abs(offset_s) / float(np.sqrt(d2 + 1e-12))
-    return own.beyond_doubt * max(float(own.sigma[CLOCK]), by_none)
 
 
 def _sigma(fit: Fit, by_imu: bool) -> float:

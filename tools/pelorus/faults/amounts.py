@@ -53,6 +53,7 @@ def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
             "lever",
             f"turns put the camera {_metres(arm + agreed.lever_m)} in the body, the extrinsic "
             f"puts it {_metres(arm)}: it looks like {likely}",
+            ratio=best,
         )
 
 
@@ -78,7 +79,8 @@ def of_place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
     arm = -T.R.T @ T.p
     known = np.linalg.inv(place_covariance(recording, agreed))
     off = float(np.linalg.norm(agreed.lever_m))
-    if float(agreed.lever_m @ known @ agreed.lever_m) > PLACE_SURE and off > PLACE_OFF_M:
+    ratio = float(agreed.lever_m @ known @ agreed.lever_m)
+    if ratio > PLACE_SURE and off > PLACE_OFF_M:
         sigma = np.sqrt(np.diagonal(agreed.lever_covariance))
         yield Fault(
             "lever",
@@ -86,6 +88,7 @@ def of_place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
             f"{sigma.max():.2f} m; the extrinsic puts it {_metres(arm)}",
             stops=False,
             grave=False,
+            ratio=ratio,
         )
 
 
@@ -107,6 +110,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
                 "camera and twists do not tell the same motion: the images show "
                 f"{agreed.scale:.2f} +- {sigma:.2f} times the twists' way. Extrinsic, axes or "
                 "units, but which is not told",
+                ratio=(off / sigma) ** 2,
             )
         return
     if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
@@ -117,6 +121,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
             "which of them cannot be known",
             stops=abs(off) > SCALE_WILD,
             grave=abs(off) > SCALE_WILD,
+            ratio=(off / sigma) ** 2,
         )
         return
     if abs(turn) > max(SCALE_SIGMAS * turn_sigma, SCALE_OFF):
@@ -127,6 +132,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
             "known to be, or the gyro's scale",
             stops=abs(turn) > SCALE_WILD,
             grave=abs(turn) > SCALE_WILD,
+            ratio=(turn / turn_sigma) ** 2,
         )
         return
     bias = abs(through) * agreed.speed_mps
@@ -141,6 +147,7 @@ def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:
             f"that is off from a bias of {bias:.2g} m/s",
             stops=wild,
             grave=wild,
+            ratio=(through / its_sigma) ** 2,
         )
 
 
@@ -163,7 +170,11 @@ def of_scale_by_imu(agreed: Agreement) -> Iterator[Fault]:
         if abs(off) > max(SCALE_SIGMAS * sigma, SCALE_OFF):
             wild = abs(off) > SCALE_WILD
             yield Fault(
-                "scale", f"stereo and IMU disagree in scale: {words}", stops=wild, grave=wild
+                "scale",
+                f"stereo and IMU disagree in scale: {words}",
+                stops=wild,
+                grave=wild,
+                ratio=(off / sigma) ** 2,
             )
             return
 
@@ -186,7 +197,7 @@ def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
         )
         if not by_imu:
             words += _timing(recording, offset) + _or_turns(agreed)
-        yield Fault("clock", words, stops=False, grave=False)
+        yield Fault("clock", words, stops=False, grave=False, ratio=(offset / sigma) ** 2)
     if apart:
         yield Fault(
             "clock-turns",
@@ -197,6 +208,7 @@ def of_clock(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
             f"--late {own.turns_late_s:.2g} moves them; on the robot, stamp the gyro earlier",
             stops=False,
             grave=False,
+            ratio=(own.turns_late_s / own.turns_late_sigma_s) ** 2,
         )
 
 

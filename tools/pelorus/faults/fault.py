@@ -19,6 +19,13 @@ class Fault:
     ratio: float | None = None  # 2 ln of its likelihood beside that of no fault
 
     @property
+    def told(self) -> str:
+        """The words, and how much likelier what is seen is with the fault than without."""
+        if self.ratio is None:
+            return self.words
+        return f"{self.words} (2 ln of the likelihood ratio: {self.ratio:.0f})"
+
+    @property
     def lasts(self) -> bool:
         """Is it off alike for longer than a step? Not gaps and order; and a clock can be set."""
         return self.name not in ("clock", UNTOLD) and not self.name.startswith("time-")

@@ -23,7 +23,9 @@ SCALE, BIAS, LEVER, TILT, CLOCK, GYRO, TURN, TURN_SCALE, FOCAL = 0, 1, 4, 7, 10,
 TURN_CLOCK = 19
 PARAMETERS = 20
 NEIGHBOURS = 0.5  # weight of what neighbouring blocks have in common
-TELLS_SIGMAS = 3.0
+# Of an instrument: below, nothing is told (Stock and Yogo 2005: F of 10); above, standard errors
+# are those of strong ones (Lee, McCrary, Moreira and Porter 2022: F of 104)
+TELLS_SIGMAS, STRONG = 3.0, 10.0
 SURE = 4.0  # standard errors
 WITHIN = (0.01, 0.99)  # of a column, where its instrument stays: pictures that hang tell leaps
 RIDGE = 1e-9  # of instruments that say the same
@@ -32,7 +34,8 @@ RIDGE = 1e-9  # of instruments that say the same
 @dataclass(frozen=True)
 class Design:
     """y = X x + noise by pairs of frames, (k, 6): v and w. `Z` are instruments: X but for what
-    shares the noise of y, and more of them behind. `g` is the camera's velocity as the body has it, `at` ascends with time.
+    shares the noise of y, and more of them behind. `g` is the camera's velocity as the body has it,
+    `at` ascends with time.
     """
 
     y: Floats
@@ -151,28 +154,32 @@ class Fit:
         return float(np.sqrt(degrees * np.expm1(SURE**2 / (degrees - 0.5))) / SURE)
 
     def known(self, which: int) -> float:
-        """The standard error of an unknown, by how likely it is that there is none of it: the
-        larger of that and its sigma.
+        """The standard error of an unknown. Where the drive tells little of it, by how likely it is
+        that there is none of it, if that is more.
         """
-        d2 = self.beside([which], np.zeros(1))
-        by_none = abs(float(self.x[which])) / float(np.sqrt(d2 + 1e-12))
-        return self.beyond_doubt * max(float(self.sigma[which]), by_none)
+        sigma = float(self.sigma[which])
+        if self.strength(which) < STRONG:
+            d2 = self.beside([which], np.zeros(1))
+            sigma = max(sigma, abs(float(self.x[which])) / float(np.sqrt(d2 + 1e-12)))
+        return self.beyond_doubt * sigma
 
     def covariance_known(self, which: Sequence[int]) -> Floats:
         """Likewise of several unknowns."""
         some = np.asarray(which)
-        covariance = self.covariance[np.ix_(some, some)]
+        covariance = self.covariance[np.ix_(some, some)] * self.beyond_doubt**2
+        if min(self.strength(k) for k in which) >= STRONG:
+            return np.asarray(covariance)
         x = self.x[some]
-        d2 = float(x @ np.linalg.solve(covariance, x))
+        d2 = float(x @ np.linalg.solve(self.covariance[np.ix_(some, some)], x))
         by_none = d2 / (self.beside(which, np.zeros(len(x))) + 1e-12)
-        return np.asarray(covariance * self.beyond_doubt**2 * max(1.0, by_none))
+        return np.asarray(covariance * max(1.0, by_none))
 
-    def tells(self, which: int) -> bool:
-        """Whether an unknown's column and its instrument vary together by more than chance, by
-        themselves and beyond what the other unknowns explain of both. Else, as for the clock on a
-        circle at an even speed, or for the scale beside a bias, nothing is told of it: what varies
-        is noise, and a weak instrument takes least squares back to what noise makes of the unknown,
-        with a small standard error.
+    def strength(self, which: int) -> float:
+        """By how many standard errors an unknown's column and its instrument vary together, by
+        themselves and beyond what the other unknowns explain of both: the less of both. Where it
+        is small, as for the clock on a circle at an even speed, or for the scale beside a bias,
+        what varies is noise, and a weak instrument takes least squares back to what noise makes of
+        the unknown, with a small standard error.
         """
         A, X, Z = self._A, self._X, self._Z
         others = np.arange(len(A)) != which
@@ -180,11 +187,15 @@ class Fit:
         of_x[others] = np.linalg.solve(A[np.ix_(others, others)], A[others, which])
         of_z[others] = np.linalg.solve(A[np.ix_(others, others)].T, A[which, others])
         x, z = (c[:, :, which] - c[:, :, which].mean(axis=0) for c in (X, Z))
+        found = []
         for both in (x * z, (X @ of_x) * (Z @ of_z)):
             together = np.sum(both * self._trust, axis=1)
-            if together.sum() < TELLS_SIGMAS * np.linalg.norm(together):
-                return False
-        return True
+            found.append(float(together.sum() / (np.linalg.norm(together) + 1e-12)))
+        return min(found)
+
+    def tells(self, which: int) -> bool:
+        """Whether anything is told of an unknown at all."""
+        return self.strength(which) > TELLS_SIGMAS
 
 
 def _within(Z: Floats, X: Floats) -> Floats:

@@ -8,7 +8,7 @@ matters. What the data cannot tell apart is not guessed at.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -149,21 +149,26 @@ def _of_imu(recording: Recording, seen: Seen) -> Iterator[Fault]:
     why = imu_axes.explained(found, given)
     if why is None:
         return
+    fault = _why(why, given)
+    if fault is not None:
+        none = replace(why, of_turn=np.eye(3), of_force=np.eye(3))
+        yield replace(fault, ratio=found.held_against(none) - found.held_against(why))
+
+
+def _why(why: imu_axes.Explained, given: Floats) -> Fault | None:
+    """In words; nothing where a turn is too small to matter."""
     off = angle_between(why.of_turn, np.eye(3))
     if why.name == "no-fit":
-        yield Fault(
-            "no-fit",
-            "camera and IMU do not tell the same motion, and no known fault explains why",
-        )
-    elif why.name == "inverted":
-        yield _inverted(angle_between(given, given.T))
-    elif why.name == "axes":
-        words = _words(why.F)
-        yield Fault("axes", f"the IMU's axes are turned or mirrored: {why.words} {words}")
-    elif why.name != "turned":
-        yield Fault(why.name, why.words)
-    elif off > TURNED_DEG:
-        yield _turned(given, given @ why.of_turn, off)
+        words = "camera and IMU do not tell the same motion, and no known fault explains why"
+        return Fault("no-fit", words)
+    if why.name == "inverted":
+        return _inverted(angle_between(given, given.T))
+    if why.name == "axes":
+        words = f"the IMU's axes are turned or mirrored: {why.words} {_words(why.F)}"
+        return Fault("axes", words)
+    if why.name != "turned":
+        return Fault(why.name, why.words)
+    return _turned(given, given @ why.of_turn, off) if off > TURNED_DEG else None
 
 
 def _unfit(frames: int, fit: float) -> Iterator[Fault]:
@@ -314,7 +319,7 @@ def _pitch(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
     off = float(np.degrees(across @ agreed.tilt_rad))
     sigma = float(np.degrees(np.sqrt(across @ agreed.tilt_covariance @ across)))
     if abs(off) > max(PITCH_SIGMAS * sigma, PITCH_OFF_DEG):
-        yield _pitched(f"{abs(off):.1f} +- {sigma:.1f}")
+        yield replace(_pitched(f"{abs(off):.1f} +- {sigma:.1f}"), ratio=(off / sigma) ** 2)
 
 
 def _pitched(degrees: str) -> Fault:

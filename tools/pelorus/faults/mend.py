@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pelorus.faults import axes, lever, stale
+from pelorus.faults.agreement import Agreement
 from pelorus.faults.fault import UNTOLD, Fault
 from pelorus.faults.finding import Finding
 from pelorus.faults.geometry import Judged
@@ -17,6 +18,7 @@ from pelorus.recording import Recording
 
 NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
+CANNOT = "what is off by less than four times as much cannot be seen in this drive"
 SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
 
 
@@ -59,17 +61,21 @@ def held_to_fit(
 
 def _known(found: Judged) -> Iterator[Finding]:
     """How well the drive tells what it was asked, so that silence is not taken for a promise."""
-    agreed = found.agreed
-    if agreed is None or found.faults:
-        return
+    if found.agreed is not None:
+        told = found.agreed.scale_sigma < SCALE_TOLD
+        yield Finding(AGREES, False, known_words(found.agreed), CANNOT, told=told)
+
+
+def known_words(agreed: Agreement) -> str:
+    """What the drive tells of camera and body, and how well."""
     place_m = float(np.sqrt(np.diagonal(agreed.lever_covariance)).max())
-    evidence = (
-        f"scale of the way {agreed.scale:.3f} +- {agreed.scale_sigma:.3f}, clock "
-        f"{agreed.offset_s * 1e3:+.0f} +- {agreed.offset_sigma_s * 1e3:.0f} ms, the camera's place "
-        f"to {place_m:.2f} m"
+    clock = "the clock cannot be told"
+    if np.isfinite(agreed.offset_sigma_s):
+        clock = f"clock {agreed.offset_s * 1e3:+.0f} +- {agreed.offset_sigma_s * 1e3:.0f} ms"
+    return (
+        f"scale of the way {agreed.scale:.3f} +- {agreed.scale_sigma:.3f}, {clock}, the camera's "
+        f"place to {place_m:.2f} m"
     )
-    action = "what is off by less than four times as much cannot be seen in this drive"
-    yield Finding(AGREES, False, evidence, action, told=agreed.scale_sigma < SCALE_TOLD)
 
 
 def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
@@ -81,8 +87,8 @@ def _taken_back(finding: Finding, because: Fault, *subjects: str) -> Finding:
 
 def _told(fault: Fault) -> Finding:
     if fault.name == UNTOLD:
-        return Finding(AGREES, False, fault.words, "nothing was changed", told=False)
+        return Finding(AGREES, False, fault.told, "nothing was changed", told=False)
     action = "nothing was changed; the filter can live with it, and pelorus check tells more"
     if fault.grave:
         action = "nothing was changed: mend it where the data or the calibration come from"
-    return Finding(fault.name, True, fault.words, action)
+    return Finding(fault.name, True, fault.told, action)
