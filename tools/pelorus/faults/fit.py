@@ -28,6 +28,7 @@ NEIGHBOURS = 0.5  # weight of what neighbouring blocks have in common
 TELLS_SIGMAS, STRONG = 3.0, 10.0
 SURE = 4.0  # standard errors
 WITHIN = (0.01, 0.99)  # of a column, where its instrument stays: pictures that hang tell leaps
+UNTOLD = 1e6  # variance of what nothing is told of
 RIDGE = 1e-9  # of instruments that say the same
 
 
@@ -164,15 +165,16 @@ class Fit:
         return self.beyond_doubt * sigma
 
     def covariance_known(self, which: Sequence[int]) -> Floats:
-        """Likewise of several unknowns."""
+        """Likewise of several unknowns; of what the drive tells nothing, nothing."""
         some = np.asarray(which)
-        covariance = self.covariance[np.ix_(some, some)] * self.beyond_doubt**2
-        if min(self.strength(k) for k in which) >= STRONG:
-            return np.asarray(covariance)
-        x = self.x[some]
-        d2 = float(x @ np.linalg.solve(self.covariance[np.ix_(some, some)], x))
-        by_none = d2 / (self.beside(which, np.zeros(len(x))) + 1e-12)
-        return np.asarray(covariance * max(1.0, by_none))
+        own = self.covariance[np.ix_(some, some)]
+        strengths = np.array([self.strength(k) for k in which])
+        covariance = own * self.beyond_doubt**2
+        if strengths.min() < STRONG:
+            x = self.x[some]
+            d2 = float(x @ np.linalg.solve(own, x))
+            covariance *= max(1.0, d2 / (self.beside(which, np.zeros(len(x))) + 1e-12))
+        return np.asarray(covariance + np.diag(np.where(strengths < TELLS_SIGMAS, UNTOLD, 0.0)))
 
     def strength(self, which: int) -> float:
         """By how many standard errors an unknown's column and its instrument vary together, by

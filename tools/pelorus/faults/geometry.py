@@ -118,8 +118,7 @@ def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> I
                 "left unexplained), and no known fault explains why",
             )
         ]
-    if turned:
-        yield from _in_world(recording, seen) or turned
+    yield from _in_world(recording, seen) or turned
 
 
 def _in_world(recording: Recording, seen: Seen) -> list[Fault]:

@@ -19,6 +19,7 @@ from pelorus.recording import Recording
 NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
 CANNOT = "what is off by less than four times as much cannot be seen in this drive"
+PLACE_TOLD_M = 10.0  # above, a place is not told
 SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
 
 
@@ -68,13 +69,16 @@ def _known(found: Judged) -> Iterator[Finding]:
 
 def known_words(agreed: Agreement) -> str:
     """What the drive tells of camera and body, and how well."""
-    place_m = float(np.sqrt(np.diagonal(agreed.lever_covariance)).max())
+    place_m = np.sqrt(np.diagonal(agreed.lever_covariance))
+    place = f"to {place_m.max():.2f} m"
+    if place_m.max() > PLACE_TOLD_M:
+        place = f"not along every axis (to {place_m.min():.2f} m along the best)"
     clock = "the clock cannot be told"
     if np.isfinite(agreed.offset_sigma_s):
         clock = f"clock {agreed.offset_s * 1e3:+.0f} +- {agreed.offset_sigma_s * 1e3:.0f} ms"
     return (
         f"scale of the way {agreed.scale:.3f} +- {agreed.scale_sigma:.3f}, {clock}, the camera's "
-        f"place to {place_m:.2f} m"
+        f"place {place}"
     )
 
 

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""A slice of tests/recordings/verdicts.py, and each kind of drive that was accused wrongly, or of
+the wrong cause, with numbers of its own.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from everyday import drawn
+from everyday import drive as everyday_drive
+from injected import found_in
+from pelorus import se3
+from pelorus.converters.streams import Twists, recording
+from pelorus.faults.fault import UNTOLD
+from pelorus.faults.named import faults_in
+from pelorus.recording import Recording
+from robots import BY_IMU, KINDS, WHOLE, drive
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "recordings"))
+import verdicts
+
+
+@pytest.mark.parametrize(("kind", "by"), [(kind, by) for kind in KINDS for by in (WHOLE, BY_IMU)])
+def test_clean_robots_are_accused_of_nothing(kind: str, by: str) -> None:
+    assert verdicts.found_in(drive(kind, by, 71))[1] == []
+
+
+def test_what_stands_is_told_to_tell_nothing() -> None:
+    [said] = faults_in(recording(drive("standing", WHOLE, 72).streams))
+    assert said.name == UNTOLD
+    assert "stands all along" in said.words
+
+
+def moving(seed: int) -> Recording:
+    return everyday_drive(replace(drawn(seed), kind="rover", told=0), seed)
+
+
+def test_twists_that_were_never_filled_in_are_named() -> None:
+    clean = moving(7201)
+    none = np.zeros_like(clean.v_B_mps)
+    said = faults_in(replace(clean, v_B_mps=none, w_B_radps=none))
+    assert [fault.name for fault in said] == ["twists-zero"]
+    assert "only the pose" in said[0].words
+
+
+@pytest.mark.parametrize("seed", [7202, 7205])
+def test_velocities_in_world_axes_are_named_so(seed: int) -> None:
+    clean = moving(seed)
+    t_ns = clean.twist_t_ns
+    world = se3.exp(np.zeros(3), np.array([0.0, 0.0, 0.7])).R
+    R = np.stack(
+        [np.interp(t_ns, clean.truth_t_ns, x) for x in clean.truth.R.reshape(-1, 9).T], axis=-1
+    )
+    R_WB = np.stack([se3.nearest_rotation(x) for x in R.reshape(-1, 3, 3)])
+    v_W = np.einsum("ij,njk,nk->ni", world, R_WB, clean.v_B_mps)
+    said = found_in(replace(clean, v_B_mps=v_W))
+    assert said[0].name == "world-axes", said
+    assert said[0].ratio is not None
+    assert said[0].ratio > 100
+
+
+def test_no_scale_is_read_across_gaps_and_the_way_in_them_is_told() -> None:
+    streams = drive("stop and go", WHOLE, 73).streams
+    twists = streams.motion
+    assert isinstance(twists, Twists)
+    moves = np.linalg.norm(twists.v_B_mps, axis=1) > 0.25 * np.max(np.abs(twists.v_B_mps))
+    lost = replace(
+        twists, t_ns=twists.t_ns[moves], v_B_mps=twists.v_B_mps[moves],
+        w_B_radps=twists.w_B_radps[moves],
+    )  # fmt: skip
+    said = faults_in(recording(replace(streams, motion=lost)))
+    assert {fault.name for fault in said} <= {"time-gap"}
+
+
+@pytest.mark.parametrize("seed", [74, 75])
+def test_wrong_right_pictures_are_no_lever(seed: int) -> None:
+    """In a tenth of the pairs the right picture is the one of three frames before."""
+    clean = recording(drive("carried", BY_IMU, seed).streams)
+    tracks = clean.tracks
+    px = tracks.pixels.copy()
+    pairs = tracks.pairs(3)
+    wrong = np.random.default_rng(seed).random(tracks.frame_count) < 0.11
+    stale = wrong[tracks.frame[pairs.second]]
+    px[pairs.second[stale], 2:] = tracks.pixels[pairs.first[stale], 2:]
+    said = faults_in(replace(clean, tracks=replace(tracks, pixels=px)))
+    assert not {fault.name for fault in said} & {"lever", "scale", "axes", "no-fit"}
