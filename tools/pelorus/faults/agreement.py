@@ -83,9 +83,11 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         body, at, found = TwistBody(recording, clocks.turns_late_s), clocks.ways_s, None
     if found is None:
         found = Fit(body.design(recording, seen, at, bias))
-    none = found
+    none = place = found
     turns_told = by_imu or found.tells(TURN_SCALE)
     if not by_imu:
+        late = clocks.turns_late_s if clocks.apart else None
+        place = Fit(TwistBody(recording, late, True).design(recording, seen, at, bias))
         none = Fit(body.design(recording, seen, at, NO_BIAS_MPS))
     speed = float(np.median(np.linalg.norm(found.g, axis=1))) + 1e-12
     scale, sigma = float(found.x[SCALE]), _sigma(found, by_imu)
@@ -103,8 +105,8 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         float(np.hypot(sigma, doubt)),
         1 + float(none.x[SCALE]),
         float(np.hypot(none.known(SCALE), doubt)),
-        found.x[lever],
-        found.covariance_known(range(LEVER, LEVER + 3)),
+        place.x[lever],
+        place.covariance_known(range(LEVER, LEVER + 3)),
         offset,
         clock_sigma,
         speed,

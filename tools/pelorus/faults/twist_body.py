@@ -25,29 +25,33 @@ from pelorus.faults.fit import (
     TURN_CLOCK,
     TURN_SCALE,
     Design,
-    joined,
 )
-from pelorus.faults.seen import Motions, Seen, pauses, slope
+from pelorus.faults.seen import Seen, beside, pauses, slope
 from pelorus.layout import Floats
 from pelorus.motion import dead_reckoning
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
 
 ONE_CLOCK_S, OWN_CLOCK_S = 1e-6, 0.3  # sigmas of by how much the rates of turn are later
+SPREAD_MOST = 3.0  # of what images and twists differ by, in its own spread
+FAR, NEAR = 3, 2  # frames from which a slope is taken: farther than a reading's noise reaches
 
 
 class TwistBody:
     """What the twists say of the motion between any two times. `turns_late_s`: the rates of turn
     are taken so much later than the velocities, and how far they are from that is asked, too.
+    `for_place`: the lever is free of the gyro's noise, too, and known worse; other unknowns are
+    surer with one that is a little short.
     """
 
     def __init__(
         self,
         recording: Recording,
         turns_late_s: float | None = None,
+        for_place: bool = False,
     ) -> None:
         header = recording.header
-        self._turns_late_s = turns_late_s
+        self._turns_late_s, self._for_place = turns_late_s, for_place
         self._t_ns, self._v, self._w = recording.twist_t_ns, recording.v_B_mps, recording.w_B_radps
         self._nodes = dead_reckoning(self._t_ns, self._v, self._w, header.twist_timing)
         before, after = self._nodes.at(slice(None, -1)), self._nodes.at(slice(1, None))
@@ -89,21 +93,22 @@ class TwistBody:
         return self.rates(frame_t_ns, 1, offset_s)[:, 3:]
 
     def design(self, recording: Recording, seen: Seen, offset_s: float, bias: float) -> Design:
-        """As fit.Body."""
-        told = self.rates(recording.frame_t_ns, 1, offset_s)
+        """As fit.Body. Scale and time are free of the twists' noise by instruments: the same motion
+        some frames away.
+        """
+        rates = self.rates(recording.frame_t_ns, 1, offset_s)
         arm = -recording.T_CB.R.T @ recording.T_CB.p
-        told[:, :3] += np.cross(told[:, 3:], arm)
+        w = rates[:, 3:]
+        g = rates[:, :3] + np.cross(w, arm)
+        usable = seen.usable & np.isfinite(beside(np.hstack((g, w)), 3)).all(axis=1)
+        usable &= np.isfinite(rates).all(axis=1)
+        y = seen.rates - np.hstack((g, w))
+        X, Z = _columns(g, w, seen)
+        if self._for_place:
+            Z[:, :3, LEVER : LEVER + 3] = se3.skew(beside(w, 2))
+        k = np.flatnonzero(usable & np.isfinite(X + Z).all(axis=(1, 2)))
         own = ONE_CLOCK_S if self._turns_late_s is None else OWN_CLOCK_S
-        return joined(*(_design(told, seen, z, _prior(bias, own)) for seen, z in seen.pairs()))
-
-
-def _design(told: Floats, seen: Seen, others: list[Motions], prior: Floats) -> Design:
-    """`others` are the instruments."""
-    X = _columns(told, slope(told, 1, float(np.median(seen.tau_s))))
-    Z = np.concatenate([_columns(z.rates, z.slope) for z in others], axis=2)
-    usable = seen.usable & np.isfinite(told).all(axis=1)
-    k = np.flatnonzero(usable & np.isfinite(X).all(axis=(1, 2)) & np.isfinite(Z).all(axis=(1, 2)))
-    return Design((seen.rates - told)[k], X[k], Z[k], seen.variance[k], prior, told[k, :3], k)
+        return Design(y[k], X[k], Z[k], seen.variance[k], _prior(bias, own), g[k], k)
 
 
 def _prior(bias: float, turns_late: float) -> Floats:
@@ -117,9 +122,8 @@ def _prior(bias: float, turns_late: float) -> Floats:
     return np.diag(sigma**-2)
 
 
-def _columns(told: Floats, by_time: Floats) -> Floats:
-    """(k, 6, m): what each unknown adds to a motion (v, w) and its slope."""
-    g, w = told[:, :3], told[:, 3:]
+def _columns(g: Floats, w: Floats, seen: Seen) -> tuple[Floats, Floats]:
+    """(k, 6, m): what each unknown adds to (v, w), and the instruments."""
     X = np.zeros((len(g), 6, PARAMETERS))
     X[:, :3, SCALE] = g
     X[:, :3, BIAS : BIAS + 3] = X[:, 3:, GYRO : GYRO + 3] = -np.eye(3)
@@ -127,6 +131,29 @@ def _columns(told: Floats, by_time: Floats) -> Floats:
     X[:, :3, TILT : TILT + 3] = -se3.skew(g)
     X[:, 3:, TURN : TURN + 3] = -se3.skew(w)
     X[:, 3:, TURN_SCALE] = w
-    X[:, :, CLOCK] = by_time
-    X[:, 3:, TURN_CLOCK] = by_time[:, 3:]
-    return X
+    both = np.hstack((g, w))
+    X[:, :, CLOCK] = slope(both, 1, float(np.median(seen.tau_s)))
+    Z = X.copy()
+    Z[:, :3, SCALE] = beside(g, 2, 3)
+    Z[:, 3:, TURN_SCALE] = beside(w, 2, 3)
+    Z[:, :, CLOCK] = _slope_beside(both, seen)
+    X[:, 3:, TURN_CLOCK], Z[:, 3:, TURN_CLOCK] = X[:, 3:, CLOCK], Z[:, 3:, CLOCK]
+    return X, Z
+
+
+def _slope_beside(told: Floats, seen: Seen) -> Floats:
+    """By the time, from what images and twists tell together of the frames beside, each as far as
+    it is the surer one. Between two readings the twists are a mean of both, and share their noise
+    with the next but one: of them the slope is taken from farther off. An instrument that
+    shares it makes any offset by half a reading look like the right one.
+    """
+    tau_s = float(np.median(seen.tau_s))
+    off = np.where(seen.usable[:, None], seen.rates - told, 0.0)
+    off = np.where(np.isfinite(off), off, 0.0)
+    off -= np.median(off, axis=0)
+    spread = 2.198 * np.median(off[seen.usable] ** 2, axis=0) + 1e-12
+    of_images = np.median(seen.variance[seen.usable], axis=0)
+    share = np.clip(1 - of_images / spread, 0, 1)  # of the noise, what the twists have
+    most = SPREAD_MOST * np.sqrt(spread)
+    by_images = slope(told + np.clip(off, -most, most), NEAR, tau_s)
+    return np.asarray(share * by_images + (1 - share) * slope(told, FAR, tau_s))
