@@ -21,7 +21,7 @@ import os
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +35,7 @@ import injected  # noqa: E402
 import robots  # noqa: E402
 from pelorus import wire  # noqa: E402
 from pelorus.check import checked  # noqa: E402
+from pelorus.check.verdict import Grade  # noqa: E402
 from pelorus.cli import main as pelorus  # noqa: E402
 from pelorus.converters.streams import converted  # noqa: E402
 from pelorus.faults.named import judged_of  # noqa: E402
@@ -146,10 +147,10 @@ def verdict_of(name: str, path: Path, program: Path) -> tuple[bool, bool]:
     ate = figures.get("ATE m (truth, to compare)", "-")
     # what was not tuned has no figures; of clean drives it is the verdict that is wrong
     right = ate == "-" or float(ate) <= max(RIGHT_SHARE * way, RIGHT_M)
-    bad = found.grade is checked.Grade.BAD
+    bad = found.grade is Grade.BAD
     print(f"{name}: {found.verdict}; ATE {ate} m of {way:.1f} m", flush=True)
     for remark in found.remarks:
-        if bad and remark.grade is checked.Grade.BAD:
+        if bad and remark.grade is Grade.BAD:
             print(f"    {remark.text}", flush=True)
     return right, bad
 
@@ -181,7 +182,7 @@ def verdicts(
     ]
 
 
-def table(title: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+def table(title: tuple[str, ...], rows: Sequence[tuple[str | int, ...]]) -> None:
     """As docs/TESTING.md has it, with the sums."""
     print(f"| {' | '.join(title)} |", f"|{'---|' * len(title)}", sep="\n")
     for row in rows:
