@@ -112,7 +112,7 @@ def test_noise_that_nobody_told_of_is_measured_unless_the_data_are_to_be_left(
     sources = sources_in(tmp_path)
     recording, findings = csv_converter.convert(sources)
     noise = next(finding for finding in findings if finding.subject == "twist noise")
-    assert noise.found
+    assert noise.measured
     assert recording.header.noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
     assert recording.header.noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
     assert recording.header.noise.pixel_sigma_px == 0.5, "as the calibration says"

@@ -49,8 +49,6 @@ def inflate(parts: Parts, settings: Settings, sigma_px: float, most_px: float) -
     first = best = of(sigma_px)
     if not first.after.ratio > first.after.by_chance:
         return first
-    # squares that differ so many times as much are explained by a variance that is so much larger
-    most_px = min(most_px, sigma_px * float(np.sqrt(first.after.ratio)))
     tried = best = first
     for _ in range(ROUNDS):
         due = tried.after.due

@@ -57,7 +57,7 @@ def held_to_fit(
         findings = [_taken_back(f, wrong[0], axes.SUBJECT, lever.SUBJECT) for f in findings]
         mended = mended.with_extrinsic(given.T_CB)
         found = judged(mended)
-    return mended, [*findings, *(_told(fault) for fault in found.faults), *_known(found)]
+    return mended, [*findings, *_known(found), *(_told(fault) for fault in found.faults)]
 
 
 def _known(found: Judged) -> Iterator[Finding]:
