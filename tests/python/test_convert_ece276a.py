@@ -133,7 +133,7 @@ def test_the_noise_of_the_twists_is_measured_and_biases_are_not_taken_for_it(
     biases = {"bias_velocity_sigma_mps": 2.0, "bias_gyro_sigma_radps": 0.1}
     drive = untold(3, **NOISY, **biases, twist_timing=timing, twist_rate_hz=rate_hz)
     recording, finding = twist_noise.suggest(drive)
-    assert finding.found
+    assert finding.measured
     noise = recording.header.noise
     assert noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
     assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
@@ -144,7 +144,7 @@ def test_the_noise_of_the_twists_is_measured_and_biases_are_not_taken_for_it(
 def test_what_the_images_cannot_tell_is_not_suggested() -> None:
     quiet = {"velocity_sigma_mps": 0.001, "gyro_sigma_radps": 0.0002}
     recording, finding = twist_noise.suggest(untold(3, **quiet))
-    assert not finding.found
+    assert not finding.measured
     assert "no suggestion" in finding.action
     assert vars(recording.header.noise) == vars(Noise())
     noise = twist_noise.suggest(untold(3, **(quiet | {"gyro_sigma_radps": 0.05})))[0].header.noise
