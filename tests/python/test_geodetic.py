@@ -24,7 +24,8 @@ from replay_drive import run
 from scipy.spatial.transform import Rotation
 from test_convert_csv import csv_files
 from test_convert_ros import written
-from test_ros_world import NAMES, links, odometry, of_cameras, on_body, with_tracks
+from test_ros_frames import NAMES, links
+from test_ros_world import odometry, of_cameras, on_body, with_tracks
 
 Floats = NDArray[np.float64]
 A, F = 6378137.0, 1 / 298.257223563  # WGS 84
