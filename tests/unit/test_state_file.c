@@ -9,7 +9,8 @@
 static int model_fsync(int fd);
 
 #define fsync model_fsync
-#include "../../port/posix/system_posix.c"
+#include "../../port/posix/system_posix.c" /* first: it calls fsync */
+
 #include "../../port/posix/state_file.c"
 #include "posix/state_file.h"
 
