@@ -51,7 +51,6 @@ uint32_t plr_build_fingerprint(void) {
                                      PLR_MAX_LANDMARKS,
                                      PLR_MAX_OBSERVATIONS,
                                      PLR_BLOCK_OBSERVATIONS,
-                                     PLR_CALIBRATIONS,
                                      2 * PLR_SUPERVISE + PLR_KNOWN_MAP};
     uint32_t hash = 2166136261U;
     for (unsigned i = 0; i < sizeof parts / sizeof *parts; i++)

@@ -91,7 +91,7 @@ def test_each_fault_is_mended_whatever_the_keys_are_called(tmp_path: Path, pelor
     broken = with_turned_axes(with_camera_position(stale))
     for edition in (2019, 2021):
         source, target = save_npz(tmp_path / "b.npz", broken, edition), tmp_path / "b.plr"
-        said = pelorus("convert", "ece276a", source, target)
+        said = pelorus("convert", "ece276a", source, target, "--force")
         assert said.out.count("FOUND") >= 3
         header = messages_of(target, Header)[0]
         assert np.allclose(header.R_CB, drive.T_CB.R, atol=1e-9)
@@ -168,7 +168,7 @@ def test_the_header_suggests_the_noise_and_convert_says_so(tmp_path: Path, pelor
     assert noise.velocity_sigma_mps == pytest.approx(0.5, rel=0.15)
     assert noise.gyro_sigma_radps == pytest.approx(0.05, rel=0.15)
     assert any(text.text.startswith("twist noise") for text in messages_of(target, Text))
-    pelorus("convert", "ece276a", source, target, "--fix", "none")
+    pelorus("convert", "ece276a", source, target, "--fix", "none", "--force")
     assert messages_of(target, Header)[0].noise.velocity_sigma_mps < 0
 
 

@@ -162,7 +162,7 @@ def test_a_raw_drive_arrives_with_its_oxts_as_twists_and_truth(
     assert np.allclose(way, velocity_B() * (FRAMES - 2) / RATE_HZ, atol=1e-5)
     assert np.allclose(first.R_WB, Rotation.from_euler("ZYX", [YAW, PITCH, ROLL]).as_matrix())
     assert_points_are_right(target)
-    words = ("--fix", "none", "--twist-timing", "start")
+    words = ("--force", "--fix", "none", "--twist-timing", "start")
     pelorus("convert", "kitti", drive, target, *words)
     assert messages_of(target, Header)[0].twist_timing is TwistTiming.START
 
@@ -187,7 +187,7 @@ def test_noise_of_made_twists_is_what_was_asked_for_and_the_header_tells_it(
     sequence, target = write_odometry(tmp_path, pairs), tmp_path / "out.plr"
     drawn = []
     for seed in range(12):
-        pelorus("convert", "kitti", sequence, target, "--seed", seed)
+        pelorus("convert", "kitti", sequence, target, "--seed", seed, "--force")
         twists = messages_of(target, Twist)
         drawn.append([[*(m.v_B_mps - [SPEED_MPS, 0, 0]), *m.w_B_radps] for m in twists])
     sigma = np.std(drawn, axis=(0, 1))
