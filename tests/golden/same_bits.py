@@ -33,7 +33,10 @@ TWISTS = {
 IMU = {
     "start given": ["--slots", "50"],
     "start in motion": ["--slots", "50", "--imu-start", "motion"],
-    "calibrated": ["--slots", "50", "--calibrate", "focal,baseline,turn"],
+    "calibrated": [  # the simulation says that its camera is exact
+        *("--slots", "50", "--calibrate", "focal,baseline,turn"),
+        *("--focal-sigma", "0.005", "--baseline-sigma", "0.005", "--camera-turn-sigma", "0.003"),
+    ],
 }
 SIMULATED = ("simulate", "--seed", "11", "--duration", "20")
 BY_IMU = ("--imu-rate", "400", "--wheel-rate", "20")

@@ -111,7 +111,7 @@ def test_the_timing_of_the_readings_is_found(simulated: Path, tmp_path: Path) ->
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Half a minute by an IMU of 100 readings a second, that turns and accelerates."""
-    noise = ("--gyro-noise", "0.002", "--accel-noise", "0.03", "--pixel-sigma", "0.8")
+    noise = ("--gyro-noise", "0.002", "--accel-noise", "0.1", "--pixel-sigma", "0.8")
     rates = ("--duration", "40", "--lap", "6", "--imu-rate", "100", "--observations", "40")
     return simulate(tmp_path_factory, "--seed", "7", *noise, *rates)
 
@@ -122,7 +122,7 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     early = tmp_path / "early.plr"
     messages = [m for m in wire.messages_of(flown) if m.kind not in (Kind.END, Kind.TRUTH)]
     write(early, shifted(messages, -20 * MS))
-    wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.1"}
+    wrong = {"pixel-sigma": "2", "gyro-noise": "0.0005", "accel-noise": "0.3"}
     sets = [word for name, value in wrong.items() for word in ("--set", f"{name}={value}")]
     conf = tmp_path / "tuned.conf"
     said = pelorus("check", early, "--out", conf, "--bin", BIN, "--json", *sets)
@@ -130,7 +130,7 @@ def test_noises_and_clock_of_an_imu_are_found_from_wrong_ones(
     settings = found["settings"]
     assert float(settings["pixel-sigma"]) == pytest.approx(0.8, rel=0.2)
     assert float(settings["gyro-noise"]) == pytest.approx(0.002, rel=0.2)
-    assert float(settings["accel-noise"]) == pytest.approx(0.03, rel=0.2)
+    assert float(settings["accel-noise"]) == pytest.approx(0.1, rel=0.2)
     assert found["camera_offset_s"] == pytest.approx(0.02, rel=0.1)
     assert settings["camera-offset"] == f"{found['camera_offset_s']:.4g}"
     texts = [remark["text"] for remark in found["remarks"]]

@@ -18,7 +18,7 @@ from pelorus.check.parameters import Parameter, limits, written
 
 COARSE, COARSE_FRAMES = (2.0, 2.0, 2.0), "300"  # of a rough answer
 FARTHEST = 2.0  # steps that a parabola may lead away
-WORTH_ANOTHER = 0.01  # an observation: so much from a wide step asks for one more
+WORTH_ANOTHER = 0.01  # an observation: so much from a step asks for one more
 LEAST_COST = 2e-5  # an observation: less is no improvement
 
 Build = Callable[[Mapping[str, float]], Settings]
@@ -58,7 +58,7 @@ def search(
     for round_, step in enumerate(steps):
         said = f"{what}, round {round_ + 1} of {len(steps)}"
         better = _round(bench, best, within, build, step, said)
-        while step > 1.9 and better.outcome.cost < best.outcome.cost - WORTH_ANOTHER:
+        while better.outcome.cost < best.outcome.cost - WORTH_ANOTHER:
             best, better = better, _round(bench, better, within, build, step, said)
         best = better
     return best

@@ -39,6 +39,8 @@ FINE = (1.5, 1.2)
 WALK_STEPS = (4.0, 2.0)
 TOLD = 9.0  # 3 sigma, to either side
 TOLD_FACTOR = 3.0
+FLOOR = 2.0  # the filter takes a noise below half of what the readings scatter as that half
+TOLD_ABOVE_FLOOR = TOLD * (np.log(FLOOR) / np.log(TOLD_FACTOR)) ** 2  # as far by the same parabola
 
 
 def tune(bench: Bench, given: Settings) -> Tuned:
@@ -174,10 +176,13 @@ def _untold(
     out = []
     for name, parameter in parameters.items():
         value, most, least = found.values[name], parameter.most, parameter.least
-        sides = [min(value * TOLD_FACTOR, most), max(value / TOLD_FACTOR, least)]
+        less, told = (FLOOR, TOLD_ABOVE_FLOOR) if parameters is IMU else (TOLD_FACTOR, TOLD)
+        sides = [min(value * TOLD_FACTOR, most), max(value / less, least)]
         tried = [{**side, **written({**found.values, name: v}, parameters)} for v in sides]
-        ran = bench.run_all(tried, "what is told")
-        if not all(found.outcome.gain_over(other) > TOLD for other in ran):
+        above, below = (
+            found.outcome.gain_over(one) for one in bench.run_all(tried, "what is told")
+        )
+        if above <= TOLD or below <= told:
             out.append(parameter.setting)
     return out
 
