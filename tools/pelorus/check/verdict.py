@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import takewhile
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
 from pelorus.check.tracks_noise import DRIFT
 from pelorus.frame_table import BIASES, FrameTable, frame_table
-from pelorus.frames import Header, Kind, Message, Report
+from pelorus.frames import Header, Message, Report
 from pelorus.health import LOST, TimeLine, time_line
 from pelorus.schema import HEALTHS, number
 from pelorus.settings import in_force
@@ -32,7 +31,6 @@ NIS_LOW, NIS_HIGH = 0.6, 1.6
 BIAS_SIGMAS, BIAS_SIGMAS_BAD = 3.0, 10.0
 OTHER_SIGMA = 1.2  # a setting that differs by more is told
 FEW_USED = 8.0  # a frame
-ALIGN_NS = 3_000_000_000  # in so long a start in motion is told
 SHARE_MANY = 0.01  # of the way, that a bias may hide
 
 
@@ -72,23 +70,15 @@ class Run:
         return cls(messages, frame_table(messages), time_line(messages) or TimeLine(0, {}, ()))
 
     @property
-    def aligning(self) -> int:
-        """Frames of its beginning in which a filter with an IMU has yet to find the vertical."""
-        answers = [m for m in self.messages if isinstance(m, Report) and m.subject == Kind.STEREO]
-        until_ns = answers[0].t_ns + ALIGN_NS if answers and self.frames.by_imu else 0
-        first = takewhile(lambda m: m.health == LOST and m.t_ns <= until_ns, answers)
-        return sum(1 for _ in first)
-
-    @property
     def good_share(self) -> float:
-        return self.health.by_health.get(GOOD, 0) / max(self.health.frames - self.aligning, 1)
+        return self.health.by_health.get(GOOD, 0) / max(self.health.frames, 1)
 
     @property
     def lost_share(self) -> float:
         lost = self.health.frames - sum(
             self.health.by_health.get(HEALTHS[k], 0) for k in range(LOST)
         )
-        return (lost - self.aligning) / max(self.health.frames - self.aligning, 1)
+        return lost / max(self.health.frames, 1)
 
     @property
     def gated_share(self) -> float:
@@ -134,12 +124,10 @@ def of_length(frames: int) -> Iterator[Remark]:
 
 
 def _health(run: Run) -> Iterator[Remark]:
-    """But for the first seconds of an IMU, which are no loss."""
+    """Frames before an IMU's start are not counted: they are no loss."""
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
     grade = Grade.BAD if run.lost_share > LOST_MANY or run.good_share < GOOD_HALF else grade
     words = f"health {run.health.summary()}"
-    if run.aligning:
-        words += f" (the first {run.aligning} until the IMU has shown where up is: no fault)"
     yield Remark(grade, words)
     misfit = number("reason", "NOISE_MISFIT")
     if any(isinstance(m, Report) and m.reasons & misfit for m in run.messages):
