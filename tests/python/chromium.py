@@ -12,12 +12,13 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 WAIT_S = 60
+OneTab = TypeVar("OneTab", bound="Tab")
 
 
 class Tab:
@@ -113,16 +114,26 @@ class Tab:
         path.write_bytes(base64.b64decode(shot["data"]))
 
 
+def chromium() -> str | None:
+    """Where the program is, if it is."""
+    return next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
 @contextmanager
-def tab() -> Iterator[Tab]:
-    """Skips the test where there is no Chromium."""
-    program = next((found for name in NAMES if (found := shutil.which(name))), None)
+def tab(kind: type[OneTab]) -> Iterator[OneTab]:
+    """Of a browser of its own. Skips the test where there is none."""
+    program = chromium()
     if program is None:
         pytest.skip(f"there is no Chromium ({', '.join(NAMES)}): apt-get install chromium")
     ours_out, ours_in = os.pipe(), os.pipe()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         script = f'exec "$0" "$@" 3<&{ours_out[0]} 4>&{ours_in[1]}'
-        options = ("--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe")
+        options = (
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--remote-debugging-pipe",
+        )
         process = subprocess.Popen(
             [
                 "bash",
@@ -140,7 +151,7 @@ def tab() -> Iterator[Tab]:
         os.close(ours_out[0])
         os.close(ours_in[1])
         try:
-            yield Tab(ours_out[1], ours_in[0])
+            yield kind(ours_out[1], ours_in[0])
         finally:
             process.terminate()
             process.wait(WAIT_S)

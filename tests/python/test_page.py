@@ -57,7 +57,7 @@ def written(tmp_path: Path, log: list[Message]) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Tab]:
-    with tab() as opened:
+    with tab(Tab) as opened:
         yield opened
 
 

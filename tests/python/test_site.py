@@ -6,12 +6,9 @@ settings, and what it refuses.
 from __future__ import annotations
 
 import base64
-import contextlib
 import hashlib
 import json
-import os
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -20,59 +17,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from chromium import Tab, chromium, tab
 from pelorus.cli import main
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium")
 PATIENCE_S = 120.0
 
 
-class Page:
-    """A page in a browser of its own, spoken to by the DevTools protocol over two pipes."""
+class Page(Tab):
+    """The page with the replay in it."""
 
-    def __init__(self, url: str, folder: Path, *options: str) -> None:
-        theirs, self._to = os.pipe()
-        self._from, answers = os.pipe()
-        browser = [str(CHROMIUM), "--headless=new", "--no-sandbox", "--disable-gpu", *options]
-        browser += [f"--user-data-dir={folder}", "--remote-debugging-pipe"]
-        script = f'exec "$@" 3<&{theirs} 4>&{answers}'
-        self._process = subprocess.Popen(
-            ["bash", "-c", script, "bash", *browser],
-            pass_fds=(theirs, answers), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        os.close(theirs)
-        os.close(answers)
-        self._read, self._count, self._session = b"", 0, ""
-        target = self.call("Target.createTarget", url=url)["targetId"]
-        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
-        self._session = attached["sessionId"]
+    def shows(self, site: Path) -> None:
+        self.call("Page.navigate", url=site.as_uri())
         self.until("document.readyState === 'complete' && !!document.getElementById('err')")
-
-    def call(self, method: str, **parameters: Any) -> Any:
-        self._count += 1
-        message = {"id": self._count, "method": method, "params": parameters}
-        if self._session:
-            message["sessionId"] = self._session
-        os.write(self._to, json.dumps(message).encode() + b"\0")
-        while True:
-            while b"\0" not in self._read:
-                piece = os.read(self._from, 1 << 16)
-                assert piece, "the browser has gone"
-                self._read += piece
-            answer, self._read = self._read.split(b"\0", 1)
-            found = json.loads(answer)
-            if found.get("id") == self._count:
-                assert "error" not in found, found
-                return found["result"]
-
-    def does(self, expression: str) -> Any:
-        found = self.call(
-            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
-        )
-        assert "exceptionDetails" not in found, found
-        return found["result"].get("value")
 
     def until(self, expression: str) -> Any:
         begun = time.monotonic()
@@ -99,13 +58,6 @@ class Page:
         self.does("document.getElementById('run').click()")
         self.until("document.body.dataset.done === 'yes' || !document.getElementById('err').hidden")
 
-    def close(self) -> None:
-        with contextlib.suppress(OSError):
-            os.close(self._to)
-            os.close(self._from)
-        self._process.terminate()
-        self._process.wait()
-
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -118,10 +70,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def page(site: Path, tmp_path: Path) -> Iterator[Page]:
-    found = Page(site.as_uri(), tmp_path)
-    yield found
-    found.close()
+def page(site: Path) -> Iterator[Page]:
+    with tab(Page) as found:
+        found.shows(site)
+        yield found
 
 
 def desk(recording: Path, *words: str) -> str:
@@ -180,20 +132,14 @@ def test_what_cannot_be_replayed_is_said_and_no_sum_shown(page: Page, tmp_path: 
 
 
 def test_without_relaxed_simd_the_portable_program_gives_the_same(
-    site: Path, tmp_path: Path
+    page: Page, tmp_path: Path
 ) -> None:
     recording = tmp_path / "short.plr"
     assert main(["simulate", "--seed", "9", "--duration", "3", str(recording)]) == 0
-    page = Page(site.as_uri(), tmp_path / "profile")
-    try:
-        worker = "document.getElementById('worker')"
-        page.does(
-            f"{worker}.textContent = {worker}.textContent.replace('return f(', 'return 0 * f(')"
-        )
-        page.drops("short.plr", recording.read_bytes())
-        page.replays("--slots 12")
-        assert page.text("err") == ""
-        assert "portable program ran" in page.text("state")
-        assert page.text("sum") == desk(recording, "--slots", "12")
-    finally:
-        page.close()
+    worker = "document.getElementById('worker')"
+    page.does(f"{worker}.textContent = {worker}.textContent.replace('return f(', 'return 0 * f(')")
+    page.drops("short.plr", recording.read_bytes())
+    page.replays("--slots 12")
+    assert page.text("err") == ""
+    assert "portable program ran" in page.text("state")
+    assert page.text("sum") == desk(recording, "--slots", "12")
