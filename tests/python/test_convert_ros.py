@@ -83,6 +83,7 @@ def test_pictures_odometry_and_truth_of_a_bag_become_a_recording(
     words = ("--calibration", kalibr, "--truth-topic", "/odom", "--twist-topic", "/odom")
     outcome = pelorus("convert", "ros", bag, target, *words, "--fix", "none")
     assert "/odom: twists of the frame 'base_link'" in outcome.out
+    assert "left pictures are /cam0/image_raw, right ones /cam1/image_raw" in outcome.out
     twists = messages_of(target, Twist)
     assert [m.t_ns for m in twists] == Scene().t_ns
     assert np.allclose([m.v_B_mps[1] for m in twists], 0.01 * np.arange(FRAMES))
@@ -367,11 +368,7 @@ def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
         ((*given, "--imu-topic", "/imu0"), "has no topic /imu0; there are:"),
         ((*given, "--imu-topic", "/odom"), "/odom holds 6 messages of nav_msgs/msg/Odometry; some"),
         ((*given, "--left-topic", "/l", "--right-topic", "/r"), "has no topic /l; there are:"),
-        ((), "which topics are the left and the right camera? --left-topic and --right-topic"),
-        (
-            ("--left-topic", "/cam0/image_raw", "--right-topic", "/cam1/image_raw"),
-            "which topics of sensor_msgs/msg/CameraInfo are the cameras'? --left-info-topic",
-        ),
+        ((), "which topics of sensor_msgs/msg/CameraInfo are the cameras'? --left-info-topic"),
         ((*given, "--truth-topic", "/odom"), "what moves the body? 0 topics hold twists"),
         ((*given, "--pair-within", "0.5"), "0 have one of the 6 of /cam1/image_raw within 0.5"),
         ((*given, "--joint", "left"), "wheels: --joint-topic TOPIC, --joint NAME (once or more)"),

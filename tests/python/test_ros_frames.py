@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Frames of a bag: what /tf_static says of the camera and of a gyro."""
+"""A bag's frames: what /tf_static says of camera and gyro; and which topics are a pair."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,15 @@ from converted import Run, messages_of
 from drives import clean
 from numpy.typing import NDArray
 from pelorus import se3
+from pelorus.converters import ros_frames
+from pelorus.converters.bag import Bag
+from pelorus.errors import PelorusError
 from pelorus.frames import Header
 from pelorus.recording import Recording
+from pelorus.rig.read import read_rig
 from pelorus.se3 import Poses
+from rendered import HEIGHT, WIDTH, Scene
+from rigs import camchain, write_yaml
 from scipy.spatial.transform import Rotation
 from test_convert_ros import written
 from test_ros_world import DRIVE, odometry, of_cameras, twists_of, with_tracks
@@ -137,3 +144,36 @@ def test_a_gyro_on_another_frame_is_turned_into_the_body(
     said = pelorus("convert", "ros", bag, target, *calibration, "--gyro-topic", "/imu").out
     assert "its rates are turned into 'base_link' as /tf_static says: imu_link - base_link" in said
     assert np.allclose(twists_of(target)[:, 3:], [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("topics", "swapped", "found"),
+    [
+        (("/zed/left/image", "/zed/right/image", "/zed/depth"), True, "/zed/left/image"),
+        (("/Left/x", "/Left/x/compressed", "/Right/x", "/Right/x/compressed"), False, "/Left/x"),
+        (("/cam0/image_raw/compressed", "/cam1/image_raw/compressed"), False, "/cam0/image_raw"),
+        (("/d455/camera0/i", "/d455/camera1/i", "/d455/camera2/i"), False, "/d455/camera0/i"),
+        (("/cam0/image_raw", "/cam1/image_raw"), True, "/cam1/image_raw"),
+        (("/left/image_raw", "/right/image_raw", "/left/image_rect", "/right/image_rect"), False,
+         "are due (sensor_msgs/msg/Image, sensor_msgs/msg/CompressedImage), or --tracks-topic; "
+         "pairs are /left/image_raw and /right/image_raw, /left/image_rect and /right/image_rect;"),
+        (("/front", "/rear"), False, "which topics are the left and the right camera?"),
+    ],
+)  # fmt: skip
+def test_two_topics_that_differ_in_the_cameras_word_alone_are_the_pair(
+    topics: tuple[str, ...], swapped: bool, found: str, tmp_path: Path
+) -> None:
+    kalibr = write_yaml(tmp_path / "c.yaml", camchain(Scene().cameras, (WIDTH, HEIGHT)))
+    recorder, grey = Recorder(), np.zeros((64, 80), np.uint8)
+    for topic in topics:
+        if topic.endswith("/compressed"):
+            recorder.compressed(topic, NS, b"")
+        else:
+            recorder.image(topic, NS, grey)
+    rig = replace(read_rig((kalibr,)), swapped=swapped, topics=())
+    with Bag(written(recorder, tmp_path, "mcap")) as bag:
+        try:
+            outcome = ros_frames.chosen(bag, ros_frames.Cameras(), rig).left
+        except PelorusError as error:
+            outcome = str(error)
+    assert found in outcome

@@ -34,6 +34,8 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     tree = Tree(bag)
     motion = asked.motion or ros_motion.read(bag, topics.moving, asked, tree, remarks)
     calibrated, cameras = _calibrated(bag, topics, asked, motion, tree, remarks)
+    if cameras.left != topics.cameras.left:
+        remarks.append(f"left pictures are {cameras.left}, right ones {cameras.right}")
     frames = ros_frames.read(bag, cameras, calibrated, remarks)
     small = []
     if topics.position:
@@ -61,12 +63,12 @@ def _calibrated(
     name = bag.path.resolve().stem
     if rig_files.is_own(asked.calibration):
         found = rig_files.read(asked.calibration, name, asked.extrinsic, asked.lens)
-        return found, ros_frames.chosen(bag, topics.cameras, ())
+        return found, ros_frames.chosen(bag, topics.cameras)
     if asked.calibration:
         rig = rig_files.read_rig(asked.calibration, asked.lens)
-        cameras = ros_frames.chosen(bag, topics.cameras, rig.topics)
+        cameras = ros_frames.chosen(bag, topics.cameras, rig)
     else:
-        cameras = ros_frames.chosen(bag, topics.cameras, ())
+        cameras = ros_frames.chosen(bag, topics.cameras)
         rig = _of_camera_info(bag, cameras, tree, remarks)
         if rig.swapped:
             remarks.append(f"{cameras.left} stands on the right: taken as the right camera")

@@ -30,6 +30,7 @@ from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated
 from pelorus.rig.rectification import Gray
+from pelorus.rig.rig import Rig
 from pelorus.tracking import images
 from pelorus.tracks import Tracks
 
@@ -51,7 +52,8 @@ TO_GRAY = {  # names of OpenCV
 }
 CHANNELS = {"rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
 PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
-SIDES = (("left", "right"), ("infra1", "infra2"))  # as RealSense calls them
+SIDES = (("left", "right"), ("infra1", "infra2"), ("fisheye1", "fisheye2"))  # and RealSense
+NUMBERED = (("cam0", "cam1"), ("camera0", "camera1"), ("cam_0", "cam_1"), ("camera_0", "camera_1"))
 WAITING_MAX = 200  # pictures of one side that wait for the other
 # The numbers of PointCloud2's types.
 TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -70,8 +72,10 @@ class Cameras:
     frame: str = ""  # of the left one, in place of what its messages say
 
 
-def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Cameras:
-    """The user's topics; else the calibration's; else those that are called left and right."""
+def chosen(bag: Bag, cameras: Cameras, rig: Rig | None = None) -> Cameras:
+    """The user's topics; else the calibration's; else the one pair that is called left and right,
+    or 0 and 1: 0 is the calibration's first camera.
+    """
     if cameras.tracks:
         return cameras
     there = bag.of_type(IMAGE, COMPRESSED)
@@ -79,19 +83,37 @@ def chosen(bag: Bag, cameras: Cameras, of_calibration: tuple[str, ...]) -> Camer
         for topic in (cameras.left, cameras.right):
             bag.require(topic, IMAGE, COMPRESSED)
         return cameras
-    if len(of_calibration) == 2 and all(topic in there for topic in of_calibration):
-        return replace(cameras, left=of_calibration[0], right=of_calibration[1])
-    for words in SIDES:
-        lefts, rights = ([t for t in there if word in t.lower()] for word in words)
-        if len(lefts) == len(rights) == 1:
-            return replace(cameras, left=lefts[0], right=rights[0])
+    if rig is not None and len(rig.topics) == 2 and all(topic in there for topic in rig.topics):
+        return replace(cameras, left=rig.topics[0], right=rig.topics[1])
+    swap = rig is not None and rig.swapped
+    pairs = _partners(there, SIDES) or [
+        (second, first) if swap else (first, second) for first, second in _partners(there, NUMBERED)
+    ]
+    if len(pairs) == 1:
+        return replace(cameras, left=pairs[0][0], right=pairs[0][1])
     tracked = bag.of_type(CLOUD, CLOUD2)
     if not there and len(tracked) == 1:
         return replace(cameras, tracks=tracked[0])
+    several = f"; pairs are {', '.join(map(' and '.join, pairs))}" if pairs else ""
     raise PelorusError(
         f"{bag.path}: which topics are the left and the right camera? --left-topic and "
-        f"--right-topic are due ({IMAGE}, {COMPRESSED}), or --tracks-topic; {bag.listing()}"
+        f"--right-topic are due ({IMAGE}, {COMPRESSED}), or --tracks-topic{several}; "
+        f"{bag.listing()}"
     )
+
+
+def _partners(topics: list[str], words: tuple[tuple[str, str], ...]) -> list[tuple[str, str]]:
+    """Those whose names differ in a camera's word alone. What image_transport packs of a topic
+    that is there itself (/compressed) is no picture of its own.
+    """
+    there = {t.lower(): t for t in topics if t.rsplit("/", 1)[0] not in topics}
+    found = {
+        (there[name], there[other])
+        for first, second in words
+        for name in there
+        if first in name and (other := name.replace(first, second)) in there
+    }
+    return sorted(found)
 
 
 def read(bag: Bag, cameras: Cameras, calibrated: Calibrated, remarks: list[str]) -> Pictures | Seen:
