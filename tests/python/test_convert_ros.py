@@ -331,6 +331,8 @@ def test_tracks_of_a_bag_arrive_as_they_are(
         ("mono16", lambda g: g.astype("<u2") << 8),
         ("rgb8", lambda g: np.dstack([g] * 3)),
         ("bgra8", lambda g: np.dstack([g, g, g, 255 - g])),
+        ("yuv422", lambda g: np.dstack([255 - g, g])),  # U Y V Y
+        ("yuyv", lambda g: np.dstack([g, 255 - g])),
     ],
 )
 def test_a_picture_of_any_encoding_is_the_same_in_grey(
@@ -348,8 +350,8 @@ def test_a_picture_of_any_encoding_is_the_same_in_grey(
 
 def test_an_encoding_that_is_not_known_is_told() -> None:
     recorder = Recorder()
-    recorder.image("/x", NS, np.zeros((80, 100), np.uint8), "yuv422")
-    with pytest.raises(ForeignFileError, match="encoded as yuv422; mono8, 8UC1"):
+    recorder.image("/x", NS, np.zeros((80, 100), np.uint8), "32FC1")
+    with pytest.raises(ForeignFileError, match="encoded as 32FC1; mono8, 8UC1"):
         ros_frames.gray(Path("x"), recorder.found[0][3])
     recorder.found[0][3].encoding = "rgb8"
     with pytest.raises(ForeignFileError, match="a picture of 100 x 80 has 8000 bytes"):

@@ -49,8 +49,13 @@ TO_GRAY = {  # names of OpenCV
     "bayer_bggr8": "COLOR_BayerBGGR2GRAY",
     "bayer_gbrg8": "COLOR_BayerGBRG2GRAY",
     "bayer_grbg8": "COLOR_BayerGRBG2GRAY",
+    "yuv422": "COLOR_YUV2GRAY_UYVY",
+    "uyvy": "COLOR_YUV2GRAY_UYVY",
+    "yuv422_yuy2": "COLOR_YUV2GRAY_YUY2",
+    "yuyv": "COLOR_YUV2GRAY_YUY2",
 }
 CHANNELS = {"rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
+CHANNELS |= dict.fromkeys(("yuv422", "uyvy", "yuv422_yuy2", "yuyv"), 2)
 PLAIN, DEEP = ("mono8", "8UC1"), ("mono16", "16UC1")
 SIDES = (("left", "right"), ("infra1", "infra2"), ("fisheye1", "fisheye2"))  # and RealSense
 NUMBERED = (("cam0", "cam1"), ("camera0", "camera1"), ("cam_0", "cam_1"), ("camera_0", "camera_1"))
