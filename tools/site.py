@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Makes the page that replays recordings in a browser: one file, which needs no server.
+"""Makes the site: the documentation, and the page that replays recordings in a browser. It needs no
+server: open index.html.
 
-usage: site.py [--out FOLDER]
+usage: site.py [--out FOLDER] [--only docs|replay]
 
-docs/site has its parts. Beside them it holds the replay as WebAssembly, once with relaxed SIMD and
-once for any browser, a simulated drive of a minute, and the SHA-256 of the trajectory that
-build/bin/pelorus-replay makes of it.
+The documentation is README, docs and the public headers, laid out as in the repository and built by
+zensical; a link that leads nowhere is an error. docs/site has the parts of the page. Beside them
+replay.html holds the replay as WebAssembly, once with relaxed SIMD and once for any browser, and
+two drives with the SHA-256 of their trajectories: a simulated one of a minute, as
+build/bin/pelorus-replay finds it here, and tests/golden/drive.plr, as the boards find it, too.
 """
 
 from __future__ import annotations
@@ -14,53 +17,139 @@ from __future__ import annotations
 import argparse
 import base64
 import hashlib
+import importlib.util
+import json
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import cross
 
-PARTS = cross.ROOT / "docs/site"
+ROOT = cross.ROOT
+PARTS = ROOT / "docs/site"
 PROGRAMS = {"RELAXED": "wasi-relaxed", "PORTABLE": "wasi"}
+DRIVE, DRIVE_SUM = ROOT / "tests/golden/drive.plr", ROOT / "tests/golden/drive.sha256"
+DRIVE_WORDS = ("--slots", "32")  # of the boards
+PICTURES = ("*.png", "*.webp")
+Known = dict[str, Sequence[str] | dict[str, str]]
+HEADER_LINK = re.compile(r"(\]\((?:\.\./)?include/pelorus/\w+\.h)\)")
 
 
-def sample(folder: Path) -> tuple[bytes, str]:
-    """A recording, and the sum that the desk gives it."""
-    drive, path = folder / "drive.plr", folder / "path.tum"
-    command = [sys.executable, "-m", "pelorus", "simulate", str(drive)]
+def trajectory_sum(recording: Path, words: tuple[str, ...], folder: Path) -> str:
+    """SHA-256 of the trajectory that the desk finds."""
+    path = folder / "path.tum"
+    command = [str(cross.NATIVE), str(recording), *words, "--quiet", "--trajectory", str(path)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    replay = [str(cross.NATIVE), str(drive), "--quiet", "--trajectory", str(path)]
-    subprocess.run(replay, check=True, stdout=subprocess.DEVNULL)
-    return drive.read_bytes(), hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def page(programs: dict[str, bytes], drive: bytes, desk: str) -> str:
-    """The whole page."""
+def drives(folder: Path) -> tuple[dict[str, bytes], dict[str, Known]]:
+    """The recordings of the page, and with which words they have which sums."""
+    minute = folder / "minute.plr"
+    command = [sys.executable, "-m", "pelorus", "simulate", str(minute)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    golden = DRIVE_SUM.read_text("ascii").strip()
+    if trajectory_sum(DRIVE, DRIVE_WORDS, folder) != golden:
+        sys.exit(f"{cross.NATIVE} finds another path of {DRIVE} than {DRIVE_SUM} says")
+    sums = {"a desk (x86-64 Linux)": golden, "a board (Cortex-M, emulated)": golden}
+    known: dict[str, Known] = {
+        "sample": {
+            "words": [],
+            "sums": {"a desk (x86-64 Linux)": trajectory_sum(minute, (), folder)},
+        },
+        "drive": {"words": DRIVE_WORDS, "sums": sums},
+    }
+    return {"SAMPLE": minute.read_bytes(), "DRIVE": DRIVE.read_bytes()}, known
+
+
+def replay_page(out: Path) -> Path:
+    """The page, in one file."""
+    if not cross.NATIVE.is_file():
+        sys.exit(f"{cross.NATIVE} is not there: tools/demo.sh builds it")
+    packed = {
+        name: cross.build(cross.TARGETS[target], out / "programs" / target).read_bytes()
+        for name, target in PROGRAMS.items()
+    }
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        recordings, known = drives(Path(folder))
     text = (PARTS / "index.html").read_text(encoding="utf-8")
     worker = "".join((PARTS / name).read_text("utf-8") for name in ("replay.js", "worker.js"))
-    packed = {**programs, "SAMPLE": drive}
-    for name, content in packed.items():
+    for name, content in {**packed, **recordings}.items():
         text = text.replace(f"@{name}@", base64.b64encode(content).decode())
-    return text.replace("@DESK@", desk).replace("@WORKER@", worker)
+    text = text.replace("@KNOWN@", json.dumps(known)).replace("@WORKER@", worker)
+    page = out / "replay.html"
+    page.write_text(text, encoding="utf-8")
+    return page
+
+
+def copied(source: Path, target: Path) -> None:
+    """A page; its links to headers lead to their pages."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(HEADER_LINK.sub(r"\1.md)", source.read_text("utf-8")), encoding="utf-8")
+
+
+def stage(folder: Path, replay: Path | None) -> None:
+    """What zensical builds: its settings, and `pages`, laid out as the repository is."""
+    pages = folder / "pages"
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
+        copied(page, pages / page.relative_to(ROOT))
+    pictures = pages / "docs/images"
+    pictures.mkdir()
+    for picture in (one for kind in PICTURES for one in (ROOT / "docs/images").glob(kind)):
+        shutil.copy(picture, pictures)
+    names = []
+    for header in sorted((ROOT / "include/pelorus").glob("*.h")):
+        name = header.relative_to(ROOT).as_posix()
+        names.append(name)
+        page = pages / f"{name}.md"
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(f"# {header.name}\n\n```c\n{header.read_text('utf-8')}```\n", "utf-8")
+    if replay is None:
+        (pages / "replay.html").write_text("left out: tools/site.py makes it\n", "utf-8")
+    else:
+        shutil.copy(replay, pages / "replay.html")
+    shutil.copy(PARTS / "wide.css", pages)
+    settings = (PARTS / "zensical.yml").read_text("utf-8")
+    headers = "\n".join(f"      - {Path(name).name}: {name}.md" for name in names)
+    settings = settings.replace("      - HEADERS", headers)
+    (folder / "mkdocs.yml").write_text(settings, encoding="utf-8")
+
+
+def built(folder: Path) -> Path:
+    """The site of what is staged there."""
+    command = [sys.executable, "-m", "zensical", "build", "--strict"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        said = (done.stdout + done.stderr).partition("Traceback")[0]
+        sys.exit(f"{said}the documentation cannot be built: the lines above say why")
+    return folder / "site"
+
+
+def documentation(out: Path, replay: Path | None) -> Path:
+    """The whole site, with the page in it."""
+    if importlib.util.find_spec("zensical") is None:
+        sys.exit("zensical is not there: pip install --requirement tools/requirements.lock")
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
+        stage(Path(folder), replay)
+        shutil.copytree(built(Path(folder)), out, dirs_exist_ok=True)
+    return out / "index.html"
 
 
 def main() -> int:
     """Builds it; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=cross.ROOT / "build/site", help="its folder")
-    out = parser.parse_args().out
-    if not cross.NATIVE.is_file():
-        print(f"{cross.NATIVE} is not there: tools/demo.sh builds it", file=sys.stderr)
-        return 1
-    programs = {
-        name: cross.build(cross.TARGETS[target], out / target).read_bytes()
-        for name, target in PROGRAMS.items()
-    }
-    with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
-        text = page(programs, *sample(Path(folder)))
-    (out / "index.html").write_text(text, encoding="utf-8")
-    print(f"{out / 'index.html'}: {len(text) // 1024} KB")
+    parser.add_argument("--out", type=Path, default=ROOT / "build/site", help="its folder")
+    parser.add_argument("--only", choices=("docs", "replay"), help="a part of it")
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    made = None if given.only == "docs" else replay_page(given.out)
+    if given.only != "replay":
+        made = documentation(given.out, made)
+    print(made)
     return 0
 
 

@@ -5,6 +5,7 @@
 onmessage = async ({ data }) => {
     try {
         const fast = fuses();
+        postMessage({ begins: true, fast });
         const done = await replay(fast ? data.relaxed : data.portable, data.words, { "drive.plr": data.recording });
         const path = done.files.read("path.tum");
         postMessage({ ...done, files: undefined, fast, path });

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Looks up what README, CHANGELOG and docs name: identifiers, tests and files in `backticks`, and
-the files and headings that links lead to, must be there.
+the files and headings that links lead to, must be there. Addresses elsewhere must be https.
 
 usage: names.py PROJECT_ROOT
 
@@ -31,6 +31,7 @@ SPAN = re.compile(r"(?<!`)(`+)(?!`)(.+?)(?<!`)\1(?!`)", re.DOTALL)
 LINK = re.compile(r"\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)")
 HEADING = re.compile(r"^#{1,6} +(.*?)(?: +#+)? *$", re.MULTILINE)
 ELSEWHERE = re.compile(r"[a-z][a-z0-9+.-]*:")  # https:, mailto:
+ADDRESS = re.compile(r"https://[a-z0-9-]+(\.[a-z0-9-]+)+(/[\w./~#%?=&+-]*)?|mailto:\S+@\S+")
 
 # A name of the project, also behind the compiler's -D, but not where a pattern begins or ends.
 IDENTIFIER = re.compile(r"(?:(?<=-[DU])|(?<![\w*}-]))((?:plr|PLR|PELORUS)_\w*\w)(?![\w*{])")
@@ -131,11 +132,10 @@ def spans(text: str) -> Iterator[tuple[int, str]]:
 
 
 def links(text: str) -> Iterator[tuple[int, str]]:
-    """(line, target) of every link to a place in the repository."""
+    """(line, target) of every link."""
     plain = PARAGRAPH.sub(lambda paragraph: SPAN.sub(blank, paragraph.group()), text)
     for match in LINK.finditer(plain):
-        if not ELSEWHERE.match(match.group(1)):
-            yield line_of(text, match.start()), match.group(1)
+        yield line_of(text, match.start()), match.group(1)
 
 
 def files_in(span: str) -> Iterator[str]:
@@ -176,6 +176,8 @@ def anchors(page: Path) -> set[str]:
 
 def what_is_wrong(page: Path, target: str) -> str | None:
     """Where a link leads to nothing."""
+    if ELSEWHERE.match(target):
+        return None if ADDRESS.fullmatch(target) else f"{target} is no https address"
     file, _, anchor = target.partition("#")
     path = page.parent / file if file else page
     if not path.exists():
@@ -209,7 +211,7 @@ def main() -> int:
         return 2
     root = Path(sys.argv[1]).resolve()
     tree = read_tree(root)
-    pages = [root / "README.md", root / "CHANGELOG.md", *sorted((root / "docs").glob("*.md"))]
+    pages = [*sorted(root.glob("*.md")), *sorted((root / "docs").glob("*.md"))]
     results = [check_page(tree, page) for page in pages]
     breaches = [breach for _, found in results for breach in found]
     for breach in breaches:

@@ -63,10 +63,17 @@ class Page(Tab):
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("ziglang")
     folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, str(ROOT / "tools/site.py"), "--out", str(folder)]
+    command = [
+        sys.executable,
+        str(ROOT / "tools/site.py"),
+        "--only",
+        "replay",
+        "--out",
+        str(folder),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return folder / "index.html"
+    return folder / "replay.html"
 
 
 @pytest.fixture
@@ -89,9 +96,23 @@ def test_the_sample_has_the_desks_sum(page: Page) -> None:
     page.replays()
     assert page.text("err") == ""
     assert re.fullmatch("[0-9a-f]{64}", page.text("sum"))
-    assert page.text("desk").endswith(": the same")
+    assert page.text("others") == f"a desk (x86-64 Linux): {page.text('sum')}: the same"
     assert "594 used" in page.text("out")
-    assert re.match(r"[0-9.]+ s", page.text("state"))
+    took = re.match(r"([0-9.]+) s", page.text("state"))
+    assert took
+    assert float(took.group(1)) < 10  # 0.8 s alone; an unoptimised program takes 16
+
+
+def test_the_boards_drive_has_the_sum_that_the_boards_gave(page: Page) -> None:
+    """tests/target holds them to it."""
+    page.does("document.getElementById('drive').click()")
+    page.replays("--slots 32")
+    golden = (ROOT / "tests/golden/drive.sha256").read_text().strip()
+    assert page.text("sum") == golden
+    assert re.search(f"a board .*: {golden}: the same", page.text("others"))
+    page.replays("--slots 31")
+    assert page.text("sum") != golden
+    assert "the same" not in page.text("others").replace("with the same", "")
 
 
 def test_another_recording_and_settings_have_theirs(page: Page, tmp_path: Path) -> None:
@@ -102,7 +123,7 @@ def test_another_recording_and_settings_have_theirs(page: Page, tmp_path: Path) 
     page.replays("--slots 25 --pixel-sigma 1.3")
     assert page.text("err") == ""
     assert page.text("sum") == desk(recording, "--slots", "25", "--pixel-sigma", "1.3")
-    assert "On a desk" not in page.text("desk")  # nothing is claimed of it
+    assert page.text("others").startswith("A desk's, with the same")  # nothing is claimed of it
 
 
 def test_what_cannot_be_replayed_is_said_and_no_sum_shown(page: Page, tmp_path: Path) -> None:

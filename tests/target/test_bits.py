@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from pelorus.robot.stream import Streamer
 from pelorus.wire import read_file
 
 SLOTS, OBSERVATIONS = 32, 128  # of the images and of the desktop's builds
+GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 FULL = -10  # plr_status
 FLOAT64_BOARD = "mps2_an500"  # the M7's FPU has it
 
@@ -50,3 +53,15 @@ def test_float32(program: Path, board: str, firmware: Path, recording: Path) -> 
 def test_float64(desktop: Path, board: str, robot: Path, recording: Path) -> None:
     image = robot / "images" / f"pelorus-{board}-n{SLOTS}-f64.elf"
     same_bits(desktop / "pelorus-replay-f64", recording, board_poses(board, image, recording))
+
+
+@pytest.mark.spread
+def test_the_golden_drive_has_the_sum_that_the_page_in_the_browser_shows(
+    program: Path, board: str, firmware: Path, tmp_path: Path
+) -> None:
+    drive, path = GOLDEN / "drive.plr", tmp_path / "path.tum"
+    same_bits(program, drive, board_poses(board, firmware, drive))
+    command = [str(program), str(drive), "--slots", str(SLOTS), "--trajectory", str(path)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    golden = (GOLDEN / "drive.sha256").read_text().strip()
+    assert hashlib.sha256(path.read_bytes()).hexdigest() == golden
