@@ -212,7 +212,8 @@ ensure_python # there by now; if not, it says why and ends this
 # --- form, beside the first build -----------------------------------------------------------------
 
 beside 'Python types' "$VENV/bin/mypy" --config-file tools/pyproject.toml \
-    tools/pelorus tools/firmware tools/*.py tests/python tests/layering tests/golden tests/fuzz tests/recordings
+    tools/pelorus tools/firmware tools/*.py tests/python tests/layering tests/golden tests/fuzz tests/independent \
+    tests/recordings
 beside 'Python types, tests on boards' env MYPYPATH=tools "$VENV/bin/mypy" \
     --config-file tools/pyproject.toml --cache-dir .mypy_cache/boards tests/target
 beside 'Python format' "$VENV/bin/ruff" format --check --config tools/pyproject.toml tools tests
