@@ -2,7 +2,7 @@
 """Events put into recordings: how often `pelorus explain` names the first cause and its time, and
 says of recordings without one that nothing happened.
 
-usage: explain.py [--bin build/bin] [--only TEXT] [--seeds 2] [--event NAME]
+usage: explain.py [--bin build/bin] [--only TEXT] [--seeds 2] [--first-seed 1] [--event NAME]
 
 Twenty recordings and more: simulated drives by twists and by IMU, and windows of real ones from
 $PELORUS_DATA. Into each one every event is put that fits it, at a time drawn where the robot moves.
@@ -12,6 +12,7 @@ in which the filter itself is GOOD in 95 of 100 frames; others have troubles of 
 
 from __future__ import annotations
 
+import itertools
 import sys
 import tempfile
 import zlib
@@ -45,9 +46,9 @@ class Drive(NamedTuple):
     options: tuple[str, ...]
 
 
-def simulated(seeds: int) -> Iterator[Drive]:
+def simulated(seeds: range) -> Iterator[Drive]:
     """Drives that differ in speed, rate and scene."""
-    for seed in range(1, seeds + 1):
+    for seed in seeds:
         for name, options in (
             ("plain", Options(seed=seed)),
             ("slow", Options(seed=seed, speed_mps=1.0, lap_s=30)),
@@ -145,6 +146,7 @@ def main() -> int:
     """Prints what was wrong, and the shares."""
     parser = parser_of(__doc__, "recordings whose name contains it")
     parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument(
         "--event", default="", help="events whose name contains it; none: clean ones alone"
     )
@@ -152,7 +154,8 @@ def main() -> int:
     given.cache.mkdir(exist_ok=True)
     program = given.bin / "pelorus-replay"
     all_tried: list[Tried] = []
-    for drive in (*simulated(given.seeds), *real(given.cache)):
+    seeds = range(given.first_seed, given.first_seed + given.seeds)
+    for drive in itertools.chain(simulated(seeds), real(given.cache)):
         if given.only not in drive.name:
             continue
         own = explained(program, drive.messages, drive.options)

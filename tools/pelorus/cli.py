@@ -23,6 +23,7 @@ COMMANDS = (
     "evaluate",
     "explain",
     "export",
+    "view",
     "simulate",
     "report",
     "map",

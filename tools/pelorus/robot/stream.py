@@ -81,12 +81,15 @@ class Streamer:
         log: BinaryIO | None = None,
         on_pose: Callable[[Pose], None] = lambda _: None,
         answer_s: float | None = None,
+        on_message: Callable[[Message], None] = lambda _: None,
     ) -> None:
+        """`on_message` gets all that the log gets, in the same order."""
         self.outcome = Outcome()
         self.reader = Reader()
         self._link = link
         self._log = None if log is None else FlightLog(log)
         self._on_pose = on_pose
+        self._on_message = on_message
         self.answer_s = ANSWER_S if answer_s is None else answer_s
         self._sequence = 0
         self._sent: Counter[Kind] = Counter()
@@ -174,8 +177,8 @@ class Streamer:
             self._log.end(self._end_heard)
 
     def _put(self, message: Message, logged: bool = True) -> None:
-        if logged and self._log is not None:
-            self._log.keep(message)
+        if logged:
+            self._keep(message)
         frame = encode(message, self._sequence)
         self._sequence += 1
         self._sent[message.kind] += 1
@@ -241,8 +244,8 @@ class Streamer:
         return came
 
     def _take(self, message: Message) -> None:
-        if self._under_way and self._log is not None and message.kind != Kind.END:
-            self._log.keep(message, heard=True)
+        if self._under_way and message.kind != Kind.END:
+            self._keep(message, heard=True)
         match message:
             case Pose() if message.after_stereo:
                 self.outcome.poses.append(message)
@@ -294,8 +297,12 @@ class Streamer:
 
     def _note(self, remark: str) -> None:
         """The host's own word on what went wrong, for who reads the log."""
+        self._keep(Text(remark, WARNING))
+
+    def _keep(self, message: Message, heard: bool = False) -> None:
         if self._log is not None:
-            self._log.keep(Text(remark, WARNING))
+            self._log.keep(message, heard)
+        self._on_message(message)
 
 
 def is_restore(message: Message) -> bool:

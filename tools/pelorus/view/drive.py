@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: MIT
+"""What a viewer is given of a drive, moment by moment, of a log or while it comes in.
+
+Times are in ns on the recording's clock. Positions are in the filter's world, m; ellipsoids are of
+three sigma.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pelorus import schema
+from pelorus.errors import PelorusError
+from pelorus.evaluation import assess, by_imu, on_its_clock
+from pelorus.evidence import Evidence
+from pelorus.frame_table import DIAGONAL
+from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Stereo
+from pelorus.health import reasons
+from pelorus.layout import Floats, unpack_symmetric
+from pelorus.trajectory import estimate_in, truth_in
+
+SIGMAS = 3.0
+COUNTS = ("observations", "matched", "used", "gated", "created", "active")  # of REPORT
+TWIST = tuple(f"{kind} {axis}" for kind in ("linear", "turn") for axis in "xyz")
+POINT_M = 0.02  # half the size of a landmark whose ellipsoid would say nothing
+
+
+def extra(module: str) -> Any:
+    """A library that is no part of every installation."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise PelorusError(
+            f"this needs {module.partition('.')[0]}, which is missing: pip install 'pelorus[view]'"
+        ) from error
+
+
+@dataclass
+class Moment:
+    """A stereo frame, and what the filter answered to it."""
+
+    frame: Stereo
+    pose: Pose | None = None  # of a frame that was not refused
+    report: Report | None = None
+    evidence: Evidence | None = None
+    truth_W_m: Floats | None = None
+
+    @property
+    def t_ns(self) -> int:
+        return self.frame.t_ns
+
+    @property
+    def condition(self) -> str:
+        """`degraded: identical pixels`."""
+        if self.report is None:
+            return "no answer"
+        health = schema.HEALTHS.get(self.report.health, f"health {self.report.health}")
+        if self.report.status:
+            health = f"refused, {schema.STATUSES.get(self.report.status, self.report.status)}"
+        why = ", ".join(reasons(self.report.reasons))
+        return f"{health}: {why}" if why else health
+
+    @property
+    def rejected(self) -> list[int]:
+        """Ids that were seen and not used."""
+        return [] if self.evidence is None else self.evidence.rejected["id"].tolist()
+
+    def curves(self) -> dict[str, dict[str, float]]:
+        """Numbers over time, by what they belong to."""
+        found: dict[str, dict[str, float]] = {}
+        if (report := self.report) is not None:
+            found["points"] = {name: float(getattr(report, name)) for name in COUNTS}
+            found["health"] = {"health": float(report.health)}
+            if report.nis_dof:
+                found["innovations"] = {"NIS of a degree of freedom": report.nis / report.nis_dof}
+            if report.update_us:
+                found["computing"] = {"ms": report.update_us * 1e-3}
+        if (pose := self.pose) is not None:
+            if pose.knows_covariance:
+                sigma = np.sqrt(np.clip(np.asarray(pose.covariance)[DIAGONAL], 0, None))
+                found["sigma"] = {
+                    "position, m": float(np.linalg.norm(sigma[:3])),
+                    "rotation, deg": float(np.degrees(np.linalg.norm(sigma[3:]))),
+                }
+            found["velocity"] = dict(zip(TWIST, (*pose.v_B_mps, *pose.w_B_radps), strict=True))
+            found["bias"] = dict(zip(TWIST, pose.bias, strict=True))
+        if (evidence := self.evidence) is not None:
+            found["doubt"] = {"statistic": evidence.statistic}
+            found["odometry"] = {"weight": evidence.weight, "agreement": evidence.agreement}
+        return found
+
+
+class Ellipsoids(NamedTuple):
+    """Of three sigma: half axes (n, 3), m, and the turn of the axes (n, 4), x y z w."""
+
+    half_m: Floats
+    turn: Floats
+
+
+class Viewer(Protocol):
+    """Shows or keeps a drive."""
+
+    def begin(self, header: Header) -> None: ...
+
+    def moment(self, moment: Moment) -> None: ...
+
+    def landmarks(self, t_ns: int, landmarks: Sequence[Landmark], shapes: Ellipsoids) -> None:
+        """That have left the state, or were in it at the end."""
+        ...
+
+    def end(self) -> None: ...
+
+
+class Drive:
+    """Hands messages on to viewers as moments, in their order."""
+
+    def __init__(
+        self, viewers: Sequence[Viewer], truth_W_m: Mapping[int, Floats] | None = None
+    ) -> None:
+        self._viewers = viewers
+        self._truth = truth_W_m or {}
+        self._begun = False
+        self._moment: Moment | None = None
+        self._pose: Pose | None = None
+        self._p_W_m = np.zeros(3)
+        self._left: list[Landmark] = []
+
+    def take(self, message: Message) -> None:
+        """The next one, of an input or of an answer."""
+        match message:
+            case Header() if not self._begun:
+                self._begun = True
+                for viewer in self._viewers:
+                    viewer.begin(message)
+            case Stereo() if self._begun:
+                self._hand_on()
+                self._moment = Moment(message, truth_W_m=self._truth.get(message.t_ns))
+            case Pose() if self._answers(message.t_ns) and message.after_stereo:
+                self._pose, self._p_W_m = message, np.asarray(message.p_WB_m)
+            case Report() if message.subject == Kind.STEREO and self._answers(message.t_ns):
+                assert self._moment is not None
+                self._moment.report, self._moment.pose = message, self._pose
+            case Evidence() if self._answers(message.t_ns):
+                assert self._moment is not None
+                self._moment.evidence = message
+            case Landmark() if message.role != Role.KNOWN and np.isfinite(message.p_W_m).all():
+                self._left.append(message)
+            case _:
+                pass
+
+    def end(self) -> None:
+        """Nothing more comes."""
+        self._hand_on()
+        for viewer in self._viewers:
+            viewer.end()
+
+    def _answers(self, t_ns: int) -> bool:
+        return self._moment is not None and self._moment.t_ns == t_ns
+
+    def _hand_on(self) -> None:
+        if self._moment is not None:
+            for viewer in self._viewers:
+                viewer.moment(self._moment)
+                if self._left:
+                    shapes = of_landmarks(self._left, self._p_W_m)
+                    viewer.landmarks(self._moment.t_ns, self._left, shapes)
+            self._left = []
+        self._moment = self._pose = None
+
+
+def show(messages: Sequence[Message], viewers: Sequence[Viewer]) -> None:
+    """A whole log, with its truth brought to the estimate's start."""
+    if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
+        raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
+    drive = Drive(viewers, _truth(messages))
+    for message in messages:
+        drive.take(message)
+    drive.end()
+
+
+def _truth(messages: Sequence[Message]) -> dict[int, Floats]:
+    found, truth = estimate_in(messages), truth_in(messages)
+    if found is None or truth is None:
+        return {}
+    on_clock = on_its_clock(messages, truth, found[0])
+    accuracy = assess(found[0], on_clock, found[1], upright=by_imu(messages))
+    if accuracy is None:
+        return {}
+    return dict(zip(accuracy.t_ns.tolist(), accuracy.truth.p, strict=True))
+
+
+# --- shapes ---------------------------------------------------------------------------------------
+
+
+def ellipsoids(P: Floats) -> Ellipsoids:
+    """Of covariances (n, 3, 3); one that is none becomes a point."""
+    good = np.isfinite(P).all(axis=(1, 2), keepdims=True)
+    variances, axes = np.linalg.eigh(np.where(good, P, 0.0))
+    axes[np.linalg.det(axes) < 0, :, 0] *= -1
+    half = SIGMAS * np.sqrt(np.clip(variances, 0, None))
+    return Ellipsoids(half, Rotation.from_matrix(axes).as_quat())
+
+
+def of_pose(pose: Pose) -> Ellipsoids | None:
+    """Of the position, along the body's axes; None where nothing is known of it."""
+    if not pose.knows_covariance:
+        return None
+    return ellipsoids(unpack_symmetric(np.asarray(pose.covariance)[None], 6)[:, :3, :3])
+
+
+def of_landmarks(landmarks: Sequence[Landmark], from_W_m: Floats) -> Ellipsoids:
+    """Along the world's axes. One that reaches as far as the body is away from it does not say
+    where the landmark is: it becomes a point.
+    """
+    shapes = ellipsoids(unpack_symmetric(np.array([m.covariance for m in landmarks]), 3))
+    distance = np.linalg.norm(np.array([m.p_W_m for m in landmarks]) - from_W_m, axis=1)
+    vague = shapes.half_m.max(axis=1) > distance
+    return shapes._replace(half_m=np.where(vague[:, None], POINT_M, shapes.half_m))
+
+
+def quaternion(R: Floats) -> Floats:
+    """(4,) x y z w."""
+    return np.asarray(Rotation.from_matrix(R).as_quat())

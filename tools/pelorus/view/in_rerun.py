@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""A drive in Rerun: a file to open later, a viewer that is started, or one that runs already.
+
+What grows, the way and the map, is kept in pieces of ten seconds, for an entity that is logged anew
+with each frame would hold the drive as often as it has frames.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pelorus.errors import PelorusError
+from pelorus.frames import Header, Landmark
+from pelorus.layout import Floats
+from pelorus.view.drive import Ellipsoids, Moment, extra, of_pose, quaternion
+
+S = 1_000_000_000
+PIECE_NS = 10 * S
+SHOWN_NS = S  # a piece is shown anew so often
+GREEN, RED, BLUE, ORANGE, GRAY = (
+    (63, 208, 160),
+    (213, 94, 0),
+    (86, 180, 233),
+    (230, 159, 0),
+    (160, 160, 160),
+)
+LEVELS = ("INFO", "WARN", "ERROR", "CRITICAL")  # by health
+PANELS = ("innovations", "sigma", "points", "doubt", "odometry", "bias", "computing")
+
+
+class InRerun:
+    """A Viewer. `rrd` keeps it; `connect` is a viewer's URL; `spawn` starts one."""
+
+    def __init__(
+        self, rrd: Path | None = None, connect: str | None = None, spawn: bool = False
+    ) -> None:
+        os.environ.setdefault("RUST_LOG", "error")  # its warnings are for who writes programs
+        self._rr = extra("rerun")
+        self._stream = self._rr.RecordingStream("pelorus")
+        views = self._views()
+        try:
+            if rrd is not None:
+                self._stream.save(rrd, default_blueprint=views)
+            elif connect is not None:
+                self._stream.connect_grpc(connect, default_blueprint=views)
+            elif spawn:
+                self._stream.spawn(default_blueprint=views)
+        except (RuntimeError, ValueError) as error:
+            raise PelorusError(
+                f"Rerun cannot open {rrd or connect or 'its viewer'}: {error}"
+            ) from error
+        self._origin_ns: int | None = None
+        self._condition = ""
+        self._way: list[Floats] = []
+        self._map: list[tuple[Landmark, Floats, Floats]] = []  # half axes, and their turn
+        self._piece = 0
+        self._shown_ns = 0
+
+    def _views(self) -> Any:
+        rrb = extra("rerun.blueprint")
+        curves = [rrb.TimeSeriesView(origin=f"curves/{name}", name=name) for name in PANELS]
+        pictures = rrb.Spatial2DView(origin="world/body/camera", name="points in the left picture")
+        words = rrb.TextLogView(origin="health", name="health, and why")
+        scene = rrb.Spatial3DView(origin="world", name="way, map, three sigma")
+        left = rrb.Vertical(scene, rrb.Horizontal(pictures, words), row_shares=[2, 1])
+        all_of_it = rrb.Horizontal(left, rrb.Vertical(*curves), column_shares=[3, 2])
+        return rrb.Blueprint(all_of_it, collapse_panels=True)
+
+    def begin(self, header: Header) -> None:
+        rr, log = self._rr, self._stream.log
+        self._stream.send_recording_name(header.name or "drive")
+        R_BC = np.asarray(header.R_CB).T
+        turn = rr.Quaternion(xyzw=quaternion(R_BC))
+        p_BC_m = -R_BC @ header.t_CB_m
+        log("world/body/camera", rr.Transform3D(translation=p_BC_m, quaternion=turn), static=True)
+        camera = header.camera
+        size = (
+            header.image_width_px or 2 * camera.cx_px,
+            header.image_height_px or 2 * camera.cy_px,
+        )
+        K = [[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]]
+        log("world/body/camera", rr.Pinhole(image_from_camera=K, resolution=size), static=True)
+
+    def moment(self, moment: Moment) -> None:
+        rr, log = self._rr, self._stream.log
+        if self._origin_ns is None:
+            self._origin_ns = self._shown_ns = moment.t_ns
+        self._stream.set_time("drive", duration=np.timedelta64(moment.t_ns - self._origin_ns, "ns"))
+        if moment.t_ns - self._shown_ns >= SHOWN_NS:
+            self._show_pieces(moment.t_ns)
+        if (pose := moment.pose) is not None:
+            self._way.append(np.asarray(pose.p_WB_m))
+            turn = rr.Quaternion(xyzw=quaternion(np.asarray(pose.R_WB)))
+            log("world/body", rr.Transform3D(translation=pose.p_WB_m, quaternion=turn))
+            if (shape := of_pose(pose)) is not None:
+                log(
+                    "world/body/three-sigma",
+                    rr.Ellipsoids3D(half_sizes=shape.half_m, quaternions=shape.turn, colors=BLUE),
+                )
+        if moment.truth_W_m is not None:
+            log(
+                "world/truth",
+                rr.Points3D([moment.truth_W_m], colors=GRAY, radii=rr.Radius.ui_points(6)),
+            )
+        self._points(moment)
+        for name, values in moment.curves().items():
+            for title, value in values.items():
+                log(f"curves/{name}/{rr.escape_entity_path_part(title)}", rr.Scalars(value))
+        if moment.condition != self._condition:
+            self._condition = moment.condition
+            health = 0 if moment.report is None else min(moment.report.health, len(LEVELS) - 1)
+            log("health", rr.TextLog(self._condition, level=LEVELS[health]))
+
+    def _points(self, moment: Moment) -> None:
+        """Of the left picture, the rejected ones red."""
+        frame = moment.frame
+        rejected = np.isin(frame.ids, moment.rejected)
+        colours = np.where(rejected[:, None], RED, GREEN).astype(np.uint8)
+        labels = [str(i) for i in frame.ids.tolist()]
+        points = self._rr.Points2D(
+            frame.pixels[:, :2], colors=colours, radii=3.0, labels=labels, show_labels=False
+        )
+        self._stream.log("world/body/camera/points", points)
+
+    def landmarks(
+        self,
+        t_ns: int,  # noqa: ARG002 - of the moment before
+        landmarks: Sequence[Landmark],
+        shapes: Ellipsoids,
+    ) -> None:
+        self._map += zip(landmarks, *shapes, strict=True)
+
+    def end(self) -> None:
+        if self._origin_ns is not None:
+            self._show_pieces(self._shown_ns)
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def _show_pieces(self, t_ns: int) -> None:
+        rr, log = self._rr, self._stream.log
+        self._shown_ns = t_ns
+        assert self._origin_ns is not None
+        if len(self._way) > 1:
+            strip = rr.LineStrips3D([np.array(self._way)], colors=BLUE)
+            log(f"world/way/{self._piece}", strip)
+        if self._map:
+            marks, half_m, turn = zip(*self._map, strict=True)
+            balls = rr.Ellipsoids3D(
+                centers=[m.p_W_m for m in marks],
+                half_sizes=half_m,
+                quaternions=turn,
+                colors=GREEN,
+                labels=[str(m.id) for m in marks],
+                show_labels=False,
+            )
+            log(f"world/map/{self._piece}", balls)
+        piece = (t_ns - self._origin_ns) // PIECE_NS
+        if piece > self._piece:
+            self._piece, self._way, self._map = piece, self._way[-1:], []
