@@ -101,7 +101,7 @@ def test_the_page_is_whole_says_it_first_and_fetches_nothing(written: Path) -> N
     assert not re.search(r'(src|href)="(?!data:|#)', text)
     assert 'http-equiv="Content-Security-Policy" content="default-src \'none\'' in text
     assert "uPlot (v1.6.32)" in text
-    assert text.count("</script>") == 4
+    assert text.count("</script>") == 5
 
 
 def test_names_of_a_recording_are_no_markup(written: Path) -> None:
@@ -124,8 +124,8 @@ def test_what_a_page_leaves_out_it_says(
     tmp_path: Path, log: list[Message], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pelorus.report.curves.FRAMES_MOST", 200)
-    monkeypatch.setattr("pelorus.report.curves.LANDMARKS_MOST", 5)
-    monkeypatch.setattr("pelorus.report.curves.REJECTIONS_MOST", 7)
+    monkeypatch.setattr("pelorus.report.landmarks.LANDMARKS_MOST", 5)
+    monkeypatch.setattr("pelorus.report.landmarks.REJECTIONS_MOST", 7)
     path = tmp_path / "less.html"
     page.write(path, answers.of_explanation(explain(log), "less"), Curves(log))
     data = data_of(path)

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from converted import Run as Command
 from fake_board import FakeBoard, TcpBoard
+from pelorus.ellipsoids import POINT_M, SIGMAS, ellipsoids, of_landmarks
 from pelorus.evidence import Evidence
 from pelorus.frames import Landmark, Message, Pose, Report, Role, Stereo
 from pelorus.layout import pack_symmetric, unpack_symmetric
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
-from pelorus.view.drive import POINT_M, SIGMAS, ellipsoids, of_landmarks
 from pelorus.wire import messages_of, write_file
 from replay_drive import drive, encode, log_of, run
 from scipy.spatial.transform import Rotation

@@ -15,14 +15,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from pelorus import schema
-from pelorus.evaluation import Accuracy, assess, by_imu, made_in, on_its_clock, sigmas_m
+from pelorus.ellipsoids import ellipsoids
+from pelorus.evaluation import Accuracy, assess, by_imu, on_its_clock
 from pelorus.evidence import Evidence
 from pelorus.frame_table import FrameTable, frame_table
-from pelorus.frames import Message, Stereo, Truth, TruthKnows
+from pelorus.frames import Message, Truth, TruthKnows
 from pelorus.grid.plane import AXES, choose
 from pelorus.health import GOOD, SHORT
 from pelorus.layout import Floats
 from pelorus.motion import Times
+from pelorus.report.landmarks import WHY, Landmarks, packed
 from pelorus.report.packed import Packer
 from pelorus.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
 from pelorus.wire import header_of_messages
@@ -30,13 +32,11 @@ from pelorus.wire import header_of_messages
 SIGMAS = 3.0
 BAND = 0.95
 FRAMES_MOST = 150_000  # two hours at 20 Hz
-LANDMARKS_MOST = 20_000
-REJECTIONS_MOST = 60_000
+SHAPES = 200  # ellipsoids along the way
 INSIDE = (
     "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
     "filter stays inside."
 )
-WHY = {1: "rejected by the gate", 2: "far off", 4: "it moves"}  # EVIDENCE's `why`
 RHO_THETA = tuple(f"var_{part}_{axis}" for part in ("rho", "theta") for axis in AXES)
 
 
@@ -101,7 +101,9 @@ class Curves:
             "words": _words(),
             "charts": list(self._charts()),
             "map": self._map(),
-            "landmarks": self._landmarks(),
+            "landmarks": Landmarks(
+                self._messages, self.origin_ns, self._found and self._found[0], self.packer
+            ).json(self.left_out),
         }
 
     # --- curves -----------------------------------------------------------------------------------
@@ -293,6 +295,22 @@ class Curves:
             "tracks": tracks,
             "axes": [plane.right.number, plane.up.number],
             "signs": [plane.right.sign, plane.up.sign],
+            "shapes": self._shapes(),
+        }
+
+    def _shapes(self) -> dict[str, Any]:
+        """Ellipsoids of the position at some frames all along the way, in the world."""
+        assert self._found is not None
+        trajectory, P = self._found
+        some = np.unique(np.linspace(0, len(P) - 1, min(len(P), SHAPES)).astype(int))
+        some = some[np.isfinite(P[some]).all(axis=(1, 2))]
+        R, p = trajectory.poses.R[some], trajectory.poses.p[some]
+        shapes = ellipsoids(R @ P[some, :3, :3] @ R.transpose(0, 2, 1))
+        t_ms = np.round(self._seconds(trajectory.t_ns)[some] * 1e3)
+        return {
+            "t": self.packer.add_exactly(t_ms, "u4"),
+            "p": [self.packer.add_exactly(p[:, k], "f4") for k in range(3)],
+            **packed(shapes, self.packer),
         }
 
     def _track(self, name: str, t_ns: Times, p: Floats) -> dict[str, Any]:
@@ -300,72 +318,6 @@ class Curves:
         columns = [self.packer.add(p[some, k]) for k in range(3)]
         t = self.packer.add_exactly(np.round(self._seconds(t_ns)[some] * 1e3), "u4")
         return {"name": name, "p": columns, "t": t}
-
-    def _landmarks(self) -> dict[str, Any]:
-        """What the filter left behind, and the history of each id that the log shows."""
-        made = {m.id: m for m in made_in(self._messages)}
-        kept = sorted(made.values(), key=lambda m: -m.times_seen)[:LANDMARKS_MOST]
-        if len(made) > len(kept):
-            self.left_out.append(
-                f"{len(made) - len(kept)} of {len(made)} landmarks, those seen least often"
-            )
-        ids = np.array([m.id for m in kept], np.int64)
-        first, last, seen = self._sightings(ids)
-        p = np.array([m.p_W_m for m in kept]).reshape(-1, 3)
-        exactly = self.packer.add_exactly
-        return {
-            "id": exactly(ids, "u4"),
-            "p": [exactly(p[:, k], "f4") for k in range(3)],
-            "sigma": exactly(sigmas_m(kept), "f4"),
-            "first": exactly(first, "u4"),
-            "last": exactly(last, "u4"),
-            "seen": exactly(seen, "u4"),
-            "rejected": self._rejections(),
-        }
-
-    def _sightings(self, ids: Any) -> tuple[Any, Any, Any]:
-        """First and last frame in which each was seen, ms, and in how many."""
-        frames = [m for m in self._messages if isinstance(m, Stereo)]
-        if not frames or not len(ids):
-            nothing = np.zeros(len(ids), np.int64)
-            return nothing, nothing, nothing
-        t_ms = np.array([max(m.t_ns - self.origin_ns, 0) // 1_000_000 for m in frames])
-        when = np.repeat(t_ms, [len(m.ids) for m in frames])
-        every = np.concatenate([m.ids for m in frames]).astype(np.int64)
-        known, at = np.unique(every, return_inverse=True)
-        first = np.full(len(known), np.iinfo(np.int64).max)
-        last, seen = np.zeros(len(known), np.int64), np.bincount(at, minlength=len(known))
-        np.minimum.at(first, at, when)
-        np.maximum.at(last, at, when)
-        where = np.minimum(np.searchsorted(known, ids), len(known) - 1)
-        there = known[where] == ids
-        return tuple(np.where(there, x[where], 0) for x in (first, last, seen))  # type: ignore[return-value]
-
-    def _rejections(self) -> dict[str, Any]:
-        rows = [
-            (max(m.t_ns - self.origin_ns, 0) // 1_000_000, m.rejected)
-            for m in self._messages
-            if isinstance(m, Evidence) and len(m.rejected)
-        ]
-        when = np.repeat([t for t, _ in rows], [len(r) for _, r in rows]).astype(np.int64)
-        names = ("id", "why", "in_succession", "mean2")
-        columns = [
-            np.concatenate([r[name] for _, r in rows]) if rows else np.zeros(0) for name in names
-        ]
-        count = len(when)
-        if count > REJECTIONS_MOST:
-            self.left_out.append(
-                f"{count - REJECTIONS_MOST} of {count} rejections, all but every "
-                f"{-(-count // REJECTIONS_MOST)}th"
-            )
-            every = slice(None, None, -(-count // REJECTIONS_MOST))
-            when, columns = when[every], [x[every] for x in columns]
-        exactly = self.packer.add_exactly
-        kinds = ("u4", "u1", "u2", "f4")
-        found = {
-            name: exactly(x, kind) for name, x, kind in zip(names, columns, kinds, strict=True)
-        }
-        return found | {"t": exactly(when, "u4")}
 
 
 _PARTS = (slice(0, 3), slice(3, 6))

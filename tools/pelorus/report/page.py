@@ -173,5 +173,6 @@ def _scripts(content: dict[str, Any], curves: Curves) -> list[str]:
         f'<script type="application/json" id="data">{told}</script>',
         f'<script type="application/octet-stream" id="columns">{curves.packer.text()}</script>',
         f"<script>{_asset('uPlot.min.js')}</script>",
+        f"<script>{_asset('map.js')}</script>",
         f"<script>{_asset('page.js')}</script>",
     ]

@@ -10,25 +10,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pelorus import schema
+from pelorus.ellipsoids import Ellipsoids, of_landmarks
 from pelorus.errors import PelorusError
 from pelorus.evaluation import assess, by_imu, on_its_clock
 from pelorus.evidence import Evidence
 from pelorus.frame_table import DIAGONAL
 from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Stereo
 from pelorus.health import reasons
-from pelorus.layout import Floats, unpack_symmetric
+from pelorus.layout import Floats
 from pelorus.trajectory import estimate_in, truth_in
 
-SIGMAS = 3.0
 COUNTS = ("observations", "matched", "used", "gated", "created", "active")  # of REPORT
 TWIST = tuple(f"{kind} {axis}" for kind in ("linear", "turn") for axis in "xyz")
-POINT_M = 0.02  # half the size of a landmark whose ellipsoid would say nothing
 
 
 def extra(module: str) -> Any:
@@ -94,13 +93,6 @@ class Moment:
             found["doubt"] = {"statistic": evidence.statistic}
             found["odometry"] = {"weight": evidence.weight, "agreement": evidence.agreement}
         return found
-
-
-class Ellipsoids(NamedTuple):
-    """Of three sigma: half axes (n, 3), m, and the turn of the axes (n, 4), x y z w."""
-
-    half_m: Floats
-    turn: Floats
 
 
 class Viewer(Protocol):
@@ -193,35 +185,6 @@ def _truth(messages: Sequence[Message]) -> dict[int, Floats]:
     if accuracy is None:
         return {}
     return dict(zip(accuracy.t_ns.tolist(), accuracy.truth.p, strict=True))
-
-
-# --- shapes ---------------------------------------------------------------------------------------
-
-
-def ellipsoids(P: Floats) -> Ellipsoids:
-    """Of covariances (n, 3, 3); one that is none becomes a point."""
-    good = np.isfinite(P).all(axis=(1, 2), keepdims=True)
-    variances, axes = np.linalg.eigh(np.where(good, P, 0.0))
-    axes[np.linalg.det(axes) < 0, :, 0] *= -1
-    half = SIGMAS * np.sqrt(np.clip(variances, 0, None))
-    return Ellipsoids(half, Rotation.from_matrix(axes).as_quat())
-
-
-def of_pose(pose: Pose) -> Ellipsoids | None:
-    """Of the position, along the body's axes; None where nothing is known of it."""
-    if not pose.knows_covariance:
-        return None
-    return ellipsoids(unpack_symmetric(np.asarray(pose.covariance)[None], 6)[:, :3, :3])
-
-
-def of_landmarks(landmarks: Sequence[Landmark], from_W_m: Floats) -> Ellipsoids:
-    """Along the world's axes. One that reaches as far as the body is away from it does not say
-    where the landmark is: it becomes a point.
-    """
-    shapes = ellipsoids(unpack_symmetric(np.array([m.covariance for m in landmarks]), 3))
-    distance = np.linalg.norm(np.array([m.p_W_m for m in landmarks]) - from_W_m, axis=1)
-    vague = shapes.half_m.max(axis=1) > distance
-    return shapes._replace(half_m=np.where(vague[:, None], POINT_M, shapes.half_m))
 
 
 def quaternion(R: Floats) -> Floats:

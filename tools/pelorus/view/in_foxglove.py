@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from pelorus.ellipsoids import Ellipsoids, of_pose
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Landmark, Pose
 from pelorus.layout import Floats, unpack_symmetric
-from pelorus.view.drive import Ellipsoids, Moment, extra, of_pose, quaternion
+from pelorus.view.drive import Moment, extra, quaternion
 
 S = 1_000_000_000
 WORLD, BODY, CAMERA = "world", "body", "camera"

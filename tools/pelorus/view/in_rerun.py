@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from pelorus.ellipsoids import Ellipsoids, of_pose
 from pelorus.errors import PelorusError
 from pelorus.frames import Header, Landmark
 from pelorus.layout import Floats
-from pelorus.view.drive import Ellipsoids, Moment, extra, of_pose, quaternion
+from pelorus.view.drive import Moment, extra, quaternion
 
 S = 1_000_000_000
 PIECE_NS = 10 * S

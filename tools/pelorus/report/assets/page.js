@@ -250,184 +250,15 @@
     }
   }
 
-  // --- the map -----------------------------------------------------------------------------------
-
-  const marks = data.landmarks, ids = exact(marks.id), p = marks.p.map(exact), sigma = exact(marks.sigma);
-  const firstSeen = exact(marks.first), lastSeen = exact(marks.last), seen = exact(marks.seen);
-  const rejected = {};
-  for (const name of ["t", "id", "why", "in_succession", "mean2"]) rejected[name] = exact(marks.rejected[name]);
-  const tracks = data.map.tracks.map((track) => ({
-    name: track.name, p: track.p.map(unpack), t: exact(track.t),
-  }));
-  const map = { axes: data.map.axes.slice(), signs: (data.map.signs || [1, 1]).slice(), x: 0, y: 0, scale: 1, chosen: -1 };
-  const PENS = { estimate: ["--l0", []], truth: ["--truth", [2, 3]] };
-  const OTHERS = [["--l1", [7, 4]], ["--l2", [9, 3, 2, 3]], ["--l3", [3, 3]]]; // as in the curves of all runs
-  const runs = tracks.map((track) => track.name).filter((name) => !(name in PENS));
-  const penOf = (name) => PENS[name] || OTHERS[runs.indexOf(name) % OTHERS.length];
-  const flat = (q, k) => [map.signs[0] * q[map.axes[0]][k], map.signs[1] * q[map.axes[1]][k]];
-
-  function fit() {
-    const box = $("map").getBoundingClientRect(), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-    for (const track of tracks.slice(0, 2)) for (let k = 0; k < track.t.length; k++) {
-      if (track.p[0][k] == null) continue; // of a filter that diverged
-      flat(track.p, k).forEach((x, i) => { if (x < low[i]) low[i] = x; if (x > high[i]) high[i] = x; });
-    }
-    if (low[0] > high[0]) return;
-    const side = Math.max(high[0] - low[0], high[1] - low[1], 1e-3);
-    map.scale = 0.8 * Math.min(box.width / Math.max(high[0] - low[0], side * 0.2), box.height / Math.max(high[1] - low[1], side * 0.2));
-    [map.x, map.y] = [0, 1].map((i) => (low[i] + high[i]) / 2);
-  }
-  const at = ([a, b]) => [map.width / 2 + (a - map.x) * map.scale, map.height / 2 - (b - map.y) * map.scale];
-  function paintWays(pen, width, height) {
-    [map.width, map.height] = [width, height];
-    pen.font = font;
-    pen.fillStyle = css("--dot");
-    pen.globalAlpha = 0.55;
-    for (let k = 0; k < ids.length; k++) {
-      const [x, y] = at(flat(p, k));
-      if (x > 0 && y > 0 && x < width && y < height) pen.fillRect(x - 1.5, y - 1.5, 3, 3);
-    }
-    pen.globalAlpha = 1;
-    [...tracks].sort((a, b) => (a.name === "estimate") - (b.name === "estimate")).forEach((track) => {
-      const [colour, dashes] = penOf(track.name);
-      pen.strokeStyle = css(colour);
-      pen.setLineDash(dashes);
-      pen.lineWidth = 1.8;
-      pen.beginPath();
-      const step = Math.max(1, Math.floor(track.t.length / 20000));
-      for (let k = 0; k < track.t.length; k += step) {
-        if (track.p[0][k] != null) pen.lineTo(...at(flat(track.p, k)));
-      }
-      pen.stroke();
-    });
-    pen.setLineDash([]);
-    scaleBar(pen, height);
-  }
-  function paintMap() {
-    const key = [map.x, map.y, map.scale, map.axes, map.signs].join();
-    const { pen } = still(map, $("map"), key, paintWays);
-    const now = Math.round(t[view.at] * 1e3);
-    const own = tracks[0];
-    if (own) {
-      const [x, y] = at(flat(own.p, Math.max(lower(own.t, now + 1) - 1, 0)));
-      pen.fillStyle = css("--accent");
-      pen.strokeStyle = css("--paper");
-      pen.lineWidth = 2;
-      pen.beginPath();
-      pen.arc(x, y, 6, 0, 7);
-      pen.fill();
-      pen.stroke();
-    }
-    const of = (id) => ids.indexOf(id);
-    pen.strokeStyle = css("--lost");
-    for (let k = lower(rejected.t, now); k < rejected.t.length && rejected.t[k] === now; k++) {
-      const mark = of(rejected.id[k]);
-      if (mark < 0) continue;
-      const [x, y] = at(flat(p, mark));
-      pen.strokeRect(x - 4, y - 4, 8, 8);
-    }
-    if (map.chosen >= 0) {
-      const [x, y] = at(flat(p, map.chosen));
-      pen.strokeStyle = css("--ink");
-      pen.beginPath();
-      pen.arc(x, y, Math.max(8, 3 * sigma[map.chosen] * map.scale), 0, 7);
-      pen.stroke();
-    }
-  }
-  function scaleBar(pen, height) {
-    const wanted = 90 / map.scale, power = 10 ** Math.floor(Math.log10(wanted));
-    const metres = [5, 2, 1].find((n) => n * power <= wanted) * power;
-    const names = map.axes.map((a, i) => (map.signs[i] < 0 ? "-" : "") + "xyz"[a]);
-    pen.fillStyle = pen.strokeStyle = css("--ink");
-    pen.lineWidth = 2;
-    pen.beginPath();
-    pen.moveTo(12, height - 14);
-    pen.lineTo(12 + metres * map.scale, height - 14);
-    pen.stroke();
-    const words = `${metres} m; right ${names[0]}, up ${names[1]}`;
-    pen.fillStyle = css("--paper");
-    pen.fillRect(8, height - 36, pen.measureText(words).width + 8, 19);
-    pen.fillStyle = css("--ink");
-    pen.fillText(words, 12, height - 22);
-  }
-  function lower(column, value) {
+  const lower = (column, value) => { // the first that is not less
     let low = 0, high = column.length;
     while (low < high) { const m = (low + high) >> 1; if (column[m] < value) low = m + 1; else high = m; }
     return low;
-  }
-  function choose(mark) {
-    map.chosen = mark;
-    const place = $("landmark");
-    if (mark < 0) { place.replaceChildren(node("p", "soft", "No such landmark in this page.")); return; }
-    const id = ids[mark], s = (ms) => (ms / 1e3).toFixed(2);
-    const where = p.map((column) => column[mark].toFixed(2)).join(", ");
-    const lines = [
-      `Landmark ${id} at (${where}) m, sigma ${sigma[mark].toPrecision(2)} m`,
-      seen[mark] ? `seen in ${seen[mark]} frames, from ${s(firstSeen[mark])} to ${s(lastSeen[mark])} s` : "never seen in this log",
-    ];
-    const why = new Map(), times = [];
-    for (let k = 0; k < rejected.id.length; k++) {
-      if (rejected.id[k] !== id) continue;
-      const words = Object.entries(data.words.why).filter(([bit]) => rejected.why[k] & bit).map(([, w]) => w).join(", ");
-      why.set(words, (why.get(words) || 0) + 1);
-      times.push(rejected.t[k]);
-    }
-    for (const [words, n] of why) lines.push(`${words || "not used"}: ${n} times`);
-    if (!times.length) lines.push("never rejected");
-    place.replaceChildren(...lines.map((line) => node("p", "", line)));
-    for (const ms of times.slice(0, 12)) {
-      const button = node("button", "", `${s(ms)} s`);
-      button.addEventListener("click", () => go(nearest(ms / 1e3), true));
-      place.append(button);
-    }
-    if (times.length > 12) place.append(node("span", "soft", ` and ${times.length - 12} more`));
-    $("id").value = id;
-    later();
-  }
-  function mapTools() {
-    const canvas = $("map");
-    tracks.forEach((track) => {
-      const item = node("span"), line = node("i");
-      line.style.background = `var(${penOf(track.name)[0]})`;
-      item.append(line, document.createTextNode(track.name));
-      $("pens").append(item);
-    });
-    let from = null;
-    canvas.addEventListener("pointerdown", (e) => { from = { x: e.offsetX, y: e.offsetY, moved: false }; });
-    canvas.addEventListener("pointermove", (e) => {
-      if (!from || e.buttons !== 1) return;
-      const [dx, dy] = [e.offsetX - from.x, e.offsetY - from.y];
-      if (!from.moved && Math.hypot(dx, dy) < 4) return;
-      map.x -= dx / map.scale;
-      map.y += dy / map.scale;
-      from = { x: e.offsetX, y: e.offsetY, moved: true };
-      later();
-    });
-    canvas.addEventListener("pointerup", (e) => {
-      if (from && !from.moved) {
-        let best = -1, least = 20;
-        for (let k = 0; k < ids.length; k++) {
-          const [x, y] = at(flat(p, k)), far = Math.hypot(x - e.offsetX, y - e.offsetY);
-          if (far < least) { least = far; best = k; }
-        }
-        if (best >= 0) choose(best);
-      }
-      from = null;
-    });
-    canvas.addEventListener("wheel", (e) => { e.preventDefault(); closer(e.deltaY < 0 ? 1.25 : 0.8); }, { passive: false });
-    $("closer").addEventListener("click", () => closer(1.4));
-    $("farther").addEventListener("click", () => closer(1 / 1.4));
-    $("whole").addEventListener("click", () => { fit(); later(); });
-    $("side").addEventListener("click", () => {
-      const [a, b] = map.axes, third = 3 - a - b;
-      map.axes = [a, third].includes(b) ? map.axes : [a, third];
-      map.signs = [map.signs[0], 1];
-      fit();
-      later();
-    });
-    $("id").addEventListener("change", (e) => choose(ids.indexOf(Number(e.target.value))));
-  }
-  const closer = (by) => { map.scale *= by; later(); };
+  };
+  const map = pelorusMap({
+    data, exact, unpack, lower, $, node, css, still, font, time: () => t[view.at],
+    go: (seconds) => go(nearest(seconds), true), later: () => later(),
+  });
 
   // --- one cursor, one zoom ----------------------------------------------------------------------
 
@@ -435,7 +266,7 @@
   function later() { // once a picture of the screen
     if (waiting) return;
     waiting = true;
-    requestAnimationFrame(() => { waiting = false; ribbons.forEach(paintRibbon); paintMap(); tell(); });
+    requestAnimationFrame(() => { waiting = false; ribbons.forEach(paintRibbon); map.paint(); tell(); });
   }
   function go(k, show) {
     view.at = Math.max(0, Math.min(count - 1, k));
@@ -516,8 +347,7 @@
 
   makeRibbons();
   data.charts.forEach(draw);
-  mapTools();
-  fit();
+  map.start();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   new ResizeObserver(() => {
     for (const u of charts) {
@@ -528,5 +358,5 @@
   }).observe($("charts"));
   if (events.length) event(0); else go(0);
   document.documentElement.dataset.ready = "yes";
-  window.pelorus = { view, go, zoom, count, t }; // for tests, and for the console
+  window.pelorus = { view, go, zoom, count, t, map: map.state }; // for tests, and for the console
 })();

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""What the page knows of each landmark: where it is and how well, when it was seen, and when and
+why it was rejected.
+
+There may be too many for a page: those seen least often are left out, and of the rejections all but
+every nth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pelorus.ellipsoids import Ellipsoids, of_landmarks
+from pelorus.evaluation import made_in, sigmas_m
+from pelorus.evidence import Evidence
+from pelorus.frames import Message, Stereo
+from pelorus.layout import Floats
+from pelorus.report.packed import Packer
+from pelorus.trajectory import Trajectory
+
+LANDMARKS_MOST = 20_000
+REJECTIONS_MOST = 60_000
+WHY = {1: "rejected by the gate", 2: "far off", 4: "it moves"}  # EVIDENCE's `why`
+
+
+def packed(shapes: Ellipsoids, packer: Packer) -> dict[str, Any]:
+    """Logarithms of the half axes, for they go from millimetres to kilometres, and x, y, z of a
+    turn whose w is not negative.
+    """
+    with np.errstate(divide="ignore"):  # -inf is told as not known
+        half = np.log10(shapes.half_m)
+    return {
+        "half": [packer.add(half[:, k]) for k in range(3)],
+        "turn": [packer.add(shapes.turn[:, k]) for k in range(3)],
+    }
+
+
+class Landmarks:
+    """What the filter left behind, and the history of each id that the log shows."""
+
+    def __init__(
+        self,
+        messages: Sequence[Message],
+        origin_ns: int,
+        way: Trajectory | None,
+        packer: Packer,
+    ) -> None:
+        self._messages = messages
+        self._origin_ns = origin_ns
+        self._way = way
+        self._packer = packer
+
+    def json(self, left_out: list[str]) -> dict[str, Any]:
+        """All of it but the columns; `left_out` is told what is not in it."""
+        made = {m.id: m for m in made_in(self._messages) if np.isfinite(m.p_W_m).all()}
+        kept = sorted(made.values(), key=lambda m: -m.times_seen)[:LANDMARKS_MOST]
+        if len(made) > len(kept):
+            left_out.append(
+                f"{len(made) - len(kept)} of {len(made)} landmarks, those seen least often"
+            )
+        ids = np.array([m.id for m in kept], np.int64)
+        first, last, seen = self._sightings(ids)
+        p = np.array([m.p_W_m for m in kept]).reshape(-1, 3)
+        exactly = self._packer.add_exactly
+        return {
+            "id": exactly(ids, "u4"),
+            "p": [exactly(p[:, k], "f4") for k in range(3)],
+            "sigma": exactly(sigmas_m(kept), "f4"),
+            "first": exactly(first, "u4"),
+            "last": exactly(last, "u4"),
+            "seen": exactly(seen, "u4"),
+            "rejected": self._rejections(left_out),
+            **packed(of_landmarks(kept, self._nearest(p)), self._packer),
+        }
+
+    def _nearest(self, p_W_m: Floats) -> Floats:
+        """(n, 3) the point of the way that is nearest to each."""
+        way = np.zeros((1, 3)) if self._way is None else self._way.poses.p
+        way = way[np.isfinite(way).all(axis=1)]
+        if not len(way) or not len(p_W_m):
+            return np.zeros((len(p_W_m), 3))
+        return np.asarray(way[cKDTree(way).query(p_W_m)[1]])
+
+    def _sightings(self, ids: Any) -> tuple[Any, Any, Any]:
+        """First and last frame in which each was seen, ms, and in how many."""
+        frames = [m for m in self._messages if isinstance(m, Stereo)]
+        if not frames or not len(ids):
+            nothing = np.zeros(len(ids), np.int64)
+            return nothing, nothing, nothing
+        t_ms = np.array([max(m.t_ns - self._origin_ns, 0) // 1_000_000 for m in frames])
+        when = np.repeat(t_ms, [len(m.ids) for m in frames])
+        every = np.concatenate([m.ids for m in frames]).astype(np.int64)
+        known, at = np.unique(every, return_inverse=True)
+        first = np.full(len(known), np.iinfo(np.int64).max)
+        last, seen = np.zeros(len(known), np.int64), np.bincount(at, minlength=len(known))
+        np.minimum.at(first, at, when)
+        np.maximum.at(last, at, when)
+        where = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+        there = known[where] == ids
+        return tuple(np.where(there, x[where], 0) for x in (first, last, seen))  # type: ignore[return-value]
+
+    def _rejections(self, left_out: list[str]) -> dict[str, Any]:
+        rows = [
+            (max(m.t_ns - self._origin_ns, 0) // 1_000_000, m.rejected)
+            for m in self._messages
+            if isinstance(m, Evidence) and len(m.rejected)
+        ]
+        when = np.repeat([t for t, _ in rows], [len(r) for _, r in rows]).astype(np.int64)
+        names = ("id", "why", "in_succession", "mean2")
+        columns = [
+            np.concatenate([r[name] for _, r in rows]) if rows else np.zeros(0) for name in names
+        ]
+        count = len(when)
+        if count > REJECTIONS_MOST:
+            left_out.append(
+                f"{count - REJECTIONS_MOST} of {count} rejections, all but every "
+                f"{-(-count // REJECTIONS_MOST)}th"
+            )
+            every = slice(None, None, -(-count // REJECTIONS_MOST))
+            when, columns = when[every], [x[every] for x in columns]
+        exactly = self._packer.add_exactly
+        kinds = ("u4", "u1", "u2", "f4")
+        found = {
+            name: exactly(x, kind) for name, x, kind in zip(names, columns, kinds, strict=True)
+        }
+        return found | {"t": exactly(when, "u4")}
