@@ -21,6 +21,7 @@ from converted import Run as Command
 from pelorus.evidence import Evidence
 from pelorus.explain import explain
 from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Truth
+from pelorus.layout import unpack_symmetric
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.report.packed import Packer
@@ -286,6 +287,77 @@ def test_a_landmark_tells_its_history(browser: Tab, written: Path, log: list[Mes
     browser.does("document.querySelector('#landmark button').click()")
     browser.settle()
     assert state(browser)["at"] > 0
+
+
+def test_the_map_turns_by_keys_and_outlines_are_the_projected_covariances(
+    browser: Tab, written: Path, log: list[Message]
+) -> None:
+    browser.open(written, 1280)
+    at = state(browser)["at"]
+    browser.does("document.getElementById('map').focus()")
+    press = "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {{key: {!r}, "
+    press += "shiftKey: {}, bubbles: true, cancelable: true}}))"
+    for key in ("ArrowRight", "ArrowDown", "ArrowDown"):
+        browser.does(press.format(key, "false"))
+    turned = browser.does("window.pelorus.map")
+    assert (turned["yaw"], turned["pitch"]) == (10, 20)
+    assert state(browser)["at"] == at
+    rows = np.array(turned["rows"])
+    assert np.allclose(rows @ rows.T, np.eye(2))
+    made = sorted(
+        {m.id: m for m in log if isinstance(m, Landmark)}.values(), key=lambda m: -m.times_seen
+    )
+    way = np.array([m.p_WB_m for m in log if isinstance(m, Pose) and m.after_stereo])
+    compared = 0
+    for k, m in enumerate(made[:60]):
+        P = unpack_symmetric(np.asarray(m.covariance)[None], 3)[0]
+        if 3 * np.sqrt(np.linalg.eigvalsh(P)[2]) > np.linalg.norm(way - m.p_W_m, axis=1).min():
+            continue
+        long, short, _ = browser.does(f"window.pelorus.map.outline({k})")
+        due = 3 * turned["scale"] * np.sqrt(np.linalg.eigvalsh(rows @ P @ rows.T))
+        assert [short, long] == pytest.approx(due, rel=2e-3)
+        compared += 1
+    assert compared > 20
+    browser.does(press.format("ArrowRight", "true"))
+    assert browser.does("window.pelorus.map.x") != turned["x"]
+    browser.does("document.getElementById('side').click()")
+    assert browser.does("window.pelorus.map.pitch") == 90
+
+
+def test_another_log_stands_beside_curve_by_curve(
+    browser: Tab, tmp_path: Path, log: list[Message]
+) -> None:
+    beside = Curves([m for m in log if not isinstance(m, Evidence)])
+    path = tmp_path / "beside.html"
+    page.write(path, answers.of_explanation(explain(log), "two"), Curves(log, beside=beside))
+    charts = {chart["title"]: chart["lines"] for chart in data_of(path)["charts"]}
+    assert [line["name"] for line in charts["Innovations"]] == ["NIS", "low", "high", "NIS, beside"]
+    assert charts["Innovations"][3]["like"] == 0
+    assert len(charts["Doubt"]) == 1  # the other log has no evidence
+    browser.troubles.clear()
+    browser.open(path, 390)
+    browser.settle()
+    assert browser.troubles == []
+    rows = "[...document.querySelectorAll('#ribbons .row span')].map((s) => s.textContent)"
+    assert browser.does(rows)[:2] == ["health", "health, beside"]
+    values = "[...document.querySelectorAll('.u-legend')].flatMap((l) => "
+    values += "[...l.querySelectorAll('.u-series')]).filter((r) => "
+    values += "r.textContent.startsWith('NIS')).map((r) => r.querySelector('.u-value').textContent)"
+    own, there = browser.does(values)
+    assert own == there
+    assert float(own) > 0
+
+
+def test_explain_sets_two_settings_side_by_side(pelorus: Command, tmp_path: Path) -> None:
+    recording, shown = tmp_path / "in.plr", tmp_path / "two.html"
+    recording.write_bytes(encode(drive(60)))
+    assert "--page" in pelorus("explain", recording, "--beside-set", "bias=on", status=2).err
+    pelorus("explain", recording, "--page", shown, "--beside-set", "pixel-sigma=2.5")
+    text = shown.read_text(encoding="utf-8")
+    assert "Dashed curves are those of pixel-sigma=2.5." in text
+    assert re.search(r"<td>pixel-sigma</td><td>[\d.]+ px</td><td>2.5 px</td>", text)
+    assert "Side by side" in text
+    assert "Drift by length" in text
 
 
 def test_a_page_without_its_data_says_so_and_keeps_its_text(

@@ -5,12 +5,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.replay import result_of
+
+if TYPE_CHECKING:
+    from pelorus.explain import Explanation
+    from pelorus.frames import Message
 
 app = typer.Typer()
 
@@ -25,6 +30,18 @@ def explain(
     ),
     page: Path | None = typer.Option(
         None, "--page", metavar="FILE.html", help="The same with curves, way and map, to look into."
+    ),
+    beside: Path | None = typer.Option(
+        None,
+        "--beside",
+        metavar="LOG.plr",
+        help="On the page: another log, each of its curves beside its like, and what differs.",
+    ),
+    beside_settings: list[str] = typer.Option(
+        [],
+        "--beside-set",
+        metavar="NAME=VALUE",
+        help="Of a recording: the same, or that of --beside, with another setting; repeatable.",
     ),
     as_json: bool = typer.Option(False, "--json", help="All of it as one JSON object."),
     config: Path | None = typer.Option(
@@ -41,15 +58,48 @@ def explain(
     """
     from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
 
-    messages = result_of(source, replay_options(config, settings), programs)
+    if page is None and (beside is not None or beside_settings):
+        raise typer.BadParameter("is seen on the page alone: --page", param_hint="--beside")
+    options = replay_options(config, settings)
+    messages = result_of(source, options, programs)
     found = explained(messages)
     if page is not None:
-        from pelorus.report import answers, curves  # noqa: PLC0415
-        from pelorus.report.page import write  # noqa: PLC0415
-
-        write(page, answers.of_explanation(found, source.name), curves.Curves(messages))
+        other = None
+        if beside is not None or beside_settings:
+            changed = replay_options(None, beside_settings, "--beside-set")
+            named = ", ".join(beside_settings) or str(beside)
+            other = named, result_of(beside or source, [*options, *changed], programs)
+        _write(page, source.name, found, messages, other)
     if as_json:
         out.print(json.dumps(found.json(), indent=2), markup=False)
         return
     for line in found.lines():
         out.print(line, markup=False)
+
+
+def _write(
+    page: Path,
+    name: str,
+    found: Explanation,
+    messages: list[Message],
+    other: tuple[str, list[Message]] | None,
+) -> None:
+    from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
+    from pelorus.report import answers  # noqa: PLC0415
+    from pelorus.report.beside import Told, drift_table, side_by_side  # noqa: PLC0415
+    from pelorus.report.curves import Curves  # noqa: PLC0415
+    from pelorus.report.page import write  # noqa: PLC0415
+
+    facts = ""
+    if other is None:
+        curves = Curves(messages)
+        first = Told(name, found, curves.accuracy, messages)
+        tables = drift_table([first])
+    else:
+        there = Curves(other[1])
+        curves = Curves(messages, beside=there)
+        first = Told(name, found, curves.accuracy, messages)
+        second = Told(other[0], explained(other[1]), there.accuracy, other[1])
+        tables = [*side_by_side(first, second), *drift_table([first, second])]
+        facts = f"Dashed curves are those of {other[0]}."
+    write(page, answers.of_explanation(found, name, tables, facts), curves)

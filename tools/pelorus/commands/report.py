@@ -92,6 +92,7 @@ def _draw(compared: Comparison, folder: Path) -> list[str]:
     from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page, pictures  # noqa: PLC0415 - as above
+    from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
 
     shown = []
@@ -108,7 +109,9 @@ def _draw(compared: Comparison, folder: Path) -> list[str]:
         if run is not main
     }
     curves = Curves(main.messages, compared.subject.truth, others)
-    answer = answers.of_comparison(compared, lines, explain(main.messages), shown)
+    found = explain(main.messages)
+    drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
+    answer = answers.of_comparison(compared, lines, found, shown, drift)
     page.write(folder / PAGE, answer, curves)
     return lines
 

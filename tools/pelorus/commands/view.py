@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
-from pelorus.errors import Existing, PelorusError, whole
+from pelorus.errors import PelorusError, whole
 from pelorus.replay import result_of
 
 if TYPE_CHECKING:
@@ -57,7 +57,6 @@ def view(
     for path in files:
         if path.exists() and path.samefile(source):
             raise PelorusError(f"{path}: is the log itself; another name is due")
-    Existing.keep(*files)
     from pelorus.view.drive import show  # noqa: PLC0415 - scipy loads slowly
     from pelorus.view.in_foxglove import InFoxglove  # noqa: PLC0415
     from pelorus.view.in_rerun import InRerun  # noqa: PLC0415

@@ -31,7 +31,9 @@ ALSO = (
 )
 
 
-def of_explanation(found: Explanation, title: str) -> Answer:
+def of_explanation(
+    found: Explanation, title: str, tables: Sequence[Table] = (), facts: str = ""
+) -> Answer:
     """Of a log."""
     first = found.first
     grade = "bad" if found.episodes else "care" if first is not None else "good"
@@ -40,8 +42,10 @@ def of_explanation(found: Explanation, title: str) -> Answer:
         title,
         grade,
         head[0].upper() + head[1:],
+        facts,
         lines=[*found.remarks, *found.setup],
         events=_events(found),
+        tables=tables,
     )
 
 
@@ -62,8 +66,9 @@ def of_comparison(
     lines: Sequence[str],
     found: Explanation,
     pictures: Sequence[tuple[str, str, Path]],
+    tables: Sequence[Table] = (),
 ) -> Answer:
-    """Of a report; `lines` are its verdicts."""
+    """Of a report; `lines` are its verdicts, `tables` stand below that of the runs."""
     from pelorus.report import words  # noqa: PLC0415 - it looks at runs, which load slowly
 
     calm = not found.episodes and list(lines) == words.NOTHING_OFF
@@ -80,7 +85,7 @@ def of_comparison(
         _facts(compared),
         [*lines, *found.setup],
         events=_events(found),
-        tables=[Table("Runs", rows, meaning)],
+        tables=[Table("Runs", rows, meaning), *tables],
         pictures=pictures,
         commands=commands,
         lists=[("Health", compared.main.health.told(compared.origin_ns))],

@@ -9,6 +9,7 @@ seen are left out, and `left_out` says how many.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from pelorus.frames import Message, Truth, TruthKnows
 from pelorus.grid.plane import AXES, choose
 from pelorus.health import GOOD, SHORT
 from pelorus.layout import Floats
-from pelorus.motion import Times
+from pelorus.motion import Times, nearest
 from pelorus.report.landmarks import WHY, Landmarks, packed
 from pelorus.report.packed import Packer
 from pelorus.trajectory import POSE_SIZE, Trajectory, estimate_in, truth_in
@@ -32,6 +33,8 @@ from pelorus.wire import header_of_messages
 SIGMAS = 3.0
 BAND = 0.95
 FRAMES_MOST = 150_000  # two hours at 20 Hz
+BESIDE = "beside"  # what curves of another log are called
+NO_HEALTH = 255
 SHAPES = 200  # ellipsoids along the way
 INSIDE = (
     "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
@@ -55,17 +58,20 @@ class Curves:
         messages: Sequence[Message],
         truth: Trajectory | None = None,
         others: Mapping[str, Other] | None = None,
+        beside: Curves | None = None,
     ) -> None:
+        """`beside` is another log: each of its curves is drawn beside its like."""
         self.packer = Packer()
         self.left_out: list[str] = []
         self._others = others or {}
+        self._beside = beside
         self._messages = messages
         self._frames = self._thinned(frame_table(messages))
         self._t = self._seconds(self._frames.t_ns)
         found = estimate_in(messages)
         self._found = found
         truth = truth_in(messages) if truth is None else truth
-        self._accuracy = _accuracy(messages, found, truth)
+        self.accuracy = _accuracy(messages, found, truth)
 
     @property
     def origin_ns(self) -> int:
@@ -98,13 +104,21 @@ class Curves:
             "health": self.packer.add_exactly(self._frames["health"], "u1"),
             "reasons": self.packer.add_exactly(self._frames.reasons, "u4"),
             "status": self.packer.add_exactly(self._frames["status"] + 128, "u1"),
+            **self._health_beside(),
             "words": _words(),
-            "charts": list(self._charts()),
+            "charts": [self._packed(chart) for chart in self._charts()],
             "map": self._map(),
             "landmarks": Landmarks(
                 self._messages, self.origin_ns, self._found and self._found[0], self.packer
             ).json(self.left_out),
         }
+
+    def _health_beside(self) -> dict[str, Any]:
+        if self._beside is None:
+            return {}
+        there = self._at_own(self._beside, self._beside._frames["health"])
+        known = np.where(np.isnan(there), NO_HEALTH, there)
+        return {"health_beside": self.packer.add_exactly(known, "u1")}
 
     # --- curves -----------------------------------------------------------------------------------
 
@@ -119,12 +133,46 @@ class Curves:
     def _chart(
         self, title: str, unit: str, about: str, lines: Sequence[tuple[str, Floats]], **more: Any
     ) -> dict[str, Any]:
-        columns = [{"name": name, **self.packer.add(values)} for name, values in lines]
-        return {"title": title, "unit": unit, "about": about, "lines": columns, **more}
+        return {"title": title, "unit": unit, "about": about, "lines": list(lines), **more}
+
+    def _packed(self, chart: dict[str, Any]) -> dict[str, Any]:
+        columns = [{"name": name, **self.packer.add(values)} for name, values in chart["lines"]]
+        if self._beside is not None:
+            for like, (line, values) in self._beside.lines(chart):
+                there = {"name": f"{line}, {BESIDE}", "like": like}
+                columns.append(there | self.packer.add(self._at_own(self._beside, values)))
+        return chart | {"lines": columns}
+
+    def lines(self, like: Mapping[str, Any]) -> Iterator[tuple[int, tuple[str, Floats]]]:
+        """The curves of the chart of the same title, with the numbers of those that they stand
+        beside; no bands.
+        """
+        names = [name for name, _ in like["lines"]]
+        for chart in self._own_charts:
+            if chart["title"] == like["title"]:
+                for k, line in enumerate(chart["lines"]):
+                    if k not in chart.get("band", ()) and line[0] in names:
+                        yield names.index(line[0]), line
+
+    @cached_property
+    def _own_charts(self) -> list[dict[str, Any]]:
+        return list(self._charts())
+
+    def _at_own(self, other: Curves, values: Floats) -> Floats:
+        """Another log's values at the frames of this one: by stamps, else by the time since the
+        first frame.
+        """
+        same = np.isin(self._frames.t_ns, other._frames.t_ns).mean() > 0.5
+        offset_ns = other.origin_ns - self.origin_ns if same else 0
+        mine, theirs = (np.round(x * 1e9).astype(np.int64) for x in (self._t, other._t))
+        theirs += offset_ns
+        at = nearest(theirs, mine)
+        reach = np.median(np.diff(mine)) / 2 if len(mine) > 1 else 0.0
+        return np.where(np.abs(theirs[at] - mine) <= reach, values[at], np.nan)
 
     def _errors(self) -> Iterator[dict[str, Any]]:
         sigma = np.sqrt(self._frames.stack(*RHO_THETA))
-        accuracy = self._accuracy
+        accuracy = self.accuracy
         if accuracy is None:
             p, r = (SIGMAS * np.linalg.norm(sigma[:, part], axis=1) for part in _PARTS)
             about = "Three sigma of the filter's own covariance, all axes; the log has no truth."
@@ -285,12 +333,15 @@ class Curves:
         trajectory = self._found[0]
         plane = choose(header_of_messages(self._messages).body_axes, trajectory.poses)
         tracks = [self._track("estimate", trajectory.t_ns, trajectory.poses.p)]
-        if self._accuracy is not None:
-            tracks.append(self._track("truth", self._accuracy.t_ns, self._accuracy.truth.p))
+        if self.accuracy is not None:
+            tracks.append(self._track("truth", self.accuracy.t_ns, self.accuracy.truth.p))
         tracks += [
             self._track(name, other.trajectory.t_ns, other.trajectory.poses.p)
             for name, other in self._others.items()
         ]
+        if (beside := self._beside) is not None and beside._found is not None:
+            there = beside._found[0]
+            tracks.append(self._track(BESIDE, there.t_ns, there.poses.p, beside._seconds))
         return {
             "tracks": tracks,
             "axes": [plane.right.number, plane.up.number],
@@ -313,10 +364,17 @@ class Curves:
             **packed(shapes, self.packer),
         }
 
-    def _track(self, name: str, t_ns: Times, p: Floats) -> dict[str, Any]:
+    def _track(
+        self,
+        name: str,
+        t_ns: Times,
+        p: Floats,
+        seconds: Callable[[Times], Floats] | None = None,
+    ) -> dict[str, Any]:
         some = slice(None, None, -(-len(p) // FRAMES_MOST))
+        since = (seconds or self._seconds)(t_ns)[some]
         columns = [self.packer.add(p[some, k]) for k in range(3)]
-        t = self.packer.add_exactly(np.round(self._seconds(t_ns)[some] * 1e3), "u4")
+        t = self.packer.add_exactly(np.round(since * 1e3), "u4")
         return {"name": name, "p": columns, "t": t}
 
 

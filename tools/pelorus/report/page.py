@@ -42,6 +42,7 @@ class Table:
     title: str
     rows: Sequence[Sequence[str]]
     about: str = ""
+    folded: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,10 +131,11 @@ def _table(table: Table) -> str:
         if table.about
         else ""
     )
-    return (
-        f'<h2>{escape(table.title)}</h2>\n<div class="wide"><table>\n<tr>{cells}</tr>\n{body}\n'
-        f"</table></div>{about}"
-    )
+    content = f'<div class="wide"><table>\n<tr>{cells}</tr>\n{body}\n</table></div>{about}'
+    title = escape(table.title)
+    if table.folded:
+        return f"<details><summary>{title}</summary>{content}</details>"
+    return f"<h2>{title}</h2>\n{content}"
 
 
 _KEYS = (

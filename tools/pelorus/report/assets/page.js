@@ -134,7 +134,8 @@
       const inBand = (chart.band || []).includes(k);
       return {
         label: line.name, width: inBand ? 1 : 1.5, spanGaps: false, points: { show: count < 60 },
-        stroke: () => css(inBand ? "--l3" : `--l${k % 4}`), dash: k > 3 ? [5, 4] : undefined, value: (u, x) => short(x),
+        stroke: () => css(inBand ? "--l3" : `--l${(line.like ?? k) % 4}`), // that of another log as its like
+        dash: line.like != null ? [6, 3] : k > 3 ? [5, 4] : undefined, value: (u, x) => short(x),
       };
     });
     const u = new uPlot({
@@ -233,7 +234,9 @@
     pen.restore();
   }
   function makeRibbons() {
-    const names = [...data.words.health.entries()].filter(([h]) => health.includes(h));
+    const there = data.health_beside && exact(data.health_beside);
+    const shown = (h) => health.includes(h) || there && there.includes(h);
+    const names = [...data.words.health.entries()].filter(([h]) => shown(h));
     for (const [h, name] of names) {
       const item = node("span"), box = node("i");
       box.style.background = `var(${COLOURS[h]})`;
@@ -241,6 +244,7 @@
       $("key").append(item);
     }
     ribbon("health", (k) => status[k] === 128 ? COLOURS[health[k]] : "--refused", () => true);
+    if (there) ribbon("health, beside", (k) => COLOURS[there[k]], (k) => there[k] < COLOURS.length);
     let seen = 0;
     for (const bits of reasons) seen |= bits;
     for (let bit = 0; bit < 32; bit++) {

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""What the page says in tables of one log, or of two side by side: settings that differ, figures,
+drift by length.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from pelorus.evaluation import Accuracy
+from pelorus.explain.explanation import Explanation
+from pelorus.frames import Config, Message
+from pelorus.relative_error import Drift, drifts
+from pelorus.report.curves import BESIDE
+from pelorus.report.page import Table
+from pelorus.report.words import NONE, number
+from pelorus.settings import describe
+
+DRIFT = (
+    "How far a piece of the way of that length is off, wherever it begins, first poses aligned: "
+    "RMS over the starts, as KITTI counts it."
+)
+
+
+class Told(NamedTuple):
+    """A log by its name."""
+
+    name: str
+    found: Explanation
+    accuracy: Accuracy | None
+    messages: Sequence[Message]
+
+
+def drift_table(logs: Sequence[Told]) -> list[Table]:
+    """None where no log has a truth."""
+    by_log = {
+        log.name: {drift.length_m: drift for drift in drifts(log.accuracy)}
+        for log in logs
+        if log.accuracy is not None
+    }
+    lengths = sorted({length for found in by_log.values() for length in found})
+    if not lengths:
+        return []
+    head = ["position m", "%", "rotation deg", "starts"]
+    whose = ["", f"{BESIDE} "] if len(by_log) > 1 else [""]
+    rows = [["length", *(f"{who}{name}" for who in whose for name in head)]]
+    for length in lengths:
+        cells = [_cells(found.get(length)) for found in by_log.values()]
+        rows.append([f"{length:g} m", *itertools.chain(*cells)])
+    return [Table("Drift by length (RPE)", rows, DRIFT, folded=True)]
+
+
+def _cells(drift: Drift | None) -> list[str]:
+    if drift is None:
+        return [NONE] * 4
+    figures = (drift.position_m, drift.percent, drift.rotation_deg)
+    return [*(f"{x:.3g}" for x in figures), str(drift.starts)]
+
+
+def side_by_side(first: Told, second: Told) -> list[Table]:
+    """Figures of both, and the settings in which they differ."""
+    head = ("", first.name, BESIDE)
+    mine, theirs = dict(_figures(first)), dict(_figures(second))
+    tables = [Table("Side by side", [head, *((key, x, theirs[key]) for key, x in mine.items())])]
+    if settings := list(_settings(first, second)):
+        tables.append(Table("Settings that differ", [head, *settings]))
+    return tables
+
+
+def _figures(log: Told) -> Iterator[tuple[str, str]]:
+    cause = log.found.first
+    yield "first cause", "nothing" if cause is None else str(cause.cause)
+    yield "events", str(len(log.found.episodes))
+    yield "good frames", f"{log.found.health.by_health['good']} of {log.found.health.frames}"
+    figures = {} if log.accuracy is None else log.accuracy.figures
+    for title, key in (
+        ("err0 m", "err0_m"),
+        ("ATE m", "ate_m"),
+        ("rotation deg", "rot_deg"),
+        ("NEES/6", "nees_per_dof"),
+    ):
+        yield title, number(figures.get(key))
+
+
+def _settings(first: Told, second: Told) -> Iterator[tuple[str, ...]]:
+    mine, theirs = (_in_force(log.messages) for log in (first, second))
+    for id in sorted(mine.keys() | theirs.keys()):
+        here, there = mine.get(id), theirs.get(id)
+        if here != there:
+            name = describe(id, 0.0)[0]
+            yield name, *(NONE if x is None else describe(id, x)[1] for x in (here, there))
+
+
+def _in_force(messages: Sequence[Message]) -> dict[int, float]:
+    configs = [m for m in messages if isinstance(m, Config) and m.build_fingerprint]
+    return configs[-1].settings if configs else {}
