@@ -17,6 +17,13 @@ CONFIG = typer.Option(
 SETTINGS = typer.Option(
     [], "--set", metavar="NAME=VALUE", help="One setting more, for example bias=on; repeatable."
 )
+PICTURES = typer.Option(
+    None,
+    metavar="FOLDER|BAG",
+    help="On the page: pictures of the moments that matter, with tracks and residuals. What the "
+    "recording was converted from; or a folder of the left camera's rectified pictures, named by "
+    "their times in ns, or one a frame.",
+)
 PROGRAMS = typer.Option(
     None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
 )

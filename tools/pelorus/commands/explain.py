@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.replay import result_of
 
@@ -31,6 +31,7 @@ def explain(
     page: Path | None = typer.Option(
         None, "--page", metavar="FILE.html", help="The same with curves, way and map, to look into."
     ),
+    pictures: Path | None = PICTURES,
     beside: Path | None = typer.Option(
         None,
         "--beside",
@@ -58,8 +59,9 @@ def explain(
     """
     from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
 
-    if page is None and (beside is not None or beside_settings):
-        raise typer.BadParameter("is seen on the page alone: --page", param_hint="--beside")
+    if page is None and (beside is not None or beside_settings or pictures is not None):
+        where = "--beside / --beside-set / --pictures"
+        raise typer.BadParameter("what they ask for is seen on a --page alone", param_hint=where)
     options = replay_options(config, settings)
     messages = result_of(source, options, programs)
     found = explained(messages)
@@ -69,7 +71,7 @@ def explain(
             changed = replay_options(None, beside_settings, "--beside-set")
             named = ", ".join(beside_settings) or str(beside)
             other = named, result_of(beside or source, [*options, *changed], programs)
-        _write(page, source.name, found, messages, other)
+        _write(page, source.name, found, messages, other, pictures)
     if as_json:
         out.print(json.dumps(found.json(), indent=2), markup=False)
         return
@@ -83,11 +85,13 @@ def _write(
     found: Explanation,
     messages: list[Message],
     other: tuple[str, list[Message]] | None,
+    pictures: Path | None,
 ) -> None:
     from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
     from pelorus.report import answers  # noqa: PLC0415
     from pelorus.report.beside import Told, drift_table, side_by_side  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
+    from pelorus.report.footage import footage  # noqa: PLC0415
     from pelorus.report.page import write  # noqa: PLC0415
 
     facts = ""
@@ -102,4 +106,7 @@ def _write(
         second = Told(other[0], explained(other[1]), there.accuracy, other[1])
         tables = [*side_by_side(first, second), *drift_table([first, second])]
         facts = f"Dashed curves are those of {other[0]}."
-    write(page, answers.of_explanation(found, name, tables, facts), curves)
+    answer = answers.of_explanation(found, name, tables, facts)
+    if pictures is not None:
+        answer = answers.with_footage(answer, footage(messages, found, pictures))
+    write(page, answer, curves)

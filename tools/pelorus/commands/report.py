@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, progress
 from pelorus.errors import Existing, made, whole_folder
 from pelorus.replay import find_programs
@@ -52,6 +52,7 @@ def report(
     ),
     settings: list[str] = SETTINGS,
     also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
+    pictures: Path | None = PICTURES,
     programs: Path | None = PROGRAMS,
 ) -> None:
     """Replay a recording with your settings and by dead reckoning, and show what came out.
@@ -74,7 +75,7 @@ def report(
         from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
 
         compared = Comparison(subject, runs)
-        lines = _draw(compared, part)
+        lines = _draw(compared, part, pictures)
         _remove_pictures(folder)
     _tell(compared, lines, folder / PAGE)
 
@@ -87,13 +88,14 @@ def _remove_pictures(folder: Path) -> None:
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 
-def _draw(compared: Comparison, folder: Path) -> list[str]:
+def _draw(compared: Comparison, folder: Path, source: Path | None) -> list[str]:
     """The pictures and the page; the verdicts on it."""
     from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.explain import explain  # noqa: PLC0415 - as above
     from pelorus.report import answers, page, pictures  # noqa: PLC0415 - as above
     from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
+    from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
     shown = []
     for picture in progress(pictures.pictures(compared), "drawing"):
@@ -112,6 +114,8 @@ def _draw(compared: Comparison, folder: Path) -> list[str]:
     found = explain(main.messages)
     drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
+    if source is not None:
+        answer = answers.with_footage(answer, footage(main.messages, found, source))
     page.write(folder / PAGE, answer, curves)
     return lines
 

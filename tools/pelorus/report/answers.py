@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pelorus.explain.explanation import Episode, Explanation
+from pelorus.report.footage import CAPTION, Footage
 from pelorus.report.page import GRADES, Answer, Event, Table
 
 if TYPE_CHECKING:
@@ -29,6 +31,14 @@ ALSO = (
     "settings of the course report that Pelorus grew from, whatever settings the others have; both "
     "in float64."
 )
+
+
+def with_footage(answer: Answer, shown: Footage) -> Answer:
+    """The same with pictures."""
+    left_out = (
+        f"{len(shown.moments)} of {shown.frames} frames are shown: events, and some all along."
+    )
+    return replace(answer, moments=shown.moments, about_moments=f"{left_out} {CAPTION}")
 
 
 def of_explanation(

@@ -58,6 +58,8 @@ class Answer:
     events: Sequence[Event] = ()
     tables: Sequence[Table] = ()
     pictures: Sequence[tuple[str, str, Path]] = ()  # title, caption, PNG
+    moments: Sequence[tuple[float, str, bytes]] = ()  # s since the first frame, words, WebP
+    about_moments: str = ""
     commands: Sequence[str] = ()
     lists: Sequence[tuple[str, Sequence[str]]] = ()  # to unfold: what stands before, and the rest
 
@@ -75,7 +77,8 @@ def write(path: Path, answer: Answer, curves: Curves | None = None) -> None:
     ]
     if curves is not None:
         content = curves.json()  # before what it has left out is told
-        parts += [_asset("body.html"), *_below(answer, curves), *_scripts(content, curves)]
+        body = _asset("body.html").replace("<!-- moments -->", _moments(answer))
+        parts += [body, *_below(answer, curves), *_scripts(content, curves)]
     else:
         parts += ["<main>", *_pictures(answer), "</main>", *_commands(answer)]
     parts.append("</body>\n</html>\n")
@@ -150,6 +153,22 @@ def _below(answer: Answer, curves: Curves) -> list[str]:
         words = "; ".join(curves.left_out)
         out.append(f'<p class="soft">Left out, to keep the page small: {escape(words)}.</p>')
     return [*out, "</main>", *_commands(answer)]
+
+
+def _moments(answer: Answer) -> str:
+    """A strip of pictures, each of which brings the cursor to its frame."""
+    if not answer.moments:
+        return ""
+    out = [f'<h2>In the pictures</h2>\n<p class="soft">{escape(answer.about_moments)}</p>']
+    out.append('<div class="strip" tabindex="0" role="group" aria-label="pictures">')
+    for t_s, words, packed in answer.moments:
+        caption = escape(f"{t_s:.2f} s {words}".strip())
+        out.append(
+            f'<button class="moment" data-at="{t_s:.3f}"><img alt="the left picture at {caption}" '
+            f'src="data:image/webp;base64,{base64.b64encode(packed).decode("ascii")}">'
+            f"<span>{caption}</span></button>"
+        )
+    return "\n".join([*out, "</div>"])
 
 
 def _pictures(answer: Answer) -> list[str]:

@@ -270,7 +270,7 @@
   function later() { // once a picture of the screen
     if (waiting) return;
     waiting = true;
-    requestAnimationFrame(() => { waiting = false; ribbons.forEach(paintRibbon); map.paint(); tell(); });
+    requestAnimationFrame(() => { waiting = false; ribbons.forEach(paintRibbon); map.paint(); tell(); mark(); });
   }
   function go(k, show) {
     view.at = Math.max(0, Math.min(count - 1, k));
@@ -348,6 +348,17 @@
   $("theme").addEventListener("click", theme);
   $("previous").hidden = $("next").hidden = !events.length;
   events.forEach((button, k) => button.addEventListener("click", () => event(k)));
+
+  const moments = [...document.querySelectorAll("button.moment")];
+  moments.forEach((button) => button.addEventListener("click", () => go(nearest(Number(button.dataset.at)), true)));
+  let marked;
+  function mark() { // the latest picture that is not after the cursor
+    const now = t[view.at] + 1e-3;
+    const last = moments.filter((button) => Number(button.dataset.at) <= now).at(-1);
+    for (const button of moments) button.classList.toggle("now", button === last);
+    if (last && last !== marked) last.parentElement.scrollTo({ left: last.offsetLeft - last.parentElement.offsetLeft - 4 });
+    marked = last;
+  }
 
   makeRibbons();
   data.charts.forEach(draw);
