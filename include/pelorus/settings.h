@@ -117,8 +117,9 @@ typedef struct plr_config {
      * Which parts of the camera's calibration are estimated on the way: bits of plr_calibrate. Each
      * begins as the calibration says, with the sigma of its own setting, and is learnt as far as the
      * drive shows it: with an IMU a minute of walking with turns shows all of them, at rest and at
-     * constant speed nothing shows. Parts that are not listed are considered: covariances contain
-     * their sigma, and estimates do not depend on it. */
+     * constant speed nothing shows. By twists, whose scale and axes are wrong as easily, less shows, and
+     * what successive frames have in common counts as error of the twists. Parts that are not
+     * listed are considered: covariances contain their sigma, and estimates do not depend on it. */
     uint8_t calibrate;
 
     /* Setting known-map: 0 or 1, default 0.

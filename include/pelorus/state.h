@@ -219,6 +219,11 @@ typedef struct plr_calibration_estimate {
     /* Of the errors' covariance G D G^T: G, a lower triangle of ones on its diagonal, row k the column
      * of error k; and D beside the prior's variances. */
     plr_real factor[PLR_CALIBRATIONS * PLR_CALIBRATIONS], told[PLR_CALIBRATIONS];
+    /* By twists: what successive frames say of each, summed up, older ones weighted less; the variance
+     * of that sum if their errors are white; and its mean square beside that variance. */
+    plr_real sum[PLR_CALIBRATIONS], sum_variance[PLR_CALIBRATIONS], usual[PLR_CALIBRATIONS];
+    plr_real usual_frames; /* from which that was learnt */
+    plr_real excess; /* the largest that is usual, 1 or more: what is learnt counts 1/excess */
 } plr_calibration_estimate;
 
 /* Settings and camera in the filter's precision; of sigmas the squares. */

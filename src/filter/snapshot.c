@@ -17,7 +17,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 12 };
+enum { STATE_VERSION = 13 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -70,18 +70,22 @@ static uint32_t rows(const plr_filter *f, unsigned landmarks) {
     return (uint32_t)plr_covariance_row(f, landmarks);
 }
 
-/* Behind the sensitivity: by how much each error has been corrected, and the information, rows of those
- * that are estimated by all. `f` NULL: it is skipped. */
+/* Behind the sensitivity: by how much each error has been corrected; the information, rows of those that
+ * are estimated by all; and of those how white their residuals are. `f` NULL: it is skipped. */
 static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *errors) {
     plr_calibration_estimate *to = f ? &f->calibration : NULL;
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->moved : NULL, errors->count);
     for (unsigned k = 0; k < errors->estimated; k++)
         plr_codec_numbers(c, PLR_FIELD_F64, to ? to->information + PLR_CALIBRATIONS * k : NULL,
                           errors->count);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum : NULL, errors->estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum_variance : NULL, errors->estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, errors->estimated);
 }
 
 static uint32_t calibration_size(const plr_calibrated *errors) {
-    return errors->count * (uint32_t)(sizeof(plr_real) + errors->estimated * sizeof(double));
+    return errors->count * (uint32_t)(sizeof(plr_real) + errors->estimated * sizeof(double)) +
+           3 * errors->estimated * (uint32_t)sizeof(plr_real);
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
@@ -259,6 +263,8 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
         return PLR_E_CORRUPT;
     PASS(c, f, time);
     plr_status status = read_pose(c, f);
+    if (f)
+        plr_calibration_forget(f);
     PASS(c, f, filter);
     if (f) {
         f->count = count.landmarks;
@@ -277,7 +283,6 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));
     for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
-    plr_calibration_forget(f);
     pass_calibration(c, f, &f->par.calibrated);
     return plr_calibration_take_up(f) ? as_stored(c) : PLR_E_CORRUPT;
 }

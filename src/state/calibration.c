@@ -14,8 +14,15 @@
 
 enum {
     K = PLR_CALIBRATIONS,
-    MOST_SIGMAS = 5 /* of the prior, in one correction: more is no calibration */
+    MOST_SIGMAS = 5,    /* of the prior, in one correction: more is no calibration */
+    USUAL_AT_FIRST = 20 /* frames that the prior of what is usual counts */
 };
+
+/* What a frame says of the calibration is added up over some 32 frames, seconds of a camera: slow errors
+ * of the odometry last as long. */
+#define KEPT (PLR_R(1) - PLR_R(1) / PLR_R(32))
+/* Added to the variance of that sum, in sigmas of the prior: what is told less of is no evidence. */
+#define LITTLE PLR_R(1e-4)
 
 /* ---------------------------------------------------------------- the columns */
 
@@ -91,9 +98,13 @@ void plr_calibration_forget(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     memset(c->information, 0, sizeof c->information);
     memset(c->factor, 0, sizeof c->factor);
+    memset(c->sum, 0, sizeof c->sum);
+    memset(c->sum_variance, 0, sizeof c->sum_variance);
+    c->usual_frames = USUAL_AT_FIRST;
+    c->excess = 1;
     for (unsigned k = 0; k < K; k++) {
         c->information[(K + 1) * k] = 1;
-        c->factor[(K + 1) * k] = c->told[k] = 1;
+        c->factor[(K + 1) * k] = c->told[k] = c->usual[k] = 1;
     }
 }
 
@@ -231,20 +242,28 @@ static double sigma_of(const plr_filter *f, unsigned k) {
     return (double)PLR_SQRT(f->par.calibrated.variance[k]);
 }
 
-/* The information, each error in sigmas of its prior, += share times what was learnt. */
+/* What was learnt of k and l, each error in sigmas of its prior. */
+static double learnt(const plr_filter *f, unsigned k, unsigned l) {
+    const unsigned row = k < l ? k : l, column = k < l ? l : k;
+    return sigma_of(f, row) * sigma_of(f, column) * (double)f->work.learnt.J[K * row + column];
+}
+
+/* The information += share times what was learnt. */
 static void add_information(plr_filter *f, double share) {
     for (unsigned k = 0; k < f->par.calibrated.estimated; k++)
         for (unsigned l = k; l < f->par.calibrated.count; l++)
-            f->calibration.information[K * k + l] +=
-                share * sigma_of(f, k) * sigma_of(f, l) * (double)f->work.learnt.J[K * k + l];
+            f->calibration.information[K * k + l] += share * learnt(f, k, l);
 }
 
-/* J = L D L^T of the first n rows: L^T above the diagonal of U, D on it. False if a pivot is not above
- * zero. */
-static bool factorise(unsigned n, const double *J, double *U) {
+/* The information J, where the prior's share counts `excess` times, = L D L^T in the rows of the estimated:
+ * L^T above the diagonal of U, D on it. False if a pivot is not above zero. */
+static bool factorise(const plr_filter *f, plr_real excess, double *U) {
+    const unsigned n = f->par.calibrated.estimated;
     for (unsigned k = 0; k < n; k++)
         for (unsigned l = k; l < n; l++) {
-            double sum = J[K * k + l];
+            double sum = f->calibration.information[K * k + l];
+            if (l == k)
+                sum += (double)(excess - PLR_R(1));
             for (unsigned i = 0; i < k; i++)
                 sum -= U[K * i + k] * U[K * i + l] * U[(K + 1) * i];
             U[K * k + l] = l == k ? sum : sum / U[(K + 1) * k];
@@ -271,7 +290,7 @@ static void solve(unsigned n, const double *U, double *x) {
     solve_back(n, U, x);
 }
 
-/* The columns of G: of an estimated error that of L^-T, whose variance is 1 / D; of one that is
+/* The columns of G: of an estimated error that of L^-T, whose variance is excess / D; of one that is
  * considered how it misleads the others. In sigmas of the prior. */
 static void factor_covariance(plr_filter *f, const double *U) {
     plr_calibration_estimate *c = &f->calibration;
@@ -281,7 +300,7 @@ static void factor_covariance(plr_filter *f, const double *U) {
         if (k < n) {
             x[k] = 1;
             solve_back(n, U, x);
-            c->told[k] = (plr_real)(1 / U[(K + 1) * k]);
+            c->told[k] = (plr_real)((double)c->excess / U[(K + 1) * k]);
         } else {
             for (unsigned j = 0; j < n; j++)
                 x[j] = -c->information[K * j + k];
@@ -294,22 +313,61 @@ static void factor_covariance(plr_filter *f, const double *U) {
 
 bool plr_calibration_take_up(plr_filter *f) {
     double U[K * K];
-    const bool good = factorise(f->par.calibrated.estimated, f->calibration.information, U);
+    const bool good = factorise(f, f->calibration.excess, U);
     if (good)
         factor_covariance(f, U);
     return good;
 }
 
+/* The variance of what a frame says of error k beside its estimate, were all errors white: J + J Sigma J. */
+static plr_real score_variance(const plr_filter *f, unsigned k) {
+    const plr_calibration_estimate *c = &f->calibration;
+    double sum = learnt(f, k, k);
+    for (unsigned m = 0; m < f->par.calibrated.estimated; m++) {
+        double by = learnt(f, m, k);
+        for (unsigned j = 0; j < m; j++)
+            by += (double)c->factor[K * m + j] * sigma_of(f, m) / sigma_of(f, j) * learnt(f, j, k);
+        sum += by * by * (double)c->told[m];
+    }
+    return (plr_real)sum;
+}
+
+/* How much more the scores g of several frames add up to than those of one suggest. Errors that are alike
+ * from frame to frame do not average out, and the information of the residuals, taken for white, is
+ * that much too large: an overdispersion (McCullagh and Nelder, Generalized Linear Models, 1989, 4.5), of
+ * a sum because of the correlation. */
+static plr_real note_excess(plr_filter *f, const double g[K]) {
+    plr_calibration_estimate *c = &f->calibration;
+    plr_real largest = 1;
+    c->usual_frames += 1;
+    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+        c->sum[k] = PLR_FMA(KEPT, c->sum[k], (plr_real)g[k]);
+        c->sum_variance[k] = PLR_FMA(KEPT * KEPT, c->sum_variance[k], score_variance(f, k));
+        const plr_real ratio = c->sum[k] * c->sum[k] / (c->sum_variance[k] + LITTLE);
+        c->usual[k] += (ratio - c->usual[k]) / c->usual_frames;
+        if (c->usual[k] > largest)
+            largest = c->usual[k];
+    }
+    return largest;
+}
+
+/* The estimate is that of all frames so far, each of them counting 1/excess of what it says: so what is
+ * found out of the excess holds for those before, too. */
 void plr_calibration_learn(plr_filter *f) {
+    plr_calibration_estimate *c = &f->calibration;
     const unsigned n = f->par.calibrated.estimated;
     double U[K * K], x[K];
-    plr_real ds[K];
-    if (n == 0 || !f->calibration.moves)
+    plr_real ds[K], excess = 1;
+    if (n == 0 || !c->moves)
         return;
-    add_information(f, 1);
-    bool good = factorise(n, f->calibration.information, U);
     for (unsigned k = 0; k < n; k++)
         x[k] = sigma_of(f, k) * (double)f->work.learnt.eta[k];
+    if (f->config.process == PLR_PROCESS_TWIST)
+        excess = note_excess(f, x);
+    for (unsigned k = 0; k < n; k++)
+        x[k] -= (double)((excess - c->excess) * c->moved[k]) / sigma_of(f, k);
+    add_information(f, 1);
+    bool good = factorise(f, excess, U);
     if (good)
         solve(n, U, x);
     for (unsigned k = 0; k < n && good; k++) {
@@ -320,6 +378,7 @@ void plr_calibration_learn(plr_filter *f) {
         add_information(f, -1);
         return;
     }
+    c->excess = excess;
     factor_covariance(f, U);
     plr_combine_rows(plr_covariance_dim(f), n, ds, 1, f->S[0], PLR_MAX_LD, f->work.dx);
     correct_camera(f, ds);
