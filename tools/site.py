@@ -36,7 +36,8 @@ DRIVE, DRIVE_SUM = ROOT / "tests/golden/drive.plr", ROOT / "tests/golden/drive.s
 DRIVE_WORDS = ("--slots", "32")  # of the boards
 PICTURES = ("*.png", "*.webp")
 Known = dict[str, Sequence[str] | dict[str, str]]
-HEADER_LINK = re.compile(r"(\]\((?:\.\./)?include/pelorus/\w+\.h)\)")
+SOURCE_LINK = re.compile(r"\]\(((?:\.\./)?([\w./-]+\.(h|py)))\)")
+LANGUAGES = {"h": "c", "py": "python"}
 
 
 def trajectory_sum(recording: Path, words: tuple[str, ...], folder: Path) -> str:
@@ -86,42 +87,51 @@ def replay_page(out: Path) -> Path:
     return page
 
 
-def copied(source: Path, target: Path) -> None:
-    """A page; its links to headers lead to their pages."""
+def copied(source: Path, target: Path) -> set[str]:
+    """A page, whose links to sources lead to their pages; which sources those are."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(HEADER_LINK.sub(r"\1.md)", source.read_text("utf-8")), encoding="utf-8")
+    text = source.read_text("utf-8")
+    target.write_text(SOURCE_LINK.sub(r"](\1.md)", text), encoding="utf-8")
+    return {match[2] for match in SOURCE_LINK.finditer(text)}
 
 
 def stage(folder: Path, replay: Path | None) -> None:
     """What zensical builds: its settings, and `pages`, laid out as the repository is."""
     pages = folder / "pages"
+    headers = [one.relative_to(ROOT).as_posix() for one in (ROOT / "include/pelorus").glob("*.h")]
+    sources = set(headers)
     for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
-        copied(page, pages / page.relative_to(ROOT))
-    pictures = pages / "docs/images"
-    pictures.mkdir()
-    for picture in (one for kind in PICTURES for one in (ROOT / "docs/images").glob(kind)):
-        shutil.copy(picture, pictures)
-    names = []
-    for header in sorted((ROOT / "include/pelorus").glob("*.h")):
-        name = header.relative_to(ROOT).as_posix()
-        names.append(name)
+        sources |= copied(page, pages / page.relative_to(ROOT))
+    for name in sources:
         page = pages / f"{name}.md"
         page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(f"# {header.name}\n\n```c\n{header.read_text('utf-8')}```\n", "utf-8")
+        source, language = (ROOT / name).read_text("utf-8"), LANGUAGES[name.rpartition(".")[2]]
+        page.write_text(f"# {Path(name).name}\n\n```{language}\n{source}```\n", "utf-8")
+    (pages / "docs/images").mkdir(exist_ok=True)
+    for picture in (one for kind in PICTURES for one in (ROOT / "docs/images").glob(kind)):
+        shutil.copy(picture, pages / "docs/images")
+    shutil.copy(PARTS / "wide.css", pages)
     if replay is None:
         (pages / "replay.html").write_text("left out: tools/site.py makes it\n", "utf-8")
     else:
         shutil.copy(replay, pages / "replay.html")
-    shutil.copy(PARTS / "wide.css", pages)
     settings = (PARTS / "zensical.yml").read_text("utf-8")
-    headers = "\n".join(f"      - {Path(name).name}: {name}.md" for name in names)
-    settings = settings.replace("      - HEADERS", headers)
-    (folder / "mkdocs.yml").write_text(settings, encoding="utf-8")
+    entries = "\n".join(f"      - {Path(name).name}: {name}.md" for name in sorted(headers))
+    settings = settings.replace("      - HEADERS", entries)
+    (folder / "zensical.yml").write_text(settings, encoding="utf-8")
 
 
 def built(folder: Path) -> Path:
     """The site of what is staged there."""
-    command = [sys.executable, "-m", "zensical", "build", "--strict"]
+    command = [
+        sys.executable,
+        "-m",
+        "zensical",
+        "build",
+        "--strict",
+        "--config-file",
+        "zensical.yml",
+    ]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         said = (done.stdout + done.stderr).partition("Traceback")[0]
