@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from converted import Run as Command
+from pelorus import schema
 from pelorus.errors import PelorusError
 from pelorus.evidence import Evidence
 from pelorus.explain import Explanation, explain
@@ -176,6 +177,35 @@ def test_settings_that_do_not_fit_are_told_as_such_and_not_as_an_event(tmp_path:
 
 
 # --- how it is told -------------------------------------------------------------------------------
+
+
+def test_readings_that_come_late_all_along_are_a_matter_of_settings(tmp_path: Path) -> None:
+    messages = simulated(twist_delay_s=0.08)
+    found = explained(messages, tmp_path)
+    (words,) = [words for words in found.setup if "later than the frames" in words]
+    told = re.search(r"come ([\d.]+) s later", words)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.08, abs=0.011)
+    assert "were refused: set twist-delay" in words
+    assert explained(messages, tmp_path, "--twist-delay", "0.1").setup == ()
+
+
+def test_health_that_nothing_explains_is_told(tmp_path: Path) -> None:
+    messages = log_of(simulated(), tmp_path)
+    reports = [k for k, m in enumerate(messages) if isinstance(m, Report) and m.observations]
+    for k in reports[100:110]:
+        report = messages[k]
+        assert isinstance(report, Report)
+        messages[k] = replace(report, health=1, reasons=schema.number("reason", "NIS_HIGH"))
+    found = explain(messages)
+    assert found.episodes == ()
+    (line,) = found.lines()[1:]
+    assert line.startswith("not explained: degraded from 10.")
+    assert "(10 frames): innovations larger than the noise explains" in line
+    assert found.json()["not_explained"] == [line.removeprefix("not explained: ")]
+    answer = answers.of_explanation(found, "odd")
+    assert answer.grade == "care"
+    assert [event.lines for event in answer.events] == [(line,)]
 
 
 def test_a_log_full_of_events_is_told_in_twenty_lines(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import PROGRAMS, SETTINGS, settings_given
+from pelorus.commands.choices import PICTURES, PROGRAMS, SETTINGS, settings_given
 from pelorus.console import out
 from pelorus.errors import write_text
 from pelorus.replay import find_programs
@@ -41,6 +41,7 @@ def check(
     page: Path | None = typer.Option(
         None, "--page", metavar="FILE.html", help="The verdict with curves, way and map of the run."
     ),
+    pictures: Path | None = PICTURES,
     as_json: bool = typer.Option(False, "--json", help="The verdict as one JSON object."),
     programs: Path | None = PROGRAMS,
 ) -> None:
@@ -53,12 +54,14 @@ def check(
     """
     from pelorus.check import checked  # noqa: PLC0415 - scipy loads slowly
 
+    if pictures is not None and page is None:
+        raise typer.BadParameter("are seen on a --page alone", param_hint="--pictures")
     given = settings_given(config, settings)
     program = find_programs(programs).float32
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         found = checked.check(program, recording, given, Path(folder))
         if page is not None:
-            _write(page, found, recording, program, Path(folder))
+            _write(page, found, recording, program, Path(folder), pictures)
     if found.tuned is not None:
         write_text(tuned, checked.config_text(found, recording))
     if as_json:
@@ -69,7 +72,14 @@ def check(
         raise typer.Exit(1)
 
 
-def _write(page: Path, found: Checked, recording: Path, program: Path, folder: Path) -> None:
+def _write(
+    page: Path,
+    found: Checked,
+    recording: Path,
+    program: Path,
+    folder: Path,
+    pictures: Path | None,
+) -> None:
     """With curves of a run with the settings that were found; without them, where a fault stopped
     the search.
     """
@@ -79,6 +89,7 @@ def _write(page: Path, found: Checked, recording: Path, program: Path, folder: P
     from pelorus.replay import Outputs, replay  # noqa: PLC0415
     from pelorus.report import answers  # noqa: PLC0415
     from pelorus.report.curves import Curves  # noqa: PLC0415
+    from pelorus.report.footage import footage  # noqa: PLC0415
     from pelorus.report.page import write  # noqa: PLC0415
 
     if found.tuned is None:
@@ -87,7 +98,11 @@ def _write(page: Path, found: Checked, recording: Path, program: Path, folder: P
     outputs = Outputs.named(folder, "page")
     replay(program, recording, options_of(found.tuned.settings), outputs)
     messages = wire.messages_of(outputs.log)
-    write(page, answers.of_check(found, recording.name, explain(messages)), Curves(messages))
+    explained = explain(messages)
+    answer = answers.of_check(found, recording.name, explained)
+    if pictures is not None:
+        answer = answers.with_footage(answer, footage(messages, explained, pictures))
+    write(page, answer, Curves(messages))
 
 
 def _tell(found: Checked, tuned: Path) -> None:

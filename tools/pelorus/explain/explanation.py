@@ -26,6 +26,7 @@ TOGETHER_NS = S  # what begins within is told in the order of causes
 BEFORE_NS = S  # what was seen before: the last second
 LINES = 20
 EPISODES_TOLD = 4
+SPELLS_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class Explanation:
     setup: tuple[str, ...]
     health: TimeLine
     remarks: tuple[str, ...] = ()  # what the log lacks
+    unexplained: tuple[Spell, ...] = ()  # health that was not good, and no finding says why
 
     @property
     def first(self) -> Finding | None:
@@ -77,6 +79,7 @@ class Explanation:
         out = list(self._head())
         out += [f"log: {words}" for words in self.remarks]
         out += [f"setup: {words}" for words in self.setup]
+        out += self._unexplained()
         told = min(len(self.episodes), EPISODES_TOLD)
         room = (LINES - 1 - len(out)) // max(told, 1)
         for number, episode in enumerate(self.episodes[:told], 1):
@@ -91,6 +94,12 @@ class Explanation:
         what = "nothing happened" if not count else "one event" if count == 1 else f"{count} events"
         whole = self.seconds(self.end_ns)
         yield f"{what} in {whole:.1f} s; health: {self.health.summary()}"
+
+    def _unexplained(self) -> Iterator[str]:
+        for spell in self.unexplained[:SPELLS_TOLD]:
+            yield f"not explained: {spell.words(self.origin_ns)}"
+        if len(self.unexplained) > SPELLS_TOLD:
+            yield f"not explained: {len(self.unexplained) - SPELLS_TOLD} times more"
 
     def _episode(self, number: int, episode: Episode, room: int) -> list[str]:
         first = episode.first
@@ -120,6 +129,7 @@ class Explanation:
             ],
             "setup": list(self.setup),
             "remarks": list(self.remarks),
+            "not_explained": [spell.words(self.origin_ns) for spell in self.unexplained],
             "health": self.health.by_health,
             "origin_ns": self.origin_ns,
             "duration_s": self.seconds(self.end_ns),
@@ -152,9 +162,10 @@ def explain(messages: Sequence[Message]) -> Explanation:
     groups = _grouped(sorted(found, key=_order))
     episodes = tuple(_episode(log, group, health) for group in groups)
     end_ns = int(log.t_ns.max())
-    return Explanation(
-        log.origin_ns, end_ns, episodes, setup, health, tuple(_remarks(log, messages))
-    )
+    told = {spell for episode in episodes for spell in episode.spells}
+    rest = () if setup else tuple(spell for spell in health.spells if spell not in told)
+    remarks = tuple(_remarks(log, messages))
+    return Explanation(log.origin_ns, end_ns, episodes, setup, health, remarks, rest)
 
 
 def _remarks(log: Log, messages: Sequence[Message]) -> Iterator[str]:

@@ -12,15 +12,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from pelorus.explain.inputs import is_habit, losses
-from pelorus.explain.log import Flags, Log
+from pelorus.explain.log import NO_READING, Flags, Log, period
 from pelorus.schema import number
 
-MISFIT, BIAS_OFF, CONTRADICTED = (
-    number("reason", name) for name in ("NOISE_MISFIT", "BIAS_OFF_PRIOR", "TWIST_CONTRADICTED")
+MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
+    number("reason", name)
+    for name in ("NOISE_MISFIT", "BIAS_OFF_PRIOR", "TWIST_CONTRADICTED", "NO_TWISTS")
 )
 GATED_MOST = 0.2  # of the matches: as sigmas say, the gate rejects one of a hundred
 FRAMES_LEAST = 20  # to say so of
 ALL_ALONG = 0.5  # of the frames
+PERIODS_LATE = 2.0  # behind a frame; within one its newest reading lies as it comes
 DIRECTIONS = ("forward", "sideways", "upward", "roll", "pitch", "yaw")
 
 
@@ -30,6 +32,8 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
         return
     yield from (gate := list(_gate(log, calm)))
     yield from _noise(log, calm, bool(gate))
+    if _share(log, NO_READINGS, calm) > ALL_ALONG:
+        yield _readings(log, calm)
     if _share(log, BIAS_OFF, calm) > ALL_ALONG:
         yield (
             "a bias is far from its prior: do pictures and odometry disagree in scale, or is "
@@ -60,6 +64,22 @@ def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
             f"pictures and odometry disagree in {_share(log, CONTRADICTED, calm):.0%} of the "
             "frames and no one moment shows why: settings, calibration or clocks; `pelorus check`"
         )
+
+
+def _readings(log: Log, calm: Flags) -> str:
+    """Missing, refused, or behind the frames."""
+    name = "IMU readings" if log.by_imu else "twists"
+    behind = log.behind_ns[calm & (log.behind_ns != NO_READING)]
+    if not len(behind):
+        return f"there are no {name}: pictures alone move the body"
+    late_s = float(np.median(log.t_ns[calm & (log.behind_ns != NO_READING)] - behind)) * 1e-9
+    refused = f"{len(log.refused)} messages of {len(log.reading_ns)} {name} were refused"
+    if late_s * 1e9 > PERIODS_LATE * period(log.reading_ns):
+        return (
+            f"the {name} come {late_s:.3f} s later than the frames, and {refused}: set twist-delay "
+            "to that or more, or correct the stamps"
+        )
+    return f"{name} are missing, refused or too old all along: {refused}"
 
 
 def gated_share(log: Log, calm: Flags) -> float:

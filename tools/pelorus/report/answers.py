@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pelorus.check.checked import Checked
     from pelorus.report.comparison import Comparison
 
+UNEXPLAINED_MOST = 20  # spells that are told on a page
 MEANING = (
     "err0: RMS position error, first poses aligned. ATE: RMS position error after the best rigid "
     "fit. Rotation: RMS angle, first poses aligned. NEES/6: mean over the frames, 1 is due. Used "
@@ -46,7 +47,8 @@ def of_explanation(
 ) -> Answer:
     """Of a log."""
     first = found.first
-    grade = "bad" if found.episodes else "care" if first is not None else "good"
+    odd = first is not None or found.unexplained
+    grade = "bad" if found.episodes else "care" if odd else "good"
     head = found.lines()[0]
     return Answer(
         title,
@@ -60,7 +62,12 @@ def of_explanation(
 
 
 def _events(found: Explanation) -> list[Event]:
-    return [_event(found, episode) for episode in found.episodes]
+    """In the order of time, and health that nothing explains among them."""
+    events = [_event(found, episode) for episode in found.episodes]
+    for spell in found.unexplained[:UNEXPLAINED_MOST]:
+        begin, end = (found.seconds(t) for t in (spell.from_ns, spell.to_ns))
+        events.append(Event(begin, end, (f"not explained: {spell.words(found.origin_ns)}",)))
+    return sorted(events, key=lambda event: event.from_s)
 
 
 def _event(found: Explanation, episode: Episode) -> Event:

@@ -285,7 +285,7 @@ class Curves:
             100 * frames["gated"], matched, out=np.full(len(matched), np.nan), where=matched > 0
         )
         about = "Of the matches, by the gate. As the sigmas say it is one of a hundred."
-        yield self._chart("Rejected", "%", about, [("rejected", share)])
+        yield self._chart("Rejected", "%", about, [("rejected", share)], levels=[1.0])
 
     def _timing(self) -> dict[str, Any]:
         ms = self._frames["update_us"] * 1e-3
