@@ -190,6 +190,27 @@ def test_readings_that_come_late_all_along_are_a_matter_of_settings(tmp_path: Pa
     assert explained(messages, tmp_path, "--twist-delay", "0.1").setup == ()
 
 
+@pytest.mark.parametrize(
+    ("wrong", "by", "told"),
+    [
+        ("baseline_error_percent", 20.0, "along the way"),
+        ("camera_turned_deg", 8.0, "across the way"),
+    ],
+)
+def test_a_bias_tells_a_wrong_scale_from_a_turned_camera(
+    tmp_path: Path, wrong: str, by: float, told: str
+) -> None:
+    found = explained(simulated(**{wrong: by}), tmp_path)
+    assert found.lines()[0].startswith("no event in 30.0 s, but something is wrong all along; ")
+    assert [words for words in found.setup if told in words], found.setup
+
+
+def test_the_end_of_the_readings_is_no_step_of_a_clock(tmp_path: Path) -> None:
+    late = replace(DRIVE, camera_delay_s=0.25)
+    found = explained(list(simulate(late).recording.messages()), tmp_path)
+    assert found.first is None
+
+
 def test_health_that_nothing_explains_is_told(tmp_path: Path) -> None:
     messages = log_of(simulated(), tmp_path)
     reports = [k for k, m in enumerate(messages) if isinstance(m, Report) and m.observations]

@@ -92,8 +92,10 @@ class Explanation:
     def _head(self) -> Iterator[str]:
         count = len(self.episodes)
         what = "nothing happened" if not count else "one event" if count == 1 else f"{count} events"
-        whole = self.seconds(self.end_ns)
-        yield f"{what} in {whole:.1f} s; health: {self.health.summary()}"
+        whole, along = self.seconds(self.end_ns), ""
+        if not count and self.setup:
+            what, along = "no event", ", but something is wrong all along"
+        yield f"{what} in {whole:.1f} s{along}; health: {self.health.summary()}"
 
     def _unexplained(self) -> Iterator[str]:
         for spell in self.unexplained[:SPELLS_TOLD]:

@@ -50,6 +50,7 @@ class Log:
     by_imu: bool
     refused: list[Report]  # of readings
     sigma: Floats  # (6,) of a twist reading as the filter had it; zeros where it says nothing
+    bias_sigma: Floats  # (6,) likewise, of the biases before anything was seen
 
     @cached_property
     def t_ns(self) -> Times:
@@ -133,7 +134,8 @@ def log_of(messages: Sequence[Message]) -> Log:
             for m in messages
             if isinstance(m, Report) and m.subject in (Kind.TWIST, Kind.IMU) and m.status
         ],
-        _sigma(messages),
+        _sigma(messages, "velocity-sigma", "gyro-sigma"),
+        _sigma(messages, "bias-velocity-sigma", "bias-gyro-sigma"),
     )
 
 
@@ -192,8 +194,7 @@ def _readings(messages: Sequence[Message]) -> tuple[Times, Times, Floats]:
     return np.array(behind, np.int64), np.array(stamps, np.int64)[good], readings[good]
 
 
-def _sigma(messages: Sequence[Message]) -> Floats:
-    names = [f"{name}-sigma" for name in ("velocity", "gyro")]
+def _sigma(messages: Sequence[Message], *names: str) -> Floats:
     return np.repeat([in_force(messages, name) or 0.0 for name in names], 3)
 
 

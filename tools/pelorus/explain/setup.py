@@ -22,6 +22,7 @@ MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
 GATED_MOST = 0.2  # of the matches: as sigmas say, the gate rejects one of a hundred
 FRAMES_LEAST = 20  # to say so of
 ALL_ALONG = 0.5  # of the frames
+DOMINATES = 2.0  # of two parts of a vector one is most of it
 PERIODS_LATE = 2.0  # behind a frame; within one its newest reading lies as it comes
 DIRECTIONS = ("forward", "sideways", "upward", "roll", "pitch", "yaw")
 
@@ -35,10 +36,7 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
     if _share(log, NO_READINGS, calm) > ALL_ALONG:
         yield _readings(log, calm)
     if _share(log, BIAS_OFF, calm) > ALL_ALONG:
-        yield (
-            "a bias is far from its prior: do pictures and odometry disagree in scale, or is "
-            "bias-velocity-sigma or bias-gyro-sigma too small?"
-        )
+        yield _bias(log, calm)
     lost = losses(log)
     if lost and is_habit(log, lost, 0):
         whole_s = float(np.ptp(log.t_ns)) * 1e-9
@@ -64,6 +62,36 @@ def _noise(log: Log, calm: Flags, gate_told: bool) -> Iterator[str]:
             f"pictures and odometry disagree in {_share(log, CONTRADICTED, calm):.0%} of the "
             "frames and no one moment shows why: settings, calibration or clocks; `pelorus check`"
         )
+
+
+def _bias(log: Log, calm: Flags) -> str:
+    """Of wheels: a wrong scale makes one along the way, a camera that is turned one across it."""
+    poses = [pose for pose, good in zip(log.poses, calm, strict=True) if good and pose is not None]
+    v, b = np.zeros(3), np.zeros(6)
+    if poses and len(log.readings) and not log.by_imu and log.bias_sigma.all():
+        v, b = log.readings[:, :3].mean(axis=0), np.asarray(poses[-1].bias, np.float64)
+    speed = float(np.linalg.norm(v))
+    off = np.linalg.norm(
+        (b / np.where(log.bias_sigma > 0, log.bias_sigma, 1)).reshape(2, 3), axis=1
+    )
+    if speed and off[0] > off[1]:
+        along = abs(float(b[:3] @ v)) / speed
+        across = float(np.linalg.norm(b[:3] - (b[:3] @ v) / speed**2 * v))
+        told = f"the velocity's bias is far from its prior, {np.linalg.norm(b[:3]):.2f} m/s mostly"
+        if along > DOMINATES * across:
+            return (
+                f"{told} along the way at {speed:.1f} m/s, as a wrong scale makes it: baseline, "
+                "focal length, or the wheels' radius"
+            )
+        if across > DOMINATES * along:
+            return (
+                f"{told} across the way at {speed:.1f} m/s, as a camera makes it that is turned on "
+                "the body: R_CB"
+            )
+    return (
+        "a bias is far from its prior: do pictures and odometry disagree in scale or direction, or "
+        "is bias-velocity-sigma or bias-gyro-sigma too small?"
+    )
 
 
 def _readings(log: Log, calm: Flags) -> str:

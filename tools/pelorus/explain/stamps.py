@@ -37,12 +37,15 @@ def clock_steps(log: Log) -> Iterator[Finding]:
     known = np.nonzero(log.behind_ns != NO_READING)[0]
     if len(known) < BEFORE:
         return
-    ahead = (log.t_ns - log.behind_ns)[known].astype(np.float64)
-    frame_step, reading_step = np.diff(log.t_ns[known]), np.diff(log.behind_ns[known])
+    behind = log.behind_ns[known]
+    ahead = (log.t_ns[known] - behind).astype(np.float64)
+    frame_step, reading_step = np.diff(log.t_ns[known]), np.diff(behind)
     usual = float(np.median(np.abs(frame_step)))
     least = max(2 * period(log.reading_ns), JITTER_SIGMAS * _jitter(ahead))
     for k in np.nonzero(np.abs(np.diff(ahead)) > least)[0] + 1:
         before, after = ahead[max(k - BEFORE, 0) : k], ahead[k : k + AFTER]
+        if behind[k : k + AFTER][-1] == behind[-1]:
+            continue  # the readings have ended: no frame tells their stamps any more
         by = float(np.median(after) - np.median(before))
         if abs(by) <= least or np.ptp(before) > abs(by) / 2 or np.ptp(after) > abs(by) / 2:
             continue
