@@ -16,12 +16,12 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
   const way = data.map.shapes && { t: exact(data.map.shapes.t), p: data.map.shapes.p.map(exact), ...shapesOf(data.map.shapes) };
   const axes = data.map.axes, signs = data.map.signs || [1, 1];
   // `yaw` about the way's own vertical, `pitch` 0 from above and 90 from the side
-  const map = { yaw: 0, pitch: 0, x: 0, y: 0, scale: 1, chosen: -1, moving: false, rows: null };
+  const map = { yaw: 0, pitch: 0, x: 0, y: 0, scale: 1, chosen: -1, moving: false, rests: 0, rows: null };
   const PENS = { estimate: ["--l0", []], truth: ["--truth", [2, 3]] };
   const OTHERS = [["--l1", [7, 4]], ["--l2", [9, 3, 2, 3]], ["--l3", [3, 3]]]; // as in the curves of all runs
   const runs = tracks.map((track) => track.name).filter((name) => !(name in PENS));
   const penOf = (name) => PENS[name] || OTHERS[runs.indexOf(name) % OTHERS.length];
-  const canvas = $("map");
+  const canvas = $("map"), ELLIPSES_MOST = 2000;
 
   // --- projection ------------------------------------------------------------------------------
 
@@ -29,16 +29,23 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const right = unit(axes[0], signs[0]), up = unit(axes[1], signs[1]), out = cross(right, up);
   const sum = (a, s, b, t) => a.map((x, k) => s * x + t * b[k]);
+  const pivot = [0, 1, 2].map((axis) => { // the middle of the way stays where it is
+    const known = tracks.length ? tracks[0].p[axis].filter((x) => x != null) : [];
+    return known.length ? [known.reduce((a, b) => a + b, 0) / known.length] : [0];
+  });
   function turn(yaw, pitch) {
+    const before = map.rows && flat(pivot, 0);
     map.yaw = yaw;
     map.pitch = Math.max(0, Math.min(90, pitch));
     const [a, b] = [yaw * Math.PI / 180, map.pitch * Math.PI / 180];
     const ahead = sum(right, -Math.sin(a), up, Math.cos(a));
     map.rows = [sum(right, Math.cos(a), up, Math.sin(a)), sum(ahead, Math.cos(b), out, Math.sin(b))];
+    const after = flat(pivot, 0);
+    if (before) { map.x += after[0] - before[0]; map.y += after[1] - before[1]; }
   }
-  turn(0, 0);
   const flat = (q, k) => map.rows.map((row) => row[0] * q[0][k] + row[1] * q[1][k] + row[2] * q[2][k]);
   const at = ([a, b]) => [map.width / 2 + (a - map.x) * map.scale, map.height / 2 - (b - map.y) * map.scale];
+  turn(0, 0);
 
   function outline({ half, turn }, k) { // half axes in px, and the angle of the first on the screen
     if (half[0][k] == null || turn[0][k] == null) return null;
@@ -58,11 +65,12 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
     const middle = (a + c) / 2, apart = Math.hypot((a - c) / 2, b);
     return [Math.sqrt(middle + apart), Math.sqrt(Math.max(0, middle - apart)), -0.5 * Math.atan2(2 * b, a - c)];
   }
-  function ellipse(pen, [x, y], shape, least) {
-    if (!shape || !(shape[0] > least) || shape[0] > 1e5) return;
+  function ellipse(pen, [x, y], shape, least) { // whether it is large enough to be drawn
+    if (!shape || !(shape[0] > least) || shape[0] > 1e5) return false;
     pen.beginPath();
     pen.ellipse(x, y, shape[0], shape[1], shape[2], 0, 7);
     pen.stroke();
+    return true;
   }
   function fit() {
     const box = canvas.getBoundingClientRect(), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
@@ -83,15 +91,12 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
     [map.width, map.height] = [width, height];
     pen.font = font;
     pen.fillStyle = pen.strokeStyle = css("--dot");
-    for (let k = 0; k < ids.length; k++) {
-      const place = at(flat(p, k));
-      if (!on(place)) continue;
-      pen.globalAlpha = 0.6;
-      pen.fillRect(place[0] - 1.5, place[1] - 1.5, 3, 3);
-      pen.globalAlpha = 0.35;
-      if (!map.moving) ellipse(pen, place, outline(markShapes, k), 3);
-    }
+    let left = map.moving ? 0 : ELLIPSES_MOST; // the first are those seen most often
+    const places = ids.map((_, k) => k).filter((k) => on(at(flat(p, k))));
+    pen.globalAlpha = 0.6;
+    for (const k of places) { const [x, y] = at(flat(p, k)); pen.fillRect(x - 1.5, y - 1.5, 3, 3); }
     pen.globalAlpha = 0.35;
+    for (const k of places) if (left && ellipse(pen, at(flat(p, k)), outline(markShapes, k), 3)) left--;
     pen.strokeStyle = css("--l0");
     if (way && !map.moving) for (let k = 0; k < way.t.length; k++) ellipse(pen, at(flat(way.p, k)), outline(way, k), 3);
     pen.globalAlpha = 1;
@@ -101,7 +106,7 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
       pen.setLineDash(dashes);
       pen.lineWidth = 1.8;
       pen.beginPath();
-      const step = Math.max(1, Math.floor(track.t.length / 20000));
+      const step = Math.max(1, Math.floor(track.t.length / (map.moving ? 2000 : 20000)));
       for (let k = 0; k < track.t.length; k += step) {
         if (track.p[0][k] != null) pen.lineTo(...at(flat(track.p, k)));
       }
@@ -234,6 +239,9 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
     e.preventDefault();
     e.stopPropagation(); // else the cursor moves as well
     if (move) shift(...move); else KEYS[e.key]();
+    map.moving = true;
+    clearTimeout(map.rests);
+    map.rests = setTimeout(() => { map.moving = false; later(); }, 200);
     later();
   }
   function pointer() {
