@@ -91,9 +91,11 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
     }
 }
 
-/* Columns of a batch's E, in whole tiles: those behind the sensitivity's are zero. */
+/* Columns of a batch's E, in whole tiles, those behind the sensitivity's being zero; but a last one that
+ * would be alone in its tile stays so. */
 static unsigned whole_tiles(const plr_filter *f) {
-    return ((unsigned)OF_S + f->par.calibrated.count + TILE - 1) / TILE * TILE;
+    const unsigned columns = (unsigned)OF_S + f->par.calibrated.count;
+    return columns % TILE == 1 ? columns : (columns + TILE - 1) / TILE * TILE;
 }
 
 /* A column of the sensitivity (state/sensitivity.h) is corrected as dx is, with -H_s in the place of
@@ -179,9 +181,15 @@ static void update_estimate(plr_filter *f, const plr_batch *batch) {
     rows[OF_DX] = w->dx;
     for (unsigned k = 0; k < PLR_CALIBRATIONS; k++)
         rows[OF_S + k] = f->S[k];
-    for (unsigned k = w->noise.open ? 0 : TILE; k < used; k += TILE)
+    for (unsigned k = w->noise.open ? 0 : TILE; k + TILE <= used; k += TILE)
         plr_subtract_four_rows(batch->ld, batch->rows, batch->E + k, WIDE, w->Vt, batch->ld,
                                rows + k);
+    if (used % TILE == 0)
+        return;
+    plr_real alone[PLR_BLOCK_ROWS];
+    for (unsigned r = 0; r < batch->rows; r++)
+        alone[r] = -batch->E[WIDE * r + used - 1];
+    plr_combine_rows(batch->ld, batch->rows, alone, 1, w->Vt, batch->ld, rows[used - 1]);
 }
 
 /* With S = U^T U: V^T = U^-T (P H^T)^T, P -= V V^T, dx += V U^-T y. False, and nothing changed but

@@ -213,17 +213,23 @@ void plr_calibration_begin(plr_filter *f) {
         memset(&f->work.learnt, 0, sizeof f->work.learnt);
 }
 
+/* sum + a^T b, columns of rows that are ld apart. */
+static plr_real add_product(unsigned rows, const plr_real *a, const plr_real *b, unsigned ld,
+                            plr_real sum) {
+    for (; rows > 0; rows--, a += ld, b += ld)
+        sum = PLR_FMA(*a, *b, sum);
+    return sum;
+}
+
 void plr_calibration_add(plr_filter *f, unsigned rows, const plr_real *E, const plr_real *e,
                          unsigned ld) {
     plr_learnt *to = &f->work.learnt;
     const unsigned all = f->par.calibrated.count;
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++)
-        for (unsigned r = 0; r < rows; r++) {
-            const plr_real by = E[ld * r + k];
-            to->eta[k] = PLR_FMA(by, -e[ld * r], to->eta[k]);
-            for (unsigned l = k; l < all; l++)
-                to->J[K * k + l] = PLR_FMA(by, E[ld * r + l], to->J[K * k + l]);
-        }
+    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+        to->eta[k] = -add_product(rows, E + k, e, ld, -to->eta[k]);
+        for (unsigned l = k; l < all; l++)
+            to->J[K * k + l] = add_product(rows, E + k, E + l, ld, to->J[K * k + l]);
+    }
 }
 
 void plr_calibration_marginalise(plr_filter *f) {
@@ -238,21 +244,18 @@ void plr_calibration_marginalise(plr_filter *f) {
         }
 }
 
-static double sigma_of(const plr_filter *f, unsigned k) {
-    return (double)PLR_SQRT(f->par.calibrated.variance[k]);
+/* Of the priors. */
+static void get_sigmas(const plr_filter *f, double sigma[K]) {
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+        sigma[k] = (double)PLR_SQRT(f->par.calibrated.variance[k]);
 }
 
-/* What was learnt of k and l, each error in sigmas of its prior. */
-static double learnt(const plr_filter *f, unsigned k, unsigned l) {
-    const unsigned row = k < l ? k : l, column = k < l ? l : k;
-    return sigma_of(f, row) * sigma_of(f, column) * (double)f->work.learnt.J[K * row + column];
-}
-
-/* The information += share times what was learnt. */
-static void add_information(plr_filter *f, double share) {
+/* The information, each error in sigmas of its prior, += share times what was learnt. */
+static void add_information(plr_filter *f, const double sigma[K], double share) {
     for (unsigned k = 0; k < f->par.calibrated.estimated; k++)
         for (unsigned l = k; l < f->par.calibrated.count; l++)
-            f->calibration.information[K * k + l] += share * learnt(f, k, l);
+            f->calibration.information[K * k + l] +=
+                share * sigma[k] * sigma[l] * (double)f->work.learnt.J[K * k + l];
 }
 
 /* The information J, where the prior's share counts `excess` times, = L D L^T in the rows of the estimated:
@@ -295,11 +298,13 @@ static void solve(unsigned n, const double *U, double *x) {
 static void factor_covariance(plr_filter *f, const double *U) {
     plr_calibration_estimate *c = &f->calibration;
     const unsigned n = f->par.calibrated.estimated;
+    double sigma[K];
+    get_sigmas(f, sigma);
     for (unsigned k = 0; k < f->par.calibrated.count; k++) {
         double x[K] = {0};
         if (k < n) {
             x[k] = 1;
-            solve_back(n, U, x);
+            solve_back(k + 1, U, x); /* the others stay 0 */
             c->told[k] = (plr_real)((double)c->excess / U[(K + 1) * k]);
         } else {
             for (unsigned j = 0; j < n; j++)
@@ -307,7 +312,7 @@ static void factor_covariance(plr_filter *f, const double *U) {
             solve(n, U, x);
         }
         for (unsigned j = 0; j < k && j < n; j++)
-            c->factor[K * k + j] = (plr_real)(x[j] * sigma_of(f, j) / sigma_of(f, k));
+            c->factor[K * k + j] = (plr_real)(x[j] * sigma[j] / sigma[k]);
     }
 }
 
@@ -319,17 +324,19 @@ bool plr_calibration_take_up(plr_filter *f) {
     return good;
 }
 
-/* The variance of what a frame says of error k beside its estimate, were all errors white: J + J Sigma J. */
+/* The variance of what a frame says of error k beside its estimate, were all errors white, in sigmas of the
+ * prior: J + J Sigma J. */
 static plr_real score_variance(const plr_filter *f, unsigned k) {
     const plr_calibration_estimate *c = &f->calibration;
-    double sum = learnt(f, k, k);
+    const plr_real *J = f->work.learnt.J;
+    plr_real sum = J[(K + 1) * k];
     for (unsigned m = 0; m < f->par.calibrated.estimated; m++) {
-        double by = learnt(f, m, k);
-        for (unsigned j = 0; j < m; j++)
-            by += (double)c->factor[K * m + j] * sigma_of(f, m) / sigma_of(f, j) * learnt(f, j, k);
-        sum += by * by * (double)c->told[m];
+        plr_real by = 0;
+        for (unsigned j = 0; j <= m; j++)
+            by = PLR_FMA(c->factor[K * m + j], j < k ? J[K * j + k] : J[K * k + j], by);
+        sum = PLR_FMA(f->par.calibrated.variance[m] * c->told[m] * by, by, sum);
     }
-    return (plr_real)sum;
+    return f->par.calibrated.variance[k] * sum;
 }
 
 /* How much more the scores g of several frames add up to than those of one suggest. Errors that are alike
@@ -356,26 +363,27 @@ static plr_real note_excess(plr_filter *f, const double g[K]) {
 void plr_calibration_learn(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     const unsigned n = f->par.calibrated.estimated;
-    double U[K * K], x[K];
+    double U[K * K], x[K], sigma[K];
     plr_real ds[K], excess = 1;
     if (n == 0 || !c->moves)
         return;
+    get_sigmas(f, sigma);
     for (unsigned k = 0; k < n; k++)
-        x[k] = sigma_of(f, k) * (double)f->work.learnt.eta[k];
+        x[k] = sigma[k] * (double)f->work.learnt.eta[k];
     if (f->config.process == PLR_PROCESS_TWIST)
         excess = note_excess(f, x);
     for (unsigned k = 0; k < n; k++)
-        x[k] -= (double)((excess - c->excess) * c->moved[k]) / sigma_of(f, k);
-    add_information(f, 1);
+        x[k] -= (double)((excess - c->excess) * c->moved[k]) / sigma[k];
+    add_information(f, sigma, 1);
     bool good = factorise(f, excess, U);
     if (good)
         solve(n, U, x);
     for (unsigned k = 0; k < n && good; k++) {
-        ds[k] = (plr_real)(x[k] * sigma_of(f, k));
+        ds[k] = (plr_real)(x[k] * sigma[k]);
         good = x[k] < MOST_SIGMAS && x[k] > -MOST_SIGMAS;
     }
     if (!good) {
-        add_information(f, -1);
+        add_information(f, sigma, -1);
         return;
     }
     c->excess = excess;
