@@ -75,17 +75,19 @@ static uint32_t rows(const plr_filter *f, unsigned landmarks) {
 static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *errors) {
     plr_calibration_estimate *to = f ? &f->calibration : NULL;
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->moved : NULL, errors->count);
-    for (unsigned k = 0; k < errors->estimated; k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(errors); k++)
         plr_codec_numbers(c, PLR_FIELD_F64, to ? to->information + PLR_CALIBRATIONS * k : NULL,
                           errors->count);
-    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum : NULL, errors->estimated);
-    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum_variance : NULL, errors->estimated);
-    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, errors->estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum : NULL, plr_calibration_estimated(errors));
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum_variance : NULL,
+                      plr_calibration_estimated(errors));
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, plr_calibration_estimated(errors));
 }
 
 static uint32_t calibration_size(const plr_calibrated *errors) {
-    return errors->count * (uint32_t)(sizeof(plr_real) + errors->estimated * sizeof(double)) +
-           3 * errors->estimated * (uint32_t)sizeof(plr_real);
+    return errors->count *
+               (uint32_t)(sizeof(plr_real) + plr_calibration_estimated(errors) * sizeof(double)) +
+           3 * plr_calibration_estimated(errors) * (uint32_t)sizeof(plr_real);
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {

@@ -4,6 +4,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "pelorus/assertions.h"
+#include "state/calibration.h"
 #include "state/camera.h"
 #include "state/covariance.h"
 #include "state/polar.h"
@@ -95,7 +96,7 @@ typedef struct plr_eye_view {
 static bool look_by_eye(const plr_filter *f, const plr_real q[3], plr_eye_view *view) {
     const plr_camera *eye = &f->calibration.eye;
     plr_real Dz[9];
-    if (f->par.calibrated.estimated == 0) { /* it is where par.camera has it */
+    if (plr_calibration_estimated(&f->par.calibrated) == 0) { /* it is where par.camera has it */
         memcpy(view->q, q, sizeof view->q);
         plr_stereo_jacobian(view->Dz, eye, q);
         memset(view->Dt, 0, sizeof view->Dt);

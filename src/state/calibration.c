@@ -152,7 +152,8 @@ void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]) {
 }
 
 bool plr_calibration_needs_twist(const plr_filter *f) {
-    return f->par.calibrated.estimated > 0 || column_of_clock(f) < f->par.calibrated.count;
+    return plr_calibration_estimated(&f->par.calibrated) > 0 ||
+           column_of_clock(f) < f->par.calibrated.count;
 }
 
 /* x <- 0, and false, unless it is beyond three sigmas, three numbers whose variances add up to that. */
@@ -184,7 +185,7 @@ void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM
 static void correct_camera(plr_filter *f, const plr_real *ds) {
     plr_calibration_estimate *c = &f->calibration;
     plr_real by[PLR_CALIBRATION_ERRORS] = {0}, turn[9], before[9], t[3];
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
         const unsigned kind = f->par.calibrated.kind[k];
         const bool share = kind == PLR_BASELINE || kind == PLR_FOCAL_LENGTH;
         by[kind] = ds[k];
@@ -209,7 +210,7 @@ static void correct_camera(plr_filter *f, const plr_real *ds) {
 /* ---------------------------------------------------------------- what is learnt */
 
 void plr_calibration_begin(plr_filter *f) {
-    if (f->par.calibrated.estimated > 0)
+    if (plr_calibration_estimated(&f->par.calibrated) > 0)
         memset(&f->work.learnt, 0, sizeof f->work.learnt);
 }
 
@@ -225,7 +226,7 @@ void plr_calibration_add(plr_filter *f, unsigned rows, const plr_real *E, const 
                          unsigned ld) {
     plr_learnt *to = &f->work.learnt;
     const unsigned all = f->par.calibrated.count;
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
         to->eta[k] = -add_product(rows, E + k, e, ld, -to->eta[k]);
         for (unsigned l = k; l < all; l++)
             to->J[K * k + l] = add_product(rows, E + k, E + l, ld, to->J[K * k + l]);
@@ -235,7 +236,7 @@ void plr_calibration_add(plr_filter *f, unsigned rows, const plr_real *E, const 
 void plr_calibration_marginalise(plr_filter *f) {
     plr_learnt *to = &f->work.learnt;
     const plr_noise *noise = &f->work.noise;
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
         for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
             const plr_real by = noise->eta_of_S[k][i];
             to->eta[k] = PLR_FMA(by, noise->eta[i], to->eta[k]);
@@ -252,7 +253,7 @@ static void get_sigmas(const plr_filter *f, double sigma[K]) {
 
 /* The information, each error in sigmas of its prior, += share times what was learnt. */
 static void add_information(plr_filter *f, const double sigma[K], double share) {
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++)
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
         for (unsigned l = k; l < f->par.calibrated.count; l++)
             f->calibration.information[K * k + l] +=
                 share * sigma[k] * sigma[l] * (double)f->work.learnt.J[K * k + l];
@@ -261,7 +262,7 @@ static void add_information(plr_filter *f, const double sigma[K], double share) 
 /* The information J, where the prior's share counts `excess` times, = L D L^T in the rows of the estimated:
  * L^T above the diagonal of U, D on it. False if a pivot is not above zero. */
 static bool factorise(const plr_filter *f, plr_real excess, double *U) {
-    const unsigned n = f->par.calibrated.estimated;
+    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
     for (unsigned k = 0; k < n; k++)
         for (unsigned l = k; l < n; l++) {
             double sum = f->calibration.information[K * k + l];
@@ -297,7 +298,7 @@ static void solve(unsigned n, const double *U, double *x) {
  * considered how it misleads the others. In sigmas of the prior. */
 static void factor_covariance(plr_filter *f, const double *U) {
     plr_calibration_estimate *c = &f->calibration;
-    const unsigned n = f->par.calibrated.estimated;
+    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
     double sigma[K];
     get_sigmas(f, sigma);
     for (unsigned k = 0; k < f->par.calibrated.count; k++) {
@@ -330,7 +331,7 @@ static plr_real score_variance(const plr_filter *f, unsigned k) {
     const plr_calibration_estimate *c = &f->calibration;
     const plr_real *J = f->work.learnt.J;
     plr_real sum = J[(K + 1) * k];
-    for (unsigned m = 0; m < f->par.calibrated.estimated; m++) {
+    for (unsigned m = 0; m < plr_calibration_estimated(&f->par.calibrated); m++) {
         plr_real by = 0;
         for (unsigned j = 0; j <= m; j++)
             by = PLR_FMA(c->factor[K * m + j], j < k ? J[K * j + k] : J[K * k + j], by);
@@ -347,7 +348,7 @@ static plr_real note_excess(plr_filter *f, const double g[K]) {
     plr_calibration_estimate *c = &f->calibration;
     plr_real largest = 1;
     c->usual_frames += 1;
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
         c->sum[k] = PLR_FMA(KEPT, c->sum[k], (plr_real)g[k]);
         c->sum_variance[k] = PLR_FMA(KEPT * KEPT, c->sum_variance[k], score_variance(f, k));
         const plr_real ratio = c->sum[k] * c->sum[k] / (c->sum_variance[k] + LITTLE);
@@ -362,7 +363,7 @@ static plr_real note_excess(plr_filter *f, const double g[K]) {
  * found out of the excess holds for those before, too. */
 void plr_calibration_learn(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
-    const unsigned n = f->par.calibrated.estimated;
+    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
     double U[K * K], x[K], sigma[K];
     plr_real ds[K], excess = 1;
     if (n == 0 || !c->moves)
@@ -393,7 +394,7 @@ void plr_calibration_learn(plr_filter *f) {
 }
 
 bool plr_calibration_is_off(const plr_filter *f) {
-    for (unsigned k = 0; k < f->par.calibrated.estimated; k++) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
         const plr_real moved = f->calibration.moved[k];
         if (moved * moved > PLR_R(16) * f->par.calibrated.variance[k])
             return true;
@@ -430,12 +431,13 @@ void plr_calibration_tell(const plr_filter *f, plr_calibration_result *told) {
     tell_camera(f, &told->camera);
     for (unsigned j = 0; j < errors->count; j++) {
         plr_real variance = 0;
-        for (unsigned k = j; k < errors->count && (j < errors->estimated || k == j); k++)
+        for (unsigned k = j; k < errors->count && (j < plr_calibration_estimated(errors) || k == j);
+             k++)
             variance = PLR_FMA(c->factor[K * k + j] * c->factor[K * k + j],
                                errors->variance[k] * c->told[k], variance);
         told->corrected[errors->kind[j]] = (double)c->moved[j];
         told->sigma[errors->kind[j]] = (double)PLR_SQRT(variance);
-        if (j < errors->estimated)
+        if (j < plr_calibration_estimated(errors))
             told->estimated |= (uint16_t)(1U << errors->kind[j]);
     }
 }

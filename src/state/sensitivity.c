@@ -7,6 +7,7 @@
 #include "math/se3.h"
 #include "math/small.h"
 #include "state/blocks.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 
 /* ---------------------------------------------------------------- as P changes */
@@ -57,7 +58,7 @@ void plr_sensitivity_move_range(plr_filter *f, unsigned slot, plr_real ratio) {
         const unsigned kind = f->par.calibrated.kind[k];
         const bool is_way = kind >= PLR_CAMERA_PLACE_X; /* it moves a point by its inverse range */
         plr_real *w = f->S[k] + plr_covariance_row(f, slot);
-        if (k >= f->par.calibrated.estimated && !is_way)
+        if (k >= plr_calibration_estimated(&f->par.calibrated) && !is_way)
             continue;
         w[2] *= is_way ? ratio * ratio : ratio;
         for (unsigned i = 0; i < 2 && is_way && kind != PLR_CAMERA_CLOCK; i++)
@@ -136,7 +137,7 @@ static void add_told(const plr_filter *f, unsigned n, plr_by_error y, plr_real *
         const plr_real variance = errors->variance[k] * f->calibration.told[k];
         plr_real s[PLR_POSE_DIM];
         memcpy(s, y[k], sizeof s);
-        for (unsigned j = 0; j < k && j < errors->estimated; j++)
+        for (unsigned j = 0; j < k && j < plr_calibration_estimated(errors); j++)
             for (unsigned i = 0; i < n; i++)
                 s[i] = PLR_FMA(G[j], y[j][i], s[i]);
         for (unsigned i = 0; i < n; i++)

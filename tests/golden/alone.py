@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The estimator alone (PLR_SUPERVISE=0, PLR_KNOWN_MAP=0) beside the whole filter.
+"""The estimator alone beside the whole filter.
 
 usage: alone.py REPLAY REPLAY-ALONE
 
-On the golden drives, where nothing goes wrong, each pose is the same to the bit.
+Alone: PLR_SUPERVISE=0, PLR_KNOWN_MAP=0, PLR_MAX_CALIBRATION=0. On the golden drives, where nothing goes wrong, each pose is the same to the bit.
 """
 
 from __future__ import annotations

@@ -62,6 +62,20 @@ def test_they_compile_without_a_warning_and_need_no_library(
     }
 
 
+@pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
+@pytest.mark.parametrize("room", [0, 5])
+def test_a_build_with_no_room_for_it_is_without_what_estimates_the_calibration(
+    two_files: Path, room: int
+) -> None:
+    options = ("-std=c99", "-DPLR_PORTABLE=1", f"-DPLR_MAX_CALIBRATION={room}")
+    assert compiled(two_files, "gcc", *options, "-O1").returncode == 0
+    names = subprocess.run(
+        ["nm", "pelorus.o"], cwd=two_files, capture_output=True, text=True, check=True
+    ).stdout
+    assert ("factor_covariance" in names) == (room > 0)
+    assert "plr_calibration_learn" in names
+
+
 @pytest.mark.skipif(not COMPILERS, reason="no C compiler")
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_without_the_instruction_the_remedy_is_said(two_files: Path, compiler: str) -> None:
