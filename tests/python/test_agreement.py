@@ -20,6 +20,7 @@ from pelorus.faults.fault import Fault
 from pelorus.faults.mounting import Rates
 from pelorus.faults.moving import Moving
 from pelorus.faults.named import faults_in
+from pelorus.faults.seen import Seen
 from pelorus.faults.two_views import TwoViews, two_views
 from pelorus.recording import Recording
 from pelorus.second_view import NOISE, inverse
@@ -264,9 +265,9 @@ def test_a_wrong_lever_is_not_told_as_a_turned_extrinsic(off: str) -> None:
     wrong = T._replace(p=-right if off == "the sign" else -T.R.T @ right)
     asked = []
 
-    def counted(recording: Recording, views: TwoViews) -> Agreement:
+    def counted(recording: Recording, views: TwoViews, seen: Seen) -> Agreement:
         asked.append(1)
-        return agreement(recording, views)
+        return agreement(recording, views, seen)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(geometry, "agreement", counted)

@@ -20,7 +20,7 @@ from pelorus.check.verdict import Grade, Remark, Run
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.evaluation import judge
-from pelorus.faults.mend import CANNOT, known_words
+from pelorus.faults.mend import BEHIND, CANNOT, known_words
 from pelorus.faults.named import judged_of
 from pelorus.replay import Outputs, replay
 from pelorus.trajectory import Trajectory, truth_in
@@ -68,6 +68,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     named = judged.faults
     faults = [Remark(Grade.BAD if f.grave else Grade.CARE, f.told) for f in named]
     if any(fault.stops for fault in named):
+        known = BEHIND if judged.agreed is None else f"{known_words(judged.agreed)}; {CANNOT}"
+        faults.append(Remark(Grade.CARE, known))
         return Checked(Grade.BAD, faults, [], [], [], None)
     found = tune(bench, given, all(fault.name != "clock-turns" for fault in named))
     if any(fault.lasts for fault in named):

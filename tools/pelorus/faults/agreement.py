@@ -57,9 +57,16 @@ class Agreement:
         return self.frames >= FRAMES_MIN
 
 
-def agreement(recording: Recording, views: TwoViews) -> Agreement:
-    """Of a recording whose extrinsic's rotation and whose units are right."""
-    seen = Seen.of(recording, views)
+def halved(recording: Recording, seen: Seen, lag: int) -> Seen:
+    """With halves of the points, where they tell of enough of the frames."""
+    return seen.with_halves(recording, lag, int(HALVED_MIN * seen.usable.sum()))
+
+
+def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -> Agreement:
+    """Of a recording whose extrinsic's rotation and whose units are right; `seen` of the views, if
+    that is told already.
+    """
+    seen = Seen.of(recording, views) if seen is None else seen
     if seen.usable.sum() < FRAMES_MIN:
         nan = float("nan")
         return Agreement(
@@ -68,8 +75,8 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
         )  # fmt: skip
     body, bias = _body(recording, seen)
     by_imu = len(recording.inertial.t_ns) > 0
-    if by_imu:
-        seen = seen.with_halves(recording, views.lag, int(HALVED_MIN * seen.usable.sum()))
+    if by_imu and seen.halves is None:
+        seen = halved(recording, seen, views.lag)
     offset = offset_of(recording, body, seen, bias)
     found = None if by_imu else Fit(body.design(recording, seen, offset, bias))
     clock_told = found is None or found.tells(CLOCK)
@@ -94,9 +101,9 @@ def agreement(recording: Recording, views: TwoViews) -> Agreement:
     by_prior = float(np.hypot(none.known(SCALE), bias / speed))
     if not by_imu and sigma > by_prior:  # then the bias is what is known of it beforehand
         scale, sigma = float(none.x[SCALE]), by_prior
-    doubt = _doubt_by_depth(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS))
-    if not by_imu:
-        doubt = float(np.hypot(doubt, _doubt_by_noise(recording, views, body, at, none)))
+    bias = bias if by_imu else NO_BIAS_MPS
+    doubt = _doubt_by_depth(recording, views, body, (at, bias))
+    doubt = float(np.hypot(doubt, _doubt_by_noise(recording, views, body, (at, bias), none)))
     lever = slice(LEVER, LEVER + 3)
     tilt = (None, None) if by_imu else _tilt(found)
     return Agreement(
@@ -169,23 +176,25 @@ def _doubt_by_depth(
 
 
 def _doubt_by_noise(
-    recording: Recording, views: TwoViews, body: Body, offset_s: float, fit: Fit
+    recording: Recording, views: TwoViews, body: Body, at: tuple[float, float], fit: Fit
 ) -> float:
-    """How much another scale pixels of twice the variance show, beyond what chance makes: about as
-    much the noise that is there has changed it (Cook and Stefanski 1994). Of points whose
-    disparity is hardly more than its noise every way comes out too short. `fit` is as it is,
-    without a bias.
+    """How much another scale pixels of twice the variance show, beyond what chance makes: of points
+    whose disparity is hardly more than its noise every way comes out too short. The noise that is
+    there has changed it by as much if that grows with its square, by a third if with its fourth
+    power (Cook and Stefanski 1994): half is one sigma. `at` as beside, `fit` of what is there.
     """
     tracks = recording.tracks
     more = np.random.default_rng(1).normal(0, views.sigma_px, tracks.pixels.shape)
-    noisy = replace(tracks, pixels=tracks.pixels + more)
-    seen = Seen.of(recording, two_views(noisy, recording.header.camera, views.lag))
+    noisy = replace(recording, tracks=replace(tracks, pixels=tracks.pixels + more))
+    seen = Seen.of(noisy, two_views(noisy.tracks, recording.header.camera, views.lag))
     if seen.usable.sum() < FRAMES_MIN:
         return 0.0
-    other = Fit(body.design(recording, seen, offset_s, NO_BIAS_MPS))
+    if len(recording.inertial.t_ns):
+        seen = halved(noisy, seen, views.lag)
+    other = Fit(body.design(noisy, seen, *at))
     change = other.x[SCALE] - fit.x[SCALE]
     excess = change**2 - CHANCE**2 * other.image_sigma[SCALE] ** 2
-    return float(np.sqrt(max(excess, 0.0)))
+    return float(np.sqrt(max(excess, 0.0))) / 2
 
 
 def by_depth(tracks: Tracks) -> tuple[Tracks, Tracks]:

@@ -15,6 +15,7 @@ import numpy as np
 from pelorus import se3
 from pelorus.faults.duel import TOO_FEW, duel
 from pelorus.faults.finding import Finding
+from pelorus.faults.likelihood import told
 from pelorus.frames import BodyAxes
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -64,6 +65,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"lag-{LAG} reprojection falls from {result.given:.1f} to {result.challenger:.1f} px with "
         f"the axes turned, in {100 * result.share:.0f} % of {result.frames} frames"
     )
+    evidence = told(evidence, result.ratio)
     action = f"T_CB turned by {_text(candidates[best])}: body axes are now {name(mended.R)}"
     return recording.with_extrinsic(mended), Finding(SUBJECT, True, evidence, action)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pelorus.faults.likelihood import of_share
 from pelorus.layout import Floats
 
 TOO_FEW = "too few common tracks to judge"
@@ -30,6 +31,11 @@ class Duel:
     def z(self) -> float:
         """Sign test: standard deviations by which the wins exceed a coin's."""
         return 2.0 * (self.share - 0.5) * float(np.sqrt(self.independent))
+
+    @property
+    def ratio(self) -> float:
+        """2 ln of the likelihood of so many wins beside that of a coin's."""
+        return of_share(self.share, self.independent, 0.5)
 
     def clearly_won(self, ratio: float, share: float, z: float) -> bool:
         return self.challenger < ratio * self.given and self.share >= share and self.z >= z

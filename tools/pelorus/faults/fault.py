@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pelorus.faults.likelihood import told
+
 UNTOLD = "untold"  # no fault, but not called good either
 
 
@@ -21,9 +23,7 @@ class Fault:
     @property
     def told(self) -> str:
         """The words, and how much likelier what is seen is with the fault than without."""
-        if self.ratio is None:
-            return self.words
-        return f"{self.words} (2 ln of the likelihood ratio: {self.ratio:.0f})"
+        return told(self.words, self.ratio)
 
     @property
     def lasts(self) -> bool:

@@ -29,6 +29,7 @@ TELLS_SIGMAS, STRONG = 3.0, 10.0
 SURE = 4.0  # standard errors
 WITHIN = (0.01, 0.99)  # of a column, where its instrument stays: pictures that hang tell leaps
 UNTOLD = 1e6  # variance of what nothing is told of
+PIECE_FRAMES = 20  # longer than what instruments have in common with their neighbours
 RIDGE = 1e-9  # of instruments that say the same
 
 
@@ -85,9 +86,8 @@ class Fit:
         exact = np.flatnonzero((Z_rows[:, : X.shape[2]] == X_rows).all(axis=0))
         for _ in range(ROUNDS):
             trust = weight[:, None] / (variance + extra)
-            trusted = Z_rows * trust.reshape(-1, 1)
-            stage = _first_stage(trusted, Z_rows, X_rows, exact)
-            trusted = trusted @ stage
+            told = _told_by_others(Z, X, trust, exact)
+            trusted = told.reshape(X_rows.shape) * trust.reshape(-1, 1)
             A = trusted.T @ X_rows + prior
             x = np.linalg.solve(A, trusted.T @ y.ravel())
             left = y - X @ x
@@ -97,7 +97,7 @@ class Fit:
             weight = 1 / (1 + d2 / 9) ** 2
         inverse = np.linalg.inv(A)
         self._A, self._inverse, self._trust = A, inverse, trust
-        self._y, self._X, self._Z = y, X, Z @ stage
+        self._y, self._X, self._Z = y, X, told
         self.blocks = int(np.clip(self.frames // BLOCK_FRAMES, BLOCKS_LEAST, blocks_most))
         self.x = np.asarray(x)
         self.cost = float(np.sum(np.log(spread)))
@@ -208,6 +208,21 @@ def _within(Z: Floats, X: Floats) -> Floats:
     of = np.arange(Z.shape[2]) % X.shape[2]
     own = X[:, :, of] == Z
     return np.where(own, Z, np.clip(Z, low[:, of], high[:, of]))
+
+
+def _told_by_others(Z: Floats, X: Floats, trust: Floats, exact: NDArray[np.intp]) -> Floats:
+    """(k, a, m) what the instruments tell of each column of X, by what goes with what in the other
+    pieces of the drive, which take turns: fitted where it is used, many instruments that know
+    nothing would each explain a little of the column's own noise, and seem to tell something
+    (Angrist, Imbens and Krueger 1999).
+    """
+    piece = np.arange(len(X)) // PIECE_FRAMES % 2
+    told = np.empty_like(X)
+    for own, others in ((0, 1), (1, 0)):
+        of_Z, of_X = (c[piece == others].reshape(-1, c.shape[2]) for c in (Z, X))
+        trusted = of_Z * trust[piece == others].reshape(-1, 1)
+        told[piece == own] = Z[piece == own] @ _first_stage(trusted, of_Z, of_X, exact)
+    return told
 
 
 def _first_stage(trusted: Floats, Z: Floats, X: Floats, exact: NDArray[np.intp]) -> Floats:

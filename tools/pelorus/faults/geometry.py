@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from pelorus.faults import imu_axes, mounting
-from pelorus.faults.agreement import Agreement, agreement
+from pelorus.faults.agreement import Agreement, agreement, halved
 from pelorus.faults.amounts import (
     BIAS_SIGMAS,
     bias_mps,
@@ -34,7 +34,8 @@ from pelorus.faults.handeye import (
     share_of_fit,
 )
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.moving import Moving
+from pelorus.faults.likelihood import of_estimate, of_share
+from pelorus.faults.moving import USUAL, Moving
 from pelorus.faults.seen import Seen
 from pelorus.faults.twist_body import TwistBody
 from pelorus.faults.two_views import TwoViews
@@ -72,10 +73,11 @@ class Judged:
 def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Judged:
     """`views` of neighbouring frames. Nothing where all is well."""
     by_imu = len(recording.inertial.t_ns) > 0
-    ask = cache(lambda: agreement(recording, views))  # it takes longer than all the rest
+    ask = cache(lambda: agreement(recording, views, seen))  # it takes longer than all the rest
     seen = Seen.of(recording, views)
     wrong = [*_unfit(int(seen.usable.sum()), share_of_fit(views))] or [*_standing(seen, moved)]
     if not wrong:
+        seen = halved(recording, seen, views.lag) if by_imu else seen
         wrong = [*(_of_imu(recording, seen) if by_imu else _of_twists(recording, seen, views, ask))]
     unexplained = [fault for fault in wrong if fault.name in UNEXPLAINED]
     if wrong and not unexplained:
@@ -116,6 +118,7 @@ def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> I
                 "no-fit",
                 f"camera and twists do not tell the same motion ({found.way_left:.0%} of it is "
                 "left unexplained), and no known fault explains why",
+                ratio=of_estimate(found.way_scale, 1.0, found.way_scale, found.way_sigma),
             )
         ]
     yield from _in_world(recording, seen) or turned
@@ -179,6 +182,7 @@ def _unfit(frames: int, fit: float) -> Iterator[Fault]:
             "scene",
             f"only {fit:.0%} of the points of two frames agree on one motion: wrong ids, a "
             "wrong calibration, or much of the scene moves",
+            ratio=of_share(1 - fit, frames, 1 - FIT_LEAST),
         )
 
 
@@ -200,19 +204,22 @@ def _standing(seen: Seen, moved: Callable[[], Moving]) -> Iterator[Fault]:
 
 def _units(found: HandEye) -> Iterator[Fault]:
     """c = s b: with degrees b is 57 times too large, so s is 1/57."""
-    for name, scale, unit, words in (
-        ("degrees", found.turn_scale, np.pi / 180, "rates: they are in degrees"),
-        ("degrees", found.turn_scale, 180 / np.pi, "rates: degrees were made of radians twice"),
-        ("km/h", found.way_scale, 1 / 3.6, "velocities: they are in km/h"),
-        ("cm/s", found.way_scale, 1e-2, "velocities: they are in cm/s"),
-        ("mm/s", found.way_scale, 1e-3, "velocities: they are in mm/s"),
-        ("km/h", found.way_scale, 3.6, "velocities: m/s were made of km/h twice"),
+    turns = found.turn_scale, found.turn_sigma
+    ways = found.way_scale, found.way_sigma
+    for name, (scale, sigma), unit, words in (
+        ("degrees", turns, np.pi / 180, "rates: they are in degrees"),
+        ("degrees", turns, 180 / np.pi, "rates: degrees were made of radians twice"),
+        ("km/h", ways, 1 / 3.6, "velocities: they are in km/h"),
+        ("cm/s", ways, 1e-2, "velocities: they are in cm/s"),
+        ("mm/s", ways, 1e-3, "velocities: they are in mm/s"),
+        ("km/h", ways, 3.6, "velocities: m/s were made of km/h twice"),
     ):
         near = UNIT_NEAR + (0.3 if abs(np.log(unit)) > np.log(10) else 0)
         if name == "degrees" and not found.turns_told:
             continue
         if scale > 0 and abs(np.log(scale / unit)) < near:
-            yield Fault(f"unit-{name}", f"the images show {scale:.3g} times the {words}")
+            shown = f"the images show {scale:.3g} times the {words}"
+            yield Fault(f"unit-{name}", shown, ratio=of_estimate(scale, 1.0, unit, sigma))
             return  # ways of a lever are the turns', too
 
 
@@ -223,13 +230,14 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
     """The rotation, and whether each of the twists' axes is the one that is meant."""
     given = recording.T_CB.R
     off = angle_between(found.R, given)
-    sure = off > SURE_SIGMAS * _sigma_deg(found, given)
+    sigmas = off / _sigma_deg(found, given)
+    sure = sigmas > SURE_SIGMAS
     rolled = off > ROLLED_DEG and found.turns_told
     axes = list(_axes(recording, views))
     cosine = float((found.R @ found.heading_B) @ (given @ found.heading_B))
     headed = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
     if axes and sure and angle_between(found.R, given.T) < NEAR_DEG:
-        yield _inverted(off)
+        yield replace(_inverted(off), ratio=sigmas**2)
     elif axes:
         yield from axes
     # the way tells where the camera looks; the roll about it only the turns do, which may be noise
@@ -241,9 +249,10 @@ def _extrinsic(recording: Recording, found: HandEye, views: TwoViews, ask: Ask) 
         if off < NEAR_DEG and _otherwise(ask(), off):
             return
         if by_pitch and HEADED_SHARE * off < headed and off < NEAR_DEG:
-            yield _pitched(f"{headed:.0f}")  # the rest is roll, known worse
+            fault = _pitched(f"{headed:.0f}")  # the rest is roll, known worse
         else:
-            yield _turned(given, found.R, off)
+            fault = _turned(given, found.R, off)
+        yield replace(fault, ratio=sigmas**2)
 
 
 def _otherwise(agreed: Agreement, off: float) -> bool:
@@ -273,15 +282,18 @@ def _axes(recording: Recording, views: TwoViews) -> Iterator[Fault]:
         mounting.Rates(own[:, :3] - np.cross(turn, arm), rates[:, :3], turn),
         mounting.Rates(turn, rates[:, 3:]),
     )
-    both = of_turn.won and of_way.won and np.array_equal(of_turn.F, of_way.F)
-    if both or (of_turn.won and not of_way.won):
-        whose = "the twists have" if both else "the rates of turn have"
-        yield Fault("axes", f"the body's axes are turned or mirrored: {whose} {_words(of_turn.F)}")
-    elif of_way.won:
-        words = f"the velocities have {_words(of_way.F)}"
-        if of_turn.won:
-            words += f", the rates of turn {_words(of_turn.F)}"
-        yield Fault("axes", f"the body's axes are turned or mirrored: {words}")
+    won = {
+        whose: found
+        for whose, found in (("the velocities", of_way), ("the rates of turn", of_turn))
+        if found.won
+    }
+    if not won:
+        return
+    words = ", ".join(f"{whose} have {_words(found.F)}" for whose, found in won.items())
+    if len(won) > 1 and np.array_equal(of_turn.F, of_way.F):
+        words = f"the twists have {_words(of_turn.F)}"
+    ratio = sum(found.ratio for found in won.values())
+    yield Fault("axes", f"the body's axes are turned or mirrored: {words}", ratio=ratio)
 
 
 def _words(F: Floats) -> str:
@@ -356,4 +368,5 @@ def _moving(found: Moving, misleads: bool) -> Iterator[Fault]:
             f"some length){so}",
             stops=misleads,
             grave=misleads,
+            ratio=of_share(found.share, found.tracks, USUAL),
         )

@@ -45,6 +45,7 @@ class HandEye:
     turn_scale: float
     turn_sigma: float
     way_scale: float
+    way_sigma: float
     way_left: float  # of the ways what the fit does not explain, as a share
     R_covariance: Floats  # rad^2, of a small turn on the left of R
     heading_B: Floats  # unit vector: where the body mostly drives
@@ -113,17 +114,17 @@ def _fit(
     v_B, w_B = of_body[usable, :3], of_body[usable, 3:]
     if len(v_C) < FRAMES_ENOUGH:
         x, axes = float("nan"), np.eye(3)
-        return HandEye(len(v_C), fit, axes, x, x, x, x, axes, axes[0], 0.0)
+        return HandEye(len(v_C), fit, axes, x, x, x, x, x, axes, axes[0], 0.0)
     w_B = w_B - np.median(w_B - np.median(w_B, axis=0), axis=0)
     lever = -recording.T_CB.R.T @ recording.T_CB.p
     driven = v_B + np.cross(w_B, lever)
     R, covariance = _rotation(w_B, w_C, driven, v_C)
     turn_scale, turn_sigma, _ = _scale(w_C, w_B @ R.T)
-    way_scale, _, way_left = _scale(v_C, driven @ R.T)
+    way_scale, way_sigma, way_left = _scale(v_C, driven @ R.T)
     mean = np.median(driven, axis=0)
     heading = mean / (np.linalg.norm(mean) + 1e-12)
     speed = float(np.median(np.linalg.norm(v_C, axis=1)))
-    scales = (turn_scale, turn_sigma, way_scale, way_left)
+    scales = (turn_scale, turn_sigma, way_scale, way_sigma, way_left)
     return HandEye(len(v_C), fit, R, *scales, covariance, heading, speed)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtrc
 
 from pelorus import se3
+from pelorus.faults.likelihood import of_share
 from pelorus.faults.two_views import TwoViews
 from pelorus.recording import Recording
 from pelorus.se3 import Poses
@@ -71,6 +72,15 @@ class Jumps:
     ends: int
     again: int  # points seen again after a few frames
     elsewhere: int  # of these far from where they must be
+
+    @property
+    def ratio(self) -> float:
+        """2 ln of the likelihood of so many beside that of the most that bad matches make."""
+        goes_on, ends = self.jumps + self.elsewhere, self.jumps + self.ends
+        return max(
+            of_share(self.elsewhere / max(self.again, 1), self.again, BY_CHANCE),
+            of_share(min(goes_on / max(ends, 1), 1.0), ends, JUMPS_SHARE),
+        )
 
     @property
     def are_slots(self) -> bool:

@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from pelorus import se3
 from pelorus.faults.axes import ways
-from pelorus.faults.fit import Design, Fit
+from pelorus.faults.fit import WITHIN, Design, Fit
 from pelorus.faults.force import by_images, force
 from pelorus.faults.imu_body import ImuBody
-from pelorus.faults.seen import Seen
+from pelorus.faults.seen import Motions, Seen
 from pelorus.inertial import Inertial
 from pelorus.layout import Floats
 from pelorus.recording import Recording
+from pelorus.tracks import Indices
 
 LIMIT = 50.0  # by which d^2, of 18 degrees of freedom, may be above the least of all
 UNFIT, UNFIT_SHARE = 300.0, 0.2  # above, and above such a share of what it is as given, none fits
@@ -64,16 +65,20 @@ class Matrix:
     by_readings: Floats
 
     def held_against(self, N: Floats, free: bool = True) -> float:
-        """d^2 of N, at the scale beside its own that fits best."""
+        """d^2 of N, at the scale beside its own that fits best; and what it costs N, by likelihood,
+        if the noise is wider with it: then it explains anything.
+        """
         size = float(np.linalg.norm(N) / np.sqrt(3))
         doubt = self.by_readings + DOUBT**2 * np.eye(9)
-        known = np.linalg.inv(self.covariance + size**2 * doubt)
+        wide = self.covariance + size**2 * doubt
+        known = np.linalg.inv(wide)
+        wider = np.linalg.slogdet(wide)[1] - np.linalg.slogdet(self.covariance + doubt)[1]
         n, m = N.ravel(), self.M.ravel()
         scale = 1.0
         if free:
             scale = float(np.clip(n @ known @ m / (n @ known @ n), 1 - FREE_SCALE, 1 + FREE_SCALE))
         left = m - scale * n
-        return float(left @ known @ left)
+        return float(left @ known @ left + max(wider, 0.0))
 
     @property
     def is_told(self) -> bool:
@@ -149,7 +154,8 @@ def measured(recording: Recording, seen: Seen, body: ImuBody) -> Measured | None
     beside = [BIAS_MPS2] * 3 + [LEVER_M] * 3 + [100.0] * stretches.shape[2]
     one, other = X[:, good]  # of the readings, each with a noise of its own
     noise = np.sqrt(0.5) * (one - other)[:, :, :9]
-    fit = _fit(seen.rates[good, :3], one, other, noise, seen.variance[good, :3], beside)
+    at = np.flatnonzero(good)
+    fit = _fit(seen.rates[at, :3], one, other, noise, seen.variance[at, :3], beside, at)
     return Measured(turn, fit.matrix)
 
 
@@ -167,24 +173,55 @@ def _turns_without_noise(w: Floats, fit: Fit) -> Floats:
 
 
 def _turn(body: ImuBody, seen: Seen, frame_t_ns: np.ndarray, offset_s: float) -> Found | None:
-    """By what the images tell of the frames beside: in that there is nothing of what a gyro reads
-    without turning, be it noise or a motor. What they do not tell of the readings counts as noise.
+    """By what the images tell otherwise, by the other half of the points and by the frames beside:
+    in that there is nothing of what a gyro reads without turning, be it noise or a motor. What
+    they do not tell of the readings counts as noise.
     """
-    w, own = body.mean_turns(frame_t_ns, offset_s), seen.beside()[:, 3:]
-    good = seen.usable & np.isfinite(np.hstack((w, own))).all(axis=1)
+    w, beside = body.mean_turns(frame_t_ns, offset_s), seen.beside()[:, 3:]
+    good = seen.usable & np.isfinite(np.hstack((w, beside))).all(axis=1)
     if good.sum() < 0.5 * seen.usable.sum():
         return None
-    y, w, own = seen.rates[good, 3:], w[good], own[good]
-    told = np.hstack((own, np.ones((len(own), 1))))
-    expected = told @ np.linalg.lstsq(told, w, rcond=None)[0]
-    X, Z = np.zeros((2, len(w), 3, 12))
+    silent = _are_silent(seen.rates[good, 3:], w[good], beside[good])
+    parts = [_rows(own, w, others, silent) for own, others in seen.pairs()]
+    order = np.argsort(np.concatenate([part[-1] for part in parts]), kind="stable")
+    y, X, Z, variance, at = (np.concatenate(rows)[order] for rows in zip(*parts, strict=True))
+    return _fit(y, X, Z, (X - Z)[:, :, :9], variance, [1.0] * 3, at)
+
+
+def _are_silent(y: Floats, w: Floats, beside: Floats) -> bool:
+    """Whether the readings have no part in what the images show."""
+    seen_to_turn = _together(y, beside)
+    return seen_to_turn > max(TURNS_SIGMAS, PART_LEAST * _together(w, _foretold(w, _told(beside))))
+
+
+def _told(own: Floats) -> Floats:
+    """With a bias."""
+    return np.hstack((own, np.ones((len(own), 1))))
+
+
+def _rows(
+    own: Seen, w: Floats, others: list[Motions], silent: bool
+) -> tuple[Floats, Floats, Floats, Floats, Indices]:
+    """y, X, Z, the variance and when. Of silent readings 0 is what they say."""
+    instruments = np.hstack([other.rates[:, 3:] for other in others])
+    at = np.flatnonzero(own.usable & np.isfinite(np.hstack((w, instruments))).all(axis=1))
+    w, told = w[at], _told(_within(instruments[at]))
+    expected = w if silent else told @ np.linalg.lstsq(told, w, rcond=None)[0]
+    return own.rates[at, 3:], _columns(w), _columns(expected), own.variance[at, 3:], at
+
+
+def _within(x: Floats) -> Floats:
+    """Half of the points may tell leaps."""
+    return np.asarray(np.clip(x, *np.quantile(x, WITHIN, axis=0)))
+
+
+def _columns(w: Floats) -> Floats:
+    """(k, 3, 12) of M row by row, and of a bias."""
+    X = np.zeros((len(w), 3, 12))
     for i in range(3):
-        X[:, i, 3 * i : 3 * i + 3], Z[:, i, 3 * i : 3 * i + 3] = w, expected
-        X[:, i, 9 + i] = Z[:, i, 9 + i] = 1
-    seen_to_turn = _together(y, own)
-    if seen_to_turn > max(TURNS_SIGMAS, PART_LEAST * _together(w, _foretold(w, told))):
-        Z = X  # the readings have no part in what the images show: 0 is what they say
-    return _fit(y, X, Z, (X - Z)[:, :, :9], seen.variance[good, 3:], [1.0] * 3)
+        X[:, i, 3 * i : 3 * i + 3] = w
+        X[:, i, 9 + i] = 1
+    return X
 
 
 def _foretold(w: Floats, told: Floats) -> Floats:
@@ -203,13 +240,19 @@ def _together(a: Floats, b: Floats) -> float:
 
 
 def _fit(
-    y: Floats, X: Floats, Z: Floats, noise: Floats, variance: Floats, beside: list[float]
+    y: Floats,
+    X: Floats,
+    Z: Floats,
+    noise: Floats,
+    variance: Floats,
+    beside: list[float],
+    at: Indices,
 ) -> Found:
     """By their own noise, where the drive does not move them, least squares would find a matrix of
     0, and be sure of it.
     """
     prior = np.diag(np.array([MATRIX] * 9 + beside) ** -2.0)
-    fit = Fit(Design(y, X, Z, variance, prior, y, np.arange(len(y))), BLOCKS)
+    fit = Fit(Design(y, X, Z, variance, prior, y, at), BLOCKS)
     by_readings = np.sum([fit.covariance_of(part)[:9, :9] for part in np.moveaxis(noise, 2, 0)], 0)
     return Found(fit, Matrix(fit.x[:9].reshape(3, 3), fit.covariance[:9, :9], by_readings))
 

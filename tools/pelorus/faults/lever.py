@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pelorus import visual_motion
 from pelorus.faults.finding import Finding
+from pelorus.faults.likelihood import of_estimate, told
 from pelorus.frames import TwistTiming
 from pelorus.layout import Floats
 from pelorus.recording import Recording
@@ -60,6 +61,7 @@ def mend(recording: Recording) -> tuple[Recording, Finding]:
         f"reprojection in {int(turning.sum())} turning frames is {errors[0]:.1f} and "
         f"{errors[1]:.1f} px"
     )
+    evidence = told(evidence, of_estimate(s, 0.0, 1.0, sigma))
     if s - 0.5 < max(SIGMAS_MIN * sigma, MARGIN_MIN):
         return recording, Finding(SUBJECT, False, evidence, "nothing to mend")
     action = f"t_CB {_metres(given.p)} replaced by {_metres(other.p)}"

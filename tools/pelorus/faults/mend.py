@@ -19,6 +19,7 @@ from pelorus.recording import Recording
 NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
 CANNOT = "what is off by less than four times as much cannot be seen in this drive"
+BEHIND = "before that is mended this drive cannot tell scale, clock and the camera's place"
 PLACE_TOLD_M = 10.0  # above, a place is not told
 SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
 
@@ -65,6 +66,8 @@ def _known(found: Judged) -> Iterator[Finding]:
     if found.agreed is not None:
         told = found.agreed.scale_sigma < SCALE_TOLD
         yield Finding(AGREES, False, known_words(found.agreed), CANNOT, told=told)
+    elif any(fault.stops for fault in found.faults):
+        yield Finding(AGREES, False, BEHIND, "nothing was changed", told=False)
 
 
 def known_words(agreed: Agreement) -> str:

@@ -21,10 +21,13 @@ import numpy as np
 
 from pelorus import se3
 from pelorus.faults.axes import ways
+from pelorus.faults.fit import TELLS_SIGMAS
+from pelorus.faults.likelihood import of_estimate
 from pelorus.layout import Floats
 
 BESIDE = (1, 2)
 EXPLAINED_LEAST = 0.3
+SURE_SHARED = 4.0  # standard errors by which turns go together: what they explain, noise may hide
 SURE, BEYOND = 6.0, 3.0  # standard errors by which T must lie below 0, and below the middle
 SURE_OF_WAYS = 6.0  # the same below the middle, by velocities: whole blocks must agree in it
 NEAR = 0.3  # to -1 must both T be, where they tell it together
@@ -44,6 +47,7 @@ class Duel:
     z: float  # standard errors by which the blocks of the drive lie below the middle
     by_ways: bool
     explained: float  # of what the images show on the axes in question, by F
+    shared: float = 0.0  # standard errors by which the two go together there, by F
     together: bool = False  # velocities and rates of turn tell the same
 
     @property
@@ -52,13 +56,23 @@ class Duel:
         return -self.effect > SURE * self.sigma and -0.5 - self.effect > BEYOND * self.sigma
 
     @property
+    def ratio(self) -> float:
+        """2 ln of the likelihood of F beside that of the given axes. Of velocities whole blocks
+        must agree, and z has their standard error.
+        """
+        sigma = self.sigma
+        if self.by_ways and not self.together:
+            sigma = (-0.5 - self.effect) / self.z
+        return of_estimate(self.effect, 0.0, -1.0, sigma)
+
+    @property
     def won(self) -> bool:
         if self.together:
             return True
-        sure = self.is_far
         if self.by_ways:
-            sure = self.effect < -0.5 and self.z > SURE_OF_WAYS
-        return sure and self.explained > EXPLAINED_LEAST
+            told = self.effect < -0.5 and self.z > SURE_OF_WAYS
+            return told and self.explained > EXPLAINED_LEAST
+        return self.is_far and self.shared > SURE_SHARED
 
 
 STAYS = Duel(np.eye(3), 0.0, float("inf"), 0.0, False, 0.0)
@@ -117,7 +131,10 @@ def best_of_both(way: Rates, turn: Rates) -> tuple[Duel, Duel]:
     weight = np.array([found.sigma**-2 for found in both])
     effect = float(weight @ [found.effect for found in both]) / weight.sum()
     together = replace(both[0], effect=effect, sigma=float(weight.sum() ** -0.5))
-    if not (together.is_far and all(abs(found.effect + 1) < NEAR for found in both)):
+    # noise beside noise, where nothing but the speed is told, goes together in no axes
+    shared = sum(found.shared for found in both) / float(np.sqrt(2))
+    near = all(abs(found.effect + 1) < NEAR for found in both)
+    if not (together.is_far and near and shared > TELLS_SIGMAS):
         return STAYS, STAYS
     return replace(both[0], together=True), replace(both[1], together=True)
 
@@ -183,5 +200,8 @@ def _duel(F: Floats, seen: Floats, told: Floats, nuisance: Floats, spread: Float
     z = -float(np.mean(below)) / spread_of * float(np.sqrt(blocks))
     other = ~np.isclose(np.diag(F), 1)
     left, shown = free(seen - told @ F.T)[:, other], free(seen)[:, other]
+    same = np.sum(shown * (shown - left) / spread[other], axis=1) * weight
+    sums = np.bincount(at, same)
+    shared = float(np.sum(sums) / (np.sqrt(blocks) * np.std(sums, ddof=1) + 1e-12))
     share = np.sum(weight[:, None] * left**2) / (np.sum(weight[:, None] * shown**2) + 1e-12)
-    return Duel(F, effect, sigma, z, False, 1 - float(share))
+    return Duel(F, effect, sigma, z, False, 1 - float(share), shared)

@@ -19,6 +19,7 @@ from pelorus.faults import identity
 from pelorus.faults.fault import Fault
 from pelorus.faults.geometry import Judged, geometry
 from pelorus.faults.handeye import first_part
+from pelorus.faults.likelihood import of_share
 from pelorus.faults.moving import Moving, moving
 from pelorus.faults.seen import Seen, pauses
 from pelorus.faults.two_views import TwoViews, two_views
@@ -32,6 +33,7 @@ SWAPPED_SHARE = 0.5
 ROW_GAP_PX = 2.0  # of a rectified pair the median is below one
 ROW_BIN, ROW_BINS = 50, 4  # observations and parts of the picture by which rows are compared
 ROW_OFF_PX = 1.0
+OF_MEDIAN = 1.858  # standard error of a median of n, times root n, beside the median deviation
 FROZEN_FRAMES = 3
 MOVES_M, TURNS_RAD = 0.005, 0.003  # from frame to frame
 GAP_TIMES = 10.0
@@ -150,27 +152,34 @@ def _pixels(recording: Recording) -> Iterator[Fault]:
     u_l, v_l, u_r, v_r = recording.tracks.pixels.T
     disparity, rows = u_l - u_r, v_l - v_r
     gap = float(np.median(np.abs(rows)))
+    points = len(np.unique(recording.tracks.id))  # one of them is off alike in all its frames
     if np.mean(disparity < 0) > SWAPPED_SHARE and gap < ROW_GAP_PX:
         yield Fault(
             "left-right",
             f"{np.mean(disparity < 0):.0%} of the disparities are negative: left and right are "
             "swapped",
+            ratio=of_share(float(np.mean(disparity < 0)), points, SWAPPED_SHARE),
         )
         return
     if gap > ROW_GAP_PX and np.median(np.abs(disparity)) < ROW_GAP_PX:
-        yield Fault("u-v", f"rows differ by {gap:.0f} px where columns should: u and v are swapped")
+        words = f"rows differ by {gap:.0f} px where columns should: u and v are swapped"
+        far = float(np.mean(np.abs(rows) > ROW_GAP_PX))
+        yield Fault("u-v", words, ratio=of_share(far, points, 0.5))
         return
-    off = _row_offset(recording)
+    off, ratio = _row_offset(recording, points)
     if gap > ROW_GAP_PX or off > ROW_OFF_PX:
         yield Fault(
             "unrectified",
             f"a point's rows differ by {gap:.1f} px, by {off:.1f} px in whole parts of the "
             "picture: the pair is not rectified, or left and right are of different moments",
+            ratio=ratio,
         )
 
 
-def _row_offset(recording: Recording) -> float:
-    """RMS over parts of the picture of the rows' median difference, px."""
+def _row_offset(recording: Recording, points: int) -> tuple[float, float]:
+    """RMS over parts of the picture of the rows' median difference, px; and 2 ln of the likelihood
+    of these medians beside that of none, by their spread over the points in a part.
+    """
     px = recording.tracks.pixels
     rows = px[:, 1] - px[:, 3]
     parts = np.zeros(len(px), np.int64)
@@ -178,8 +187,14 @@ def _row_offset(recording: Recording) -> float:
         edges = np.quantile(px[:, axis], np.arange(1, ROW_BINS) / ROW_BINS)
         parts = parts * ROW_BINS + np.searchsorted(edges, px[:, axis])
     own = [rows[parts == k] for k in range(ROW_BINS * ROW_BINS)]
-    medians = [float(np.median(values)) for values in own if len(values) >= ROW_BIN]
-    return float(np.sqrt(np.mean(np.square(medians)))) if medians else 0.0
+    some = [values for values in own if len(values) >= ROW_BIN]
+    if not some:
+        return 0.0, 0.0
+    medians = np.array([np.median(values) for values in some])
+    spread = [np.median(np.abs(x - m)) for x, m in zip(some, medians, strict=True)]
+    count = points / len(px) * np.array([len(values) for values in some])
+    sigma = OF_MEDIAN * np.array(spread) / np.sqrt(count) + 1e-3
+    return float(np.sqrt(np.mean(medians**2))), float(np.sum((medians / sigma) ** 2))
 
 
 def _ids(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> Iterator[Fault]:
@@ -198,6 +213,7 @@ def _ids(recording: Recording, views: TwoViews, moved: Callable[[], Moving]) -> 
             f"{found.jumps} tracks go on with another point from one frame to the next, "
             f"{found.elsewhere} of {found.again} come back elsewhere, {found.ends} end: the ids "
             f"({len(np.unique(tracks.id))}) are slots, not points",
+            ratio=found.ratio,
         )
 
 
