@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from everyday import drawn
 from everyday import drive as everyday_drive
-from injected import found_in
+from injected import found_in, injections
 from pelorus import se3
-from pelorus.converters.streams import Twists, recording
+from pelorus.converters.streams import Twists, converted, recording
 from pelorus.faults.fault import UNTOLD
 from pelorus.faults.named import faults_in
 from pelorus.recording import Recording
@@ -28,6 +28,39 @@ import verdicts
 @pytest.mark.parametrize(("kind", "by"), [(kind, by) for kind in KINDS for by in (WHOLE, BY_IMU)])
 def test_clean_robots_are_accused_of_nothing(kind: str, by: str) -> None:
     assert verdicts.found_in(drive(kind, by, 71))[1] == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "by", "seed"),
+    [("stop and go", BY_IMU, 918), ("rover", BY_IMU, 954), ("rover", WHOLE, 20116)],
+)
+def test_what_a_drive_does_not_tell_is_no_fault(kind: str, by: str, seed: int) -> None:
+    """A lever of 10 m along the axis of all turns, by instruments that were fitted to noise; a way
+    4 % too short, of points whose disparity is three times its noise; axes turned by 90 degrees, at
+    an even speed.
+    """
+    assert verdicts.found_in(drive(kind, by, seed))[1] == []
+
+
+def test_what_is_estimated_carries_its_ratio_of_likelihoods() -> None:
+    """What is read off the file has none."""
+    exact = {"ids-rows", "frozen"}
+    for name, k, wrong, due in injections(moving(7201)):
+        if k == 0 and name not in exact:
+            first = found_in(wrong)[0]
+            assert first.name in due, name
+            assert first.ratio is not None, name
+            assert first.ratio > 16, name
+
+
+def test_what_is_told_no_more_beside_a_fault_is_said() -> None:
+    streams = drive("carried", WHOLE, 76).streams
+    assert isinstance(streams.motion, Twists)
+    wrong = replace(streams.motion, w_B_radps=np.degrees(streams.motion.w_B_radps))
+    _, findings = converted(replace(streams, motion=wrong), None, True)
+    words = {f.subject: f.evidence for f in findings}
+    assert "likelihood ratio" in words["unit-degrees"]
+    assert "cannot tell scale, clock and the camera's place" in words["camera and body"]
 
 
 def test_what_stands_is_told_to_tell_nothing() -> None:
