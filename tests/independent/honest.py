@@ -2,15 +2,16 @@
 """Is the covariance honest? A world that shares nothing with the other tests, in numpy alone: its
 own motion, camera, noise and logarithm. Of the project it uses pelorus.Filter.
 
-usage: honest.py [--runs 50] [--seconds 24] [--float64] [--told NAME=VALUE]
+usage: honest.py [--imu] [--runs 50] [--seconds 24] [--float64] [--told NAME=VALUE]
        honest.py --table [--runs 32] [--seconds 60]
 
 A robot drives at 1 m/s among 30 tracks at 2 to 30 m, 1 px, 10 frames a second, a stereo pair 12 cm
-wide; twists come at 50 Hz. All that the filter takes for uncertain is drawn from what it is told:
-noises, biases and their walks, focal length, baseline, the camera's turn on the body. Then the
-squared error of the pose over its covariance (NEES) is chi-square with 6 degrees of freedom, and
-the sum over independent runs with 6 a run. Exit status 1 if it is beyond bounds at a checkpoint,
-which an honest filter would be in one of a thousand calls. --told gives the filter a setting.
+wide; twists come at 50 Hz, with --imu readings of an IMU at 200 Hz instead. All that the filter
+takes for uncertain is drawn from what it is told: noises, biases and their walks, the start, focal
+length, baseline, the camera's turn on the body. Then the squared error of the pose over its
+covariance (NEES) is chi-square with 6 degrees of freedom, and the sum over independent runs with 6
+a run. Exit status 1 if it is beyond bounds at a checkpoint, which an honest filter would be in one
+of a thousand calls. --told gives the filter a setting.
 
 --table: what if something is wrong that the filter is not told? First with a camera that it takes
 for exact, then with default settings: the share of frames that are GOOD though an error is beyond
@@ -21,7 +22,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +47,12 @@ VELOCITY_SIGMA, GYRO_SIGMA = 0.1, 0.01
 BIAS_SIGMA = np.repeat([0.005, 0.01], 3)
 BIAS_WALK = np.repeat([1e-8, 1e-10], 3)
 FOCAL_SIGMA, BASELINE_SIGMA, TURN_SIGMA = 0.005, 0.005, 0.003
+# By an IMU: its densities and walks, as the defaults have them, and what is known at first.
+GRAVITY_W = np.array([0.0, 0, -9.81])
+IMU_S, IMU_PER_FRAME = 0.005, 20
+IMU_NOISE, IMU_WALK = np.repeat([0.01, 0.001], 3), np.repeat([0.001, 0.0001], 3)
+IMU_BIAS_SIGMA = np.repeat([0.05, 0.005], 3)
+START_SIGMA = np.repeat([0.001, 0.01, 0.1], 3)  # of the pose and of the velocity in the body
 EXACT: Config = {"focal-sigma": 0.0, "baseline-sigma": 0.0, "camera-turn-sigma": 0.0}
 
 
@@ -183,6 +192,21 @@ class Camera:
         self.next_id += n
 
 
+def filter_of(config: Config, precision: Precision) -> Filter:
+    """That is told the calibration."""
+    told = Calibration(FX, FX, CX, CY, BASELINE_M, R_CB, T_CB)
+    settings = {"slots": 40, "pixel-sigma": PIXEL_SIGMA} | config
+    return Filter(told, settings, precision=precision)
+
+
+def compared(filter: Filter, R: Floats, p: Floats) -> tuple[float, Floats, Floats]:
+    """NEES, error and sigmas of the pose beside the true one."""
+    R_found, p_found = filter.pose()
+    P = filter.pose_covariance()
+    e = screw(R_found.T @ R, R_found.T @ (p - p_found))
+    return float(e @ np.linalg.solve(P, e)), e, np.sqrt(np.diag(P))
+
+
 def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Precision) -> Outcome:
     """One run, as an Outcome of one row."""
     rng = np.random.default_rng([20, seed])
@@ -193,9 +217,7 @@ def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Pr
     noise = np.repeat([VELOCITY_SIGMA, GYRO_SIGMA], 3) * rng.normal(size=(steps, 6))
     read = true + bias + np.cumsum(walk, axis=0) + noise
     turns, screws = turned(true[:, 3:] * STEP_S)
-    told = Calibration(FX, FX, CX, CY, BASELINE_M, R_CB, T_CB)
-    settings = {"slots": 40, "pixel-sigma": PIXEL_SIGMA} | config
-    filter = Filter(told, settings, precision=precision)
+    filter = filter_of(config, precision)
     R, p = turned(np.array([0.1, -0.2, 0.7]))[0], np.array([3.0, -2.0, 1.0])
     filter.set_pose(0, R, p)
     camera = Camera(rng, wrong)
@@ -206,30 +228,78 @@ def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Pr
         if k % FRAME_STEPS == 0:
             ids, pixels = camera.look(R, p, true[k])
             report = filter.update(t_ns, observations(ids, pixels))
-            R_found, p_found = filter.pose()
-            P = filter.pose_covariance()
-            e = screw(R_found.T @ R, R_found.T @ (p - p_found))
-            sigma = np.sqrt(np.diag(P))
-            rows.append((e @ np.linalg.solve(P, e), e, sigma, report.health == GOOD))
+            rows.append((*compared(filter, R, p), report.health == GOOD))
         way = R @ screws[k] @ (true[k, :3] * STEP_S)
         camera.move(way)
         R, p = R @ turns[k], p + way
-    nees, error, sigmas, good = (np.array(column)[None] for column in zip(*rows[1:], strict=True))
-    return Outcome(nees, error, sigmas, good)
+    return Outcome(*(np.array(column)[None] for column in zip(*rows[1:], strict=True)))
+
+
+def flight(
+    seed: int, seconds: float, wrong: Wrong, config: Config, precision: Precision
+) -> Outcome:
+    """One run by a raw IMU, whose start is known but for what is drawn."""
+    rng = np.random.default_rng([21, seed])
+    steps, h = round(seconds / IMU_S), IMU_S
+    t = (np.arange(steps + 2) - 0.5) * h  # a reading stands for the time from t[k] to t[k + 1]
+    hertz, phase = rng.uniform(0.05, 0.4, (2, 3)), rng.uniform(0, 2 * np.pi, (2, 3))
+    waves = np.sin(2 * np.pi * hertz * t[:, None, None] + phase)
+    p = np.array([1.5, 1.5, 0.4]) * waves[:, 0] + np.outer(t, [0.7, 0.2, 0])
+    angles = np.array([0.15, 0.15, 0.8]) * waves[:, 1]
+    R = (
+        turned(angles * [0, 0, 1])[0]
+        @ turned(angles * [0, 1, 0])[0]
+        @ turned(angles * [1, 0, 0])[0]
+    )
+    v = np.gradient(p, h, axis=0)
+    rate = np.array([screw(A.T @ B, np.zeros(3))[3:] for A, B in pairwise(R)]) / h
+    middle = R[:-1] @ turned(rate * h / 2)[0]
+    force = np.einsum("nji,nj->ni", middle, np.diff(v, axis=0) / h - GRAVITY_W)
+    bias = IMU_BIAS_SIGMA * rng.normal(size=6)
+    walk = np.cumsum(IMU_WALK * np.sqrt(h) * rng.normal(size=(steps + 1, 6)), axis=0)
+    read = np.hstack((force, rate)) + bias + walk
+    read += IMU_NOISE / np.sqrt(h) * rng.normal(size=read.shape)
+    by_imu: Config = {"process": "imu", "imu-timing": "mid"}
+    filter = filter_of(by_imu | config, precision)
+    at_reading = middle, (p[:-1] + p[1:]) / 2, (v[:-1] + v[1:]) / 2
+    R0, p0, v0 = (quantity[0] for quantity in at_reading)
+    spread = START_SIGMA * rng.normal(size=9)
+    turn, V = turned(spread[3:6])
+    filter.set_pose(0, R0 @ turn, p0 + R0 @ V @ spread[:3], np.diag(START_SIGMA[:6] ** 2))
+    filter.set_bias(np.zeros(6), IMU_BIAS_SIGMA**2)
+    filter.set_velocity(turn.T @ (R0.T @ v0) + spread[6:], START_SIGMA[6:] ** 2)
+    camera = Camera(rng, wrong)
+    rows = []
+    for k in range(steps):
+        t_ns = round(k * h * 1e9)
+        filter.inertial(t_ns, read[k, :3], read[k, 3:])
+        if k % IMU_PER_FRAME == 0:
+            ids, pixels = camera.look(at_reading[0][k], at_reading[1][k], np.zeros(6))
+            report = filter.update(t_ns, observations(ids, pixels))
+            rows.append(
+                (*compared(filter, at_reading[0][k], at_reading[1][k]), report.health == GOOD)
+            )
+    return Outcome(*(np.array(column)[None] for column in zip(*rows[1:], strict=True)))
 
 
 def driven(
-    runs: int, seconds: float, wrong: Wrong, config: Config, precision: Precision = "float32"
+    runs: int,
+    seconds: float,
+    wrong: Wrong,
+    config: Config,
+    precision: Precision = "float32",
+    run: Callable[[int, float, Wrong, Config, Precision], Outcome] = drive,
 ) -> Outcome:
     """All runs."""
-    all_of_them = [drive(seed, seconds, wrong, config, precision) for seed in range(runs)]
+    all_of_them = [run(seed, seconds, wrong, config, precision) for seed in range(runs)]
     parts = zip(*(vars(one).values() for one in all_of_them), strict=True)
     return Outcome(*(np.concatenate(part) for part in parts))
 
 
-def honest(runs: int, seconds: float, config: Config, precision: Precision) -> bool:
+def honest(runs: int, seconds: float, config: Config, precision: Precision, by_imu: bool) -> bool:
     """Prints NEES/6 at the checkpoints; whether each is within its bounds."""
-    outcome = driven(runs, seconds, Wrong(drawn=True), config, precision)
+    run = flight if by_imu else drive
+    outcome = driven(runs, seconds, Wrong(drawn=True), config, precision, run)
     last = outcome.nees.shape[1]
     checkpoints = np.linspace(last / 8, last, 8).astype(int) - 1
     outside = 0.001 / len(checkpoints) / 2
@@ -283,6 +353,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int)
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--float64", action="store_true")
+    parser.add_argument("--imu", action="store_true")
     parser.add_argument("--told", action="append", default=[])
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
@@ -293,7 +364,8 @@ def main() -> int:
     for name, _, value in (words.partition("=") for words in given.told):
         config[name] = float(value) if value[:1].isdigit() else value
     precision: Precision = "float64" if given.float64 else "float32"
-    return 0 if honest(given.runs or 50, given.seconds or 24, config, precision) else 1
+    seconds = given.seconds or 24
+    return 0 if honest(given.runs or 50, seconds, config, precision, given.imu) else 1
 
 
 if __name__ == "__main__":
