@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -238,4 +239,15 @@ def test_a_log_that_is_cut_or_bare_is_shown_as_far_as_it_goes(
     kept = [m for m in log_of(log) if not isinstance(m, Evidence)]
     write_file(bare, kept, len(kept))
     pelorus("view", bare, "--rrd", tmp_path / "bare.rrd")
+    broken = tmp_path / "broken.plr"
+    nowhere = [replace(m, p_WB_m=np.full(3, np.nan)) if isinstance(m, Pose) else m for m in kept]
+    write_file(broken, [*kept[: len(kept) // 2], *nowhere[len(kept) // 2 :]], len(kept))
+    pelorus("view", broken, "--rrd", tmp_path / "b.rrd", "--mcap", tmp_path / "b.mcap")
+    moved = read_rrd(tmp_path / "b.rrd")["/world/body Transform3D:translation"]
+    assert 0 < len(moved) < len(poses_of(kept))
+    pelorus("explain", broken, "--page", tmp_path / "b.html")
+    silent = tmp_path / "silent.plr"
+    write_file(silent, [m for m in kept if not isinstance(m, Report)], len(kept))
+    words = pelorus("explain", silent, status=1).err
+    assert words == f"error: {silent}: holds poses and no REPORT: a whole log is due\n"
     assert not any(name.startswith("/curves/doubt") for name in read_rrd(tmp_path / "bare.rrd"))

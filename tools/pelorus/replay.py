@@ -17,7 +17,7 @@ from rich.markup import escape
 from pelorus import native, packed_file
 from pelorus.console import err, waiting
 from pelorus.errors import PelorusError, write_text, writing
-from pelorus.frames import Kind, Message, Pose
+from pelorus.frames import Kind, Message, Pose, Report
 from pelorus.wire import Writer, counted_messages_of, messages_of
 
 EXE = ".exe" if os.name == "nt" else ""
@@ -107,6 +107,8 @@ def result_of(source: Path, options: Sequence[str], programs: Path | None) -> li
             raise PelorusError(
                 f"{source}: holds a filter's result already: --config and --set are for recordings"
             )
+        if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
+            raise PelorusError(f"{source}: holds poses and no REPORT: a whole log is due")
         return messages
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         outputs = Outputs.named(Path(folder), "result")

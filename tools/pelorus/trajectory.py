@@ -197,13 +197,21 @@ def truth_in(messages: Sequence[Message]) -> Trajectory | None:
     frames = _frame_times(messages)
     whole = {m.t_ns: m for m in messages if isinstance(m, Truth)}
     used = {t: m for t, m in whole.items() if t in frames} or whole
-    sound = [m for m in used.values() if np.isfinite(m.R_WB).all() and np.isfinite(m.p_WB_m).all()]
+    sound = [m for m in used.values() if is_finite(m)]
     return _ordered(sound) if sound else None
 
 
+def is_finite(pose: Pose | Truth) -> bool:
+    """Whether it is one."""
+    return bool(np.isfinite(pose.R_WB).all() and np.isfinite(pose.p_WB_m).all())
+
+
 def estimate_in(messages: Sequence[Message]) -> tuple[Trajectory, Floats] | None:
-    """A filter's poses after STEREO with their covariance (n, 6, 6), NaN where it knows none."""
-    poses = {m.t_ns: m for m in messages if isinstance(m, Pose) and m.after_stereo}
+    """A filter's poses after STEREO that are finite, with their covariance (n, 6, 6), NaN where it
+    knows none.
+    """
+    found = (m for m in messages if isinstance(m, Pose) and m.after_stereo)
+    poses = {m.t_ns: m for m in found if is_finite(m)}
     if not poses:
         return None
     estimate = _ordered(list(poses.values()))

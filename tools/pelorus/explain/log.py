@@ -22,6 +22,7 @@ from pelorus.layout import Floats
 from pelorus.motion import Times
 from pelorus.schema import number
 from pelorus.settings import in_force
+from pelorus.trajectory import is_finite
 from pelorus.wire import header_of_messages
 
 Flags = NDArray[np.bool_]
@@ -156,7 +157,7 @@ def _answers(
         if isinstance(m, Stereo):
             waiting.setdefault(m.t_ns, deque()).append(len(frames))
             frames.append(m)
-        elif isinstance(m, Pose) and m.after_stereo:
+        elif isinstance(m, Pose) and m.after_stereo and is_finite(m):
             pose = m
         elif isinstance(m, Report) and m.subject == Kind.STEREO:
             last = waiting[m.t_ns].popleft() if waiting.get(m.t_ns) else None

@@ -24,7 +24,7 @@ from pelorus.frame_table import DIAGONAL
 from pelorus.frames import Header, Kind, Landmark, Message, Pose, Report, Role, Stereo
 from pelorus.health import reasons
 from pelorus.layout import Floats
-from pelorus.trajectory import estimate_in, truth_in
+from pelorus.trajectory import estimate_in, is_finite, truth_in
 
 COUNTS = ("observations", "matched", "used", "gated", "created", "active")  # of REPORT
 TWIST = tuple(f"{kind} {axis}" for kind in ("linear", "turn") for axis in "xyz")
@@ -133,7 +133,9 @@ class Drive:
             case Stereo() if self._begun:
                 self._hand_on()
                 self._moment = Moment(message, truth_W_m=self._truth.get(message.t_ns))
-            case Pose() if self._answers(message.t_ns) and message.after_stereo:
+            case Pose() if (
+                self._answers(message.t_ns) and message.after_stereo and is_finite(message)
+            ):
                 self._pose, self._p_W_m = message, np.asarray(message.p_WB_m)
             case Report() if message.subject == Kind.STEREO and self._answers(message.t_ns):
                 assert self._moment is not None
