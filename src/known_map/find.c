@@ -9,6 +9,7 @@
 #include "math/small.h"
 #include "math/so3.h"
 #include "sensor/stereo.h"
+#include "state/calibration.h"
 #include "state/motion.h"
 #include "state/pose.h"
 #include "state/sensitivity.h"
@@ -45,28 +46,29 @@ static unsigned collect(const plr_filter *f, const plr_frame *frame, unsigned n,
 
 /* The present pose, without its covariance. */
 static void guess_placing(const plr_filter *f, const double origin[3], plr_placing *guess) {
-    plr_real offset_W[3], offset_C[3];
+    plr_real offset_W[3], offset_C[3], R_CB[9], t_CB[3];
     for (unsigned i = 0; i < 3; i++)
         offset_W[i] = (plr_real)(origin[i] - f->p_WB[i]);
-    plr_mat3_mul_nt(guess->R, f->par.camera.R_CB, f->R_WB);
+    plr_calibration_place(f, R_CB, t_CB);
+    plr_mat3_mul_nt(guess->R, R_CB, f->R_WB);
     plr_mat3_vec(offset_C, guess->R, offset_W);
     for (unsigned i = 0; i < 3; i++)
-        guess->t[i] = offset_C[i] + f->par.camera.t_CB[i];
+        guess->t[i] = offset_C[i] + t_CB[i];
 }
 
 /* T_WB = T_WC T_CB. Where T_WB Exp(xi) is the truth, (rho, theta) of the camera is -Ad(T_CB) xi. */
 static void set_found(const plr_filter *f, const plr_placing *at, const double origin[3],
                       plr_found_pose *found) {
-    const plr_camera *camera = &f->par.camera;
-    plr_real offset_C[3], offset_W[3], A[PLR_POSE_SQUARE];
+    plr_real offset_C[3], offset_W[3], A[PLR_POSE_SQUARE], R_CB[9], t_CB[3];
+    plr_calibration_place(f, R_CB, t_CB);
     for (unsigned i = 0; i < 3; i++)
-        offset_C[i] = camera->t_CB[i] - at->t[i];
+        offset_C[i] = t_CB[i] - at->t[i];
     plr_mat3_tvec(offset_W, at->R, offset_C);
     for (unsigned i = 0; i < 3; i++)
         found->p_WB[i] = origin[i] + (double)offset_W[i];
-    plr_mat3_mul_tn(found->R_WB, at->R, camera->R_CB);
+    plr_mat3_mul_tn(found->R_WB, at->R, R_CB);
     plr_so3_orthonormalise(found->R_WB);
-    plr_se3_adjoint_inverse(A, camera->R_CB, camera->t_CB);
+    plr_se3_adjoint_inverse(A, R_CB, t_CB);
     plr_sandwich6(found->P_xi, A, at->P_C);
 }
 
@@ -90,14 +92,16 @@ bool plr_find_pose(plr_filter *f, const plr_frame *frame, unsigned n, bool guess
 bool plr_find_likeliest_pose(plr_filter *f, const plr_frame *frame, unsigned n,
                              plr_found_pose *found) {
     double origin[3];
-    plr_real P[PLR_POSE_SQUARE];
+    plr_real P[PLR_POSE_SQUARE], A[PLR_POSE_SQUARE], R_CB[9], t_CB[3];
     plr_placing prior, at;
     found->count = collect(f, frame, n, true, plr_seen_known_of(f), origin);
     if (found->count == 0)
         return false;
     guess_placing(f, origin, &prior);
     plr_motion_pose_covariance(f, P);
-    plr_sandwich6(prior.P_C, f->par.Ad_CB, P);
+    plr_calibration_place(f, R_CB, t_CB);
+    plr_se3_adjoint(A, R_CB, t_CB);
+    plr_sandwich6(prior.P_C, A, P);
     const unsigned agreeing =
         plr_place_by_prior(f, plr_seen_known_of(f), found->count, &prior, &at);
     if (5 * agreeing < 3 * found->count)

@@ -9,6 +9,7 @@
 #include "math/small.h"
 #include "math/so3.h"
 #include "state/blocks.h"
+#include "state/camera.h"
 #include "state/covariance.h"
 #include "state/pose.h"
 
@@ -92,6 +93,12 @@ static void place_eye(plr_filter *f) {
     plr_mat3_vec(turned, c->R, p);
     for (unsigned i = 0; i < 3; i++)
         c->eye.t_CB[i] = c->t[i] + turned[i];
+}
+
+void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]) {
+    const plr_camera *eye = &f->calibration.eye;
+    plr_mat3_mul(R, eye->R_CB, f->par.camera.R_CB);
+    plr_camera_from_body(t, eye, f->par.camera.t_CB);
 }
 
 void plr_calibration_forget(plr_filter *f) {

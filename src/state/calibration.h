@@ -41,6 +41,9 @@ bool plr_calibration_needs_twist(const plr_filter *f);
 void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM],
                               const plr_real P_u[PLR_POSE_SQUARE]);
 
+/* From the body to the camera as it is estimated, and where it was at the time of the last frame. */
+void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]);
+
 /* Nothing is known but the prior; the estimate stays. */
 void plr_calibration_forget(plr_filter *f);
 
