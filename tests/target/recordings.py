@@ -15,8 +15,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pelorus.frames import Kind, Message
-from pelorus.wire import Writer, read_file
+from pelorus.frames import Config, End, Header, Kind, Message
+from pelorus.settings import IDS
+from pelorus.wire import Writer, messages_of, read_file, write_file
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("PELORUS_DATA", ROOT.parent / "shared" / "data"))
@@ -35,6 +36,11 @@ INERTIAL: tuple[str, ...] = (
     *("simulate", "{out}", "--seed", "7", "--duration", "4", "--observations", "20"),
     *("--imu-rate", "200", "--rest", "2", "--start", "pose", "--outliers", "0"),
 )
+# The same, and the settings by which focal length, baseline and turn are estimated.
+CALIBRATED = {
+    **{"calibrate": 7.0, "focal-sigma": 0.02, "baseline-sigma": 0.02},
+    "camera-turn-sigma": 0.02,
+}
 AS_IT_IS = ("convert", "ece276a", "{in}", "{out}", "--fix", "none", "--twist-timing", "end")
 REAL: dict[str, tuple[tuple[str, ...], str, int]] = {
     "starry-night": (
@@ -63,6 +69,15 @@ def cut(whole: Path, part: Path, frames: int) -> None:
         writer.end()
 
 
+def with_settings(source: Path, target: Path, settings: dict[str, float]) -> None:
+    """The recording, which asks for these settings too."""
+    asked = {IDS[name]: value for name, value in settings.items()}
+    messages = [m for m in messages_of(source) if not isinstance(m, End)]
+    before = [m for m in messages if isinstance(m, (Header, Config))]
+    others = [m for m in messages if not isinstance(m, (Header, Config))]
+    write_file(target, [*before, Config(asked), *others], len(messages) + 1)
+
+
 def first_frames(messages: list[Message], frames: int) -> list[Message]:
     """The messages up to and with the n-th stereo frame, without END."""
     stereos = [at for at, message in enumerate(messages) if message.kind == Kind.STEREO]
@@ -80,6 +95,8 @@ def main() -> None:
     for simulated, words in made.items():
         if not simulated.exists():
             pelorus(words, simulated, simulated)
+    if not (calibrated := folder / "calibrated.plr").exists():
+        with_settings(folder / "imu.plr", calibrated, CALIBRATED)
     for name, (words, path, frames) in REAL.items():
         source, whole, part = DATA / path, folder / "whole" / f"{name}.plr", folder / f"{name}.plr"
         if not source.exists():
