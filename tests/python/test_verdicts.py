@@ -122,3 +122,20 @@ def test_wrong_right_pictures_are_no_lever(seed: int) -> None:
     px[pairs.second[stale], 2:] = tracks.pixels[pairs.first[stale], 2:]
     said = faults_in(replace(clean, tracks=replace(tracks, pixels=px)))
     assert not {fault.name for fault in said} & {"lever", "scale", "axes", "no-fit"}
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("rover", 501), ("carried", 503), ("drone", 506)])
+def test_velocities_of_another_point_of_the_robot_are_named(kind: str, seed: int) -> None:
+    """As of an axle, where the extrinsic counts from the robot's middle. On a level floor nothing
+    tells how high it is.
+    """
+    streams = drive(kind, WHOLE, seed).streams
+    twists = streams.motion
+    assert isinstance(twists, Twists)
+    assert faults_in(recording(streams)) == []
+    v_B_mps = twists.v_B_mps + np.cross(twists.w_B_radps, [0.6, 0.0, 0.0])
+    [said] = faults_in(recording(replace(streams, motion=replace(twists, v_B_mps=v_B_mps))))
+    assert said.name == "lever"
+    assert not said.stops
+    assert "velocities are those of a point at (0.60, " in said.words
+    assert ("?" in said.words) == (kind == "rover")

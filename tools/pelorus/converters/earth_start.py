@@ -35,7 +35,9 @@ def started(recording: Recording) -> tuple[Recording, Finding]:
     """The recording with a START in the axes of its positions, if its twists tell one."""
     readings = [m for m in recording.readings if m.sensor == POSITION.number and m.axes & 3 == 3]
     level = LEVEL.get(recording.header.body_axes)
-    if level is None or not len(recording.twist_t_ns) or len(readings) < 3:
+    if not len(recording.twist_t_ns):
+        return recording, _untold("no twists are there, and an IMU does not tell where north is")
+    if level is None or len(readings) < 3:
         return recording, _untold(
             "twists, and body axes forward-left-up or forward-right-down, tell it"
         )
@@ -102,6 +104,7 @@ def _untold(why: str) -> Finding:
         SUBJECT,
         False,
         why,
-        "the filter takes positions only if its start is given in their axes: by a truth, or START",
+        "positions are used only if the start's place and heading are given in their axes: by a "
+        "truth (--truth), or by START",
         told=False,
     )

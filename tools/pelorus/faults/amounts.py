@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pelorus.faults.agreement import Agreement
 from pelorus.faults.fault import Fault
@@ -21,6 +22,7 @@ SCALE_KNOWN = 10.0  # sigmas from zero: a wild scale known no better is no scale
 CLOCK_SIGMAS, CLOCK_OFF_S = 4.0, 0.015
 LEVER_APART, LEVER_SURE = 4.0, 16.0  # sigmas between the two places; -2 ln of likelihood
 PLACE_SURE, PLACE_OFF_M = 36.0, 0.05
+PLACE_TOLD_M = 10.0  # sigma above which a place is not told
 LEVER_SHARE = 0.05  # so well the place is known beside what turns tell
 # A turning car goes sideways by this times v^2 w: so far off its camera seems to be.
 SLIP_S2_PER_M = 0.003
@@ -72,28 +74,37 @@ def place_covariance(recording: Recording, agreed: Agreement) -> Floats:
 
 
 def of_place(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
-    """Is the camera where it is said to be? Of an IMU, which measures where it is; wheels measure
-    the velocity of some other point than the one that their data sheet names.
+    """Is the camera where it is said to be? An IMU measures where it is; twists may be of another
+    point of the robot than the one from which the extrinsic counts.
     """
     T = recording.T_CB
     arm = -T.R.T @ T.p
     known = np.linalg.inv(place_covariance(recording, agreed))
-    off = float(np.linalg.norm(agreed.lever_m))
+    sigma = np.sqrt(np.diagonal(agreed.lever_covariance))
+    told = sigma < PLACE_TOLD_M
+    off = float(np.linalg.norm(agreed.lever_m[told]))
     ratio = float(agreed.lever_m @ known @ agreed.lever_m)
-    if ratio > PLACE_SURE and off > PLACE_OFF_M:
-        sigma = np.sqrt(np.diagonal(agreed.lever_covariance))
-        yield Fault(
-            "lever",
-            f"turns put the camera {_metres(arm + agreed.lever_m)} from the IMU, known to "
-            f"{sigma.max():.2f} m; the extrinsic puts it {_metres(arm)}",
-            stops=False,
-            grave=False,
-            ratio=ratio,
+    if not (ratio > PLACE_SURE and off > PLACE_OFF_M):
+        return
+    how_well = f"known to {sigma[told].max():.2f} m"
+    if len(recording.inertial.t_ns):
+        words = (
+            f"turns put the camera {_metres(arm + agreed.lever_m, told)} from the IMU, {how_well}; "
+            f"the extrinsic puts it {_metres(arm, told)}"
         )
+    else:
+        words = (
+            f"the velocities are those of a point {_metres(-agreed.lever_m, told)} in the body, "
+            f"{how_well}: give them of the body's origin, or the extrinsic of that point; or the "
+            "extrinsic's translation is off by as much"
+        )
+    yield Fault("lever", words, stops=False, grave=False, ratio=ratio)
 
 
-def _metres(p: Floats) -> str:
-    return "at (" + ", ".join(f"{x:.2f}" for x in p) + ") m"
+def _metres(p: Floats, told: NDArray[np.bool_] | None = None) -> str:
+    """A place; ? for what of it is not told."""
+    known = np.ones(3, bool) if told is None else told
+    return f"at ({', '.join(f'{x:.2f}' if k else '?' for x, k in zip(p, known, strict=True))}) m"
 
 
 def of_scale(agreed: Agreement, bias_sigma: float) -> Iterator[Fault]:

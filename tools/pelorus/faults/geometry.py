@@ -94,7 +94,10 @@ def geometry(recording: Recording, views: TwoViews, moved: Callable[[], Moving])
         if by_imu and not any(fault.name == "lever" for fault in faults):
             faults += of_place(recording, agreed)
         faults += of_scale_by_imu(agreed) if by_imu else of_scale(agreed, bias_mps(recording))
-    return Judged([*faults, *of_clock(recording, agreed)], agreed)
+    faults = [*faults, *of_clock(recording, agreed)]
+    if not (faults or by_imu):  # beside another fault a place may be off by what that does
+        faults = list(of_place(recording, agreed))
+    return Judged(faults, agreed)
 
 
 def _of_twists(recording: Recording, seen: Seen, views: TwoViews, ask: Ask) -> Iterator[Fault]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pelorus.faults import axes, lever, stale
 from pelorus.faults.agreement import Agreement
+from pelorus.faults.amounts import PLACE_TOLD_M
 from pelorus.faults.fault import UNTOLD, Fault
 from pelorus.faults.finding import Finding
 from pelorus.faults.geometry import Judged
@@ -20,7 +21,6 @@ NOTHING_LASTS = "ids-new"
 AGREES = "camera and body"
 CANNOT = "what is off by less than four times as much cannot be seen in this drive"
 BEHIND = "before that is mended this drive cannot tell scale, clock and the camera's place"
-PLACE_TOLD_M = 10.0  # above, a place is not told
 SCALE_TOLD = 0.02  # sigma of the scale, above which a drive says little of it
 
 
