@@ -31,7 +31,7 @@ def test_the_error_of_many_runs_is_as_large_as_the_filter_says(words: list[str])
 @pytest.mark.parametrize("words", [["--told", "focal-sigma=0"], ["--told", "model=world"]])
 def test_a_covariance_that_is_too_small_is_seen(words: list[str]) -> None:
     """A calibration that is taken for exact and is not; the textbook's model."""
-    command = [sys.executable, str(SCRIPT), "--runs", "20", *words]
+    command = [sys.executable, str(SCRIPT), "--runs", "20", "--seconds", "8", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stdout + done.stderr
     assert "OUTSIDE" in done.stdout
