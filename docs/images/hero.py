@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Draws docs/images/hero.webp, the moving picture of README: pictures are rendered (street.py), followed
-by the tools' tracker, and the filter finds the way from them and noisy odometry.
+"""Draws docs/images/hero.webp, the moving picture of README: pictures are rendered (street.py),
+points are followed by the tools' tracker, and the filter finds the way from them and odometry.
 
 usage: PYTHONPATH=tools hero.py [FILE.webp]
 
@@ -54,7 +54,7 @@ SHOWN_EVERY, TAIL = 2, 5
 
 
 def way(s: float) -> tuple[float, float, float]:
-    """x, y, heading after s metres, counter-clockwise around the block, from the middle of a long side."""
+    """x, y, heading after s metres, counter-clockwise, from the middle of a long side."""
     straights = 2 * (HALF_LONG_M - CORNER_M), 2 * (HALF_WIDE_M - CORNER_M)
     x, y, yaw, s = 0.0, -HALF_WIDE_M, 0.0, s % lap()
     for length in (straights[0] / 2, straights[1], straights[0], straights[1], straights[0] / 2):
@@ -110,6 +110,7 @@ def rendered() -> list[tuple[Pixels, Pixels]]:
 
 
 def gray(picture: Pixels) -> Pixels:
+    """As the tracker wants it."""
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
@@ -147,7 +148,10 @@ def drive(tracks: Tracks) -> Run:
             (R0, p0), (R1, p1) = body(begin), body(begin + step)
             w = Rotation.from_matrix(R0.T @ R1).as_rotvec() / step
             v = Rotation.from_rotvec(w * step / 2).as_matrix().T @ R0.T @ (p1 - p0) / step
-            v, w = v + BIAS_V + rng.normal(0, VELOCITY_SIGMA, 3), w + BIAS_W + rng.normal(0, GYRO_SIGMA, 3)
+            v, w = (
+                v + BIAS_V + rng.normal(0, VELOCITY_SIGMA, 3),
+                w + BIAS_W + rng.normal(0, GYRO_SIGMA, 3),
+            )
             for one in (filter, alone):
                 one.predict(round(begin * 1e9), v, w)
         now = slice(int(bounds[k]), int(bounds[k + 1]))
@@ -155,7 +159,11 @@ def drive(tracks: Tracks) -> Run:
         alone.update(t_ns, observations([], np.empty((0, 4))))
         R, p = filter.pose()
         held = filter.landmarks()
-        gone = [np.asarray(one.p_W_m)[:2] for one in filter.evicted.values() if isinstance(one, KnownLandmark)]
+        gone = [
+            np.asarray(one.p_W_m)[:2]
+            for one in filter.evicted.values()
+            if isinstance(one, KnownLandmark)
+        ]
         rows.append(
             (
                 p, R @ filter.pose_covariance()[:3, :3] @ R.T, alone.pose().p, body(k / RATE_HZ)[1],
@@ -172,14 +180,18 @@ def drive(tracks: Tracks) -> Run:
 def with_tracks(picture: Pixels, tracks: Tracks, k: int) -> Pixels:
     """Each track with its way through the last frames, warm near and cold far."""
     scale = 2
-    big = np.ascontiguousarray(cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC))
+    big = np.ascontiguousarray(
+        cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    )
     bounds = tracks.bounds()
     recent = slice(int(bounds[max(k - TAIL, 0)]), int(bounds[k + 1]))
     ids, pixels = tracks.id[recent], tracks.pixels[recent]
     for row in range(int(bounds[k]), int(bounds[k + 1])):
         u, _, right, _ = tracks.pixels[row]
         warm = np.uint8(255 * np.clip((u - right) / 22, 0, 1))
-        blue, green, red = (int(c) for c in cv2.applyColorMap(np.array([[warm]]), cv2.COLORMAP_TURBO)[0, 0])
+        blue, green, red = (
+            int(c) for c in cv2.applyColorMap(np.array([[warm]]), cv2.COLORMAP_TURBO)[0, 0]
+        )
         tail = np.round((pixels[ids == tracks.id[row], :2] + 0.5) * scale).astype(np.int32)
         cv2.polylines(big, [tail.reshape(-1, 1, 2)], False, (red, green, blue), 2, cv2.LINE_AA)
         cv2.circle(big, tail[-1].tolist(), 5, (red, green, blue), -1, cv2.LINE_AA)
@@ -206,15 +218,34 @@ def map_of(axes: Axes, run: Run, k: int, scene: list[street.Box]) -> None:
             wide, deep, _ = box.high - box.low
             axes.add_patch(plt.Rectangle(box.low[:2], wide, deep, color="#eceff1", zorder=0))
     axes.plot(*run.left_behind[k].T, ".", color="#90a4ae", markersize=1.6, zorder=1)
-    ellipse(axes, run.landmarks[k], run.ellipses[k], facecolor="#43a04766", edgecolor="#2e7d32", linewidth=0.6)
+    ellipse(
+        axes,
+        run.landmarks[k],
+        run.ellipses[k],
+        facecolor="#43a04766",
+        edgecolor="#2e7d32",
+        linewidth=0.6,
+    )
     axes.plot(*run.odometry[: k + 1, :2].T, color=ODOMETRY, linewidth=1.2)
     axes.plot(*run.truth[: k + 1, :2].T, color=INK, linewidth=2.6, alpha=0.35)
     axes.plot(*run.p[: k + 1, :2].T, color=OURS, linewidth=1.4)
-    ellipse(axes, run.p[k : k + 1, :2], run.P[k : k + 1, :2, :2], facecolor="#1565c055", edgecolor=OURS, linewidth=1)
+    ellipse(
+        axes,
+        run.p[k : k + 1, :2],
+        run.P[k : k + 1, :2, :2],
+        facecolor="#1565c055",
+        edgecolor=OURS,
+        linewidth=1,
+    )
     axes.plot(*run.p[k, :2], "o", color=OURS, markersize=4)
     axes.set(xlim=(-13.8, 13.8), ylim=(-13.6, 11.0), aspect="equal")
     axes.axis("off")
-    lines = (("odometry alone", ODOMETRY), ("Pelorus", OURS), ("landmarks, 3 sigma", "#2e7d32"), ("truth", "#8d959c"))
+    lines = (
+        ("odometry alone", ODOMETRY),
+        ("Pelorus", OURS),
+        ("landmarks, 3 sigma", "#2e7d32"),
+        ("truth", "#8d959c"),
+    )
     for place, (name, colour) in enumerate(lines):
         at = (0.02 + 0.44 * (place % 2), 0.055 - 0.055 * (place // 2))
         axes.text(*at, name, color=colour, fontsize=8.5, weight="bold", transform=axes.transAxes)
@@ -224,7 +255,9 @@ def band_of(axes: Axes, run: Run, k: int) -> None:
     """The error of y in its 3-sigma band."""
     t = np.arange(FRAMES) / RATE_HZ
     error, sigma = 100 * (run.p - run.truth)[:, 1], 100 * np.sqrt(run.P[:, 1, 1])
-    axes.fill_between(t[: k + 1], -3 * sigma[: k + 1], 3 * sigma[: k + 1], color="#bbdefb", linewidth=0)
+    axes.fill_between(
+        t[: k + 1], -3 * sigma[: k + 1], 3 * sigma[: k + 1], color="#bbdefb", linewidth=0
+    )
     axes.plot(t[: k + 1], error[: k + 1], color=INK, linewidth=1.1)
     axes.set(xlim=(0, t[-1]), ylim=(-3.4 * sigma.max(), 3.4 * sigma.max()))
     axes.set_title("error of y in its 3-sigma band, cm", fontsize=8.5, loc="left", pad=3, color=INK)
@@ -232,7 +265,10 @@ def band_of(axes: Axes, run: Run, k: int) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def drawn(picture: Pixels, tracks: Tracks, run: Run, k: int, scene: list[street.Box]) -> Image.Image:
+def drawn(
+    picture: Pixels, tracks: Tracks, run: Run, k: int, scene: list[street.Box]
+) -> Image.Image:
+    """A frame of the moving picture."""
     figure = plt.figure(figsize=(9.6, 4.1), dpi=100, facecolor="white")
     axes = figure.add_axes((0.0, 0.229, 0.583, 0.771))
     axes.imshow(with_tracks(picture, tracks, k), aspect="auto")
@@ -253,13 +289,17 @@ def main() -> None:
     run = drive(tracks)
     error, own = run.p[-1] - run.truth[-1], np.sqrt(np.diag(run.P[-1]))
     drift = np.linalg.norm(run.odometry[-1] - run.truth[-1])
-    print(f"{lap():.0f} m in {FRAMES / RATE_HZ:.1f} s, {len(tracks.id) / FRAMES:.0f} tracks a frame")
+    print(
+        f"{lap():.0f} m in {FRAMES / RATE_HZ:.1f} s, {len(tracks.id) / FRAMES:.0f} tracks a frame"
+    )
     print(f"at the end off by {error} m, 3 sigma {3 * own} m; odometry alone {drift:.2f} m")
     scene = street.block()
     shown = [drawn(pairs[k][0], tracks, run, k, scene) for k in range(0, FRAMES, SHOWN_EVERY)]
     first, *others = shown
     lasting = [SHOWN_EVERY * 1000 // RATE_HZ // 2] * (len(shown) - 1) + [2500]
-    first.save(out, save_all=True, append_images=others, duration=lasting, loop=0, quality=38, method=6)
+    first.save(
+        out, save_all=True, append_images=others, duration=lasting, loop=0, quality=38, method=6
+    )
     print(f"{out}: {out.stat().st_size // 1024} KB")
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A street around a block of houses, rendered for docs/images/hero.webp: boxes with textures, sunlight,
-shadows and haze. Nothing of it is anybody's picture.
+"""A street around a block of houses, rendered for docs/images/hero.webp: boxes with textures,
+sunlight, shadows and haze. Nothing of it is anybody's picture.
 
 World: x, y on the ground, z up, m. Camera: x right, y down, z forward.
 """
@@ -41,7 +41,9 @@ def stones(rng: np.random.Generator, size: int, rows: int, columns: int, joint: 
     column = np.floor(u * columns).astype(int) % columns
     shade = rng.normal(1, 0.16, (rows, columns))[row, column]
     off_row, off_column = (v * rows) % 1, (u * columns) % 1
-    edge = np.minimum(np.minimum(off_row, 1 - off_row) / rows, np.minimum(off_column, 1 - off_column) / columns)
+    edge = np.minimum(
+        np.minimum(off_row, 1 - off_row) / rows, np.minimum(off_column, 1 - off_column) / columns
+    )
     return np.asarray(shade * np.clip(edge * size / joint, 0.45, 1), np.float32)
 
 
@@ -74,10 +76,14 @@ def planks(rng: np.random.Generator) -> Floats:
     """1 m by 1 m of a crate."""
     size = TEXELS_PER_M
     v, u = np.mgrid[0:size, 0:size] / size
-    shade = rng.normal(1, 0.13, 6)[np.floor(v * 6).astype(int)] * (1 + 0.14 * noise(rng, (size, size), 2))
+    shade = rng.normal(1, 0.13, 6)[np.floor(v * 6).astype(int)] * (
+        1 + 0.14 * noise(rng, (size, size), 2)
+    )
     shade *= np.where((v * 6) % 1 < 0.1, 0.5, 1)
     border = (np.minimum(u, 1 - u) < 0.09) | (abs(u - v) < 0.07)
-    return np.asarray(np.where(border, 1.15, shade)[..., None] * np.array([0.62, 0.45, 0.28]), np.float32)
+    return np.asarray(
+        np.where(border, 1.15, shade)[..., None] * np.array([0.62, 0.45, 0.28]), np.float32
+    )
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,10 @@ class Face:
 
     def points(self) -> Floats:
         """A point for each texel of its light, (h, w, 3)."""
-        spans = [np.arange(a + 0.5 / LIGHT_PER_M, b, 1 / LIGHT_PER_M) for a, b in zip(self.low, self.high, strict=True)]
+        spans = [
+            np.arange(a + 0.5 / LIGHT_PER_M, b, 1 / LIGHT_PER_M)
+            for a, b in zip(self.low, self.high, strict=True)
+        ]
         grid = np.stack(np.meshgrid(*spans), axis=-1)
         out = np.empty((*grid.shape[:2], 3))
         out[..., self.others], out[..., self.axis] = grid, self.at + 0.01 * self.outwards
@@ -119,7 +128,9 @@ def block() -> list[Box]:
     rng = np.random.default_rng(4)
     boxes = []
 
-    def put(x: float, y: float, wide: float, deep: float, tall: float, texture: int, lift: float = 0) -> None:
+    def put(
+        x: float, y: float, wide: float, deep: float, tall: float, texture: int, lift: float = 0
+    ) -> None:
         low, high = np.array([x, y, lift]), np.array([x + wide, y + deep, lift + tall])
         boxes.append(Box(np.float32(low), np.float32(high), texture))
 
@@ -163,7 +174,9 @@ class Camera:
 
     def rays(self) -> Floats:
         """(h, w, 3), in the world, of depth 1."""
-        u, v = np.meshgrid(np.arange(self.width, dtype=np.float32), np.arange(self.height, dtype=np.float32))
+        u, v = np.meshgrid(
+            np.arange(self.width, dtype=np.float32), np.arange(self.height, dtype=np.float32)
+        )
         x, y = (u - (self.width - 1) / 2) / self.focal, (v - (self.height - 1) / 2) / self.focal
         return np.asarray(np.stack((x, y, np.ones_like(u)), axis=-1) @ self.R.T, np.float32)
 
@@ -171,7 +184,9 @@ class Camera:
         """The part of the picture in which a face may be seen."""
         corners = np.empty((4, 3), np.float32)
         corners[:, face.axis] = face.at
-        corners[:, face.others] = [(a, b) for a in (face.low[0], face.high[0]) for b in (face.low[1], face.high[1])]
+        corners[:, face.others] = [
+            (a, b) for a in (face.low[0], face.high[0]) for b in (face.low[1], face.high[1])
+        ]
         q = (corners - self.p) @ self.R
         if (q[:, 2] <= 0.05).all():
             return None
@@ -214,7 +229,9 @@ class Street:
             if sun.any():
                 sun[hits(points, SUN, box)] = 0
             if face.axis == 2 and box.low[2] == 0:  # it is darker at the foot of a wall
-                gap = np.maximum(np.maximum(box.low[:2] - points[..., :2], points[..., :2] - box.high[:2]), 0)
+                gap = np.maximum(
+                    np.maximum(box.low[:2] - points[..., :2], points[..., :2] - box.high[:2]), 0
+                )
                 sky *= 1 - 0.5 * np.exp(-np.linalg.norm(gap, axis=-1) / 0.5)
         return np.stack((cv2.GaussianBlur(sun, (0, 0), 0.7), sky), axis=-1).astype(np.float32)
 
@@ -222,7 +239,10 @@ class Street:
         """(HEIGHT, WIDTH, 3), RGB."""
         camera = Camera(np.float32(R_WC), np.float32(p_WC))
         rays = camera.rays()
-        depth, which = np.full(rays.shape[:2], np.inf, np.float32), np.full(rays.shape[:2], -1, np.int16)
+        depth, which = (
+            np.full(rays.shape[:2], np.inf, np.float32),
+            np.full(rays.shape[:2], -1, np.int16),
+        )
         for k, face in enumerate(self.faces):
             if (camera.p[face.axis] - face.at) * face.outwards > 0:
                 self._cover(k, face, camera, rays, depth, which)
@@ -237,7 +257,9 @@ class Street:
         return np.clip(np.round(bright), 0, 255).astype(np.uint8)
 
     @staticmethod
-    def _cover(k: int, face: Face, camera: Camera, rays: Floats, depth: Floats, which: Shorts) -> None:
+    def _cover(
+        k: int, face: Face, camera: Camera, rays: Floats, depth: Floats, which: Shorts
+    ) -> None:
         window = camera.window_of(face)
         if window is None:
             return
@@ -261,7 +283,9 @@ class Street:
         colour = sampled_levels(texture, across / metres, -up / metres, level)
         place = (across * 0.11 + face.at * 0.37) % 1, (up * 0.11 + face.axis * 0.31) % 1
         colour = colour * bilinear(self.stains[..., None], *place)
-        lit = bilinear_clamped(face.light, (a - face.low[0]) * LIGHT_PER_M, (b - face.low[1]) * LIGHT_PER_M)
+        lit = bilinear_clamped(
+            face.light, (a - face.low[0]) * LIGHT_PER_M, (b - face.low[1]) * LIGHT_PER_M
+        )
         colour = colour * (lit[:, :1] * SUN_LIGHT + lit[:, 1:] * SKY_LIGHT)
         haze = 1 - np.exp(-t / HAZE_M)[:, None]
         return np.asarray(colour * (1 - haze) + HAZE * haze, np.float32)
@@ -282,7 +306,16 @@ def faces_of(box: Box) -> list[Face]:
         others = [i for i in range(3) if i != axis]
         for side, outwards in ((box.low, -1.0), (box.high, 1.0)):
             if not (axis == 2 and outwards < 0):
-                out.append(Face(axis, float(side[axis]), outwards, box.low[others], box.high[others], box.texture))
+                out.append(
+                    Face(
+                        axis,
+                        float(side[axis]),
+                        outwards,
+                        box.low[others],
+                        box.high[others],
+                        box.texture,
+                    )
+                )
     return out
 
 
@@ -290,7 +323,10 @@ def hits(points: Floats, direction: Floats, box: Box) -> NDArray[np.bool_]:
     """Whether the ray from each point meets the box."""
     near, far = np.zeros(points.shape[:2]), np.full(points.shape[:2], np.inf)
     for i in range(3):
-        a, b = (box.low[i] - points[..., i]) / direction[i], (box.high[i] - points[..., i]) / direction[i]
+        a, b = (
+            (box.low[i] - points[..., i]) / direction[i],
+            (box.high[i] - points[..., i]) / direction[i],
+        )
         near, far = np.maximum(near, np.minimum(a, b)), np.minimum(far, np.maximum(a, b))
     return near < far - 1e-3
 
