@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import re
 from base64 import b64decode
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -159,6 +160,21 @@ def test_pictures_of_something_else_are_refused(
     assert "error" in refused(log, tmp_path / "nowhere")
     assert "error" in refused(log, tmp_path / "nowhere.mcap")
     assert "--page" in pelorus("explain", log, "--pictures", pictures, status=2).err
+
+
+def test_raw_pictures_are_rectified_as_for_tracking(
+    pelorus: Command, real: Callable[[str], Path], tmp_path: Path
+) -> None:
+    folder = real("images/euroc-v101-start/mav0/cam0/data.csv").parents[2]
+    made, shown = tmp_path / "made.plr", tmp_path / "page.html"
+    pelorus("convert", "euroc", folder, made)
+    pelorus("explain", made, "--page", shown, "--pictures", folder)
+    packed = re.findall(r'src="data:image/webp;base64,([^"]+)"', shown.read_text())
+    assert len(packed) == MOMENTS_MOST
+    first = unpacked(b64decode(packed[0])).mean(axis=2)
+    raw = Image.open(sorted((folder / "mav0/cam0/data").glob("*.png"))[0]).convert("L")
+    same = np.asarray(raw.resize(first.shape[::-1]), np.float64)
+    assert np.abs(first - same).mean() > 8  # a lens bends what a rectified picture has straight
 
 
 def test_a_picture_brings_the_cursor_to_its_frame(

@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import PICTURES, PROGRAMS, SETTINGS, settings_given
+from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
 from pelorus.console import out
 from pelorus.errors import write_text
 from pelorus.replay import find_programs
@@ -42,6 +42,7 @@ def check(
         None, "--page", metavar="FILE.html", help="The verdict with curves, way and map of the run."
     ),
     pictures: Path | None = PICTURES,
+    calibration: list[Path] = CALIBRATION,
     as_json: bool = typer.Option(False, "--json", help="The verdict as one JSON object."),
     programs: Path | None = PROGRAMS,
 ) -> None:
@@ -61,7 +62,7 @@ def check(
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         found = checked.check(program, recording, given, Path(folder))
         if page is not None:
-            _write(page, found, recording, program, Path(folder), pictures)
+            _write(page, found, recording, program, Path(folder), pictures, calibration)
     if found.tuned is not None:
         write_text(tuned, checked.config_text(found, recording))
     if as_json:
@@ -79,6 +80,7 @@ def _write(
     program: Path,
     folder: Path,
     pictures: Path | None,
+    calibration: list[Path],
 ) -> None:
     """With curves of a run with the settings that were found; without them, where a fault stopped
     the search.
@@ -101,7 +103,7 @@ def _write(
     explained = explain(messages)
     answer = answers.of_check(found, recording.name, explained)
     if pictures is not None:
-        answer = answers.with_footage(answer, footage(messages, explained, pictures))
+        answer = answers.with_footage(answer, footage(messages, explained, pictures, calibration))
     write(page, answer, Curves(messages))
 
 

@@ -24,6 +24,12 @@ PICTURES = typer.Option(
     "recording was converted from; or a folder of the left camera's rectified pictures, named by "
     "their times in ns, or one a frame.",
 )
+CALIBRATION = typer.Option(
+    [],
+    "--calibration",
+    metavar="FILE",
+    help="Of --pictures that do not bring their own, as for pelorus convert; repeatable.",
+)
 PROGRAMS = typer.Option(
     None, "--bin", metavar="DIR", help="Where the replays are; else PELORUS_BIN, build/bin."
 )

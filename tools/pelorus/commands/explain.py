@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pelorus.commands.choices import PICTURES, PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.replay import result_of
 
@@ -32,6 +32,7 @@ def explain(
         None, "--page", metavar="FILE.html", help="The same with curves, way and map, to look into."
     ),
     pictures: Path | None = PICTURES,
+    calibration: list[Path] = CALIBRATION,
     beside: Path | None = typer.Option(
         None,
         "--beside",
@@ -71,7 +72,7 @@ def explain(
             changed = replay_options(None, beside_settings, "--beside-set")
             named = ", ".join(beside_settings) or str(beside)
             other = named, result_of(beside or source, [*options, *changed], programs)
-        _write(page, source.name, found, messages, other, pictures)
+        _write(page, source.name, found, messages, other, pictures, calibration)
     if as_json:
         out.print(json.dumps(found.json(), indent=2), markup=False)
         return
@@ -86,6 +87,7 @@ def _write(
     messages: list[Message],
     other: tuple[str, list[Message]] | None,
     pictures: Path | None,
+    calibration: list[Path],
 ) -> None:
     from pelorus.explain import explain as explained  # noqa: PLC0415 - scipy loads slowly
     from pelorus.report import answers  # noqa: PLC0415
@@ -108,5 +110,5 @@ def _write(
         facts = f"Dashed curves are those of {other[0]}."
     answer = answers.of_explanation(found, name, tables, facts)
     if pictures is not None:
-        answer = answers.with_footage(answer, footage(messages, found, pictures))
+        answer = answers.with_footage(answer, footage(messages, found, pictures, calibration))
     write(page, answer, curves)

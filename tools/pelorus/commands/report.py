@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from pelorus.commands.choices import PICTURES, PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, progress
 from pelorus.errors import Existing, made, whole_folder
 from pelorus.replay import find_programs
@@ -53,6 +53,7 @@ def report(
     settings: list[str] = SETTINGS,
     also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
     pictures: Path | None = PICTURES,
+    calibration: list[Path] = CALIBRATION,
     programs: Path | None = PROGRAMS,
 ) -> None:
     """Replay a recording with your settings and by dead reckoning, and show what came out.
@@ -75,7 +76,7 @@ def report(
         from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
 
         compared = Comparison(subject, runs)
-        lines = _draw(compared, part, pictures)
+        lines = _draw(compared, part, pictures, calibration)
         _remove_pictures(folder)
     _tell(compared, lines, folder / PAGE)
 
@@ -88,7 +89,9 @@ def _remove_pictures(folder: Path) -> None:
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 
-def _draw(compared: Comparison, folder: Path, source: Path | None) -> list[str]:
+def _draw(
+    compared: Comparison, folder: Path, source: Path | None, calibration: list[Path]
+) -> list[str]:
     """The pictures and the page; the verdicts on it."""
     from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.explain import explain  # noqa: PLC0415 - as above
@@ -115,7 +118,7 @@ def _draw(compared: Comparison, folder: Path, source: Path | None) -> list[str]:
     drift = drift_table([Told(main.name, found, curves.accuracy, main.messages)])
     answer = answers.of_comparison(compared, lines, found, shown, drift)
     if source is not None:
-        answer = answers.with_footage(answer, footage(main.messages, found, source))
+        answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)
     return lines
 

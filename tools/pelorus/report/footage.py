@@ -67,12 +67,19 @@ class _Source(NamedTuple):
     left: Iterator[Gray]
 
 
-def footage(messages: Sequence[Message], found: Explanation, source: Path) -> Footage:
-    """PelorusError where the pictures are not this log's."""
+def footage(
+    messages: Sequence[Message],
+    found: Explanation,
+    source: Path,
+    calibration: Sequence[Path] = (),
+) -> Footage:
+    """PelorusError where the pictures are not this log's. `calibration` of raw ones, where they do
+    not bring it.
+    """
     log = log_of(messages)
     wanted = moments(log, found)
     artist = _Artist(log, messages)
-    with _opened(source) as pictures:
+    with _opened(source, tuple(calibration)) as pictures:
         frame_of = _frames(pictures, log)
         chosen = {int(k): picture for picture, k in enumerate(frame_of) if k in wanted}
         by_picture = {picture: k for k, picture in chosen.items()}
@@ -122,19 +129,20 @@ def moments(log: Log, found: Explanation) -> dict[int, str]:
 
 
 @contextmanager
-def _opened(source: Path) -> Iterator[_Source]:
+def _opened(source: Path, calibration: tuple[Path, ...]) -> Iterator[_Source]:
     from pelorus.converters import euroc, kitti, ros  # noqa: PLC0415 - they load slowly
     from pelorus.converters.bag import Bag  # noqa: PLC0415
     from pelorus.converters.ros_frames import Cameras  # noqa: PLC0415
     from pelorus.converters.streams import Asked  # noqa: PLC0415
 
+    asked = Asked(calibration)
     if source.suffix in BAGS or (source / "metadata.yaml").is_file():
         with Bag(source) as bag:
-            yield _of_streams(ros.read(bag, ros.Topics(Cameras()), Asked()), source)
+            yield _of_streams(ros.read(bag, ros.Topics(Cameras()), asked), source)
     elif any((source / name).is_dir() for name in ("mav0", "cam0")):
-        yield _of_streams(euroc.read(source, Asked()), source)
+        yield _of_streams(euroc.read(source, asked), source)
     elif (source / "calib.txt").is_file() or kitti.is_raw(source):
-        yield _of_streams(kitti.read(source, Asked(), kitti.Made(0.5, 0.05, 1)), source)
+        yield _of_streams(kitti.read(source, asked, kitti.Made(0.5, 0.05, 1)), source)
     else:
         yield _of_folder(source)
 
