@@ -21,6 +21,7 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
   const OTHERS = [["--l1", [7, 4]], ["--l2", [9, 3, 2, 3]], ["--l3", [3, 3]]]; // as in the curves of all runs
   const runs = tracks.map((track) => track.name).filter((name) => !(name in PENS));
   const penOf = (name) => PENS[name] || OTHERS[runs.indexOf(name) % OTHERS.length];
+  const every = (track, most) => Math.max(1, Math.ceil(track.t.length / most));
   const canvas = $("map"), ELLIPSES_MOST = 2000;
 
   // --- projection ------------------------------------------------------------------------------
@@ -43,7 +44,10 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
     const after = flat(pivot, 0);
     if (before) { map.x += after[0] - before[0]; map.y += after[1] - before[1]; }
   }
-  const flat = (q, k) => map.rows.map((row) => row[0] * q[0][k] + row[1] * q[1][k] + row[2] * q[2][k]);
+  const flat = ([x, y, z], k) => {
+    const [[a, b, c], [d, e, f]] = map.rows;
+    return [a * x[k] + b * y[k] + c * z[k], d * x[k] + e * y[k] + f * z[k]];
+  };
   const at = ([a, b]) => [map.width / 2 + (a - map.x) * map.scale, map.height / 2 - (b - map.y) * map.scale];
   turn(0, 0);
 
@@ -74,7 +78,7 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
   }
   function fit() {
     const box = canvas.getBoundingClientRect(), low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-    for (const track of tracks.slice(0, 2)) for (let k = 0; k < track.t.length; k++) {
+    for (const track of tracks.slice(0, 2)) for (let k = 0; k < track.t.length; k += every(track, 5000)) {
       if (track.p[0][k] == null) continue; // of a filter that diverged
       flat(track.p, k).forEach((x, i) => { if (x < low[i]) low[i] = x; if (x > high[i]) high[i] = x; });
     }
@@ -106,7 +110,7 @@ function pelorusMap({ data, exact, unpack, lower, $, node, css, still, font, tim
       pen.setLineDash(dashes);
       pen.lineWidth = 1.8;
       pen.beginPath();
-      const step = Math.max(1, Math.floor(track.t.length / (map.moving ? 2000 : 20000)));
+      const step = every(track, map.moving ? 2000 : 20000);
       for (let k = 0; k < track.t.length; k += step) {
         if (track.p[0][k] != null) pen.lineTo(...at(flat(track.p, k)));
       }

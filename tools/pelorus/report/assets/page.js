@@ -18,7 +18,8 @@
   let data, bytes;
   try {
     data = JSON.parse($("data").textContent);
-    const packed = Uint8Array.from(atob($("columns").textContent), (c) => c.charCodeAt(0));
+    const letters = atob($("columns").textContent), packed = new Uint8Array(letters.length);
+    for (let k = 0; k < letters.length; k++) packed[k] = letters.charCodeAt(k);
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
     bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   } catch (error) {
