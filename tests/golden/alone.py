@@ -3,7 +3,8 @@
 
 usage: alone.py REPLAY REPLAY-ALONE
 
-Alone: PLR_SUPERVISE=0, PLR_KNOWN_MAP=0, PLR_MAX_CALIBRATION=0. On the golden drives, where nothing goes wrong, each pose is the same to the bit.
+Alone: PLR_SUPERVISE=0, PLR_KNOWN_MAP=0, PLR_MAX_CALIBRATION=0. On the golden drives, where nothing
+goes wrong, each pose is the same to the bit.
 """
 
 from __future__ import annotations

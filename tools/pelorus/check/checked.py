@@ -9,6 +9,7 @@ from pathlib import Path
 from pelorus import wire
 from pelorus.check import verdict
 from pelorus.check.calibration import calibration
+from pelorus.check.estimated import estimated, without_clock
 from pelorus.check.halves_alike import with_halves_alike
 from pelorus.check.held import held_against
 from pelorus.check.options import Settings, options_of
@@ -71,7 +72,10 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
         known = BEHIND if judged.agreed is None else f"{known_words(judged.agreed)}; {CANNOT}"
         faults.append(Remark(Grade.CARE, known))
         return Checked(Grade.BAD, faults, [], [], [], None)
-    found = tune(bench, given, all(fault.name != "clock-turns" for fault in named))
+    one_clock = all(fault.name != "clock-turns" for fault in named)
+    found = tune(bench, without_clock(given), one_clock)
+    if "calibrate" in given:
+        found = replace(found, settings=found.settings | {"calibrate": given["calibrate"]})
     if any(fault.lasts for fault in named):
         found.lasting.append(NAMED)
     tuned = held_against(bench, given, found)
@@ -88,7 +92,8 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
         tuned = replace(tuned, settings=tuned.settings | camera.settings)
         run = _whole(program, recording, tuned.settings, folder, "after") or run
     origin = int(run.frames.t_ns[0])
-    remarks = [*faults, *verdict.remarks(run, tuned, origin), *verdict.of_calibration(camera)]
+    own = estimated(run.messages, camera)
+    remarks = [*faults, *verdict.remarks(run, tuned, origin), *verdict.of_calibration(camera, own)]
     rows = [(title, figures.get(title, "-"), now) for title, now in _figures(run, truth).items()]
     cost = (
         "-2 ln likelihood an observation",

@@ -11,6 +11,7 @@ import numpy as np
 
 from pelorus.arrivals import late_ones
 from pelorus.check.calibration import Calibration
+from pelorus.check.estimated import Estimated
 from pelorus.check.mount import CAMERA_TURN, Turned
 from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
@@ -272,11 +273,13 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
     yield Remark(Grade.CARE, words)
 
 
-def of_calibration(found: Calibration) -> Iterator[Remark]:
-    """What images and twists together say of the camera."""
+def of_calibration(found: Calibration, own: Estimated | None = None) -> Iterator[Remark]:
+    """What images and twists together say of the camera; `own`: what the filter estimates of it."""
     if found.scale is not None:
         yield from of_scale(found.scale)
-    if found.turn is not None:
+    if own is not None:
+        yield Remark(Grade.CARE if own.is_doubtful else Grade.GOOD, own.words())
+    if found.turn is not None and not (own is not None and own.answers_turn):
         yield from of_turn(found.turn)
 
 

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""What the filter has estimated of the calibration in a run (setting calibrate), and whether the
+search beside it says the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pelorus.calibrated import Calibrated, Part, last_calibrated
+from pelorus.check.calibration import Calibration
+from pelorus.check.mount import SURE, Turned
+from pelorus.check.options import Settings
+from pelorus.frames import Message
+from pelorus.layout import Floats
+from pelorus.settings import in_force
+
+TOLD = 3.0  # sigmas from which a correction is worth naming
+OFF_PRIOR = 4.0  # sigmas of the prior, as the filter's own reason CALIBRATION_OFF
+TURN = slice(2, 5)  # of calibrated.PARTS
+PRIORS = {
+    "baseline": "baseline-sigma",
+    "focal": "focal-sigma",
+    "turn": "camera-turn-sigma",
+    "centre": "centre-sigma",
+    "place": "camera-place-sigma",
+    "clock": "camera-clock-sigma",
+}
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """`off`: settings whose sigma the estimate is far beyond. `apart`: the search sees the camera
+    turned otherwise, by so many sigmas.
+    """
+
+    told: Calibrated
+    off: tuple[str, ...]
+    apart: float | None  # None: it has seen none, or the turn is not estimated
+
+    @property
+    def answers_turn(self) -> bool:
+        """Whether nothing is left to be said of the search's turn."""
+        return bool(self.told.estimated >> TURN.start & 1) and (self.apart or 0.0) <= SURE
+
+    def words(self) -> str:
+        """One sentence."""
+        parts = list(self.told.parts())
+        clear = [_with_sigma(*part) for part in parts if abs(part[1]) > TOLD * part[2]]
+        said = "the filter estimates the calibration on the way"
+        if not clear:
+            known = ", ".join(f"{part.name} to {sigma:.2g} {part.unit}" for part, _, sigma in parts)
+            return f"{said} and finds it right: {known}"
+        said += f", corrected by {', '.join(clear)}"
+        if self.off:
+            said += (
+                f": more than {OFF_PRIOR:.0f} sigma by {', '.join(self.off)}. If the drive is "
+                "right, take it over (pelorus info shows it); if not, an axis, a scale or a clock "
+                "is wrong"
+            )
+        if self.apart is not None and self.apart > SURE:
+            said += f"; the search sees the camera turned otherwise, by {self.apart:.1f} sigma"
+        return said
+
+    @property
+    def is_doubtful(self) -> bool:
+        return bool(self.off) or (self.apart or 0.0) > SURE
+
+
+def _with_sigma(part: Part, value: float, sigma: float) -> str:
+    return f"{part.name} {value:+.3g} +- {sigma:.2g} {part.unit}"
+
+
+def estimated(messages: Sequence[Message], found: Calibration) -> Estimated | None:
+    """Of a run; None where nothing is estimated."""
+    told = last_calibrated(messages)
+    return None if told is None else Estimated(told, _off(messages, told), _apart(told, found.turn))
+
+
+def _off(messages: Sequence[Message], told: Calibrated) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_settings_off(messages, told)))
+
+
+def _settings_off(messages: Sequence[Message], told: Calibrated) -> Iterator[str]:
+    for part, value, _ in told.parts():
+        setting = PRIORS[part.key.partition("_")[0]]
+        si = value / (1.0 if part.unit == "px" else part.scale)
+        if abs(si) > OFF_PRIOR * (in_force(messages, setting) or np.inf):
+            yield setting
+
+
+def _apart(told: Calibrated, turn: Turned | None) -> float | None:
+    """In sigmas, between the turns of the camera by the filter and by the search, body axes."""
+    if turn is None or not told.estimated >> TURN.start & 1:
+        return None
+    by_filter, P = turn_in_body(told)
+    off = turn.turn_rad - by_filter
+    return float(np.sqrt(off @ np.linalg.solve(turn.covariance + P, off)))
+
+
+def turn_in_body(told: Calibrated) -> tuple[Floats, Floats]:
+    """The turn about the body's axes, as Turned has it, rad, and the covariance: T_CB <- Exp(phi)
+    T_CB is T_CB Exp(R_BC phi).
+    """
+    R_BC = np.asarray(told.R_CB).T
+    return R_BC @ told.corrected[TURN], R_BC @ np.diag(told.sigma[TURN] ** 2) @ R_BC.T
+
+
+def without_clock(given: Settings) -> Settings:
+    """For the search of the clock: where the filter estimated it too, each offset would do."""
+    listed = [part for part in given.get("calibrate", "").split(",") if part.strip() != "clock"]
+    return {**given, "calibrate": ",".join(listed) or "off"} if "calibrate" in given else given
