@@ -47,7 +47,10 @@ def of_lever(recording: Recording, agreed: Agreement) -> Iterator[Fault]:
     ):
         apart = place - arm
         left = agreed.lever_m - apart
-        gain = as_given - float(left @ known @ left)
+        off = float(left @ known @ left)
+        gain = as_given - off
+        if off > PLACE_SURE:  # it is elsewhere
+            continue
         if float(np.sqrt(apart @ known @ apart)) > LEVER_APART and gain > max(best, LEVER_SURE):
             best, likely = gain, words
     if likely:
