@@ -223,6 +223,10 @@ def test_what_makes_no_sense_is_said(pelorus: Command, log: Path, tmp_path: Path
     assert not out.exists()
     nowhere = tmp_path / "there" / "is" / "none.rrd"
     assert "none.rrd" in pelorus("view", log, "--rrd", nowhere, status=1).err
+    said = pelorus("view", log, "--connect", "desk", status=1).err
+    assert "is no viewer's address: rerun+http or rerun+https or rerun://HOST:9876" in said
+    nobody = "rerun+http://127.0.0.1:9/proxy"
+    assert "no viewer answers there" in pelorus("view", log, "--connect", nobody, status=1).err
     assert "is the log itself" in pelorus("view", log, "--force", "--rrd", log, status=1).err
 
 

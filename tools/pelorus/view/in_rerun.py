@@ -8,9 +8,11 @@ with each frame would hold the drive as often as it has frames.
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -30,6 +32,8 @@ GREEN, RED, BLUE, ORANGE, GRAY = (
     (230, 159, 0),
     (160, 160, 160),
 )
+SCHEMES = ("rerun+http", "rerun+https", "rerun")
+PORT, CONNECT_S, FLUSH_S = 9876, 5.0, 60.0
 LEVELS = ("INFO", "WARN", "ERROR", "CRITICAL")  # by health
 PANELS = ("innovations", "sigma", "points", "doubt", "odometry", "bias", "computing")
 
@@ -48,6 +52,7 @@ class InRerun:
             if rrd is not None:
                 self._stream.save(rrd, default_blueprint=views)
             elif connect is not None:
+                _require_viewer(connect)
                 self._stream.connect_grpc(connect, default_blueprint=views)
             elif spawn:
                 self._stream.spawn(default_blueprint=views)
@@ -139,7 +144,7 @@ class InRerun:
     def end(self) -> None:
         if self._origin_ns is not None:
             self._show_pieces(self._shown_ns)
-        self._stream.flush()
+        self._stream.flush(timeout_sec=FLUSH_S)
         self._stream.disconnect()
 
     def _show_pieces(self, t_ns: int) -> None:
@@ -163,3 +168,22 @@ class InRerun:
         piece = (t_ns - self._origin_ns) // PIECE_NS
         if piece > self._piece:
             self._piece, self._way, self._map = piece, self._way[-1:], []
+
+
+def _require_viewer(url: str) -> None:
+    """The SDK itself waits for one for ever."""
+    forms = " or ".join(SCHEMES)
+    due = PelorusError(f"{url}: is no viewer's address: {forms}://HOST:{PORT}/proxy is due")
+    try:
+        at = urlsplit(url)
+        port = at.port or PORT
+    except ValueError:
+        raise due from None
+    if at.scheme not in SCHEMES or at.hostname is None:
+        raise due
+    try:
+        socket.create_connection((at.hostname, port), CONNECT_S).close()
+    except OSError as error:
+        raise PelorusError(
+            f"{url}: no viewer answers there: {error.strerror or error}; `rerun` starts one"
+        ) from error
