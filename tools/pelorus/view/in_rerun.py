@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import os
 import socket
+import sysconfig
+import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -33,7 +36,7 @@ GREEN, RED, BLUE, ORANGE, GRAY = (
     (160, 160, 160),
 )
 SCHEMES = ("rerun+http", "rerun+https", "rerun")
-PORT, CONNECT_S, FLUSH_S = 9876, 5.0, 60.0
+PORT, CONNECT_S, START_S, FLUSH_S = 9876, 5.0, 15.0, 60.0
 LEVELS = ("INFO", "WARN", "ERROR", "CRITICAL")  # by health
 PANELS = ("innovations", "sigma", "points", "doubt", "odometry", "bias", "computing")
 
@@ -55,7 +58,11 @@ class InRerun:
                 _require_viewer(connect)
                 self._stream.connect_grpc(connect, default_blueprint=views)
             elif spawn:
-                self._stream.spawn(default_blueprint=views)
+                here = sysconfig.get_path("scripts")  # the viewer came with the SDK
+                os.environ["PATH"] = os.pathsep.join((here, os.environ.get("PATH", "")))
+                self._stream.spawn(connect=False)
+                _await_viewer()
+                self._stream.connect_grpc(default_blueprint=views)
         except (RuntimeError, ValueError) as error:
             raise PelorusError(
                 f"Rerun cannot open {rrd or connect or 'its viewer'}: {error}"
@@ -168,6 +175,19 @@ class InRerun:
         piece = (t_ns - self._origin_ns) // PIECE_NS
         if piece > self._piece:
             self._piece, self._way, self._map = piece, self._way[-1:], []
+
+
+def _await_viewer() -> None:
+    """Of one that was started: without a display it ends at once."""
+    until = time.monotonic() + START_S
+    while time.monotonic() < until:
+        with suppress(OSError):
+            socket.create_connection(("127.0.0.1", PORT), CONNECT_S).close()
+            return
+        time.sleep(0.2)
+    raise PelorusError(
+        "Rerun's viewer does not start: has this machine a display? --rrd keeps the drive in a file"
+    )
 
 
 def _require_viewer(url: str) -> None:
