@@ -6,38 +6,90 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tomllib
 import venv
 import zipfile
+from collections.abc import Iterable, Sequence
+from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
-NOT_THERE = (
-    "import sys; sys.modules['cv2'] = None;"
-    "from pelorus.cli import main; sys.exit(main(sys.argv[1:]))"
+EXTRAS = ("cv2", "PIL", "matplotlib", "rosbags", "pyproj")
+MOST_BYTES = 250e6  # of a plain install
+
+
+def without(packages: Sequence[str], *words: str) -> subprocess.CompletedProcess[str]:
+    """A command where these are not installed."""
+    hidden = f"import sys; sys.modules.update(dict.fromkeys({list(packages)}))"
+    main = "from pelorus.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", f"{hidden}; {main}", *words]
+    there = os.environ | {"PELORUS_BIN": str(BIN)}
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=there)
+
+
+def test_without_any_extra_a_sample_comes_to_its_report(tmp_path: Path) -> None:
+    drive, out = str(tmp_path / "drive.plr"), tmp_path / "out"
+    assert without(EXTRAS, "--help").returncode == 0
+    assert without(EXTRAS, "simulate", "--duration", "4", drive).returncode == 0
+    done = without(EXTRAS, "try", drive, "--out", str(out))
+    assert (out / "report.html").is_file(), done.stderr
+    assert "pip install 'pelorus[figures]'" in done.stderr
+    for words, files in (
+        (("map", drive), {"map.pgm", "map.yaml"}),
+        (("course", drive), {"table.md", "runs"}),
+    ):
+        folder = tmp_path / words[0]
+        done = without(EXTRAS, *words, "--out", str(folder))
+        assert done.returncode == 0, done.stderr
+        assert "drawings (.png) need matplotlib, which is missing: pip install" in done.stderr
+        assert {path.name for path in folder.iterdir()} == files
+
+
+@pytest.mark.parametrize(
+    ("extra", "code"),
+    [
+        ("vision", "from pelorus.extras import cv2; cv2.blur"),
+        ("vision", "from pelorus.tracking.images import unpacked; unpacked(Path(), b'')"),
+        ("ros", "from pelorus.converters.bag import Bag; Bag(Path('/dev/null'))"),
+        ("geodetic", "from pelorus.converters.geodetic import Ground; Ground().system()"),
+    ],
 )
+def test_what_needs_an_extra_names_it(extra: str, code: str) -> None:
+    hidden = f"import sys; sys.modules.update(dict.fromkeys({EXTRAS}))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{hidden}; from pathlib import Path; {code}"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert f"which is missing: pip install 'pelorus[{extra}]'" in done.stderr.splitlines()[-1]
+    assert done.stderr.splitlines()[-1].startswith("pelorus.errors.PelorusError: ")
 
 
-def without_opencv(*words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", NOT_THERE, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def installed_bytes(requirements: Iterable[str], seen: set[str]) -> int:
+    """Of the files of all that these need, by this environment's versions of them."""
+    total = 0
+    for requirement in map(Requirement, requirements):
+        wanted = requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+        if wanted and requirement.name.lower() not in seen:
+            seen.add(requirement.name.lower())
+            found = distribution(requirement.name)
+            sizes = [
+                path.stat().st_size for f in found.files or () if (path := f.locate()).exists()
+            ]
+            total += sum(sizes) + installed_bytes(found.requires or (), seen)
+    return total
 
 
-def test_without_opencv_only_pictures_are_refused(tmp_path: Path) -> None:
-    assert without_opencv("--help").returncode == 0
-    drive = tmp_path / "drive.plr"
-    assert without_opencv("simulate", "--duration", "4", str(drive)).returncode == 0
-    assert without_opencv("info", str(drive)).returncode == 0
-    needs = (
-        "from pelorus.tracking.matching import *;"
-        "import numpy as np;"
-        "from pelorus.opencv import cv2; cv2.blur"
-    )
-    code = f"import sys; sys.modules['cv2'] = None; {needs}"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "PelorusError: pictures need OpenCV" in said.stderr
-    assert "pip install 'pelorus[vision]'" in said.stderr
+def test_a_plain_install_stays_small() -> None:
+    """With OpenCV and the like as extras. Of what these tools take some 6 MB are their own."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    seen: set[str] = set()
+    total = installed_bytes(project["dependencies"], seen)
+    assert {"numpy", "scipy", "typer"} <= seen
+    assert 150e6 < total < MOST_BYTES - 6e6
 
 
 def built(folder: Path) -> Path:

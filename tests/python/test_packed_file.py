@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import zstandard
 from converted import Run
 from fake_board import FakeBoard, TcpBoard
 from pelorus import packed_file, wire
@@ -20,7 +19,8 @@ from report_runs import built_programs
 
 def packed(folder: Path, content: bytes, name: str = "drive.plr.zst") -> Path:
     path = folder / name
-    path.write_bytes(zstandard.ZstdCompressor().compress(content))
+    with closing(packed_file.create(path, packed=True)) as stream:
+        stream.write(content)
     return path
 
 
@@ -37,9 +37,9 @@ def test_a_packed_recording_is_read_as_the_plain_one(tmp_path: Path) -> None:
 
 def test_two_packed_pieces_in_a_row_are_one_recording(tmp_path: Path) -> None:
     content = encode(drive())
-    pack = zstandard.ZstdCompressor().compress
+    one, other = (packed(tmp_path, part).read_bytes() for part in (content[:3000], content[3000:]))
     path = tmp_path / "drive.plr.zst"
-    path.write_bytes(pack(content[:3000]) + pack(content[3000:]))
+    path.write_bytes(one + other)
     assert wire.read_file(path)[1].ended
 
 

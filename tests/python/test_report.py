@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from converted import Run as Command
 from pelorus import se3
+from pelorus.commands.report import DRAWINGS
 from pelorus.consistency import nees_per_dof
 from pelorus.errors import PelorusError
 from pelorus.evaluation import assess, made_in, map_figures
@@ -22,7 +23,7 @@ from pelorus.frame_table import frame_table, write_csv
 from pelorus.frames import Kind, Landmark, Pose, Report, Role, Stereo, Truth
 from pelorus.layout import pack_symmetric, unpack_symmetric
 from pelorus.replay import Outputs, Programs
-from pelorus.report import pictures, words
+from pelorus.report import words
 from pelorus.report.comparison import Comparison
 from pelorus.report.results import read_map
 from pelorus.trajectory import Trajectory, estimate_in, read_stamped
@@ -190,7 +191,7 @@ def test_report_leaves_page_pictures_and_runs(
 ) -> None:
     path, out = recorded(tmp_path, drive()), tmp_path / "a" / "out"
     said = pelorus("report", path, "--out", out, "--bin", programs.float32.parent, *ALSO)
-    assert pictures_in(out) == set(pictures.NAMES)
+    assert pictures_in(out) == set(DRAWINGS)
     assert said.out.splitlines()[0].split() == list(RUNS)
     page = (out / "report.html").read_text(encoding="utf-8")
     assert (

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from imu_drives import noisy
 from pelorus import style
+from pelorus.commands.report import DRAWINGS
 from pelorus.frame_table import write_csv
 from pelorus.frames import BodyAxes
 from pelorus.grid import plane
@@ -103,7 +104,7 @@ def test_every_picture_has_labelled_axes(tmp_path: Path, programs: Programs) -> 
         assert len(labels) >= 2, picture.name
         for label in labels:
             assert "(" in label, f"{picture.name}: {label} has no unit"
-    assert {picture.name for picture in pictures.pictures(found)} == set(pictures.NAMES)
+    assert {picture.name for picture in pictures.pictures(found)} == set(DRAWINGS)
 
 
 def test_limits_show_every_error_and_as_much_of_the_band_as_lets_it_be_seen() -> None:

@@ -7,13 +7,17 @@ same: `zstdcat FILE.plr.zst` gives the plain recording.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, cast
 
-import zstandard
-
 from pelorus.errors import PelorusError
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
 
 SUFFIX = ".zst"
 MAGIC = b"\x28\xb5\x2f\xfd"  # of a zstd frame (RFC 8878, 3.1.1)
@@ -41,14 +45,31 @@ def pieces(path: Path, piece_bytes: int = 1 << 16) -> Iterator[bytes]:
     OSError where the disk fails; PackingDamaged behind the last bytes that could be unpacked.
     """
     with path.open("rb") as stream:
-        packed = stream.peek(len(MAGIC))[: len(MAGIC)] == MAGIC
-        unpacker = zstandard.ZstdDecompressor()
-        source = unpacker.stream_reader(stream, read_across_frames=True) if packed else stream
+        if stream.peek(len(MAGIC))[: len(MAGIC)] == MAGIC:
+            yield from _unpacked(cast(BinaryIO, stream), piece_bytes)
+            return
+        while piece := stream.read(piece_bytes):
+            yield piece
+
+
+def _unpacked(stream: BinaryIO, piece_bytes: int) -> Iterator[bytes]:
+    """Of all packed frames, one behind the other; of the last one as much as is there. zstd's own
+    file object gives nothing of the last piece of a file that was cut.
+    """
+    unpacker = zstd.ZstdDecompressor()
+    while True:
+        packed = b""
+        if unpacker.eof:
+            packed = unpacker.unused_data
+            unpacker = zstd.ZstdDecompressor()
+        if unpacker.needs_input and not packed and not (packed := stream.read(piece_bytes)):
+            return
         try:
-            while piece := source.read(piece_bytes):
-                yield piece
-        except zstandard.ZstdError as error:
+            piece = unpacker.decompress(packed, piece_bytes)
+        except zstd.ZstdError as error:
             raise PackingDamaged(f"the zstd packing is damaged here: {error}") from error
+        if piece:
+            yield piece
 
 
 def create(path: Path, packed: bool, live: bool = False) -> BinaryIO:
@@ -66,7 +87,10 @@ class _Packer:
 
     def __init__(self, stream: BinaryIO, live: bool) -> None:
         level = LIVE_LEVEL if live else LEVEL
-        self._packer = zstandard.ZstdCompressor(level=level, write_checksum=True).compressobj()
+        parameter = zstd.CompressionParameter
+        self._packer = zstd.ZstdCompressor(
+            options={parameter.compression_level: level, parameter.checksum_flag: 1}
+        )
         self._stream = stream
         self._live = live
         self._held = 0
@@ -80,7 +104,7 @@ class _Packer:
     def flush(self) -> None:
         """Closes a block where it is large enough: a block each message would pack badly."""
         if self._live and self._held >= LIVE_BYTES:
-            self._stream.write(self._packer.flush(zstandard.COMPRESSOBJ_FLUSH_BLOCK))
+            self._stream.write(self._packer.flush(self._packer.FLUSH_BLOCK))
             self._held = 0
         self._stream.flush()
 

@@ -15,6 +15,7 @@ from pelorus import road
 from pelorus.commands.choices import PROGRAMS, SETTINGS, replay_options
 from pelorus.console import err, out
 from pelorus.errors import Existing, PelorusError, made, write_text
+from pelorus.extras import figures_missing
 from pelorus.packed_file import bare_name
 from pelorus.replay import find_programs
 from pelorus.report.results import Subject, read_subject
@@ -68,7 +69,7 @@ def course(
     truth or road, with the landmarks. Figure 2: the trace of the covariance, of the whole map and
     of the state. docs/COURSE.md says what they show.
     """
-    from pelorus.course import trial  # noqa: PLC0415 - matplotlib and scipy load slowly
+    from pelorus.course import trial  # noqa: PLC0415 - scipy loads slowly
 
     Existing.keep(folder / TABLE)
     options = _options(configs, settings, recordings)
@@ -138,12 +139,10 @@ def _references(
 
 
 def _publish(trials: list[Trial], folder: Path) -> None:
-    from pelorus import style  # noqa: PLC0415 - as above
-    from pelorus.course import pictures, table  # noqa: PLC0415 - as above
+    from pelorus.course import table  # noqa: PLC0415 - as above
 
     text = table.markdown(trials)
-    style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)
-    style.save(lambda: pictures.figure_2(trials), folder / FIGURE_2)
+    names = _draw(trials, folder)
     write_text(folder / TABLE, text)
     shown = Table(box=None, pad_edge=False)
     for k, title in enumerate(table.TITLES[: -table.TRACES]):
@@ -156,4 +155,17 @@ def _publish(trials: list[Trial], folder: Path) -> None:
     out.print(shown)
     for trial in trials:
         out.print(escape(table.summary(trial)))
-    out.print(escape(f"figures and table: {folder / FIGURE_1}, {FIGURE_2}, {TABLE}"))
+    out.print(escape(f"{folder}: {', '.join((*names, TABLE))}"))
+
+
+def _draw(trials: list[Trial], folder: Path) -> tuple[str, ...]:
+    """The files of the figures."""
+    if missing := figures_missing():
+        err.print(escape(f"the table comes without figures: {missing}"))
+        return ()
+    from pelorus import style  # noqa: PLC0415 - an extra
+    from pelorus.course import pictures  # noqa: PLC0415 - as above
+
+    style.save(lambda: pictures.figure_1(trials), folder / FIGURE_1)
+    style.save(lambda: pictures.figure_2(trials), folder / FIGURE_2)
+    return FIGURE_1, FIGURE_2

@@ -11,8 +11,9 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out
+from pelorus.console import err, out
 from pelorus.errors import Existing
+from pelorus.extras import figures_missing
 from pelorus.grid import files, occupancy
 from pelorus.grid.occupancy import Band, Grid, Wish
 from pelorus.grid.sightings import sightings
@@ -83,8 +84,12 @@ def _wish(resolution: float | None, height: tuple[float, float] | None, range_m:
 
 
 def _publish(grid: Grid, title: str, folder: Path) -> None:
-    from pelorus import style  # noqa: PLC0415 - as above
-    from pelorus.grid import picture  # noqa: PLC0415 - matplotlib loads slowly
+    if missing := figures_missing():
+        err.print(escape(f"the map has no {files.PICTURE}: {missing}"))
+        files.write(folder, grid, None)
+        return
+    from pelorus import style  # noqa: PLC0415 - an extra
+    from pelorus.grid import picture  # noqa: PLC0415 - as above
 
     files.write(folder, grid, lambda path: style.save(lambda: picture.draw(grid, title), path))
 

@@ -12,8 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out, progress
+from pelorus.console import err, out, progress
 from pelorus.errors import Existing, made, whole_folder
+from pelorus.extras import figures_missing
 from pelorus.replay import find_programs
 from pelorus.report import words
 from pelorus.report.results import carry_out, plan_runs, read_subject, require_twists
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pelorus.report.comparison import Comparison
 
 PAGE = "report.html"
+DRAWINGS = ("map", "covariance", "top-view", "hero")  # that a recording may have
 OLDER = (  # pictures of earlier versions, which would be taken for this report's
     *("error-yours", "error-world", "error-course", "nees", "bias", "observations", "time"),
 )
@@ -73,7 +75,7 @@ def report(
         runs_folder = made(part / "runs")
         runs = [carry_out(plan, subject, runs_folder) for plan in progress(plans, "replaying")]
 
-        from pelorus.report.comparison import Comparison  # noqa: PLC0415 - matplotlib loads slowly
+        from pelorus.report.comparison import Comparison  # noqa: PLC0415 - scipy loads slowly
 
         compared = Comparison(subject, runs)
         lines = _draw(compared, part, pictures, calibration)
@@ -83,9 +85,7 @@ def report(
 
 def _remove_pictures(folder: Path) -> None:
     """Of an earlier report: not every recording has all of them."""
-    from pelorus.report import pictures  # noqa: PLC0415 - as above
-
-    for name in (*pictures.NAMES, *OLDER):
+    for name in (*DRAWINGS, *OLDER):
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 
@@ -93,19 +93,13 @@ def _draw(
     compared: Comparison, folder: Path, source: Path | None, calibration: list[Path]
 ) -> list[str]:
     """The pictures and the page; the verdicts on it."""
-    from pelorus import style  # noqa: PLC0415 - as above
     from pelorus.explain import explain  # noqa: PLC0415 - as above
-    from pelorus.report import answers, page, pictures  # noqa: PLC0415 - as above
+    from pelorus.report import answers, page  # noqa: PLC0415 - as above
     from pelorus.report.beside import Told, drift_table  # noqa: PLC0415 - as above
     from pelorus.report.curves import Curves, Other  # noqa: PLC0415 - as above
     from pelorus.report.footage import footage  # noqa: PLC0415 - as above
 
-    shown = []
-    for picture in progress(pictures.pictures(compared), "drawing"):
-        path = folder / f"{picture.name}.png"
-        style.save(picture.draw, path)
-        if picture.caption:
-            shown.append((picture.title, picture.caption, path))
+    shown = _draw_pictures(compared, folder)
     lines = words.verdicts(compared)
     main = compared.main
     others = {
@@ -121,6 +115,23 @@ def _draw(
         answer = answers.with_footage(answer, footage(main.messages, found, source, calibration))
     page.write(folder / PAGE, answer, curves)
     return lines
+
+
+def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, Path]]:
+    """Title, caption and file of those that stand on the page, which can do without."""
+    if missing := figures_missing():
+        err.print(escape(f"the report has no {', '.join(DRAWINGS)}: {missing}"))
+        return []
+    from pelorus import style  # noqa: PLC0415 - an extra
+    from pelorus.report import pictures  # noqa: PLC0415 - as above
+
+    shown = []
+    for picture in progress(pictures.pictures(compared), "drawing"):
+        path = folder / f"{picture.name}.png"
+        style.save(picture.draw, path)
+        if picture.caption:
+            shown.append((picture.title, picture.caption, path))
+    return shown
 
 
 def _tell(compared: Comparison, lines: list[str], page: Path) -> None:

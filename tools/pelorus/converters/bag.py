@@ -9,17 +9,16 @@ from contextlib import AbstractContextManager, ExitStack
 from functools import cached_property, partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
-
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection
-from rosbags.rosbag1 import Reader as Reader1
-from rosbags.rosbag2.storage_mcap import McapReader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
-from rosbags.typesys import Stores, get_typestore
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pelorus.errors import PelorusError
+from pelorus.extras import extra
 from pelorus.foreign import ForeignFileError
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import Connection
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 NS = 10**9
 HEADER, LOG = "header", "log"
@@ -64,6 +63,9 @@ class Bag(AbstractContextManager["Bag"]):
         self._part_s = part
 
     def _opened(self) -> AnyReader:
+        with extra("rosbags"):
+            from rosbags.highlevel import AnyReader  # noqa: PLC0415 - an extra
+            from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
         try:
             # bags of before ROS 2 iron hold no definitions
             store = get_typestore(Stores.ROS2_HUMBLE)
@@ -168,6 +170,10 @@ class Bag(AbstractContextManager["Bag"]):
 
 def _keep_order(reader: Any) -> None:
     """Have the library give messages as they stand in the file; it sorts them by their arrival."""
+    from rosbags.rosbag1 import Reader as Reader1  # noqa: PLC0415 - an extra
+    from rosbags.rosbag2.storage_mcap import McapReader  # noqa: PLC0415
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader  # noqa: PLC0415
+
     if isinstance(reader, Reader1):
         for index in reader.indexes.values():
             index.sort(key=lambda entry: (entry.chunk_pos, entry.offset))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pelorus.errors import PelorusError
+from pelorus.extras import extra
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.table import Table
@@ -38,9 +39,9 @@ class Ground:
 
     def local(self, path: Path, places: Floats, remarks: list[str]) -> Floats:
         """(n, 3) longitude, latitude, height, or easting, northing, height -> m, east north up."""
-        from pyproj import Transformer  # noqa: PLC0415 - a quarter of a second, and few need it
-
         crs = self.system()
+        from pyproj import Transformer  # noqa: PLC0415 - an extra
+
         to_centre = Transformer.from_crs(crs.to_3d(), GEOCENTRIC, always_xy=True)
         centred = np.stack(to_centre.transform(*places.T), axis=-1)
         if not np.isfinite(centred).all():
@@ -65,8 +66,9 @@ class Ground:
 
     def system(self) -> CRS:
         """What the numbers are of."""
-        from pyproj import CRS  # noqa: PLC0415
-        from pyproj.exceptions import CRSError, ProjError  # noqa: PLC0415
+        with extra("pyproj"):
+            from pyproj import CRS  # noqa: PLC0415 - an extra
+            from pyproj.exceptions import CRSError, ProjError  # noqa: PLC0415
 
         try:
             return CRS.from_user_input(self.crs or WGS84)

@@ -22,10 +22,10 @@ from pelorus.converters.order import Stamps, in_order, leave_out, sound
 from pelorus.converters.streams import Pictures, Seen
 from pelorus.converters.transforms import bare
 from pelorus.errors import PelorusError
+from pelorus.extras import cv2
 from pelorus.foreign import ForeignFileError
 from pelorus.layout import Floats
 from pelorus.motion import Times
-from pelorus.opencv import cv2
 from pelorus.rig.camera_info import Info, Infos
 from pelorus.rig.lens import Lens, LensModel
 from pelorus.rig.read import Calibrated

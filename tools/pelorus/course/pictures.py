@@ -10,17 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pelorus.course.trial import Trial
+from pelorus.course.trial import NAMES, Trial
 from pelorus.layout import Floats
 from pelorus.report.results import OWN
 from pelorus.report.top_view import Box, around
 from pelorus.style import BLACK, BLUE, GREEN, ORANGE, PENS, TRUTH, VERMILLION, new_figure
 
-NAMES = {
-    "dead-reckoning": "dead reckoning",
-    "course": "the course's filter",
-    OWN: "Pelorus (body)",
-}
 COLUMN_IN, HEIGHT_1_IN, HEIGHT_2_IN = 7.0, 6.4, 6.0
 MARGIN = 0.08  # of the larger side
 STRAY = 0.4  # dead reckoning may widen the picture by so much of the larger side

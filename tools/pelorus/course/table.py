@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pelorus.course.pictures import NAMES
-from pelorus.course.trial import Trial
+from pelorus.course.trial import NAMES, Trial
 from pelorus.evaluation import step_change
 from pelorus.layout import Floats
 from pelorus.report.words import NONE, POSE_KEYS, number

@@ -22,7 +22,11 @@ from pelorus.report.results import OWN, Run, Subject, carry_out, plan_runs
 from pelorus.road import RoadFit
 from pelorus.se3 import apply
 
-RUNS = ("dead-reckoning", "course", OWN)
+NAMES = {
+    "dead-reckoning": "dead reckoning",
+    "course": "the course's filter",
+    OWN: "Pelorus (body)",
+}
 SKIP_M = 45.0  # the digitised road begins later than the drive
 NEAR_M, SIGMA_MOST_M = (
     40.0,
@@ -40,7 +44,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Trial:
-    """The runs, in the order of RUNS, and the reference."""
+    """The runs, in the order of NAMES, and the reference."""
 
     compared: Comparison
     reference: Reference
@@ -112,6 +116,6 @@ def carry_out_trial(
     planned = {plan.name: plan for plan in found}
     preset = planned[COURSE]
     planned[COURSE] = replace(preset, options=(*preset.options, *options.course))
-    plans = progress([planned[name] for name in RUNS], f"replaying {subject.path.name}")
+    plans = progress([planned[name] for name in NAMES], f"replaying {subject.path.name}")
     runs = [carry_out(plan, subject, folder) for plan in plans]
     return Trial(Comparison(subject, runs), reference)

@@ -67,11 +67,11 @@ def heights(band: Band) -> str:
     return f"heights from {band.low_m:g} to {band.high_m:g} m about the body"
 
 
-def write(folder: Path, grid: Grid, draw: Callable[[Path], None]) -> None:
-    """All three files, or none: `draw` makes the PNG at a path."""
+def write(folder: Path, grid: Grid, draw: Callable[[Path], None] | None) -> None:
+    """All files, or none: `draw` makes the PNG at a path; None: there is none."""
     makers: dict[str, Callable[[Path], object]] = {
         IMAGE: lambda path: path.write_bytes(image(grid)),
-        PICTURE: draw,
+        **({PICTURE: draw} if draw else {}),
         TEXT: lambda path: path.write_text(text(grid), encoding="ascii"),  # names the image: last
     }
     with writing(folder):

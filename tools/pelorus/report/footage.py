@@ -12,21 +12,24 @@ import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
 
 from pelorus.errors import PelorusError
 from pelorus.evaluation import made_in
 from pelorus.explain.explanation import Explanation
 from pelorus.explain.log import Log, log_of
+from pelorus.extras import extra
 from pelorus.frames import Message, Stereo
 from pelorus.layout import Floats
 from pelorus.motion import Times, nearest
 from pelorus.tracking import images
 from pelorus.tracking.images import Gray
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw
 
 MOMENTS_MOST = 16
 WIDTH_PX = 560  # of a picture on the page
@@ -219,6 +222,8 @@ class _Artist:
             )
         scale = WIDTH_PX / width
         size = (WIDTH_PX, round(height * scale))
+        with extra("PIL"):
+            from PIL import Image, ImageDraw  # noqa: PLC0415 - an extra
         image = Image.fromarray(picture).resize(size).convert("RGB")
         pen = ImageDraw.Draw(image)
         rejected = self._rejected(k)

@@ -34,7 +34,6 @@ from pelorus.style import (
 )
 
 CURVE_MIN = 2  # frames: one point is no curve
-NAMES = ("map", "covariance", "top-view", "hero")
 
 
 class Picture(NamedTuple):

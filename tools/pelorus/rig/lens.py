@@ -15,8 +15,8 @@ from enum import StrEnum
 
 import numpy as np
 
+from pelorus.extras import cv2
 from pelorus.layout import Floats
-from pelorus.opencv import cv2
 from pelorus.rig import spheres
 
 

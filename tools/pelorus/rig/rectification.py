@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.extras import cv2
 from pelorus.frames import Camera
 from pelorus.layout import Floats
-from pelorus.opencv import cv2
 from pelorus.rig.lens import Lens
 from pelorus.se3 import Poses
 

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import ImageFile
 
 from pelorus import arrays, foreign, motion
 from pelorus.errors import PelorusError
+from pelorus.extras import extra
 from pelorus.foreign import ForeignFileError
 from pelorus.motion import Times
 
@@ -267,6 +267,8 @@ def decoded(path: Path, packed: bytes, bits: int = 16) -> Gray:
 
 def unpacked(path: Path, packed: bytes) -> NDArray[np.integer[Any]]:
     """Of 8 bits, or of 16 in a wider type."""
+    with extra("PIL"):
+        from PIL import ImageFile  # noqa: PLC0415 - an extra
     try:
         parser = ImageFile.Parser()
         parser.feed(packed)

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pelorus.extras import cv2
 from pelorus.layout import Floats
-from pelorus.opencv import cv2
 from pelorus.tracking.images import Gray
 from pelorus.tracking.matching import Mask, Points
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pelorus.errors import PelorusError
-from pelorus.opencv import cv2
+from pelorus.extras import cv2
 from pelorus.tracking.images import Gray
 from pelorus.tracks import Tracks
 

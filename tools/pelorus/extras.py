@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Packages that a plain install has not, for together they are larger than all else: loaded where
+something of them is first used. Where one is missing the user is told which extra brings it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from pelorus.errors import PelorusError
+
+__all__ = ["cv2", "extra", "figures_missing"]
+
+# By the name that is imported: what needs it, and the extra.
+EXTRAS = {
+    "cv2": ("pictures need OpenCV", "vision"),
+    "PIL": ("pictures need Pillow", "vision"),
+    "matplotlib": ("drawings (.png) need matplotlib", "figures"),
+    "rosbags": ("bags need rosbags", "ros"),
+    "pyproj": ("places on the earth need pyproj", "geodetic"),
+}
+
+
+def _missing(package: str) -> str:
+    needs, name = EXTRAS[package]
+    return f"{needs}, which is missing: pip install 'pelorus[{name}]'"
+
+
+@contextmanager
+def extra(package: str) -> Iterator[None]:
+    """Around the imports of one."""
+    try:
+        yield
+    except ImportError as error:
+        raise PelorusError(_missing(package)) from error
+
+
+def figures_missing() -> str:
+    """What to say of drawings that are left out; nothing where they can be made."""
+    return "" if find_spec("matplotlib") else _missing("matplotlib")
+
+
+if TYPE_CHECKING:
+    import cv2
+else:
+
+    class _OpenCV:
+        def __getattr__(self, name: str) -> Any:
+            with extra("cv2"):
+                import cv2  # noqa: PLC0415 - it takes longer to load than most commands to run
+            return getattr(cv2, name)
+
+    cv2 = _OpenCV()
