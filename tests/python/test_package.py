@@ -76,10 +76,9 @@ def installed_bytes(requirements: Iterable[str], seen: set[str]) -> int:
         if wanted and requirement.name.lower() not in seen:
             seen.add(requirement.name.lower())
             found = distribution(requirement.name)
-            sizes = [
-                path.stat().st_size for f in found.files or () if (path := f.locate()).exists()
-            ]
-            total += sum(sizes) + installed_bytes(found.requires or (), seen)
+            paths = [Path(str(file.locate())) for file in found.files or ()]
+            total += sum(path.stat().st_size for path in paths if path.exists())
+            total += installed_bytes(found.requires or (), seen)
     return total
 
 

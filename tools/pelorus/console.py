@@ -7,6 +7,8 @@ ESC moves its cursor, renames its window, or types. So both consoles show them i
 
 from __future__ import annotations
 
+import json
+import math
 import unicodedata
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -53,6 +55,19 @@ class SafeConsole(Console):
 # No emoji: tcp:x:5000 would be printed with a cross in it.
 out = SafeConsole(highlight=False, soft_wrap=True, emoji=False)
 err = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+
+
+def print_json(found: dict[str, Any]) -> None:
+    """One object, the whole output of a command. What is not finite has no number in JSON: null."""
+    out.print(json.dumps(_finite(found), indent=2, allow_nan=False), markup=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def leave_standard_output() -> None:

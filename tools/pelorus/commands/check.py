@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, settings_given
-from pelorus.console import out
+from pelorus.console import out, print_json
 from pelorus.errors import write_text
 from pelorus.replay import find_programs
 
@@ -66,7 +65,7 @@ def check(
     if found.tuned is not None:
         write_text(tuned, checked.config_text(found, recording))
     if as_json:
-        out.print(json.dumps(_json(found, tuned), indent=2), markup=False)
+        print_json(_json(found, tuned))
     else:
         _tell(found, tuned)
     if found.tuned is None:

@@ -10,8 +10,9 @@ import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import PROGRAMS
-from pelorus.console import err, out
+from pelorus.console import err, out, print_json
 from pelorus.errors import PelorusError
+from pelorus.flight import flight_json
 from pelorus.flight.difference import Difference, Sizes
 from pelorus.flight.judge import Desk, Judgement, Verdict, judge, of_this_version, verdict_of
 from pelorus.flight.log import NOWHERE, Frame, read_log
@@ -54,6 +55,7 @@ def compare(
         metavar="FILE",
         help="The state that the drive went on from, as pelorus-replay --save-state keeps it.",
     ),
+    as_json: bool = typer.Option(False, "--json", help="What it tells as one JSON object."),
 ) -> None:
     """Replay a robot's log here, and compare every answer with the robot's, bit by bit.
 
@@ -64,7 +66,7 @@ def compare(
     if start is not None and start not in STARTS:
         raise typer.BadParameter(f"{start!r} is none of {', '.join(STARTS)}", param_hint="--start")
     try:
-        verdict = compare_log(log, programs, start, load_state)
+        verdict = compare_log(log, programs, start, load_state, as_json)
     except PelorusError as error:
         err.print(f"[bold red]error:[/] {escape(str(error))}")
         verdict = Verdict.NOT_COMPARABLE
@@ -73,7 +75,11 @@ def compare(
 
 
 def compare_log(
-    path: Path, programs: Path | None, start: str | None = None, state: Path | None = None
+    path: Path,
+    programs: Path | None,
+    start: str | None = None,
+    state: Path | None = None,
+    as_json: bool = False,
 ) -> Verdict:
     """Tell what differs, and how it ends."""
     desk = Desk(find_programs(programs), start, state)
@@ -81,6 +87,9 @@ def compare_log(
         log = read_log(path)
     with err.status(f"replaying {log.frames} frames"):
         judgements = judge(log, desk)
+    if as_json:
+        print_json(flight_json.of(log, judgements))
+        return verdict_of(judgements)
     for remark in log.remarks:
         _line("log", remark)
     for number, judgement in enumerate(judgements, 1):

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from rich.table import Table
 from pelorus import calibrated, evaluation, misread, road
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.consistency import Figures
-from pelorus.console import err, out
+from pelorus.console import err, out, print_json
 from pelorus.errors import PelorusError
 from pelorus.evaluation import assess, judge, known_in, match
 from pelorus.frames import Message
@@ -123,7 +122,7 @@ def evaluate(
     found["path_m"] = evaluation.path_m(estimate.poses)
     found["step_change_m"] = evaluation.step_change(estimate.poses)
     if as_json:
-        typer.echo(json.dumps(found))
+        print_json(dict(found))
     else:
         _show(found)
     for question in asked:

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import out
+from pelorus.console import out, print_json
 from pelorus.replay import result_of
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def explain(
             other = named, result_of(beside or source, [*options, *changed], programs)
         _write(page, source.name, found, messages, other, pictures, calibration)
     if as_json:
-        out.print(json.dumps(found.json(), indent=2), markup=False)
+        print_json(found.json())
         return
     for line in found.lines():
         out.print(line, markup=False)

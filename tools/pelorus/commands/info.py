@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from rich.table import Table
 
 from pelorus import survey_json
 from pelorus.calibrated import Calibrated
-from pelorus.console import one_line, out
+from pelorus.console import one_line, out, print_json
 from pelorus.frames import Config, Header, Kind, Process
 from pelorus.inertial_survey import ImuSurvey
 from pelorus.settings import IDS, describe
@@ -40,7 +39,7 @@ def info(
     """
     found = survey(recording)
     if as_json:
-        out.print(json.dumps(survey_json.of(found), indent=2), markup=False)
+        print_json(survey_json.of(found))
         require_useful(found)
         return
     out.print(f"[bold]{escape(str(found.path))}[/]  {found.counts.bytes} bytes")

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import typer
 from rich.markup import escape
 
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out
+from pelorus.console import err, out, print_json
 from pelorus.errors import Existing
 from pelorus.extras import figures_missing
 from pelorus.grid import files, occupancy
@@ -49,6 +50,7 @@ def map_(
     ),
     config: Path | None = CONFIG,
     settings: list[str] = SETTINGS,
+    as_json: bool = typer.Option(False, "--json", help="What it tells as one JSON object."),
     programs: Path | None = PROGRAMS,
 ) -> None:
     """Draw the map of a drive: where it is free, where something stands.
@@ -63,7 +65,10 @@ def map_(
     seen = sightings(source, messages)
     grid = occupancy.occupancy(seen, wish)
     _publish(grid, f"{seen.name}: {files.heights(grid.band)}", folder)
-    _tell(grid, folder)
+    if as_json:
+        print_json(_json(grid, folder))
+    else:
+        _tell(grid, folder)
 
 
 def _wish(resolution: float | None, height: tuple[float, float] | None, range_m: float) -> Wish:
@@ -92,6 +97,25 @@ def _publish(grid: Grid, title: str, folder: Path) -> None:
     from pelorus.grid import picture  # noqa: PLC0415 - as above
 
     files.write(folder, grid, lambda path: style.save(lambda: picture.draw(grid, title), path))
+
+
+def _json(grid: Grid, folder: Path) -> dict[str, Any]:
+    found = files.cells(grid)
+    height, width = found.shape
+    return {
+        "map": str(folder / files.TEXT),
+        "resolution_m": grid.resolution_m,
+        "width": width,
+        "height": height,
+        "origin_m": grid.origin_m,
+        "right": grid.plane.right.name,
+        "up": grid.plane.up.name,
+        "heights_m": grid.band,
+        "free": int(np.sum(found == files.FREE)),
+        "occupied": int(np.sum(found == files.OCCUPIED)),
+        "unknown": int(np.sum(found == files.UNKNOWN)),
+        "landmarks": grid.landmarks,
+    }
 
 
 def _tell(grid: Grid, folder: Path) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
-from pelorus.console import err, out, progress
+from pelorus.console import err, out, print_json, progress
 from pelorus.errors import Existing, made, whole_folder
 from pelorus.extras import figures_missing
 from pelorus.replay import find_programs
@@ -56,6 +56,7 @@ def report(
     also: list[Also] = typer.Option([], help="One run more, for comparison; repeatable."),
     pictures: Path | None = PICTURES,
     calibration: list[Path] = CALIBRATION,
+    as_json: bool = typer.Option(False, "--json", help="What it tells as one JSON object."),
     programs: Path | None = PROGRAMS,
 ) -> None:
     """Replay a recording with your settings and by dead reckoning, and show what came out.
@@ -80,7 +81,10 @@ def report(
         compared = Comparison(subject, runs)
         lines = _draw(compared, part, pictures, calibration)
         _remove_pictures(folder)
-    _tell(compared, lines, folder / PAGE)
+    if as_json:
+        print_json(_json(compared, lines, folder / PAGE))
+    else:
+        _tell(compared, lines, folder / PAGE)
 
 
 def _remove_pictures(folder: Path) -> None:
@@ -132,6 +136,17 @@ def _draw_pictures(compared: Comparison, folder: Path) -> list[tuple[str, str, P
         if picture.caption:
             shown.append((picture.title, picture.caption, path))
     return shown
+
+
+def _json(compared: Comparison, lines: list[str], page: Path) -> dict[str, Any]:
+    """The same as `_tell`, and all figures of each run."""
+    return {
+        "report": str(page),
+        "recording": str(compared.subject.path),
+        "verdicts": lines,
+        "health": compared.main.health.told(compared.origin_ns),
+        "runs": {run.name: run.summary for run in compared.runs},
+    }
 
 
 def _tell(compared: Comparison, lines: list[str], page: Path) -> None:

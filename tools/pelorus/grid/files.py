@@ -47,7 +47,7 @@ def image(grid: Grid) -> bytes:
 def text(grid: Grid) -> str:
     """The YAML beside it."""
     x, y = grid.origin_m
-    right, up = (axis.label.removesuffix(" (m)") for axis in grid.plane[:2])
+    right, up = (axis.name for axis in grid.plane[:2])
     return (
         f"# x of the map is {right} of the world, y is {up}; {heights(grid.band)}\n"
         f"image: {IMAGE}\n"

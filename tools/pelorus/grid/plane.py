@@ -27,8 +27,12 @@ class Axis(NamedTuple):
         return np.asarray(self.sign * points[..., self.number])
 
     @property
+    def name(self) -> str:
+        return f"{'-' if self.sign < 0 else ''}{AXES[self.number]}"
+
+    @property
     def label(self) -> str:
-        return f"{'-' if self.sign < 0 else ''}{AXES[self.number]} (m)"
+        return f"{self.name} (m)"
 
 
 class Plane(NamedTuple):
