@@ -89,23 +89,41 @@ def replay_sources(target: Target) -> list[Path]:
     return sorted(p for p in (ROOT / "port/posix").glob("*.c") if p.name not in left_out)
 
 
-def build(target: Target, folder: Path) -> Path:
-    """The program, in the folder."""
+def build_library(target: Target, folder: Path, bits: int = 32) -> Path:
+    """The library in this precision, as an object file in the folder, beside its sources."""
     folder.mkdir(parents=True, exist_ok=True)
     header, library = amalgamate.library(ROOT)
     (folder / "pelorus.h").write_text(header, encoding="utf-8")
     (folder / "pelorus.c").write_text(library, encoding="utf-8")
+    made = folder / f"pelorus-{bits}.o"
+    pic = [] if target.windows or ".wasm" in target.program else ["-fPIC"]
+    flags = [*WARNINGS, *target.library, *pic, real(bits), "-c"]
+    compile_to(made, folder / "pelorus.c", target, flags)
+    return made
+
+
+def real(bits: int) -> str:
+    """The option that says the precision."""
+    return f"-DPLR_REAL={bits}"
+
+
+def port_flags(target: Target, bits: int) -> list[str]:
+    """What the files of `port` are told of the library."""
+    arch = "x86-64-v3" if X86_64_V3[0] in target.library else ""
+    return [*WARNINGS, real(bits), f'-DPELORUS_ARCH="{arch}"']
+
+
+def build(target: Target, folder: Path, bits: int = 32) -> Path:
+    """The program, in the folder."""
+    library = build_library(target, folder, bits)
     replay = amalgamate.program(ROOT, replay_sources(target))
     (folder / "replay.c").write_text(replay, encoding="utf-8")
-    compile_to(
-        folder / "pelorus.o", folder / "pelorus.c", target, [*WARNINGS, *target.library, "-c"]
-    )
-    arch = "x86-64-v3" if X86_64_V3[0] in target.library else ""
-    names = ['-DPELORUS_NAME="pelorus-replay"', f'-DPELORUS_ARCH="{arch}"', "-D_XOPEN_SOURCE=700"]
+    program = folder / target.program.replace("replay", "replay-f64" if bits == 64 else "replay")
+    names = [f'-DPELORUS_NAME="{program.stem}"', "-D_XOPEN_SOURCE=700"]
     large = ["-D_FILE_OFFSET_BITS=64"] if target.windows else []
-    objects = [str(folder / "pelorus.o"), *([] if target.windows else ["-lm"]), "-s"]
-    program = folder / target.program
-    compile_to(program, folder / "replay.c", target, [*WARNINGS, *names, *large, *objects])
+    objects = [str(library), *([] if target.windows else ["-lm"]), "-s"]
+    flags = [*port_flags(target, bits), *names, *large, *objects]
+    compile_to(program, folder / "replay.c", target, flags)
     return program
 
 

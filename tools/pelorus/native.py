@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pelorus import __version__
 from pelorus.errors import PelorusError
@@ -368,7 +368,7 @@ STRUCTS: tuple[type[_Struct], ...] = (
 )
 
 _VOID = c.c_void_p
-_SIGNATURES: dict[str, tuple[object, ...]] = {
+SIGNATURES: dict[str, tuple[object, ...]] = {
     "init_sized": (_VOID, _VOID, _VOID, _VOID, _VOID),
     "reset": (_VOID,),
     "set_pose": (_VOID, c.c_uint64, _VOID, _VOID),
@@ -394,6 +394,23 @@ _SIGNATURES: dict[str, tuple[object, ...]] = {
     "supervision": (_VOID, _VOID),
     "totals": (_VOID, _VOID),
 }
+# The other functions: name, result, arguments.
+OTHER_SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
+    ("plr_filter_time", c.c_uint64, (_VOID,)),
+    ("plr_filter_trace", c.c_double, (_VOID,)),
+    ("plr_filter_landmark_count", c.c_uint, (_VOID,)),
+    ("plr_setting_by_name", c.POINTER(Setting), (c.c_char_p,)),
+    ("plr_config_default", None, (_VOID,)),
+    ("plr_config_set", c.c_int, (_VOID, _VOID, c.c_double)),
+    ("plr_config_get", c.c_double, (_VOID, _VOID)),
+    ("plr_config_check", c.c_int, (_VOID, c.POINTER(c.POINTER(Setting)))),
+    ("plr_version", c.c_char_p, ()),
+    ("plr_status_text", c.c_char_p, (c.c_int,)),
+    ("plr_build_fingerprint", c.c_uint32, ()),
+    ("plr_binding_size_of", c.c_uint32, (c.c_char_p,)),
+    ("plr_binding_processor_lacks", c.c_char_p, ()),
+    ("plr_binding_sizes", None, (_VOID,)),
+)
 
 
 class Library:
@@ -419,25 +436,10 @@ class Library:
     def _declare(self, path: Path) -> None:
         """Tells ctypes the functions' types."""
         try:
-            for name, arguments in _SIGNATURES.items():
+            for name, arguments in SIGNATURES.items():
                 function = getattr(self._library, f"plr_filter_{name}")
                 function.argtypes, function.restype = arguments, c.c_int
-            for name, result, arguments in (
-                ("plr_filter_time", c.c_uint64, (_VOID,)),
-                ("plr_filter_trace", c.c_double, (_VOID,)),
-                ("plr_filter_landmark_count", c.c_uint, (_VOID,)),
-                ("plr_setting_by_name", c.POINTER(Setting), (c.c_char_p,)),
-                ("plr_config_default", None, (_VOID,)),
-                ("plr_config_set", c.c_int, (_VOID, _VOID, c.c_double)),
-                ("plr_config_get", c.c_double, (_VOID, _VOID)),
-                ("plr_config_check", c.c_int, (_VOID, c.POINTER(c.POINTER(Setting)))),
-                ("plr_version", c.c_char_p, ()),
-                ("plr_status_text", c.c_char_p, (c.c_int,)),
-                ("plr_build_fingerprint", c.c_uint32, ()),
-                ("plr_binding_size_of", c.c_uint32, (c.c_char_p,)),
-                ("plr_binding_processor_lacks", c.c_char_p, ()),
-                ("plr_binding_sizes", None, (_VOID,)),
-            ):
+            for name, result, arguments in OTHER_SIGNATURES:
                 function = getattr(self._library, name)
                 function.argtypes, function.restype = arguments, result
         except AttributeError as error:

@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Builds the Python package's wheels for other systems than this one.
+
+usage: wheels.py [--out FOLDER] [TAG...]
+
+pip builds this machine's wheel; in a copy of it for each system the two libraries and the two
+replays are exchanged for those that the compiler of the package ziglang makes (cross.py), and the
+tag. Nothing of a wheel depends on the version of Python.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import amalgamate
+from cross import ROOT, X86_64_V3, Target, build, compile_to, port_flags
+
+NATIVE = "pelorus/native"
+WHEELS = {
+    "manylinux_2_17_x86_64": Target("x86_64-linux-gnu.2.17", X86_64_V3),
+    "manylinux_2_17_aarch64": Target("aarch64-linux-gnu.2.17"),
+    "win_amd64": Target("x86_64-windows-gnu", X86_64_V3, "pelorus-replay.exe"),
+    "macosx_11_0_x86_64": Target("x86_64-macos.11.0", X86_64_V3),
+    "macosx_11_0_arm64": Target("aarch64-macos.11.0"),
+}
+
+
+def suffix(target: Target) -> str:
+    """Of a library, as tools/pelorus/native.py looks for it."""
+    if target.windows:
+        return ".dll"
+    return ".dylib" if "macos" in target.triple else ".so"
+
+
+def build_binding(target: Target, folder: Path, bits: int) -> Path:
+    """The library as Python loads it; `build` has been here."""
+    sources = [ROOT / "port/python/binding.c", ROOT / "port/posix/processor.c"]
+    (folder / "binding.c").write_text(amalgamate.program(ROOT, sources), encoding="utf-8")
+    made = folder / f"pelorus-filter{'-f64' if bits == 64 else ''}{suffix(target)}"
+    pic = [] if target.windows else ["-fPIC", "-lm"]
+    link = ["-shared", *pic, str(folder / f"pelorus-{bits}.o"), "-s"]
+    compile_to(made, folder / "binding.c", target, [*port_flags(target, bits), *link])
+    return made
+
+
+def pip_wheel(folder: Path) -> Path:
+    """This machine's."""
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
+    command += ["--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)]
+    subprocess.run(command, check=True)
+    (made,) = folder.glob("pelorus-*.whl")
+    return made
+
+
+def run_wheel(*words: str | Path) -> None:
+    """The package `wheel`: it unpacks wheels, and packs them with their list of contents."""
+    command = [sys.executable, "-m", "wheel", *map(str, words)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def make(tag: str, own: Path, work: Path, out: Path) -> Path:
+    """The wheel for the system of the tag."""
+    target = WHEELS[tag]
+    run_wheel("unpack", own, "--dest", work / "unpacked")
+    (content,) = (work / "unpacked").iterdir()
+    shutil.rmtree(content / NATIVE)
+    (content / NATIVE).mkdir()
+    for bits in (32, 64):
+        replay = build(target, work / "built", bits)
+        for made in (replay, build_binding(target, work / "built", bits)):
+            shutil.copy(made, content / NATIVE)
+            (content / NATIVE / made.name).chmod(0o755)
+    (about,) = content.glob("*.dist-info/WHEEL")
+    text = re.sub(r"^Tag: .*$", f"Tag: py3-none-{tag}", about.read_text(), flags=re.M)
+    about.write_text(text)
+    run_wheel("pack", content, "--dest-dir", out)
+    (made,) = out.glob(f"pelorus-*-py3-none-{tag}.whl")
+    return made
+
+
+def main() -> int:
+    """Builds them; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=ROOT / "build/wheels", help="where they go")
+    parser.add_argument("tags", nargs="*", metavar="TAG", help=", ".join(WHEELS))
+    given = parser.parse_args()
+    if unknown := sorted(set(given.tags) - WHEELS.keys()):
+        parser.error(f"no system {', '.join(unknown)}; there are {', '.join(WHEELS)}")
+    given.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
+        folder = Path(temporary)
+        own = pip_wheel(folder)
+        for tag in given.tags or WHEELS:
+            (work := folder / tag).mkdir()
+            made = make(tag, own, work, given.out)
+            print(f"{made}: {made.stat().st_size // 1024} KB", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
