@@ -43,10 +43,14 @@ bool result_file_open(result_file *result, const char *path, const char *input_p
         fprintf(stderr, PELORUS_NAME ": %s: is the recording itself; give another path\n", path);
         return false;
     }
+    if (chosen && result->part[0] != '\0')
+        system_unfinished(result->part);
     if (chosen)
         result->file = fopen(result->part[0] != '\0' ? result->part : path, "wb");
-    if (result->file == NULL)
+    if (result->file == NULL) {
         fprintf(stderr, PELORUS_NAME ": %s: cannot be written: %s\n", path, strerror(errno));
+        system_released(result->part);
+    }
     return result->file != NULL;
 }
 
@@ -60,6 +64,7 @@ bool result_file_close(result_file *result) {
     const bool placed =
         !failed && closed &&
         (result->part[0] == '\0' || system_put_in_place(result->part, result->target));
+    system_released(result->part);
     if (placed)
         return true;
     fprintf(stderr, PELORUS_NAME ": %s: not wholly written: %s\n", result->path,
@@ -76,4 +81,5 @@ void result_file_discard(result_file *result) {
     result->file = NULL;
     if (result->part[0] != '\0')
         (void)remove(result->part);
+    system_released(result->part);
 }

@@ -44,6 +44,13 @@ bool system_may_write(const char *path);
 /* The file behind all links, into target[size]. */
 bool system_target(char *target, size_t size, const char *path);
 
+/* Should Ctrl-C, or another signal that ends programs, end this one, the file goes with it; until it
+ * is released. The name must stay until then. Of more than SYSTEM_UNFINISHED_MOST files, and of all
+ * on Windows and WASI, nothing is kept: there it stays. */
+enum { SYSTEM_UNFINISHED_MOST = 8 };
+void system_unfinished(const char *part);
+void system_released(const char *part);
+
 /* `part` becomes `target`, in one step; it takes on the permissions of what stood there. */
 bool system_put_in_place(const char *part, const char *target);
 

@@ -11,7 +11,55 @@
 
 #include "posix/system.h"
 
+#ifdef __wasi__ /* has no signals */
+static void remove_at_signals(void) {
+}
+static const char *unfinished[SYSTEM_UNFINISHED_MOST];
+#else
+#include <signal.h>
+
+static const char *volatile unfinished[SYSTEM_UNFINISHED_MOST];
+
+/* Calls nothing but what a signal's handler may (POSIX 2.4.3); behind it the signal does its work. */
+static void remove_unfinished(int signal) {
+    for (int i = 0; i < SYSTEM_UNFINISHED_MOST; i++)
+        if (unfinished[i] != NULL)
+            (void)unlink(unfinished[i]);
+    (void)raise(signal);
+}
+
+/* Those that are ignored, as by nohup, stay so. */
+static void remove_at_signals(void) {
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    struct sigaction action = {.sa_handler = remove_unfinished};
+    action.sa_flags = (int)SA_RESETHAND; /* raised anew it is not caught */
+    (void)sigemptyset(&action.sa_mask);
+    for (unsigned i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+        struct sigaction before;
+        if (sigaction(signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            (void)sigaction(signals[i], &action, NULL);
+    }
+}
+#endif
+
 void system_begin(void) {
+    remove_at_signals();
+}
+
+static void exchange(const char *is, const char *becomes) {
+    for (int i = 0; i < SYSTEM_UNFINISHED_MOST; i++)
+        if (unfinished[i] == is) {
+            unfinished[i] = becomes;
+            return;
+        }
+}
+
+void system_unfinished(const char *part) {
+    exchange(NULL, part);
+}
+
+void system_released(const char *part) {
+    exchange(part, NULL);
 }
 
 int system_open_to_read(const char *path) {

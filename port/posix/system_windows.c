@@ -102,6 +102,14 @@ bool system_target(char *target, size_t size, const char *path) {
     return _fullpath(target, path, size) != NULL;
 }
 
+void system_unfinished(const char *part) {
+    (void)part;
+}
+
+void system_released(const char *part) {
+    (void)part;
+}
+
 bool system_put_in_place(const char *part, const char *target) {
     if (MoveFileExA(part, target, MOVEFILE_REPLACE_EXISTING) != 0)
         return true;

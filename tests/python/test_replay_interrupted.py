@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""pelorus-replay is ended by a signal: nothing unfinished stays, what stood there does."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from replay_drive import BIN, drive, encode
+
+WAIT_S = 60.0  # of a loaded machine; in fact milliseconds
+LEAVING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def begun(folder: Path, *before: str) -> subprocess.Popen[bytes]:
+    """A replay that waits for more on its standard input, its files begun."""
+    program = BIN / "pelorus-replay"
+    if not program.exists():
+        pytest.skip(f"{program} is not built")
+    outputs = ("--quiet", "--out", str(folder / "log.plr"), "--trajectory", str(folder / "t.tum"))
+    replay = subprocess.Popen([*before, str(program), "-", *outputs], stdin=subprocess.PIPE)
+    assert replay.stdin
+    replay.stdin.write(encode(drive())[:-400])
+    replay.stdin.flush()
+    end = time.monotonic() + WAIT_S
+    while not (folder / "t.tum.part").exists() or not (folder / "log.plr.part").exists():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    return replay
+
+
+@pytest.mark.parametrize("number", LEAVING)
+def test_a_signal_leaves_no_part_and_the_older_result(tmp_path: Path, number: int) -> None:
+    (tmp_path / "t.tum").write_text("an older one\n")
+    replay = begun(tmp_path)
+    replay.send_signal(number)
+    assert replay.wait(WAIT_S) == -number
+    assert [path.name for path in tmp_path.iterdir()] == ["t.tum"]
+    assert (tmp_path / "t.tum").read_text() == "an older one\n"
+
+
+def test_what_is_ignored_stays_ignored(tmp_path: Path) -> None:
+    """As under nohup: the replay goes on to its end."""
+    replay = begun(tmp_path, "sh", "-c", 'trap "" HUP; exec "$@"', "sh")
+    replay.send_signal(signal.SIGHUP)
+    assert replay.stdin
+    replay.stdin.close()
+    assert replay.wait(WAIT_S) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.plr", "t.tum"]
