@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib import import_module
+from pathlib import Path
 
 import typer
 
@@ -38,9 +39,26 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _write_man_pages(context: typer.Context, folder: Path | None) -> None:
+    if folder is not None:
+        from pelorus import man  # noqa: PLC0415 - hardly ever wanted
+
+        pages = man.write(context.command, folder)
+        out.print(f"{len(pages)} man pages: {pages[0].parent}", markup=False)
+        raise typer.Exit
+
+
 def _options(
     version: bool = typer.Option(
         False, "--version", help="Print the version.", callback=_show_version, is_eager=True
     ),
+    man_pages: Path | None = typer.Option(
+        None,
+        "--man-pages",
+        metavar="DIR",
+        help="Write the man pages into DIR/man1, such as ~/.local/share/man.",
+        callback=_write_man_pages,
+        is_eager=True,
+    ),
 ) -> None:
-    del version  # its callback has done the work
+    del version, man_pages  # their callbacks have done the work
