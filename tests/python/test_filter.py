@@ -139,6 +139,7 @@ REFUSED: tuple[tuple[str, Callable[[Filter], Any]], ...] = (
     (r"w_B_radps: <U1 of shape \(3,\)", lambda f: f.predict(7, [1, 2, 3], list("abc"))),
     (r"w_B_radps: .*inhomogeneous", lambda f: f.predict(7, [1, 2, 3], [[1], [2, 3]])),
     (r"t_ns: 1.5 is no whole number", lambda f: f.predict(cast(int, 1.5), ZEROS, ZEROS)),
+    (r"saved: str; the bytes", lambda f: f.restore(cast(bytes, "state"))),
     (r"t_ns: -3; 0 to ", lambda f: f.predict(-3, [1, 2, 3], [0, 0, 0])),
     (r"predict: .*NaN", lambda f: f.predict(7, [1, np.nan, 3], [0, 0, 0])),
     (r"predict: .*infinite", lambda f: f.predict(7, [1, np.inf, 3], [0, 0, 0])),
@@ -200,6 +201,9 @@ def test_a_calibration_that_cannot_be_is_refused() -> None:
     with pytest.raises(FilterError, match=r"init: .*baseline") as refused:
         Filter(Calibration(400, 400, 320, 240, -0.1))
     assert refused.value.status < 0
+    for wrong in ("wide", None, (400, 405)):
+        with pytest.raises(PelorusError, match=r"calibration: fx_px: .* is no number"):
+            Filter(Calibration(cast(float, wrong), 400, 320, 240, 0.1))
 
 
 def test_a_package_without_its_library_says_so(

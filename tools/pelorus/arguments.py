@@ -30,6 +30,14 @@ def checked(name: str, value: ArrayLike, shape: tuple[int, ...], type: Any = np.
         return np.ascontiguousarray(array, type)
 
 
+def real(name: str, value: Any) -> float:
+    """One number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise PelorusError(f"{name}: {value!r} is no number") from None
+
+
 def whole_number(name: str, value: int, most: int) -> int:
     """From 0 to `most`."""
     number = value if type(value) is int else integer(name, value)

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pelorus import native, schema
-from pelorus.arguments import address, checked, kind_of, whole_number
+from pelorus.arguments import address, checked, kind_of, real, whole_number
 from pelorus.errors import PelorusError
 from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
 
@@ -161,7 +161,10 @@ class Filter:
         self._check_config()
         self._callbacks = native.Map(None, native.Sink(self._take), native.Source(self._find))
         given = native.Calibration(
-            *(float(getattr(calibration, name)) for name, _ in native.Calibration._fields_[:5]),
+            *(
+                real(f"calibration: {name}", getattr(calibration, name))
+                for name, _ in native.Calibration._fields_[:5]
+            ),
             _pose("calibration", calibration.R_CB, calibration.t_CB_m),
         )
         pointers = (c.byref(part) for part in (given, self._config, self._callbacks, sizes))
@@ -411,6 +414,8 @@ class Filter:
 
     def restore(self, saved: bytes) -> None:
         """Goes on from a saved state of the same calibration, settings and build."""
+        if not isinstance(saved, bytes | bytearray):
+            raise PelorusError(f"saved: {type(saved).__name__}; the bytes that save gave are due")
 
         def give(_context: object, offset: int, data: int, n: int) -> int:
             c.memmove(data, saved[offset : offset + n], n)
