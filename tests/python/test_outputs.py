@@ -23,6 +23,8 @@ from replay_drive import Record, drive, run
         ("convert", "late-turns", "IN", "IN", "--late", "0.1"),
         ("export", "IN", "--frames", "OUT"),
         ("check", "IN", "--out", "OUT"),
+        ("check", "IN", "--page", "OUT"),
+        ("explain", "IN", "--page", "OUT"),
     ],
     ids=" ".join,
 )

@@ -38,7 +38,7 @@ def check(
     ),
     settings: list[str] = SETTINGS,
     page: Path | None = typer.Option(
-        None, "--page", metavar="FILE.html", help="The verdict with curves, way and map of the run."
+        None, "--page", metavar="OUT.html", help="The verdict with curves, way and map of the run."
     ),
     pictures: Path | None = PICTURES,
     calibration: list[Path] = CALIBRATION,

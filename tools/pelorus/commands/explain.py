@@ -28,7 +28,7 @@ def explain(
         "replayed first.",
     ),
     page: Path | None = typer.Option(
-        None, "--page", metavar="FILE.html", help="The same with curves, way and map, to look into."
+        None, "--page", metavar="OUT.html", help="The same with curves, way and map, to look into."
     ),
     pictures: Path | None = PICTURES,
     calibration: list[Path] = CALIBRATION,
