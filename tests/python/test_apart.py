@@ -221,3 +221,13 @@ def test_what_a_half_may_differ_by_is_what_it_knows_less() -> None:
     assert d2 / count == pytest.approx(1, abs=0.05)
     unknown = part[0], np.full((n, 6, 6), np.nan)
     assert compare(whole, cast(Any, unknown)) == (0.0, 0)
+
+
+def test_a_window_in_which_odometry_pauses_is_left_out() -> None:
+    """`check` of a robot whose twists are published only while it moves ended there: no twists."""
+    messages = [header(), *drive(150)[1:]]
+    edge = [m.t_ns for m in messages if isinstance(m, Stereo)][74]
+    paused = [m for m in messages if not (isinstance(m, Twist) and m.t_ns > edge)]
+    assert len(list(windows(messages))) == 2
+    [kept] = windows(paused)
+    assert len(recording_of(kept).tracks) > 0

@@ -36,7 +36,7 @@ from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
 from pelorus.errors import PelorusError
 from pelorus.evaluation import world_laid
-from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo
+from pelorus.frames import Imu, Kind, Message, Reading, Start, Stereo, Twist
 from pelorus.layout import Floats
 from pelorus.replay import run_program
 from pelorus.settings import CALIBRATION_SIGMAS
@@ -223,7 +223,9 @@ def windows(messages: Sequence[Message]) -> Iterator[list[Message]]:
         begin = at[first - 1] + 1 if first else 0
         inside = messages[begin : at[end - 1] + 1] if end > first else []
         kept = [m for m in inside if m.kind not in AHEAD and not isinstance(m, left_out)]
-        if end - first > SETTLED:
+        moved = any(isinstance(m, Twist) for m in kept)  # odometry may pause while the robot stands
+        shows = any(isinstance(m, Stereo) and len(m.ids) for m in kept)
+        if end - first > SETTLED and moved and shows:
             yield [*ahead, *kept]
 
 
