@@ -101,9 +101,7 @@ def agreement(recording: Recording, views: TwoViews, seen: Seen | None = None) -
     by_prior = float(np.hypot(none.known(SCALE), bias / speed))
     if not by_imu and sigma > by_prior:  # then the bias is what is known of it beforehand
         scale, sigma = float(none.x[SCALE]), by_prior
-    bias = bias if by_imu else NO_BIAS_MPS
-    doubt = _doubt_by_depth(recording, views, body, (at, bias))
-    doubt = float(np.hypot(doubt, _doubt_by_noise(recording, views, body, (at, bias), none)))
+    doubt = _doubt(recording, views, body, (at, bias if by_imu else NO_BIAS_MPS), none)
     lever = slice(LEVER, LEVER + 3)
     tilt = (None, None) if by_imu else _tilt(found)
     return Agreement(
@@ -153,6 +151,14 @@ def _body(recording: Recording, seen: Seen) -> tuple[Body, float]:
         return ImuBody(recording, seen), told if told > 0 else BIAS_MPS2
     told = noise.bias_velocity_sigma_mps
     return TwistBody(recording), told if told > 0 else BIAS_MPS
+
+
+def _doubt(
+    recording: Recording, views: TwoViews, body: Body, at: tuple[float, float], fit: Fit
+) -> float:
+    """About the scale, beyond its standard error."""
+    near_and_far = _doubt_by_depth(recording, views, body, at)
+    return float(np.hypot(near_and_far, _doubt_by_noise(recording, views, body, at, fit)))
 
 
 def _doubt_by_depth(
