@@ -92,11 +92,16 @@ def test_a_plain_install_stays_small() -> None:
 
 
 def built(folder: Path) -> Path:
-    """The wheel of this checkout."""
+    """The wheel that the source distribution gives."""
+    make = f"from scikit_build_core.build import build_sdist; build_sdist({str(folder)!r})"
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
-    isolation = ["--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)]
-    done = subprocess.run([*command, *isolation], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    isolation = ["--no-build-isolation", "--wheel-dir", str(folder)]
+    for step in ([sys.executable, "-c", make], [*command, *isolation]):
+        sources = list(map(str, folder.glob("pelorus-*.tar.gz")))
+        done = subprocess.run(
+            [*step, *sources], capture_output=True, text=True, check=False, cwd=ROOT
+        )
+        assert done.returncode == 0, done.stderr
     (wheel,) = folder.glob("pelorus-*.whl")
     return wheel
 
