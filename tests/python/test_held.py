@@ -17,8 +17,9 @@ from pelorus.check.parameters import Tuned
 from pelorus.check.tracks_noise import TrackNoise
 from pelorus.faults.fault import Fault
 from pelorus.frame_table import FrameTable
+from pelorus.frames import Kind, Report
 from pelorus.health import TimeLine
-from pelorus.schema import HEALTHS
+from pelorus.schema import HEALTHS, number
 from replay_drive import header
 
 WHITE, DRIFTS = TrackNoise({1: 1.0, 5: 1.0}, 1.0), TrackNoise({1: 0.3, 5: 0.6}, 1.63)
@@ -171,13 +172,19 @@ def test_priors_of_biases_that_allow_what_drifting_tracks_tell_stay(
 
 
 @pytest.mark.parametrize(
-    ("good", "grade"),
-    [(99, verdict.Grade.GOOD), (60, verdict.Grade.CARE), (40, verdict.Grade.BAD)],
+    ("good", "why", "grade"),
+    [
+        (99, "TWIST_CONTRADICTED", verdict.Grade.GOOD),
+        (60, "TWIST_CONTRADICTED", verdict.Grade.CARE),
+        (40, "TWIST_CONTRADICTED", verdict.Grade.BAD),
+        (40, "NO_TWISTS", verdict.Grade.CARE),  # of odometry that is sent while the robot moves
+    ],
 )
-def test_a_filter_that_is_not_good_most_of_the_time_is_not_to_be_trusted(
-    good: int, grade: verdict.Grade
+def test_a_filter_that_doubts_most_of_the_time_is_not_to_be_trusted(
+    good: int, why: str, grade: verdict.Grade
 ) -> None:
+    bad = Report(0, Kind.STEREO, health=1, reasons=number("reason", why))
     line = TimeLine(100, {HEALTHS[0]: good, HEALTHS[1]: 100 - good}, ())
-    run = verdict.Run([], cast(FrameTable, None), line)
+    run = verdict.Run([bad] * (100 - good), cast(FrameTable, None), line)
     (remark,) = verdict._health(run)
     assert remark.grade is grade

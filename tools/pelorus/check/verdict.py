@@ -17,14 +17,16 @@ from pelorus.check.parameters import FRAMES_FEW, Tuned, of_process, starting
 from pelorus.check.scale import Doubt
 from pelorus.check.tracks_noise import DRIFT
 from pelorus.frame_table import BIASES, FrameTable, frame_table
-from pelorus.frames import Header, Message, Report
-from pelorus.health import LOST, TimeLine, time_line
+from pelorus.frames import Header, Kind, Message, Report
+from pelorus.health import GOOD as OF_GOOD
+from pelorus.health import HARMLESS, LOST, NOT_STARTED, TimeLine, time_line
 from pelorus.schema import HEALTHS, number
 from pelorus.settings import in_force
 
 GOOD = HEALTHS[0]
 LATE = number("status", "LATE")
-GOOD_MOST, GOOD_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
+NO_TWISTS = number("reason", "NO_TWISTS")
+GOOD_MOST, DOUBTED_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
 GATED_MANY, GATED_MOST = 0.1, 0.3  # of the matches
 WINDOW_S = 5.0
 WORSE = 3.0  # times the usual share of a window that is worth naming
@@ -73,6 +75,16 @@ class Run:
     @property
     def good_share(self) -> float:
         return self.health.by_health.get(GOOD, 0) / max(self.health.frames, 1)
+
+    @property
+    def doubted_share(self) -> float:
+        """Frames that are not good for more than a pause of the readings: the pause is told by
+        itself, and what is not known in it is in the covariance.
+        """
+        frames = (m for m in self.messages if isinstance(m, Report) and m.subject == Kind.STEREO)
+        known = NO_TWISTS | HARMLESS | NOT_STARTED
+        doubted = sum(m.health != OF_GOOD and m.reasons & ~known != 0 for m in frames)
+        return doubted / max(self.health.frames, 1)
 
     @property
     def lost_share(self) -> float:
@@ -127,7 +139,8 @@ def of_length(frames: int) -> Iterator[Remark]:
 def _health(run: Run) -> Iterator[Remark]:
     """Frames before an IMU's start are not counted: they are no loss."""
     grade = Grade.GOOD if run.good_share >= GOOD_MOST else Grade.CARE
-    grade = Grade.BAD if run.lost_share > LOST_MANY or run.good_share < GOOD_HALF else grade
+    if run.lost_share > LOST_MANY or run.doubted_share > DOUBTED_HALF:
+        grade = Grade.BAD
     words = f"health {run.health.summary()}"
     yield Remark(grade, words)
     misfit = number("reason", "NOISE_MISFIT")
