@@ -125,11 +125,13 @@ void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_
 void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                      plr_notice notice) {
     plr_report report;
+    plr_health_state now; /* at the filter's own time: that of what is refused may be any */
     memset(&report, 0, sizeof report);
     report.t_ns = t_ns;
     report.status = status;
-    report.health = s->last.health;
-    report.reasons = s->last.reasons;
+    const bool known = plr_filter_health(&s->filter, 0, &now) == PLR_OK;
+    report.health = known ? now.health : s->last.health;
+    report.reasons = known ? now.reasons : s->last.reasons;
     report.budget = PLR_NO_BUDGET;
     report.active = s->last.active;
     put_report(s, subject, &report, 0, notice);

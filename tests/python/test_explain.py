@@ -41,6 +41,7 @@ from injected_events import EVENTS, S, moving
 
 DRIVE = Options(seed=11, duration_s=30.0, speed_mps=2.5, lap_s=25.0)
 WITHIN_S = 1.0
+LATE = schema.number("status", "LATE")
 
 
 @cache
@@ -190,6 +191,28 @@ def test_readings_that_come_late_all_along_are_a_matter_of_settings(tmp_path: Pa
     assert explained(messages, tmp_path, "--twist-delay", "0.1").setup == ()
 
 
+def test_frames_that_are_refused_are_told_with_what_lets_them_in(tmp_path: Path) -> None:
+    late = list(simulate(replace(DRIVE, camera_delay_s=0.07)).recording.messages())
+    messages = log_of(late, tmp_path)
+    reports = [m for m in messages if isinstance(m, Report) and m.status == LATE]
+    assert {schema.HEALTHS[m.health] for m in reports} == {"lost"}
+    found = explain(messages)
+    assert found.episodes == ()
+    (words,) = found.setup
+    assert re.match(r"(\d+) of \d+ frames were refused: .*twist-delay.*0.07", words)
+    assert explained(late, tmp_path, "--twist-delay", "0.1").setup == ()
+
+
+def test_a_few_frames_that_were_refused_are_a_remark(tmp_path: Path) -> None:
+    messages = simulated()
+    frames = [k for k, m in enumerate(messages) if isinstance(m, Stereo)]
+    for k in frames[50:60]:  # each behind the next one's readings
+        messages = [*messages[:k], *messages[k + 1 : k + 9], messages[k], *messages[k + 9 :]]
+    found = explained(messages, tmp_path)
+    assert found.setup == ()
+    assert any(re.match(r"\d+ of \d+ frames were refused: ", words) for words in found.remarks)
+
+
 @pytest.mark.parametrize(
     ("wrong", "by", "told"),
     [
@@ -208,7 +231,7 @@ def test_a_bias_tells_a_wrong_scale_from_a_turned_camera(
 def test_the_end_of_the_readings_is_no_step_of_a_clock(tmp_path: Path) -> None:
     late = replace(DRIVE, camera_delay_s=0.25)
     found = explained(list(simulate(late).recording.messages()), tmp_path)
-    assert found.first is None
+    assert found.episodes == ()
 
 
 def test_health_that_nothing_explains_is_told(tmp_path: Path) -> None:

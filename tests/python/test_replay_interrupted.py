@@ -21,7 +21,8 @@ def begun(folder: Path, *before: str) -> subprocess.Popen[bytes]:
     if not program.exists():
         pytest.skip(f"{program} is not built")
     outputs = ("--quiet", "--out", str(folder / "log.plr"), "--trajectory", str(folder / "t.tum"))
-    replay = subprocess.Popen([*before, str(program), "-", *outputs], stdin=subprocess.PIPE)
+    first = ("env", "--default-signal=HUP")  # the tests may run under nohup themselves
+    replay = subprocess.Popen([*first, *before, str(program), "-", *outputs], stdin=subprocess.PIPE)
     assert replay.stdin
     replay.stdin.write(encode(drive())[:-400])
     replay.stdin.flush()

@@ -111,6 +111,14 @@ plr_status plr_filter_totals(const plr_filter *f, plr_totals *totals) {
     return PLR_OK;
 }
 
+/* It judges frames alone. */
+plr_status plr_filter_health(const plr_filter *f, plr_time_ns t_ns, plr_health_state *health) {
+    (void)f;
+    (void)t_ns;
+    (void)health;
+    return PLR_E_MODE;
+}
+
 const plr_config *plr_filter_config(const plr_filter *f) {
     (void)f;
     return the.ready ? &the.book.config : NULL;

@@ -116,6 +116,7 @@ static unsigned degraded_frames(void) {
     faulty_port_answers_again(&port);
     while (faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer))
         n += answer.as.report.subject == PLR_KIND_STEREO &&
+             answer.as.report.report.status == PLR_OK &&
              (answer.as.report.report.reasons & PLR_REASON_NO_TWISTS) != 0;
     faulty_port_answers_again(&port);
     return n;
@@ -239,6 +240,21 @@ static void test_frames_that_wait_in_vain_are_used_when_the_delay_is_over(void) 
         TEST_ASSERT_EQUAL_UINT64(drive_time_ns(INERTIAL_FRAME_S * k), answer.as.report.report.t_ns);
     }
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
+}
+
+/* The health of the frame before would be that of the start: good. */
+static void test_where_every_frame_is_refused_its_report_says_lost(void) {
+    const manner late = {.batch = 1, .frames_late_s = 0.15, .twists = true};
+    plr_report_message report;
+    unsigned told = 0;
+    (void)run(&late, 0);
+    while (desk_next_refusal(&report)) {
+        TEST_ASSERT_EQUAL_INT(PLR_E_LATE, report.report.status);
+        TEST_ASSERT_EQUAL_INT(PLR_HEALTH_LOST, report.report.health);
+        TEST_ASSERT_BITS(PLR_REASON_NO_FRAMES, PLR_REASON_NO_FRAMES, report.report.reasons);
+        told++;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(INERTIAL_FRAMES / 2, told);
 }
 
 static void test_more_frames_than_fit_are_used_early_and_counted(void) {

@@ -107,8 +107,6 @@ def result_of(source: Path, options: Sequence[str], programs: Path | None) -> li
             raise PelorusError(
                 f"{source}: holds a filter's result already: --config and --set are for recordings"
             )
-        if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
-            raise PelorusError(f"{source}: holds poses and no REPORT: a whole log is due")
         return messages
     with tempfile.TemporaryDirectory(prefix="pelorus-") as folder:
         outputs = Outputs.named(Path(folder), "result")
@@ -116,6 +114,14 @@ def result_of(source: Path, options: Sequence[str], programs: Path | None) -> li
         for line in said:
             err.print(escape(line))
         return messages_of(outputs.log)
+
+
+def log_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
+    """A result that says what became of its frames, too."""
+    messages = result_of(source, options, programs)
+    if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
+        raise PelorusError(f"{source}: holds no REPORT of a frame: a whole log is due")
+    return messages
 
 
 def depth_limit_m(program: Path, recording: Path, options: Sequence[str]) -> float:

@@ -10,7 +10,7 @@ import typer
 
 from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, print_json
-from pelorus.replay import result_of
+from pelorus.replay import log_of
 
 if TYPE_CHECKING:
     from pelorus.explain import Explanation
@@ -63,14 +63,14 @@ def explain(
         where = "--beside / --beside-set / --pictures"
         raise typer.BadParameter("what they ask for is seen on a --page alone", param_hint=where)
     options = replay_options(config, settings)
-    messages = result_of(source, options, programs)
+    messages = log_of(source, options, programs)
     found = explained(messages)
     if page is not None:
         other = None
         if beside is not None or beside_settings:
             changed = replay_options(None, beside_settings, "--beside-set")
             named = ", ".join(beside_settings) or str(beside)
-            other = named, result_of(beside or source, [*options, *changed], programs)
+            other = named, log_of(beside or source, [*options, *changed], programs)
         _write(page, source.name, found, messages, other, pictures, calibration)
     if as_json:
         print_json(found.json())

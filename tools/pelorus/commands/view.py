@@ -13,7 +13,7 @@ from rich.markup import escape
 from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.errors import PelorusError, whole
-from pelorus.replay import result_of
+from pelorus.replay import log_of
 
 if TYPE_CHECKING:
     from pelorus.view.drive import Viewer
@@ -61,7 +61,7 @@ def view(
     from pelorus.view.in_foxglove import InFoxglove  # noqa: PLC0415
     from pelorus.view.in_rerun import InRerun  # noqa: PLC0415
 
-    messages = result_of(source, replay_options(config, settings), programs)
+    messages = log_of(source, replay_options(config, settings), programs)
     with ExitStack() as stack:
         viewers: list[Viewer] = []
         if rrd is not None:

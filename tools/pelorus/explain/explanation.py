@@ -16,7 +16,7 @@ from pelorus.explain.contradiction import contradictions
 from pelorus.explain.finding import Cause, Finding, S
 from pelorus.explain.inputs import of_inputs, rejected
 from pelorus.explain.log import FEW, Flags, Log, log_of
-from pelorus.explain.setup import GATED_MOST, gated_share, of_setup
+from pelorus.explain.setup import GATED_MOST, gated_share, of_setup, refusals
 from pelorus.explain.stamps import of_stamps
 from pelorus.frames import Kind, Message
 from pelorus.health import LOST, Spell, TimeLine, time_line
@@ -166,7 +166,8 @@ def explain(messages: Sequence[Message]) -> Explanation:
     end_ns = int(log.t_ns.max())
     told = {spell for episode in episodes for spell in episode.spells}
     rest = () if setup else tuple(spell for spell in health.spells if spell not in told)
-    remarks = tuple(_remarks(log, messages))
+    refused = refusals(log)
+    remarks = (*([] if refused in ("", *setup) else [refused]), *_remarks(log, messages))
     return Explanation(log.origin_ns, end_ns, episodes, setup, health, remarks, rest)
 
 

@@ -13,12 +13,13 @@ import numpy as np
 
 from pelorus.explain.inputs import is_habit, losses
 from pelorus.explain.log import NO_READING, Flags, Log, period
-from pelorus.schema import number
+from pelorus.schema import STATUSES, number
 
 MISFIT, BIAS_OFF, CONTRADICTED, NO_READINGS = (
     number("reason", name)
     for name in ("NOISE_MISFIT", "BIAS_OFF_PRIOR", "TWIST_CONTRADICTED", "NO_TWISTS")
 )
+LATE = number("status", "LATE")
 GATED_MOST = 0.2  # of the matches: as sigmas say, the gate rejects one of a hundred
 FRAMES_LEAST = 20  # to say so of
 ALL_ALONG = 0.5  # of the frames
@@ -31,6 +32,8 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
     """In words; `calm` are the frames to judge by: those before the first event."""
     if np.count_nonzero(calm) < FRAMES_LEAST:
         return
+    if np.mean(log.column("status")[calm] != 0) > ALL_ALONG:
+        yield refusals(log)
     yield from (gate := list(_gate(log, calm)))
     yield from _noise(log, calm, bool(gate))
     if _share(log, NO_READINGS, calm) > ALL_ALONG:
@@ -41,6 +44,21 @@ def of_setup(log: Log, calm: Flags) -> Iterator[str]:
     if lost and is_habit(log, lost, 0):
         whole_s = float(np.ptp(log.t_ns)) * 1e-9
         yield f"the front end loses all tracks every {whole_s / len(lost):.1f} s, and begins anew"
+
+
+def refusals(log: Log) -> str:
+    """Of frames; empty where there are none."""
+    status = log.column("status")
+    refused = status != 0
+    if not refused.any():
+        return ""
+    number_of = int(np.bincount(-status[refused]).argmax())
+    words = f"{np.count_nonzero(refused)} of {len(status)} frames were refused: "
+    words += STATUSES.get(-number_of, f"status {-number_of}")
+    behind_ns = (log.behind_ns - log.t_ns)[refused & (log.behind_ns != NO_READING)]
+    if -number_of == LATE and len(behind_ns) and behind_ns.max() > 0:
+        words += f" (here {behind_ns.max() * 1e-9:.3f} s)"
+    return words
 
 
 def _share(log: Log, bits: int, calm: Flags) -> float:
