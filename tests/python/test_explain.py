@@ -199,7 +199,9 @@ def test_frames_that_are_refused_are_told_with_what_lets_them_in(tmp_path: Path)
     found = explain(messages)
     assert found.episodes == ()
     (words,) = found.setup
-    assert re.match(r"(\d+) of \d+ frames were refused: .*twist-delay.*0.07", words)
+    assert re.match(
+        r"\d+ of \d+ frames were refused: .* twists .* 0\.07. s: set twist-delay", words
+    )
     assert explained(late, tmp_path, "--twist-delay", "0.1").setup == ()
 
 
@@ -272,7 +274,7 @@ def test_the_command_tells_a_log_and_replays_a_recording(pelorus: Command, tmp_p
     messages = simulated(slip=0.4, slip_span=Span(17.0, 3.0))
     log_of(messages, tmp_path)
     lines = pelorus("explain", tmp_path / "log.plr").out.splitlines()
-    assert lines[0].startswith("one event in ")
+    assert lines[0].startswith("one event (slip) in ")
     assert lines[1].startswith("1. 17.")
     assert "the odometry says" in lines[1]
     assert lines[2].startswith("   before: health good, ")

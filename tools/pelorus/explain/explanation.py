@@ -25,6 +25,7 @@ APART_NS = S  # what begins later than that after the end of another is an episo
 TOGETHER_NS = S  # what begins within is told in the order of causes
 BEFORE_NS = S  # what was seen before: the last second
 LINES = 20
+LASTS_S = 0.05  # what is shorter is a moment
 EPISODES_TOLD = 4
 SPELLS_TOLD = 3
 
@@ -95,6 +96,8 @@ class Explanation:
         whole, along = self.seconds(self.end_ns), ""
         if not count and self.setup:
             what, along = "no event", ", but something is wrong all along"
+        if count == 1:
+            what += f" ({self.episodes[0].first.cause})"
         yield f"{what} in {whole:.1f} s{along}; health: {self.health.summary()}"
 
     def _unexplained(self) -> Iterator[str]:
@@ -104,14 +107,31 @@ class Explanation:
             yield f"not explained: {len(self.unexplained) - SPELLS_TOLD} times more"
 
     def _episode(self, number: int, episode: Episode, room: int) -> list[str]:
+        span = f"{self.seconds(episode.from_ns):.2f} to {self.seconds(episode.to_ns):.2f} s"
+        head, *lines = self.told_of(episode)
+        return [f"{number}. {span}: {head}", *(f"   {words}" for words in lines)][: max(room, 2)]
+
+    def told_of(self, episode: Episode) -> list[str]:
+        """The first cause, what was seen before, what to do, and what followed in its order."""
         first = episode.first
-        span = f"{self.seconds(first.from_ns):.2f} to {self.seconds(episode.to_ns):.2f} s"
-        lines = [f"{number}. {span}: {first.cause}: {first.words}"]
-        lines.append(f"   before: {episode.before}")
-        then = [(f.from_ns, f"{f.cause}: {f.words}") for f in episode.others]
+        then = [(f.from_ns, self._follows(f, first)) for f in episode.others]
         then += [(s.from_ns, s.words(self.origin_ns)) for s in episode.spells]
-        lines += [f"   {self.seconds(t):.2f} s {words}" for t, words in sorted(then)]
-        return lines[: max(room, 2)]
+        return [
+            f"{first.cause}{self._lasting(first)}: {first.words}",
+            f"before: {episode.before}",
+            f"what to do: {first.remedy}",
+            *(words for _, words in sorted(then)),
+        ]
+
+    def _follows(self, one: Finding, first: Finding) -> str:
+        by_it = one.rank > first.rank and one.from_ns <= first.to_ns + TOGETHER_NS
+        why = ", probably by it" if by_it else ""
+        return f"{self.seconds(one.from_ns):.2f} s{why}: {one.cause}: {one.words}"
+
+    def _lasting(self, found: Finding) -> str:
+        """For how long, if it lasted."""
+        seconds = self.seconds(found.to_ns) - self.seconds(found.from_ns)
+        return f", {seconds:.1f} s long" if seconds >= LASTS_S else ""
 
     def json(self) -> dict[str, Any]:
         """Times in seconds since the first frame, and in ns as in the log."""
@@ -144,6 +164,7 @@ class Explanation:
             "to_s": self.seconds(found.to_ns),
             "from_ns": found.from_ns,
             "words": found.words,
+            "what_to_do": found.remedy,
         }
 
 

@@ -44,3 +44,31 @@ class Finding(NamedTuple):
     @property
     def rank(self) -> int:
         return list(Cause).index(self.cause)
+
+    @property
+    def remedy(self) -> str:
+        """What to look at first."""
+        return REMEDIES[self.cause]
+
+
+REMEDIES = {
+    Cause.CLOCK_STEP: "stamp by a clock that nobody sets while the robot runs (monotonic)",
+    Cause.NO_READINGS: "look at the sensor's cable, driver and bus; what the filter says of the "
+    "motion meanwhile comes of a reading that is old",
+    Cause.NO_FRAMES: "look at the camera's cable, trigger and driver",
+    Cause.SHOCK: "nothing, where the robot fell or was hit; else look at the IMU's mount and range",
+    Cause.FROZEN_PICTURE: "look at the camera's driver: it hands on the same picture again",
+    Cause.DEAD_ODOMETRY: "look at the encoders, their cables and driver",
+    Cause.DEAD_GYRO: "look at the gyro's bus and driver",
+    Cause.DEAD_ACCELEROMETER: "look at the accelerometer's bus and driver",
+    Cause.LOST_TRACKS: "look at light, exposure and what was before the camera; a front end that "
+    "begins anew keeps no ids",
+    Cause.JUMP: "nothing, where the robot was pushed or carried; else look at the stamps there",
+    Cause.SLIP: "nothing, where wheels slip or traffic fills the picture; else look at the wheels "
+    "and, in `pelorus check`, at scale and timing",
+    Cause.TURN_CONTRADICTED: "look at the gyro: its axes, units and clock (`pelorus check`)",
+    Cause.CONTRADICTED: "`pelorus check` on the recording: scale, axes, clocks",
+    Cause.WRONG_MATCHES: "look at the front end's matches (`pelorus report --pictures`)",
+    Cause.LOST: "`pelorus report` shows the points of each frame, and which were rejected",
+    Cause.SETTINGS: "`pelorus check` on the recording writes settings that fit",
+}

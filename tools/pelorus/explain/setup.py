@@ -54,11 +54,14 @@ def refusals(log: Log) -> str:
         return ""
     number_of = int(np.bincount(-status[refused]).argmax())
     words = f"{np.count_nonzero(refused)} of {len(status)} frames were refused: "
-    words += STATUSES.get(-number_of, f"status {-number_of}")
     behind_ns = (log.behind_ns - log.t_ns)[refused & (log.behind_ns != NO_READING)]
-    if -number_of == LATE and len(behind_ns) and behind_ns.max() > 0:
-        words += f" (here {behind_ns.max() * 1e-9:.3f} s)"
-    return words
+    if -number_of == LATE and len(behind_ns) and (late_ns := behind_ns.max()) > 0:
+        name = "IMU readings" if log.by_imu else "twists"
+        return (
+            f"{words}they come after {name} that are newer by up to {late_ns * 1e-9:.3f} s: set "
+            "twist-delay to that or more, or correct the camera's stamps"
+        )
+    return words + STATUSES.get(-number_of, f"status {-number_of}")
 
 
 def _share(log: Log, bits: int, calm: Flags) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pelorus.explain.explanation import Episode, Explanation
+from pelorus.health import LOST
 from pelorus.report.footage import CAPTION, Footage
 from pelorus.report.page import GRADES, Answer, Event, Table
 
@@ -48,7 +49,8 @@ def of_explanation(
     """Of a log."""
     first = found.first
     odd = first is not None or found.unexplained
-    grade = "bad" if found.episodes else "care" if odd else "good"
+    lost = any(spell.health >= LOST for spell in found.health.spells)
+    grade = "bad" if found.episodes or lost else "care" if odd else "good"
     head = found.lines()[0]
     return Answer(
         title,
@@ -71,10 +73,7 @@ def _events(found: Explanation) -> list[Event]:
 
 
 def _event(found: Explanation, episode: Episode) -> Event:
-    then = [f"{found.seconds(f.from_ns):.2f} s {f.cause}: {f.words}" for f in episode.others]
-    then += [spell.words(found.origin_ns) for spell in episode.spells]
-    head = f"{episode.first.cause}: {episode.first.words}"
-    lines = (head, f"before: {episode.before}", *then)
+    lines = tuple(found.told_of(episode))
     return Event(found.seconds(episode.from_ns), found.seconds(episode.to_ns), lines)
 
 

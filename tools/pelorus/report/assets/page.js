@@ -237,10 +237,11 @@
   function makeRibbons() {
     const there = data.health_beside && exact(data.health_beside);
     const shown = (h) => health.includes(h) || there && there.includes(h);
-    const names = [...data.words.health.entries()].filter(([h]) => shown(h));
-    for (const [h, name] of names) {
+    const names = [...data.words.health.entries()].filter(([h]) => shown(h)).map(([h, name]) => [COLOURS[h], name]);
+    if (status.some((s) => s !== 128)) names.push(["--refused", "frame refused"]);
+    for (const [colour, name] of names) {
       const item = node("span"), box = node("i");
-      box.style.background = `var(${COLOURS[h]})`;
+      box.style.background = `var(${colour})`;
       item.append(box, document.createTextNode(name));
       $("key").append(item);
     }
