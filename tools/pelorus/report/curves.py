@@ -193,7 +193,7 @@ class Curves:
         yield self._chart("Rotation error", "deg", about, lines)
         low, high = np.array(chi2.interval(BAND, POSE_SIZE)) / POSE_SIZE
         about = (
-            "Normalised estimation error squared, a degree of freedom: 1 on average for an honest "
+            "Normalised estimation error squared, per degree of freedom: 1 on average for an honest "
             "filter; 95 % of its frames are in the band."
         )
         nees = self._spread(accuracy.t_ns, accuracy.nees[:, None])[:, 0]
@@ -237,7 +237,7 @@ class Curves:
             )
         )
         about = (
-            "Innovations squared in their own sigmas, a degree of freedom (NIS): 1 is due, and "
+            "Innovations squared in their own sigmas, per degree of freedom (NIS): 1 is due, and "
             "95 % of the frames in the band if noise is as set. Above: pixel-sigma is too small."
         )
         lines = [("NIS", nis), ("low", low), ("high", high)]
@@ -306,8 +306,8 @@ class Curves:
             for name in ("statistic", "weight", "agreement")
         )
         about = (
-            "Why: the sum of the differences between pictures and odometry, chi-square of six in "
-            "what is usual on this drive. Above 32 the pose is doubted."
+            "Why: the sum of the differences between pictures and odometry, squared in units of "
+            "what is usual on this drive: 6 on average. Above 32 the pose is doubted."
         )
         lines = [("statistic", np.maximum(statistic, 1e-2))]
         yield self._chart("Doubt", "chi-square", about, lines, log=True, levels=[32.0])
@@ -320,8 +320,8 @@ class Curves:
             ("agreement", agreement),
         ]
         about = (
-            "Why: pictures less odometry in the odometry's stated sigmas, and the share of the "
-            "last frames in which both agreed."
+            "Why: pictures less odometry in the odometry's stated sigmas, and the share of "
+            "frames in which both agreed before a doubt began: it stands while that lasts."
         )
         yield self._chart("Pictures less odometry", "sigma", about, lines, log=True)
 
