@@ -193,8 +193,8 @@ class Curves:
         yield self._chart("Rotation error", "deg", about, lines)
         low, high = np.array(chi2.interval(BAND, POSE_SIZE)) / POSE_SIZE
         about = (
-            "Normalised estimation error squared, per degree of freedom: 1 on average for an honest "
-            "filter; 95 % of its frames are in the band."
+            "Normalised estimation error squared, per degree of freedom: 1 on average for an "
+            "honest filter; 95 % of its frames are in the band."
         )
         nees = self._spread(accuracy.t_ns, accuracy.nees[:, None])[:, 0]
         own = [("NEES", nees)]
