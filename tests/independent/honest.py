@@ -207,6 +207,15 @@ def compared(filter: Filter, R: Floats, p: Floats) -> tuple[float, Floats, Float
     return float(e @ np.linalg.solve(P, e)), e, np.sqrt(np.diag(P))
 
 
+def frame(
+    filter: Filter, camera: Camera, t_ns: int, R: Floats, p: Floats, twist: Floats
+) -> tuple[float, Floats, Floats, bool]:
+    """What the camera sees there is given to the filter: as compared, and whether it is GOOD."""
+    ids, pixels = camera.look(R, p, twist)
+    report = filter.update(t_ns, observations(ids, pixels))
+    return *compared(filter, R, p), report.health == GOOD
+
+
 def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Precision) -> Outcome:
     """One run, as an Outcome of one row."""
     rng = np.random.default_rng([20, seed])
@@ -226,9 +235,7 @@ def drive(seed: int, seconds: float, wrong: Wrong, config: Config, precision: Pr
         t_ns = round(k * STEP_S * 1e9)
         filter.predict(t_ns, read[k, :3], read[k, 3:])
         if k % FRAME_STEPS == 0:
-            ids, pixels = camera.look(R, p, true[k])
-            report = filter.update(t_ns, observations(ids, pixels))
-            rows.append((*compared(filter, R, p), report.health == GOOD))
+            rows.append(frame(filter, camera, t_ns, R, p, true[k]))
         way = R @ screws[k] @ (true[k, :3] * STEP_S)
         camera.move(way)
         R, p = R @ turns[k], p + way
@@ -274,11 +281,8 @@ def flight(
         t_ns = round(k * h * 1e9)
         filter.inertial(t_ns, read[k, :3], read[k, 3:])
         if k % IMU_PER_FRAME == 0:
-            ids, pixels = camera.look(at_reading[0][k], at_reading[1][k], np.zeros(6))
-            report = filter.update(t_ns, observations(ids, pixels))
-            rows.append(
-                (*compared(filter, at_reading[0][k], at_reading[1][k]), report.health == GOOD)
-            )
+            R, p = at_reading[0][k], at_reading[1][k]
+            rows.append(frame(filter, camera, t_ns, R, p, np.zeros(6)))
     return Outcome(*(np.array(column)[None] for column in zip(*rows[1:], strict=True)))
 
 

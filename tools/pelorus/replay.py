@@ -116,7 +116,7 @@ def result_of(source: Path, options: Sequence[str], programs: Path | None) -> li
         return messages_of(outputs.log)
 
 
-def log_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
+def whole_log_of(source: Path, options: Sequence[str], programs: Path | None) -> list[Message]:
     """A result that says what became of its frames, too."""
     messages = result_of(source, options, programs)
     if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):

@@ -11,6 +11,12 @@ import typer
 from pelorus.errors import PelorusError, read_text
 from pelorus.frames import TwistTiming
 
+LOG: Path = typer.Argument(
+    ...,
+    metavar="LOG.plr",
+    help="What `pelorus-replay --out` or `pelorus stream --record` wrote; a recording is replayed "
+    "first.",
+)
 CONFIG = typer.Option(
     None, metavar="FILE", help="For a recording: settings, as pelorus-replay takes them."
 )

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from pelorus.commands.choices import CALIBRATION, PICTURES, PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CALIBRATION, LOG, PICTURES, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out, print_json
-from pelorus.replay import log_of
+from pelorus.replay import whole_log_of
 
 if TYPE_CHECKING:
     from pelorus.explain import Explanation
@@ -21,12 +21,7 @@ app = typer.Typer()
 
 @app.command(epilog="Example:  pelorus explain flight.plr")
 def explain(
-    source: Path = typer.Argument(
-        ...,
-        metavar="LOG.plr",
-        help="What `pelorus-replay --out` or `pelorus stream --record` wrote; a recording is "
-        "replayed first.",
-    ),
+    source: Path = LOG,
     page: Path | None = typer.Option(
         None, "--page", metavar="OUT.html", help="The same with curves, way and map, to look into."
     ),
@@ -63,14 +58,14 @@ def explain(
         where = "--beside / --beside-set / --pictures"
         raise typer.BadParameter("what they ask for is seen on a --page alone", param_hint=where)
     options = replay_options(config, settings)
-    messages = log_of(source, options, programs)
+    messages = whole_log_of(source, options, programs)
     found = explained(messages)
     if page is not None:
         other = None
         if beside is not None or beside_settings:
             changed = replay_options(None, beside_settings, "--beside-set")
             named = ", ".join(beside_settings) or str(beside)
-            other = named, log_of(beside or source, [*options, *changed], programs)
+            other = named, whole_log_of(beside or source, [*options, *changed], programs)
         _write(page, source.name, found, messages, other, pictures, calibration)
     if as_json:
         print_json(found.json())

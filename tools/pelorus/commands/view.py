@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import typer
 from rich.markup import escape
 
-from pelorus.commands.choices import CONFIG, PROGRAMS, SETTINGS, replay_options
+from pelorus.commands.choices import CONFIG, LOG, PROGRAMS, SETTINGS, replay_options
 from pelorus.console import out
 from pelorus.errors import PelorusError, whole
-from pelorus.replay import log_of
+from pelorus.replay import whole_log_of
 
 if TYPE_CHECKING:
     from pelorus.view.drive import Viewer
@@ -23,12 +23,7 @@ app = typer.Typer()
 
 @app.command(epilog="Example:  pelorus view flight.plr --rrd flight.rrd")
 def view(
-    source: Path = typer.Argument(
-        ...,
-        metavar="LOG.plr",
-        help="What `pelorus-replay --out` or `pelorus stream --record` wrote; a recording is "
-        "replayed first.",
-    ),
+    source: Path = LOG,
     rrd: Path | None = typer.Option(
         None, "--rrd", metavar="OUT.rrd", help="Keep it for Rerun: `rerun OUT.rrd` opens it."
     ),
@@ -61,7 +56,7 @@ def view(
     from pelorus.view.in_foxglove import InFoxglove  # noqa: PLC0415
     from pelorus.view.in_rerun import InRerun  # noqa: PLC0415
 
-    messages = log_of(source, replay_options(config, settings), programs)
+    messages = whole_log_of(source, replay_options(config, settings), programs)
     with ExitStack() as stack:
         viewers: list[Viewer] = []
         if rrd is not None:

@@ -170,8 +170,6 @@ class Drive:
 
 def show(messages: Sequence[Message], viewers: Sequence[Viewer]) -> None:
     """A whole log, with its truth brought to the estimate's start."""
-    if not any(isinstance(m, Report) and m.subject == Kind.STEREO for m in messages):
-        raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
     drive = Drive(viewers, _truth(messages))
     for message in messages:
         drive.take(message)
