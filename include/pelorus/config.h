@@ -22,7 +22,7 @@ extern "C" {
 /* Increases with every change of the source that changes the bits of a result. It is part of the
  * build fingerprint, so a log shows whether it was made by the same arithmetic as this source's.
  * tests/golden fails if the bits change and this number does not. */
-#define PLR_ARITHMETIC 21
+#define PLR_ARITHMETIC 22
 
 /* Precision of the filter's arithmetic: 32 (float; default) or 64 (double). For the model `body`
  * float is as accurate (docs/NUMERICS.md) and takes half the RAM; choose 64 for `world`. */
@@ -191,11 +191,15 @@ enum {
     PLR_MAX_LD = PLR_LD_OF_16 > PLR_LD_OF_6 ? PLR_LD_OF_16 : PLR_LD_OF_6,
     PLR_KERNEL_MARGIN = 20, /* elements that a kernel may read beyond the end of a matrix */
     PLR_PACKED_SIZE = PLR_MAX_STATE * (PLR_MAX_STATE + 1) / 2,
+    /* Steps of the process that lead back to where a camera with a late clock was. */
+    PLR_CLOCK_STEPS = 8,
     /* Errors of the calibration that can be considered or estimated together: with the seven other
-     * columns of a correction they make whole tiles of four. */
-    PLR_CALIBRATIONS = PLR_MAX_CALIBRATION <= 5   ? 5
-                       : PLR_MAX_CALIBRATION <= 9 ? 9
-                                                  : 13
+     * columns of a correction they make whole tiles of four, or one more than that. */
+    PLR_CALIBRATIONS = PLR_MAX_CALIBRATION <= 5    ? 5
+                       : PLR_MAX_CALIBRATION == 6  ? 6
+                       : PLR_MAX_CALIBRATION <= 9  ? 9
+                       : PLR_MAX_CALIBRATION == 10 ? 10
+                                                   : 13
 };
 
 /* What the memory layout of a filter or session depends on in one translation unit, and its size in

@@ -205,15 +205,15 @@ typedef struct plr_calibrated {
 
 /* What has become of the calibration: src/state/calibration.h. */
 typedef struct plr_calibration_estimate {
-    /* Information about the errors, each in units of its prior's sigma, prior included: rows of those
-     * that are estimated by all columns. */
-    double information[PLR_CALIBRATIONS * PLR_CALIBRATIONS];
     plr_camera
         eye; /* the camera as estimated; R_CB, t_CB: from the axes that par.camera gives it to
                        where it was at the time of the last frame */
-    plr_real R[9], t[3];             /* the same without the clock's part */
-    plr_real twist[PLR_POSE_DIM];    /* of the camera at the last frame, m/s and rad/s */
-    plr_real rate[3], rate_variance; /* of the gyro, smoothed, bias included, rad/s; of an axis */
+    plr_real R[9], t[3];               /* the same without the clock's part */
+    plr_real twist[PLR_POSE_DIM];      /* of the camera at the last frame, m/s and rad/s */
+    plr_real mean_twist[PLR_POSE_DIM]; /* the mean of it over the offset of the camera's clock */
+    plr_real rate[3], rate_variance;   /* of the gyro, smoothed, bias included, rad/s; of an axis */
+    /* Of the process, the last one first: seconds, and the rate, bias included, rad/s. */
+    plr_real step[PLR_CLOCK_STEPS][4];
     uint32_t moves; /* 0: by all that is known the body rests, and nothing is learnt */
     plr_real moved[PLR_CALIBRATIONS]; /* by how much each has been corrected */
     /* Of the errors' covariance G D G^T: G, a lower triangle of ones on its diagonal, row k the column

@@ -53,6 +53,8 @@ static void begin(const plr_header *header) {
         config.accel_walk = header->accel_walk;
         config.gravity_mps2 = header->gravity_mps2;
     }
+    config.calibrate = BENCH_CALIBRATE;
+    config.camera_clock_sigma_s = (BENCH_CALIBRATE & PLR_CALIBRATE_CLOCK) != 0 ? 0.005 : 0.0;
     add_field("process", header->process);
     put_line();
     if (plr_filter_init(&filter, &header->calibration, &config, NULL) != PLR_OK) {

@@ -19,10 +19,13 @@
 #include "state/sensitivity.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
-/* The columns of a batch's E. They make whole tiles of rows of the product, or this does not
- * compile. */
+/* The columns of a batch's E. They make whole tiles of rows of the product, and at most one more, or this
+ * does not compile. */
 enum { OF_W, OF_DX = PLR_POSE_DIM, OF_S, WIDE = OF_S + PLR_CALIBRATIONS, TILE = 4 };
-enum { WHOLE_TILES = 1 / (WIDE % TILE == 0) };
+enum { WHOLE_TILES = 1 / (WIDE % TILE <= 1) };
+enum {
+    BESIDE_Y = PLR_POSE_DIM - 1
+}; /* the sensitivity's columns in the block of six that y begins */
 
 /* All measurements of a correction, in their order. After those of its arguments come two of the
  * biases. */
@@ -94,7 +97,9 @@ static void get_measurement(const plr_filter *f, const plr_sensed *sensed, unsig
 /* Columns of a batch's E, in whole tiles, those behind the sensitivity's being zero; but a last one that
  * would be alone in its tile stays so. */
 static unsigned whole_tiles(const plr_filter *f) {
-    const unsigned columns = (unsigned)OF_S + f->par.calibrated.count;
+    const plr_calibrated *errors = &f->par.calibrated;
+    const unsigned least = plr_calibration_estimated(errors) > 0 ? BESIDE_Y : 0;
+    const unsigned columns = (unsigned)OF_S + (errors->count > least ? errors->count : least);
     return columns % TILE == 1 ? columns : (columns + TILE - 1) / TILE * TILE;
 }
 
@@ -146,28 +151,64 @@ static void stack(plr_filter *f, const plr_measurement *m, unsigned first, plr_b
     }
 }
 
-/* eta += E^T y, E the first columns, y the negative of another one */
-static void project_on_noise(const plr_batch *batch, unsigned column, plr_real eta[PLR_POSE_DIM]) {
+/* sum += E^T y, E six columns from `at` on, y the negative of another one */
+static void project(const plr_batch *batch, unsigned at, unsigned column,
+                    plr_real to[PLR_POSE_DIM]) {
     plr_real sum[PLR_POSE_DIM]; /* in registers */
-    memcpy(sum, eta, sizeof sum);
+    memcpy(sum, to, sizeof sum);
     for (unsigned r = 0; r < batch->rows; r++)
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            sum[k] = PLR_FMA(batch->E[WIDE * r + OF_W + k], -batch->E[WIDE * r + column], sum[k]);
-    memcpy(eta, sum, sizeof sum);
+            sum[k] = PLR_FMA(batch->E[WIDE * r + at + k], -batch->E[WIDE * r + column], sum[k]);
+    memcpy(to, sum, sizeof sum);
+}
+
+/* Of two columns. */
+static plr_real product(const plr_batch *batch, unsigned a, unsigned b) {
+    plr_real sum = 0;
+    for (unsigned r = 0; r < batch->rows; r++)
+        sum = PLR_FMA(batch->E[WIDE * r + a], batch->E[WIDE * r + b], sum);
+    return sum;
+}
+
+/* sum += E^T E, E six columns from `at` on, its upper triangle. */
+static void add_squares(const plr_batch *batch, unsigned at, plr_real to[PLR_POSE_TRIANGLE]) {
+    plr_real sum[PLR_POSE_TRIANGLE]; /* in registers */
+    memcpy(sum, to, sizeof sum);
+    for (unsigned r = 0; r < batch->rows; r++)
+        plr_upper6_add(sum, batch->E + WIDE * r + at, batch->E + WIDE * r + at);
+    memcpy(to, sum, sizeof sum);
 }
 
 /* The batch's information about the motion's noise: Lambda += E^T E, eta += E^T y, with E = U^-T H
  * W and y = U^-T (r - H dx); and eta of each column of the sensitivity. */
 static void add_noise_information(plr_filter *f, const plr_batch *batch) {
     plr_noise *noise = &f->work.noise;
-    plr_real sum[PLR_POSE_TRIANGLE]; /* in registers */
-    memcpy(sum, noise->Lambda, sizeof sum);
-    for (unsigned r = 0; r < batch->rows; r++)
-        plr_upper6_add(sum, batch->E + WIDE * r + OF_W, batch->E + WIDE * r + OF_W);
-    memcpy(noise->Lambda, sum, sizeof sum);
-    project_on_noise(batch, OF_DX, noise->eta);
+    add_squares(batch, OF_W, noise->Lambda);
+    project(batch, OF_W, OF_DX, noise->eta);
     for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        project_on_noise(batch, OF_S + k, noise->eta_of_S[k]);
+        project(batch, OF_W, OF_S + k, noise->eta_of_S[k]);
+}
+
+/* The batch's information about the calibration: J += E^T E, eta += E^T y, with E = U^-T (H_s + H S). In the
+ * block of six y stands first, as -y. */
+static void add_learnt(plr_filter *f, const plr_batch *batch) {
+    plr_learnt *to = &f->work.learnt;
+    plr_real first[PLR_POSE_TRIANGLE] = {0}, *sum = first + PLR_POSE_DIM;
+    add_squares(batch, OF_DX, first);
+    for (unsigned k = 0; k < BESIDE_Y; k++) {
+        to->eta[k] -= first[1 + k];
+        for (unsigned l = k; l < BESIDE_Y; l++)
+            to->J[PLR_CALIBRATIONS * k + l] += *sum++;
+    }
+    for (unsigned k = BESIDE_Y; k < PLR_CALIBRATIONS && k < f->par.calibrated.count; k++) {
+        plr_real less[PLR_POSE_DIM] = {0};
+        project(batch, OF_DX, OF_S + k, less);
+        to->eta[k] += less[0];
+        for (unsigned l = 0; l < BESIDE_Y; l++)
+            to->J[PLR_CALIBRATIONS * l + k] -= less[1 + l];
+        for (unsigned l = BESIDE_Y; l <= k; l++)
+            to->J[PLR_CALIBRATIONS * l + k] += product(batch, OF_S + l, OF_S + k);
+    }
 }
 
 /* W -= V E, dx += V y and S += V y, each column of S with its own y: the rows of one product with E.
@@ -206,7 +247,8 @@ static bool apply_batch(plr_filter *f, plr_batch *batch, bool *factorised) {
         return false;
     if (w->noise.open)
         add_noise_information(f, batch);
-    plr_calibration_add(f, batch->rows, batch->E + OF_S, batch->E + OF_DX, WIDE);
+    if (plr_calibration_estimated(&f->par.calibrated) > 0)
+        add_learnt(f, batch);
     update_estimate(f, batch);
     return true;
 }

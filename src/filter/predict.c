@@ -13,6 +13,7 @@
 #include "pelorus/assertions.h"
 #include "process/process.h"
 #include "process/statistics.h"
+#include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
 #include "state/motion.h"
@@ -99,7 +100,9 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
         const plr_real interval = noise_interval(f, h0, h1);
         plr_real held[PLR_POSE_DIM];
         plr_process_of(f)->hold(f, h0, held);
-        plr_process_of(f)->step(f, t_ns, held, plr_seconds(t_ns - f->t_ns), interval);
+        const plr_real seconds = plr_seconds(t_ns - f->t_ns);
+        plr_process_of(f)->step(f, t_ns, held, seconds, interval);
+        plr_calibration_note_step(f, held, seconds);
         add_missed(f, h0, h1, NULL);
     }
     f->t_ns = t_ns;
@@ -171,6 +174,7 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
     }
     if (planned->seconds > 0 && plr_process_has_started(f)) {
         plr_process_of(f)->step(f, t_ns, planned->mean, planned->seconds, planned->interval);
+        plr_calibration_note_step(f, planned->mean, planned->seconds);
         add_missed(f, planned->interval - planned->seconds, planned->interval, reading);
     }
     f->t_ns = t_ns;

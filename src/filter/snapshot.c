@@ -17,7 +17,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 13 };
+enum { STATE_VERSION = 14 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -70,24 +70,24 @@ static uint32_t rows(const plr_filter *f, unsigned landmarks) {
     return (uint32_t)plr_covariance_row(f, landmarks);
 }
 
-/* Behind the sensitivity: by how much each error has been corrected; the information, rows of those that
- * are estimated by all; and of those how white their residuals are. `f` NULL: it is skipped. */
+/* Behind the sensitivity: by how much each error has been corrected; the covariance's factor, a row of each
+ * by those that are estimated; and of these D and how white their residuals are. `f` NULL: it is skipped. */
 static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *errors) {
     plr_calibration_estimate *to = f ? &f->calibration : NULL;
+    const unsigned estimated = plr_calibration_estimated(errors);
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->moved : NULL, errors->count);
-    for (unsigned k = 0; k < plr_calibration_estimated(errors); k++)
-        plr_codec_numbers(c, PLR_FIELD_F64, to ? to->information + PLR_CALIBRATIONS * k : NULL,
-                          errors->count);
-    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum : NULL, plr_calibration_estimated(errors));
-    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum_variance : NULL,
-                      plr_calibration_estimated(errors));
-    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, plr_calibration_estimated(errors));
+    for (unsigned k = 0; k < errors->count; k++)
+        plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->factor + PLR_CALIBRATIONS * k : NULL,
+                          estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->told : NULL, estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum : NULL, estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum_variance : NULL, estimated);
+    plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, estimated);
 }
 
 static uint32_t calibration_size(const plr_calibrated *errors) {
-    return errors->count *
-               (uint32_t)(sizeof(plr_real) + plr_calibration_estimated(errors) * sizeof(double)) +
-           3 * plr_calibration_estimated(errors) * (uint32_t)sizeof(plr_real);
+    const uint32_t estimated = plr_calibration_estimated(errors);
+    return (errors->count * (1 + estimated) + 4 * estimated) * (uint32_t)sizeof(plr_real);
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {
@@ -286,7 +286,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     for (unsigned k = 0; k < f->par.calibrated.count; k++)
         plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
     pass_calibration(c, f, &f->par.calibrated);
-    return plr_calibration_take_up(f) ? as_stored(c) : PLR_E_CORRUPT;
+    return plr_calibration_is_sound(f) ? as_stored(c) : PLR_E_CORRUPT;
 }
 
 plr_status plr_filter_restore(plr_filter *f, uint32_t length, plr_state_source source,

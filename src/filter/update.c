@@ -364,11 +364,13 @@ static void count(plr_filter *f, const plr_report *report) {
 
 /* How the camera moves, should its clock be off. */
 static void note_twist(plr_filter *f) {
-    plr_real twist[PLR_POSE_DIM], P_u[PLR_POSE_SQUARE];
+    plr_real twist[PLR_POSE_DIM], change[3] = {0}, P_u[PLR_POSE_SQUARE];
     if (!plr_calibration_needs_twist(f))
         return;
     plr_process_of(f)->now(f, twist, P_u);
-    plr_calibration_at_frame(f, twist, P_u);
+    if (plr_process_of(f)->changes)
+        plr_process_of(f)->changes(f, twist, change);
+    plr_calibration_at_frame(f, twist, change, P_u);
 }
 
 static plr_status refuse_damaged(plr_filter *f, plr_report *report) {

@@ -440,6 +440,15 @@ static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_
         }
 }
 
+/* a + gamma - w x v */
+static void changes(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_real change[3]) {
+    plr_real turning[3];
+    plr_cross3(turning, u + 3, u);
+    gravity(f, change);
+    for (int i = 0; i < 3; i++)
+        change[i] += f->reading[i] - f->bias[i] - turning[i];
+}
+
 /* The noise of the rate at a standstill is in theta too, where v = 0 finds it again: as if it were
  * independent, the gyro's bias would be believed too much. */
 #define USED_TWICE PLR_R(2)
@@ -485,6 +494,7 @@ const plr_process plr_process_imu = {
     .walk = walk,
     .bias_walk = bias_walk,
     .now = now,
+    .changes = changes,
     .bias_covariance = bias_covariance,
     .measure = measure,
 };

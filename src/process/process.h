@@ -55,6 +55,9 @@ typedef struct plr_process {
     /* The body's present twist (v, w) with its covariance, 6x6, which may be NULL. */
     void (*now)(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]);
 
+    /* By how much v of that twist changes in a second. NULL: that is not known. */
+    void (*changes)(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_real change[3]);
+
     /* The covariance of the biases at the time of the estimate; zeros if not estimated. */
     void (*bias_covariance)(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]);
 

@@ -102,12 +102,19 @@ static bool look_by_eye(const plr_filter *f, const plr_real q[3], plr_eye_view *
         memset(view->Dt, 0, sizeof view->Dt);
         return q[2] >= f->par.min_depth;
     }
-    plr_camera_from_body(view->q, eye, q);
+    const plr_real *R = eye->R_CB, *t = eye->t_CB;
+    for (unsigned i = 0; i < 3; i++)
+        view->q[i] = plr_dot3(R + 3 * i, q) + t[i];
     if (!(view->q[2] >= f->par.min_depth))
         return false;
     plr_stereo_jacobian(Dz, eye, view->q);
-    plr_mat3_mul(view->Dz, Dz, eye->R_CB);
-    plr_mat3_vec(view->Dt, Dz, eye->t_CB);
+    for (unsigned r = 0; r < PLR_ROWS; r++) { /* of u and v one depends on q_x, one on q_y */
+        const unsigned across = r < 2 ? 0 : 1;
+        const plr_real by = Dz[3 * r + across], by_depth = Dz[3 * r + 2];
+        for (unsigned c = 0; c < 3; c++)
+            view->Dz[3 * r + c] = PLR_FMA(by_depth, R[6 + c], by * R[3 * across + c]);
+        view->Dt[r] = PLR_FMA(by_depth, t[2], by * t[across]);
+    }
     return true;
 }
 

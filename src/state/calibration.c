@@ -80,14 +80,19 @@ static unsigned column_of_clock(const plr_filter *f) {
     return k;
 }
 
-/* By its clock the camera was elsewhere: q(t + tau) = Exp(-tau u) q(t), u its twist. */
+/* By how much later than its stamp a picture was taken, s. */
+static plr_real offset_of_clock(const plr_filter *f) {
+    const unsigned clock = column_of_clock(f);
+    return clock < f->par.calibrated.count ? f->calibration.moved[clock] : PLR_R(0);
+}
+
+/* By its clock the camera was elsewhere: q(t + tau) = Exp(-tau u) q(t), u its mean twist over tau. */
 static void place_eye(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     plr_real way[PLR_POSE_DIM], R[9], p[3], turned[3];
-    const unsigned clock = column_of_clock(f);
-    const plr_real tau = clock < f->par.calibrated.count ? c->moved[clock] : PLR_R(0);
+    const plr_real tau = offset_of_clock(f);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
-        way[i] = -tau * c->twist[i];
+        way[i] = -tau * c->mean_twist[i];
     plr_se3_exp(R, p, way);
     plr_mat3_mul(c->eye.R_CB, c->R, R);
     plr_mat3_vec(turned, c->R, p);
@@ -103,14 +108,12 @@ void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]) {
 
 void plr_calibration_forget(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
-    memset(c->information, 0, sizeof c->information);
     memset(c->factor, 0, sizeof c->factor);
     memset(c->sum, 0, sizeof c->sum);
     memset(c->sum_variance, 0, sizeof c->sum_variance);
     c->usual_frames = USUAL_AT_FIRST;
     c->excess = 1;
     for (unsigned k = 0; k < K; k++) {
-        c->information[(K + 1) * k] = 1;
         c->factor[(K + 1) * k] = c->told[k] = c->usual[k] = 1;
     }
 }
@@ -133,15 +136,16 @@ void plr_calibration_doubt(plr_filter *f) {
 
 /* The gain of a Kalman filter in its steady state: the rate walks by so much in a step that it scatters in
  * half a second (a quarter in the mean) as it does beside the readings' noise. At least that of the mean of
- * half a second. */
+ * half a second, at most that of a twentieth: a column that is late by so much is hardly less like the rate, but
+ * its noise is in the innovations too, and draws the clock's offset towards zero. */
 static plr_real rate_gain(const plr_inertial *s) {
     const plr_real noise = PLR_R(0.5) * s->change2[1], scatter = s->spread2[1] - noise;
-    const plr_real least = PLR_R(2) * s->usual_s;
+    const plr_real least = PLR_R(2) * s->usual_s, most = PLR_R(20) * s->usual_s;
     if (!(noise > 0) || !(scatter > 0))
         return least;
     const plr_real walk = scatter / noise * s->usual_s / PLR_R(0.25);
     const plr_real gain = PLR_R(0.5) * (PLR_SQRT(PLR_FMA(walk, walk, PLR_R(4) * walk)) - walk);
-    return gain > least ? gain : least;
+    return gain < least ? least : gain > most && most < PLR_R(1) ? most : gain;
 }
 
 void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]) {
@@ -158,6 +162,16 @@ void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]) {
         c->rate[i] = PLR_FMA(gain, w_B[i] - c->rate[i], c->rate[i]);
 }
 
+void plr_calibration_note_step(plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                               plr_real seconds) {
+    plr_calibration_estimate *c = &f->calibration;
+    if (column_of_clock(f) == f->par.calibrated.count)
+        return;
+    memmove(c->step + 1, c->step, sizeof c->step - sizeof c->step[0]);
+    c->step[0][0] = seconds;
+    memcpy(c->step[0] + 1, reading + 3, 3 * sizeof *reading);
+}
+
 bool plr_calibration_needs_twist(const plr_filter *f) {
     return plr_calibration_estimated(&f->par.calibrated) > 0 ||
            column_of_clock(f) < f->par.calibrated.count;
@@ -171,20 +185,60 @@ static bool demand_motion(plr_real x[3], plr_real variance) {
     return moves;
 }
 
+/* mean += share times the mean rate, bias included, of the time from `begin` to `end` seconds ago; w stands
+ * for what is not kept. */
+static void add_mean_rate(const plr_filter *f, plr_real begin, plr_real end, const plr_real w[3],
+                          plr_real share, plr_real mean[3]) {
+    const plr_real each = share / (begin - end);
+    plr_real at = 0;
+    for (unsigned k = 0; k <= PLR_CLOCK_STEPS && at < begin; k++) {
+        const plr_real *step = k < PLR_CLOCK_STEPS ? f->calibration.step[k] : NULL;
+        const plr_real *rate = step ? step + 1 : w;
+        const plr_real next = step && at + step[0] < begin ? at + step[0] : begin;
+        const plr_real seconds = next - (at > end ? at : end);
+        for (unsigned i = 0; i < 3 && seconds > 0; i++)
+            mean[i] = PLR_FMA(each * seconds, rate[i], mean[i]);
+        at = next;
+    }
+}
+
+/* The mean rate over the camera's offset, bias included. In the past it is that of the steps by which the body was
+ * turned: so their noise, which stands in the pose, is taken back with them. Of the future it is what goes
+ * on evenly: the last mean and its change. */
+static void mean_rate(const plr_filter *f, plr_real tau, const plr_real w[3], plr_real mean[3]) {
+    memset(mean, 0, 3 * sizeof *mean);
+    if (tau < 0) {
+        add_mean_rate(f, -tau, 0, w, 1, mean);
+    } else if (tau > 0) {
+        add_mean_rate(f, tau, 0, w, 2, mean);
+        add_mean_rate(f, 2 * tau, tau, w, -1, mean);
+    } else {
+        memcpy(mean, w, 3 * sizeof *mean);
+    }
+}
+
 void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM],
-                              const plr_real P_u[PLR_POSE_SQUARE]) {
-    plr_real u[PLR_POSE_DIM], variance[2] = {0};
+                              const plr_real change[3], const plr_real P_u[PLR_POSE_SQUARE]) {
+    const bool imu = f->config.process == PLR_PROCESS_IMU;
+    const plr_real tau = offset_of_clock(f);
+    plr_real u[PLR_POSE_DIM], mean[PLR_POSE_DIM], variance[2] = {0};
     memcpy(u, twist_B, sizeof u);
     for (unsigned i = 0; i < PLR_POSE_DIM; i++)
         variance[i / 3] += P_u[(PLR_POSE_DIM + 1) * i];
-    if (f->config.process == PLR_PROCESS_IMU) {
+    if (imu) {
         variance[1] = PLR_R(3) * f->calibration.rate_variance;
         for (unsigned i = 0; i < 3; i++)
             u[3 + i] = f->calibration.rate[i] - f->bias[3 + i];
     }
     const bool goes = demand_motion(u, variance[0]), turns = demand_motion(u + 3, variance[1]);
+    for (unsigned i = 0; i < 3; i++)
+        mean[i] = goes ? PLR_FMA(PLR_R(0.5) * tau, change[i], u[i]) : PLR_R(0);
+    mean_rate(f, tau, f->calibration.rate, mean + 3);
+    for (unsigned i = 3; i < PLR_POSE_DIM; i++)
+        mean[i] = turns && imu ? mean[i] - f->bias[i] : u[i];
     f->calibration.moves = goes || turns || f->config.mode == PLR_MODE_MAPPING;
     plr_mat6_vec(f->calibration.twist, f->par.Ad_CB, u);
+    plr_mat6_vec(f->calibration.mean_twist, f->par.Ad_CB, mean);
     place_eye(f);
 }
 
@@ -221,25 +275,6 @@ void plr_calibration_begin(plr_filter *f) {
         memset(&f->work.learnt, 0, sizeof f->work.learnt);
 }
 
-/* sum + a^T b, columns of rows that are ld apart. */
-static plr_real add_product(unsigned rows, const plr_real *a, const plr_real *b, unsigned ld,
-                            plr_real sum) {
-    for (; rows > 0; rows--, a += ld, b += ld)
-        sum = PLR_FMA(*a, *b, sum);
-    return sum;
-}
-
-void plr_calibration_add(plr_filter *f, unsigned rows, const plr_real *E, const plr_real *e,
-                         unsigned ld) {
-    plr_learnt *to = &f->work.learnt;
-    const unsigned all = f->par.calibrated.count;
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
-        to->eta[k] = -add_product(rows, E + k, e, ld, -to->eta[k]);
-        for (unsigned l = k; l < all; l++)
-            to->J[K * k + l] = add_product(rows, E + k, E + l, ld, to->J[K * k + l]);
-    }
-}
-
 void plr_calibration_marginalise(plr_filter *f) {
     plr_learnt *to = &f->work.learnt;
     const plr_noise *noise = &f->work.noise;
@@ -252,84 +287,62 @@ void plr_calibration_marginalise(plr_filter *f) {
         }
 }
 
-/* Of the priors. */
-static void get_sigmas(const plr_filter *f, double sigma[K]) {
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        sigma[k] = (double)PLR_SQRT(f->par.calibrated.variance[k]);
+static plr_real dot(unsigned n, const plr_real *a, const plr_real *b) {
+    plr_real sum = 0;
+    for (unsigned i = 0; i < n; i++)
+        sum = PLR_FMA(a[i], b[i], sum);
+    return sum;
 }
 
-/* The information, each error in sigmas of its prior, += share times what was learnt. */
-static void add_information(plr_filter *f, const double sigma[K], double share) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
-        for (unsigned l = k; l < f->par.calibrated.count; l++)
-            f->calibration.information[K * k + l] +=
-                share * sigma[k] * sigma[l] * (double)f->work.learnt.J[K * k + l];
+/* y += a x */
+static void add(unsigned n, plr_real a, const plr_real *x, plr_real *y) {
+    for (unsigned i = 0; i < n; i++)
+        y[i] = PLR_FMA(a, x[i], y[i]);
 }
 
-/* The information J, where the prior's share counts `excess` times, = L D L^T in the rows of the estimated:
- * L^T above the diagonal of U, D on it. False if a pivot is not above zero. */
-static bool factorise(const plr_filter *f, plr_real excess, double *U) {
-    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
-    for (unsigned k = 0; k < n; k++)
-        for (unsigned l = k; l < n; l++) {
-            double sum = f->calibration.information[K * k + l];
-            if (l == k)
-                sum += (double)(excess - PLR_R(1));
-            for (unsigned i = 0; i < k; i++)
-                sum -= U[K * i + k] * U[K * i + l] * U[(K + 1) * i];
-            U[K * k + l] = l == k ? sum : sum / U[(K + 1) * k];
-            if (l == k && !(sum > 0))
-                return false;
-        }
-    return true;
-}
-
-/* x <- L^-T x */
-static void solve_back(unsigned n, const double *U, double *x) {
-    for (unsigned k = n; k-- > 0;)
-        for (unsigned l = k + 1; l < n; l++)
-            x[k] -= U[K * k + l] * x[l];
-}
-
-/* x <- J^-1 x */
-static void solve(unsigned n, const double *U, double *x) {
-    for (unsigned k = 0; k < n; k++)
-        for (unsigned i = 0; i < k; i++)
-            x[k] -= U[K * i + k] * x[i];
-    for (unsigned k = 0; k < n; k++)
-        x[k] /= U[(K + 1) * k];
-    solve_back(n, U, x);
-}
-
-/* The columns of G: of an estimated error that of L^-T, whose variance is excess / D; of one that is
- * considered how it misleads the others. In sigmas of the prior. */
-static void factor_covariance(plr_filter *f, const double *U) {
-    plr_calibration_estimate *c = &f->calibration;
-    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
-    double sigma[K];
-    get_sigmas(f, sigma);
-    for (unsigned k = 0; k < f->par.calibrated.count; k++) {
-        double x[K] = {0};
-        if (k < n) {
-            x[k] = 1;
-            solve_back(k + 1, U, x); /* the others stay 0 */
-            c->told[k] = (plr_real)((double)c->excess / U[(K + 1) * k]);
-        } else {
-            for (unsigned j = 0; j < n; j++)
-                x[j] = -c->information[K * j + k];
-            solve(n, U, x);
-        }
-        for (unsigned j = 0; j < k && j < n; j++)
-            c->factor[K * k + j] = (plr_real)(x[j] * sigma[j] / sigma[k]);
+/* y = J x, J of the estimated errors, x the first `size` of them. */
+static void times_learnt(const plr_filter *f, unsigned size, const plr_real *x, plr_real *y) {
+    const plr_real *J = f->work.learnt.J; /* an upper triangle */
+    for (unsigned i = 0; i < plr_calibration_estimated(&f->par.calibrated); i++) {
+        y[i] = 0;
+        for (unsigned j = 0; j < size; j++)
+            y[i] = PLR_FMA(i < j ? J[K * i + j] : J[K * j + i], x[j], y[i]);
     }
 }
 
-bool plr_calibration_take_up(plr_filter *f) {
-    double U[K * K];
-    const bool good = factorise(f, f->calibration.excess, U);
-    if (good)
-        factor_covariance(f, U);
-    return good;
+/* Sigma = G D G^T, row k of G the column of error k, once J is known of the estimated. The columns are
+ * conjugate, g_i^T Sigma^-1 g_k = 0, and of each is taken off what makes it so by Sigma^-1 + J; 1 / D_k is what
+ * that gives of g_k itself. So nothing is ever inverted, and float32 will do: it is a square root filter
+ * (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977). False if J is none. */
+static bool correct_factor(const plr_filter *f, plr_real *G, plr_real *D) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+        plr_real *g = G + K * k, Jg[K];
+        times_learnt(f, k + 1, g, Jg);
+        plr_real pivot = PLR_R(1) / D[k] + dot(k + 1, g, Jg);
+        for (unsigned i = 0; i < k; i++) {
+            const plr_real both = dot(i + 1, G + K * i, Jg), share = both * D[i];
+            pivot = PLR_FMA(-share, both, pivot);
+            add(i + 1, -share, G + K * i, g);
+        }
+        if (!(pivot > 0) || !plr_is_finite(pivot))
+            return false;
+        D[k] = PLR_R(1) / pivot;
+    }
+    return true;
+}
+
+/* x += Sigma y, of the estimated errors. */
+static void add_product(const plr_filter *f, const plr_real *G, const plr_real *D,
+                        const plr_real *y, plr_real *x) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+        add(k + 1, D[k] * dot(k + 1, G + K * k, y), G + K * k, x);
+}
+
+bool plr_calibration_is_sound(const plr_filter *f) {
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+        if (!(f->calibration.told[k] > 0))
+            return false;
+    return true;
 }
 
 /* The variance of what a frame says of error k beside its estimate, were all errors white, in sigmas of the
@@ -351,12 +364,13 @@ static plr_real score_variance(const plr_filter *f, unsigned k) {
  * from frame to frame do not average out, and the information of the residuals, taken for white, is
  * that much too large: an overdispersion (McCullagh and Nelder, Generalized Linear Models, 1989, 4.5), of
  * a sum because of the correlation. */
-static plr_real note_excess(plr_filter *f, const double g[K]) {
+static plr_real note_excess(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     plr_real largest = 1;
     c->usual_frames += 1;
     for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
-        c->sum[k] = PLR_FMA(KEPT, c->sum[k], (plr_real)g[k]);
+        const plr_real sigma = PLR_SQRT(f->par.calibrated.variance[k]);
+        c->sum[k] = PLR_FMA(KEPT, c->sum[k], sigma * f->work.learnt.eta[k]);
         c->sum_variance[k] = PLR_FMA(KEPT * KEPT, c->sum_variance[k], score_variance(f, k));
         const plr_real ratio = c->sum[k] * c->sum[k] / (c->sum_variance[k] + LITTLE);
         c->usual[k] += (ratio - c->usual[k]) / c->usual_frames;
@@ -366,36 +380,55 @@ static plr_real note_excess(plr_filter *f, const double g[K]) {
     return largest;
 }
 
-/* The estimate is that of all frames so far, each of them counting 1/excess of what it says: so what is
- * found out of the excess holds for those before, too. */
+/* What is learnt counts 1/excess of what it says, that of all frames so far too: so as the excess grows,
+ * prior and what it was drawn to gain weight beside it. */
+static plr_real weigh_prior(plr_filter *f) {
+    plr_calibration_estimate *c = &f->calibration;
+    plr_learnt *learnt = &f->work.learnt;
+    const plr_real excess = f->config.process == PLR_PROCESS_TWIST ? note_excess(f) : c->excess;
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+        const plr_real more = (excess - c->excess) / f->par.calibrated.variance[k];
+        learnt->J[(K + 1) * k] += more;
+        learnt->eta[k] = PLR_FMA(-more, c->moved[k], learnt->eta[k]);
+    }
+    return excess;
+}
+
+/* How each error that is considered misleads those that are estimated: -Sigma times the information that
+ * they share. */
+static void mislead(plr_filter *f, plr_real *G, const plr_real *D) {
+    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
+    for (unsigned k = n; k < f->par.calibrated.count; k++) {
+        plr_real less[K];
+        times_learnt(f, n, G + K * k, less);
+        for (unsigned i = 0; i < n; i++)
+            less[i] = -(less[i] + f->work.learnt.J[K * i + k]);
+        add_product(f, G, D, less, G + K * k);
+    }
+}
+
 void plr_calibration_learn(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
-    const unsigned n = plr_calibration_estimated(&f->par.calibrated);
-    double U[K * K], x[K], sigma[K];
-    plr_real ds[K], excess = 1;
+    const plr_calibrated *errors = &f->par.calibrated;
+    const unsigned n = plr_calibration_estimated(errors);
+    plr_real G[K * K], D[K], ds[K] = {0};
     if (n == 0 || !c->moves)
         return;
-    get_sigmas(f, sigma);
+    const plr_real excess = weigh_prior(f);
+    memcpy(G, c->factor, sizeof G);
     for (unsigned k = 0; k < n; k++)
-        x[k] = sigma[k] * (double)f->work.learnt.eta[k];
-    if (f->config.process == PLR_PROCESS_TWIST)
-        excess = note_excess(f, x);
-    for (unsigned k = 0; k < n; k++)
-        x[k] -= (double)((excess - c->excess) * c->moved[k]) / sigma[k];
-    add_information(f, sigma, 1);
-    bool good = factorise(f, excess, U);
-    if (good)
-        solve(n, U, x);
-    for (unsigned k = 0; k < n && good; k++) {
-        ds[k] = (plr_real)(x[k] * sigma[k]);
-        good = x[k] < MOST_SIGMAS && x[k] > -MOST_SIGMAS;
-    }
-    if (!good) {
-        add_information(f, sigma, -1);
+        D[k] = errors->variance[k] * c->told[k] / c->excess;
+    if (!correct_factor(f, G, D))
         return;
-    }
+    add_product(f, G, D, f->work.learnt.eta, ds);
+    for (unsigned k = 0; k < n; k++)
+        if (!(ds[k] * ds[k] < PLR_R(MOST_SIGMAS * MOST_SIGMAS) * errors->variance[k]))
+            return;
+    mislead(f, G, D);
+    memcpy(c->factor, G, sizeof G);
+    for (unsigned k = 0; k < n; k++)
+        c->told[k] = excess * D[k] / errors->variance[k];
     c->excess = excess;
-    factor_covariance(f, U);
     plr_combine_rows(plr_covariance_dim(f), n, ds, 1, f->S[0], PLR_MAX_LD, f->work.dx);
     correct_camera(f, ds);
 }

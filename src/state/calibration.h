@@ -31,15 +31,19 @@ void plr_calibration_reset(plr_filter *f);
  * the camera's clock to show: the rate is smoothed as the readings' statistics allow. */
 void plr_calibration_note_rate(plr_filter *f, const plr_real w_B[3]);
 
+/* A step of the process by a mean reading: the last of them lead back to where a late camera was. */
+void plr_calibration_note_step(plr_filter *f, const plr_real reading[PLR_POSE_DIM],
+                               plr_real seconds);
+
 /* True if a part is estimated, or the camera's clock considered. */
 bool plr_calibration_needs_twist(const plr_filter *f);
 
 /* Notes how the camera moves at the time of this frame, and where that puts it by its clock. twist_B is
- * the body's with its covariance as the process has it. What is not beyond three of its sigmas counts as
- * rest: noise moves the prediction, and it would seem as if the pictures told something of that motion.
- * A frame at rest teaches nothing. */
+ * the body's with its covariance as the process has it, and `change` that of its v in a second. What is not
+ * beyond three of its sigmas counts as rest: noise moves the prediction, and it would seem as if the
+ * pictures told something of that motion. A frame at rest teaches nothing. */
 void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM],
-                              const plr_real P_u[PLR_POSE_SQUARE]);
+                              const plr_real change[3], const plr_real P_u[PLR_POSE_SQUARE]);
 
 /* From the body to the camera as it is estimated, and where it was at the time of the last frame. */
 void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]);
@@ -47,22 +51,17 @@ void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]);
 /* Nothing is known but the prior; the estimate stays. */
 void plr_calibration_forget(plr_filter *f);
 
-/* The covariance of the information as it stands, from a saved state. False if it is none. */
-bool plr_calibration_take_up(plr_filter *f);
+/* False if what a saved state holds of it is no covariance. */
+bool plr_calibration_is_sound(const plr_filter *f);
 
 /* After a divergence: what is known of it may be what has broken down. The estimate stays if its prior
  * allows it, as well known as it was at first. */
 void plr_calibration_doubt(plr_filter *f);
 
-/* Nothing learnt yet from the correction that begins. */
+/* Nothing is learnt yet from the correction that begins: work.learnt. */
 void plr_calibration_begin(plr_filter *f);
 
-/* A batch's rows of E = U^-T (H_s + H S) and e = -U^-T (r - H dx), ld between the rows of both: J += E^T
- * E, eta -= E^T e. */
-void plr_calibration_add(plr_filter *f, unsigned rows, const plr_real *E, const plr_real *e,
-                         unsigned ld);
-
-/* Takes off what the same rows say of the motion's noise, once eta_of_S and eta are multiplied by
+/* Takes off what its batches say of the motion's noise, once eta_of_S and eta are multiplied by
  * U^-T, Lambda = U^T U. */
 void plr_calibration_marginalise(plr_filter *f);
 

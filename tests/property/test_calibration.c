@@ -12,19 +12,22 @@
 #include "support/chi_square.h"
 #include "support/imu_rig.h"
 #include "support/matrices.h"
-#include "support/oracle.h"
+#include "support/reseal.h"
 #include "support/rigid.h"
 #include "support/state_bytes.h"
+#include "support/wrong_camera.h"
 
 enum { RUNS = PELORUS_SHORT_FORM ? 3 : 12, FRAMES = PELORUS_SHORT_FORM ? 100 : 200 };
 enum { REST = 4000 };
-enum { ERRORS = PLR_CALIBRATION_ERRORS, LATE_READINGS = 2, EVERYTHING = 63 };
+enum { ERRORS = PLR_CALIBRATION_ERRORS, EVERYTHING = 63 };
 
 static double drawn[ERRORS]; /* what is to be corrected */
+static unsigned late;        /* readings by which frames are stamped late */
 
 void setUp(void) {
     plr_config *c = &imu_rig.config;
     imu_rig_set_up();
+    late = 2;
     c->calibrate = EVERYTHING;
     c->focal_sigma = 0.007;
     c->baseline_sigma = 0.006;
@@ -36,52 +39,15 @@ void setUp(void) {
 
 /* ---------------------------------------------------------------- a wrong calibration */
 
-static void draw(rng *chance) {
-    const plr_config *c = &imu_rig.config;
-    const double sigma[ERRORS] = {c->baseline_sigma,
-                                  c->focal_sigma,
-                                  c->camera_turn_sigma_rad,
-                                  c->camera_turn_sigma_rad,
-                                  c->camera_turn_sigma_rad,
-                                  c->centre_sigma_px,
-                                  c->centre_sigma_px,
-                                  c->camera_place_sigma_m,
-                                  c->camera_place_sigma_m,
-                                  c->camera_place_sigma_m,
-                                  0};
-    for (unsigned k = 0; k < ERRORS; k++)
-        drawn[k] = sigma[k] * rng_normal(chance);
-    drawn[PLR_CAMERA_CLOCK] = -LATE_READINGS / imu_rig.options.rate_hz;
-}
-
-/* The true calibration less what was drawn. */
-static plr_calibration spoiled(const plr_calibration *truth) {
-    plr_calibration told = *truth;
-    double back[6], E[16], T[16], before[16];
-    told.baseline_m /= 1 + drawn[PLR_BASELINE];
-    told.fx_px /= 1 + drawn[PLR_FOCAL_LENGTH];
-    told.fy_px /= 1 + drawn[PLR_FOCAL_LENGTH];
-    told.cx_px -= drawn[PLR_CENTRE_X];
-    told.cy_px -= drawn[PLR_CENTRE_Y];
-    for (unsigned i = 0; i < 3; i++) {
-        back[i] = -drawn[PLR_CAMERA_PLACE_X + i];
-        back[3 + i] = -drawn[PLR_CAMERA_TURN_X + i];
-    }
-    rigid_exp(E, back);
-    rigid_from_pose(T, &truth->T_CB);
-    square_multiply(4, E, T, before);
-    rigid_to_pose(&told.T_CB, before);
-    return told;
-}
-
 static void begin(imu_rig_start start, uint64_t seed) {
     static const double exact[3] = {1e-6, 1e-6, 1e-6};
     rng chance = rng_seeded(1000 + seed);
     double T[16], v[3];
     plr_pose pose;
-    draw(&chance);
+    wrong_camera_draw(&chance, &imu_rig.config, drawn);
+    drawn[PLR_CAMERA_CLOCK] = -(double)late / imu_rig.options.rate_hz;
     imu_rig_begin(start, seed);
-    const plr_calibration told = spoiled(&imu_rig.flight.calibration);
+    const plr_calibration told = wrong_camera(&imu_rig.flight.calibration, drawn);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&imu_rig.filter, &told, &imu_rig.config, NULL));
     if (start != IMU_RIG_GIVEN)
         return;
@@ -98,10 +64,10 @@ static void begin(imu_rig_start start, uint64_t seed) {
 static void fly(unsigned frames) {
     static plr_observation seen[IMU_FLIGHT_MOST_SEEN];
     for (unsigned k = 0; k < frames; k++) {
-        imu_rig_readings(IMU_RIG_EVERY - LATE_READINGS);
+        imu_rig_readings(IMU_RIG_EVERY - late);
         plr_frame frame = imu_flight_look(&imu_rig.flight);
         memcpy(seen, frame.observations, frame.count * sizeof *seen);
-        imu_rig_readings(LATE_READINGS);
+        imu_rig_readings(late);
         frame.observations = seen;
         frame.t_ns = imu_rig.flight.t_ns;
         TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_update(&imu_rig.filter, &frame, &imu_rig.report));
@@ -110,27 +76,7 @@ static void fly(unsigned frames) {
 
 /* ---------------------------------------------------------------- what was learnt */
 
-/* e^T Sigma^-1 e of all errors together, Sigma = G D G^T. */
-static double squared_error(void) {
-    const plr_filter *f = &imu_rig.filter;
-    const unsigned n = f->par.calibrated.count;
-    double Sigma[ERRORS * ERRORS] = {0}, e[ERRORS], x[ERRORS], sum = 0;
-    TEST_ASSERT_EQUAL_UINT(ERRORS, n);
-    for (unsigned k = 0; k < n; k++) {
-        const plr_real *G = f->calibration.factor + PLR_CALIBRATIONS * k;
-        for (unsigned i = 0; i <= k; i++)
-            for (unsigned j = 0; j <= k; j++)
-                Sigma[n * i + j] +=
-                    (double)(f->par.calibrated.variance[k] * f->calibration.told[k] * G[i] * G[j]);
-        x[k] = e[k] = (double)f->calibration.moved[k] - drawn[f->par.calibrated.kind[k]];
-    }
-    TEST_ASSERT_TRUE(oracle_solve_spd(n, 1, Sigma, x));
-    for (unsigned k = 0; k < n; k++)
-        sum += x[k] * e[k];
-    return sum;
-}
-
-static void test_errors_of_calibration_and_state_stay_within_their_covariance(void) {
+static void demand_consistent(void) {
     imu_rig_errors sum = {0};
     double calibration = 0;
     for (uint64_t seed = 1; seed <= RUNS; seed++) {
@@ -138,11 +84,72 @@ static void test_errors_of_calibration_and_state_stay_within_their_covariance(vo
         fly(FRAMES);
         const imu_rig_errors e = imu_rig_errors_now();
         imu_rig_add(&sum, &e, 1.0 / RUNS);
-        calibration += squared_error() / (RUNS * ERRORS);
+        TEST_ASSERT_EQUAL_UINT(ERRORS, imu_rig.filter.par.calibrated.count);
+        calibration += wrong_camera_squared_error(&imu_rig.filter, drawn) / (RUNS * ERRORS);
     }
     printf("calibration %.3f\n", calibration);
     chi_square_demand("calibration", calibration, RUNS * ERRORS);
     imu_rig_demand_consistent("state", &sum, RUNS, true);
+}
+
+static void test_errors_of_calibration_and_state_stay_within_their_covariance(void) {
+    demand_consistent();
+}
+
+static void test_so_do_they_with_a_late_camera_in_a_hand_that_swings(void) {
+    late = 4;
+    imu_rig.options.swing = 5;
+    demand_consistent();
+}
+
+/* The angle between where the filter has the camera, turned back by its clock's offset, and the truth. */
+static double misplaced_rad(double offset_s) {
+    const plr_filter *f = &imu_rig.filter;
+    imu_flight there = imu_rig.flight;
+    double now[16], then[16], back[16], way[16], v[3], T_CB[16], seen[16], R[9], sum = 0;
+    there.t_ns += (plr_time_ns)(int64_t)(offset_s * 1e9);
+    imu_flight_truth(&imu_rig.flight, now, v);
+    imu_flight_truth(&there, then, v);
+    rigid_inverse(back, then);
+    square_multiply(4, back, now, way);
+    rigid_from_pose(T_CB, &imu_rig.flight.calibration.T_CB);
+    square_multiply(4, T_CB, way, seen); /* points of the body now in the camera then */
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned j = 0; j < 3; j++) {
+            R[3 * i + j] = -seen[4 * i + j];
+            for (unsigned k = 0; k < 3; k++)
+                R[3 * i + j] +=
+                    (double)(f->calibration.eye.R_CB[3 * i + k] * f->par.camera.R_CB[3 * k + j]);
+            sum += R[3 * i + j] * R[3 * i + j];
+        }
+    return sqrt(sum / 2);
+}
+
+/* Over the offset the rate changes: by its value at the frame's time it would be 4e-4 rad with 10 ms. */
+static void test_the_camera_is_where_it_was_at_its_clocks_time(void) {
+    static const double offset_s[] = {-0.01, -0.005, 0.005};
+    for (unsigned i = 0; i < sizeof offset_s / sizeof *offset_s; i++) {
+        plr_config *c = &imu_rig.config;
+        c->calibrate = PLR_CALIBRATE_CLOCK;
+        c->focal_sigma = c->baseline_sigma = c->camera_turn_sigma_rad = 0;
+        c->centre_sigma_px = c->camera_place_sigma_m = 0;
+        imu_rig.options.swing = 5;
+        imu_rig.options.gyro_noise = 1e-6;
+        imu_rig.options.bias_gyro_sigma = 1e-6;
+        begin(IMU_RIG_GIVEN, 1);
+        imu_rig.filter.calibration.moved[0] = (plr_real)offset_s[i];
+        reseal(&imu_rig.filter);
+        double worst = 0;
+        for (unsigned k = 0; k < 60; k++) {
+            imu_rig_readings(IMU_RIG_EVERY);
+            const plr_frame dark = {imu_rig.flight.t_ns, PLR_NO_BUDGET, 0, NULL};
+            TEST_ASSERT_EQUAL_INT(PLR_OK,
+                                  plr_filter_update(&imu_rig.filter, &dark, &imu_rig.report));
+            worst = fmax(worst, misplaced_rad(offset_s[i]));
+        }
+        printf("offset %.0f ms: %.2g rad\n", 1e3 * offset_s[i], worst);
+        TEST_ASSERT_LESS_THAN_DOUBLE(1.5e-5, worst);
+    }
 }
 
 static void test_a_saved_state_goes_on_with_what_was_learnt(void) {
@@ -152,7 +159,7 @@ static void test_a_saved_state_goes_on_with_what_was_learnt(void) {
     imu_rig.config.slots = 12;
     begin(IMU_RIG_GIVEN, 2);
     fly(40);
-    const plr_calibration told = spoiled(&imu_rig.flight.calibration);
+    const plr_calibration told = wrong_camera(&imu_rig.flight.calibration, drawn);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&other, &told, &imu_rig.config, NULL));
     state_bytes_save(&state, f);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));

@@ -10,10 +10,9 @@
 
 #include "pelorus/filter.h"
 #include "support/chi_square.h"
-#include "support/oracle.h"
-#include "support/rigid.h"
 #include "support/scene.h"
 #include "support/state_bytes.h"
+#include "support/wrong_camera.h"
 
 enum { RUNS = PELORUS_SHORT_FORM ? 4 : 12, FRAMES = PELORUS_SHORT_FORM ? 300 : 600 };
 enum { ERRORS = PLR_CAMERA_TURN_Z + 1, STEP_NS = 100000000 };
@@ -21,7 +20,7 @@ enum { ERRORS = PLR_CAMERA_TURN_Z + 1, STEP_NS = 100000000 };
 static plr_filter filter;
 static plr_config config;
 static scene world;
-static double drawn[ERRORS]; /* what is to be corrected */
+static double drawn[PLR_CALIBRATION_ERRORS]; /* what is to be corrected */
 
 void setUp(void) {
     plr_config_default(&config);
@@ -29,29 +28,11 @@ void setUp(void) {
     config.twist_timing = PLR_TWIST_START;
 }
 
-static plr_calibration spoiled(const plr_calibration *truth) {
-    plr_calibration told = *truth;
-    double back[6] = {0}, E[16], T[16], before[16];
-    told.baseline_m /= 1 + drawn[PLR_BASELINE];
-    told.fx_px /= 1 + drawn[PLR_FOCAL_LENGTH];
-    told.fy_px /= 1 + drawn[PLR_FOCAL_LENGTH];
-    for (unsigned i = 0; i < 3; i++)
-        back[3 + i] = -drawn[PLR_CAMERA_TURN_X + i];
-    rigid_exp(E, back);
-    rigid_from_pose(T, &truth->T_CB);
-    square_multiply(4, E, T, before);
-    rigid_to_pose(&told.T_CB, before);
-    return told;
-}
-
 static void begin(uint64_t seed) {
     static const plr_pose start = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
     rng chance = rng_seeded(500 + seed);
     scene_options options;
-    for (unsigned k = 0; k < ERRORS; k++)
-        drawn[k] = rng_normal(&chance) * (k == PLR_BASELINE       ? config.baseline_sigma
-                                          : k == PLR_FOCAL_LENGTH ? config.focal_sigma
-                                                                  : config.camera_turn_sigma_rad);
+    wrong_camera_draw(&chance, &config, drawn);
     scene_options_default(&options);
     options.seed = seed;
     scene_start(&world, &options);
@@ -60,7 +41,7 @@ static void begin(uint64_t seed) {
         config.gyro_sigma[i] = options.gyro_sigma_radps;
     }
     config.pixel_sigma_px = options.pixel_sigma_px;
-    const plr_calibration told = spoiled(&world.calibration);
+    const plr_calibration told = wrong_camera(&world.calibration, drawn);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&filter, &told, &config, NULL));
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_set_pose(&filter, world.t_ns, &start, NULL));
 }
@@ -92,23 +73,13 @@ static double squared_errors(double share, double *focal_left) {
     double sum = 0;
     *focal_left = 0;
     for (uint64_t seed = 1; seed <= RUNS; seed++) {
-        double Sigma[ERRORS * ERRORS] = {0}, e[ERRORS], x[ERRORS];
+        double Sigma[ERRORS * ERRORS];
         begin(seed);
         drive(share);
-        const plr_calibrated *errors = &filter.par.calibrated;
-        TEST_ASSERT_EQUAL_UINT(ERRORS, errors->count);
-        for (unsigned k = 0; k < ERRORS; k++) {
-            const plr_real *G = filter.calibration.factor + PLR_CALIBRATIONS * k;
-            const double D = (double)(errors->variance[k] * filter.calibration.told[k]);
-            for (unsigned i = 0; i <= k; i++)
-                for (unsigned j = 0; j <= k; j++)
-                    Sigma[ERRORS * i + j] += D * (double)G[i] * (double)G[j];
-            x[k] = e[k] = (double)filter.calibration.moved[k] - drawn[errors->kind[k]];
-        }
+        TEST_ASSERT_EQUAL_UINT(ERRORS, filter.par.calibrated.count);
+        wrong_camera_covariance(&filter, Sigma);
         *focal_left = fmax(*focal_left, sqrt(Sigma[ERRORS + 1]) / config.focal_sigma);
-        TEST_ASSERT_TRUE(oracle_solve_spd(ERRORS, 1, Sigma, x));
-        for (unsigned k = 0; k < ERRORS; k++)
-            sum += x[k] * e[k] / (RUNS * ERRORS);
+        sum += wrong_camera_squared_error(&filter, drawn) / (RUNS * ERRORS);
     }
     printf("share %.2f: calibration %.3f, focal length's sigma at most %.3f of the prior's\n",
            share, sum, *focal_left);
@@ -133,7 +104,7 @@ static void test_a_saved_state_goes_on_with_what_is_usual(void) {
     config.slots = 12;
     begin(1);
     drive(0.95);
-    const plr_calibration told = spoiled(&world.calibration);
+    const plr_calibration told = wrong_camera(&world.calibration, drawn);
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_filter_init(&other, &told, &config, NULL));
     state_bytes_save(&state, &filter);
     TEST_ASSERT_EQUAL_INT(PLR_OK, state_bytes_restore(&state, &other));

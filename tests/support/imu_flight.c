@@ -11,6 +11,7 @@ void imu_flight_options_default(imu_flight_options *options) {
     memset(options, 0, sizeof *options);
     options->seed = 1;
     options->rate_hz = 400;
+    options->swing = 1;
     options->gyro_noise = 1e-3;
     options->accel_noise = 1e-2;
     options->gyro_walk = 1e-4;
@@ -37,9 +38,9 @@ static double along(const imu_flight_options *is, double t) {
 
 /* The path: R = Rz(yaw) Ry(pitch) Rx(roll), and the position. */
 static void pose_at(const imu_flight_options *is, double t, double T[16]) {
-    const double s = along(is, t);
-    const double yaw = 0.9 * sin(0.45 * s) + 0.2 * s, pitch = 0.25 * sin(0.8 * s);
-    const double roll = 0.2 * sin(1.1 * s);
+    const double s = along(is, t), turns = is->swing * s;
+    const double yaw = 0.9 * sin(0.45 * turns) + 0.2 * s, pitch = 0.25 * sin(0.8 * turns);
+    const double roll = 0.2 * sin(1.1 * turns);
     const double cy = cos(yaw), sy = sin(yaw), cp = cos(pitch), sp = sin(pitch);
     const double cr = cos(roll), sr = sin(roll);
     const double pose[16] = {cy * cp,

@@ -17,6 +17,7 @@ typedef struct imu_flight_options {
     double rate_hz; /* of the IMU */
     double rest_s;  /* the body stands before it moves */
     double ahead_s; /* or it moves already: the path begins there */
+    double swing;   /* it turns to and fro so many times as fast */
     double gyro_noise, accel_noise, gyro_walk, accel_walk; /* densities, as in the settings */
     double bias_accel_sigma, bias_gyro_sigma;              /* of what is drawn at the start */
     double pixel_sigma_px;

@@ -13,6 +13,7 @@
 #include "support/matrices.h"
 #include "support/oracle.h"
 #include "support/specimens.h"
+#include "support/wrong_camera.h"
 
 enum { SEEN = PLR_BLOCK_OBSERVATIONS + 3, ROWS = 3 * SEEN, EVERYTHING = 63 };
 
@@ -71,19 +72,6 @@ static void join(const plr_filter *f, const double *V, double *joint) {
     free(P);
 }
 
-/* Their covariance as it is told: G D G^T. */
-static void told_of_errors(const plr_filter *f, double *V) {
-    const unsigned m = f->par.calibrated.count;
-    memset(V, 0, m * m * sizeof *V);
-    for (unsigned k = 0; k < m; k++) {
-        const plr_real *G = f->calibration.factor + PLR_CALIBRATIONS * k;
-        for (unsigned i = 0; i <= k; i++)
-            for (unsigned j = 0; j <= k; j++)
-                V[m * i + j] +=
-                    (double)(f->par.calibrated.variance[k] * f->calibration.told[k] * G[i] * G[j]);
-    }
-}
-
 /* A gain over state and errors. */
 static void dense(double *joint, double *dx) {
     const unsigned n = plr_covariance_dim(&filter), m = filter.par.calibrated.count, all = n + m;
@@ -128,7 +116,7 @@ static void hold_against_dense(plr_model_kind model, unsigned calibrate) {
     for (unsigned i = 0; i < n; i++) /* dx stays in the workspace */
         TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 4e4 * eps) * (1 + fabs(dx[i])), dx[i],
                                   (double)filter.work.dx[i]);
-    told_of_errors(&filter, V);
+    wrong_camera_covariance(&filter, V);
     for (unsigned k = 0; k < m; k++) {
         const double moved = (double)filter.calibration.moved[k];
         TEST_ASSERT_DOUBLE_WITHIN((1e-9 + 4e4 * eps) * sqrt(before[k]), dx[n + k], moved);
@@ -154,7 +142,7 @@ static void test_what_is_considered_widens_what_is_estimated(void) {
     TEST_ASSERT_EQUAL_UINT(4, estimated);
     TEST_ASSERT_EQUAL_UINT(PLR_CALIBRATION_ERRORS, m);
     (void)plr_correct(&filter, SEEN, NULL, 0);
-    told_of_errors(&filter, V);
+    wrong_camera_covariance(&filter, V);
     for (unsigned k = estimated; k < m; k++)
         TEST_ASSERT_DOUBLE_WITHIN(1e-6 * V[(m + 1) * k], (double)filter.par.calibrated.variance[k],
                                   V[(m + 1) * k]);

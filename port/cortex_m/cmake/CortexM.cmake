@@ -181,6 +181,7 @@ function(cortexm_bench board capacity recording)
   cortexm_image(${name} ${board} ${library} 32 "${PORT}/main_bench.c" "${PORT}/bench_recording.S")
   set_source_files_properties("${PORT}/bench_recording.S" PROPERTIES
     OBJECT_DEPENDS "${PELORUS_BENCH_RECORDINGS}")
-  target_compile_definitions(${name} PRIVATE "BENCH_RECORDING=\"${recording}\"")
+  target_compile_definitions(${name} PRIVATE "BENCH_RECORDING=\"${recording}\""
+    BENCH_CALIBRATE=${PELORUS_BENCH_CALIBRATE})
   add_dependencies(bench ${name})
 endfunction()
