@@ -14,10 +14,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* What plr_port.read returns if it returns no bytes. */
 enum {
     PLR_PORT_NOTHING = 0, /* no byte is there now */
@@ -68,9 +64,5 @@ typedef struct plr_block_device {
     /* Erases n bytes. Offset and length are multiples of erase_size. */
     int (*erase)(void *context, uint32_t offset, uint32_t n);
 } plr_block_device;
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

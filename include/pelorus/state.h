@@ -15,10 +15,6 @@
 #include "pelorus/supervisor.h"
 #include "pelorus/types.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* The caller's store of landmarks outside the filter. Both functions may be NULL. They must not
  * call the filter. */
 typedef struct plr_map {
@@ -354,9 +350,5 @@ typedef struct plr_filter {
     plr_totals totals;
     plr_guard guard;
 } plr_filter;
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -13,10 +13,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Time in nanoseconds; the zero is the recorder's choice. */
 typedef uint64_t plr_time_ns;
 
@@ -400,9 +396,5 @@ typedef struct plr_health_state {
     uint32_t resets; /* times the pose may have jumped: it was set by a call, or its covariance was
                         enlarged; the reset counter of a POSE */
 } plr_health_state;
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

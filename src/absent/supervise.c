@@ -74,10 +74,6 @@ plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor) {
     return 1;
 }
 
-bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading) {
-    return plr_sensors_repeat(s, reading);
-}
-
 void plr_supervise_restored(plr_supervisor *s) {
     plr_sensors_forget(s);
 }

@@ -2,7 +2,6 @@
 #include "filter/births.h"
 
 #include "filter/gate.h"
-#include "filter/matching.h"
 #include "filter/predict.h"
 #include "filter/tracks.h"
 #include "known_map/lookup.h"

@@ -13,10 +13,7 @@
 #include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
-#include "state/motion.h"
 #include "state/pose.h"
-#include "state/rigid_fit.h"
-#include "state/sensitivity.h"
 
 enum { BIAS_MEASUREMENTS = 2 }; /* measurements of the biases by velocities */
 /* The columns of a batch's E. They make whole tiles of rows of the product, and at most one more, or this

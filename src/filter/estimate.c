@@ -14,7 +14,6 @@
 #include "state/covariance.h"
 #include "state/motion.h"
 #include "state/sensitivity.h"
-#include "state/slots.h"
 #include "supervise/supervise.h"
 
 static bool ready(const plr_filter *f) {

@@ -18,7 +18,6 @@
 #include "state/blocks.h"
 #include "state/calibration.h"
 #include "state/covariance.h"
-#include "state/model.h"
 #include "state/motion.h"
 #include "supervise/supervise.h"
 
@@ -166,16 +165,6 @@ static void start_bias(plr_filter *f) {
     set_bias_prior(f, zero, variance);
 }
 
-/* After the biases' covariance was lost. */
-static void restore_bias_prior(plr_filter *f) {
-    double variance[PLR_POSE_DIM];
-    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
-        f->bias[i] = f->bias_prior[i];
-        variance[i] = (double)plr_bias_prior_variance(f, i);
-    }
-    plr_filter_begin_bias(f, variance);
-}
-
 plr_status plr_filter_reset(plr_filter *f) {
     double P_xi[PLR_POSE_SQUARE];
     const plr_status sound = plr_guard_check_constant(f);
@@ -287,9 +276,8 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     plr_filter_store_for_recovery(f);
     f->diverged = 0;
     f->frames_off_the_map = 0;
-    if (!plr_covariance_is_positive(f) &&
-        plr_has_block(f, PLR_BLOCK_BIAS)) /* the bias is lost too */
-        restore_bias_prior(f);
+    if (!plr_covariance_is_positive(f)) /* the biases are lost too */
+        plr_filter_begin_prior_bias(f);
     /* readings and frames of another clock are not used any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);

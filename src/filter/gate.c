@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "filter/gate.h"
 
-#include "math/dense.h"
 #include "math/small.h"
 #include "state/covariance.h"
 #include "supervise/supervise.h"

@@ -12,7 +12,6 @@
 #include "math/finite.h"
 #include "math/small.h"
 #include "process/alignment.h"
-#include "process/process.h"
 #include "process/statistics.h"
 #include "state/calibration.h"
 #include "state/seconds.h"

@@ -5,7 +5,6 @@
 #include "math/finite.h"
 #include "process/alignment.h"
 #include "process/process.h"
-#include "state/covariance.h"
 #include "state/model.h"
 #include "state/slots.h"
 

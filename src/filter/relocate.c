@@ -6,7 +6,6 @@
 #include "filter/correction.h"
 #include "filter/filter_internal.h"
 #include "filter/gate.h"
-#include "filter/matching.h"
 #include "filter/predict.h"
 #include "known_map/find.h"
 #include "known_map/lookup.h"

@@ -10,7 +10,6 @@
 #include "session/line.h"
 #include "session/phase.h"
 #include "session/plausible.h"
-#include "session/reanchor.h"
 #include "session/send.h"
 
 void plr_start_clear(plr_session *s) {

@@ -11,6 +11,7 @@
 #include "supervise/doubt.h"
 #include "supervise/limits.h"
 #include "supervise/sum.h"
+#include "supervise/supervise.h"
 
 /* What an average of a frame's own square is worth to what is usual: a frame that is far off is an event. */
 #define MOST_TIMES_USUAL PLR_R(4)
@@ -97,7 +98,8 @@ static void learn_usual(plr_supervisor *s) {
     judge_usual(s);
 }
 
-bool plr_odometry_has_a_before(const plr_supervisor *s) {
+/* An event needs a before: the odometry has agreed with the pictures on this drive. */
+bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
     const bool agreed = s->agreement >= plr_limit(s, PLR_LIMIT_BEFORE_SHARE);
     return (agreed && !s->misfits) || plr_doubt_contradicted(s);
 }
@@ -254,7 +256,7 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
     carry_difference(s, m);
     plr_sum_add(&s->sum, plr_limit(s, PLR_LIMIT_SUM_KEEPS), nu, V);
     s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED));
-    const bool before = plr_odometry_has_a_before(s);
+    const bool before = plr_supervise_may_exclude_odometry(s);
     if ((calm || !before) && tells)
         learn_usual(s);
     if (calm || !before)

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "supervise/limits.h"
+#include "supervise/supervise.h"
 
 /* What the sums of innovations keep from frame to frame, and the degrees of freedom that it takes to judge
  * by them. */
@@ -12,7 +13,7 @@
 
 /* ---------------------------------------------------------------- a frozen picture */
 
-void plr_pictures_note_motion(plr_supervisor *s, const plr_picture_evidence *e) {
+void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         s->frozen_motion[k] += e->moved[k];
         s->frozen_variance[k] += e->variance[k];
@@ -34,7 +35,9 @@ static bool has_moved(const plr_supervisor *s, const plr_picture_evidence *e) {
     return sum > above;
 }
 
-bool plr_pictures_are_frozen(plr_supervisor *s, const plr_picture_evidence *e) {
+/* A frozen picture would hold a moving body: it repeats the last one, though the body has moved by more than
+ * noise. */
+bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
     const bool repeats =
         e->matched >= plr_limit_count(s, PLR_LIMIT_FEW) &&
         (plr_real)e->same >= plr_limit(s, PLR_LIMIT_FROZEN_SHARE) * (plr_real)e->matched;
@@ -43,9 +46,9 @@ bool plr_pictures_are_frozen(plr_supervisor *s, const plr_picture_evidence *e) {
         memset(s->frozen_motion, 0, sizeof s->frozen_motion);
         memset(s->frozen_variance, 0, sizeof s->frozen_variance);
     } else if (!s->frozen) {
-        plr_pictures_note_motion(s, e); /* this frame is used, and ends what is pending */
+        plr_supervise_moved(s, e); /* this frame is used, and ends what is pending */
     }
-    return s->frozen;
+    return !s->frozen;
 }
 
 /* ---------------------------------------------------------------- the gate */
@@ -64,7 +67,9 @@ bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated) {
     return s->frames_mostly_gated == frames;
 }
 
-bool plr_pictures_open_fixed_gate(const plr_supervisor *s) {
+/* After a lock, or after ten frames without a used observation, until one is used: a gate of fixed width would
+ * reject everything for ever. */
+bool plr_supervise_opens_fixed_gate(const plr_supervisor *s) {
     return s->frames_mostly_gated >= plr_limit_count(s, PLR_LIMIT_LOCK_FRAMES) ||
            s->frames_without_use >= plr_limit_count(s, PLR_LIMIT_LOST_FRAMES);
 }

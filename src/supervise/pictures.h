@@ -6,23 +6,12 @@
 
 #include "pelorus/supervisor.h"
 
-/* True of a picture that repeats the last one, though the body has moved by more than noise: it would hold
- * a moving body, and does not show the present. */
-bool plr_pictures_are_frozen(plr_supervisor *s, const plr_picture_evidence *e);
-
-/* The pending motion is applied without a frame: adds it to what the above compares. */
-void plr_pictures_note_motion(plr_supervisor *s, const plr_picture_evidence *e);
-
 /* True if the gate rejects nearly all of a frame. */
 bool plr_pictures_reject_all(const plr_supervisor *s, unsigned matched, unsigned gated);
 
 /* Counts a gate that rejects nearly all. True if it has done so for ten frames, and after each further
  * ten. */
 bool plr_pictures_lock(plr_supervisor *s, unsigned matched, unsigned gated);
-
-/* True after that, or after ten frames without a used observation, until one is used: a gate of fixed
- * width would reject everything for ever. */
-bool plr_pictures_open_fixed_gate(const plr_supervisor *s);
 
 /* Adds a frame's counts. Returns bits of plr_reason. */
 uint32_t plr_pictures_add(plr_supervisor *s, const plr_report *report, plr_time_ns t_ns,

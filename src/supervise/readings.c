@@ -2,6 +2,7 @@
 #include "supervise/readings.h"
 
 #include "supervise/limits.h"
+#include "supervise/supervise.h"
 
 /* What the sums keep from reading to reading; they look back 1 / (1 - KEEPS) of them. */
 #define KEEPS    PLR_R(0.95)
@@ -25,7 +26,7 @@ void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned num
     plr_sensors_note(s, reading);
 }
 
-plr_real plr_sensors_widening(const plr_supervisor *s, unsigned sensor) {
+plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor) {
     const plr_sensor_record *of = &s->sensors[sensor - 1];
     return of->off ? PLR_R(1) + of->excess / of->numbers : PLR_R(1);
 }

@@ -27,17 +27,7 @@ static inline void plr_sensors_note(plr_supervisor *s, const plr_reading *readin
 void plr_sensors_add(plr_supervisor *s, const plr_reading *reading, unsigned numbers, bool used,
                      plr_real d2);
 
-/* By how much the variance of the sensor's readings is larger than stated, 1 or more: what they differ
- * from the estimate by says so while they are off. */
-plr_real plr_sensors_widening(const plr_supervisor *s, unsigned sensor);
-
 /* True if ten in succession were rejected, or if readings are off, of any sensor. */
 bool plr_sensors_are_wrong(const plr_supervisor *s);
-
-/* True if a reading is the sensor's last one again, of the same time: it says nothing new. */
-static inline bool plr_sensors_repeat(const plr_supervisor *s, const plr_reading *reading) {
-    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
-    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
-}
 
 #endif

@@ -51,10 +51,6 @@ static void lose(plr_supervisor *s) {
 
 /* ---------------------------------------------------------------- the three points of a frame */
 
-bool plr_supervise_picture(plr_supervisor *s, const plr_picture_evidence *e) {
-    return !plr_pictures_are_frozen(s, e);
-}
-
 plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evidence *e) {
     plr_search_decision decision = {false, false, false, false};
     const bool first = e->outright && !s->outright && !plr_doubt_contradicted(s);
@@ -75,14 +71,6 @@ plr_search_decision plr_supervise_search(plr_supervisor *s, const plr_search_evi
     decision.make_none = s->frames_mostly_gated > 0 && !decision.drop_rejected;
     s->holds_biases = decision.hold_biases;
     return decision;
-}
-
-bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
-    return plr_odometry_has_a_before(s);
-}
-
-bool plr_supervise_opens_fixed_gate(const plr_supervisor *s) {
-    return plr_pictures_open_fixed_gate(s);
 }
 
 /* If prior and noise are as stated, an estimate differs from the mean of its prior by N(0, P_0 - P), with
@@ -234,23 +222,11 @@ void plr_supervise_begun_anew(plr_supervisor *s, bool relocated) {
     s->relocated = relocated;
 }
 
-void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e) {
-    plr_pictures_note_motion(s, e);
-}
-
 void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,
                            bool used, plr_real d2, bool bounds, plr_time_ns now_ns) {
     plr_sensors_add(s, reading, numbers, used, d2);
     if (used && bounds)
         s->last_position_ns = now_ns;
-}
-
-plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor) {
-    return plr_sensors_widening(s, sensor);
-}
-
-bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading) {
-    return plr_sensors_repeat(s, reading);
 }
 
 void plr_supervise_restored(plr_supervisor *s) {

@@ -7,6 +7,8 @@
 #ifndef PLR_SUPERVISE_SUPERVISE_H
 #define PLR_SUPERVISE_SUPERVISE_H
 
+#include <string.h>
+
 #include "pelorus/settings.h"
 #include "pelorus/supervisor.h"
 
@@ -58,8 +60,16 @@ void plr_supervise_moved(plr_supervisor *s, const plr_picture_evidence *e);
 /* A small sensor's reading that was used or rejected; its position bounds the pose if `bounds`. */
 void plr_supervise_reading(plr_supervisor *s, const plr_reading *reading, unsigned numbers,
                            bool used, plr_real d2, bool bounds, plr_time_ns now_ns);
+
+/* By how much the variance of the sensor's readings is larger than stated, 1 or more: what they differ
+ * from the estimate by says so while they are off. */
 plr_real plr_supervise_widening(const plr_supervisor *s, unsigned sensor);
-bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading);
+
+/* True if a reading is the sensor's last one again, of the same time: it says nothing new. */
+static inline bool plr_supervise_repeats(const plr_supervisor *s, const plr_reading *reading) {
+    const plr_sensor_record *of = &s->sensors[reading->sensor - 1];
+    return of->t_ns == reading->t_ns && memcmp(of->value, reading->value, sizeof of->value) == 0;
+}
 
 /* After a restore: small sensors and positions of before do not count. */
 void plr_supervise_restored(plr_supervisor *s);

@@ -5,6 +5,7 @@
 
 #include "sensor/sensor.h"
 #include "supervise/readings.h"
+#include "supervise/supervise.h"
 #include "support/axes.h"
 #include "support/random.h"
 #include "support/rig.h"
@@ -45,7 +46,7 @@ static void test_readings_as_stated_are_never_off(void) {
             reading.axes = (uint8_t)axes;
             add(1, 0);
             TEST_ASSERT_FALSE(are_off());
-            TEST_ASSERT_TRUE(plr_sensors_widening(&supervisor, PLR_SENSOR_POSITION) == 1);
+            TEST_ASSERT_TRUE(plr_supervise_widening(&supervisor, PLR_SENSOR_POSITION) == 1);
         }
 }
 
@@ -53,7 +54,7 @@ static void test_errors_of_twice_the_sigma_are_off_and_their_variance_is_found(v
     for (unsigned k = 0; k < 40; k++)
         add(2, 0);
     TEST_ASSERT_TRUE(are_off());
-    TEST_ASSERT_TRUE(plr_sensors_widening(&supervisor, PLR_SENSOR_POSITION) > PLR_R(1.8));
+    TEST_ASSERT_TRUE(plr_supervise_widening(&supervisor, PLR_SENSOR_POSITION) > PLR_R(1.8));
     for (unsigned k = 0; k < 100; k++)
         add(1, 0);
     TEST_ASSERT_FALSE(are_off());
@@ -76,7 +77,7 @@ static void test_wild_readings_now_and_then_are_no_sensor_that_is_off(void) {
 static void test_one_sensor_says_nothing_of_another(void) {
     for (unsigned k = 0; k < 40; k++)
         add(3, 0);
-    TEST_ASSERT_TRUE(plr_sensors_widening(&supervisor, PLR_SENSOR_WHEEL) == 1);
+    TEST_ASSERT_TRUE(plr_supervise_widening(&supervisor, PLR_SENSOR_WHEEL) == 1);
 }
 
 static void test_ten_rejected_in_succession_are_wrong_and_nine_are_not(void) {
@@ -92,11 +93,11 @@ static void test_ten_rejected_in_succession_are_wrong_and_nine_are_not(void) {
 }
 
 static void test_the_same_reading_again_says_nothing_new(void) {
-    TEST_ASSERT_FALSE(plr_sensors_repeat(&supervisor, &reading));
+    TEST_ASSERT_FALSE(plr_supervise_repeats(&supervisor, &reading));
     plr_sensors_add(&supervisor, &reading, 3, true, 3);
-    TEST_ASSERT_TRUE(plr_sensors_repeat(&supervisor, &reading));
+    TEST_ASSERT_TRUE(plr_supervise_repeats(&supervisor, &reading));
     reading.value[2] = 1; /* a correction */
-    TEST_ASSERT_FALSE(plr_sensors_repeat(&supervisor, &reading));
+    TEST_ASSERT_FALSE(plr_supervise_repeats(&supervisor, &reading));
 }
 
 static void test_a_position_with_a_third_of_its_sigma_is_told_and_weighed_as_it_scatters(void) {
