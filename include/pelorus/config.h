@@ -165,6 +165,10 @@ typedef double plr_real;
  * every finite input and for infinities; a NaN results in a NaN. */
 float plr_fmaf_exact(float a, float b, float c);
 
+/* A function that few frames need: it is compiled to be small, even where the others of its file are
+ * compiled to be fast. */
+#define PLR_SELDOM __attribute__((cold))
+
 /* A constant in the filter's precision. */
 #define PLR_R(x) ((plr_real)(x))
 

@@ -84,7 +84,7 @@ typedef enum plr_calibrate {
  * the three noise sigmas and twist_timing.
  *
  * Above each field stands its row in the table: name, unit, default and limits (both included).
- * The table is in src/record/settings.c; tests/layering/settings.py compares this text with it.
+ * The table is src/record/settings.def; tests/layering/settings.py compares this text with it.
  *
  * Within the limits some combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
@@ -372,10 +372,9 @@ typedef enum plr_setting_kind {
 
 /* One row of the table. */
 typedef struct plr_setting {
-    uint8_t id;        /* number in a CONFIG frame; never reused */
-    const char *name;  /* as in options and config files: "pixel-sigma" */
-    const char *unit;  /* "px"; "" where there is none */
-    const char *about; /* one line for a help text */
+    uint8_t id;       /* number in a CONFIG frame; never reused */
+    const char *name; /* as in options and config files: "pixel-sigma" */
+    const char *unit; /* "px"; "" where there is none */
     plr_setting_kind kind;
     const char *const *choices; /* words, ended by NULL, for SWITCH, CHOICE and LIST; else NULL */
     double minimum, maximum, standard; /* limits, both included, and the default */
@@ -386,6 +385,9 @@ unsigned plr_setting_count(void);
 
 /* Row index of the table, 0 to plr_setting_count() - 1; NULL beyond. */
 const plr_setting *plr_setting_at(unsigned index);
+
+/* One line for a help text. */
+const char *plr_setting_about(const plr_setting *setting);
 
 /* The row of that id or name; NULL if there is none. */
 const plr_setting *plr_setting_by_id(uint8_t id);

@@ -107,6 +107,6 @@ void config_file_print(const plr_config *config) {
         setting_in_force_to_text(setting, config, value, sizeof value);
         snprintf(pair, sizeof pair, "%s = %s", setting->name, value);
         printf("%-36s # %s%s%s\n", pair, setting->unit, setting->unit[0] != '\0' ? ": " : "",
-               setting->about);
+               plr_setting_about(setting));
     }
 }

@@ -69,7 +69,7 @@ static void print_setting(const plr_setting *setting) {
         snprintf(standard, sizeof standard, "%g", setting->standard); /* six digits will do */
     else
         setting_value_to_text(setting, setting->standard, standard, sizeof standard);
-    print_row(setting->name, hint, setting->about);
+    print_row(setting->name, hint, plr_setting_about(setting));
     printf(" [%s]\n", standard);
 }
 

@@ -277,7 +277,7 @@ plr_status plr_filter_set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *
     f->diverged = 0;
     f->frames_off_the_map = 0;
     if (!plr_covariance_is_positive(f)) /* the biases are lost too */
-        plr_filter_begin_prior_bias(f);
+        plr_filter_begin_prior_bias(f, 0);
     /* readings and frames of another clock are not used any more */
     if (f->reading_ns > t_ns || t_ns - f->reading_ns > f->par.max_gap_ns)
         plr_filter_forget_reading(f);

@@ -42,9 +42,9 @@ void plr_filter_propagate_recovery(plr_filter *f);
  * velocity for unknown, and doubts the pose until pictures and twists agree. */
 void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], bool relocated);
 
-/* The biases' covariance becomes their prior's, and their mean too if it is more than 4 sigmas from it. Only
- * without landmarks. */
-void plr_filter_begin_prior_bias(plr_filter *f);
+/* The biases' covariance becomes their prior's, and the mean of one that is further from its own than so many
+ * sigmas. Only without landmarks. */
+void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas);
 
 /* After a divergence: keeps the pose, sets its covariance to the stored one, drops the landmarks,
  * and sets the biases' covariance to their prior's. */

@@ -82,13 +82,13 @@ void plr_filter_begin_anew(plr_filter *f, const plr_real P[PLR_POSE_SQUARE], boo
     plr_filter_begin_velocity(f);
 }
 
-void plr_filter_begin_prior_bias(plr_filter *f) {
+void plr_filter_begin_prior_bias(plr_filter *f, plr_real sigmas) {
     double variance[PLR_POSE_DIM];
     if (!plr_has_block(f, PLR_BLOCK_BIAS))
         return;
     for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
         const plr_real prior = plr_bias_prior_variance(f, i), off = f->bias[i] - f->bias_prior[i];
-        if (!(off * off <= 16 * prior))
+        if (!(off * off <= sigmas * sigmas * prior))
             f->bias[i] = f->bias_prior[i];
         variance[i] = (double)prior;
     }
@@ -107,5 +107,5 @@ void plr_filter_recover(plr_filter *f) {
     f->totals.recoveries++;
     plr_filter_begin_anew(f, P, false);
     plr_calibration_doubt(f);
-    plr_filter_begin_prior_bias(f); /* what is known of them may be what has broken down */
+    plr_filter_begin_prior_bias(f, 4); /* what is known of them may be what has broken down */
 }

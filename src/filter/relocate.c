@@ -78,7 +78,7 @@ static void begin_at(plr_filter *f, const plr_frame *frame, const plr_found_pose
         P[i] = WIDER * found->P_xi[i];
     plr_filter_begin_anew(f, P, true);
     if (again && f->config.process == PLR_PROCESS_IMU) /* wrong biases lead away from each pose */
-        plr_filter_begin_prior_bias(f);
+        plr_filter_begin_prior_bias(f, 4);
     plr_alignment_keep_world(f);
     take_up(f, frame, plr_seen_known_of(f), found->count);
 }

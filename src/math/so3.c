@@ -81,7 +81,7 @@ void plr_so3_orthonormalise(plr_real R[9]) {
 }
 
 /* The angle from tan(t / 2) = sin t / (1 + cos t), roughly; then Newton's steps, on the axis. */
-void plr_so3_log(plr_real theta[3], const plr_real R[9]) {
+PLR_SELDOM void plr_so3_log(plr_real theta[3], const plr_real R[9]) {
     plr_turn_of(theta, R);
     const plr_real sine = PLR_SQRT(plr_dot3(theta, theta));
     const plr_real cosine = PLR_R(0.5) * (R[0] + R[4] + R[8] - PLR_R(1));

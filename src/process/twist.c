@@ -46,7 +46,8 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) 
         P_b[(PLR_BIAS_DIM + 1) * i] += f->motion.seconds * bias_walk(f, i);
 }
 
-static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM], plr_real P_u[PLR_POSE_SQUARE]) {
+PLR_SELDOM static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
+                           plr_real P_u[PLR_POSE_SQUARE]) {
     for (int i = 0; i < PLR_POSE_DIM; i++)
         u[i] = f->reading[i] - f->bias[i];
     if (!P_u)
@@ -125,8 +126,8 @@ static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
     return changed < most ? changed : most;
 }
 
-static bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
-                   plr_real variance[PLR_POSE_DIM]) {
+PLR_SELDOM static bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
+                              plr_real variance[PLR_POSE_DIM]) {
     const plr_real usual = f->inertial.usual_s;
     if (!lost_readings(f, h1) || f->config.noise == PLR_NOISE_STEP)
         return false;

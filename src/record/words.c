@@ -1,42 +1,57 @@
 // SPDX-License-Identifier: MIT
 #include "pelorus/filter.h"
 
-/* A sentence for a number of one of these enums. */
-typedef enum plr_words_of { OF_STATUS, OF_HEALTH, OF_REASON, OF_IMU_FAULT } plr_words_of;
-
-#define STATUS(status, text)   {OF_STATUS, (int)(status), text},
-#define HEALTH(health, text)   {OF_HEALTH, (int)(health), text},
-#define REASON(reason, text)   {OF_REASON, (int)(reason), text},
-#define IMU_FAULT(fault, text) {OF_IMU_FAULT, (int)(fault), text},
-static const struct {
-    plr_words_of of;
-    int number;
-    const char *text;
-} words[] = {
-#include "record/words.def"
-};
-
-static const char *find(plr_words_of of, int number, const char *otherwise) {
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (words[i].of == of && words[i].number == number)
-            return words[i].text;
-    return otherwise;
-}
+/* A function for each enum: a program that never calls one does not carry its sentences. */
+#define STATUS(status, text)
+#define HEALTH(health, text)
+#define REASON(reason, text)
+#define IMU_FAULT(fault, text)
+#define SENTENCE(number, text)                                                                     \
+    case number:                                                                                   \
+        return text;
 
 const char *plr_status_text(plr_status status) {
-    return find(OF_STATUS, (int)status, "no status of this version");
+    switch (status) {
+#undef STATUS
+#define STATUS SENTENCE
+#include "record/words.def"
+#undef STATUS
+#define STATUS(status, text)
+    }
+    return "no status of this version";
 }
 
 const char *plr_reason_text(plr_reason reason) {
-    return find(OF_REASON, (int)reason, "no reason of this version");
+    switch (reason) {
+#undef REASON
+#define REASON SENTENCE
+#include "record/words.def"
+#undef REASON
+#define REASON(reason, text)
+    }
+    return "no reason of this version";
 }
 
 const char *plr_health_text(plr_health health) {
-    return find(OF_HEALTH, (int)health, "no health of this version");
+    switch (health) {
+#undef HEALTH
+#define HEALTH SENTENCE
+#include "record/words.def"
+#undef HEALTH
+#define HEALTH(health, text)
+    }
+    return "no health of this version";
 }
 
 const char *plr_imu_fault_text(plr_imu_fault fault) {
-    return find(OF_IMU_FAULT, (int)fault, "no fault of this version");
+    switch (fault) {
+#undef IMU_FAULT
+#define IMU_FAULT SENTENCE
+#include "record/words.def"
+    case PLR_IMU_FAULTS:
+        break;
+    }
+    return "no fault of this version";
 }
 
 const char *plr_version(void) {

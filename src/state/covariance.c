@@ -26,7 +26,7 @@ unsigned plr_covariance_ld(const plr_filter *f) {
 
 /* ---------------------------------------------------------------- blocks */
 
-void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own) {
+PLR_SELDOM void plr_covariance_begin(plr_filter *f, plr_block_id block, const double *P_own) {
     const unsigned row = plr_row_of(f, block), size = plr_block_size(f, block);
     plr_sensitivity_clear(f, row, size);
     for (unsigned i = row; i < plr_core_dim(f); i++)
@@ -47,7 +47,8 @@ void plr_covariance_begin_diagonal(plr_filter *f, plr_block_id block, const doub
     plr_covariance_begin(f, block, P_own);
 }
 
-void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, const plr_real *P) {
+PLR_SELDOM void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns,
+                                   const plr_real *P) {
     PLR_ASSERT(plr_row_of(f, rows) > plr_row_of(f, columns));
     for (unsigned i = 0; i < plr_block_size(f, rows); i++)
         for (unsigned j = 0; j < plr_block_size(f, columns); j++)
@@ -55,7 +56,7 @@ void plr_covariance_set(plr_filter *f, plr_block_id rows, plr_block_id columns, 
                 P[plr_block_size(f, columns) * i + j];
 }
 
-bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_real *g) {
+PLR_SELDOM bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_real *g) {
     const unsigned n = plr_covariance_dim(f);
     plr_real P[PLR_POSE_SQUARE], U[PLR_POSE_TRIANGLE + PLR_KERNEL_MARGIN], y[PLR_POSE_DIM];
     plr_covariance_get(f, PLR_BLOCK_POSE, PLR_BLOCK_POSE, P);
@@ -79,7 +80,7 @@ bool plr_covariance_shift(plr_filter *f, const plr_real xi[PLR_POSE_DIM], plr_re
     return true;
 }
 
-void plr_covariance_forget(plr_filter *f, plr_block_id block, const plr_real *variance) {
+PLR_SELDOM void plr_covariance_forget(plr_filter *f, plr_block_id block, const plr_real *variance) {
     const unsigned row = plr_row_of(f, block), n = plr_covariance_dim(f);
     plr_sensitivity_clear(f, row, plr_block_size(f, block));
     for (unsigned i = row; i < row + plr_block_size(f, block); i++) {
@@ -160,7 +161,7 @@ bool plr_covariance_is_positive(const plr_filter *f) {
 
 /* ---------------------------------------------------------------- slots */
 
-void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
+PLR_SELDOM void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
     const unsigned s = plr_covariance_dim(f);
     for (unsigned i = 0; i < 3; i++)
         memset(f->P + plr_packed_row(s + i), 0, (s + i + 1) * sizeof *f->P);
@@ -181,7 +182,7 @@ void plr_covariance_append(plr_filter *f, const plr_new_landmark *landmark) {
     plr_sensitivity_append(f, s, landmark);
 }
 
-void plr_covariance_remove(plr_filter *f, unsigned slot) {
+PLR_SELDOM void plr_covariance_remove(plr_filter *f, unsigned slot) {
     const unsigned to = plr_covariance_row(f, slot);
     const unsigned from = plr_covariance_row(f, f->count - 1);
     if (to == from)

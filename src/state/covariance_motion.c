@@ -276,9 +276,9 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     }
 }
 
-void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
-                                 const plr_real B[PLR_MOTION_BY],
-                                 const plr_real M[PLR_POSE_SQUARE]) {
+PLR_SELDOM void plr_covariance_predict_pose(plr_filter *f, const plr_real A[PLR_POSE_SQUARE],
+                                            const plr_real B[PLR_MOTION_BY],
+                                            const plr_real M[PLR_POSE_SQUARE]) {
     const unsigned n = plr_covariance_dim(f), drivers = f->layout.drivers;
     PLR_ASSERT(drivers == 0 || f->layout.driver >= PLR_POSE_DIM);
     plr_real P_xi[PLR_POSE_SQUARE], turned[PLR_POSE_SQUARE];

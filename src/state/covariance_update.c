@@ -7,7 +7,7 @@
 #include "math/small.h"
 #include "state/elements.h"
 
-void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]) {
+PLR_SELDOM void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9]) {
     if (H->terms == 1 && plr_rows_begin_with_three(H)) {
         plr_real P[9], HP[9];
         plr_get_block(f, H->term[0].row, 3, H->term[0].row, 3, P);
@@ -31,7 +31,8 @@ void plr_covariance_of_rows(const plr_filter *f, const plr_rows *H, plr_real S[9
     }
 }
 
-void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H, plr_real S[9]) {
+PLR_SELDOM void plr_covariance_add_open_noise(const plr_filter *f, const plr_rows *H,
+                                              plr_real S[9]) {
     const unsigned ld = plr_covariance_ld(f);
     for (unsigned k = 0; k < PLR_POSE_DIM; k++) {
         plr_real a[3];

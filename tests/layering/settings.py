@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Compares what include/pelorus/settings.h says above each field of plr_config (name, unit, limits,
-default) with the table in src/record/settings.c, which is what the code accepts.
+default) with the table src/record/settings.def, which is what the code accepts.
 
 usage: settings.py PROJECT_ROOT
 """
@@ -13,10 +13,11 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-# {{id, "name", "unit", "about", kind, words, minimum, maximum, default}, AT(field), storage}
+# SETTING(id, "name", "unit", "about", kind, words, minimum, maximum, default, field, storage)
 ROW = re.compile(
-    r'\{\{(\d+), "([^"]*)", "([^"]*)", "[^"]*", PLR_SETTING_(\w+), (\w+), '
-    r"([^,]+), ([^,]+), ([^}]+)\}, AT\(([^)]+)\), \w+\}"
+    r'^SETTING\((\d+), "([^"]*)", "([^"]*)", "[^"]*", (\w+), (\w+), '
+    r"([^,]+), ([^,]+), ([^,]+), ([^,]+), \w+\)$",
+    re.MULTILINE,
 )
 # The first line of a field's comment, the rest of the comment, and the field.
 FIELD = re.compile(
@@ -101,7 +102,7 @@ def main() -> int:
         print(__doc__, file=sys.stderr)
         return 2
     root = Path(sys.argv[1]).resolve()
-    source = (root / "src/record/settings.c").read_text(encoding="utf-8")
+    source = (root / "src/record/settings.def").read_text(encoding="utf-8")
     text = (root / "include/pelorus/settings.h").read_text(encoding="utf-8")
     struct = text[text.index("typedef struct plr_config {") : text.index("} plr_config;")]
     table, header = from_table(source), from_header(struct)
@@ -109,7 +110,7 @@ def main() -> int:
     for field in MEMBER.findall(struct):
         if field not in {setting.field for setting in header}:
             texts.append(f"plr_config.{field} has no comment that begins with `Setting`")
-    if len(table) != source.count("{{"):
+    if len(table) != source.count("\nSETTING("):
         texts.append("a row of the table does not have the form that this test reads")
     for line in texts:
         print(line)

@@ -35,7 +35,7 @@ static void test_every_row_is_found_by_its_id_and_its_name(void) {
         TEST_ASSERT_NOT_NULL(row);
         TEST_ASSERT_EQUAL_PTR(row, plr_setting_by_id(row->id)); /* so no id stands twice */
         TEST_ASSERT_EQUAL_PTR(row, plr_setting_by_name(row->name));
-        TEST_ASSERT_GREATER_THAN_UINT(0, strlen(row->about));
+        TEST_ASSERT_GREATER_THAN_UINT(0, strlen(plr_setting_about(row)));
         TEST_ASSERT_TRUE(row->minimum <= row->standard && row->standard <= row->maximum);
     }
 }

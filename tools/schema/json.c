@@ -141,7 +141,7 @@ static void print_setting(const plr_setting *s) {
     if (whole)
         printf(", \"of_axis\": %u", (unsigned)whole->id);
     printf(", ");
-    print_pair("about", s->about);
+    print_pair("about", plr_setting_about(s));
     printf("}");
 }
 

@@ -144,7 +144,7 @@ static void print_settings(void) {
         print_values(s);
         printf(" | ");
         print_standard(s);
-        printf(" | %s |\n", s->about);
+        printf(" | %s |\n", plr_setting_about(s));
     }
 }
 
