@@ -315,7 +315,7 @@ plr_correction plr_correct(plr_filter *f, unsigned seen, const plr_measurement *
         memset(f->work.noise.motion_variance, 0, sizeof f->work.noise.motion_variance);
     }
     plr_calibration_begin(f);
-    plr_evidence evidence = {0, plr_log_product_one(), 0};
+    plr_evidence evidence = {.det_root = {1, 0}};
     const unsigned all = sensed.count + (plr_velocity_informs_bias(f) ? BIAS_MEASUREMENTS : 0);
     unsigned batches = (all + PLR_BLOCK_OBSERVATIONS - 1) / PLR_BLOCK_OBSERVATIONS, at = 0;
     for (; batches > 0 && !f->diverged; batches--) {

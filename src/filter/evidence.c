@@ -17,10 +17,6 @@
 #include "state/slots.h"
 #include "supervise/supervise.h"
 
-void plr_evidence_begin(plr_filter *f) {
-    memset(&f->work.evidence, 0, sizeof f->work.evidence);
-}
-
 /* A hash of an observation's four pixel coordinates. */
 static uint32_t hash_of_pixels(const plr_observation *o) {
     const float pixels[4] = {o->uL_px, o->vL_px, o->uR_px, o->vR_px};

@@ -16,9 +16,6 @@ typedef struct plr_evidence_pose {
     double p_WB[3];
 } plr_evidence_pose;
 
-/* A frame begins: nothing is known of it. */
-void plr_evidence_begin(plr_filter *f);
-
 /* How many of the n observations show the very pixels of last time, and the motion since. */
 void plr_evidence_of_picture(plr_filter *f, const plr_frame *frame, unsigned n);
 

@@ -153,12 +153,10 @@ plr_status plr_guard_check_constant(const plr_filter *f) {
 }
 
 plr_status plr_guard_check(const plr_filter *f) {
-    if (!f)
-        return PLR_E_ARGUMENT;
-    if (f->magic != PLR_FILTER_MAGIC)
-        return PLR_E_NOT_READY;
-    return sound(is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&
-                 constant_sum(f) == f->guard.constant && small_sum(f) == f->guard.small);
+    const plr_status status = plr_guard_check_constant(f);
+    return status != PLR_OK ? status
+                            : sound(is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&
+                                    small_sum(f) == f->guard.small);
 }
 
 plr_status plr_guard_check_whole(const plr_filter *f) {

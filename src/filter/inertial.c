@@ -101,7 +101,7 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     plr_calibration_note_rate(f, reading + 3);
     if (f->inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
-    (void)plr_alignment_add(f, t_ns, reading);
+    plr_alignment_add(f, t_ns, reading);
     const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
     plr_guard_seal_whole(f); /* the start sets P */
     return status;
@@ -159,7 +159,7 @@ static bool has_moved(const plr_filter *f, plr_watched_point *point, const plr_o
 
 void plr_filter_watch_start(plr_filter *f, const plr_frame *frame, unsigned n) {
     unsigned seen = 0, moved = 0;
-    const bool early = plr_alignment_is_early(f);
+    const bool early = plr_alignment_is_early(&f->either.alignment, f->t_ns);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_watched_point *point = watched(&f->either.alignment, o->id);
@@ -184,8 +184,7 @@ void plr_filter_follow_start(plr_filter *f, const plr_report *report) {
         return;
     f->inertial.frames =
         (uint16_t)(f->inertial.frames + (report->used > 0 && f->inertial.frames < UINT16_MAX));
-    if (plr_alignment_wants_anchor(f))
-        plr_alignment_anchor(f);
+    plr_alignment_anchor(f);
     plr_alignment_watch_gravity(f);
 }
 

@@ -85,6 +85,14 @@ static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, estimated);
 }
 
+/* P, the sensitivity, and what has become of the calibration. */
+static void pass_covariance(plr_codec *c, plr_filter *f) {
+    plr_codec_numbers(c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f), elements(f, f->count));
+    for (unsigned k = 0; k < f->par.calibrated.count; k++)
+        plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
+    pass_calibration(c, f, &f->par.calibrated);
+}
+
 static uint32_t calibration_size(const plr_calibrated *errors) {
     const uint32_t estimated = plr_calibration_estimated(errors);
     return (errors->count * (1 + estimated) + 4 * estimated) * (uint32_t)sizeof(plr_real);
@@ -163,11 +171,7 @@ plr_status plr_filter_save(const plr_filter *f, plr_state_sink sink, void *conte
     PASS(&c, f, filter);
     for (unsigned slot = 0; slot < f->count; slot++)
         PASS(&c, &f->slots[slot], slot);
-    plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)plr_covariance_elements(f),
-                      elements(f, f->count));
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        plr_codec_numbers(&c, PLR_FIELD_REAL, (void *)f->S[k], rows(f, f->count));
-    pass_calibration(&c, (plr_filter *)f, &f->par.calibrated);
+    pass_covariance(&c, (plr_filter *)f);
     if (c.status == PLR_OK && !flush(&out))
         c.status = PLR_E_IO;
     return c.status;
@@ -282,10 +286,7 @@ static plr_status read_whole(plr_codec *c, plr_filter *f, const plr_filter *like
     if (!f)
         return check_covariance(c, plr_covariance_row(like, count.landmarks),
                                 &like->par.calibrated);
-    plr_codec_numbers(c, PLR_FIELD_REAL, plr_covariance_memory(f), elements(f, f->count));
-    for (unsigned k = 0; k < f->par.calibrated.count; k++)
-        plr_codec_numbers(c, PLR_FIELD_REAL, f->S[k], rows(f, f->count));
-    pass_calibration(c, f, &f->par.calibrated);
+    pass_covariance(c, f);
     return plr_calibration_is_sound(f) ? as_stored(c) : PLR_E_CORRUPT;
 }
 

@@ -403,7 +403,7 @@ plr_status plr_filter_update(plr_filter *f, const plr_frame *frame, plr_report *
     plr_predict_to(f, frame->t_ns);
     f->frame_number++;
     f->totals.frames++;
-    plr_evidence_begin(f);
+    memset(&f->work.evidence, 0, sizeof f->work.evidence);
     note_twist(f);
     if (!plr_process_has_started(f)) {
         wait_for_start(f, frame, r);

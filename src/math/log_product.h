@@ -6,16 +6,11 @@
 
 #include "pelorus/config.h"
 
-/* mantissa * 2^exponent */
+/* mantissa * 2^exponent; 1 is {1, 0} */
 typedef struct plr_log_product {
     plr_real mantissa;
     int exponent;
 } plr_log_product;
-
-static inline plr_log_product plr_log_product_one(void) {
-    const plr_log_product one = {1, 0};
-    return one;
-}
 
 /* p <- p * factor. A factor that is not a positive number leaves it as it is. */
 static inline void plr_log_product_multiply(plr_log_product *p, plr_real factor) {

@@ -70,13 +70,8 @@ static void end_stretch(plr_filter *f, plr_time_ns t_ns) {
         plr_alignment_restart(f);
 }
 
-/* True in the first half of a stretch. */
-static bool is_early(const plr_alignment *at, plr_time_ns t_ns) {
+bool plr_alignment_is_early(const plr_alignment *at, plr_time_ns t_ns) {
     return at->count == 0 || 2 * (t_ns - at->begin_ns) <= REST_NS;
-}
-
-bool plr_alignment_is_early(const plr_filter *f) {
-    return is_early(&f->either.alignment, f->t_ns);
 }
 
 /* Mean and spread of the readings so far (Welford). */
@@ -93,7 +88,7 @@ static void average(plr_alignment *at, plr_time_ns t_ns, const plr_real reading[
         plr_real *spread = &at->spread2[i / 3];
         *spread = PLR_FMA(off, reading[i] - at->mean[i], *spread);
     }
-    if (is_early(at, t_ns))
+    if (plr_alignment_is_early(at, t_ns))
         memcpy(at->half_mean, at->mean, sizeof at->half_mean);
 }
 
@@ -355,15 +350,15 @@ static bool try_to_start(plr_filter *f, plr_time_ns t_ns, bool at_rest) {
     return true;
 }
 
-bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
+void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]) {
     const plr_imu_start kind = (plr_imu_start)f->config.imu_start;
     plr_alignment *at = &f->either.alignment;
     if (kind == PLR_IMU_START_GIVEN) {
         if (!f->inertial.pose_given)
-            return false;
+            return;
         set_unknown_velocity(f, f->par.start_velocity_variance);
         begin(f, t_ns, 0);
-        return true;
+        return;
     }
     end_stretch(f, t_ns);
     average(at, t_ns, reading);
@@ -379,7 +374,6 @@ bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[P
         started = try_to_start(f, t_ns, false);
     if (!started && stretch >= REST_NS)
         plr_alignment_restart(f);
-    return started;
 }
 
 /* What speaks against the readings' mean of half a second, whatever the body does meanwhile. */
@@ -421,12 +415,6 @@ bool plr_alignment_is_unsettled(const plr_filter *f) {
     return f->inertial.started && f->inertial.anchored != PLR_ANCHORED;
 }
 
-bool plr_alignment_wants_anchor(const plr_filter *f) {
-    const plr_inertial *s = &f->inertial;
-    return plr_alignment_is_unsettled(f) && s->frames >= ANCHOR_FRAMES &&
-           f->t_ns - s->started_ns >= ANCHOR_NS && !f->motion.pending;
-}
-
 void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns) {
     if (!f->inertial.started)
         return;
@@ -460,9 +448,13 @@ static void forget_place(plr_filter *f, const plr_real u[3]) {
 }
 
 void plr_alignment_anchor(plr_filter *f) {
+    const plr_inertial *s = &f->inertial;
     const plr_real variance = (plr_real)(f->config.start_sigma * f->config.start_sigma);
     const plr_real *u = f->R_WB + 6; /* R_WB^T e_z */
-    if (f->inertial.anchored == PLR_WORLD_IS_GIVEN) {
+    if (!plr_alignment_is_unsettled(f) || s->frames < ANCHOR_FRAMES ||
+        f->t_ns - s->started_ns < ANCHOR_NS || f->motion.pending)
+        return;
+    if (s->anchored == PLR_WORLD_IS_GIVEN) {
         const plr_real way2 = f->par.start_velocity_variance * (FOUND_S * FOUND_S);
         add_to_pose(f, u, TILT * TILT * way2, TILT * TILT * (TILT * TILT));
     } else {

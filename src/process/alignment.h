@@ -13,12 +13,12 @@
 /* Not started, nothing averaged. */
 void plr_alignment_clear(plr_filter *f);
 
-/* Adds a reading (a, w) of before the start. True if the filter has started by it: pose, velocity
- * and biases are set, with their covariance. There may be no landmarks. */
-bool plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]);
+/* Adds a reading (a, w) of before the start, and starts by it if the readings are good for that: sets pose,
+ * velocity and biases, with their covariance. There may be no landmarks. */
+void plr_alignment_add(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM]);
 
 /* True in the first half of the stretch that is averaged. */
-bool plr_alignment_is_early(const plr_filter *f);
+bool plr_alignment_is_early(const plr_alignment *at, plr_time_ns t_ns);
 
 /* The stretch that is averaged begins anew: the pictures show that the body moves. */
 void plr_alignment_restart(plr_filter *f);
@@ -35,9 +35,6 @@ void plr_alignment_given(plr_filter *f, const plr_real v[PLR_VELOCITY_DIM],
  * pose, as a start that was given may have it: units, signs, axes. */
 void plr_alignment_watch_gravity(plr_filter *f);
 
-/* True if position and yaw are to be fixed anew, some time after a start in motion. */
-bool plr_alignment_wants_anchor(const plr_filter *f);
-
 /* The pose was set with a covariance, a position was measured, or a landmark of a map came in:
  * position and yaw are not free any more, and an anchor would lose what is known of them. */
 void plr_alignment_keep_world(plr_filter *f);
@@ -48,8 +45,8 @@ void plr_alignment_follow_clock(plr_filter *f, plr_time_ns t_ns);
 /* True between a start in motion and the anchor: errors of second order are not in P yet. */
 bool plr_alignment_is_unsettled(const plr_filter *f);
 
-/* Lays the world anew so that the present position and yaw are exact, or known to start_sigma.
- * Where the world is given, P is widened instead. No motion may be pending. */
+/* Some time after a start in motion: lays the world anew so that the present position and yaw are exact,
+ * or known to start_sigma. Where the world is given, P is widened instead. Not while a motion is pending. */
 void plr_alignment_anchor(plr_filter *f);
 
 #endif

@@ -31,14 +31,7 @@ enum { D_THETA = 0, D_VEL = 3, D_ACCEL = 6, D_GYRO = 9 };
 enum { MOVED = 9 }; /* rows that a step changes: rho, theta, v */
 
 static void lay_out(plr_filter *f) {
-    static const uint8_t size[PLR_BLOCKS] = {PLR_POSE_DIM, PLR_VELOCITY_DIM, PLR_BIAS_DIM};
-    for (unsigned block = 0, row = 0; block < PLR_BLOCKS; row += size[block++]) {
-        f->layout.block[block].row = (uint8_t)row;
-        f->layout.block[block].size = size[block];
-    }
-    f->layout.core = DIM;
-    f->layout.driver = THETA;
-    f->layout.drivers = D;
+    plr_lay_out(f, PLR_VELOCITY_DIM, PLR_BIAS_DIM, THETA);
 }
 
 /* gamma = R_WB^T (0, 0, -g): gravity's acceleration in body axes, m/s^2. */

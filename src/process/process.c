@@ -7,6 +7,19 @@
 #define MAX_WAY  PLR_R(1000)
 #define MAX_TURN PLR_R(3.1415926)
 
+void plr_lay_out(plr_filter *f, uint8_t velocity, uint8_t bias, uint8_t driver) {
+    const uint8_t size[PLR_BLOCKS] = {PLR_POSE_DIM, velocity, bias};
+    uint8_t row = 0;
+    for (unsigned block = 0; block < PLR_BLOCKS; block++) {
+        f->layout.block[block].row = row;
+        f->layout.block[block].size = size[block];
+        row = (uint8_t)(row + size[block]);
+    }
+    f->layout.core = row;
+    f->layout.driver = driver;
+    f->layout.drivers = (uint8_t)(row - driver);
+}
+
 bool plr_step_is_possible(plr_real way2, plr_real turn2) {
     return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
 }

@@ -17,7 +17,7 @@ enum { PLR_READING_DIM = PLR_POSE_DIM };
 #define PLR_LONG_INTERVALS PLR_R(2.5)
 
 typedef struct plr_process {
-    /* Lays out the state's blocks. */
+    /* Lays out the state's blocks: plr_lay_out. */
     void (*lay_out)(plr_filter *f);
 
     /* PLR_OK if the reading may be held for `seconds`, else PLR_E_RANGE: plr_step_is_possible. */
@@ -66,6 +66,9 @@ typedef struct plr_process {
     void (*measure)(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                     plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]);
 } plr_process;
+
+/* Lays out the pose, a velocity and biases of these sizes; all rows from `driver` on are drivers. */
+void plr_lay_out(plr_filter *f, uint8_t velocity, uint8_t bias, uint8_t driver);
 
 /* False if a step of these squares, m^2 and rad^2, is longer than 1 km or pi rad; and for NaN. */
 bool plr_step_is_possible(plr_real way2, plr_real turn2);

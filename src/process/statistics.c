@@ -12,19 +12,13 @@
 /* The mean reading covers about this much at most, and no more than since the last standstill, s. */
 #define SLOW_S PLR_R(0.5)
 
-/* The square of the difference from the last reading, of three numbers from `first` on. */
-static plr_real square_of_change(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
-                                 unsigned first) {
-    plr_real off[3];
-    for (unsigned i = 0; i < 3; i++)
-        off[i] = reading[first + i] - f->reading[first + i];
-    return plr_dot3(off, off);
-}
-
 void plr_statistics_change(const plr_filter *f, const plr_real reading[PLR_POSE_DIM],
                            plr_real change2[2]) {
-    change2[0] = square_of_change(f, reading, 0);
-    change2[1] = square_of_change(f, reading, 3);
+    change2[0] = change2[1] = 0;
+    for (unsigned i = 0; i < PLR_POSE_DIM; i++) {
+        const plr_real off = reading[i] - f->reading[i];
+        change2[i / 3] = PLR_FMA(off, off, change2[i / 3]);
+    }
 }
 
 /* Each reading is compared with the line through the two before it: their second difference has six times

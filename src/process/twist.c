@@ -16,14 +16,7 @@
 #define LATE_SIGMAS PLR_R(4)
 
 static void lay_out(plr_filter *f) {
-    const uint8_t bias = f->config.bias ? PLR_BIAS_DIM : 0;
-    f->layout.block[PLR_BLOCK_POSE].row = 0;
-    f->layout.block[PLR_BLOCK_POSE].size = PLR_POSE_DIM;
-    f->layout.block[PLR_BLOCK_BIAS].row = PLR_POSE_DIM;
-    f->layout.block[PLR_BLOCK_BIAS].size = bias;
-    f->layout.core = (uint8_t)(PLR_POSE_DIM + bias);
-    f->layout.driver = PLR_POSE_DIM; /* the biases */
-    f->layout.drivers = bias;
+    plr_lay_out(f, 0, f->config.bias ? PLR_BIAS_DIM : 0, PLR_POSE_DIM);
 }
 
 static plr_real bias_walk(const plr_filter *f, unsigned k) {

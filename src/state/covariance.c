@@ -137,10 +137,6 @@ const plr_real *plr_covariance_elements(const plr_filter *f) {
     return f->P;
 }
 
-plr_real *plr_covariance_memory(plr_filter *f) {
-    return f->P;
-}
-
 double plr_covariance_trace(const plr_filter *f) {
     const unsigned n = plr_covariance_dim(f);
     double trace = 0;

@@ -69,9 +69,6 @@ size_t plr_covariance_size(const plr_filter *f, unsigned landmarks);
 /* The elements themselves, for a checksum or a saved state. */
 const plr_real *plr_covariance_elements(const plr_filter *f);
 
-/* The same for a state that is being restored. */
-plr_real *plr_covariance_memory(plr_filter *f);
-
 /* False if a variance is negative or not finite. */
 bool plr_covariance_is_positive(const plr_filter *f);
 

@@ -6,7 +6,7 @@
 #include "support/matrices.h"
 
 static double value_of(const double *factors, unsigned count) {
-    plr_log_product p = plr_log_product_one();
+    plr_log_product p = {1, 0};
     for (unsigned i = 0; i < count; i++)
         plr_log_product_multiply(&p, (plr_real)factors[i]);
     return (double)plr_log_product_value(&p);
