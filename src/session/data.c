@@ -38,8 +38,7 @@ void plr_data_refuse_frame(plr_session *s, const plr_frame *frame, plr_status st
 static void report_divergence(plr_session *s) {
     if (!(s->last.reasons & PLR_REASON_RECOVERED))
         return;
-    plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR);
-    plr_line_text(&s->out.as.text, "the filter diverged at ");
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR, "the filter diverged at ");
     plr_line_time(&s->out.as.text, s->last.t_ns);
     plr_line_text(&s->out.as.text, ": a variance was not positive; it goes on from its pose, "
                                    "and the landmarks were dropped");

@@ -3,11 +3,6 @@
 
 #include <string.h>
 
-void plr_line_begin(plr_text *line, plr_severity severity) {
-    line->severity = (uint8_t)severity;
-    line->text[0] = '\0';
-}
-
 /* The length of UTF-8 text when it is cut to `room` bytes: never inside a character. */
 static size_t whole_characters(const char *added, size_t room) {
     size_t n = 0;
@@ -24,6 +19,12 @@ void plr_line_text(plr_text *line, const char *added) {
     const size_t n = whole_characters(added, PLR_WIRE_MAX_TEXT - at);
     memcpy(line->text + at, added, n);
     line->text[at + n] = '\0';
+}
+
+void plr_line_begin(plr_text *line, plr_severity severity, const char *words) {
+    line->severity = (uint8_t)severity;
+    line->text[0] = '\0';
+    plr_line_text(line, words);
 }
 
 /* Decimal digits of a number, at least `width` of them. */

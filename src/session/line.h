@@ -5,8 +5,8 @@
 
 #include "pelorus/wire.h"
 
-/* Makes the line empty. */
-void plr_line_begin(plr_text *line, plr_severity severity);
+/* The line holds these words alone. */
+void plr_line_begin(plr_text *line, plr_severity severity, const char *words);
 
 void plr_line_text(plr_text *line, const char *added);
 

@@ -90,8 +90,7 @@ static void know_nothing(double P[36]) {
 
 static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
     plr_text *line = &s->out.as.text;
-    plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_text(line, "the clock jumped from ");
+    plr_line_begin(line, PLR_SEVERITY_WARNING, "the clock jumped from ");
     plr_line_time(line, from_ns);
     plr_line_text(line, " to ");
     plr_line_time(line, to_ns);

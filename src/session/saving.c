@@ -35,8 +35,8 @@ static const char *reason(const plr_session *s, plr_state_action action, plr_sta
 void plr_saving_refuse(plr_session *s, plr_state_action action, plr_time_ns t_ns,
                        plr_status status) {
     plr_text *line = &s->out.as.text;
-    plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_text(line, action == PLR_STATE_SAVE ? "state not saved: " : "state not restored: ");
+    plr_line_begin(line, PLR_SEVERITY_WARNING,
+                   action == PLR_STATE_SAVE ? "state not saved: " : "state not restored: ");
     plr_line_text(line, reason(s, action, status));
     if (status == PLR_E_FULL) {
         plr_line_count(line, ": it has ", s->options.store->device.size);
@@ -52,8 +52,8 @@ void plr_saving_refuse(plr_session *s, plr_state_action action, plr_time_ns t_ns
 static void answer(plr_session *s, plr_notice notice, const plr_stored_state *stored,
                    plr_time_ns of_ns, plr_time_ns t_ns) {
     plr_text *line = &s->out.as.text;
-    plr_line_begin(line, PLR_SEVERITY_INFO);
-    plr_line_text(line, notice == PLR_NOTICE_SAVED ? "state saved" : "state restored");
+    plr_line_begin(line, PLR_SEVERITY_INFO,
+                   notice == PLR_NOTICE_SAVED ? "state saved" : "state restored");
     plr_line_count(line, ": generation ", stored->generation);
     plr_line_count(line, ", ", plr_filter_landmark_count(&s->filter));
     plr_line_count(line, " landmarks, ", stored->length);

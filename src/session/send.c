@@ -163,8 +163,7 @@ void plr_send_text(plr_session *s) {
 }
 
 void plr_send_words(plr_session *s, plr_severity severity, const char *words) {
-    plr_line_begin(&s->out.as.text, severity);
-    plr_line_text(&s->out.as.text, words);
+    plr_line_begin(&s->out.as.text, severity, words);
     plr_send_text(s);
 }
 

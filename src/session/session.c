@@ -56,8 +56,8 @@ static void compare_counts(plr_session *s) {
     plr_end answer;
     plr_text *line = &s->out.as.text;
     plr_send_describe_end(s, &answer);
-    plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_text(line, "the recording is not complete: not everything arrived");
+    plr_line_begin(line, PLR_SEVERITY_WARNING,
+                   "the recording is not complete: not everything arrived");
     for (unsigned i = 0; i < PLR_COUNTED; i++)
         if (answer.differs >> i & 1) {
             plr_line_count(line, ", ", answer.arrived[i]);

@@ -58,8 +58,7 @@ void plr_start_begin(plr_session *s) {
 
 static void report_setting(plr_session *s, plr_wire_setting given, const plr_setting *setting) {
     plr_text *line = &s->out.as.text;
-    plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_text(line, "CONFIG: ");
+    plr_line_begin(line, PLR_SEVERITY_WARNING, "CONFIG: ");
     if (setting == NULL) {
         plr_line_count(line, "setting ", given.id);
         plr_line_text(line, " is not known here, and left out");

@@ -45,8 +45,7 @@ static void note_late(plr_session *s, plr_time_ns t_ns) {
     if (needed_ns < 2 * order->told_ns || needed_ns > plr_clock_max_gap_ns(s))
         return;
     order->told_ns = needed_ns;
-    plr_line_begin(line, PLR_SEVERITY_WARNING);
-    plr_line_text(line, is_inertial(s) ? "IMU readings" : "TWISTs");
+    plr_line_begin(line, PLR_SEVERITY_WARNING, is_inertial(s) ? "IMU readings" : "TWISTs");
     plr_line_text(line, " come late: what was used before them is newer, here by ");
     plr_line_time(line, needed_ns + 999999); /* upwards, for it is to be enough */
     plr_line_text(line, ", and they are refused. Set twist-delay to that or more: then frames and "
@@ -90,8 +89,7 @@ static void report_fault(plr_session *s) {
     if (fault == PLR_IMU_FAULT_NONE || (s->imu_faults & bit) != 0 || full_of_holes)
         return;
     s->imu_faults |= bit;
-    plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING);
-    plr_line_text(&s->out.as.text, "the IMU: ");
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_WARNING, "the IMU: ");
     plr_line_text(&s->out.as.text, plr_imu_fault_text(fault));
     plr_send_text(s);
 }

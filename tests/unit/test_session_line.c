@@ -12,11 +12,11 @@
 static plr_text line;
 
 void setUp(void) {
-    plr_line_begin(&line, PLR_SEVERITY_WARNING);
+    plr_line_begin(&line, PLR_SEVERITY_WARNING, "");
 }
 
 static const char *number(double x) {
-    plr_line_begin(&line, PLR_SEVERITY_INFO);
+    plr_line_begin(&line, PLR_SEVERITY_INFO, "");
     plr_line_number(&line, x);
     return line.text;
 }
@@ -39,7 +39,7 @@ static void test_what_does_not_fit_is_cut_at_a_whole_character(void) {
     for (int i = 0; i < 100; i++)
         plr_line_text(&line, "\xc3\xa9_"); /* three bytes: 240 is 80 of them */
     TEST_ASSERT_EQUAL_size_t(240, strlen(line.text));
-    plr_line_begin(&line, PLR_SEVERITY_INFO);
+    plr_line_begin(&line, PLR_SEVERITY_INFO, "");
     for (int i = 0; i < 239; i++)
         plr_line_text(&line, "x");
     plr_line_text(&line, "\xc3\xa9");
