@@ -168,7 +168,6 @@ static void replay(void) {
 
 static void put_sizes(void) {
     add_field("size filter", sizeof(plr_filter));
-    add_field("workspace", sizeof(plr_workspace));
     add_field("session", sizeof(plr_session));
     add_field("hz", board_core_hz());
     put_line();

@@ -313,7 +313,7 @@ static bool has_support(const plr_search *s, const plr_search_point *open, plr_m
  * twists, so that wrong matches may mislead it, without those that fit worst, too. True, with `best`
  * and s->prior at the result, if enough observations support it; otherwise the search is put back to
  * where it was. */
-PLR_SELDOM static bool search_without_twists(plr_search *s, plr_search_point *best,
+static PLR_SELDOM bool search_without_twists(plr_search *s, plr_search_point *best,
                                              plr_misfit misfit) {
     const plr_applied_motion stated = s->prior;
     const bool most_agree = is_three_fifths(count_agreement(s));
@@ -374,7 +374,7 @@ static unsigned judge_all_by_prior(plr_search *s, plr_search_point *best) {
  * they agree with each other can be found, all of them take part in the search. They need not be well
  * spread: a direction in which they say little keeps what the twists say of it. Otherwise the search
  * goes on with those whose prediction is good enough. Returns how many take part. */
-PLR_SELDOM static unsigned search_by_agreement(plr_search *s, plr_search_point *best) {
+static PLR_SELDOM unsigned search_by_agreement(plr_search *s, plr_search_point *best) {
     unsigned active = 0;
     let_unknown_take_part(s);
     for (unsigned i = 0; i < s->count; i++) {

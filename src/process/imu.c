@@ -397,7 +397,7 @@ static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DI
 
 /* ---------------------------------------------------------------- the estimate */
 
-PLR_SELDOM static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
+static PLR_SELDOM void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) {
     const plr_real *Q = f->core_motion.Q_cc;
     plr_covariance_get(f, PLR_BLOCK_BIAS, PLR_BLOCK_BIAS, P_b);
     for (unsigned i = 0; i < PLR_BIAS_DIM; i++)
@@ -407,7 +407,7 @@ PLR_SELDOM static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POS
 }
 
 /* v with its covariance now, and w = w_m - b_g, correlated by the gyro's bias. */
-PLR_SELDOM static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
+static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
                            plr_real P_u[PLR_POSE_SQUARE]) {
     enum { V = PLR_VELOCITY_DIM };
     const plr_core_motion *m = &f->core_motion;
@@ -450,7 +450,7 @@ static void changes(const plr_filter *f, const plr_real u[PLR_POSE_DIM], plr_rea
 /* A measurement of the twist is one of the state: v is estimated, and w = w_m - b_g, whose noise
  * adds to it. A row of v and w together (a wheel) takes the last reading, for both change; a row of
  * w alone (a standstill) the mean since the last one, which has less noise. */
-PLR_SELDOM static void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
+static PLR_SELDOM void measure(const plr_filter *f, const plr_twist_rows *rows, plr_rows *H,
                                plr_real r[PLR_ROWS], plr_real R[PLR_ROWS]) {
     const plr_real since = plr_seconds(f->t_ns - f->inertial.still_ns);
     const plr_real most = since < PLR_R(0.5) ? since : PLR_R(0.5);

@@ -39,7 +39,7 @@ static void bias_covariance(const plr_filter *f, plr_real P_b[PLR_POSE_SQUARE]) 
         P_b[(PLR_BIAS_DIM + 1) * i] += f->motion.seconds * bias_walk(f, i);
 }
 
-PLR_SELDOM static void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
+static PLR_SELDOM void now(const plr_filter *f, plr_real u[PLR_POSE_DIM],
                            plr_real P_u[PLR_POSE_SQUARE]) {
     for (int i = 0; i < PLR_POSE_DIM; i++)
         u[i] = f->reading[i] - f->bias[i];
@@ -119,7 +119,7 @@ static plr_real off2(const plr_filter *f, unsigned which, plr_real n) {
     return changed < most ? changed : most;
 }
 
-PLR_SELDOM static bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
+static PLR_SELDOM bool missed(const plr_filter *f, plr_real h0, plr_real h1, const plr_real *next,
                               plr_real variance[PLR_POSE_DIM]) {
     const plr_real usual = f->inertial.usual_s;
     if (!lost_readings(f, h1) || f->config.noise == PLR_NOISE_STEP)

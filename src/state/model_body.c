@@ -186,7 +186,7 @@ static bool covariance_in_chart(plr_real P[9], const plr_real J[9], const double
     return P[0] >= 0 && P[4] >= 0 && P[8] >= 0;
 }
 
-PLR_SELDOM static bool body_adopt(const plr_filter *f, const plr_landmark *known,
+static PLR_SELDOM bool body_adopt(const plr_filter *f, const plr_landmark *known,
                                   plr_new_landmark *landmark) {
     plr_real offset_W[3], s_B[3], R_CW[9], R_WB[9];
     double p_WB[3];
@@ -350,7 +350,7 @@ static void body_propagate(plr_filter *f, const plr_applied_motion *motion) {
     plr_covariance_open_noise(f, motion);
 }
 
-PLR_SELDOM static void body_drift(plr_filter *f, plr_real sigma) {
+static PLR_SELDOM void body_drift(plr_filter *f, plr_real sigma) {
     for (unsigned slot = 0; slot < f->count; slot++) {
         const plr_real *q = f->slots[slot].x, wanders = sigma * q[2];
         const plr_real S_q[9] = {
@@ -363,7 +363,7 @@ PLR_SELDOM static void body_drift(plr_filter *f, plr_real sigma) {
     }
 }
 
-PLR_SELDOM static void body_in_world(const plr_filter *f, const plr_slot *slot,
+static PLR_SELDOM void body_in_world(const plr_filter *f, const plr_slot *slot,
                                      plr_world_point *point) {
     plr_polar chart;
     plr_real s_B[3], offset[3], Ji[9], R_WC[9], R_WB[9];

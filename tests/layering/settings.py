@@ -13,7 +13,7 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-# SETTING(id, "name", "unit", "about", kind, words, minimum, maximum, default, field, storage)
+# A row: id, name, unit, about, kind, words, minimum, maximum, default, field, storage.
 ROW = re.compile(
     r'^SETTING\((\d+), "([^"]*)", "([^"]*)", "[^"]*", (\w+), (\w+), '
     r"([^,]+), ([^,]+), ([^,]+), ([^,]+), \w+\)$",

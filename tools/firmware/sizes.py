@@ -147,7 +147,6 @@ class Bench:
     """What a bench image told."""
 
     filter_bytes: int
-    workspace_bytes: int
     session_bytes: int
     stack_bytes: int
     run: Run
@@ -188,7 +187,7 @@ def run_bench(board: str, image: Path) -> Bench:
             found.pop("evicted")
             run.updates.append(Update(instructions, **found))
     stack = fields(last.removeprefix("done "))["stack"]
-    return Bench(sizes["filter"], sizes["workspace"], sizes["session"], stack, run)
+    return Bench(sizes["filter"], sizes["session"], stack, run)
 
 
 @dataclass(frozen=True)
