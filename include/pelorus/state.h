@@ -40,8 +40,8 @@ typedef struct plr_totals {
     uint32_t recoveries;    /* times the landmarks were dropped after a divergence */
     uint32_t contradictions; /* times the filter followed vision against twists or IMU */
     uint32_t twists_refused, frames_refused;             /* for any reason */
-    uint32_t readings, readings_gated, readings_refused; /* of small sensors */
     uint32_t damaged;                                    /* frames refused with PLR_E_DAMAGED */
+    uint32_t readings, readings_gated, readings_refused; /* of small sensors */
     uint64_t observations, matched, used, gated, created, evicted;
     plr_time_ns diverged_ns; /* when a variance was last found not positive; 0: never */
 } plr_totals;

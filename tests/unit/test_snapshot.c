@@ -153,7 +153,9 @@ static void test_a_filter_that_has_seen_nothing_can_be_saved(void) {
 typedef enum kind { U8, U16, U32, U64, F64, REAL } kind;
 
 /* A field that it is in order to save any number in gets one that it has not by chance. */
-static void fill(rng *chance, void *field, kind is, size_t bytes, unsigned most) {
+static void fill(rng *chance, void *field, kind is, size_t count, unsigned most) {
+    static const size_t size[] = {1, 2, 4, 8, sizeof(double), sizeof(plr_real)};
+    const size_t bytes = count * size[is];
     for (size_t i = 0; is == REAL && i < bytes / sizeof(plr_real); i++)
         ((plr_real *)field)[i] = (plr_real)(1 + rng_uniform(chance, 0, 1));
     for (size_t i = 0; is == F64 && i < bytes / sizeof(double); i++)
@@ -172,16 +174,16 @@ static void test_every_field_is_carried(void) {
 #define TABLE(name, times) in_filter = strcmp("filter", #name) == 0;
 #define GROUP(about)
 #define END(name)
-#define FIELD(type, member, is, count, most, about) FIELD_OF_##type(member, is, most)
-#define FIELD_OF_plr_filter(member, is, most)                                                      \
+#define FIELD(type, member, is, count, most, about) FIELD_OF_##type(member, is, count, most)
+#define FIELD_OF_plr_filter(member, is, count, most)                                               \
     if (in_filter)                                                                                 \
-        fill(&chance, &driven.member, is, sizeof driven.member, most);
-#define FIELD_OF_plr_slot(member, is, most)
-#define FIELD_OF_plr_camera(member, is, most)
-#define FIELD_OF_plr_state_origin(member, is, most)
-#define FIELD_OF_plr_state_setting(member, is, most)
-#define FIELD_OF_plr_state_count(member, is, most)
-#define FIELD_OF_plr_state_pose(member, is, most)
+        fill(&chance, &driven.member, is, count, most);
+#define FIELD_OF_plr_slot(member, is, count, most)
+#define FIELD_OF_plr_camera(member, is, count, most)
+#define FIELD_OF_plr_state_origin(member, is, count, most)
+#define FIELD_OF_plr_state_setting(member, is, count, most)
+#define FIELD_OF_plr_state_count(member, is, count, most)
+#define FIELD_OF_plr_state_pose(member, is, count, most)
 #include "filter/snapshot.def"
     driven.slots[1].beyond = PLR_R(-0.25);
     driven.slots[1].pixel_hash = 0x3456789A;

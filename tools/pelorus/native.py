@@ -292,7 +292,7 @@ class Health(_Struct):
 COUNTS_32 = (
     *("twists", "frames", "late", "refused", "resets", "locks", "range_limited", "blocks_failed"),
     *("widened", "recoveries", "contradictions", "twists_refused", "frames_refused"),
-    *("readings", "readings_gated", "readings_refused", "damaged"),
+    *("damaged", "readings", "readings_gated", "readings_refused"),
 )
 COUNTS_64 = ("observations", "matched", "used", "gated", "created", "evicted", "diverged_ns")
 
@@ -320,7 +320,6 @@ class Setting(_Struct):
         ("id", c.c_uint8),
         ("name", c.c_char_p),
         ("unit", c.c_char_p),
-        ("about", c.c_char_p),
         ("kind", c.c_int),
         ("choices", c.c_void_p),
         ("minimum", c.c_double),
