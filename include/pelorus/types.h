@@ -306,7 +306,6 @@ typedef struct plr_report {
     uint16_t matched;       /* observations of landmarks that are in the state */
     uint16_t used;          /* matched, accepted by the gate, and applied in the update */
     uint16_t gated;         /* matched, and rejected by the gate */
-    uint16_t gated_again;   /* of these: rejected when last seen, too */
     uint16_t created;       /* new landmarks, and known ones that came in or came in again */
     uint16_t evicted;       /* landmarks handed to the map sink to make room; not those dropped */
     uint16_t refused;       /* observations that are not finite or outside any image */

@@ -432,22 +432,22 @@ void plr_motion_find(plr_filter *f, const plr_frame *frame, unsigned n, plr_moti
     unsigned active = judge_all_by_prior(&s, &best);
     if (unknown >= MIN_AGREEING && 2 * active < unknown)
         active = search_by_agreement(&s, &best);
-    first->found = active >= MIN_POINTS;
+    bool found = active >= MIN_POINTS; /* else `motion` is the twists' */
     if (active > 0)
         plr_search_descend(&s, &best);
     for (unsigned again = 0; again < MORE_SEARCHES && fits_poorly(&s); again++)
         plr_search_descend(&s, &best);
-    const plr_misfit misfit = first->found && plr_supervise_may_exclude_odometry(&f->supervisor)
+    const plr_misfit misfit = found && plr_supervise_may_exclude_odometry(&f->supervisor)
                                   ? find_misfit(&s, &best)
                                   : PLR_MISFIT_NONE;
     first->outright = misfit != PLR_MISFIT_NONE && search_without_twists(&s, &best, misfit);
-    first->found = first->found && plr_search_factorise(&best, 0, U);
-    if (first->found)
+    found = found && plr_search_factorise(&best, 0, U);
+    if (found)
         (void)plr_search_step(&best, U, dz);
     plr_motion_at(f, &s.prior, best.z, &first->motion);
     const plr_real usual = plr_linearisation_usual(f);
     for (unsigned i = 0; i < s.count; i++) {
-        const plr_gate_result result = judge(&s, i, first->found, U, dz, nis);
+        const plr_gate_result result = judge(&s, i, found, U, dz, nis);
         plr_slot *slot = plr_search_slot(&s, i);
         const unsigned number = (unsigned)(slot - f->slots);
         const bool accepted = result == PLR_GATE_ACCEPTED;

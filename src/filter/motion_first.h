@@ -14,7 +14,6 @@
 /* The estimate of the motion D Exp(L nu), nu ~ N(0, I). */
 typedef struct plr_motion_first {
     plr_applied_motion motion; /* at the nu that was found, or at 0 */
-    bool found;                /* false: too few observations; `motion` is the twists' */
     bool outright;             /* the observations agree on a motion that the twists exclude, and
                                   `motion` is that one, with a prior wide enough for it */
 } plr_motion_first;

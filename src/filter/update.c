@@ -62,8 +62,6 @@ static unsigned choose(plr_filter *f, const plr_frame *frame, unsigned n, plr_re
         plr_track_count(&f->slots[slot], (plr_gate_result)w->verdict[slot]);
         if (!plr_gate_accepted(f, slot)) {
             report->gated++;
-            if (f->slots[slot].rejected > 1)
-                report->gated_again++;
             continue;
         }
         w->used[used++] = (uint16_t)k;

@@ -154,7 +154,6 @@ class Report(_Struct):
     matched: int
     used: int
     gated: int
-    gated_again: int
     created: int
     evicted: int
     refused: int
@@ -179,7 +178,6 @@ class Report(_Struct):
         ("matched", c.c_uint16),
         ("used", c.c_uint16),
         ("gated", c.c_uint16),
-        ("gated_again", c.c_uint16),
         ("created", c.c_uint16),
         ("evicted", c.c_uint16),
         ("refused", c.c_uint16),
