@@ -140,28 +140,26 @@ bool plr_guard_is_landmark(const plr_filter *f, const plr_slot *slot) {
 
 /* ---------------------------------------------------------------- checks and seals */
 
-static plr_status sound(bool is_sound) {
-    return is_sound ? PLR_OK : PLR_E_DAMAGED;
-}
-
 plr_status plr_guard_check_constant(const plr_filter *f) {
     if (!f)
         return PLR_E_ARGUMENT;
     if (f->magic != PLR_FILTER_MAGIC)
         return PLR_E_NOT_READY;
-    return sound(constant_sum(f) == f->guard.constant);
+    return constant_sum(f) == f->guard.constant ? PLR_OK : PLR_E_DAMAGED;
 }
 
 plr_status plr_guard_check(const plr_filter *f) {
     const plr_status status = plr_guard_check_constant(f);
-    return status != PLR_OK ? status
-                            : sound(is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) &&
-                                    small_sum(f) == f->guard.small);
+    if (status != PLR_OK)
+        return status;
+    const bool sound =
+        is_in_range(f) && plr_guard_is_pose(f->R_WB, f->p_WB) && small_sum(f) == f->guard.small;
+    return sound ? PLR_OK : PLR_E_DAMAGED;
 }
 
 plr_status plr_guard_check_whole(const plr_filter *f) {
     const plr_status status = plr_guard_check(f);
-    return status != PLR_OK ? status : sound(large_sum(f) == f->guard.large);
+    return status == PLR_OK && large_sum(f) != f->guard.large ? PLR_E_DAMAGED : status;
 }
 
 void plr_guard_seal(plr_filter *f) {
