@@ -9,11 +9,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from pelorus.check import biases, outcome, shared_rows, tuning, verdict
 from pelorus.check.held import held_against
 from pelorus.check.outcome import NOTHING, Outcome
-from pelorus.check.parameters import Tuned
+from pelorus.check.parameters import Tuned, larger
 from pelorus.check.tracks_noise import TrackNoise
 from pelorus.faults.fault import Fault
 from pelorus.frame_table import FrameTable
@@ -136,11 +137,37 @@ def test_what_drifting_tracks_tell_replaces_only_what_is_clearly_off(
 
 def test_a_sigma_that_is_about_what_the_rows_leave_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TrackNoise, "rows_px", 2.3)
-    bench = SimpleNamespace(run=lambda _: NOTHING)
+    less_sure = replace(NOTHING, pose_log_det=0.0)
+    bench = SimpleNamespace(run=lambda _: less_sure, by_imu=False, header=header())
     for given, written in (("2", "2"), ("1", "2.3")):
         tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, DRIFTS)
         kept = shared_rows.with_shared_rows(cast(Any, bench), tuned)
         assert kept.settings["pixel-sigma"] == written
+        surer = replace(tuned, after=replace(NOTHING, pose_log_det=1.0))  # as it was
+        assert shared_rows.with_shared_rows(cast(Any, bench), surer) is surer
+
+
+def test_all_noises_are_made_larger_alike() -> None:
+    """So the estimate, which depends on their ratios, stays."""
+    given = {
+        "pixel-sigma": "2",
+        "velocity-sigma": "0.1,0.2,0.3",
+        "velocity-sigma-z": "0.4",
+        "track-drift": "1",
+        "slots": "50",
+    }
+    assert larger(header(), given, False, 1.5) == {
+        "pixel-sigma": "3",
+        "velocity-sigma": "0.15,0.3,0.6",
+        "gyro-sigma": "0.015",
+        "track-drift": "1.5",
+        "bias-velocity-sigma": "0.0075",
+        "bias-gyro-sigma": "0.015",
+        "slots": "50",
+    }
+    by_imu = larger(header(), {}, True, 2.0)
+    assert by_imu["accel-noise"] == "0.02"
+    assert not any(name.startswith("bias") for name in by_imu)
 
 
 @pytest.mark.parametrize(
@@ -163,9 +190,25 @@ def test_priors_of_biases_that_allow_what_drifting_tracks_tell_stay(
     told = {"bias-gyro-sigma": biases.Told(size, 1e-4)}
     monkeypatch.setattr(biases, "_halves", lambda *_: told)
     for frames, expected in ((200, given | changed), (199, given)):
-        bench = SimpleNamespace(examined=SimpleNamespace(frame_t_ns=range(frames)))
+        examined = SimpleNamespace(frame_t_ns=np.arange(frames) * 100_000_000)
+        bench = SimpleNamespace(examined=examined, header=header())
         settings, _ = biases.told_in_drift(cast(Any, bench), given, {})
         assert settings == expected
+
+
+def test_a_bias_that_a_bent_picture_may_be_is_not_switched_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(biases, "_halves", lambda *_: {"bias-gyro-sigma": biases.Told(0.002, 1e-4)})
+    examined = SimpleNamespace(frame_t_ns=np.arange(200) * 100_000_000)
+    bench = SimpleNamespace(examined=examined, header=header())
+    turns_px = 0.002 * header().camera.fx_px * 0.1
+    off = {"bias": "off"}
+    bent, words = biases.told_in_drift(cast(Any, bench), off, {}, 1.1 * turns_px)
+    assert bent == off
+    assert "rectification" in words
+    flat, _ = biases.told_in_drift(cast(Any, bench), off, {}, 0.9 * turns_px)
+    assert flat["bias"] == "on"
 
 
 # --- the verdict ----------------------------------------------------------------------------------

@@ -10,8 +10,8 @@ best one from all of it has the covariance P_half - P_all, whatever noise (of th
 (Hausman, Specification tests in econometrics, 1978). So the drive is cut into windows, each
 window's points into halves, left and right, upper and lower, near and far, and at random; each
 half's poses are compared with those from all points. 1 is due. Where they are farther apart,
-pixel-sigma is made larger until they are not. A drive by an IMU is one window: each window would
-have to find the vertical and its speed anew.
+the noises are made larger until they are not (halves_alike.py). A drive by an IMU is one window:
+each window would have to find the vertical and its speed anew.
 
 An error that all points share alike (a baseline, a mounting) moves no half beside another: it stays
 unseen.
@@ -88,18 +88,17 @@ class Apart:
 
 
 class Inflated(NamedTuple):
-    """The sigma with which halves agree, and how far apart they are with the one before and with
-    it.
+    """How many times larger noises make halves agree, and how far apart they are before and with
+    them.
     """
 
-    was_px: float
-    sigma_px: float
+    times: float
     before: Apart
     after: Apart
 
     @property
     def is_larger(self) -> bool:
-        return self.sigma_px > self.was_px
+        return self.times > 1
 
 
 class _Part(NamedTuple):

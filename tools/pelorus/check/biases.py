@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pelorus.check.clock import seconds
 from pelorus.check.options import Settings
 from pelorus.check.outcome import PART, Bench
 from pelorus.check.parameters import FRAMES_FEW, PAYS, TWIST, written
@@ -61,10 +62,13 @@ def told_by_halves(
 
 
 def told_in_drift(
-    bench: Bench, fixed: Settings, values: Mapping[str, float]
+    bench: Bench, fixed: Settings, values: Mapping[str, float], shared_px: float = 0.0
 ) -> tuple[dict[str, str], str]:
     """Where tracks drift both halves of the drive must tell the same gyro bias, and a prior that
     allows it stays. Halves of few frames agree by chance, when errors last for seconds.
+
+    `shared_px`: a picture that is bent so far moves points from frame to frame by up to so much,
+    all along alike. A bias that turns them by less may be that, and is not switched on.
 
     Such tracks look like a bias of the velocity all along, so with them there is none of it to be
     told, and likelihood would find one.
@@ -77,6 +81,12 @@ def told_in_drift(
         return dict(fixed), "no bias that both halves of the drive agree on"
     words = f"biases of the gyro readings of about {size:.2g} rad/s, in both halves alike"
     if fixed.get("bias", "on") == "off":
+        turns_px = size * bench.header.camera.fx_px * seconds(bench.examined.frame_t_ns)
+        if turns_px < shared_px:
+            return dict(fixed), (
+                f"{words}, or the rectification: it is off by {shared_px:.2g} px, and such a bias "
+                f"turns points by {turns_px:.2g} px a frame"
+            )
         return {**fixed, "bias": "on", "bias-velocity-sigma": "0", name: f"{size:.2g}"}, words
     if size > ALLOWS * float(fixed.get(name, DEFAULTS[name])):
         return {**fixed, name: f"{size:.2g}"}, words

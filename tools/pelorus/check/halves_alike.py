@@ -1,8 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""The pixel-sigma with which halves of the points tell the same motion (apart.py)."""
+"""The noises with which halves of the points tell the same motion (apart.py).
+
+How far halves differ says by how much the covariance is too small; it does not say whose errors
+they are. They may be the pixels', or the twists', for two halves weigh the same wrong twist
+differently. So all noises are made larger by one factor, the variance of unit weight of geodesy
+(Baarda, Statistical concepts in geodesy, 1967): an estimate depends on their ratios alone, so it
+stays where it is, and its covariance grows. A larger pixel-sigma alone would leave more to the
+twists, of whose errors halves of the points know nothing.
+
+The factor is known before it is tried: where errors are noise, halves with it differ as they
+should. Where they do not, something else moves them (cars, a scale, a clock), and no noises stand
+for that. Nor may larger noises make the filter surer: it widens its covariance by itself while
+pictures and twists contradict each other (NOISE_MISFIT), and wide noises can hide that they do.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,66 +24,39 @@ import numpy as np
 from pelorus.check.apart import Inflated, Parts
 from pelorus.check.options import Settings
 from pelorus.check.outcome import Bench
-from pelorus.check.parameters import PIXEL, Tuned, starting
+from pelorus.check.parameters import Tuned, larger
 from pelorus.frames import Kind
-
-ROUNDS, STEP_LEAST, STEP_MOST = 6, 1.15, 2.5
-# Of the frames: where sigmas are honest 0 to 0.04 were seen, where they are not 0.5 to 1. The limit
-# is the geometric mean of both: above, a larger pixel-sigma made NEES/6 worse (4.4, then 13).
-CONTRADICTED_MOST = 0.14
-NEAR = 1.1  # times the ratio that is due: there the search ends
-LESS = 0.05  # so much nearer a larger sigma must bring them
-PARAMETER = PIXEL["pixel"]
 
 
 def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:
-    """The same with at least that sigma. As it is on a known map, and where vision often
-    contradicts the twists: a larger pixel-sigma would leave more to them, and the covariances that
-    are compared are wider already.
-    """
-    by_map = tuned.settings.get("mode", "slam") != "slam" or bench.holds(Kind.LANDMARK)
-    if by_map or tuned.after.contradicted > CONTRADICTED_MOST:
+    """The same with at least those noises. As it is on a known map."""
+    if tuned.settings.get("mode", "slam") != "slam" or bench.holds(Kind.LANDMARK):
         return tuned
-    sigma_px = starting(bench.header, tuned.settings, PIXEL)["pixel"]
     offset_s = float(tuned.settings.get("camera-offset", "0"))
-    settings = {k: v for k, v in tuned.settings.items() if k != "camera-offset"}
-    found = inflate(bench.parts(offset_s), settings, sigma_px, PARAMETER.most)
-    if not found.is_larger:
-        return replace(tuned, halves=found)
-    wider = tuned.settings | {PARAMETER.setting: f"{found.sigma_px:.3g}"}
-    return replace(tuned, settings=wider, after=bench.run(wider), halves=found)
+
+    def of(times: float) -> dict[str, str]:
+        return larger(bench.header, tuned.settings, bench.by_imu, times)
+
+    def without_offset(times: float) -> Settings:
+        return {k: v for k, v in of(times).items() if k != "camera-offset"}
+
+    found = inflate(bench.parts(offset_s), without_offset)
+    if found.is_larger:
+        settings = of(found.times)
+        after = bench.run(settings)
+        if after.pose_log_det > tuned.after.pose_log_det:
+            return replace(tuned, settings=settings, after=after, halves=found)
+    return replace(tuned, halves=found._replace(times=1.0, after=found.before))
 
 
-def inflate(parts: Parts, settings: Settings, sigma_px: float, most_px: float) -> Inflated:
-    """The same sigma where chance may have moved the halves, or a larger one does not help."""
-
-    def of(px: float) -> Inflated:
-        apart = parts.apart({**settings, PARAMETER.setting: f"{px:.4g}"})
-        return Inflated(sigma_px, px, apart, apart)
-
-    first = best = of(sigma_px)
-    if not first.after.ratio > first.after.by_chance:
-        return first
-    tried = best = first
-    for _ in range(ROUNDS):
-        due = tried.after.due
-        step = float(np.clip(np.sqrt(tried.after.ratio / due), STEP_LEAST, STEP_MOST))
-        last, tried = tried, of(min(tried.sigma_px * step, most_px))
-        if tried.after.ratio < due / NEAR and last.after.ratio > due:
-            tried = of(_between(last, tried))
-        vain = not best.after.ratio - tried.after.ratio > LESS * best.after.ratio
-        if vain and last is not best:  # twice
-            break
-        best = best if vain else tried
-        if tried.after.ratio < NEAR * due or tried.sigma_px >= most_px:
-            break
-    return best._replace(before=first.before)
-
-
-def _between(apart: Inflated, alike: Inflated) -> float:
-    """Where the ratio is what is due, by a straight line in the logarithms."""
-    x, y = (
-        np.log([alike.sigma_px, apart.sigma_px]),
-        np.log([alike.after.ratio, apart.after.ratio]),
-    )
-    return float(np.exp(np.interp(np.log(apart.after.due), y, x)))
+def inflate(parts: Parts, of: Callable[[float], Settings]) -> Inflated:
+    """`of`: settings with noises so many times as large. 1 where chance may have moved the halves,
+    or where the factor that is due does not bring them together.
+    """
+    before = parts.apart(of(1.0))
+    stays = Inflated(1.0, before, before)
+    if not before.ratio > before.by_chance:
+        return stays
+    times = float(np.sqrt(before.ratio / before.due))
+    after = parts.apart(of(times))
+    return Inflated(times, before, after) if after.ratio <= after.by_chance else stays

@@ -36,9 +36,10 @@ from pelorus.check.contents import (
 from pelorus.check.options import Settings, options_of
 from pelorus.console import progress
 from pelorus.frames import Header, Kind, Message, Pose, Process, Report, Stereo
-from pelorus.layout import Floats
+from pelorus.layout import Floats, unpack_symmetric
 from pelorus.replay import run_program
 from pelorus.schema import number
+from pelorus.trajectory import POSE_SIZE
 
 # While settings are compared the gate stands where an observation begins to be more likely an
 # outlier than a rare one; the usual gate cuts 1 % of the sound ones, and so would favour sigmas
@@ -65,6 +66,7 @@ class Outcome:
     bias: Floats  # at the end, (b_v, b_w)
     bias_variance: Floats
     contradicted: float = 0.0  # of the frames: in these vision contradicts twists or IMU
+    pose_log_det: float = -math.inf  # ln det of the last pose's covariance
     by_frame: Floats = field(
         default_factory=lambda: np.zeros(0)
     )  # -2 ln of each frame's likelihood
@@ -197,8 +199,15 @@ def outcome_of(answers: Iterable[Message], cost_of_outlier: float) -> Outcome:
         np.asarray(last.bias, np.float64),
         variance,
         contradicted / len(by_frame),
+        _log_det(last),
         np.array(by_frame),
     )
+
+
+def _log_det(pose: Pose) -> float:
+    P = unpack_symmetric(np.array([pose.covariance], np.float64), POSE_SIZE)[0]
+    sign, log_det = np.linalg.slogdet(P)
+    return float(log_det) if sign > 0 and pose.knows_covariance else math.inf
 
 
 def outlier_cost(header: Header, messages: Sequence[Message]) -> float:

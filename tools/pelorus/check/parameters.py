@@ -12,8 +12,9 @@ import numpy as np
 from pelorus.check.apart import Inflated
 from pelorus.check.options import Settings
 from pelorus.check.outcome import Outcome
-from pelorus.check.tracks_noise import TrackNoise
+from pelorus.check.tracks_noise import DRIFT, TrackNoise
 from pelorus.frames import Header
+from pelorus.schema import DEFAULTS
 
 AXES = "xyz"
 PAYS = 20.0  # -2 ln of the likelihood ratio that one parameter more, or another timing, must bring
@@ -43,6 +44,13 @@ IMU = PIXEL | {
 WALKS = {
     "gyro-walk": Parameter("gyro-walk", 1e-4, 1e-7, 0.1, "gyro_walk"),
     "accel-walk": Parameter("accel-walk", 1e-3, 1e-6, 1.0, "accel_walk"),
+}
+BIASES = {
+    name: Parameter(name, DEFAULTS[name], 0.0, most, suggestion)
+    for name, most, suggestion in (
+        ("bias-velocity-sigma", 100.0, "bias_velocity_sigma_mps"),
+        ("bias-gyro-sigma", 10.0, "bias_gyro_sigma_radps"),
+    )
 }
 AXIS_SUGGESTIONS = {
     "velocity": tuple(f"velocity_sigma_{axis}_mps" for axis in AXES),
@@ -140,6 +148,23 @@ def no_narrower(
         larger = [f"{max(pair):.4g}" for pair in pairs]
         out[parameter.setting] = larger[0] if len(set(larger)) == 1 else ",".join(larger)
     return out
+
+
+def larger(header: Header, settings: Settings, by_imu: bool, times: float) -> dict[str, str]:
+    """The same with all noises so many times as large, and what is known of a twist's biases before
+    the drive: the estimate depends on their ratios. An IMU soon tells its own.
+    """
+    if times == 1:
+        return dict(settings)
+    parameters = of_process(by_imu) | ({} if by_imu else BIASES)
+    noises = starting(header, settings, parameters)
+    most = limits(noises, parameters)
+    wider = {name: min(value * times, most[name][1]) for name, value in noises.items()}
+    drift = float(settings.get(DRIFT, "0")) * times
+    by_axis = tuple(f"{parameter.setting}-" for parameter in parameters.values())
+    kept = {k: v for k, v in settings.items() if not k.startswith(by_axis)}
+    told = {DRIFT: f"{drift:.3g}"} if drift > 0 else {}
+    return {**kept, **written(wider, parameters), **told}
 
 
 def pooled(values: Mapping[str, float], name: str) -> float:

@@ -58,7 +58,8 @@ def _tune(bench: Bench, given: Settings, one_clock: bool) -> Tuned:
     if noise.drifts:
         fixed.pop(DRIFT, None)  # what one step tells of biases, it tells without it
         found = _of_drifting_tracks(bench, fixed, start, noise)
-        fixed, words = told_in_drift(bench, fixed, found.values)
+        shared_px = noise.rows.shared_px if noise.rows is not None else 0.0
+        fixed, words = told_in_drift(bench, fixed, found.values, shared_px)
         offset_s = float(fixed.pop(OFFSET))
         fixed |= noise.setting(given)
         settings = fixed | written(found.values, TWIST) | offset_settings(offset_s)

@@ -201,7 +201,7 @@ def _nis(run: Run, tuned: Tuned) -> Iterator[Remark]:
         )
     elif run.nis < NIS_LOW and tuned.halves is not None and tuned.halves.is_larger:
         yield Remark(
-            Grade.GOOD, f"{words}; less than once, for pixel-sigma stands for what points share"
+            Grade.GOOD, f"{words}; less than once, for the noises stand for what points share"
         )
     elif run.nis < NIS_LOW and tuned.noise.rows_px > 0:
         yield Remark(
@@ -274,15 +274,13 @@ def _halves(tuned: Tuned) -> Iterator[Remark]:
         return
     farther = f"{np.sqrt(found.before.ratio):.2g} times as far"
     words = f"half of the points alone ({found.before.way}) leads {farther} from where all of them "
-    words += (
-        f"lead as a pixel-sigma of {found.was_px:.2g} px allows: points share errors, of lens, "
-    )
-    words += "rectification, tracker or things that move"
+    words += "lead as the noises allow: points share errors, of lens, rectification, tracker or "
+    words += "things that move, or twists (or an IMU) are off for longer than a reading"
     if found.is_larger:
-        words += f"; in pixel-sigma, {found.sigma_px:.2g} px stand for that"
-    if found.after.ratio > found.after.by_chance:
-        still = float(np.sqrt(found.after.ratio))
-        words += f"; no pixel-sigma brings them together (still {still:.2g} times as far)"
+        words += f"; all noises are written {found.times:.2g} times as large for that: the "
+        words += "estimate stays, and is less sure"
+    else:
+        words += "; larger noises would not mend it, and none are written"
     yield Remark(Grade.CARE, words)
 
 
