@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -14,6 +15,7 @@ from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tracks_noise import TrackNoise
 from pelorus.row_gaps import row_gaps
 from pelorus.tracks import Tracks
+from replay_drive import header
 
 FRAMES, POINTS = 12, 60
 
@@ -66,14 +68,18 @@ def test_few_tracks_tell_nothing() -> None:
 
 
 class AnyBench:
-    """Where a run is wanted, not its outcome."""
+    """Where a run is wanted that is less sure than the one before."""
+
+    by_imu = False
+    header = header()
 
     def run(self, _: object) -> object:
-        return NOTHING
+        return replace(NOTHING, pose_log_det=0.0)
 
 
-def test_what_the_rectification_leaves_is_added_to_the_pixel_sigma_in_squares() -> None:
-    alike = Inflated(0.3, 0.3, Apart({}, 0), Apart({}, 0))
+def test_what_the_rectification_leaves_is_added_to_what_halves_tell_in_squares() -> None:
+    told = Inflated(2.0, Apart({}, 0), Apart({}, 0))
+    alike = told._replace(times=1.0)
 
     def sigma(bend: list[float], given: str, halves: Inflated | None) -> float:
         noise = TrackNoise({}, float("nan"), row_gaps(tracks(np.array(bend))), 49)
@@ -81,9 +87,10 @@ def test_what_the_rectification_leaves_is_added_to_the_pixel_sigma_in_squares() 
         return float(with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"])
 
     shared_px = 7 * 0.4 / np.sqrt(2)
-    assert abs(sigma([0.4, 0, 0, 0], "0.3", alike) - np.hypot(0.3, shared_px)) < 0.05
-    assert abs(sigma([0.4, 0, 0, 0], "5", alike) - np.hypot(5, shared_px)) < 0.05
-    assert sigma([0.1, 0, 0, 0], "0.3", alike) == 0.3  # as good as pairs are
-    # where halves were not compared, what a larger sigma stands for is not known
-    assert abs(sigma([0.4, 0, 0, 0], "0.3", None) - shared_px) < 0.05
-    assert sigma([0.4, 0, 0, 0], "5", None) == 5
+    assert abs(sigma([0.4, 0, 0, 0], "0.3", told) - np.hypot(0.3, shared_px)) < 0.05
+    assert abs(sigma([0.4, 0, 0, 0], "5", told) - np.hypot(5, shared_px)) < 0.05
+    assert sigma([0.1, 0, 0, 0], "0.3", told) == 0.3  # as good as pairs are
+    # where halves have told no noises, what the given sigma stands for is not known
+    for untold in (None, alike):
+        assert abs(sigma([0.4, 0, 0, 0], "0.3", untold) - shared_px) < 0.05
+        assert sigma([0.4, 0, 0, 0], "5", untold) == 5
