@@ -138,7 +138,7 @@ def test_what_drifting_tracks_tell_replaces_only_what_is_clearly_off(
 def test_a_sigma_that_is_about_what_the_rows_leave_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TrackNoise, "rows_px", 2.3)
     less_sure = replace(NOTHING, pose_log_det=0.0)
-    bench = SimpleNamespace(run=lambda _: less_sure, by_imu=False, header=header())
+    bench = SimpleNamespace(run=lambda _: less_sure)
     for given, written in (("2", "2"), ("1", "2.3")):
         tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, DRIFTS)
         kept = shared_rows.with_shared_rows(cast(Any, bench), tuned)

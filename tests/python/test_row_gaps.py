@@ -8,14 +8,12 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pelorus.check.apart import Apart, Inflated
 from pelorus.check.outcome import NOTHING
 from pelorus.check.parameters import Tuned
 from pelorus.check.shared_rows import with_shared_rows
 from pelorus.check.tracks_noise import TrackNoise
 from pelorus.row_gaps import row_gaps
 from pelorus.tracks import Tracks
-from replay_drive import header
 
 FRAMES, POINTS = 12, 60
 
@@ -70,27 +68,18 @@ def test_few_tracks_tell_nothing() -> None:
 class AnyBench:
     """Where a run is wanted that is less sure than the one before."""
 
-    by_imu = False
-    header = header()
-
     def run(self, _: object) -> object:
         return replace(NOTHING, pose_log_det=0.0)
 
 
-def test_what_the_rectification_leaves_is_added_to_what_halves_tell_in_squares() -> None:
-    told = Inflated(2.0, Apart({}, 0), Apart({}, 0))
-    alike = told._replace(times=1.0)
-
-    def sigma(bend: list[float], given: str, halves: Inflated | None) -> float:
+def test_the_pixel_sigma_is_no_smaller_than_what_the_rectification_leaves() -> None:
+    def sigma(bend: list[float], given: str) -> float:
         noise = TrackNoise({}, float("nan"), row_gaps(tracks(np.array(bend))), 49)
-        tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, noise, halves=halves)
+        tuned = Tuned({"pixel-sigma": given}, NOTHING, NOTHING, noise)
         return float(with_shared_rows(cast(Any, AnyBench()), tuned).settings["pixel-sigma"])
 
     shared_px = 7 * 0.4 / np.sqrt(2)
-    assert abs(sigma([0.4, 0, 0, 0], "0.3", told) - np.hypot(0.3, shared_px)) < 0.05
-    assert abs(sigma([0.4, 0, 0, 0], "5", told) - np.hypot(5, shared_px)) < 0.05
-    assert sigma([0.1, 0, 0, 0], "0.3", told) == 0.3  # as good as pairs are
-    # where halves have told no noises, what the given sigma stands for is not known
-    for untold in (None, alike):
-        assert abs(sigma([0.4, 0, 0, 0], "0.3", untold) - shared_px) < 0.05
-        assert sigma([0.4, 0, 0, 0], "5", untold) == 5
+    assert abs(sigma([0.4, 0, 0, 0], "0.3") - shared_px) < 0.05
+    assert sigma([0.4, 0, 0, 0], "1.6") == 1.6  # about that
+    assert sigma([0.4, 0, 0, 0], "5") == 5
+    assert sigma([0.1, 0, 0, 0], "0.3") == 0.3  # as good as pairs are
