@@ -79,7 +79,7 @@ def check(program: Path, recording: Path, given: Settings, folder: Path) -> Chec
     if any(fault.lasts for fault in named):
         found.lasting.append(NAMED)
     tuned = held_against(bench, given, found)
-    tuned = with_shared_rows(bench, with_halves_alike(bench, tuned))
+    tuned = with_halves_alike(bench, with_shared_rows(bench, tuned))
     truth = truth_in(messages)
     both = progress((("before", given), ("after", tuned.settings)), "whole drive")
     before, run = (_whole(program, recording, settings, folder, name) for name, settings in both)

@@ -15,8 +15,8 @@ SETTING = "pixel-sigma"
 def with_shared_rows(bench: Bench, tuned: Tuned) -> Tuned:
     """The same with at least the sigma that the rectification leaves, unless it is about that.
 
-    What all points share moves no half of them beside another (halves_alike.py), but here it is
-    known whose error it is. As with halves, no sigma is taken that makes the filter surer.
+    It comes before halves of the points are compared (halves_alike.py), for here it is known whose
+    error it is. As there, no sigma is taken that makes the filter surer.
     """
     shared_px = tuned.noise.rows_px
     if SETTING not in tuned.settings or not shared_px > 0:
