@@ -21,13 +21,15 @@ static uint32_t to_bits(float x) {
 }
 
 static void assert_same(float a, float b, float c) {
-    const float expected = fmaf(a, b, c), got = plr_fmaf_exact(a, b, c);
+    const float expected = fmaf(a, b, c);
+    const float got[] = {plr_fmaf_exact(a, b, c), plr_fmaf_portable(a, b, c)};
     char message[120];
     snprintf(message, sizeof message, "%a * %a + %a", (double)a, (double)b, (double)c);
-    if (isnan(expected))
-        TEST_ASSERT_TRUE_MESSAGE(isnan(got), message);
-    else
-        TEST_ASSERT_EQUAL_HEX32_MESSAGE(to_bits(expected), to_bits(got), message);
+    for (int way = 0; way < 2; way++)
+        if (isnan(expected))
+            TEST_ASSERT_TRUE_MESSAGE(isnan(got[way]), message);
+        else
+            TEST_ASSERT_EQUAL_HEX32_MESSAGE(to_bits(expected), to_bits(got[way]), message);
 }
 
 static void test_any_three_bit_patterns(void) {
@@ -82,6 +84,17 @@ static void test_double_rounding_is_avoided(void) {
             assert_same(halfway, halfway, (float)sign * ldexpf(1, e));
             assert_same(-halfway, halfway, (float)sign * ldexpf(1, e));
         }
+}
+
+/* The same between two subnormal numbers, which lie farther apart than their last bits in a double say. */
+static void test_double_rounding_is_avoided_between_subnormals(void) {
+    const float a = ldexpf(1 + ldexpf(1, -23), -75), b = ldexpf(1 - ldexpf(1, -23), -75);
+    for (int k = -4; k < 4; k++) {
+        const float c = ldexpf(1, -127) + (float)k * ldexpf(1, -149);
+        assert_same(a, b, c); /* less than half a step above c, by 2^-196 */
+        assert_same(-a, b, c);
+        assert_same(a, b, -c);
+    }
 }
 
 /* Sums a few double roundings beside the middle between two float32: none may be moved onto it. */
