@@ -18,7 +18,7 @@
 #include "support/wrong_camera.h"
 
 enum { RUNS = PELORUS_SHORT_FORM ? 3 : 12, FRAMES = PELORUS_SHORT_FORM ? 100 : 200 };
-enum { REST = 4000 };
+enum { REST = PELORUS_SHORT_FORM ? 1000 : 4000 };
 enum { ERRORS = PLR_CALIBRATION_ERRORS, EVERYTHING = 63 };
 
 static double drawn[ERRORS]; /* what is to be corrected */

@@ -8,6 +8,7 @@
 #include "support/imu_rig.h"
 
 enum { SECOND = 10 /* frames */, READINGS_PER_SECOND = 400 };
+enum { SEEDS = PELORUS_SHORT_FORM ? 2 : 4 };
 
 void setUp(void) {
     imu_rig_set_up();
@@ -32,7 +33,7 @@ static void demand_recovery(const double hit_mps2[3], double seconds, unsigned a
                             double most_m) {
     static const double none[3] = {0};
     char what[80];
-    for (uint64_t seed = 1; seed <= 4; seed++) {
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         imu_rig_begin(IMU_RIG_GIVEN, seed);
         fly(4 * SECOND, none, 0);
         const unsigned frames = (unsigned)(seconds * SECOND) + 1;
