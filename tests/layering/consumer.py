@@ -46,8 +46,9 @@ def build_with_cmake(folder: Path, example: str, cmake: str, cc: str, get_peloru
     (folder / "CMakeLists.txt").write_text(
         CMAKE_LISTS.format(get_pelorus=get_pelorus), encoding="utf-8"
     )
-    run(cmake, "-S", folder, "-B", folder / "build", f"-DCMAKE_C_COMPILER={cc}")
-    run(cmake, "--build", folder / "build", "-j2")
+    options = (f"-DCMAKE_C_COMPILER={cc}", "-DCMAKE_C_FLAGS=-O0")
+    run(cmake, "-S", folder, "-B", folder / "build", *options)
+    run(cmake, "--build", folder / "build", "-j2", "--target", "example")
     return folder / "build/example"
 
 
@@ -57,7 +58,7 @@ def build_with_one_command(folder: Path, example: str, root: Path, cc: str) -> P
     (folder / "example.c").write_text(example, encoding="utf-8")
     sources = sorted((root / "src").glob("*/*.c"))
     run(
-        cc, "-std=c99", "-O2", "-DPLR_PORTABLE=1", "-ffp-contract=off", "-fno-math-errno",
+        cc, "-std=c99", "-O0", "-DPLR_PORTABLE=1", "-ffp-contract=off", "-fno-math-errno",
         f"-I{root / 'include'}", f"-I{root / 'src'}",
         folder / "example.c", *sources, "-o", folder / "example",
     )  # fmt: skip

@@ -118,7 +118,8 @@ def test_what_platformio_is_told_builds_the_library(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("installed")
-    options = ("-DPELORUS_BUILD_REPLAY=OFF", "-DPELORUS_BUILD_TESTS=OFF", "-DPLR_MAX_LANDMARKS=20")
+    options = [f"-D{part}=OFF" for part in ("PELORUS_BUILD_REPLAY", "PELORUS_BUILD_TESTS")]
+    options += ["-DPLR_MAX_LANDMARKS=20", "-DCMAKE_BUILD_TYPE=None", "-DCMAKE_C_FLAGS=-O0"]
     run("cmake", "-S", ROOT, "-B", folder / "b", *options, f"-DCMAKE_INSTALL_PREFIX={folder / 'p'}")
     run("cmake", "--build", folder / "b")
     run("cmake", "--install", folder / "b")
