@@ -29,7 +29,7 @@ import amalgamate
 ROOT = Path(__file__).resolve().parents[1]
 NATIVE = ROOT / "build/bin/pelorus-replay"
 COMMON = (
-    *("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=all", "-g0"),
+    *("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=all", "-g0"),
     *("-DPLR_MAX_LANDMARKS=256", "-DPLR_MAX_OBSERVATIONS=1024", "-DPLR_MAX_CALIBRATION=11"),
 )
 WARNINGS = ("-Wall", "-Wextra", "-Werror")
@@ -50,6 +50,7 @@ class Target:
     library: tuple[str, ...] = ()
     program: str = "pelorus-replay"
     runner: str = ""  # a program that runs it; empty: it runs as it is
+    level: int = 3  # of optimisation
 
     @property
     def windows(self) -> bool:
@@ -74,7 +75,8 @@ TARGETS = {
 
 def compile_to(output: Path, source: Path, target: Target, flags: Sequence[str]) -> None:
     """One file, linked where the output is no object."""
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target.triple, *COMMON, *flags]
+    zig = [sys.executable, "-m", "ziglang", "cc", "-target", target.triple]
+    command = [*zig, f"-O{target.level}", *COMMON, *flags]
     done = subprocess.run(
         [*command, str(source), "-o", str(output)], capture_output=True, text=True, check=False
     )

@@ -65,9 +65,8 @@ def run_wheel(*words: str | Path) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
-def make(tag: str, own: Path, work: Path, out: Path) -> Path:
-    """The wheel for the system of the tag."""
-    target = WHEELS[tag]
+def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
+    """The wheel for the system of the tag, out of this machine's own."""
     run_wheel("unpack", own, "--dest", work / "unpacked")
     (content,) = (work / "unpacked").iterdir()
     shutil.rmtree(content / NATIVE)
@@ -99,7 +98,7 @@ def main() -> int:
         own = pip_wheel(folder)
         for tag in given.tags or WHEELS:
             (work := folder / tag).mkdir()
-            made = make(tag, own, work, given.out)
+            made = make(tag, WHEELS[tag], own, work, given.out)
             print(f"{made}: {made.stat().st_size // 1024} KB", flush=True)
     return 0
 

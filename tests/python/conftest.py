@@ -6,6 +6,8 @@ from __future__ import annotations
 import fcntl
 import os
 import pickle
+import subprocess
+import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -85,6 +87,28 @@ def kept(once: Once) -> Callable[[str, Callable[[], Any]], Any]:
         return pickle.loads(path.read_bytes())
 
     return get
+
+
+@pytest.fixture(scope="session")
+def own_wheel(once: Once) -> Path:
+    """The package's wheel for this machine, from its source distribution, compiled quickly."""
+    pytest.importorskip("scikit_build_core")
+
+    def make(folder: Path) -> None:
+        source = f"from scikit_build_core.build import build_sdist; build_sdist({str(folder)!r})"
+        build = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation")
+        options = (
+            "--config-settings=cmake.define.CMAKE_C_FLAGS_RELEASE=-O1",
+            "--wheel-dir",
+            folder,
+        )
+        for words in (("-c", source), (*build, *options)):
+            command = [sys.executable, *words, *folder.glob("pelorus-*.tar.gz")]
+            done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+            assert done.returncode == 0, done.stderr
+
+    (wheel,) = once("own-wheel", make).glob("pelorus-*.whl")
+    return wheel
 
 
 @pytest.fixture

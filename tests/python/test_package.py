@@ -91,27 +91,10 @@ def test_a_plain_install_stays_small() -> None:
     assert 150e6 < total < MOST_BYTES - 6e6
 
 
-def built(folder: Path) -> Path:
-    """The wheel that the source distribution gives."""
-    make = f"from scikit_build_core.build import build_sdist; build_sdist({str(folder)!r})"
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
-    isolation = ["--no-build-isolation", "--wheel-dir", str(folder)]
-    for step in ([sys.executable, "-c", make], [*command, *isolation]):
-        sources = list(map(str, folder.glob("pelorus-*.tar.gz")))
-        done = subprocess.run(
-            [*step, *sources], capture_output=True, text=True, check=False, cwd=ROOT
-        )
-        assert done.returncode == 0, done.stderr
-    (wheel,) = folder.glob("pelorus-*.whl")
-    return wheel
-
-
-def test_every_command_works_from_the_wheel_alone(tmp_path: Path) -> None:
+def test_every_command_works_from_the_wheel_alone(own_wheel: Path, tmp_path: Path) -> None:
     """In an environment of its own, which sees the dependencies of this one and no checkout."""
-    pytest.importorskip("scikit_build_core")
-    wheel = built(tmp_path)
-    assert "-py3-none-" in wheel.name  # of no version of Python
-    packed = zipfile.ZipFile(wheel)
+    assert "-py3-none-" in own_wheel.name  # of no version of Python
+    packed = zipfile.ZipFile(own_wheel)
     assert sum(info.file_size for info in packed.infolist()) < 10e6
     environment = tmp_path / "environment"
     venv.create(environment, with_pip=False)

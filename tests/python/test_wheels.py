@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,9 @@ pytest.importorskip("ziglang")
 pytest.importorskip("wheel")
 pytest.importorskip("scikit_build_core")
 
-ROOT = Path(__file__).resolve().parents[2]
-TOOLS = ROOT / "tools"
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+import wheels
+
 NATIVE = ("pelorus-filter.dll", "pelorus-filter-f64.dll")
 PROGRAMS = ("pelorus-replay.exe", "pelorus-replay-f64.exe")
 # Loads a library, looks for each name that follows, and says its version.
@@ -49,11 +51,11 @@ def run(*command: str | Path, **variables: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(own_wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Compiled quickly: what it computes is for tools/cross.py."""
     folder = tmp_path_factory.mktemp("wheels")
-    run(sys.executable, TOOLS / "wheels.py", "--out", folder, "win_amd64")
-    (made,) = folder.glob("*.whl")
-    return made
+    target = replace(wheels.WHEELS["win_amd64"], level=1)
+    return wheels.make("win_amd64", target, own_wheel, folder, folder)
 
 
 @pytest.fixture(scope="module")
