@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
 from pelorus import foreign
@@ -115,6 +114,8 @@ def _fit(points: Floats, road: Floats) -> tuple[float, Floats, Floats]:
     """The smallest RMS distance over all planar motions, mirrored or not (axes have no sign), with
     the mirror and the motion that give it.
     """
+    from scipy.optimize import least_squares  # noqa: PLC0415 - loads slowly
+
     nearest = cKDTree(road)
 
     def distance(x: Floats, mirror: Floats) -> Floats:

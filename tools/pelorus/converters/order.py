@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtri
 
 from pelorus import arrays, foreign
 from pelorus.converters.bag import NS, Bag
@@ -183,4 +183,4 @@ def _are_two_drives(numbers: Floats) -> bool:
     near, far = (float(np.sum((np.diff(x, axis=0) / scale) ** 2)) for x in (numbers, numbers[::2]))
     far += float(np.sum((np.diff(numbers[1::2], axis=0) / scale) ** 2))
     count = len(numbers)
-    return near > float(fisher.isf(CHANCE, count, count)) * far
+    return near > float(fdtri(count, count, 1 - CHANCE)) * far
