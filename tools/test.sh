@@ -234,7 +234,7 @@ step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS"
     tests/python
 
 if [ $extent != quick ]; then
-    step 'build: sanitizers' build_preset debug "${strict[@]}" &&
+    step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
     # Another compiler, and without a fused multiply-add instruction. Every test is built, for its warnings;
     # the golden tests and the units are run. Where they compute the same bits, so would the long drives.
