@@ -114,7 +114,8 @@ ensure_python() {
     echo "Python environment: installing $(grep -c '^[a-zA-Z].*==' "$lock") pinned packages into .venv"
     rm -rf "$VENV"
     python3 -m venv "$VENV" || die 'python3 -m venv failed: install python3-venv'
-    "$VENV/bin/python" -m pip install --quiet --requirement "$lock" ||
+    # Python compiles a module when it is first imported; most of what is here never is.
+    "$VENV/bin/python" -m pip install --quiet --no-compile --requirement "$lock" ||
         die 'pip could not install tools/requirements.lock: is there a network?'
     # The sources as they are, without the library: that one comes from build/bin.
     "$VENV/bin/python" -m pip install --quiet --no-deps --no-build-isolation \

@@ -234,12 +234,13 @@ step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS"
     tests/python
 
 if [ $extent != quick ]; then
+    # Of these two nothing is installed, and no library built that nothing links.
     step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
     # Another compiler, and without a fused multiply-add instruction. Every test is built, for its warnings;
     # the golden tests and the units are run. Where they compute the same bits, so would the long drives.
-    step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_TEST_BLOCKS=OFF \
-        -DCMAKE_C_COMPILER="$clang" &&
+    step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_INSTALL=OFF \
+        -DPELORUS_TEST_BLOCKS=OFF -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
     beside 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the tests on emulated boards share. tests/target/run.sh builds what they need and calls them
 with --boards (every test is asked of each), --robot (the firmware's build folder) and --desktop
-(the build folder of a desktop's replay with the boards' capacities).
+(the build folder of the desktop's replay, which is given the boards' slots).
 """
 
 from __future__ import annotations

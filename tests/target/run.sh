@@ -35,22 +35,13 @@ build_firmware() {
     build_robot "${targets[@]}"
 }
 
-# A replay with the boards' capacities, compiled fast: its drives are short. That gcc -O2, gcc -O3, clang and a
-# build without fused multiply-add compute the same bits at the desk is for tests/golden.
-DESKTOP=$ROBOT/desktop
-build_desktop() {
-    cmake -S "$ROOT" -B "$DESKTOP" -DCMAKE_BUILD_TYPE=None -DCMAKE_C_FLAGS=-O1 -DPELORUS_DESKTOP_LANDMARKS=32 \
-        -DPELORUS_DESKTOP_OBSERVATIONS=128 -DPELORUS_BUILD_TESTS=OFF -DPELORUS_INSTALL=OFF &&
-        cmake --build "$DESKTOP" -j "$JOBS" --target pelorus-replay pelorus-replay-f64
-}
-
 # One queue for the tests of all boards. One process more than processors, for some tests wait for silence.
 # CI: pytest cuts no reason short.
 test_boards() {
     CI=true timeout "$BOARD_SECONDS" "$VENV/bin/python" -m pytest -rfEs -q -p no:cacheprovider \
         -n $((JOBS + 1)) --maxschedchunk 1 --durations 20 \
         "$ROOT/tests/target" --boards "${BOARDS[@]}" --robot "$ROBOT" \
-        --desktop "$DESKTOP" "${long[@]}" >"$OUTPUT" 2>&1
+        --desktop "$ROOT/build" "${long[@]}" >"$OUTPUT" 2>&1
     local status=$?
     [ $status -eq 124 ] && echo "1 failed in $BOARD_SECONDS s: the time is up" >>"$OUTPUT"
     return $status
@@ -69,11 +60,11 @@ ensure_python
 prefer_ninja
 mkdir -p "$LOGS"
 
-heading 'Building firmware, and the desktop (build/robot)'
+heading 'Building firmware (build/robot), and the desktop (build)'
 "$VENV/bin/python" "$ROOT/tests/target/recordings.py" "$ROBOT/recordings" "${long[@]}" \
     >"$LOGS/target-recordings.log" 2>&1 &
 recordings=$!
-if ! { build_firmware && build_desktop; } >"$LOGS/target-build.log" 2>&1; then
+if ! { build_firmware && build_replays release; } >"$LOGS/target-build.log" 2>&1; then
     tail -40 "$LOGS/target-build.log"
     die 'the build failed: the whole of it is in build-logs/target-build.log'
 fi
