@@ -234,6 +234,12 @@ step 'test: Python' env CI=true "$VENV/bin/python" -m pytest -q -rfEs -n "$JOBS"
     tests/python
 
 if [ $extent != quick ]; then
+    # Beside the builds and tests that follow: some tests on emulated boards wait for silence.
+    beside 'microcontroller' tests/target/run.sh
+    systems=(linux-aarch64 windows-x86_64 macos-aarch64 wasi-relaxed) # one of each kind; all of them take minutes
+    [ $extent = long ] && systems=()
+    beside 'same bits on other systems' "$VENV/bin/python" tools/cross.py "${systems[@]}"
+
     # Of these two nothing is installed, and no library built that nothing links.
     step 'build: sanitizers' build_preset debug "${strict[@]}" -DPELORUS_INSTALL=OFF &&
         step 'test: sanitizers' run_ctest build-debug --label-exclude sources # they are the same sources
@@ -242,17 +248,11 @@ if [ $extent != quick ]; then
     step 'build: clang, portable' build_preset portable "${strict[@]}" -DPELORUS_INSTALL=OFF \
         -DPELORUS_TEST_BLOCKS=OFF -DCMAKE_C_COMPILER="$clang" &&
         step 'test: clang, portable' run_ctest build-portable --label-regex '^(unit|golden|symbols)$'
-    beside 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
+    step 'same bits from every build' "$VENV/bin/python" tests/golden/same_bits.py \
         build build-clang build-portable build-o2
-    systems=(linux-aarch64 windows-x86_64 macos-aarch64 wasi-relaxed) # one of each kind; all of them take minutes
-    [ $extent = long ] && systems=()
-    beside 'same bits on other systems' "$VENV/bin/python" tools/cross.py "${systems[@]}"
     if [ $extent = long ] && step 'build: libFuzzer' build_fuzz "$clang"; then
         step 'fuzz the reader' fuzz 120 fuzz_reader tests/fuzz/corpus 4096
         step 'fuzz the session' fuzz 300 fuzz_session tests/fuzz/corpus_session 8192
-    fi
-    if [ -x tests/target/run.sh ]; then
-        step 'microcontroller' tests/target/run.sh
     fi
     joined
 fi
