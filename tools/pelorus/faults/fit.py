@@ -84,9 +84,10 @@ class Fit:
         weight = np.ones(count)
         X_rows, Z_rows = (c.reshape(-1, c.shape[2]) for c in (X, Z))
         exact = np.flatnonzero((Z_rows[:, : X.shape[2]] == X_rows).all(axis=0))
+        halves = _halves(Z, X)
         for _ in range(ROUNDS):
             trust = weight[:, None] / (variance + extra)
-            told = _told_by_others(Z, X, trust, exact)
+            told = _told_by_others(halves, trust, exact)
             trusted = told.reshape(X_rows.shape) * trust.reshape(-1, 1)
             A = trusted.T @ X_rows + prior
             x = np.linalg.solve(A, trusted.T @ y.ravel())
@@ -210,18 +211,27 @@ def _within(Z: Floats, X: Floats) -> Floats:
     return np.where(own, Z, np.clip(Z, low[:, of], high[:, of]))
 
 
-def _told_by_others(Z: Floats, X: Floats, trust: Floats, exact: NDArray[np.intp]) -> Floats:
-    """(k, a, m) what the instruments tell of each column of X, by what goes with what in the other
-    pieces of the drive, which take turns: fitted where it is used, many instruments that know
-    nothing would each explain a little of the column's own noise, and seem to tell something
-    (Angrist, Imbens and Krueger 1999).
-    """
+def _halves(Z: Floats, X: Floats) -> list[tuple[NDArray[np.bool_], Floats, Floats]]:
+    """Which rows are of the pieces of the drive that take turns, and what they hold."""
     piece = np.arange(len(X)) // PIECE_FRAMES % 2
-    told = np.empty_like(X)
-    for own, others in ((0, 1), (1, 0)):
-        of_Z, of_X = (c[piece == others].reshape(-1, c.shape[2]) for c in (Z, X))
-        trusted = of_Z * trust[piece == others].reshape(-1, 1)
-        told[piece == own] = Z[piece == own] @ _first_stage(trusted, of_Z, of_X, exact)
+    return [(piece == own, Z[piece == own], X[piece == own]) for own in (0, 1)]
+
+
+def _told_by_others(
+    halves: list[tuple[NDArray[np.bool_], Floats, Floats]],
+    trust: Floats,
+    exact: NDArray[np.intp],
+) -> Floats:
+    """(k, a, m) what the instruments tell of each column of X, by what goes with what in the other
+    pieces of the drive: fitted where it is used, many instruments that know nothing would each
+    explain a little of the column's own noise, and seem to tell something (Angrist, Imbens and
+    Krueger 1999).
+    """
+    told = np.empty((*trust.shape, halves[0][2].shape[2]))
+    for (here, Z, _), (there, *others) in (halves, halves[::-1]):
+        of_Z, of_X = (c.reshape(-1, c.shape[2]) for c in others)
+        trusted = of_Z * trust[there].reshape(-1, 1)
+        told[here] = Z @ _first_stage(trusted, of_Z, of_X, exact)
     return told
 
 
@@ -233,8 +243,9 @@ def _first_stage(trusted: Floats, Z: Floats, X: Floats, exact: NDArray[np.intp])
     told_by = np.setdiff1d(np.arange(Z.shape[1]), exact)
     stage = np.zeros((Z.shape[1], X.shape[1]))
     stage[exact, exact] = 1.0
-    size = np.sqrt(np.sum(trusted[:, told_by] * Z[:, told_by], axis=0)) + 1e-12
-    half = trusted[:, told_by] / size
-    of_Z = half.T @ (Z[:, told_by] / size) + RIDGE * np.eye(len(told_by))
+    trusted, Z = trusted[:, told_by], Z[:, told_by]
+    size = np.sqrt(np.sum(trusted * Z, axis=0)) + 1e-12
+    half = trusted / size
+    of_Z = half.T @ (Z / size) + RIDGE * np.eye(len(told_by))
     stage[np.ix_(told_by, others)] = np.linalg.solve(of_Z, half.T @ X[:, others]) / size[:, None]
     return stage
