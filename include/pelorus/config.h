@@ -165,10 +165,6 @@ typedef double plr_real;
  * every finite input and for infinities; a NaN results in a NaN. */
 float plr_fmaf_exact(float a, float b, float c);
 
-/* A function that few frames need: it is compiled to be small, even where the others of its file are
- * compiled to be fast. */
-#define PLR_SELDOM __attribute__((cold))
-
 /* The same, fast. The product is exact in double. Rounding the sum to double and then to float32 is
  * wrong only if the double lies halfway between two float32 (docs/NUMERICS.md, 8): for a normal result
  * its last 29 bits then are 1 and zeros. Subnormal ones are left to the long way. */
@@ -181,6 +177,10 @@ static inline float plr_fmaf_portable(float a, float b, float c) {
         return plr_fmaf_exact(a, b, c);
     return (float)sum;
 }
+
+/* A function that few frames need: it is compiled to be small, even where the others of its file are
+ * compiled to be fast. */
+#define PLR_SELDOM __attribute__((cold))
 
 /* A constant in the filter's precision. */
 #define PLR_R(x) ((plr_real)(x))
