@@ -13,7 +13,7 @@ set(PLR_BLOCK_OBSERVATIONS 8 CACHE STRING
 set(PLR_MAX_CALIBRATION 5 CACHE STRING
   "Most numbers of the calibration that can be estimated, 0 to 11; on the desk 11")
 option(PLR_SUPERVISE "With src/supervise; OFF: the estimator alone, for who has a supervisor of his own" ON)
-option(PLR_KNOWN_MAP "With src/known_map; OFF: the map source is never asked" ON)
+option(PLR_KNOWN_MAP "With src/known_map; OFF: known-map and localization are refused" ON)
 option(PLR_PORTABLE
   "Exact fused multiply-add in software: runs on any processor, slower, the same bits" OFF)
 

@@ -70,7 +70,8 @@ extern "C" {
 #define PLR_MAX_CALIBRATION 5
 #endif
 
-/* 1 (default) or 0. 0: without src/known_map, which is then not compiled: the map source is never asked. */
+/* 1 (default) or 0. 0: without src/known_map, which is then not compiled: known-map and localization are
+ * refused. */
 #ifndef PLR_KNOWN_MAP
 #define PLR_KNOWN_MAP 1
 #endif

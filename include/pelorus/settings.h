@@ -90,7 +90,8 @@ typedef enum plr_calibrate {
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
  * in the model `body`; the independent landmark_prior without landmark_sigma_m; track_drift_px
  * in the model `world`; the process IMU in the model `world`, or without `bias`; a part of
- * the calibration in `calibrate` whose sigma is 0, or more parts than the build has room for. */
+ * the calibration in `calibrate` whose sigma is 0, or more parts than the build has room for; known landmarks
+ * or scene may-move where the build has no PLR_KNOWN_MAP or PLR_SUPERVISE. */
 typedef struct plr_config {
     /* Setting model: one of plr_model_kind, default PLR_MODEL_BODY. */
     uint8_t model;
@@ -423,6 +424,10 @@ void plr_config_course(plr_config *config);
  * outside their limits, and the combinations listed above plr_config; *culprit is then the row to
  * change. PLR_E_ARGUMENT: no config. */
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit);
+
+/* Why plr_config_check refuses it, for a person: "needs model = body and bias = on"; NULL: it does not.
+ * *culprit as there. */
+const char *plr_config_why(const plr_config *config, const plr_setting **culprit);
 
 #ifdef __cplusplus
 }

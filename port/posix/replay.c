@@ -70,8 +70,16 @@ static void on_frame(void *context, const plr_frame_result *result) {
     complaints_observations(&run->complaints, run->session.totals.stereos, result->report);
 }
 
+static bool was_rejected(const replay *run) {
+    return run->session.phase == PLR_PHASE_REJECTED && run->outcome.init_status == PLR_OK;
+}
+
 static void on_text(void *context, const plr_text *text) {
     replay *run = context;
+    if (was_rejected(run)) { /* told at the end */
+        snprintf(run->outcome.contradiction, sizeof run->outcome.contradiction, "%s", text->text);
+        return;
+    }
     if (text->severity != PLR_SEVERITY_INFO)
         run->summary.warnings++;
     progress_clear(&run->progress);
@@ -113,10 +121,8 @@ static void on_refused_state(replay *run, plr_time_ns t_ns, plr_status status) {
 static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_status status,
                        const plr_setting *culprit) {
     replay *run = context;
-    if (run->session.phase == PLR_PHASE_REJECTED && run->outcome.init_status == PLR_OK) {
+    if (was_rejected(run)) {
         run->outcome.init_status = status; /* told at the end */
-        if (culprit != NULL)
-            snprintf(run->outcome.culprit, sizeof run->outcome.culprit, "%s", culprit->name);
         return;
     }
     progress_clear(&run->progress);
@@ -333,9 +339,10 @@ static int print_settings(const replay_options *options) {
     for (unsigned i = 0; i < options->override_count; i++)
         (void)plr_config_set(&config, plr_setting_by_id(options->overrides[i].id),
                              options->overrides[i].value);
-    if (plr_config_check(&config, &culprit) != PLR_OK) {
-        fprintf(stderr, PELORUS_NAME ": the settings make no sense together: change %s\n",
-                culprit != NULL ? culprit->name : "one of them");
+    const char *why = plr_config_why(&config, &culprit);
+    if (why != NULL) {
+        fprintf(stderr, PELORUS_NAME ": the settings make no sense together: %s: %s\n",
+                culprit->name, why);
         return REPLAY_EXIT_USAGE;
     }
     config_file_print(&config);

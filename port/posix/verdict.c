@@ -13,12 +13,12 @@ int verdict_say(const char *path, int status, const char *words) {
 }
 
 static int explain_no_start(const char *path, const outcome *run) {
-    char words[256];
+    char words[400];
     if (run->init_status == PLR_E_CONFIG) {
         snprintf(words, sizeof words,
-                 "the settings in force make no sense together: change %.64s (--print-config shows "
-                 "them, --help their limits)",
-                 run->culprit[0] != '\0' ? run->culprit : "one of them");
+                 "the settings in force make no sense together: %s (--print-config shows them, "
+                 "--help their limits)",
+                 run->contradiction);
         return verdict_say(path, REPLAY_EXIT_USAGE, words);
     }
     snprintf(words, sizeof words, "HEADER: %.200s", plr_status_text(run->init_status));

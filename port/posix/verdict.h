@@ -13,7 +13,7 @@ typedef struct outcome {
     bool future;              /* a HEADER of a later version */
     const char *read_problem; /* why reading failed; NULL where all was read */
     plr_status init_status;   /* why the filter did not start */
-    char culprit[64];         /* setting to change, "" where it is not one */
+    char contradiction[256];  /* which setting makes no sense, and why */
     bool foreign_map;         /* the map of --map-in is in another frame */
     char map_problem[PROBLEM_SIZE];
 } outcome;

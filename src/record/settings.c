@@ -41,6 +41,12 @@ static const plr_row rows[] = {
 };
 #undef SETTING
 
+/* A macro's value, as text. */
+#define PLR_TEXT_OF(value) PLR_TEXT(value)
+#define PLR_TEXT(value)    #value
+
+#define NO_KNOWN_MAP "this build knows no map: build it with PLR_KNOWN_MAP = 1"
+
 enum { COUNT = sizeof rows / sizeof *rows, AXES = 3 };
 
 unsigned plr_setting_count(void) {
@@ -171,60 +177,90 @@ void plr_config_course(plr_config *config) {
     config->max_depth_m = 30;      /* ours as well */
 }
 
-static plr_status refuse(const plr_setting **culprit, const plr_setting *setting) {
-    if (culprit)
-        *culprit = setting;
-    return PLR_E_CONFIG;
+/* Of each part of the calibration, by the bits of plr_calibrate: its sigma, and how many numbers it is. */
+static const char *const part_sigmas[] = {"focal-sigma",        "baseline-sigma",
+                                          "camera-turn-sigma",  "centre-sigma",
+                                          "camera-place-sigma", "camera-clock-sigma"};
+static const uint8_t part_numbers[] = {1, 1, 3, 2, 3, 1};
+enum { PARTS = sizeof part_numbers };
+
+static bool is_exact(const plr_config *config, unsigned part) {
+    return plr_config_get(config, plr_setting_by_name(part_sigmas[part])) <= 0;
 }
 
-/* A part of the calibration that shall be estimated and counts as exact; or the list itself, where it
- * is longer than the build allows. */
-static const plr_setting *refused_calibration(const plr_config *config) {
-    static const char *const sigmas[] = {"focal-sigma",        "baseline-sigma",
-                                         "camera-turn-sigma",  "centre-sigma",
-                                         "camera-place-sigma", "camera-clock-sigma"};
-    static const uint8_t numbers[] = {1, 1, 3, 2, 3, 1}; /* by the bits of plr_calibrate */
+/* The sigma of a part that shall be estimated and counts as exact; NULL: none. */
+static const char *exact_and_estimated(const plr_config *config) {
+    for (unsigned i = 0; i < PARTS; i++)
+        if ((config->calibrate >> i & 1) != 0 && is_exact(config, i))
+            return part_sigmas[i];
+    return NULL;
+}
+
+static bool has_room_for_calibration(const plr_config *config) {
     unsigned estimated = 0, all = 0;
-    for (unsigned i = 0; i < sizeof numbers; i++) {
-        const plr_setting *setting = plr_setting_by_name(sigmas[i]);
-        const bool listed = (config->calibrate >> i & 1) != 0;
-        const bool exact = plr_config_get(config, setting) <= 0;
-        if (listed && exact)
-            return setting;
-        estimated += listed ? numbers[i] : 0U;
-        all += exact ? 0U : numbers[i];
+    for (unsigned i = 0; i < PARTS; i++) {
+        estimated += (config->calibrate >> i & 1) != 0 ? part_numbers[i] : 0U;
+        all += is_exact(config, i) ? 0U : part_numbers[i];
     }
-    return estimated > PLR_MAX_CALIBRATION || all > PLR_CALIBRATIONS
-               ? plr_setting_by_name("calibrate")
-               : NULL;
+    return estimated <= PLR_MAX_CALIBRATION && all <= PLR_CALIBRATIONS;
+}
+
+/* The first combination of values, each within its limits, that no filter takes: why; NULL: none. */
+static const char *contradiction(const plr_config *c, const char **culprit) {
+    const bool body = c->model == PLR_MODEL_BODY, independent = c->landmark_prior != 0;
+    const char *exact = exact_and_estimated(c);
+    const struct {
+        bool refused;
+        const char *setting, *why;
+    } rules[] = {
+        {body && c->landmark_sigma_m > 0, "landmark-sigma",
+         "model = body knows a landmark by its pixels alone: 0, or model = world"},
+        {!body && c->track_drift_px > 0, "track-drift",
+         "goes with model = body alone; elsewhere 0"},
+        {independent && body, "landmark-prior", "independent goes with model = world alone"},
+        {independent && c->landmark_sigma_m <= 0, "landmark-sigma",
+         "landmark-prior = independent needs one above 0"},
+        {c->process == PLR_PROCESS_IMU && (!body || !c->bias), "process",
+         "imu needs model = body and bias = on"},
+        {exact != NULL, exact, "calibrate lists what it belongs to, so it must be above 0"},
+        {!has_room_for_calibration(c), "calibrate",
+         "more numbers of the calibration are to be estimated, or have a sigma, than this build "
+         "has room for: build it with PLR_MAX_CALIBRATION above " PLR_TEXT_OF(
+             PLR_MAX_CALIBRATION) ", up to 11"},
+        {!PLR_KNOWN_MAP && c->mode == PLR_MODE_LOCALIZATION, "mode", NO_KNOWN_MAP},
+        {!PLR_KNOWN_MAP && c->known_map, "known-map", NO_KNOWN_MAP},
+        {!PLR_SUPERVISE && c->scene != PLR_SCENE_STANDS, "scene",
+         "this build has no supervisor: build it with PLR_SUPERVISE = 1"},
+        {c->min_depth_m >= c->max_range_m, "min-depth", "must be below max-range"},
+        {c->max_depth_m > 0 && c->min_depth_m >= c->max_depth_m, "max-depth",
+         "must be above min-depth, or 0 for no limit"},
+    };
+    for (unsigned i = 0; i < sizeof rules / sizeof *rules; i++)
+        if (rules[i].refused) {
+            *culprit = rules[i].setting;
+            return rules[i].why;
+        }
+    return NULL;
+}
+
+const char *plr_config_why(const plr_config *config, const plr_setting **culprit) {
+    const char *name = NULL, *why;
+    *culprit = NULL;
+    for (unsigned i = 0; i < COUNT; i++)
+        if (!is_allowed(&rows[i].setting, plr_config_get(config, &rows[i].setting))) {
+            *culprit = &rows[i].setting;
+            return "outside its limits";
+        }
+    why = contradiction(config, &name);
+    if (why)
+        *culprit = plr_setting_by_name(name);
+    return why;
 }
 
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit) {
+    const plr_setting *found = NULL;
+    const char *why = config ? plr_config_why(config, &found) : NULL;
     if (culprit)
-        *culprit = NULL;
-    if (!config)
-        return PLR_E_ARGUMENT;
-    for (unsigned i = 0; i < COUNT; i++)
-        if (!is_allowed(&rows[i].setting, plr_config_get(config, &rows[i].setting)))
-            return refuse(culprit, &rows[i].setting);
-    if (config->model == PLR_MODEL_BODY && config->landmark_sigma_m > 0)
-        return refuse(culprit, plr_setting_by_name("landmark-sigma"));
-    if (config->model == PLR_MODEL_WORLD && config->track_drift_px > 0)
-        return refuse(culprit, plr_setting_by_name("track-drift"));
-    if (config->landmark_prior == PLR_PRIOR_INDEPENDENT) {
-        if (config->model == PLR_MODEL_BODY)
-            return refuse(culprit, plr_setting_by_name("landmark-prior"));
-        if (config->landmark_sigma_m <= 0)
-            return refuse(culprit, plr_setting_by_name("landmark-sigma"));
-    }
-    if (config->process == PLR_PROCESS_IMU && (config->model != PLR_MODEL_BODY || !config->bias))
-        return refuse(culprit, plr_setting_by_name("process"));
-    const plr_setting *calibrated = refused_calibration(config);
-    if (calibrated)
-        return refuse(culprit, calibrated);
-    if (config->min_depth_m >= config->max_range_m)
-        return refuse(culprit, plr_setting_by_name("min-depth"));
-    if (config->max_depth_m > 0 && config->min_depth_m >= config->max_depth_m)
-        return refuse(culprit, plr_setting_by_name("max-depth"));
-    return PLR_OK;
+        *culprit = found;
+    return !config ? PLR_E_ARGUMENT : why ? PLR_E_CONFIG : PLR_OK;
 }

@@ -138,15 +138,27 @@ static void warn_about(plr_session *s, const plr_config *config) {
             "before the data");
 }
 
-static plr_status init_filter(plr_session *s, const plr_setting **culprit) {
+/* Which setting makes no sense, and why: the REPORT that follows has no words for it. */
+static void tell_contradiction(plr_session *s, const plr_config *config) {
+    const plr_setting *culprit;
+    const char *why = plr_config_why(config, &culprit);
+    if (why == NULL)
+        return;
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR);
+    plr_line_text(&s->out.as.text, culprit->name);
+    plr_line_text(&s->out.as.text, ": ");
+    plr_line_text(&s->out.as.text, why);
+    plr_send_text(s);
+}
+
+static plr_status init_filter(plr_session *s, plr_config *config, const plr_setting **culprit) {
     const plr_layers layers = {&s->header, &s->wanted, s->options.overrides,
                                s->options.override_count};
-    plr_config config;
-    plr_status status = plr_layers_compose(&config, &layers, culprit);
+    plr_status status = plr_layers_compose(config, &layers, culprit);
     if (status != PLR_OK)
         return status;
-    const plr_map map = {s, send_evicted, asks_for_known(&config) ? find_known : NULL};
-    status = plr_filter_init(&s->filter, &s->header.calibration, &config, &map);
+    const plr_map map = {s, send_evicted, asks_for_known(config) ? find_known : NULL};
+    status = plr_filter_init(&s->filter, &s->header.calibration, config, &map);
     if (status == PLR_OK && s->options.left_out != 0)
         status = plr_filter_leave_out(&s->filter, s->options.left_out);
     return status;
@@ -155,9 +167,11 @@ static plr_status init_filter(plr_session *s, const plr_setting **culprit) {
 plr_status plr_start_filter(plr_session *s) {
     PLR_ASSERT(s->phase == PLR_PHASE_READY);
     const plr_setting *culprit = NULL;
-    const plr_status status = init_filter(s, &culprit);
+    plr_config config;
+    const plr_status status = init_filter(s, &config, &culprit);
     if (status != PLR_OK) {
         plr_phase_change(&s->phase, PLR_EVENT_REJECTED);
+        tell_contradiction(s, &config);
         plr_send_refusal(s, status == PLR_E_CONFIG ? PLR_KIND_CONFIG : PLR_KIND_HEADER, 0, status,
                          culprit);
     }

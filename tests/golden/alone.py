@@ -4,7 +4,7 @@
 usage: alone.py REPLAY REPLAY-ALONE
 
 Alone: PLR_SUPERVISE=0, PLR_KNOWN_MAP=0, PLR_MAX_CALIBRATION=0. On the golden drives, where nothing
-goes wrong, each pose is the same to the bit.
+goes wrong, each pose is the same to the bit. What it is asked for and does not have, it names.
 """
 
 from __future__ import annotations
@@ -15,6 +15,12 @@ import tempfile
 from pathlib import Path
 
 DRIVES = ("drive.plr", "imu.plr")
+LACKS = {
+    ("--calibrate", "focal"): "PLR_MAX_CALIBRATION",
+    ("--known-map", "on"): "PLR_KNOWN_MAP",
+    ("--mode", "localization"): "PLR_KNOWN_MAP",
+    ("--scene", "may-move"): "PLR_SUPERVISE",
+}
 
 
 def trajectory(replay: str, drive: Path) -> bytes:
@@ -36,6 +42,11 @@ def main() -> None:
         if trajectory(alone, drive) != poses:
             sys.exit(f"{name}: the estimator alone goes another way than the whole filter")
         print(f"{name}: the same to the bit")
+    for asked, option in LACKS.items():
+        command = [alone, "--print-config", *asked]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode == 0 or option not in done.stderr:
+            sys.exit(f"{' '.join(asked)}: is not refused, or does not say {option}: {done.stderr}")
 
 
 main()

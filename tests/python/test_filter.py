@@ -177,7 +177,7 @@ CONFIGS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("gate-d2 'wide': a number", {"gate-d2": "wide"}),
     ("pixel-sigma is one number, not three", {"pixel-sigma": (1, 2, 3)}),
     ("velocity-sigma: .* of shape .2,.; numbers of shape .3,.", {"velocity-sigma": (1, 2)}),
-    ("process: it contradicts another setting", {"process": "imu", "bias": False}),
+    ("process: imu needs model = body and bias = on", {"process": "imu", "bias": False}),
 )
 
 

@@ -72,6 +72,7 @@ static void test_a_config_value_out_of_limits_is_refused_by_name_and_the_rest_ta
 }
 
 static void test_settings_that_contradict_refuse_the_data_until_they_are_mended(void) {
+    plr_message answer;
     desk_begin_drive();
     desk_send(drive_config("landmark-sigma", 1)); /* body takes it from the pixels */
     desk_send(drive_twist(0));
@@ -80,6 +81,9 @@ static void test_settings_that_contradict_refuse_the_data_until_they_are_mended(
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, refused_status);
     TEST_ASSERT_NOT_NULL(refused_setting);
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_REJECTED, session.phase);
+    TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_TEXT, &answer));
+    TEST_ASSERT_EQUAL_UINT8(PLR_SEVERITY_ERROR, answer.as.text.severity);
+    TEST_ASSERT_NOT_NULL(strstr(answer.as.text.text, "landmark-sigma: model = body"));
     desk_send(drive_config("landmark-sigma", 0));
     desk_send(drive_twist(0.1));
     desk_run();

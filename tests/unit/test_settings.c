@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* The table of settings: names, numbers, limits, and what it refuses. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
@@ -233,6 +234,8 @@ static void demand_culprit(const char *name) {
     TEST_ASSERT_NOT_NULL(culprit);
     TEST_ASSERT_EQUAL_STRING(name, culprit->name);
     TEST_ASSERT_EQUAL_INT(PLR_E_CONFIG, plr_config_check(&config, NULL));
+    TEST_ASSERT_NOT_NULL(plr_config_why(&config, &culprit));
+    TEST_ASSERT_EQUAL_STRING(name, culprit->name);
 }
 
 static void test_the_check_names_the_field_that_is_wrong(void) {
@@ -289,6 +292,47 @@ static void test_an_independent_prior_needs_world_and_a_sigma_of_its_own(void) {
     demand_culprit("landmark-sigma"); /* from the pixels alone it would be far too sure */
     config.landmark_sigma_m = 1;
     TEST_ASSERT_EQUAL_INT(PLR_OK, plr_config_check(&config, NULL));
+}
+
+static void demand_words(const char *words) {
+    const plr_setting *culprit;
+    const char *why = plr_config_why(&config, &culprit);
+    TEST_ASSERT_NOT_NULL(why);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, words), why);
+}
+
+static void test_calibrate_beyond_the_builds_room_names_the_room(void) {
+    const plr_setting *culprit;
+    char room[48];
+    snprintf(room, sizeof room, "PLR_MAX_CALIBRATION above %d,", PLR_MAX_CALIBRATION);
+    config.calibrate = 63; /* 11 numbers */
+    config.centre_sigma_px = 1;
+    config.camera_place_sigma_m = 0.01;
+    config.camera_clock_sigma_s = 0;
+    demand_culprit("camera-clock-sigma");
+    demand_words("above 0");
+    config.camera_clock_sigma_s = 0.01;
+    if (PLR_MAX_CALIBRATION >= 11) {
+        TEST_ASSERT_NULL(plr_config_why(&config, &culprit));
+        return;
+    }
+    demand_culprit("calibrate");
+    demand_words(room);
+}
+
+static void test_an_option_that_a_build_lacks_is_named(void) {
+    const plr_setting *culprit;
+    config.known_map = 1;
+    if (PLR_KNOWN_MAP)
+        TEST_ASSERT_NULL(plr_config_why(&config, &culprit));
+    else
+        demand_words("PLR_KNOWN_MAP = 1");
+    setUp();
+    config.scene = PLR_SCENE_MAY_MOVE;
+    if (PLR_SUPERVISE)
+        TEST_ASSERT_NULL(plr_config_why(&config, &culprit));
+    else
+        demand_words("PLR_SUPERVISE = 1");
 }
 
 static void test_the_check_wants_a_config(void) {

@@ -198,12 +198,9 @@ class Filter:
 
     def _check_config(self) -> None:
         culprit = c.POINTER(native.Setting)()
-        status = self._c.config_check(self._config, c.byref(culprit))
-        if status != 0:
-            raise PelorusError(
-                f"config: {culprit[0].name.decode()}: it contradicts another setting; which ones "
-                "cannot stand together is said above plr_config in include/pelorus/settings.h"
-            )
+        why = self._c.config_why(self._config, c.byref(culprit))
+        if why is not None:
+            raise PelorusError(f"config: {culprit[0].name.decode()}: {why.decode()}")
 
     def setting(self, name: str) -> float:
         """The value in force; of a choice its number."""

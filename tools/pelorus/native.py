@@ -400,7 +400,7 @@ OTHER_SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
     ("plr_config_default", None, (_VOID,)),
     ("plr_config_set", c.c_int, (_VOID, _VOID, c.c_double)),
     ("plr_config_get", c.c_double, (_VOID, _VOID)),
-    ("plr_config_check", c.c_int, (_VOID, c.POINTER(c.POINTER(Setting)))),
+    ("plr_config_why", c.c_char_p, (_VOID, c.POINTER(c.POINTER(Setting)))),
     ("plr_version", c.c_char_p, ()),
     ("plr_status_text", c.c_char_p, (c.c_int,)),
     ("plr_build_fingerprint", c.c_uint32, ()),
