@@ -201,6 +201,11 @@ void plr_session_options_default(plr_session_options *options);
 plr_status plr_session_init_sized(plr_session *s, const plr_port *port,
                                   const plr_session_options *options, const plr_sizes *caller);
 
+/* The settings that a session begins with: those of *wanted over what the HEADER suggests over
+ * the defaults. PLR_E_CONFIG, with the row in *culprit, NULL if none has its id: the result makes no sense. */
+plr_status plr_session_settings(plr_config *config, const plr_header *header,
+                                const plr_config_message *wanted, const plr_setting **culprit);
+
 /* Prepares a session. Port and options are copied; what they point to is not.
  * PLR_E_ARGUMENT a null pointer or a port without read; PLR_E_CONFIG an override that no setting
  * allows; PLR_E_SIZE the caller was compiled with other sizes: nothing is written. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "pelorus/pelorus.h"
+#include "pelorus/session.h"
 #include "posix/processor.h"
 
 #define SIZE(type)                                                                                 \
@@ -41,6 +42,21 @@ uint32_t plr_binding_size_of(const char *name) {
         if (strcmp(table[i].name, name) == 0)
             return table[i].size;
     return 0;
+}
+
+plr_status plr_binding_settings(plr_config *config, const uint8_t *bytes, size_t n,
+                                const plr_setting **culprit) {
+    uint8_t buffer[PLR_WIRE_MIN_BUFFER];
+    plr_reader reader;
+    plr_message header, wanted;
+    size_t taken = 0, more = 0;
+    if (plr_reader_init(&reader, buffer, sizeof buffer, NULL, 0) != PLR_OK ||
+        plr_reader_feed(&reader, bytes, n, &taken, &header) != PLR_READ_MESSAGE ||
+        header.kind != PLR_KIND_HEADER ||
+        plr_reader_feed(&reader, bytes + taken, n - taken, &more, &wanted) != PLR_READ_MESSAGE ||
+        wanted.kind != PLR_KIND_CONFIG)
+        return PLR_E_ARGUMENT;
+    return plr_session_settings(config, &header.as.header, &wanted.as.config, culprit);
 }
 
 const char *plr_binding_processor_lacks(void) {

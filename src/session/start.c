@@ -151,6 +151,12 @@ static void tell_contradiction(plr_session *s, const plr_config *config) {
     plr_send_text(s);
 }
 
+plr_status plr_session_settings(plr_config *config, const plr_header *header,
+                                const plr_config_message *wanted, const plr_setting **culprit) {
+    const plr_layers layers = {header, wanted, NULL, 0};
+    return plr_layers_compose(config, &layers, culprit);
+}
+
 static plr_status init_filter(plr_session *s, plr_config *config, const plr_setting **culprit) {
     const plr_layers layers = {&s->header, &s->wanted, s->options.overrides,
                                s->options.override_count};

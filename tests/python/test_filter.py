@@ -18,16 +18,18 @@ from hypothesis.extra import numpy as arrays
 from pelorus import Calibration, Filter, FilterError, KnownLandmark, PelorusError, native
 from pelorus import observations as frame_of
 from pelorus.cli import main
-from pelorus.frames import Config, Header, Message, Pose, Stereo, Truth, Twist
+from pelorus.frames import Camera, Config, Header, Message, Noise, Pose, Stereo, Truth, Twist
 from pelorus.layout import Floats
 from pelorus.native import Precision
-from pelorus.schema import SETTINGS
-from pelorus.wire import messages_of
+from pelorus.schema import DEFAULTS, SETTINGS
+from pelorus.settings import IDS
+from pelorus.wire import messages_of, write_file
 from replay_drive import BIN
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVE = ROOT / "tests/golden/drive.plr"
 CAMERA = Calibration(410.0, 405.0, 330.0, 236.0, 0.17)
+NO_IDS, NO_PIXELS = np.zeros(0, np.uint32), np.zeros((0, 4), np.float32)
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 BUSY = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -61,30 +63,77 @@ def driven(filter: Filter, messages: Sequence[Message], seconds: float = np.inf)
     return found
 
 
-@pytest.mark.parametrize("precision", PRECISIONS)
-def test_the_bits_are_those_of_the_replay(precision: Precision, tmp_path: Path) -> None:
-    recording, log = tmp_path / "d.plr", tmp_path / "log.plr"
-    assert main(["simulate", "--seed", "29", "--duration", "12", str(recording)]) == 0
+def replayed(recording: Path, precision: Precision, *options: str) -> list[Message]:
+    """The log of it."""
+    log = recording.with_name("log.plr")
     program = BIN / ("pelorus-replay" if precision == "float32" else "pelorus-replay-f64")
-    options = ["--slots=40", "--pixel-sigma=1.5", "--scene=may-move", "--out", str(log)]
-    subprocess.run([program, recording, *options], check=True, capture_output=True)
-    expected = [
+    command = [str(program), str(recording), *options, "--out", str(log)]
+    subprocess.run(command, check=False, capture_output=True)  # its log says what it did
+    return messages_of(log)
+
+
+def poses_in(log: Sequence[Message], precision: Precision) -> list[bytes]:
+    """After each frame."""
+    return [
         bits(m.R_WB, m.p_WB_m, m.covariance, precision)
-        for m in messages_of(log)
+        for m in log
         if isinstance(m, Pose) and m.after_stereo
     ]
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_recordings_filter_has_the_bits_of_its_replay(
+    precision: Precision, tmp_path: Path
+) -> None:
+    """With the noises of its HEADER, its CONFIG, and settings of one's own above both."""
+    recording = tmp_path / "d.plr"
+    assert main(["simulate", "--seed", "29", "--duration", "12", str(recording)]) == 0
+    options = ["--slots=40", "--scene=may-move", "--velocity-sigma=0.4"]
+    log = replayed(recording, precision, *options)
+    own: dict[str, Any] = {"slots": 40, "scene": "may-move", "velocity-sigma": 0.4}
     messages = messages_of(recording)
-    header = next(m for m in messages if isinstance(m, Header))
-    filter = Filter(Calibration.of_header(header), in_force(log), precision=precision)
+    assert any(isinstance(m, Config) for m in messages)
+    filter = Filter.of_recording(messages, own, precision=precision)
+    assert filter.setting("pixel-sigma") != DEFAULTS["pixel-sigma"]
+    assert {name: filter.setting(name) for name in IDS} == in_force(log)
     found = driven(filter, messages)
     assert len(found) > 100
-    assert found == expected
+    assert found == poses_in(log, precision)
 
 
-def in_force(log: Path) -> dict[str, float]:
+def in_force(log: Sequence[Message]) -> dict[str, float]:
     """The settings of a replay, by name."""
-    config = next(m for m in messages_of(log) if isinstance(m, Config) and m.build_fingerprint)
+    config = next(m for m in log if isinstance(m, Config) and m.build_fingerprint)
     return {SETTINGS[id].name: value for id, value in config.settings.items()}
+
+
+SUGGESTED: tuple[tuple[dict[str, Any], list[str], dict[str, Any]], ...] = (
+    ({"velocity_sigma_y_mps": 0.3, "gyro_sigma_radps": 0.02}, [], {}),
+    ({"velocity_sigma_mps": 0.3}, ["--noise=step"], {"noise": "step"}),  # no sigmas of a reading
+    ({"gravity": 9.79, "accel_noise": 0.002}, ["--process=imu"], {"process": "imu"}),
+    ({"bias_velocity_sigma_mps": 0.0, "bias_gyro_sigma_radps": 0.0}, [], {}),  # so it has none
+    ({"pixel_sigma_px": 1e9}, ["--calibrate=focal,turn"], {"calibrate": "focal,turn"}),
+    ({"velocity_sigma_x_mps": 0.2}, ["--gyro-sigma-y=0.1"], {"gyro-sigma": (0.01, 0.1, 0.01)}),
+)
+
+
+@pytest.mark.parametrize(("noise", "options", "own"), SUGGESTED)
+def test_settings_of_a_header_are_those_of_the_replay(
+    noise: dict[str, float], options: list[str], own: dict[str, Any], tmp_path: Path
+) -> None:
+    recording = tmp_path / "d.plr"
+    header = Header(Camera(410.0, 405.0, 330.0, 236.0, 0.17), noise=Noise(**noise))
+    asked = [Config({IDS["slots"]: 30.0}), Config({IDS["pixel-sigma"]: -1.0, 200: 1.0})]
+    still = [Twist(t) for t in range(0, 10**9, 10**8)]
+    write_file(recording, [header, *asked, *still, Stereo(10**9, NO_IDS, NO_PIXELS)], 0)
+    log = replayed(recording, "float32", *options)
+    filter = Filter.of_recording(messages_of(recording), own)
+    assert {name: filter.setting(name) for name in IDS} == in_force(log)
+
+
+def test_messages_without_a_header_make_no_filter() -> None:
+    with pytest.raises(PelorusError, match="no HEADER comes before the data"):
+        Filter.of_recording([Twist(0), Header(Camera(410.0, 405.0, 330.0, 236.0, 0.17))])
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
@@ -175,6 +224,8 @@ CONFIGS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("slots 257: 1 to 256 are possible", {"slots": 257}),
     ("scene 'stays': one of stands, may-move", {"scene": "stays"}),
     ("gate-d2 'wide': a number", {"gate-d2": "wide"}),
+    ("calibrate 'focal,tilt': off, or some of focal,baseline", {"calibrate": "focal,tilt"}),
+    ("scene 'stands,may-move': one of", {"scene": "stands,may-move"}),
     ("pixel-sigma is one number, not three", {"pixel-sigma": (1, 2, 3)}),
     ("velocity-sigma: .* of shape .2,.; numbers of shape .3,.", {"velocity-sigma": (1, 2)}),
     ("process: imu needs model = body and bias = on", {"process": "imu", "bias": False}),
@@ -195,6 +246,9 @@ def test_settings_take_words_numbers_and_three_axes() -> None:
     assert filter.setting("bias") == 0
     axes = [filter.setting(f"velocity-sigma{end}") for end in ("", "-y", "-z")]
     assert axes == [0.3, 0.2, 0.1]
+    listed = Filter(CAMERA, {"calibrate": "turn,focal"})
+    assert listed.setting("calibrate") == 0b101
+    assert Filter(CAMERA, {"calibrate": "off"}).setting("calibrate") == 0
 
 
 def test_a_calibration_that_cannot_be_is_refused() -> None:

@@ -27,7 +27,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pelorus import native, schema
 from pelorus.arguments import address, checked, kind_of, real, whole_number
+from pelorus.configured import Configured, Named, of_recording
 from pelorus.errors import PelorusError
+from pelorus.frames import Message
+from pelorus.layout import unpack_symmetric
 from pelorus.native import Health, Precision, ReadingResult, Report, Supervision
 
 __all__ = [
@@ -44,7 +47,6 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-Value = float | bool | str
 
 # One landmark in a rectified stereo pair, as the library has it: id and four pixels.
 OBSERVATION = np.dtype(
@@ -134,15 +136,16 @@ class Filter:
     in; pose and landmarks with covariance out.
 
     `config` names settings as the command line does, {"pixel-sigma": 1.5, "process": "imu"}: a
-    number, or the word of a choice; the sigmas of twists, imu-turn and imu-arm also take three
-    numbers. All of them: include/pelorus/settings.h. `known` is a map for known-map and
-    localization. Landmarks that leave the filter are collected in `evicted`, by id.
+    number, the word of a choice, or those of a list between commas; the sigmas of twists, imu-turn
+    and imu-arm also take three numbers. All of them: include/pelorus/settings.h. `known` is a map
+    for known-map and localization. Landmarks that leave the filter are collected in `evicted`, by
+    id.
     """
 
     def __init__(
         self,
         calibration: Calibration,
-        config: Mapping[str, Value | Iterable[float]] | None = None,
+        config: Named | None = None,
         *,
         precision: Precision = "float32",
         known: Mapping[int, KnownLandmark] | None = None,
@@ -154,11 +157,10 @@ class Filter:
         sizes = self._c.sizes
         self._memory = c.create_string_buffer(sizes.bytes + 63)
         self._f = (c.addressof(self._memory) + 63) // 64 * 64
-        self._config = c.create_string_buffer(self._c.size_of("plr_config"))
-        self._c.config_default(self._config)
+        self._config = Configured(self._c)
         for name, value in (config or {}).items():
-            self._set(name, value)
-        self._check_config()
+            self._config.set(name, value)
+        self._config.check()
         self._callbacks = native.Map(None, native.Sink(self._take), native.Source(self._find))
         given = native.Calibration(
             *(
@@ -167,7 +169,7 @@ class Filter:
             ),
             _pose("calibration", calibration.R_CB, calibration.t_CB_m),
         )
-        pointers = (c.byref(part) for part in (given, self._config, self._callbacks, sizes))
+        pointers = (c.byref(part) for part in (given, self._config.memory, self._callbacks, sizes))
         self._checked("init", self._c.filter_init_sized(self._f, *pointers))
         # Made once: a frame makes no object but its report.
         self._twist, self._frame, self._report = native.Twist(), native.Frame(), native.Report()
@@ -178,36 +180,28 @@ class Filter:
         self._predict, self._inertial = self._c.filter_predict, self._c.filter_inertial
         self._update = self._c.filter_update
 
-    # --- settings
-
-    def _set(self, name: str, value: Value | Iterable[float]) -> None:
-        row = self._c.setting_by_name(name.encode())
-        if not row:
-            known = ", ".join(sorted(setting.name for setting in schema.SETTINGS.values()))
-            raise PelorusError(f"config: no setting {name}; there are {known}")
-        number = _number_of(name, value)
-        if isinstance(number, tuple):
-            for axis, one in zip(("", "-y", "-z"), number, strict=True):
-                self._set(f"{name}{axis}", one)
-        elif self._c.config_set(self._config, row, number) != 0:
-            unit = row[0].unit.decode()
-            raise PelorusError(
-                f"config: {name} {value}: {row[0].minimum:g} to {row[0].maximum:g} {unit}".rstrip()
-                + " are possible"
-            )
-
-    def _check_config(self) -> None:
-        culprit = c.POINTER(native.Setting)()
-        why = self._c.config_why(self._config, c.byref(culprit))
-        if why is not None:
-            raise PelorusError(f"config: {culprit[0].name.decode()}: {why.decode()}")
+    @classmethod
+    def of_recording(
+        cls,
+        messages: Iterable[Message],
+        config: Named | None = None,
+        *,
+        precision: Precision = "float32",
+    ) -> Self:
+        """As `pelorus-replay` makes it for these messages of a recording: its calibration and known
+        landmarks, and `config` over the recording's CONFIG over what its HEADER says of noises.
+        The pose at the start, from its START or TRUTH, is the caller's to set."""
+        header, settings, known = of_recording(messages, config or {}, precision)
+        given = {
+            id: KnownLandmark(m.p_W_m, unpack_symmetric(m.covariance[None], 3)[0])
+            for id, m in known.items()
+        }
+        camera = Calibration.of_header(header)
+        return cls(camera, settings, precision=precision, known=given)
 
     def setting(self, name: str) -> float:
         """The value in force; of a choice its number."""
-        row = self._c.setting_by_name(name.encode())
-        if not row:
-            raise PelorusError(f"no setting {name}")
-        return float(self._c.config_get(self._config, row))
+        return self._config.get(name)
 
     # --- the map, called by the library
 
@@ -437,26 +431,6 @@ class Filter:
     def most_observations(self) -> int:
         """In one frame."""
         return int(self._c.sizes.observations)
-
-
-def _number_of(name: str, value: Value | Iterable[float]) -> float | tuple[float, float, float]:
-    """A setting's value as the library takes it; of three axes three."""
-    if isinstance(value, str):
-        words = schema.SETTINGS[_ids()[name]].words
-        if value not in words:
-            expected = f"one of {', '.join(words)}" if words else "a number"
-            raise PelorusError(f"config: {name} {value!r}: {expected}")
-        return float(words.index(value))
-    if isinstance(value, bool | int | float | np.number):
-        return float(value)
-    numbers = tuple(float(one) for one in checked(f"config: {name}", np.asarray(value), (3,)))
-    if f"{name}-y" not in _ids():
-        raise PelorusError(f"config: {name} is one number, not three")
-    return numbers[0], numbers[1], numbers[2]
-
-
-def _ids() -> dict[str, int]:
-    return {setting.name: id for id, setting in schema.SETTINGS.items()}
 
 
 def _landmark(id: int, known: KnownLandmark) -> native.Landmark:

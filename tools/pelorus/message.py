@@ -34,6 +34,10 @@ class Kind(IntEnum):
     CALIBRATION = schema.kind("CALIBRATION")
 
 
+# What comes in time, behind what tells how to read it.
+DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING)
+
+
 class BodyAxes(IntEnum):
     """Which way the body's x, y and z point."""
 

@@ -405,6 +405,8 @@ OTHER_SIGNATURES: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
     ("plr_status_text", c.c_char_p, (c.c_int,)),
     ("plr_build_fingerprint", c.c_uint32, ()),
     ("plr_binding_size_of", c.c_uint32, (c.c_char_p,)),
+    ("plr_setting_by_id", c.POINTER(Setting), (c.c_uint8,)),
+    ("plr_binding_settings", c.c_int, (_VOID, c.c_char_p, c.c_size_t, _VOID)),
     ("plr_binding_processor_lacks", c.c_char_p, ()),
     ("plr_binding_sizes", None, (_VOID,)),
 )

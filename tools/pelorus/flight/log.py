@@ -32,12 +32,12 @@ from pelorus.frames import (
     Stereo,
     Text,
 )
+from pelorus.message import DATA_KINDS
 from pelorus.robot.stream import is_restore
 from pelorus.schema import STATUSES, number
 from pelorus.settings import IDS, mode_in_force
 from pelorus.wire import SEQUENCE_MODULUS, Received, header_of, read_file
 
-DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING)
 # Statuses of what was damaged on the way.
 NOT_ARRIVED = tuple(number("status", name) for name in ("ARGUMENT", "CORRUPT", "FOREIGN"))
 FULL = number("status", "FULL")
