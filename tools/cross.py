@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Builds pelorus-replay for other systems, runs what this machine can run, and compares the bits.
 
-usage: cross.py [--out FOLDER] [TARGET...]
+usage: cross.py [--out FOLDER] [SYSTEM...]
 
 The compiler is the one of the package ziglang. It is given the library as one file (amalgamate.py)
 and the replay as another. Each program that can be run here, by qemu-user, by the package wasmtime
@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -198,14 +198,22 @@ def simulate(folder: Path) -> None:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
+def asked_for(what: str, known: Iterable[str], folder: str) -> tuple[Path, list[str]]:
+    """The command line: the folder for what is built, and which of the known systems, or all."""
+    names = list(known)
+    parser = argparse.ArgumentParser(description=what.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=ROOT / folder, help="where to build")
+    parser.add_argument("systems", nargs="*", metavar="SYSTEM", help=", ".join(names))
+    given = parser.parse_args()
+    if unknown := sorted(set(given.systems) - set(names)):
+        parser.error(f"no system {', '.join(unknown)}; there are {', '.join(names)}")
+    given.out.mkdir(parents=True, exist_ok=True)
+    return given.out.resolve(), given.systems or names
+
+
 def main() -> int:
     """Builds, runs, compares; the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "build/cross", help="where to build")
-    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
-    given = parser.parse_args()
-    if unknown := sorted(set(given.targets) - TARGETS.keys()):
-        parser.error(f"no target {', '.join(unknown)}; there are {', '.join(TARGETS)}")
+    out, names = asked_for(__doc__, TARGETS, "build/cross")
     differ = 0
     with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
         folder = Path(temporary)
@@ -215,9 +223,9 @@ def main() -> int:
             native = Target("this machine's")
             wanted = digest(lambda words: run_program(native, NATIVE, words, folder), folder)
             print(f"{'build/bin':15} {wanted[:16]}...")
-        for name in given.targets or TARGETS:
+        for name in names:
             target, begun = TARGETS[name], time.monotonic()
-            program = build(target, given.out.resolve() / name)
+            program = build(target, out / name)
             built = f"{program.stat().st_size // 1024} KB in {time.monotonic() - begun:.0f} s"
             if not can_run(target):
                 why = "no such system here" if target.runner == "-" else f"no {target.runner} here"

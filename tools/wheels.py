@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Builds the Python package's wheels for other systems than this one.
 
-usage: wheels.py [--out FOLDER] [TAG...]
+usage: wheels.py [--out FOLDER] [SYSTEM...]
 
 pip builds this machine's wheel; in a copy of it for each system the two libraries and the two
 replays are exchanged for those that the compiler of the package ziglang makes (cross.py), and the
@@ -11,7 +11,6 @@ tag. Nothing of a wheel depends on the version of Python.
 
 from __future__ import annotations
 
-import argparse
 import re
 import shutil
 import subprocess
@@ -20,7 +19,7 @@ import tempfile
 from pathlib import Path
 
 import amalgamate
-from cross import ROOT, X86_64_V3, Target, build, compile_to, port_flags
+from cross import ROOT, X86_64_V3, Target, asked_for, build, compile_to, port_flags
 
 NATIVE = "pelorus/native"
 WHEELS = {
@@ -86,19 +85,13 @@ def make(tag: str, target: Target, own: Path, work: Path, out: Path) -> Path:
 
 def main() -> int:
     """Builds them; the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "build/wheels", help="where they go")
-    parser.add_argument("tags", nargs="*", metavar="TAG", help=", ".join(WHEELS))
-    given = parser.parse_args()
-    if unknown := sorted(set(given.tags) - WHEELS.keys()):
-        parser.error(f"no system {', '.join(unknown)}; there are {', '.join(WHEELS)}")
-    given.out.mkdir(parents=True, exist_ok=True)
+    out, tags = asked_for(__doc__, WHEELS, "build/wheels")
     with tempfile.TemporaryDirectory(prefix="pelorus-") as temporary:
         folder = Path(temporary)
         own = pip_wheel(folder)
-        for tag in given.tags or WHEELS:
+        for tag in tags:
             (work := folder / tag).mkdir()
-            made = make(tag, WHEELS[tag], own, work, given.out)
+            made = make(tag, WHEELS[tag], own, work, out)
             print(f"{made}: {made.stat().st_size // 1024} KB", flush=True)
     return 0
 
