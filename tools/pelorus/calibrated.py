@@ -56,7 +56,7 @@ class Calibrated(Message, kind=Kind.CALIBRATION):
     sigma: Floats = zeros(len(PARTS))
 
     def values(self) -> dict[str, Any]:
-        return vars(self) | vars(self.camera)
+        return super().values() | vars(self.camera)
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003

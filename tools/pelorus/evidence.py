@@ -55,7 +55,7 @@ class Evidence(Message, kind=Kind.EVIDENCE):
     rejected: NDArray[Any] = field(default_factory=lambda: np.zeros(0, _ROW))
 
     def values(self) -> dict[str, Any]:
-        return vars(self) | {"count": len(self.rejected)}
+        return super().values() | {"count": len(self.rejected)}
 
     def pack(self) -> bytes:
         if len(self.rejected) > REJECTED_MAX:

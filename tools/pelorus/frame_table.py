@@ -61,11 +61,15 @@ def frame_table(messages: Sequence[Message]) -> FrameTable:
     rows = list(_answers(messages))
     if not rows:
         raise PelorusError("the result holds no answer to a stereo frame")
-    estimate = np.array([_estimate(pose) for pose, _ in rows])
-    columns = dict(zip(ESTIMATE, estimate.T, strict=True))
-    for name in REPORT:
-        columns[name] = np.array([getattr(report, name) for _, report in rows], np.float64)
-    t_ns = np.array([report.t_ns for _, report in rows], np.int64)
+    estimate = np.full((len(rows), len(ESTIMATE)), np.nan)
+    report = np.empty((len(rows), len(REPORT)))
+    t_ns = np.empty(len(rows), np.int64)
+    for k, (pose, answer) in enumerate(rows):
+        if pose is not None:
+            estimate[k] = _estimate(pose)
+        report[k] = [getattr(answer, name) for name in REPORT]
+        t_ns[k] = answer.t_ns
+    columns = dict(zip((*ESTIMATE, *REPORT), (*estimate.T, *report.T), strict=True))
     return FrameTable(t_ns, columns, bool(in_force(messages, "process")))
 
 
@@ -82,9 +86,7 @@ def _answers(messages: Sequence[Message]) -> Iterator[tuple[Pose | None, Report]
             pose = None
 
 
-def _estimate(pose: Pose | None) -> Floats:
-    if pose is None:
-        return np.full(len(ESTIMATE), np.nan)
+def _estimate(pose: Pose) -> Floats:
     variances = np.append(pose.covariance[DIAGONAL], pose.trace)
     of_bias = np.asarray(pose.bias_variance, np.float64)
     return np.concatenate(

@@ -152,7 +152,7 @@ class Header(Message, kind=Kind.HEADER):
         noise = vars(self.noise)
         axes = {name: [noise[part] for part in parts] for name, parts in BY_AXIS.items()}
         arrays = {name: np.array(values) for name, values in axes.items()}
-        return vars(self) | vars(self.camera) | noise | arrays
+        return super().values() | vars(self.camera) | noise | arrays
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
@@ -219,7 +219,7 @@ class Imu(Message, kind=Kind.IMU):
         return [self.t_ns + k * self.period_ns for k in range(len(self.a_B_mps2))]
 
     def values(self) -> dict[str, Any]:
-        return vars(self) | {"count": len(self.a_B_mps2)}
+        return super().values() | {"count": len(self.a_B_mps2)}
 
     def pack(self) -> bytes:
         count = len(self.a_B_mps2)
@@ -250,7 +250,7 @@ class Stereo(Message, kind=Kind.STEREO):
     budget: int = NO_BUDGET
 
     def values(self) -> dict[str, Any]:
-        return vars(self) | {"count": len(self.ids)}
+        return super().values() | {"count": len(self.ids)}
 
     def pack(self) -> bytes:
         count = len(self.ids)
@@ -381,7 +381,7 @@ class Config(Message, kind=Kind.CONFIG):
     real_bytes: int = 0
 
     def values(self) -> dict[str, Any]:
-        return vars(self) | {"count": len(self.settings)}
+        return super().values() | {"count": len(self.settings)}
 
     def pack(self) -> bytes:
         return super().pack() + np.array(list(self.settings.items()), SETTING).tobytes()
@@ -463,9 +463,11 @@ class Report(Message, kind=Kind.REPORT):
     innovation_d2: float = -1.0  # with no rows: not known
     innovation_log_det: float = -1.0
 
+    composed: ClassVar = ("reasons",)
+
     def values(self) -> dict[str, Any]:
         upper, lower = divmod(self.reasons, 1 << 16)
-        return vars(self) | {"reasons": lower, "reasons_upper": upper}
+        return super().values() | {"reasons": lower, "reasons_upper": upper}
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003

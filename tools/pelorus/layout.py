@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import accumulate, groupby
 from typing import Any
 
@@ -149,6 +149,38 @@ class Layout:
         return values, at
 
 
+class Place:
+    """Where a field stands in a payload, so that it is read without the others."""
+
+    def __init__(self, field: Field, before: Sequence[Field]) -> None:
+        self._structs = {n: _struct([field], n) for n in (4, 8)}
+        self._at = {n: _struct(before, n).size for n in (4, 8)}
+        self._field, self._shape = field, _shape(field)
+        sizes = [f.name for f in before].index("real_bytes") if _has_real([*before, field]) else 0
+        self._real_at = _struct(before[:sizes], 8).size if _has_real([*before, field]) else None
+
+    def read(self, payload: bytes) -> Any:
+        """Its value; None where the sender is older than the field."""
+        real = 8 if self._real_at is None else payload[self._real_at]
+        numbers, at = self._structs[real], self._at[real]
+        if at + numbers.size > len(payload):
+            return None
+        found = numbers.unpack_from(payload, at)
+        if not self._shape:
+            return found[0]
+        return np.array(found).reshape(self._shape) if self._field.type in FLOATS else found
+
+
+def places(table: MessageTable) -> dict[str, Place]:
+    """Of all fields of a payload without texts, by name."""
+    fields = table.fields
+    return {f.name: Place(f, fields[:k]) for k, f in enumerate(fields) if f.name != "_"}
+
+
+def _has_real(fields: Sequence[Field]) -> bool:
+    return any(field.type == "real" for field in fields)
+
+
 def row_type(fields: Sequence[Field]) -> np.dtype[Any]:
     """That of numpy for a row of a message."""
     return np.dtype([(field.name, CODES[field.type]) for field in fields])
@@ -177,6 +209,11 @@ def _check(field: Field, value: int) -> None:
 
 
 # --- symmetric matrices: lower triangles, row by row ----------------------------------------------
+
+
+def stacked(rows: Iterable[Floats], *shape: int) -> Floats:
+    """(n, *shape) of arrays that come one after the other, and are not kept beside it."""
+    return np.fromiter(rows, np.dtype((np.float64, shape)))
 
 
 def unpack_symmetric(packed: Floats, size: int) -> Floats:

@@ -5,12 +5,14 @@ bytes of a payload by its table in `pelorus.schema`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from enum import IntEnum
+from functools import cache, lru_cache
 from typing import Any, ClassVar, Self
 
 from pelorus import schema
-from pelorus.layout import Layout
+from pelorus.layout import Layout, Place, places
 
 
 class Kind(IntEnum):
@@ -36,6 +38,8 @@ class Kind(IntEnum):
 
 # What comes in time, behind what tells how to read it.
 DATA_KINDS = (Kind.TWIST, Kind.IMU, Kind.STEREO, Kind.TRUTH, Kind.READING)
+# Of which there are many in a log: DATA_KINDS, and what answers them.
+MANY = (*DATA_KINDS, Kind.LANDMARK, Kind.POSE, Kind.REPORT, Kind.EVIDENCE)
 
 
 class BodyAxes(IntEnum):
@@ -92,11 +96,13 @@ class Message:
     kind: ClassVar[Kind]
     layout: ClassVar[Layout]
     choices: ClassVar[Mapping[str, Callable[[int], Any]]] = {}  # what a number is made into
+    composed: ClassVar[Sequence[str]] = ()  # fields that are not what the table has by their name
 
     def __init_subclass__(cls, kind: Kind | None = None) -> None:
         if kind is not None:
             cls.kind = kind
             cls.layout = Layout(schema.MESSAGES[kind.name])
+            _OF_KIND[kind] = cls
 
     def pack(self) -> bytes:
         return self.layout.pack(self.values())
@@ -109,9 +115,17 @@ class Message:
         }
         return cls.of_values(values | chosen, payload, end)
 
+    @classmethod
+    def read(cls, payload: bytes) -> Message:
+        """The same; of a kind of which a log holds many kept as its bytes, in a quarter of the
+        memory.
+        """
+        message = cls.unpack(payload)
+        return _kept_as(cls.kind)(payload) if cls.kind in MANY else message
+
     def values(self) -> dict[str, Any]:
         """By the names of the table."""
-        return vars(self)
+        return {name: getattr(self, name) for name in _names(self.kind)}
 
     @classmethod
     def of_values(cls, values: dict[str, Any], payload: bytes, end: int) -> Self:  # noqa: ARG003
@@ -119,7 +133,59 @@ class Message:
         return cls(**values)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and self.pack() == other.pack()
+        return (
+            isinstance(other, Message) and self.kind == other.kind and self.pack() == other.pack()
+        )
 
     def __hash__(self) -> int:
         return hash((self.kind, self.pack()))
+
+
+_OF_KIND: dict[Kind, type[Message]] = {}
+
+
+@cache
+def _names(kind: Kind) -> list[str]:
+    return [f.name for f in fields(_OF_KIND[kind])]  # type: ignore[arg-type]
+
+
+class _Asked:
+    """A field of a message that is kept as its bytes: read when it is asked for."""
+
+    def __init__(self, kind: Kind, name: str, place: Place | None) -> None:
+        self._kind, self._name, self._place = kind, name, place
+        self._choose = _OF_KIND[kind].choices.get(name)
+
+    def __get__(self, message: Any, owner: type[Message]) -> Any:
+        value = None if self._place is None else self._place.read(message.payload)
+        if value is None:
+            return getattr(_whole(self._kind, message.payload), self._name)
+        return value if self._choose is None else self._choose(value)
+
+
+@lru_cache(maxsize=4)  # whoever asks for one field asks for its neighbour next
+def _whole(kind: Kind, payload: bytes) -> Message:
+    return _OF_KIND[kind].unpack(payload)
+
+
+@cache
+def _kept_as(kind: Kind) -> Callable[[bytes], Message]:
+    """A subclass that holds nothing but a payload."""
+
+    def begin(self: Any, payload: bytes) -> None:
+        object.__setattr__(self, "payload", payload)
+
+    cls = _OF_KIND[kind]
+    known = places(schema.MESSAGES[kind.name])
+    asked = {
+        name: _Asked(kind, name, None if name in cls.composed else known.get(name))
+        for name in _names(kind)
+    }
+    more = {
+        "__slots__": ("payload",),
+        "__init__": begin,
+        "__reduce__": lambda self: (cls.read, (self.payload,)),
+        "__class__": property(lambda _: cls),  # dataclasses.replace makes a whole one
+        "__doc__": cls.__doc__,
+    }
+    return type(cls.__name__, (cls,), more | asked)

@@ -25,7 +25,7 @@ from pelorus import arrays, foreign, packed_file, se3, wire
 from pelorus.errors import PelorusError
 from pelorus.foreign import ForeignFileError, Row
 from pelorus.frames import Header, Message, Pose, Stereo, Truth
-from pelorus.layout import Floats, unpack_symmetric
+from pelorus.layout import Floats, stacked, unpack_symmetric
 from pelorus.motion import Times
 from pelorus.se3 import Poses
 
@@ -215,16 +215,18 @@ def estimate_in(messages: Sequence[Message]) -> tuple[Trajectory, Floats] | None
     if not poses:
         return None
     estimate = _ordered(list(poses.values()))
-    unknown = np.full(POSE_SIZE * (POSE_SIZE + 1) // 2, np.nan)
+    size = POSE_SIZE * (POSE_SIZE + 1) // 2
+    unknown = np.full(size, np.nan)
     ordered = [poses[t] for t in estimate.t_ns.tolist()]
-    packed = np.array([m.covariance if m.knows_covariance else unknown for m in ordered])
+    packed = stacked((m.covariance if m.knows_covariance else unknown for m in ordered), size)
     return estimate, unpack_symmetric(packed, POSE_SIZE)
 
 
 def _ordered(poses: Sequence[Truth | Pose]) -> Trajectory:
     poses = sorted(poses, key=lambda pose: pose.t_ns)
     t_ns = np.array([pose.t_ns for pose in poses], np.int64)
-    R, p = np.array([pose.R_WB for pose in poses]), np.array([pose.p_WB_m for pose in poses])
+    R = stacked((pose.R_WB for pose in poses), 3, 3)
+    p = stacked((pose.p_WB_m for pose in poses), 3)
     return Trajectory(t_ns, Poses(R, p))
 
 

@@ -92,8 +92,8 @@ def encode(message: Message, sequence: int) -> bytes:
 class Reader:
     """Turns a byte stream into messages. Feed it pieces, then `finish` it."""
 
-    def __init__(self) -> None:
-        self.counts = Counts()
+    def __init__(self, counts: Counts | None = None) -> None:
+        self.counts = Counts() if counts is None else counts
         self._held = bytearray()
         self._held_at = 0  # offset in the stream of the first held byte
         self._overlong = False  # the held bytes are the rest of a frame that was given up
@@ -178,7 +178,7 @@ class Reader:
                 f"this reader knows up to {VERSION_MAJOR}"
             )
         try:
-            message = KINDS[kind].unpack(payload)
+            message = KINDS[kind].read(payload)
         except MalformedPayload as error:
             self.counts.malformed += 1
             self.counts.fault(offset, f"malformed {Kind(kind).name}: {error}")
@@ -254,19 +254,26 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
 
     Raises PelorusError where nothing can be read.
     """
+    counts = Counts()
+    return list(frames_in(path, counts, piece_bytes)), counts
+
+
+def frames_in(path: Path, counts: Counts, piece_bytes: int = 1 << 16) -> Iterator[Received]:
+    """The same, one after the other."""
     if path.is_dir():
         raise PelorusError(
             f"{path}: is a folder, a recording is a .plr file: `pelorus convert` makes one of a "
             "folder of pictures, a ROS 2 bag or a KITTI drive"
         )
-    reader = Reader()
-    received: list[Received] = []
+    reader, found = Reader(counts), False
     try:
         count = path.stat().st_size // piece_bytes if path.is_file() else None
         pieces = packed_file.pieces(path, piece_bytes)
         for piece in progress(pieces, f"reading {path.name}", count):
-            received.extend(reader.feed(piece))
-            if not received and reader.counts.bytes > HOPELESS_BYTES:
+            for frame in reader.feed(piece):
+                found = True
+                yield frame
+            if not found and counts.bytes > HOPELESS_BYTES:
                 break  # a picture, a disk's image: some have terabytes
     except packed_file.PackingDamaged as error:
         reader.lose(str(error))
@@ -275,16 +282,14 @@ def read_file(path: Path, piece_bytes: int = 1 << 16) -> tuple[list[Received], C
     except VersionError as error:
         raise VersionError(f"{path}: {error}") from None
     reader.finish()
-    if not received and reader.counts.faults and not reader.counts.bytes:
-        raise PelorusError(f"{path}: {reader.counts.faults[0].what}")
-    if not reader.counts.bytes:
+    if not found and counts.faults and not counts.bytes:
+        raise PelorusError(f"{path}: {counts.faults[0].what}")
+    if not counts.bytes:
         raise PelorusError(f"{path}: the file is empty, a recording begins with a HEADER frame")
-    if not received:
+    if not found:
         raise PelorusError(
-            f"{path}: holds no frame in its first {reader.counts.bytes} bytes; this is no .plr "
-            "recording"
+            f"{path}: holds no frame in its first {counts.bytes} bytes; this is no .plr recording"
         )
-    return received, reader.counts
 
 
 def messages_of(path: Path) -> list[Message]:
@@ -296,9 +301,11 @@ def counted_messages_of(path: Path) -> tuple[list[Message], Counts]:
     """The same, and what was left out."""
     if not path.exists():
         raise PelorusError(f"{path}: there is no such file")
-    received, counts = read_file(path)
-    header_of(received, path)
-    return [frame.message for frame in received], counts
+    counts = Counts()
+    messages = [frame.message for frame in frames_in(path, counts)]
+    if not counts.frames[Kind.HEADER]:
+        raise _without_header(path)
+    return messages, counts
 
 
 def header_of_messages(messages: Iterable[Message]) -> Header:
@@ -327,4 +334,8 @@ def header_of(received: list[Received], path: Path) -> Header:
     for frame in received:
         if isinstance(frame.message, Header):
             return frame.message
-    raise PelorusError(f"{path}: holds no HEADER frame; without the calibration it is of no use")
+    raise _without_header(path)
+
+
+def _without_header(path: Path) -> PelorusError:
+    return PelorusError(f"{path}: holds no HEADER frame; without the calibration it is of no use")

@@ -5,9 +5,9 @@ and every reading.
 
 from __future__ import annotations
 
-from collections import deque
+from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -52,6 +52,7 @@ class Log:
     refused: list[Report]  # of readings
     sigma: Floats  # (6,) of a twist reading as the filter had it; zeros where it says nothing
     bias_sigma: Floats  # (6,) likewise, of the biases before anything was seen
+    _columns: dict[str, Counts] = field(default_factory=dict)
 
     @cached_property
     def t_ns(self) -> Times:
@@ -68,7 +69,10 @@ class Log:
 
     def column(self, name: str) -> Counts:
         """Of REPORT."""
-        return np.array([getattr(report, name) for report in self.reports], np.int64)
+        if name not in self._columns:
+            found = (getattr(report, name) for report in self.reports)
+            self._columns[name] = np.fromiter(found, np.int64, len(self.reports))
+        return self._columns[name]
 
     @cached_property
     def reasons(self) -> Counts:
@@ -78,54 +82,53 @@ class Log:
         """Frames of which a reason is one of these; a refused one has those of the frame before."""
         return np.asarray(((self.reasons & bits) != 0) & (self.column("status") == 0))
 
-    @cached_property
+    @property
     def shared(self) -> Counts:
         """How many points of each frame stood in the frame before."""
-        return np.array([len(first) for first, _ in self._pairs], np.int64)
+        return self._from_before[:, 0].astype(np.int64)
 
-    @cached_property
+    @property
     def repeated(self) -> Counts:
         """How many of these have the very pixels that they had there."""
-        return np.array([_repeated(first, second) for first, second in self._pairs], np.int64)
+        return self._from_before[:, 1].astype(np.int64)
 
-    @cached_property
+    @property
     def flow_px(self) -> Floats:
         """Median way of the shared points in the left picture; NaN where they are few."""
-        return np.array([_flow(first, second) for first, second in self._pairs])
+        return self._from_before[:, 2]
 
     @cached_property
-    def _pairs(self) -> list[tuple[Pixels, Pixels]]:
-        nothing = np.zeros((0, 4), np.float32)
-        out = [(nothing, nothing)]
-        for before, now in pairwise(self.frames):
+    def _from_before(self) -> Floats:
+        """(n, 3): the three of these; the points themselves are many, and not kept."""
+        out = np.tile([0.0, 0.0, np.nan], (len(self.frames), 1))
+        for k, (before, now) in enumerate(pairwise(self.frames), 1):
+            first, second = before.pixels, now.pixels
             _, i, j = np.intersect1d(before.ids, now.ids, return_indices=True)
-            out.append((before.pixels[i], now.pixels[j]))
+            out[k] = len(i), *_moved(first[i], second[j])
         return out
 
 
-def _repeated(first: Pixels, second: Pixels) -> int:
-    return int((first == second).all(axis=1).sum())
-
-
-def _flow(first: Pixels, second: Pixels) -> float:
+def _moved(first: Pixels, second: Pixels) -> tuple[int, float]:
+    """How many have not at all, and the median way of the others and these."""
+    repeated = int((first == second).all(axis=1).sum())
     way = (second.astype(np.float64) - first)[:, :2]
     way = way[np.isfinite(way).all(axis=1)]
-    return float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
+    return repeated, float(np.median(np.hypot(*way.T))) if len(way) >= FEW else np.nan
 
 
 def log_of(messages: Sequence[Message]) -> Log:
     """PelorusError where no frame was answered."""
     frames, reports, poses, evidence = _answers(messages)
-    answered = sorted(reports)
+    answered = [k for k, report in enumerate(reports) if report is not None]
     if not answered:
         raise PelorusError("holds no answer of a filter to a stereo frame: `pelorus-replay --out`")
     behind, stamps, readings = _readings(messages)
     return Log(
         header_of_messages(messages),
         [frames[k] for k in answered],
-        [reports[k] for k in answered],
-        [poses.get(k) for k in answered],
-        [evidence.get(k) for k in answered],
+        [report for report in reports if report is not None],
+        [poses[k] for k in answered],
+        [evidence[k] for k in answered],
         behind[answered],
         stamps,
         readings,
@@ -142,29 +145,31 @@ def log_of(messages: Sequence[Message]) -> Log:
 
 def _answers(
     messages: Sequence[Message],
-) -> tuple[list[Stereo], dict[int, Report], dict[int, Pose], dict[int, Evidence]]:
-    """All frames, and what answers each, by its number. A robot's answer comes when it is ready, so
-    it is known by its time; a pose stands before the report, evidence behind it.
+) -> tuple[list[Stereo], list[Report | None], list[Pose | None], list[Evidence | None]]:
+    """All frames, and what answers each. A robot's answer comes when it is ready, so it is known by
+    its time; a pose stands before the report, evidence behind it.
     """
-    frames: list[Stereo] = []
-    waiting: dict[int, deque[int]] = {}
-    reports: dict[int, Report] = {}
-    poses: dict[int, Pose] = {}
-    evidence: dict[int, Evidence] = {}
+    frames = [m for m in messages if isinstance(m, Stereo)]
+    reports: list[Report | None] = [None] * len(frames)
+    poses: list[Pose | None] = [None] * len(frames)
+    evidence: list[Evidence | None] = [None] * len(frames)
+    waiting: dict[int, list[int]] = {}
     pose: Pose | None = None
     last: int | None = None
+    arrived = 0
     for m in messages:
         if isinstance(m, Stereo):
-            waiting.setdefault(m.t_ns, deque()).append(len(frames))
-            frames.append(m)
+            waiting.setdefault(m.t_ns, []).append(arrived)
+            arrived += 1
         elif isinstance(m, Pose) and m.after_stereo and is_finite(m):
             pose = m
         elif isinstance(m, Report) and m.subject == Kind.STEREO:
-            last = waiting[m.t_ns].popleft() if waiting.get(m.t_ns) else None
-            if last is not None:
-                reports[last] = m
-                if pose is not None:
-                    poses[last] = pose
+            last = None
+            if asked := waiting.get(m.t_ns):
+                last = asked.pop(0)
+                reports[last], poses[last] = m, pose
+                if not asked:
+                    del waiting[m.t_ns]
             pose = None
         elif isinstance(m, Evidence) and last is not None:
             evidence[last] = m
@@ -176,23 +181,22 @@ def _readings(messages: Sequence[Message]) -> tuple[Times, Times, Floats]:
     no number, or none that a sensor gives, was refused: it is no part of the motion.
     """
     by_imu = any(isinstance(m, Imu) for m in messages)
-    behind: list[int] = []
-    stamps: list[int] = []
-    rows: list[Floats] = []
+    behind, stamps, numbers = array("q"), array("q"), array("d")
     for m in messages:
         if isinstance(m, Stereo):
             behind.append(stamps[-1] if stamps else NO_READING)
         elif isinstance(m, Imu):
-            stamps += m.times_ns
-            rows.append(np.hstack((m.a_B_mps2, m.w_B_radps)).astype(np.float64))
+            stamps.extend(m.times_ns)
+            numbers.extend(np.hstack((m.a_B_mps2, m.w_B_radps)).ravel().tolist())
         elif isinstance(m, Twist) and not by_imu:
             stamps.append(m.t_ns)
-            rows.append(np.concatenate((m.v_B_mps, m.w_B_radps))[None])
-    readings = np.concatenate(rows) if rows else np.zeros((0, 6))
+            numbers.extend((*m.v_B_mps, *m.w_B_radps))
+    readings = np.frombuffer(numbers).reshape(-1, 6)
     most = schema.PLAUSIBLE["ACCELERATION" if by_imu else "SPEED"]
     bounds = np.repeat([most, schema.PLAUSIBLE["RATE"]], 3)
     good = (np.abs(readings) <= bounds).all(axis=1)
-    return np.array(behind, np.int64), np.array(stamps, np.int64)[good], readings[good]
+    every = np.frombuffer(stamps, np.int64)
+    return np.array(behind, np.int64), every[good], readings[good]
 
 
 def _sigma(messages: Sequence[Message], *names: str) -> Floats:

@@ -23,7 +23,7 @@ from pelorus.frame_table import FrameTable, frame_table
 from pelorus.frames import Message, Truth, TruthKnows
 from pelorus.grid.plane import AXES, choose
 from pelorus.health import GOOD, SHORT
-from pelorus.layout import Floats
+from pelorus.layout import Floats, stacked
 from pelorus.motion import Times, nearest
 from pelorus.report.landmarks import WHY, Landmarks, packed
 from pelorus.report.packed import Packer
@@ -271,7 +271,7 @@ class Curves:
             nothing = np.full((len(self._t), 3), np.nan)
             return nothing, nothing
         t_ns = np.array([m.t_ns for m in known], np.int64)
-        true = self._spread(t_ns, np.array([m.bias for m in known], np.float64).reshape(-1, 6))
+        true = self._spread(t_ns, stacked((m.bias for m in known), 6))
         return true[:, :3], true[:, 3:]
 
     def _observations(self) -> Iterator[dict[str, Any]]:
@@ -313,7 +313,7 @@ class Curves:
         yield self._chart("Doubt", "chi-square", about, lines, log=True, levels=[32.0])
         about = "Why: by how much the odometry's sigmas are widened; 1 is as stated."
         yield self._chart("Weight", "times sigma", about, [("weight", weight)], log=True)
-        nu = np.array([np.full(6, np.nan) if e is None else np.abs(e.nu) for e in rows])
+        nu = stacked((np.full(6, np.nan) if e is None else np.abs(e.nu) for e in rows), 6)
         lines = [
             ("translation", np.linalg.norm(nu[:, :3], axis=1)),
             ("rotation", np.linalg.norm(nu[:, 3:], axis=1)),

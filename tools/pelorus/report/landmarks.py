@@ -87,21 +87,19 @@ class Landmarks:
 
     def _sightings(self, ids: Any) -> tuple[Any, Any, Any]:
         """First and last frame in which each was seen, ms, and in how many."""
-        frames = [m for m in self._messages if isinstance(m, Stereo)]
-        if not frames or not len(ids):
-            nothing = np.zeros(len(ids), np.int64)
-            return nothing, nothing, nothing
-        t_ms = np.array([max(m.t_ns - self._origin_ns, 0) // 1_000_000 for m in frames])
-        when = np.repeat(t_ms, [len(m.ids) for m in frames])
-        every = np.concatenate([m.ids for m in frames]).astype(np.int64)
-        known, at = np.unique(every, return_inverse=True)
-        first = np.full(len(known), np.iinfo(np.int64).max)
-        last, seen = np.zeros(len(known), np.int64), np.bincount(at, minlength=len(known))
-        np.minimum.at(first, at, when)
-        np.maximum.at(last, at, when)
-        where = np.minimum(np.searchsorted(known, ids), len(known) - 1)
-        there = known[where] == ids
-        return tuple(np.where(there, x[where], 0) for x in (first, last, seen))  # type: ignore[return-value]
+        order = np.argsort(ids)
+        first = np.full(len(ids), np.iinfo(np.int64).max)
+        last, seen = np.zeros(len(ids), np.int64), np.zeros(len(ids), np.int64)
+        for m in self._messages:
+            if isinstance(m, Stereo) and len(m.ids) and len(ids):
+                found = np.unique(m.ids).astype(np.int64)
+                at = order[np.minimum(np.searchsorted(ids, found, sorter=order), len(ids) - 1)]
+                at = at[ids[at] == found]
+                t_ms = max(m.t_ns - self._origin_ns, 0) // 1_000_000
+                first[at] = np.minimum(first[at], t_ms)
+                last[at] = np.maximum(last[at], t_ms)
+                seen[at] += 1
+        return np.where(seen > 0, first, 0), last, seen
 
     def _rejections(self, left_out: list[str]) -> dict[str, Any]:
         rows = [
