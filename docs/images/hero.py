@@ -262,6 +262,7 @@ def band_of(axes: Axes, run: Run, k: int) -> None:
     axes.set(xlim=(0, t[-1]), ylim=(-3.4 * sigma.max(), 3.4 * sigma.max()))
     axes.set_title("error of y in its 3-sigma band, cm", fontsize=8.5, loc="left", pad=3, color=INK)
     axes.tick_params(labelsize=7.5, colors=INK)
+    axes.xaxis.set_major_formatter("{x:.0f} s")
     axes.spines[["top", "right"]].set_visible(False)
 
 

@@ -125,6 +125,8 @@ static void on_refused(void *context, plr_kind subject, plr_time_ns t_ns, plr_st
         run->outcome.init_status = status; /* told at the end */
         return;
     }
+    if (run->session.phase == PLR_PHASE_REJECTED && status == PLR_E_NOT_READY)
+        return; /* comes of that */
     progress_clear(&run->progress);
     if (subject == PLR_KIND_STATE) {
         on_refused_state(run, t_ns, status);

@@ -283,6 +283,29 @@ def test_columns_of_other_names_are_told_how_to_be_named_whichever_file_lacks_th
         (tmp_path / name).write_text(text)
 
 
+def test_a_column_in_another_unit_is_named_as_it_is(tmp_path: Path, pelorus: Run) -> None:
+    """Whoever copied `wx=COLUMN:radps` would have degrees taken for radians."""
+    files = csv_files(tmp_path, clean(**SHORT))
+    path = tmp_path / "twists.csv"
+    path.write_text(path.read_text().replace("radps", "degps"))
+    outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr", status=1)
+    assert "called otherwise: --columns wx=wx_degps" in outcome.err
+
+
+def test_semicolons_with_decimal_commas_and_zero_bytes_are_told(
+    tmp_path: Path, pelorus: Run
+) -> None:
+    files = csv_files(tmp_path, clean(**SHORT))
+    path = tmp_path / "twists.csv"
+    whole = path.read_text()
+    path.write_text(whole.replace(",", ";").replace(".", ","))
+    outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr", status=1)
+    assert "points in numbers, and commas between them, are due" in outcome.err
+    path.write_bytes(whole.encode("utf-16-le"))
+    outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr", status=1)
+    assert "byte 1: is no text; text in UTF-8 is due" in outcome.err
+
+
 def test_files_with_plain_names_and_a_few_bad_rows_are_converted_and_that_is_said(
     tmp_path: Path, pelorus: Run
 ) -> None:

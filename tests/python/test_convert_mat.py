@@ -81,6 +81,12 @@ def test_a_misshapen_mat_is_refused(
     assert said in outcome.err
 
 
+def test_a_folder_in_place_of_the_file_is_called_so(tmp_path: Path, pelorus: Run) -> None:
+    for source in ("klt", "starry-night", "imu-npz", "ece276a"):
+        said = pelorus("convert", source, tmp_path, tmp_path / "out.plr", status=1).err
+        assert "is a folder; one file of it is due" in said
+
+
 def test_starry_night_without_landmarks_is_refused(tmp_path: Path, pelorus: Run) -> None:
     source = tmp_path / "klt.mat"
     arrays = mat_arrays(clean(**SHORT))

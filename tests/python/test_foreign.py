@@ -186,7 +186,7 @@ def test_another_version_of_mat_is_told(tmp_path: Path) -> None:
 def test_a_folder_and_nothing_at_all_are_no_arrays(
     tmp_path: Path, read: Callable[[Path], Any]
 ) -> None:
-    assert "no such file" in refused(tmp_path, read).wrong
+    assert "is a folder" in refused(tmp_path, read).wrong
     assert "no such file" in refused(tmp_path / "absent", read).wrong
     (tmp_path / "empty").write_bytes(b"")
     assert "empty" in refused(tmp_path / "empty", read).wrong

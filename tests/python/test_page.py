@@ -25,7 +25,7 @@ from pelorus.layout import unpack_symmetric
 from pelorus.report import answers, page
 from pelorus.report.curves import Curves
 from pelorus.report.packed import Packer
-from pelorus.report.page import Answer
+from pelorus.report.page import Answer, Table
 from pelorus.simulation.mishaps import Mishaps
 from pelorus.simulation.settings import Span
 from pelorus.simulation.simulate import Options, simulate
@@ -219,6 +219,8 @@ def test_the_page_shows_the_event_and_fits_the_screen(
 
 def test_cursor_and_zoom_go_through_all_of_the_page(browser: Tab, written: Path) -> None:
     browser.open(written, 1280)
+    browser.does("window.pelorus.drawAll()")
+    browser.settle()
     box = "(() => { const b = document.querySelectorAll('.u-over')[4].getBoundingClientRect(); "
     box += "window.scrollTo(0, b.top + window.scrollY - 300); "
     box += "const c = document.querySelectorAll('.u-over')[4].getBoundingClientRect(); "
@@ -336,6 +338,7 @@ def test_another_log_stands_beside_curve_by_curve(
     assert len(charts["Doubt"]) == 1  # the other log has no evidence
     browser.troubles.clear()
     browser.open(path, 390)
+    browser.does("window.pelorus.drawAll()")
     browser.settle()
     assert browser.troubles == []
     rows = "[...document.querySelectorAll('#ribbons .row span')].map((s) => s.textContent)"
@@ -385,3 +388,62 @@ def test_a_log_of_two_frames_has_a_page(browser: Tab, tmp_path: Path) -> None:
     browser.settle()
     assert browser.troubles == []
     assert state(browser)["at"] == 0
+
+
+def test_charts_are_drawn_when_they_come_near_the_screen(browser: Tab, written: Path) -> None:
+    """That makes the page of an hour's log ready in time; a zoom holds for the later ones."""
+    charts = "document.querySelectorAll('.chart').length"
+    drawn = "document.querySelectorAll('.chart .uplot').length"
+    browser.open(written, 1280)
+    browser.settle()
+    few, every = browser.does(drawn), browser.does(charts)
+    assert 0 < few < every
+    browser.does("window.pelorus.zoom(2, 5)")
+    browser.settle()
+    browser.does("window.scrollTo(0, document.body.scrollHeight)")
+    browser.settle()
+    assert browser.does(drawn) > few
+    browser.does("window.pelorus.drawAll()")
+    browser.settle()
+    assert browser.does(drawn) == every
+    legends = "[...document.querySelectorAll('.u-legend')].map((l) => "
+    legends += "l.querySelector('.u-value').textContent)"
+    assert len(set(browser.does(legends))) == 1
+    assert (state(browser)["from"], state(browser)["to"]) == (2, 5)
+
+
+def test_a_band_beyond_the_axis_is_told_and_what_has_no_value_is_said_in_words(
+    browser: Tab, tmp_path: Path
+) -> None:
+    recording, log = tmp_path / "in.plr", tmp_path / "log.plr"
+    recording.write_bytes(encode(drive()))
+    run(recording, "--quiet", "--mode", "dead_reckoning", "--velocity-sigma", "50", "--out", log)
+    messages = messages_of(log)
+    path = tmp_path / "blind.html"
+    page.write(path, answers.of_explanation(explain(messages), "blind"), Curves(messages))
+    empty = {c["title"]: c["empty"] for c in data_of(path)["charts"] if "empty" in c}
+    assert "no frame was used" in empty["Innovations"]
+    assert "no point matched" in empty["Rejected"]
+    browser.open(path, 390)
+    browser.does("window.pelorus.drawAll()")
+    browser.settle()
+    words = browser.does("document.getElementById('charts').textContent")
+    assert all(text in words for text in empty.values())
+    assert "Position error, x (m) the band leaves the axis: to -" in words
+    assert browser.does("document.querySelectorAll('.chart .uplot').length") == len(
+        [c for c in data_of(path)["charts"] if "empty" not in c]
+    )
+
+
+def test_tables_are_whole_on_a_phone(browser: Tab, tmp_path: Path) -> None:
+    path = tmp_path / "table.html"
+    rows = [[f"column {k} m" for k in range(9)], *([f"{row}.1234"] * 9 for row in range(3))]
+    page.write(
+        path,
+        Answer("t", "good", "", tables=[Table("few", [r[:5] for r in rows]), Table("many", rows)]),
+    )
+    browser.open(path, 390)
+    widths = "[...document.querySelectorAll('.wide')].map((w) => w.scrollWidth - w.clientWidth)"
+    assert browser.does(widths) == [0, 0]
+    browser.open(path, 1280)
+    assert browser.does(widths) == [0, 0]

@@ -26,6 +26,7 @@ from replay_drive import (
     OUTPUT,
     RECORDING,
     SECOND,
+    USAGE,
     Record,
     assert_healthy,
     bits_of,
@@ -236,6 +237,12 @@ def test_frames_of_a_late_camera_need_the_delay(record: Record) -> None:
     assert f"{FRAMES} STEREO, {FRAMES} refused" in blind.stderr
     assert delayed["frames"] == FRAMES
     assert delayed["err0_m"] < 0.05
+
+
+def test_settings_that_contradict_are_one_sentence_with_why(record: Record) -> None:
+    said = run(record(drive()), "--track-drift", "1", "--model", "world", status=USAGE).stderr
+    assert "make no sense together: track-drift: goes with model = body alone" in said
+    assert len(said.splitlines()) == 1
 
 
 # --- frames that make no sense --------------------------------------------------------------------

@@ -141,6 +141,73 @@ def test_points_that_were_rejected_are_red_in_mcap(
     assert red > 0
 
 
+def test_mcap_is_whole_and_its_schemas_are_foxglove_s(
+    pelorus: Command, log: Path, tmp_path: Path
+) -> None:
+    """By MCAP's own reader, which checks each CRC, and the messages that Foxglove publishes."""
+    published = pytest.importorskip("foxglove.messages")
+    reader = pytest.importorskip("mcap.reader")
+    out = tmp_path / "out.mcap"
+    pelorus("view", log, "--mcap", out)
+    with out.open("rb") as stream:
+        opened = reader.make_reader(stream, validate_crcs=True)
+        summary = opened.get_summary()
+        counts = Counter(channel.id for _, channel, _ in opened.iter_messages())
+    assert summary.statistics.channel_message_counts == counts
+    for schema in summary.schemas.values():
+        if schema.encoding == "jsonschema":
+            assert json.loads(schema.data)["type"] == "object"
+        else:
+            assert schema.encoding == "protobuf"
+            known = getattr(published, schema.name.removeprefix("foxglove.")).get_schema()
+            assert (schema.name, schema.data) == (known.name, known.data)
+
+
+def stamps_in(message: Any) -> list[int]:
+    """What it says itself of its time, and its parts of theirs."""
+    parts = [part for name in ("points", "entities") for part in getattr(message, name, ())]
+    stamps = [
+        part.timestamp
+        for part in (message, *parts)
+        if "timestamp" in part.DESCRIPTOR.fields_by_name and part.HasField("timestamp")
+    ]
+    return [stamp.seconds * S + stamp.nanos for stamp in stamps]
+
+
+def test_times_and_frames_in_mcap_fit_together(pelorus: Command, log: Path, tmp_path: Path) -> None:
+    """A viewer puts nothing in place whose frame is in no tree, or whose time is another's."""
+    pytest.importorskip("foxglove")
+    out = tmp_path / "out.mcap"
+    pelorus("view", log, "--mcap", out)
+    found = read_mcap(out)
+    parents: dict[str, str] = {}
+    for _, tf in found["/pelorus/tf"]:
+        q, p = tf.rotation, tf.translation
+        assert abs(np.linalg.norm([q.x, q.y, q.z, q.w]) - 1) < 1e-9
+        assert np.isfinite([p.x, p.y, p.z]).all()
+        assert parents.setdefault(tf.child_frame_id, tf.parent_frame_id) == tf.parent_frame_id
+    roots = set(parents.values()) - parents.keys()
+    assert len(roots) == 1
+    for frame in parents:
+        way = [frame]
+        while way[-1] in parents:
+            way.append(parents[way[-1]])
+            assert len(way) <= len(parents) + 1, "the frames go in a circle"
+        assert {way[-1]} == roots
+    named = set()
+    for topic, messages in found.items():
+        assert [t for t, _ in messages] == sorted(t for t, _ in messages)
+        for t_ns, message in messages:
+            if topic.startswith("/pelorus/curves/"):
+                continue
+            stamps = stamps_in(message)
+            assert stamps, f"{topic} says no time"
+            assert set(stamps) == {t_ns}, topic
+            named |= {e.frame_id for e in getattr(message, "entities", ())}
+            named |= {getattr(message, name, "") for name in ("frame_id", "body_frame_id")}
+    assert named - {""} <= parents.keys() | roots
+
+
 # --- Rerun ----------------------------------------------------------------------------------------
 
 
@@ -227,6 +294,11 @@ def test_what_makes_no_sense_is_said(pelorus: Command, log: Path, tmp_path: Path
     assert "is no viewer's address: rerun+http or rerun+https or rerun://HOST:9876" in said
     nobody = "rerun+http://127.0.0.1:9/proxy"
     assert "no viewer answers there" in pelorus("view", log, "--connect", nobody, status=1).err
+    there = tmp_path / "there.rrd"
+    there.touch()
+    absent = tmp_path / "absent.plr"
+    said = pelorus("view", absent, "--force", "--rrd", there, status=1).err
+    assert "absent.plr: there is no such file" in said
     assert "is the log itself" in pelorus("view", log, "--force", "--rrd", log, status=1).err
 
 

@@ -99,12 +99,14 @@ def ending(path: Path, count: int) -> bytes:
 
 def text(path: Path, most: int = TEXT_BYTES_MAX) -> str:
     """UTF-8, with a byte order mark or without."""
+    raw = content(path, most)
     try:
-        return content(path, most).decode("utf-8-sig")
+        found, bad = raw.decode("utf-8-sig"), raw.find(b"\0")
     except UnicodeDecodeError as error:
-        raise ForeignFileError(
-            path, "is no text", at=f"byte {error.start}", due="text in UTF-8 is due"
-        ) from None
+        bad = error.start
+    if bad >= 0:  # a zero, too: UTF-16 without a mark, or what was never written
+        raise ForeignFileError(path, "is no text", at=f"byte {bad}", due="text in UTF-8 is due")
+    return found
 
 
 # --- rows of numbers ------------------------------------------------------------------------------
@@ -251,6 +253,7 @@ def csv_rows(path: Path) -> Csv:
     if not table:
         raise ForeignFileError(path, "the file is empty", due="a row of column names is due")
     names, below = table[0], table[1:]
+    by_semicolons = len(names) == 1 and ";" in names[0]
     _, more = _comments(below)
     first_row = skipped + more + 2
     for number, row in enumerate(below[more:], start=first_row):
@@ -259,6 +262,7 @@ def csv_rows(path: Path) -> Csv:
                 path,
                 f"has {len(row)} cells, the first row names {len(names)}",
                 at=f"row {number}",
+                due="points in numbers, and commas between them, are due" if by_semicolons else "",
             )
     return Csv(names, below[more:], first_row)
 
@@ -454,6 +458,8 @@ def mat(path: Path) -> ArraysByName:
 
 
 def _require_file(path: Path) -> None:
+    if path.is_dir():
+        raise ForeignFileError(path, "is a folder", due="one file of it is due")
     if not path.is_file():
         raise ForeignFileError(path, "there is no such file")
     size = path.stat().st_size

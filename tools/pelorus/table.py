@@ -36,7 +36,9 @@ class Table:
         self._columns = columns
         self._factor: dict[str, float] = {}
         self._own: dict[str, str] = {}  # what a renamed column is called in the file
-        self.hint_of: Callable[[str], str] | None = None  # what to do about a column that lacks
+        self.hint_of: Callable[[str, list[str]], str] | None = (
+            None  # what to do about a column that lacks
+        )
         self._missed: dict[str, str] = {}  # the names that another column should have had
 
     @classmethod
@@ -107,7 +109,7 @@ class Table:
             there = ", ".join(self._called(name) for name in self._columns)
             hint = "; commas should part them" if len(self._columns) == 1 and ";" in there else ""
             if not hint and not self._missed and self.hint_of is not None:
-                hint = self.hint_of(lacking[0])
+                hint = self.hint_of(lacking[0], self.names)
             raise ForeignFileError(
                 self.path,
                 f"lacks the column {', '.join(self._missed.get(name, name) for name in lacking)}",

@@ -50,7 +50,7 @@ def view(
         raise typer.BadParameter("say where to show it", param_hint=where)
     files = [path for path in (rrd, mcap) if path is not None]
     for path in files:
-        if path.exists() and path.samefile(source):
+        if path.exists() and source.exists() and path.samefile(source):
             raise PelorusError(f"{path}: is the log itself; another name is due")
     from pelorus.view.drive import show  # noqa: PLC0415 - scipy loads slowly
     from pelorus.view.in_foxglove import InFoxglove  # noqa: PLC0415

@@ -10,7 +10,7 @@ is taken in SI units, and that is said.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
@@ -115,17 +115,25 @@ def _says_nothing(words: str) -> bool:
     return name == column and name in NAMES
 
 
-def _hint(lacking: str) -> str:
+def _hint(lacking: str, there: Sequence[str]) -> str:
     """What to do where a column is there under another name."""
-    short = next((name for name, (target, _) in NAMES.items() if target == lacking), None)
-    if lacking == "t_s":
-        short = "t"
-    if short is None:
-        return ""
-    unit = lacking.partition("_")[2]
+    short = "t" if lacking == "t_s" else _short_of(lacking)
+    return f". If it is called otherwise: --columns {example(lacking, there)}" if short else ""
+
+
+def example(lacking: str, there: Sequence[str]) -> str:
+    """What to write for it: wx=COLUMN:radps, or the column itself if only its unit is another."""
+    short = "t" if lacking == "t_s" else _short_of(lacking)
     units = NAMES[short][1]
-    example = f"{short}=COLUMN:{unit}" if units is not NUMBER else f"{short}=COLUMN"
-    return f". If it is called otherwise: --columns {example}"
+    for column in there:
+        if column.startswith(f"{short}_") and column.removeprefix(f"{short}_") in units:
+            return f"{short}={column}"
+    unit = lacking.partition("_")[2]
+    return f"{short}=COLUMN:{unit}" if units is not NUMBER else f"{short}=COLUMN"
+
+
+def _short_of(target: str) -> str:
+    return next((name for name, (known, _) in NAMES.items() if known == target), "")
 
 
 def _short(name: str) -> tuple[str, str]:

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from pelorus import foreign, trajectory
 from pelorus.converters import readings_csv, streams, twist_axes
-from pelorus.converters.columns import Columns
+from pelorus.converters.columns import Columns, example
 from pelorus.converters.streams import Readings, Seen, Streams, TwistIn, Twists
 from pelorus.errors import PelorusError
 from pelorus.faults.finding import Finding
@@ -199,11 +199,12 @@ def _twists(table: Table, measured: frozenset[str]) -> Twists:
     ]
     if lacking and len(lacking) < len(measured):
         there = [short for short, name in VELOCITIES.items() if table.has(name)]
+        otherwise = example(lacking[0], table.names)
         raise ForeignFileError(
             path,
             f"lacks the column {', '.join(lacking)}",
             due=f"there are: {', '.join(table.names)}. If nothing measures them: --measured "
-            f"{','.join(there)}. If they are called otherwise: --columns {_example(lacking[0])}",
+            f"{','.join(there)}. If they are called otherwise: --columns {otherwise}",
         )
     table.require(*lacking)
     table.leave_out_bad(*(name for short, name in VELOCITIES.items() if short in measured))
@@ -231,11 +232,6 @@ def _poses_beside(table: Table) -> Poses | None:
             at=table.row(int(off.argmax())),
         )
     return Poses(np.asarray(Rotation.from_quat(q).as_matrix()), p)
-
-
-def _example(column: str) -> str:
-    name, _, unit = column.partition("_")
-    return f"{name}=COLUMN:{unit}"
 
 
 def _readings(

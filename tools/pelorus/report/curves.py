@@ -35,6 +35,7 @@ BAND = 0.95
 FRAMES_MOST = 150_000  # two hours at 20 Hz
 BESIDE = "beside"  # what curves of another log are called
 NO_HEALTH = 255
+NOTHING = "Nothing to draw: in no frame of this log is it known and not zero."
 SHAPES = 200  # ellipsoids along the way
 INSIDE = (
     "In body axes, first poses aligned, and three sigma of the filter's own covariance: an honest "
@@ -136,6 +137,10 @@ class Curves:
         return {"title": title, "unit": unit, "about": about, "lines": list(lines), **more}
 
     def _packed(self, chart: dict[str, Any]) -> dict[str, Any]:
+        least = 0.0 if chart.get("log") else -np.inf  # a logarithm shows nothing else
+        if not any((np.nan_to_num(x, nan=-np.inf) > least).any() for _, x in chart["lines"]):
+            return chart | {"lines": [], "empty": chart.get("empty", NOTHING)}
+        chart.pop("empty", None)
         columns = [{"name": name, **self.packer.add(values)} for name, values in chart["lines"]]
         if self._beside is not None:
             for like, (line, values) in self._beside.lines(chart):
@@ -241,7 +246,10 @@ class Curves:
             "95 % of the frames in the band if noise is as set. Above: pixel-sigma is too small."
         )
         lines = [("NIS", nis), ("low", low), ("high", high)]
-        return self._chart("Innovations", "NIS / dof", about, lines, band=[1, 2], levels=[1.0])
+        return self._chart(
+            *("Innovations", "NIS / dof", about, lines),
+            band=[1, 2], levels=[1.0], empty="Nothing to draw: no frame was used."
+        )  # fmt: skip
 
     def _biases(self) -> Iterator[dict[str, Any]]:
         frames = self._frames
@@ -285,7 +293,8 @@ class Curves:
             100 * frames["gated"], matched, out=np.full(len(matched), np.nan), where=matched > 0
         )
         about = "Of the matches, by the gate. As the sigmas say it is one of a hundred."
-        yield self._chart("Rejected", "%", about, [("rejected", share)], levels=[1.0])
+        empty = "Nothing to draw: no point matched a landmark, so none could be rejected."
+        yield self._chart("Rejected", "%", about, [("rejected", share)], levels=[1.0], empty=empty)
 
     def _timing(self) -> dict[str, Any]:
         ms = self._frames["update_us"] * 1e-3

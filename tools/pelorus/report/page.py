@@ -23,6 +23,7 @@ from typing import Any
 from pelorus.errors import write_text
 from pelorus.report.curves import Curves
 
+COLUMNS_MOST = 5
 GRADES = ("good", "care", "bad")
 
 
@@ -126,15 +127,21 @@ def _event(event: Event) -> str:
 def _table(table: Table) -> str:
     head, *rows = table.rows
     cells = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    many = len(head) > COLUMNS_MOST  # then a phone shows a row as a list, with the names
+    names = [f' data-head="{escape(name)}"' if many else "" for name in head]
     body = "\n".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+        "<tr>"
+        + "".join(f"<td{name}>{escape(x)}</td>" for name, x in zip(names, row, strict=True))
+        + "</tr>"
+        for row in rows
     )
     about = (
         f"<details><summary>What the columns mean</summary><p>{escape(table.about)}</p></details>"
         if table.about
         else ""
     )
-    content = f'<div class="wide"><table>\n<tr>{cells}</tr>\n{body}\n</table></div>{about}'
+    kind = "wide many" if many else "wide"
+    content = f'<div class="{kind}"><table>\n<tr>{cells}</tr>\n{body}\n</table></div>{about}'
     title = escape(table.title)
     if table.folded:
         return f"<details><summary>{title}</summary>{content}</details>"

@@ -165,6 +165,7 @@ class InFoxglove:
         to, frame = self._to, moment.frame
         rejected = np.isin(frame.ids, moment.rejected).tolist()
         told = to.PointsAnnotation(
+            timestamp=self._stamp(moment.t_ns),
             type=to.PointsAnnotationType.Points,
             points=[to.Point2(x=u, y=v) for u, v in frame.pixels[:, :2].tolist()],
             outline_colors=[

@@ -100,6 +100,18 @@
     u.ctx.restore();
   };
 
+  const beyond = (chart, columns, note) => (u) => { // how far a band goes, where the axis does not
+    if (!chart.band) return;
+    const { min, max } = u.scales.y, [from, to] = [nearest(view.from), nearest(view.to)];
+    let low = min, high = max;
+    for (const b of chart.band) for (let k = from; k <= to; k++) {
+      const x = columns[b][k];
+      if (x != null) { if (x < low) low = x; if (x > high) high = x; }
+    }
+    const reach = [low < min ? short(low) : "", high > max ? short(high) : ""].filter((x) => x);
+    note.textContent = reach.length ? ` the band leaves the axis: to ${reach.join(" and ")}` : "";
+  };
+
   function range(chart, columns) { // of the main lines: a band may leave the picture
     const main = columns.filter((_, k) => !(chart.band || []).includes(k));
     return (u, low, high) => {
@@ -124,12 +136,32 @@
     };
   }
 
-  function draw(chart) {
-    const place = node("section", "chart");
-    const title = chart.title + (chart.unit ? ` (${chart.unit})` : "");
-    place.append(node("h3", "", title));
-    if (chart.about) place.append(node("p", "soft", chart.about));
-    $("charts").append(place);
+  // A chart is unpacked and drawn when it comes near the screen; before, its place is kept free.
+  const places = new Map();
+  const near = new IntersectionObserver((seen) => {
+    for (const { isIntersecting, target } of seen) if (isIntersecting) draw(target);
+  }, { rootMargin: "300px" });
+  function place(chart) {
+    const made = node("section", "chart");
+    made.append(node("h3", "", chart.title + (chart.unit ? ` (${chart.unit})` : "")));
+    if (chart.about) made.append(node("p", "soft", chart.about));
+    $("charts").append(made);
+    if (chart.empty) {
+      made.append(node("p", "empty", chart.empty));
+      return;
+    }
+    made.append(node("div", "free"));
+    places.set(made, chart);
+    near.observe(made);
+  }
+  function draw(made) {
+    const chart = places.get(made);
+    if (!chart) return;
+    places.delete(made);
+    near.unobserve(made);
+    made.lastChild.remove();
+    const title = made.firstChild.textContent, note = node("span", "soft");
+    made.firstChild.append(note);
     const columns = chart.lines.map(unpack);
     const series = chart.lines.map((line, k) => {
       const inBand = (chart.band || []).includes(k);
@@ -140,23 +172,27 @@
       };
     });
     const u = new uPlot({
-      width: place.clientWidth, height: 170, legend: { live: true }, padding: [8, 8, 0, 0],
+      width: made.clientWidth, height: 170, legend: { live: true }, padding: [8, 8, 0, 0],
       cursor: { sync: { key: "time", setSeries: false }, drag: { x: true, y: false }, y: false, points: { size: 6 } },
       scales: { x: { time: false }, y: { distr: chart.log ? 3 : 1, range: range(chart, columns) } },
       axes: [axis("s", { size: 30 }), axis("", chart.log ? decades : { size: 62, values: (v, ticks) => ticks.map(short) })],
       series: [{ label: "s", value: (v, x) => x == null ? "" : x.toFixed(2) }, ...series],
       bands: chart.band ? [{ series: [chart.band[1] + 1, chart.band[0] + 1], fill: () => css("--band") }] : [],
       hooks: {
-        draw: [levels(chart)],
+        draw: [levels(chart), beyond(chart, columns, note)],
         setScale: [(v, key) => { if (key === "x" && !busy) zoom(v.scales.x.min, v.scales.x.max); }],
         setCursor: [(v) => { if (!busy && v.cursor.idx != null && v.cursor.event) go(v.cursor.idx); }],
       },
-    }, [t, ...columns], place);
+    }, [t, ...columns], made);
     u.root.setAttribute("role", "img");
     u.root.setAttribute("aria-label", `${title}. ${chart.about}`);
     u.over.addEventListener("dblclick", () => zoom(0, end));
     charts.push(u);
+    busy = true;
+    u.setScale("x", { min: view.from, max: view.to });
+    setTimeout(() => { busy = false; go(view.at); }); // uPlot commits its scales in a microtask
   }
+  const drawAll = () => { for (const made of [...places.keys()]) draw(made); };
 
   // --- ribbons -----------------------------------------------------------------------------------
 
@@ -363,7 +399,9 @@
   }
 
   makeRibbons();
-  data.charts.forEach(draw);
+  data.charts.forEach(place);
+  if (places.size) draw(places.keys().next().value); // by whose axis the ribbons stand
+  addEventListener("beforeprint", drawAll);
   map.start();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   new ResizeObserver(() => {
@@ -375,5 +413,5 @@
   }).observe($("charts"));
   if (events.length) event(0); else go(0);
   document.documentElement.dataset.ready = "yes";
-  window.pelorus = { view, go, zoom, count, t, map: map.state }; // for tests, and for the console
+  window.pelorus = { view, go, zoom, count, t, drawAll, map: map.state }; // for tests, and for the console
 })();
