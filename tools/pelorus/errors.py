@@ -58,6 +58,9 @@ def whole(*paths: Path) -> Iterator[tuple[Path, ...]]:
         return
     files = tuple(_file_of(path) for path in paths)
     parts = tuple(_part(file) for file in files)
+    for path, file in zip(paths, files, strict=True):
+        if not file.parent.exists():
+            raise PelorusError(f"{path}: cannot be written: there is no folder {file.parent}")
     try:
         yield parts
         for path, file, part in zip(paths, files, parts, strict=True):

@@ -185,7 +185,9 @@ def truth_of(path: Path) -> Trajectory:
     found = truth_in(messages)
     if found is not None:
         return found
-    raise PelorusError(f"{path}: holds no TRUTH frame that is finite")
+    has = any(isinstance(m, Truth) for m in messages)
+    what = "no TRUTH frame that is finite" if has else "no TRUTH"
+    raise PelorusError(f"{path}: holds {what}; a file of poses can be given in its place")
 
 
 def truth_in(messages: Sequence[Message]) -> Trajectory | None:
