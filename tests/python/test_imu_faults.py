@@ -12,6 +12,7 @@ import pytest
 from converted import Run
 from imu_drives import NOISY, npz_arrays, options, written
 from injected import OF_IMU
+from pelorus.faults.imu_axes import Matrix
 from pelorus.faults.mend import held_to_fit
 from pelorus.faults.named import faults_in
 from pelorus.layout import Floats
@@ -120,3 +121,11 @@ def test_the_converter_says_what_is_wrong(tmp_path: Path, pelorus: Run) -> None:
     said = pelorus("convert", "imu-npz", written(tmp_path / "x.npz", arrays), tmp_path / "x.plr")
     assert "gravity-sign: FOUND" in said.out
     assert "wrong sign" in said.out
+
+
+@pytest.mark.filterwarnings("error")
+def test_axes_that_tell_nothing_are_held_against_without_a_scale() -> None:
+    """Of a gyro of zeros: the likelihood ratio that is told was NaN."""
+    measured = Matrix(np.zeros((3, 3)), np.eye(9) * 1e-4, np.eye(9) * 1e-6)
+    assert measured.held_against(np.zeros((3, 3))) == 0.0
+    assert measured.held_against(np.eye(3)) > 0.0

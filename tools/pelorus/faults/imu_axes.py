@@ -75,7 +75,7 @@ class Matrix:
         wider = np.linalg.slogdet(wide)[1] - np.linalg.slogdet(self.covariance + doubt)[1]
         n, m = N.ravel(), self.M.ravel()
         scale = 1.0
-        if free:
+        if free and n.any():  # nothing has no scale
             scale = float(np.clip(n @ known @ m / (n @ known @ n), 1 - FREE_SCALE, 1 + FREE_SCALE))
         left = m - scale * n
         return float(left @ known @ left + max(wider, 0.0))
