@@ -140,26 +140,6 @@ def test_an_imu_in_g_or_without_gravity_is_refused(tmp_path: Path, pelorus: Run)
         assert f"imu.csv: the specific force {said}" in outcome.err
 
 
-@pytest.mark.parametrize(("flat", "said"), [("w", "the gyro reads (0 "), ("a", "(0 0 9.8)")])
-def test_a_sensor_that_reads_the_same_for_ever_is_refused(
-    tmp_path: Path, pelorus: Run, flat: str, said: str
-) -> None:
-    drive = clean(**SHORT)
-    options = options_of(tmp_path, drive, "--twists")
-    t_ns = np.linspace(drive.twist_t_ns[0], drive.twist_t_ns[-1], 300).astype(np.int64)
-    chance = np.random.default_rng(3)
-    imu: dict[str, Any] = {"t_ns": t_ns.tolist()}
-    for name, unit, mean in (("a", "mps2", (0.0, 0.0, 9.8)), ("w", "radps", (0.0, 0.0, 0.0))):
-        for axis, x in zip("xyz", mean, strict=True):
-            noise = 0.0 if name == flat else 0.01
-            imu[f"{name}{axis}_{unit}"] = (x + noise * chance.normal(size=300)).tolist()
-    path = write_csv(tmp_path / "imu.csv", imu)
-    outcome = pelorus("convert", "csv", *options, "--imu", path, tmp_path / "out.plr", status=1)
-    assert said in outcome.err
-    assert "in each of 300 readings; a real one has noise: is it in other columns" in outcome.err
-    assert not list(tmp_path.glob("out*"))
-
-
 @pytest.mark.parametrize("form", ["tum", "euroc", "euroc-poses"])
 def test_the_truth_may_be_a_file_of_tum_or_euroc(tmp_path: Path, pelorus: Run, form: str) -> None:
     drive = clean(**SHORT)

@@ -39,7 +39,6 @@ from pelorus.tracks import Tracks
 from pelorus.trajectory import Trajectory, filled
 
 FORCES_MPS2 = (5.0, 15.0)
-READINGS_TOLD = 100  # alike to the last digit: no resting sensor, however coarse its steps
 BLIND_VELOCITY_MPS = (
     0.2  # sigma along an axis that nothing measures: wheels roll, they do not slide
 )
@@ -206,7 +205,6 @@ def _with_motion(header: Header, streams: Streams, t_ns: Times, tracks: Tracks) 
         model = streams.calibrated.imu
         told = {name: s for name, s in vars(model.noise).items() if s >= 0}
         _require_gravity(motion)
-        _require_noise(motion)
         header = replace(header, process=Process.IMU, noise=replace(header.noise, **told))
         moved = (np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)))
         inertial = model.correction.of(motion.inertial)
@@ -228,23 +226,6 @@ def _require_gravity(readings: Readings) -> None:
             due="about 9.81 is due: is it in g (--columns ax=COLUMN:g and so on), or has gravity "
             "been taken away? Raw readings are due",
         )
-
-
-def _require_noise(readings: Readings) -> None:
-    """No sensor reads the same in every reading: what does is none, or a column that is not its."""
-    inertial = readings.inertial
-    for name, unit, x in (
-        ("gyro", "rad/s", inertial.w_B_radps),
-        ("accelerometer", "m/s^2", inertial.a_B_mps2),
-    ):
-        if len(x) >= READINGS_TOLD and (x == x[0]).all():
-            raise ForeignFileError(
-                readings.where,
-                f"the {name} reads ({x[0, 0]:.3g} {x[0, 1]:.3g} {x[0, 2]:.3g}) {unit} in each of "
-                f"{len(x)} readings",
-                due="a real one has noise: is it in other columns, or in a file of its own "
-                "(--gyro, --gyro-topic)?",
-            )
 
 
 def _interval_s(t_ns: Times) -> float:
