@@ -144,8 +144,7 @@ static void tell_contradiction(plr_session *s, const plr_config *config) {
     const char *why = plr_config_why(config, &culprit);
     if (why == NULL)
         return;
-    plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR);
-    plr_line_text(&s->out.as.text, culprit->name);
+    plr_line_begin(&s->out.as.text, PLR_SEVERITY_ERROR, culprit->name);
     plr_line_text(&s->out.as.text, ": ");
     plr_line_text(&s->out.as.text, why);
     plr_send_text(s);
