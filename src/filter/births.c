@@ -22,11 +22,67 @@ static void append_new(plr_filter *f, const plr_observation *seen) {
     f->slots[f->count - 1].beyond = beyond;
 }
 
+enum { CELLS_ACROSS = 4, CELLS = CELLS_ACROSS * CELLS_ACROSS };
+
+/* The quarter that x lies in, of an image twice as wide as its centre is far from its border. */
+static unsigned quarter(plr_real x, plr_real centre) {
+    return (unsigned)(x > PLR_R(0.5) * centre) + (x > centre) + (x > PLR_R(1.5) * centre);
+}
+
+static unsigned cell_of(const plr_filter *f, const plr_observation *seen) {
+    const plr_camera *camera = &f->par.camera;
+    return CELLS_ACROSS * quarter((plr_real)seen->vL_px, camera->cy) +
+           quarter((plr_real)seen->uL_px, camera->cx);
+}
+
+/* Points of a cell of the left image. */
+typedef struct plr_cell {
+    unsigned seen;     /* that are landmarks, or could be */
+    unsigned followed; /* that are, or become landmarks now */
+} plr_cell;
+
+/* True if one more point of cell a would be a smaller share of what is seen there than of b. */
+static bool is_behind(const plr_cell *a, const plr_cell *b) {
+    return (a->followed + 1) * b->seen < (b->followed + 1) * a->seen;
+}
+
+/* What becomes of an observation, in the place of its cell. */
+enum { MATCHED = CELLS, POOR, BORN };
+
+/* Chooses the observations that become landmarks. Where more are offered than slots are free, all parts of
+ * the image have their share (D'Hondt's method), and in each the lowest ids come first: points that lie
+ * together tell the same of the motion, those that are spread tell its six numbers apart. To begin where
+ * the fewest are followed instead would take wrong matches, which often lie alone. */
+static void choose(const plr_filter *f, const plr_frame *frame, unsigned n,
+                   uint8_t fate[PLR_MAX_OBSERVATIONS]) {
+    plr_cell cells[CELLS] = {{0, 0}};
+    for (unsigned k = 0; k < n; k++) {
+        const plr_observation *o = &frame->observations[f->work.order[k]];
+        const unsigned cell = cell_of(f, o);
+        const bool matched = f->work.slot_of[k] != PLR_NO_SLOT;
+        fate[k] = (uint8_t)(matched ? MATCHED : plr_stereo_makes_landmark(f, o) ? cell : POOR);
+        cells[cell].seen += fate[k] != POOR;
+        cells[cell].followed += matched;
+    }
+    for (unsigned room = plr_slots_room(f); room > 0; room--) {
+        unsigned next = n;
+        for (unsigned k = 0; k < n; k++)
+            if (fate[k] < CELLS && (next == n || is_behind(&cells[fate[k]], &cells[fate[next]])))
+                next = k;
+        if (next == n)
+            return;
+        cells[fate[next]].followed++;
+        fate[next] = BORN;
+    }
+}
+
 /* Landmarks that a frame makes which rejects nearly all that it matched would agree with its pose in the
  * next frames, against those that show where the body is. */
 void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n, bool none,
                                plr_frame_events *events, plr_report *report) {
     const bool makes = plr_births_are_allowed(f) && !(none && f->config.model == PLR_MODEL_BODY);
+    uint8_t fate[PLR_MAX_OBSERVATIONS];
+    choose(f, frame, n, fate);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_landmark known;
@@ -36,11 +92,11 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
             report->poor++; /* it keeps its place in the map, and is asked for again */
             continue;
         }
-        if (!makes || !plr_stereo_makes_landmark(f, o)) {
+        if (!makes || fate[k] == POOR) {
             report->poor++;
             continue;
         }
-        if (!plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
+        if (fate[k] != BORN || !plr_slots_make_room(f, &report->evicted, &events->sink_failed)) {
             report->no_room++;
             continue;
         }

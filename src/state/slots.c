@@ -29,6 +29,13 @@ static uint16_t oldest(const plr_filter *f) {
     return found;
 }
 
+unsigned plr_slots_room(const plr_filter *f) {
+    unsigned room = f->config.slots > f->count ? f->config.slots - f->count : 0;
+    for (unsigned slot = 0; slot < f->count; slot++)
+        room += f->slots[slot].last_frame != f->frame_number;
+    return room;
+}
+
 bool plr_slots_make_room(plr_filter *f, uint16_t *evicted, bool *sink_failed) {
     if (f->count < f->config.slots)
         return true;

@@ -15,6 +15,9 @@
 /* The slot of an id, or PLR_NO_SLOT. */
 uint16_t plr_slots_find(const plr_filter *f, uint32_t id);
 
+/* How many landmarks can begin: the free slots, and those of landmarks that this frame does not see. */
+unsigned plr_slots_room(const plr_filter *f);
+
 /* Makes room for one landmark if all slots are taken: the one unseen for the longest time goes to
  * the map sink, in a tie that of the lowest slot, and never one seen in the current frame. False if
  * there is no room. *evicted is counted up, *sink_failed set if the sink failed. */

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "support/twin_drive.h"
 
+#include <math.h>
+
 #include <unity.h>
 
 #include "support/exact_camera.h"
@@ -53,11 +55,43 @@ void twin_drive_evict(void) {
         textbook_remove(&twins.book, textbook_find(&twins.book, twins.evicted[i]));
 }
 
+/* Of four parts of the image's width or height, which holds x. */
+static unsigned quarter(double x, double centre) {
+    const double part = ceil(2 * x / centre) - 1;
+    return (unsigned)fmin(fmax(part, 0), 3);
+}
+
 unsigned twin_drive_create(const plr_frame *frame) {
+    const plr_calibration *camera = &twins.world.calibration;
     const unsigned before = twins.book.count;
-    for (unsigned i = 0; i < frame->count && twins.book.count < twins.config.slots; i++)
-        if (textbook_find(&twins.book, frame->observations[i].id) == twins.book.count)
-            (void)textbook_create(&twins.book, twins.book.count, frame->t_ns,
-                                  &frame->observations[i]);
+    double seen[16] = {0}, followed[16] = {0};
+    unsigned cell[PLR_MAX_OBSERVATIONS];
+    bool settled[PLR_MAX_OBSERVATIONS];
+    for (unsigned i = 0; i < frame->count; i++) {
+        const plr_observation *o = &frame->observations[i];
+        const bool held = textbook_find(&twins.book, o->id) < before;
+        cell[i] = 4 * quarter(o->vL_px, camera->cy_px) + quarter(o->uL_px, camera->cx_px);
+        settled[i] =
+            held || !textbook_is_worth_a_landmark(&twins.book.config, &twins.book.camera, o);
+        seen[cell[i]] += held || !settled[i];
+        followed[cell[i]] += held;
+    }
+    while (twins.book.count < twins.config.slots) {
+        unsigned next = frame->count;
+        double largest = 0;
+        for (unsigned i = 0; i < frame->count; i++) {
+            const double quotient = seen[cell[i]] / (followed[cell[i]] + 1);
+            if (settled[i] || quotient <= largest)
+                continue;
+            next = i;
+            largest = quotient;
+        }
+        if (next == frame->count)
+            break;
+        settled[next] = true;
+        followed[cell[next]]++;
+        TEST_ASSERT_TRUE(textbook_create(&twins.book, twins.book.count, frame->t_ns,
+                                         &frame->observations[next]));
+    }
     return twins.book.count - before;
 }

@@ -39,7 +39,8 @@ void twin_drive_to_the_next_frame(void);
 /* What the filter evicted leaves the textbook too. */
 void twin_drive_evict(void);
 
-/* New landmarks in the textbook, in the frame's order and while the filter has a slot. */
+/* New landmarks in the textbook while the filter has a slot: parts of the image by D'Hondt's method, in each
+ * the order of the frame. */
 unsigned twin_drive_create(const plr_frame *frame);
 
 #endif

@@ -154,22 +154,51 @@ static void test_a_new_landmark_lies_where_its_pixels_say(void) {
 
 /* ---------------------------------------------------------------- room */
 
-static void test_new_ids_beyond_the_slots_are_taken_from_the_lowest(void) {
+/* A frame of points 10 px of disparity apart in a row of the image, their ids descending from `first`. */
+static void see_row(unsigned from, unsigned count, uint32_t first, float u_px, float v_px) {
+    for (unsigned i = from; i < from + count; i++) {
+        const float u = u_px + (float)(i - from);
+        seen[i] = (plr_observation){first - (i - from), u, v_px, u - 10, v_px};
+    }
+}
+
+static plr_frame frame_of(unsigned count) {
     rig.config.slots = 6;
     rig_begin();
-    plr_frame frame = look();
-    TEST_ASSERT_GREATER_THAN_UINT(9, frame.count);
-    for (unsigned i = 0; i < frame.count; i++) { /* the ids descend */
-        seen[i].id = 1000 - i;
-        seen[i].vR_px = seen[i].vL_px;
-    }
+    return (plr_frame){1000000000, PLR_NO_BUDGET, (uint16_t)count, seen};
+}
+
+static void test_new_ids_beyond_the_slots_are_taken_from_the_lowest(void) {
+    const plr_frame frame = frame_of(10);
+    see_row(0, 10, 1000, 400, 300);
     TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
     TEST_ASSERT_EQUAL_UINT(6, rig.report.created);
-    TEST_ASSERT_EQUAL_UINT(frame.count - 6, rig.report.no_room);
+    TEST_ASSERT_EQUAL_UINT(4, rig.report.no_room);
     TEST_ASSERT_TRUE(rig.report.reasons & PLR_REASON_NO_ROOM);
-    for (uint32_t i = 0; i < 6; i++)
-        TEST_ASSERT_TRUE(holds(1001U - frame.count + i));
+    for (uint32_t id = 991; id <= 996; id++)
+        TEST_ASSERT_TRUE(holds(id));
     TEST_ASSERT_EQUAL_UINT(0, handed_over); /* what this frame has seen is never evicted */
+}
+
+/* Twelve points, six in a corner, one alone in another: six slots are shared by D'Hondt's method, 4 : 2 : 0,
+ * and so are those that become free. */
+static void test_parts_of_the_image_have_their_share_of_the_slots(void) {
+    plr_frame frame = frame_of(19);
+    see_row(0, 12, 120, 400, 300);
+    see_row(12, 6, 905, 40, 20);
+    see_row(18, 1, 50, (float)(2 * rig.world.calibration.cx_px - 10), 20);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(6, rig.report.created);
+    for (uint32_t id = 109; id <= 112; id++)
+        TEST_ASSERT_TRUE(holds(id));
+    TEST_ASSERT_TRUE(holds(900) && holds(901));
+    frame.t_ns += 100000000; /* 109 and 110 are gone, and six more are in the corner */
+    frame.count = 22;
+    see_row(0, 10, 120, 400, 300);
+    see_row(10, 12, 911, 40, 20);
+    TEST_ASSERT_EQUAL_INT(PLR_OK, update(&frame));
+    TEST_ASSERT_EQUAL_UINT(2, rig.report.created);
+    TEST_ASSERT_TRUE(holds(113) && holds(902));
 }
 
 static void test_a_full_ring_hands_the_oldest_to_the_sink(void) {
