@@ -220,6 +220,7 @@ def test_a_bias_that_a_bent_picture_may_be_is_not_switched_on(
         (99, "TWIST_CONTRADICTED", verdict.Grade.GOOD),
         (60, "TWIST_CONTRADICTED", verdict.Grade.CARE),
         (40, "TWIST_CONTRADICTED", verdict.Grade.BAD),
+        (40, "BIAS_OFF_PRIOR", verdict.Grade.CARE),  # the bias itself is graded, too
         (40, "NO_TWISTS", verdict.Grade.CARE),  # of odometry that is sent while the robot moves
     ],
 )

@@ -338,7 +338,7 @@ Made by `tools/sizes.sh`; `tools/sizes.sh --check` measures again and fails wher
 by more than {tolerance} (stack seen: 64 bytes; worst / median: never above {spread_limit}).
 The images are float32, bias on, blocks of 8, at most 128 observations a frame (64 for N = 8 and
 16), with every room of the library; compiler `arm-none-eabi-gcc` 12.2, what frames are spent in at
--O3, the rest, and what few frames need (`PLR_SELDOM`), at -Os (`port/cortex_m/cmake/CortexM.cmake`).
+-O3, the rest and what few frames need (`PLR_SELDOM`) at -Os (`port/cortex_m/cmake/CortexM.cmake`).
 
 ## Memory
 

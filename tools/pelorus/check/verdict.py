@@ -25,7 +25,8 @@ from pelorus.settings import in_force
 
 GOOD = HEALTHS[0]
 LATE = number("status", "LATE")
-NO_TWISTS = number("reason", "NO_TWISTS")
+# reasons that have a remark of their own
+TOLD_APART = number("reason", "NO_TWISTS") | number("reason", "BIAS_OFF_PRIOR")
 GOOD_MOST, DOUBTED_HALF, LOST_MANY = 0.95, 0.5, 0.1  # of the frames
 GATED_MANY, GATED_MOST = 0.1, 0.3  # of the matches
 WINDOW_S = 5.0
@@ -78,11 +79,11 @@ class Run:
 
     @property
     def doubted_share(self) -> float:
-        """Frames that are not good for more than a pause of the readings: the pause is told by
-        itself, and what is not known in it is in the covariance.
+        """Frames that are not good for more than a pause of the readings or a bias off its prior:
+        these are graded by themselves, and what is not known in a pause is in the covariance.
         """
         frames = (m for m in self.messages if isinstance(m, Report) and m.subject == Kind.STEREO)
-        known = NO_TWISTS | HARMLESS | NOT_STARTED
+        known = TOLD_APART | HARMLESS | NOT_STARTED
         doubted = sum(m.health != OF_GOOD and m.reasons & ~known != 0 for m in frames)
         return doubted / max(self.health.frames, 1)
 
