@@ -126,21 +126,21 @@ def of_03(real: Callable[[str], Path], kept: Callable[..., Any]) -> Converted:
 
 
 @pytest.fixture
-def of_imu(real: Callable[[str], Path], kept: Callable[..., Any]) -> Callable[[str], Converted]:
-    """A recording of imu/ by its name, and what was found: a simulated one with seed 1's noise."""
+def of_imu(real: Callable[[str], Path], kept: Callable[..., Any]) -> Callable[..., Converted]:
+    """A recording of imu/ by its name, and what was found: a simulated one with a seed's noise."""
 
-    def get(name: str) -> Converted:
-        choices = Choices(seed=None if name.startswith("euroc") else 1)
+    def get(name: str, seed: int = 1) -> Converted:
+        choices = Choices(seed=None if name.startswith("euroc") else seed)
         source = real(f"imu/{name}.npz")
-        return Converted(*kept(name, lambda: imu_npz.convert(source, choices)))
+        return Converted(*kept(f"{name}-{seed}", lambda: imu_npz.convert(source, choices)))
 
     return get
 
 
 @pytest.fixture
-def plr_imu(of_imu: Callable[[str], Converted], once: Once) -> Callable[[str], Path]:
-    def get(name: str) -> Path:
-        return once(f"{name}.plr", of_imu(name).recording.write)
+def plr_imu(of_imu: Callable[..., Converted], once: Once) -> Callable[..., Path]:
+    def get(name: str, seed: int = 1) -> Path:
+        return once(f"{name}-{seed}.plr", of_imu(name, seed).recording.write)
 
     return get
 

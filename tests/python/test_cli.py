@@ -118,7 +118,7 @@ def test_a_recording_is_written_in_the_order_of_the_format(tmp_path: Path) -> No
     assert isinstance(messages[0], Header)
     assert isinstance(messages[-1], End)
     rank = {Twist: 0, Truth: 1, Stereo: 2}
-    keys = [(m.t_ns, rank[type(m)]) for m in messages if isinstance(m, (Twist, Truth, Stereo))]
+    keys = [(m.t_ns, rank[m.__class__]) for m in messages if isinstance(m, (Twist, Truth, Stereo))]
     assert keys == sorted(keys)
     assert len(keys) == 3 * 31
     assert counts.clean

@@ -81,20 +81,22 @@ NEES = ("position", "rotation", "velocity", "bias_accel", "bias_gyro")
 
 @pytest.mark.parametrize(("slots", "metres", "degrees"), [(60, 0.06, 0.15), (16, 0.12, 0.4)])
 def test_a_walk_through_a_corridor_drifts_by_centimetres(
-    plr_imu: Callable[[str], Path],
+    plr_imu: Callable[..., Path],
     pelorus: Run,
     slots: int,
     metres: float,
     degrees: float,
 ) -> None:
-    """Of five draws the median is half of these limits; this is one of them."""
+    """The median is half of these limits. The NEES of one drive is little more than one sample."""
     options = ("--config", CONFIG / "imu.conf", "--set", f"slots={slots}", "--first", 120)
-    found = figures(pelorus, plr_imu("tum_corridor1-60-seed0"), *options)
-    assert found["err0_m"] < metres
-    assert found["rot_deg"] < degrees
-    assert found["truth_frames"] == 1201
+    drives = [plr_imu("tum_corridor1-60-seed0", seed) for seed in (1, 2, 3)]
+    found = [figures(pelorus, drive, *options) for drive in drives]
+    for drive in found:
+        assert drive["err0_m"] < metres
+        assert drive["rot_deg"] < degrees
+        assert drive["truth_frames"] == 1201
     for name in NEES:
-        assert 0.3 < found[f"nees_{name}"] < 2, name
+        assert 0.3 < np.mean([drive[f"nees_{name}"] for drive in found]) < 2, name
 
 
 def test_real_readings_are_as_good_with_the_noises_of_a_data_sheet(

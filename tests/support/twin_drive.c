@@ -70,7 +70,8 @@ unsigned twin_drive_create(const plr_frame *frame) {
     for (unsigned i = 0; i < frame->count; i++) {
         const plr_observation *o = &frame->observations[i];
         const bool held = textbook_find(&twins.book, o->id) < before;
-        cell[i] = 4 * quarter(o->vL_px, camera->cy_px) + quarter(o->uL_px, camera->cx_px);
+        cell[i] =
+            4 * quarter((double)o->vL_px, camera->cy_px) + quarter((double)o->uL_px, camera->cx_px);
         settled[i] =
             held || !textbook_is_worth_a_landmark(&twins.book.config, &twins.book.camera, o);
         seen[cell[i]] += held || !settled[i];

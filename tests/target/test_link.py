@@ -166,7 +166,7 @@ def test_a_host_that_does_not_read_for_a_while_deadlocks_nothing(
 @pytest.mark.spread
 def test_data_before_a_header_is_refused(link: Link, messages: list[Message]) -> None:
     boot = answers_to(link, b"")
-    assert [type(message) for message in boot] == [Report, Text]
+    assert [message.__class__ for message in boot] == [Report, Text]
     assert isinstance(boot[0], Report)
     assert boot[0].notice == Notice.STARTED
     stereo = messages[stereo_indices(messages)[0]]

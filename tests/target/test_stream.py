@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -272,7 +273,9 @@ def test_the_log_of_a_drive_compares_equal_and_one_other_bit_does_not(
     at = [k for k, message in enumerate(messages) if isinstance(message, Pose)][17]
     pose = messages[at]
     assert isinstance(pose, Pose)
-    pose.p_WB_m[0] = np.nextafter(pose.p_WB_m[0], np.inf)
+    moved = pose.p_WB_m.copy()
+    moved[0] = np.nextafter(moved[0], np.inf)
+    messages[at] = replace(pose, p_WB_m=moved)
     with other.open("wb") as stream:
         writer = Writer(stream)
         for message in messages:

@@ -11,6 +11,8 @@ from enum import IntEnum
 from functools import cache, lru_cache
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from pelorus import schema
 from pelorus.layout import Layout, Place, places
 
@@ -159,8 +161,12 @@ class _Asked:
     def __get__(self, message: Any, owner: type[Message]) -> Any:
         value = None if self._place is None else self._place.read(message.payload)
         if value is None:
-            return getattr(_whole(self._kind, message.payload), self._name)
-        return value if self._choose is None else self._choose(value)
+            value = getattr(_whole(self._kind, message.payload), self._name)
+        elif self._choose is not None:
+            value = self._choose(value)
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False  # to write into it would change nothing
+        return value
 
 
 @lru_cache(maxsize=4)  # whoever asks for one field asks for its neighbour next
