@@ -142,7 +142,7 @@ typedef struct plr_config {
     /* Setting slots: 1 to PLR_MAX_LANDMARKS, default 100 or PLR_MAX_LANDMARKS, the smaller.
      * Landmarks in the state at once. More are more accurate; the time that an observation costs
      * grows with the square of their number. Choose about as many as the tracker follows at once
-     * (docs/NUMERICS.md 11). */
+     * (docs/NUMERICS.md 11); where it follows more, all parts of the image have their share. */
     uint16_t slots;
 
     /* Setting process: one of plr_process_kind, default PLR_PROCESS_TWIST.
