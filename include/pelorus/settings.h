@@ -425,8 +425,8 @@ void plr_config_course(plr_config *config);
  * change. PLR_E_ARGUMENT: no config. */
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit);
 
-/* Why plr_config_check refuses it, for a person: "needs model = body and bias = on"; NULL: it does not.
- * *culprit as there. */
+/* Why plr_config_check refuses it, for a person: "imu needs model = body and bias = on"; NULL: it does not.
+ * *culprit (which may be NULL) as there. There must be a config. */
 const char *plr_config_why(const plr_config *config, const plr_setting **culprit);
 
 #ifdef __cplusplus

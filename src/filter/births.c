@@ -53,8 +53,8 @@ enum { MATCHED = CELLS, POOR, BORN };
  * the image have their share (D'Hondt's method), and in each the lowest ids come first: points that lie
  * together tell the same of the motion, those that are spread tell its six numbers apart. To begin where
  * the fewest are followed instead would take wrong matches, which often lie alone. */
-static void choose(const plr_filter *f, const plr_frame *frame, unsigned n,
-                   uint8_t fate[PLR_MAX_OBSERVATIONS]) {
+static void choose_births(const plr_filter *f, const plr_frame *frame, unsigned n,
+                          uint8_t fate[PLR_MAX_OBSERVATIONS]) {
     plr_cell cells[CELLS] = {{0, 0}};
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
@@ -82,7 +82,8 @@ void plr_births_from_unmatched(plr_filter *f, const plr_frame *frame, unsigned n
                                plr_frame_events *events, plr_report *report) {
     const bool makes = plr_births_are_allowed(f) && !(none && f->config.model == PLR_MODEL_BODY);
     uint8_t fate[PLR_MAX_OBSERVATIONS];
-    choose(f, frame, n, fate);
+    if (makes)
+        choose_births(f, frame, n, fate);
     for (unsigned k = 0; k < n; k++) {
         const plr_observation *o = &frame->observations[f->work.order[k]];
         plr_landmark known;

@@ -83,6 +83,13 @@ static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
 }
 
+/* By a reading that stands for so many seconds. */
+static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
+                      plr_real seconds, plr_real interval) {
+    plr_process_of(f)->step(f, t_ns, reading, seconds, interval);
+    plr_calibration_note_step(f, reading, seconds);
+}
+
 /* Adds what the last reading misses between h0 and h1 seconds after its time. */
 static void add_missed(plr_filter *f, plr_real h0, plr_real h1, const plr_real *next) {
     plr_real variance[PLR_POSE_DIM];
@@ -100,9 +107,7 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
         const plr_real interval = noise_interval(f, h0, h1);
         plr_real held[PLR_POSE_DIM];
         plr_process_of(f)->hold(f, h0, held);
-        const plr_real seconds = plr_seconds(t_ns - f->t_ns);
-        plr_process_of(f)->step(f, t_ns, held, seconds, interval);
-        plr_calibration_note_step(f, held, seconds);
+        take_step(f, t_ns, held, plr_seconds(t_ns - f->t_ns), interval);
         add_missed(f, h0, h1, NULL);
     }
     f->t_ns = t_ns;
@@ -173,8 +178,7 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
         return PLR_OK;
     }
     if (planned->seconds > 0 && plr_process_has_started(f)) {
-        plr_process_of(f)->step(f, t_ns, planned->mean, planned->seconds, planned->interval);
-        plr_calibration_note_step(f, planned->mean, planned->seconds);
+        take_step(f, t_ns, planned->mean, planned->seconds, planned->interval);
         add_missed(f, planned->interval - planned->seconds, planned->interval, reading);
     }
     f->t_ns = t_ns;

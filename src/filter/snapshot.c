@@ -55,6 +55,16 @@ typedef struct plr_state_pose {
     ;
 #include "filter/snapshot.def"
 
+/* Where one field stands for several members of a struct, they lie without a gap, or this does not
+ * compile. */
+enum {
+    OF_CAMERA = 1 / (sizeof(plr_camera) == 17 * sizeof(plr_real)),
+    OF_TOTALS = 1 / (offsetof(plr_totals, readings_refused) ==
+                     offsetof(plr_totals, twists) + 16 * sizeof(uint32_t)),
+    OF_SUMS = 1 / (offsetof(plr_totals, diverged_ns) + sizeof(plr_time_ns) ==
+                   offsetof(plr_totals, observations) + 7 * sizeof(uint64_t))
+};
+
 /* All fields of a table, and their size as bytes. */
 #define PASS(c, object, table)                                                                     \
     plr_codec_fields((c), (void *)(object), table##_fields,                                        \

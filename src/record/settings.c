@@ -244,23 +244,24 @@ static const char *contradiction(const plr_config *c, const char **culprit) {
 }
 
 const char *plr_config_why(const plr_config *config, const plr_setting **culprit) {
-    const char *name = NULL, *why;
-    *culprit = NULL;
-    for (unsigned i = 0; i < COUNT; i++)
-        if (!is_allowed(&rows[i].setting, plr_config_get(config, &rows[i].setting))) {
-            *culprit = &rows[i].setting;
-            return "outside its limits";
-        }
-    why = contradiction(config, &name);
-    if (why)
-        *culprit = plr_setting_by_name(name);
+    const char *name = NULL, *why = NULL;
+    const plr_setting *found = NULL;
+    for (unsigned i = 0; i < COUNT && !found; i++)
+        if (!is_allowed(&rows[i].setting, plr_config_get(config, &rows[i].setting)))
+            found = &rows[i].setting;
+    if (found)
+        why = "outside its limits";
+    else if ((why = contradiction(config, &name)) != NULL)
+        found = plr_setting_by_name(name);
+    if (culprit)
+        *culprit = found;
     return why;
 }
 
 plr_status plr_config_check(const plr_config *config, const plr_setting **culprit) {
-    const plr_setting *found = NULL;
-    const char *why = config ? plr_config_why(config, &found) : NULL;
+    if (config)
+        return plr_config_why(config, culprit) ? PLR_E_CONFIG : PLR_OK;
     if (culprit)
-        *culprit = found;
-    return !config ? PLR_E_ARGUMENT : why ? PLR_E_CONFIG : PLR_OK;
+        *culprit = NULL;
+    return PLR_E_ARGUMENT;
 }

@@ -24,7 +24,7 @@ import numpy as np
 from pelorus.check.apart import Inflated, Parts
 from pelorus.check.options import Settings
 from pelorus.check.outcome import Bench
-from pelorus.check.parameters import Tuned, larger
+from pelorus.check.parameters import Tuned, larger, unless_surer
 from pelorus.frames import Kind
 
 
@@ -42,10 +42,9 @@ def with_halves_alike(bench: Bench, tuned: Tuned) -> Tuned:
 
     found = inflate(bench.parts(offset_s), without_offset)
     if found.is_larger:
-        settings = of(found.times)
-        after = bench.run(settings)
-        if after.pose_log_det > tuned.after.pose_log_det:
-            return replace(tuned, settings=settings, after=after, halves=found)
+        wider = unless_surer(bench, tuned, of(found.times))
+        if wider is not tuned:
+            return replace(wider, halves=found)
     return replace(tuned, halves=found._replace(times=1.0, after=found.before))
 
 

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from pelorus.check.apart import Inflated
 from pelorus.check.options import Settings
-from pelorus.check.outcome import Outcome
+from pelorus.check.outcome import Bench, Outcome
 from pelorus.check.tracks_noise import DRIFT, TrackNoise
 from pelorus.frames import Header
 from pelorus.schema import DEFAULTS
@@ -72,6 +72,14 @@ class Tuned:
     halves: Inflated | None = None  # None: not compared
     doubts: list[str] = field(default_factory=list)
     lasting: list[str] = field(default_factory=list)  # what is off for longer than a step
+
+
+def unless_surer(bench: Bench, tuned: Tuned, settings: dict[str, str]) -> Tuned:
+    """The same with these settings; as it is where they make the filter surer of its last pose."""
+    after = bench.run(settings)
+    if not after.pose_log_det > tuned.after.pose_log_det:
+        return tuned
+    return replace(tuned, settings=settings, after=after)
 
 
 def of_process(by_imu: bool) -> dict[str, Parameter]:

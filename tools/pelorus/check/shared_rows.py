@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from pelorus.check.outcome import Bench
-from pelorus.check.parameters import Tuned
+from pelorus.check.parameters import Tuned, unless_surer
 from pelorus.check.tracks_noise import told_apart
 
 SETTING = "pixel-sigma"
@@ -24,8 +22,4 @@ def with_shared_rows(bench: Bench, tuned: Tuned) -> Tuned:
     was_px = float(tuned.settings[SETTING])
     if not (shared_px > was_px and told_apart(shared_px, was_px)):
         return tuned
-    settings = tuned.settings | {SETTING: f"{shared_px:.3g}"}
-    after = bench.run(settings)
-    if not after.pose_log_det > tuned.after.pose_log_det:
-        return tuned
-    return replace(tuned, settings=settings, after=after)
+    return unless_surer(bench, tuned, tuned.settings | {SETTING: f"{shared_px:.3g}"})

@@ -117,13 +117,13 @@ def _says_nothing(words: str) -> bool:
 
 def _hint(lacking: str, there: Sequence[str]) -> str:
     """What to do where a column is there under another name."""
-    short = "t" if lacking == "t_s" else _short_of(lacking)
+    short = _short_of(lacking)
     return f". If it is called otherwise: --columns {example(lacking, there)}" if short else ""
 
 
 def example(lacking: str, there: Sequence[str]) -> str:
     """What to write for it: wx=COLUMN:radps, or the column itself if only its unit is another."""
-    short = "t" if lacking == "t_s" else _short_of(lacking)
+    short = _short_of(lacking)
     units = NAMES[short][1]
     for column in there:
         if column.startswith(f"{short}_") and column.removeprefix(f"{short}_") in units:
@@ -133,6 +133,8 @@ def example(lacking: str, there: Sequence[str]) -> str:
 
 
 def _short_of(target: str) -> str:
+    if target == "t_s":
+        return "t"
     return next((name for name, (known, _) in NAMES.items() if known == target), "")
 
 
