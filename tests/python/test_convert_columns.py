@@ -18,7 +18,7 @@ from pelorus.recording import Recording
 from pelorus.simulation.simulate import simulate
 from replay_drive import BIN, judged
 from scipy.spatial.transform import Rotation
-from test_convert_csv import csv_files, write_csv
+from test_convert_csv import csv_files, refusal_of_twists, write_csv
 
 TODAY_NS = 1_763_822_000_123_456_789  # a double has no such nanoseconds
 
@@ -285,11 +285,8 @@ def test_columns_of_other_names_are_told_how_to_be_named_whichever_file_lacks_th
 
 def test_a_column_in_another_unit_is_named_as_it_is(tmp_path: Path, pelorus: Run) -> None:
     """Whoever copied `wx=COLUMN:radps` would have degrees taken for radians."""
-    files = csv_files(tmp_path, clean(**SHORT))
-    path = tmp_path / "twists.csv"
-    path.write_text(path.read_text().replace("radps", "degps"))
-    outcome = pelorus("convert", "csv", *files, tmp_path / "out.plr", status=1)
-    assert "called otherwise: --columns wx=wx_degps" in outcome.err
+    said = refusal_of_twists(tmp_path, pelorus, ("radps", "degps"))
+    assert "called otherwise: --columns wx=wx_degps" in said
 
 
 def test_semicolons_with_decimal_commas_and_zero_bytes_are_told(

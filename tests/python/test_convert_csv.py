@@ -72,6 +72,14 @@ def csv_files(folder: Path, recording: Recording) -> list[Any]:
     ]
 
 
+def refusal_of_twists(folder: Path, pelorus: Run, change: tuple[str, str]) -> str:
+    """What `convert csv` says of a table of twists in which one text stands for another."""
+    options = csv_files(folder, clean(**SHORT))
+    path = folder / "twists.csv"
+    path.write_text(path.read_text().replace(*change))
+    return pelorus("convert", "csv", *options, folder / "out.plr", status=1).err
+
+
 def sources_in(folder: Path) -> csv_converter.Sources:
     """Of the files that `csv_files` wrote."""
     return csv_converter.Sources(
@@ -208,11 +216,8 @@ def test_files_that_were_taken_for_each_other_are_told_by_their_columns(
 
 
 def test_a_file_parted_by_semicolons_is_told_so(tmp_path: Path, pelorus: Run) -> None:
-    options = csv_files(tmp_path, clean(**SHORT))
-    path = tmp_path / "twists.csv"
-    path.write_text(path.read_text().replace(",", ";"))
-    outcome = pelorus("convert", "csv", *options, tmp_path / "out.plr", status=1)
-    assert "commas should part them" in outcome.err
+    said = refusal_of_twists(tmp_path, pelorus, (",", ";"))
+    assert "commas should part them" in said
 
 
 def test_what_too_few_data_cannot_tell_is_not_called_good(tmp_path: Path, pelorus: Run) -> None:
