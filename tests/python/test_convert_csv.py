@@ -77,7 +77,8 @@ def refusal_of_twists(folder: Path, pelorus: Run, change: tuple[str, str]) -> st
     options = csv_files(folder, clean(**SHORT))
     path = folder / "twists.csv"
     path.write_text(path.read_text().replace(*change))
-    return pelorus("convert", "csv", *options, folder / "out.plr", status=1).err
+    said: str = pelorus("convert", "csv", *options, folder / "out.plr", status=1).err
+    return said
 
 
 def sources_in(folder: Path) -> csv_converter.Sources:
