@@ -97,11 +97,13 @@ plr_status plr_filter_inertial(plr_filter *f, plr_time_ns t_ns, const plr_imu *i
     const plr_imu_fault fault = find_fault(f, imu, reading, change2);
     if (fault != PLR_IMU_FAULT_NONE)
         return refuse(f, fault == PLR_IMU_FAULT_FROZEN ? PLR_E_ARGUMENT : PLR_E_RANGE, fault);
-    plr_statistics_learn(f, t_ns, reading, planned.interval, change2);
+    plr_statistics_learn(f, t_ns, reading, planned.step.interval, change2);
     plr_calibration_note_rate(f, reading + 3);
     if (f->inertial.started)
         return plr_predict_accept(f, t_ns, reading, &planned);
     plr_alignment_add(f, t_ns, reading);
+    if (f->inertial.started)
+        plr_filter_store_for_recovery(f);
     const plr_status status = plr_predict_accept(f, t_ns, reading, &planned);
     plr_guard_seal_whole(f); /* the start sets P */
     return status;
@@ -208,6 +210,7 @@ plr_status plr_filter_set_velocity(plr_filter *f, const double v_B_mps[3],
         P_v[i] = (plr_real)variance[i];
     }
     plr_alignment_given(f, v, P_v);
+    plr_filter_store_for_recovery(f);
     plr_guard_seal_whole(f);
     return PLR_OK;
 }

@@ -83,11 +83,9 @@ static plr_real noise_interval(const plr_filter *f, plr_real h0, plr_real h1) {
     return h0 >= tau ? h0 + h1 : (h1 * h1 - tau * h0) / (h1 - h0);
 }
 
-/* By a reading that stands for so many seconds. */
-static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                      plr_real seconds, plr_real interval) {
-    plr_process_of(f)->step(f, t_ns, reading, seconds, interval);
-    plr_calibration_note_step(f, reading, seconds);
+static void take_step(plr_filter *f, plr_time_ns t_ns, const plr_step *step) {
+    plr_process_of(f)->step(f, t_ns, step);
+    plr_calibration_note_step(f, step->mean, step->seconds);
 }
 
 /* Adds what the last reading misses between h0 and h1 seconds after its time. */
@@ -104,10 +102,11 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns) {
     if (f->clock_started && t_ns > f->t_ns && plr_process_has_started(f)) {
         const plr_time_ns since = f->reading_valid ? f->reading_ns : f->t_ns;
         const plr_real h0 = plr_seconds(f->t_ns - since), h1 = plr_seconds(t_ns - since);
-        const plr_real interval = noise_interval(f, h0, h1);
-        plr_real held[PLR_POSE_DIM];
-        plr_process_of(f)->hold(f, h0, held);
-        take_step(f, t_ns, held, plr_seconds(t_ns - f->t_ns), interval);
+        plr_step step = {.seconds = plr_seconds(t_ns - f->t_ns),
+                         .interval = noise_interval(f, h0, h1)};
+        plr_process_of(f)->hold(f, h0, step.mean);
+        memcpy(step.whole, step.mean, sizeof step.whole);
+        take_step(f, t_ns, &step);
         add_missed(f, h0, h1, NULL);
     }
     f->t_ns = t_ns;
@@ -159,11 +158,12 @@ plr_planned_step plr_predict_plan(const plr_filter *f, plr_time_ns t_ns,
     planned.status = check_time(f, t_ns);
     if (planned.status != PLR_OK)
         return planned;
-    plr_process_of(f)->mean(f, t_ns, reading, planned.mean);
-    planned.seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
-    planned.interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : planned.seconds;
-    if (plr_process_of(f)->check(f, planned.mean, planned.seconds) != PLR_OK ||
-        check_reading(f, reading, planned.interval) != PLR_OK)
+    plr_step *step = &planned.step;
+    plr_process_of(f)->mean(f, t_ns, reading, step);
+    step->seconds = f->clock_started ? plr_seconds(t_ns - f->t_ns) : 0;
+    step->interval = f->reading_valid ? plr_seconds(t_ns - f->reading_ns) : step->seconds;
+    if (plr_process_of(f)->check(f, step->mean, step->seconds) != PLR_OK ||
+        check_reading(f, reading, step->interval) != PLR_OK)
         planned.status = PLR_E_RANGE;
     return planned;
 }
@@ -177,13 +177,14 @@ plr_status plr_predict_accept(plr_filter *f, plr_time_ns t_ns, const plr_real re
         plr_guard_seal(f);
         return PLR_OK;
     }
-    if (planned->seconds > 0 && plr_process_has_started(f)) {
-        take_step(f, t_ns, planned->mean, planned->seconds, planned->interval);
-        add_missed(f, planned->interval - planned->seconds, planned->interval, reading);
+    const plr_step *step = &planned->step;
+    if (step->seconds > 0 && plr_process_has_started(f)) {
+        take_step(f, t_ns, step);
+        add_missed(f, step->interval - step->seconds, step->interval, reading);
     }
     f->t_ns = t_ns;
     f->clock_started = 1;
-    store_reading(f, t_ns, reading, planned->interval);
+    store_reading(f, t_ns, reading, step->interval);
     plr_guard_seal(f);
     return PLR_OK;
 }
@@ -208,7 +209,7 @@ plr_status plr_filter_predict(plr_filter *f, plr_time_ns t_ns, const plr_twist *
     if (planned.status == PLR_OK && f->config.mode != PLR_MODE_MAPPING) {
         plr_real change2[2];
         plr_statistics_change(f, reading, change2);
-        plr_statistics_learn(f, t_ns, reading, planned.interval, change2);
+        plr_statistics_learn(f, t_ns, reading, planned.step.interval, change2);
     }
     return plr_predict_accept(f, t_ns, reading, &planned);
 }

@@ -4,6 +4,7 @@
 #define PLR_FILTER_PREDICT_H
 
 #include "pelorus/state.h"
+#include "process/process.h"
 #include "state/motion.h"
 
 /* Carries the pose to t_ns by the last reading. */
@@ -11,10 +12,9 @@ void plr_predict_to(plr_filter *f, plr_time_ns t_ns);
 
 /* The step that ends with a reading of the process (process/process.h). */
 typedef struct plr_planned_step {
-    plr_status status;           /* PLR_OK, or why the reading is refused */
-    plr_real mean[PLR_POSE_DIM]; /* of the readings over the step */
-    plr_real seconds;            /* since the filter's time */
-    plr_real interval;           /* since the last reading, or since the pose was set */
+    plr_status status; /* PLR_OK, or why the reading is refused */
+    plr_step step;     /* seconds: since the filter's time; interval: since the last reading, or
+                        * since the pose was set */
 } plr_planned_step;
 
 /* Plans the step of a reading at t_ns; changes nothing. In mapping there is none. */

@@ -261,10 +261,12 @@ static plr_real density_of(const plr_filter *f, unsigned which) {
 /* What three numbers of this variance each exceed once in a million. */
 #define UNLIKELY PLR_R(30)
 
-/* The densities of a step's noise. A force that accelerates the body by more than its own weight, and more than
- * scatter does, is a shock: the reading may be wrong by all of that, for as long as any error lasts. A reading held for longer than usual is wrong by
- * what changes meanwhile: at first as successive readings differ, later as they scatter at all. */
-static void densities(const plr_filter *f, const plr_imu_step *s, plr_real interval,
+/* The densities of a step's noise. A force that accelerates the body by more than its own weight, and more
+ * than scatter does, is a shock: the reading may be wrong by all of that, for as long as any error lasts. It is that
+ * of the whole interval: what is left of one that a frame cut makes up for rounded stamps too. A reading held
+ * for longer than usual is wrong by what changes meanwhile: at first as successive readings differ, later as they
+ * scatter at all. */
+static void densities(const plr_filter *f, const plr_step *by, const plr_real gamma[3],
                       plr_real density[2]) {
     const plr_inertial *at = &f->inertial;
     const plr_real g = f->par.gravity, scatter2 = UNLIKELY * at->scatter2[0];
@@ -272,14 +274,14 @@ static void densities(const plr_filter *f, const plr_imu_step *s, plr_real inter
     for (unsigned i = 0; i < 2; i++)
         density[i] = density_of(f, i);
     for (int i = 0; i < 3; i++)
-        forced[i] = s->a[i] + s->gamma[i];
+        forced[i] = by->whole[i] - f->bias[i] + gamma[i];
     const plr_real beyond2 = plr_dot3(forced, forced) - (scatter2 > g * g ? scatter2 : g * g);
     if (beyond2 > 0)
         density[0] = PLR_FMA(LASTING_S, beyond2, density[0]);
-    if (!(at->usual_s > 0) || interval <= PLR_LONG_INTERVALS * at->usual_s)
+    if (!(at->usual_s > 0) || by->interval <= PLR_LONG_INTERVALS * at->usual_s)
         return;
-    const plr_real intervals = interval / at->usual_s;
-    const plr_real lasting = interval < LASTING_S ? interval : LASTING_S;
+    const plr_real intervals = by->interval / at->usual_s;
+    const plr_real lasting = by->interval < LASTING_S ? by->interval : LASTING_S;
     for (int i = 0; i < 2; i++) {
         const plr_real changed = at->change2[i] * intervals * intervals;
         const plr_real most = at->spread2[i] + at->change2[i];
@@ -329,10 +331,10 @@ static void transport_noise(plr_filter *f, const plr_real F[MOVED * DIM],
 }
 
 static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MOVED * DIM],
-                       plr_real interval) {
+                       const plr_step *by) {
     const plr_real tau = s->tau;
     plr_real reading[2];
-    densities(f, s, interval, reading);
+    densities(f, by, s->gamma, reading);
     reading[0] /= tau;
     reading[1] /= tau;
     transport_noise(f, F, reading);
@@ -342,15 +344,15 @@ static void move_noise(plr_filter *f, const plr_imu_step *s, const plr_real F[MO
     }
 }
 
-static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_real seconds, plr_real interval) {
+static void step(plr_filter *f, plr_time_ns t_ns, const plr_step *by) {
+    const plr_real seconds = by->seconds;
     plr_imu_step s;
     plr_real F[MOVED * DIM];
     plr_motion *m = &f->motion;
-    integrate(f, reading, seconds, &s);
+    integrate(f, by->mean, seconds, &s);
     transition(&s, F);
     accumulate_derivatives(f, &s, F);
-    move_noise(f, &s, F, interval);
+    move_noise(f, &s, F, by);
     plr_pose_move(f, s.E, s.d);
     memcpy(f->inertial.velocity, s.v, sizeof s.v);
     plr_se3_append(m->E, m->p, s.E, s.d);
@@ -364,9 +366,9 @@ static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_REA
 /* ---------------------------------------------------------------- readings */
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_real held[PLR_READING_DIM]) {
-    const bool bridged = plr_seconds(t_ns - f->reading_ns) <= BRIDGED_S;
-    plr_mean_reading(f, f->config.imu_timing, bridged, t_ns, reading, held);
+                 plr_step *step) {
+    const bool makes_up = plr_seconds(t_ns - f->reading_ns) <= BRIDGED_S;
+    plr_mean_reading(f, f->config.imu_timing, makes_up, t_ns, reading, step);
 }
 
 /* The accumulated motion's noise holds the walk already. */

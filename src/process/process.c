@@ -24,20 +24,18 @@ bool plr_step_is_possible(plr_real way2, plr_real turn2) {
     return way2 <= MAX_WAY * MAX_WAY && turn2 <= MAX_TURN * MAX_TURN;
 }
 
-void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_time_ns t_ns,
-                      const plr_real reading[PLR_READING_DIM], plr_real held[PLR_READING_DIM]) {
+void plr_mean_reading(const plr_filter *f, uint8_t timing, bool makes_up, plr_time_ns t_ns,
+                      const plr_real reading[PLR_READING_DIM], plr_step *step) {
     const uint8_t when = f->reading_valid ? timing : PLR_TWIST_END;
-    const plr_real whole = plr_seconds(t_ns - f->reading_ns);
-    const plr_real done = f->t_ns > f->reading_ns && f->reading_valid
-                              ? plr_seconds(f->t_ns - f->reading_ns)
-                              : PLR_R(0);
-    const bool makes_up = bridged && done > 0 && whole > done;
+    const bool cut = f->reading_valid && f->t_ns > f->reading_ns && t_ns > f->t_ns;
+    /* of differences in ns, so that a short rest is as exact as a long one */
+    const plr_real done_by_rest =
+        makes_up && cut ? plr_seconds(f->t_ns - f->reading_ns) / plr_seconds(t_ns - f->t_ns)
+                        : PLR_R(0);
     for (int i = 0; i < PLR_READING_DIM; i++) {
-        const plr_real target = when == PLR_TWIST_END ? reading[i]
-                                : when == PLR_TWIST_START
-                                    ? f->reading[i]
-                                    : PLR_R(0.5) * (f->reading[i] + reading[i]);
-        held[i] =
-            makes_up ? PLR_FMA(done / (whole - done), target - f->reading[i], target) : target;
+        step->whole[i] = when == PLR_TWIST_END     ? reading[i]
+                         : when == PLR_TWIST_START ? f->reading[i]
+                                                   : PLR_R(0.5) * (f->reading[i] + reading[i]);
+        step->mean[i] = PLR_FMA(done_by_rest, step->whole[i] - f->reading[i], step->whole[i]);
     }
 }

@@ -16,6 +16,16 @@ enum { PLR_READING_DIM = PLR_POSE_DIM };
 /* A reading that is held for more of the usual intervals than this is no mean any more. */
 #define PLR_LONG_INTERVALS PLR_R(2.5)
 
+/* A reading that moves the state for `seconds`. */
+typedef struct plr_step {
+    plr_real mean[PLR_READING_DIM]; /* of the readings over the step */
+    plr_real whole
+        [PLR_READING_DIM]; /* over the interval that the step ends: `mean`, unless a frame cut it */
+    plr_real seconds;
+    plr_real
+        interval; /* for which the reading stands: its parts add up to the noise of the whole */
+} plr_step;
+
 typedef struct plr_process {
     /* Lays out the state's blocks: plr_lay_out. */
     void (*lay_out)(plr_filter *f);
@@ -24,14 +34,12 @@ typedef struct plr_process {
     plr_status (*check)(const plr_filter *f, const plr_real reading[PLR_READING_DIM],
                         plr_real seconds);
 
-    /* One step to t_ns: the mean reading over `seconds`. Sets the time. `interval`: the time for
-     * which the reading stands, so that its parts add up to the noise of the whole. */
-    void (*step)(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_real seconds, plr_real interval);
+    /* One step to t_ns. Sets the time. */
+    void (*step)(plr_filter *f, plr_time_ns t_ns, const plr_step *step);
 
-    /* The mean reading of the step that ends with `reading`, from that and the last one. */
+    /* Fills `mean` and `whole` of the step that ends with `reading`: plr_mean_reading. */
     void (*mean)(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_real mean[PLR_READING_DIM]);
+                 plr_step *step);
 
     /* The last reading, `age` seconds after its time, or what is assumed in its place. */
     void (*hold)(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]);
@@ -73,13 +81,13 @@ void plr_lay_out(plr_filter *f, uint8_t velocity, uint8_t bias, uint8_t driver);
 /* False if a step of these squares, m^2 and rad^2, is longer than 1 km or pi rad; and for NaN. */
 bool plr_step_is_possible(plr_real way2, plr_real turn2);
 
-/* The mean reading of the step that ends at t_ns with `reading`, by the timing (plr_twist_timing).
- * Between two samples of a smooth signal its mean is that of both. Where a frame came in between,
- * the first part of the interval was bridged by the older one: the second makes up for it, so that
- * the integral is right. Not `bridged` is an interval in which readings were lost: meanwhile frames
- * have corrected what the older one did. */
-void plr_mean_reading(const plr_filter *f, uint8_t timing, bool bridged, plr_time_ns t_ns,
-                      const plr_real reading[PLR_READING_DIM], plr_real held[PLR_READING_DIM]);
+/* The mean reading of the interval that ends at t_ns with `reading`, by the timing (plr_twist_timing):
+ * between two samples of a smooth signal its mean is that of both. Where a frame cut the interval, its
+ * first part was bridged by the older reading. If `makes_up`, the mean of the rest is such that the
+ * integral of the whole is right: of a short rest it is no rate of the body any more. Else frames or
+ * other sensors have corrected meanwhile what the older reading did. */
+void plr_mean_reading(const plr_filter *f, uint8_t timing, bool makes_up, plr_time_ns t_ns,
+                      const plr_real reading[PLR_READING_DIM], plr_step *step);
 
 extern const plr_process plr_process_twist;
 extern const plr_process plr_process_imu;

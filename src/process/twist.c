@@ -95,9 +95,11 @@ static bool lost_readings(const plr_filter *f, plr_real h) {
 }
 
 static void mean(const plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_READING_DIM],
-                 plr_real held[PLR_READING_DIM]) {
-    const bool bridged = !lost_readings(f, plr_seconds(t_ns - f->reading_ns));
-    plr_mean_reading(f, f->config.twist_timing, bridged, t_ns, reading, held);
+                 plr_step *step) {
+    /* a velocity that is held has corrected what the older reading did */
+    const bool makes_up =
+        !lost_readings(f, plr_seconds(t_ns - f->reading_ns)) && !plr_velocity_is_held(f, t_ns);
+    plr_mean_reading(f, f->config.twist_timing, makes_up, t_ns, reading, step);
 }
 
 static void hold(const plr_filter *f, plr_real age, plr_real held[PLR_READING_DIM]) {
@@ -141,14 +143,14 @@ static void rest(const plr_filter *f, plr_real reading[PLR_READING_DIM]) {
     memcpy(reading, f->bias, PLR_READING_DIM * sizeof *reading);
 }
 
-static void step(plr_filter *f, plr_time_ns t_ns, const plr_real reading[PLR_POSE_DIM],
-                 plr_real seconds, plr_real interval) {
+static void step(plr_filter *f, plr_time_ns t_ns, const plr_step *by) {
+    const plr_real *reading = by->mean, seconds = by->seconds;
     plr_real xi[PLR_POSE_DIM], E[9], R[9], p[3], A[PLR_POSE_SQUARE], next[PLR_POSE_SQUARE],
         variance[PLR_POSE_DIM], V[PLR_POSE_SQUARE], T[PLR_POSE_SQUARE];
     plr_motion *m = &f->motion;
     bool fused = plr_velocity_is_held(f, t_ns);
     displacement(f, reading, seconds, xi);
-    step_variance(f, seconds, interval, variance);
+    step_variance(f, seconds, by->interval, variance);
     if (fused) {
         memset(V, 0, sizeof V);
         for (int i = 0; i < PLR_POSE_DIM; i++)

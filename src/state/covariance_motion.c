@@ -199,6 +199,17 @@ static void carry_core(plr_filter *f, const plr_applied_motion *motion,
     }
 }
 
+/* Of the rows from `first` to end - 1: makes up for the rounding where V V^T was added to P or subtracted. */
+static void make_up_for_rounding(plr_filter *f, unsigned first, unsigned end, const plr_real *Vt,
+                                 unsigned ld) {
+    for (unsigned i = first; i < end; i++) {
+        plr_real moved = 0;
+        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
+            moved = PLR_FMA(Vt[k * ld + i], Vt[k * ld + i], moved);
+        f->P[plr_packed_row(i) + i] += PLR_R(8) * PLR_EPSILON * moved;
+    }
+}
+
 void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) {
     const unsigned n = plr_covariance_dim(f), ld = plr_covariance_ld(f);
     plr_noise *noise = &f->work.noise;
@@ -241,6 +252,8 @@ void plr_covariance_open_noise(plr_filter *f, const plr_applied_motion *motion) 
             f->work.dx[i] = PLR_FMA(v, motion->z[k], f->work.dx[i]);
         }
     plr_packed_subtract(n, PLR_POSE_DIM, Vt, Vt, ld, f->P);
+    if (carries)
+        make_up_for_rounding(f, plr_row_of(f, PLR_BLOCK_VELOCITY), plr_core_dim(f), Vt, ld);
 }
 
 void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
@@ -262,13 +275,7 @@ void plr_covariance_close_noise(plr_filter *f, plr_real nu[PLR_POSE_DIM]) {
     for (unsigned i = 0; i < PLR_POSE_DIM * ld; i++)
         minus[i] = -Xt[i];
     plr_packed_subtract(n, PLR_POSE_DIM, minus, Xt, ld, f->P);
-    for (unsigned i = plr_core_dim(f); i < n;
-         i++) { /* makes up for the rounding of this addition */
-        plr_real added = 0;
-        for (unsigned k = 0; k < PLR_POSE_DIM; k++)
-            added = PLR_FMA(Xt[k * ld + i], Xt[k * ld + i], added);
-        f->P[plr_packed_row(i) + i] += PLR_R(8) * PLR_EPSILON * added;
-    }
+    make_up_for_rounding(f, plr_core_dim(f), n, Xt, ld);
     if (nu) {
         plr_solve_upper(PLR_POSE_DIM, noise->Lambda, noise->eta);
         for (unsigned k = 0; k < PLR_POSE_DIM; k++)

@@ -203,7 +203,10 @@ static void step_all(void) {
     for (unsigned k = 0; k < READINGS; k++) {
         plr_real reading[6];
         to_reals(reading, real.reading[k], 6);
-        plr_process_imu.step(&filter, filter.t_ns + 2500000, reading, (plr_real)tau, (plr_real)tau);
+        plr_step step = {.seconds = (plr_real)tau, .interval = (plr_real)tau};
+        memcpy(step.mean, reading, sizeof step.mean);
+        memcpy(step.whole, reading, sizeof step.whole);
+        plr_process_imu.step(&filter, filter.t_ns + 2500000, &step);
     }
     reseal(&filter);
 }
