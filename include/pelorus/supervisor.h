@@ -143,6 +143,7 @@ typedef struct plr_sensor_record {
 typedef struct plr_supervisor {
     uint64_t left_out; /* bits of plr_limit_id: rules that are left out, for measurements */
     uint8_t scene;     /* the setting: plr_scene_policy */
+    uint8_t slips;     /* 1: the odometry is twists, which slip; an IMU does not */
 
     /* odometry */
     plr_sum sum; /* of nu, in the odometry's sigmas */

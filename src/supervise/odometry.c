@@ -99,9 +99,13 @@ static void learn_usual(plr_supervisor *s) {
 }
 
 /* An event needs a before: the odometry has agreed with the pictures on this drive. */
-bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
+static bool has_before(const plr_supervisor *s) {
     const bool agreed = s->agreement >= plr_limit(s, PLR_LIMIT_BEFORE_SHARE);
     return (agreed && !s->misfits) || plr_doubt_contradicted(s);
+}
+
+bool plr_supervise_may_exclude_odometry(const plr_supervisor *s) {
+    return s->slips && has_before(s);
 }
 
 /* ---------------------------------------------------------------- the difference of two poses */
@@ -256,7 +260,7 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
     carry_difference(s, m);
     plr_sum_add(&s->sum, plr_limit(s, PLR_LIMIT_SUM_KEEPS), nu, V);
     s->statistic = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_UNOBSERVED));
-    const bool before = plr_supervise_may_exclude_odometry(s);
+    const bool before = has_before(s);
     if ((calm || !before) && tells)
         learn_usual(s);
     if (calm || !before)
@@ -275,7 +279,7 @@ plr_odometry_verdict plr_odometry_add(plr_supervisor *s, const plr_motion_eviden
 
 void plr_odometry_weigh(plr_supervisor *s, plr_real excess) {
     s->weight = 1;
-    if (!plr_doubt_contradicted(s))
+    if (!s->slips || !plr_doubt_contradicted(s))
         return;
     const plr_real now = plr_sum_statistic(&s->sum, s->usual, plr_limit(s, PLR_LIMIT_WEAK));
     const plr_real most = now > excess ? now : excess;

@@ -34,6 +34,7 @@ void plr_supervise_begin(plr_supervisor *s, const plr_config *config) {
     memset(s, 0, sizeof *s);
     s->left_out = left_out;
     s->scene = config->scene;
+    s->slips = config->process == PLR_PROCESS_TWIST;
     for (unsigned k = 0; k < PLR_POSE_DIM; k++)
         s->usual[k] = 1;
     forget_frames(s);
