@@ -211,7 +211,8 @@ typedef struct plr_calibration_estimate {
     /* Of the process, the last one first: seconds, and the rate, bias included, rad/s. */
     plr_real step[PLR_CLOCK_STEPS][4];
     uint32_t moves; /* 0: by all that is known the body rests, and nothing is learnt */
-    plr_real moved[PLR_CALIBRATIONS]; /* by how much each has been corrected */
+    plr_real moved[PLR_CALIBRATIONS];  /* by how much each has been corrected */
+    uint8_t misfits[PLR_CALIBRATIONS]; /* frames that would have moved each too far; 10: refused */
     /* Of the errors' covariance G D G^T: G, a lower triangle of ones on its diagonal, row k the column
      * of error k; and D beside the prior's variances. */
     plr_real factor[PLR_CALIBRATIONS * PLR_CALIBRATIONS], told[PLR_CALIBRATIONS];

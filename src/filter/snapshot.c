@@ -17,7 +17,7 @@
 /* "PLRF" */
 #define STATE_MAGIC 0x46524C50U
 
-enum { STATE_VERSION = 14 };
+enum { STATE_VERSION = 15 };
 
 /* ---------------------------------------------------------------- layout */
 
@@ -81,7 +81,7 @@ static uint32_t rows(const plr_filter *f, unsigned landmarks) {
 }
 
 /* Behind the sensitivity: by how much each error has been corrected; the covariance's factor, a row of each
- * by those that are estimated; and of these D and how white their residuals are. `f` NULL: it is skipped. */
+ * by those that are estimated; and of these D, how white their residuals are, and misfits. `f` NULL: it is skipped. */
 static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *errors) {
     plr_calibration_estimate *to = f ? &f->calibration : NULL;
     const unsigned estimated = plr_calibration_estimated(errors);
@@ -93,6 +93,7 @@ static void pass_calibration(plr_codec *c, plr_filter *f, const plr_calibrated *
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum : NULL, estimated);
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->sum_variance : NULL, estimated);
     plr_codec_numbers(c, PLR_FIELD_REAL, to ? to->usual : NULL, estimated);
+    plr_codec_numbers(c, PLR_FIELD_U8, to ? to->misfits : NULL, estimated);
 }
 
 /* P, the sensitivity, and what has become of the calibration. */
@@ -105,7 +106,8 @@ static void pass_covariance(plr_codec *c, plr_filter *f) {
 
 static uint32_t calibration_size(const plr_calibrated *errors) {
     const uint32_t estimated = plr_calibration_estimated(errors);
-    return (errors->count * (1 + estimated) + 4 * estimated) * (uint32_t)sizeof(plr_real);
+    return (errors->count * (1 + estimated) + 4 * estimated) * (uint32_t)sizeof(plr_real) +
+           estimated;
 }
 
 uint32_t plr_filter_saved_size(const plr_filter *f, unsigned landmarks) {

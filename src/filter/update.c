@@ -20,6 +20,7 @@
 #include "filter/predict.h"
 #include "filter/relocate.h"
 #include "filter/tracks.h"
+#include "math/dense.h"
 #include "math/order.h"
 #include "pelorus/assertions.h"
 #include "process/alignment.h"
@@ -27,6 +28,7 @@
 #include "process/velocity.h"
 #include "sensor/sensor.h"
 #include "sensor/stereo.h"
+#include "state/blocks.h"
 #include "state/calibration.h"
 #include "state/covariance.h"
 #include "state/model.h"
@@ -256,6 +258,20 @@ static void renew_landmarks(plr_filter *f, const plr_frame *frame, unsigned n,
     plr_births_from_unmatched(f, frame, n, decision->make_none, events, report);
 }
 
+/* Of a covariance of the pose that part which nothing in the filter measures, where an IMU does measure the tilt:
+ * C <- A C A^T, A = I but for the rotation's rows, which keep what is about the vertical u alone. */
+static void keep_position_and_heading(const plr_filter *f, plr_real C[PLR_POSE_SQUARE]) {
+    const plr_real *u = f->R_WB + 6;
+    plr_real A[PLR_POSE_SQUARE] = {0}, kept[PLR_POSE_SQUARE];
+    for (unsigned i = 0; i < 3; i++) {
+        A[(PLR_POSE_DIM + 1) * i] = 1;
+        for (unsigned j = 0; j < 3; j++)
+            A[PLR_POSE_DIM * (3 + i) + 3 + j] = u[i] * u[j];
+    }
+    plr_sandwich6(kept, A, C);
+    memcpy(C, kept, sizeof kept);
+}
+
 /* What the supervisor has decided on the frame. */
 static void carry_out(plr_filter *f, plr_report *report) {
     plr_frame_decision decision;
@@ -269,6 +285,8 @@ static void carry_out(plr_filter *f, plr_report *report) {
         plr_filter_store_for_recovery(f);
     if (!decision.covers)
         return;
+    if (plr_has_block(f, PLR_BLOCK_VELOCITY))
+        keep_position_and_heading(f, decision.cover);
     plr_covariance_add(f, PLR_BLOCK_POSE, decision.cover);
     plr_relocate_let_go(f, decision.cover);
     f->totals.widened++;

@@ -248,7 +248,7 @@ static void transport_rows(const plr_imu_rows *rows, const plr_real *restrict F,
 
 /* Of the variance by which readings scatter about their neighbours this much counts as noise: vibration is in
  * part true motion, and stated sigmas that are right to two times stay as stated. */
-#define NOT_MOTION PLR_R(0.25)
+#define NOT_MOTION PLR_R(1)
 
 /* The density of the accelerometer's (0) or the gyro's (1) noise, squared: as stated, or as the readings
  * scatter, if that is more. */

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "session/layers.h"
 
-/* The prior of an IMU's gyro bias, rad/s, where nothing else is said: real parts have so much. The setting's
- * default is for a gyro beside wheels, which has been calibrated. */
-#define IMU_BIAS_GYRO 0.1
+/* With an IMU, where nothing else is said: the prior of its gyro's bias, rad/s, for real parts have so much (the
+ * setting's default is for a gyro beside wheels, which has been calibrated); and by how much the times of
+ * pictures and readings may differ, s: a trigger and an exposure are hardly known better. */
+#define IMU_BIAS_GYRO    0.1
+#define IMU_CAMERA_CLOCK 2e-3
 
 /* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
@@ -12,6 +14,25 @@ static void suggest_axes(plr_config *config, const char *name, double all, const
         const double value = axes[axis] > 0 ? axes[axis] : all;
         if (value >= 0)
             (void)plr_config_set(config, plr_setting_axis(setting, axis), value);
+    }
+}
+
+/* The densities of an IMU that a HEADER tells are mostly those of a data sheet, of a bare part at rest: they
+ * raise what is set by default. To lower it is left to the settings of who knows his IMU. */
+static void raise_noises(plr_config *config, const plr_header *header) {
+    const struct {
+        const char *name;
+        double value;
+    } densities[] = {
+        {"gyro-noise", header->gyro_noise},
+        {"accel-noise", header->accel_noise},
+        {"gyro-walk", header->gyro_walk},
+        {"accel-walk", header->accel_walk},
+    };
+    for (unsigned i = 0; i < sizeof densities / sizeof densities[0]; i++) {
+        const plr_setting *setting = plr_setting_by_name(densities[i].name);
+        if (densities[i].value > plr_config_get(config, setting))
+            (void)plr_config_set(config, setting, densities[i].value);
     }
 }
 
@@ -30,10 +51,6 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
         {"bias-velocity-walk", header->bias_velocity_walk},
         {"bias-gyro-walk", header->bias_gyro_walk},
         {"process", header->process},
-        {"gyro-noise", header->gyro_noise},
-        {"accel-noise", header->accel_noise},
-        {"gyro-walk", header->gyro_walk},
-        {"accel-walk", header->accel_walk},
         {"bias-accel-sigma", header->bias_accel_sigma_mps2},
         {"gravity", header->gravity_mps2},
         /* only a sensor that is said to have none does without: else the filter would believe more
@@ -44,6 +61,7 @@ static void apply_header(plr_config *config, const plr_header *header, bool sigm
         if (suggestions[i].value >= 0)
             (void)plr_config_set(config, plr_setting_by_name(suggestions[i].name),
                                  suggestions[i].value);
+    raise_noises(config, header);
     if (sigmas_of_a_reading) {
         suggest_axes(config, "velocity-sigma", header->velocity_sigma_mps,
                      header->velocity_sigma_axes_mps);
@@ -68,8 +86,10 @@ static plr_status apply_values(plr_config *config, const plr_wire_setting *value
 static plr_status apply_all(plr_config *config, const plr_layers *layers, uint8_t process,
                             uint8_t noise, const plr_setting **culprit) {
     plr_config_default(config);
-    if (process == PLR_PROCESS_IMU)
+    if (process == PLR_PROCESS_IMU) {
         config->bias_gyro_sigma_radps = IMU_BIAS_GYRO;
+        config->camera_clock_sigma_s = IMU_CAMERA_CLOCK;
+    }
     apply_header(config, layers->header, noise == PLR_NOISE_TWIST);
     plr_status status =
         apply_values(config, layers->wanted->settings, layers->wanted->count, culprit);

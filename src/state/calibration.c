@@ -16,6 +16,8 @@
 enum {
     K = PLR_CALIBRATIONS,
     MOST_SIGMAS = 5,    /* of the prior, in one correction: more is no calibration */
+    LEARNT_SIGMAS = 4,  /* by which a number may have moved, of what is learnt of it */
+    MOST_MISFITS = 10,  /* frames that would move it farther, until it is refused */
     USUAL_AT_FIRST = 20 /* frames that the prior of what is usual counts */
 };
 
@@ -118,13 +120,19 @@ void plr_calibration_forget(plr_filter *f) {
     }
 }
 
-void plr_calibration_reset(plr_filter *f) {
+static void begin_at_prior(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
-    memset(c, 0, sizeof *c);
+    memset(c->moved, 0, sizeof c->moved);
+    memset(c->t, 0, sizeof c->t);
     c->eye = f->par.camera;
     plr_mat3_identity(c->R);
-    plr_calibration_forget(f);
     place_eye(f);
+}
+
+void plr_calibration_reset(plr_filter *f) {
+    memset(&f->calibration, 0, sizeof f->calibration);
+    plr_calibration_forget(f);
+    begin_at_prior(f);
 }
 
 void plr_calibration_doubt(plr_filter *f) {
@@ -407,6 +415,73 @@ static void mislead(plr_filter *f, plr_real *G, const plr_real *D) {
     }
 }
 
+/* The variance of error j, of the columns G and D of a factor. */
+static plr_real variance_of(const plr_filter *f, const plr_real *G, const plr_real *D, unsigned j) {
+    plr_real variance = 0;
+    for (unsigned k = j; k < plr_calibration_estimated(&f->par.calibrated); k++)
+        variance = PLR_FMA(G[K * k + j] * G[K * k + j], D[k], variance);
+    return variance;
+}
+
+/* What is learnt of a number moves it from its prior's mean by N(0, P_0 - P), with P_0 the variance of its prior and P
+ * what is left: no farther than that information lets it. Else it is no calibration that the residuals show. */
+static bool may_move(const plr_filter *f, const plr_real *G, const plr_real *D, unsigned k,
+                     plr_real excess, plr_real ds) {
+    const plr_real prior = f->par.calibrated.variance[k];
+    const plr_real learnt = prior - excess * variance_of(f, G, D, k);
+    const plr_real moved = f->calibration.moved[k] + ds;
+    return moved * moved <= PLR_R(LEARNT_SIGMAS * LEARNT_SIGMAS) * (learnt + LITTLE * prior);
+}
+
+static bool is_refused(const plr_filter *f, unsigned k) {
+    return f->calibration.misfits[k] >= MOST_MISFITS;
+}
+
+/* The state and the camera as if nothing had been learnt: what was moved is no error of the calibration. A number
+ * that is refused is considered from now on, and the others are learnt anew. */
+static void put_back(plr_filter *f) {
+    plr_calibration_estimate *c = &f->calibration;
+    plr_real back[K];
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+        back[k] = -c->moved[k];
+    plr_combine_rows(plr_covariance_dim(f), plr_calibration_estimated(&f->par.calibrated), back, 1,
+                     f->S[0], PLR_MAX_LD, f->work.dx);
+    plr_calibration_forget(f);
+    begin_at_prior(f);
+}
+
+/* True if no number moves farther than it may; else this frame teaches nothing. */
+static bool may_all_move(plr_filter *f, const plr_real *G, const plr_real *D, plr_real excess,
+                         const plr_real *ds) {
+    plr_calibration_estimate *c = &f->calibration;
+    const plr_real *prior = f->par.calibrated.variance;
+    bool may = true, refused = false;
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+        if (!(ds[k] * ds[k] < PLR_R(MOST_SIGMAS * MOST_SIGMAS) * prior[k]))
+            return false;
+        if (may_move(f, G, D, k, excess, ds[k]))
+            continue;
+        may = false;
+        c->misfits[k]++;
+        refused = refused || is_refused(f, k);
+    }
+    if (refused)
+        put_back(f);
+    return may;
+}
+
+/* A number that is refused is told nothing. */
+static void leave_out_refused(plr_filter *f) {
+    plr_learnt *learnt = &f->work.learnt;
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
+        if (!is_refused(f, k))
+            continue;
+        learnt->eta[k] = 0;
+        for (unsigned i = 0; i < K; i++)
+            learnt->J[K * k + i] = learnt->J[K * i + k] = 0;
+    }
+}
+
 void plr_calibration_learn(plr_filter *f) {
     plr_calibration_estimate *c = &f->calibration;
     const plr_calibrated *errors = &f->par.calibrated;
@@ -415,15 +490,15 @@ void plr_calibration_learn(plr_filter *f) {
     if (n == 0 || !c->moves)
         return;
     const plr_real excess = weigh_prior(f);
+    leave_out_refused(f);
     memcpy(G, c->factor, sizeof G);
     for (unsigned k = 0; k < n; k++)
         D[k] = errors->variance[k] * c->told[k] / c->excess;
     if (!correct_factor(f, G, D))
         return;
     add_product(f, G, D, f->work.learnt.eta, ds);
-    for (unsigned k = 0; k < n; k++)
-        if (!(ds[k] * ds[k] < PLR_R(MOST_SIGMAS * MOST_SIGMAS) * errors->variance[k]))
-            return;
+    if (!may_all_move(f, G, D, excess, ds))
+        return;
     mislead(f, G, D);
     memcpy(c->factor, G, sizeof G);
     for (unsigned k = 0; k < n; k++)
@@ -434,11 +509,9 @@ void plr_calibration_learn(plr_filter *f) {
 }
 
 bool plr_calibration_is_off(const plr_filter *f) {
-    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++) {
-        const plr_real moved = f->calibration.moved[k];
-        if (moved * moved > PLR_R(16) * f->par.calibrated.variance[k])
+    for (unsigned k = 0; k < plr_calibration_estimated(&f->par.calibrated); k++)
+        if (is_refused(f, k))
             return true;
-    }
     return false;
 }
 
@@ -477,7 +550,7 @@ void plr_calibration_tell(const plr_filter *f, plr_calibration_result *told) {
                                errors->variance[k] * c->told[k], variance);
         told->corrected[errors->kind[j]] = (double)c->moved[j];
         told->sigma[errors->kind[j]] = (double)PLR_SQRT(variance);
-        if (j < plr_calibration_estimated(errors))
+        if (j < plr_calibration_estimated(errors) && !is_refused(f, j))
             told->estimated |= (uint16_t)(1U << errors->kind[j]);
     }
 }
