@@ -155,10 +155,6 @@ static plr_correction motion_first(plr_filter *f, const plr_frame *frame, unsign
         return correction;
     }
     plr_bias_consider(f, decision->hold_biases, &before);
-    if (first.outright)
-        plr_motion_open_velocity(f);
-    else
-        plr_motion_weigh_velocity(f, plr_supervise_weight(&f->supervisor));
     plr_predict_apply(f, &first.motion);
     if (f->diverged)
         return correction;
