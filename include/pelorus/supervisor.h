@@ -84,7 +84,7 @@ typedef struct plr_frame_events {
     plr_real far_xi[PLR_POSE_DIM], far_nu[PLR_POSE_DIM]; /* by so much, m and rad; in sigmas */
     unsigned adopted, unplaced; /* known landmarks that came in; that could not */
     unsigned cut;               /* landmark corrections limited */
-    bool miscalibrated;         /* an estimated part of the calibration is far beyond its prior */
+    bool miscalibrated;         /* a part of the calibration is refused */
 } plr_frame_events;
 
 /* The biases beside their prior. */
