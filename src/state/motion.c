@@ -101,6 +101,23 @@ void plr_motion_open_prior(plr_filter *f, plr_applied_motion *applied) {
     fill_prior(f, applied, PLR_R(900), OPEN_WAY, OPEN_TURN);
 }
 
+void plr_motion_open_velocity(plr_filter *f) {
+    plr_core_motion *m = &f->core_motion;
+    const plr_real seconds = f->motion.seconds;
+    plr_real W[9];
+    if (!plr_has_block(f, PLR_BLOCK_VELOCITY) || !(seconds > 0))
+        return;
+    plr_skew(W, f->inertial.velocity);
+    for (unsigned i = 0; i < PLR_VELOCITY_DIM; i++) {
+        m->Q_nc[(PLR_REST_DIM + 1) * i] += PLR_R(1.5) * OPEN_WAY / seconds;
+        m->Q_cc[(PLR_REST_DIM + 1) * i] += PLR_R(3) * OPEN_WAY / (seconds * seconds);
+        for (unsigned j = 0; j < PLR_VELOCITY_DIM; j++) {
+            m->Q_nc[PLR_REST_DIM * (3 + i) + j] += OPEN_TURN * W[3 * j + i];
+            m->Q_cc[PLR_REST_DIM * i + j] += OPEN_TURN * plr_dot3(W + 3 * i, W + 3 * j);
+        }
+    }
+}
+
 void plr_motion_at(const plr_filter *f, const plr_applied_motion *prior,
                    const plr_real z[PLR_POSE_DIM], plr_applied_motion *applied) {
     plr_real n[PLR_POSE_DIM], E[9], p[3], Jr[PLR_POSE_SQUARE];
