@@ -178,9 +178,7 @@ typedef struct plr_session {
     plr_start start;
     uint32_t start_resets;
     plr_time_ns calibration_ns; /* when the calibration was told last */
-    plr_held_steps held;
-    plr_held_readings held_readings;
-    plr_held_frames held_frames;
+    plr_queue queue;
     plr_step_order order;
     plr_known_map known;
     plr_clock_watch watch;

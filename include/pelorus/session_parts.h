@@ -34,38 +34,41 @@ typedef union plr_moved_by {
     plr_imu imu;
 } plr_moved_by;
 
-typedef struct plr_held_step {
-    plr_time_ns t_ns;
-    plr_moved_by by;
-    bool leads; /* it is the first of its message */
-} plr_held_step;
+/* Kinds of events, in the order in which those of one time are used. */
+typedef enum plr_event_kind {
+    PLR_EVENT_STEP,    /* the body moved */
+    PLR_EVENT_FRAME,   /* the camera took a stereo pair */
+    PLR_EVENT_READING, /* a small sensor measured */
+    PLR_EVENT_KINDS
+} plr_event_kind;
 
-/* Twists or IMU readings that wait because of twist-delay: a ring, ascending by time. */
-typedef struct plr_held_steps {
-    uint8_t first, count;
-    uint64_t leads; /* bit i: the one at place i is the first of its message */
-    plr_time_ns t_ns[PLR_SESSION_HELD_TWISTS];
-    plr_moved_by by[PLR_SESSION_HELD_TWISTS];
-} plr_held_steps;
+/* What is used in the order of time: src/session/events.h. */
+typedef struct plr_event {
+    plr_time_ns t_ns; /* by the clock of the steps */
+    plr_event_kind kind;
+    bool leads; /* a step that is the first of its message */
+    union {
+        plr_moved_by step;
+        plr_frame frame; /* as it came: t_ns is by the camera's clock */
+        plr_reading reading;
+    } as;
+} plr_event;
 
-/* Readings of small sensors that wait with the twists, ascending by time. */
-typedef struct plr_held_readings {
-    unsigned count;
+enum {
+    PLR_QUEUE_PLACES = PLR_SESSION_HELD_TWISTS + PLR_SESSION_HELD_FRAMES + PLR_SESSION_HELD_READINGS
+};
+
+/* Events that wait: src/session/queue.h. Each kind has places of its own. */
+typedef struct plr_queue {
+    uint8_t counts[PLR_EVENT_KINDS]; /* events of each kind */
+    uint8_t order[PLR_QUEUE_PLACES]; /* places: first the events', in order, then the free ones */
+    bool leads[PLR_SESSION_HELD_TWISTS];
+    plr_time_ns t_ns[PLR_QUEUE_PLACES];
+    plr_moved_by steps[PLR_SESSION_HELD_TWISTS];
+    plr_frame frames[PLR_SESSION_HELD_FRAMES];
+    plr_observation observations[PLR_SESSION_HELD_FRAMES][PLR_MAX_OBSERVATIONS];
     plr_reading readings[PLR_SESSION_HELD_READINGS];
-} plr_held_readings;
-
-/* A frame whose time lies beyond the last step: it waits until the steps have come there. */
-typedef struct plr_held_frame {
-    plr_frame frame;      /* as it came; its observations are those below */
-    plr_time_ns moved_ns; /* its time by the clock of the steps: setting camera-offset */
-    plr_observation observations[PLR_MAX_OBSERVATIONS];
-} plr_held_frame;
-
-/* Such frames: a ring, ascending by moved_ns. */
-typedef struct plr_held_frames {
-    uint8_t first, count;
-    plr_held_frame frames[PLR_SESSION_HELD_FRAMES];
-} plr_held_frames;
+} plr_queue;
 
 /* Whether steps and frames come in the order of their times: src/session/steps.h. */
 typedef struct plr_step_order {

@@ -126,7 +126,7 @@ static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void
         desk_send(drive_twist(0.01 * k));
     desk_run();
     TEST_ASSERT_EQUAL_UINT32(10, session.totals.held_short);
-    TEST_ASSERT_EQUAL_UINT(PLR_SESSION_HELD_TWISTS, session.held.count);
+    TEST_ASSERT_EQUAL_UINT(PLR_SESSION_HELD_TWISTS, session.queue.counts[PLR_EVENT_STEP]);
     desk_assert_nothing_refused();
 }
 
@@ -139,7 +139,7 @@ static void test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back(void)
     desk_send(drive_twist(50));
     desk_run();
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(100), plr_filter_time(&session.filter));
-    TEST_ASSERT_EQUAL_UINT(1, session.held.count);
+    TEST_ASSERT_EQUAL_UINT(1, session.queue.counts[PLR_EVENT_STEP]);
 }
 
 /* --- a deadline --- */
