@@ -81,12 +81,11 @@ static void refuse(plr_session *s, const plr_event *event, plr_status status) {
 }
 
 static void wait(plr_session *s, const plr_event *event) {
-    plr_time_ns first_ns;
-    if (plr_queue_is_full(&s->queue, event->kind) &&
-        plr_queue_first_ns(&s->queue, event->kind, &first_ns)) {
-        s->totals.held_short++;
-        use_until(s, first_ns, event->kind);
-    }
+    plr_event first;
+    s->totals.held_short += plr_queue_is_full(&s->queue, event->kind);
+    while (plr_queue_is_full(&s->queue, event->kind) &&
+           plr_queue_pop_until(&s->queue, UINT64_MAX, PLR_EVENT_READING, &first))
+        use(s, &first);
     plr_queue_insert(&s->queue, event);
 }
 
