@@ -179,6 +179,7 @@ typedef struct plr_session {
     uint32_t start_resets;
     plr_time_ns calibration_ns; /* when the calibration was told last */
     plr_queue queue;
+    plr_time_ns newest_ns[PLR_EVENT_KINDS]; /* the newest time of each kind that arrived */
     plr_step_order order;
     plr_known_map known;
     plr_clock_watch watch;

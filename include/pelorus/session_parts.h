@@ -60,7 +60,7 @@ enum {
 
 /* Events that wait: src/session/queue.h. Each kind has places of its own. */
 typedef struct plr_queue {
-    uint8_t counts[PLR_EVENT_KINDS]; /* events of each kind */
+    uint8_t count, counts[PLR_EVENT_KINDS]; /* events, and those of each kind */
     uint8_t order[PLR_QUEUE_PLACES]; /* places: first the events', in order, then the free ones */
     bool leads[PLR_SESSION_HELD_TWISTS];
     plr_time_ns t_ns[PLR_QUEUE_PLACES];
@@ -70,10 +70,9 @@ typedef struct plr_queue {
     plr_reading readings[PLR_SESSION_HELD_READINGS];
 } plr_queue;
 
-/* Whether steps and frames come in the order of their times: src/session/steps.h. */
+/* Whether steps and frames come in the order of their times: src/session/use.h. */
 typedef struct plr_step_order {
-    bool came;              /* a step */
-    plr_time_ns newest_ns;  /* the newest time of those that came */
+    bool came;              /* a step arrived */
     bool stepped;           /* the filter took one */
     plr_time_ns stepped_ns; /* the time of the last that it took */
     bool used;              /* it took a frame, or a reading of a small sensor */

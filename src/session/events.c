@@ -1,37 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include "session/events.h"
 
-#include "session/frames.h"
 #include "session/plausible.h"
 #include "session/queue.h"
 #include "session/reanchor.h"
 #include "session/send.h"
 #include "session/start.h"
-#include "session/steps.h"
+#include "session/use.h"
 
 /* --- leaving --- */
-
-static void use(plr_session *s, const plr_event *event) {
-    switch (event->kind) {
-    case PLR_EVENT_STEP:
-        plr_steps_use(s, event);
-        break;
-    case PLR_EVENT_FRAME:
-        plr_frames_use(s, event);
-        break;
-    case PLR_EVENT_READING:
-        plr_steps_use_reading(s, &event->as.reading);
-        break;
-    case PLR_EVENT_KINDS:
-        break;
-    }
-}
 
 /* What does not go after an event of that time and kind. */
 static void use_until(plr_session *s, plr_time_ns t_ns, plr_event_kind kind) {
     plr_event event;
     while (plr_queue_pop_until(&s->queue, t_ns, kind, &event))
-        use(s, &event);
+        plr_use(s, &event);
 }
 
 void plr_events_use_all(plr_session *s) {
@@ -69,15 +52,15 @@ static bool frames_wait(const plr_session *s) {
 
 static bool must_wait(const plr_session *s, const plr_event *event) {
     const bool delayed = delay_ns(s, event->kind) > 0;
-    return event->kind == PLR_EVENT_FRAME ? delayed && event->t_ns > s->order.newest_ns
+    return event->kind == PLR_EVENT_FRAME ? delayed && event->t_ns > s->newest_ns[PLR_EVENT_STEP]
                                           : delayed || frames_wait(s);
 }
 
-static void refuse(plr_session *s, const plr_event *event, plr_status status) {
-    if (event->kind == PLR_EVENT_FRAME)
-        plr_frames_refuse(s, &event->as.frame, status);
-    else
-        plr_steps_refuse(s, event->t_ns, status);
+/* A reading that lies beyond the last step by more than max-gap, so that the filter refuses it: others
+ * do not wait for it, and it does not for them. */
+static bool is_out_of_reach(const plr_session *s, const plr_event *event) {
+    return event->kind == PLR_EVENT_READING && s->order.came &&
+           plr_clock_was_set_back(s, event->t_ns, s->newest_ns[PLR_EVENT_STEP]);
 }
 
 static void wait(plr_session *s, const plr_event *event) {
@@ -85,83 +68,93 @@ static void wait(plr_session *s, const plr_event *event) {
     s->totals.held_short += plr_queue_is_full(&s->queue, event->kind);
     while (plr_queue_is_full(&s->queue, event->kind) &&
            plr_queue_pop_until(&s->queue, UINT64_MAX, PLR_EVENT_READING, &first))
-        use(s, &first);
+        plr_use(s, &first);
     plr_queue_insert(&s->queue, event);
 }
 
 /* Frames to whose time the steps have come; then steps that have waited long enough. */
 static void use_ready(plr_session *s) {
+    const plr_time_ns newest_ns = s->newest_ns[PLR_EVENT_STEP];
     const plr_time_ns delay = delay_ns(s, PLR_EVENT_STEP);
-    use_kind_until(s, s->order.newest_ns, PLR_EVENT_FRAME);
-    const plr_time_ns last_ns = plr_queue_last_ns(&s->queue, PLR_EVENT_STEP);
-    if (!frames_wait(s) && last_ns >= delay)
-        use_kind_until(s, last_ns - delay, PLR_EVENT_STEP);
+    use_kind_until(s, newest_ns, PLR_EVENT_FRAME);
+    if (!frames_wait(s) && newest_ns >= delay)
+        use_kind_until(s, newest_ns - delay, PLR_EVENT_STEP);
+}
+
+/* Notes the time of a step or frame that arrived. What waits is used first where another clock
+ * begins. */
+static void note_arrival(plr_session *s, const plr_event *event) {
+    plr_time_ns *newest_ns = &s->newest_ns[event->kind];
+    const bool set_back = plr_clock_was_set_back(s, *newest_ns, event->t_ns);
+    s->order.came = s->order.came || event->kind == PLR_EVENT_STEP;
+    if (set_back || event->t_ns > *newest_ns)
+        *newest_ns = event->t_ns;
+    if (set_back)
+        plr_events_use_all(s);
 }
 
 static void take(plr_session *s, const plr_event *event) {
     const plr_event_kind kind = event->kind;
     const plr_time_ns t_ns = event->t_ns, delay = delay_ns(s, kind);
-    if (kind == PLR_EVENT_STEP)
-        plr_steps_note_arrival(s, t_ns);
     if (kind != PLR_EVENT_READING && plr_queue_holds(&s->queue, kind, t_ns)) {
-        refuse(s, event, PLR_E_TIME); /* doubled by a link */
+        plr_use_refuse(s, event, PLR_E_TIME); /* doubled by a link */
         return;
     }
-    if (plr_clock_was_set_back(s, plr_queue_last_ns(&s->queue, kind), t_ns))
-        plr_events_use_all(s);
-    else if (kind == PLR_EVENT_FRAME && t_ns >= delay)
+    if (kind != PLR_EVENT_READING)
+        note_arrival(s, event);
+    if (kind == PLR_EVENT_FRAME && t_ns >= delay)
         use_kind_until(s, t_ns - delay, kind);
-    if (must_wait(s, event)) {
+    if (is_out_of_reach(s, event)) {
+        plr_use(s, event);
+    } else if (must_wait(s, event)) {
         wait(s, event);
     } else {
         use_until(s, t_ns, kind);
-        use(s, event);
+        plr_use(s, event);
     }
     use_ready(s);
 }
 
 /* --- steps --- */
 
-/* The message is of the other process. */
-static void refuse_other(plr_session *s, plr_time_ns t_ns) {
-    const plr_kind kind = s->in.kind;
+/* True if the message is of that process, which is in force; another one is refused. */
+static bool is_of_process(plr_session *s, plr_process_kind process, plr_time_ns t_ns) {
+    if (plr_filter_config(&s->filter)->process == process)
+        return true;
     if (s->totals.other_process++ > 0)
-        return;
-    plr_send_refusal(s, kind, t_ns, PLR_E_MODE, plr_setting_by_name("process"));
+        return false;
+    plr_send_refusal(s, s->in.kind, t_ns, PLR_E_MODE, plr_setting_by_name("process"));
     plr_send_words(
         s, PLR_SEVERITY_WARNING,
-        kind == PLR_KIND_IMU
+        process == PLR_PROCESS_IMU
             ? "IMU readings come, and the setting process is twist: none of them is used. "
               "Set process = imu, or let the HEADER say so"
             : "TWISTs come, and the setting process is imu: none of them is used. Send "
               "measured speeds as READINGs of a wheel, or set process = twist");
+    return false;
 }
 
 void plr_events_take_twist(plr_session *s) {
     const plr_twist_message *twist = &s->in.as.twist;
     const plr_event event = {
         .t_ns = twist->t_ns, .kind = PLR_EVENT_STEP, .leads = true, .as.step.twist = twist->twist};
-    if (plr_steps_are_inertial(s))
-        refuse_other(s, twist->t_ns);
-    else
+    if (is_of_process(s, PLR_PROCESS_TWIST, twist->t_ns))
         take(s, &event);
 }
 
 void plr_events_take_imu(plr_session *s) {
     const plr_imu_message *imu = &s->in.as.imu;
-    if (!plr_steps_are_inertial(s)) {
-        refuse_other(s, imu->t_ns);
+    if (!is_of_process(s, PLR_PROCESS_IMU, imu->t_ns))
         return;
-    }
     for (unsigned i = 0; i < imu->count; i++) {
         const plr_event event = {.t_ns = imu->t_ns + (plr_time_ns)i * imu->period_ns,
                                  .kind = PLR_EVENT_STEP,
                                  .leads = i == 0,
                                  .as.step.imu = imu->readings[i]};
         if (event.t_ns < imu->t_ns) /* beyond the clock's end */
-            plr_steps_refuse(s, imu->t_ns, PLR_E_TIME);
+            plr_use_refuse(s, &event, PLR_E_TIME);
         else if (!plr_plausible(PLR_GROUP_IMU, &event.as.step.imu))
-            plr_steps_refuse(s, event.t_ns, PLR_E_RANGE);
+            plr_use_refuse(s, &event, PLR_E_RANGE);
         else
             take(s, &event);
     }
@@ -187,7 +180,7 @@ void plr_events_take_stereo(plr_session *s) {
     if (move(s, s->in.as.stereo.t_ns, &event.t_ns))
         take(s, &event);
     else
-        refuse(s, &event, PLR_E_TIME);
+        plr_use_refuse(s, &event, PLR_E_TIME);
 }
 
 void plr_events_take_reading(plr_session *s) {

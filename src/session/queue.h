@@ -28,7 +28,4 @@ bool plr_queue_pop_until(plr_queue *queue, plr_time_ns t_ns, plr_event_kind kind
 /* The time of the first event of that kind, in *t_ns; false if there is none. */
 bool plr_queue_first_ns(const plr_queue *queue, plr_event_kind kind, plr_time_ns *t_ns);
 
-/* The time of the last event of that kind; 0 if there is none. */
-plr_time_ns plr_queue_last_ns(const plr_queue *queue, plr_event_kind kind);
-
 #endif

@@ -145,6 +145,18 @@ void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_st
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
 }
 
+void plr_send_frame_refusal(plr_session *s, const plr_frame *frame, plr_status status) {
+    plr_report report;
+    memset(&report, 0, sizeof report);
+    report.t_ns = frame->t_ns;
+    report.status = status;
+    report.observations = frame->count;
+    const plr_frame_result result = {frame, &report, NULL, 0};
+    plr_send_refusal(s, PLR_KIND_STEREO, frame->t_ns, status, NULL);
+    if (s->options.observer.frame != NULL)
+        s->options.observer.frame(s->options.observer.context, &result);
+}
+
 void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {
     const bool computed = role != PLR_LANDMARK_KNOWN;
     s->out.kind = PLR_KIND_LANDMARK;

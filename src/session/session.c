@@ -5,8 +5,8 @@
 
 #include "pelorus/assertions.h"
 #include "record/messages.h"
+#include "session/budget.h"
 #include "session/events.h"
-#include "session/frames.h"
 #include "session/layers.h"
 #include "session/line.h"
 #include "session/phase.h"
@@ -166,7 +166,7 @@ static plr_status check(const plr_session *s, unsigned row, plr_rule rule) {
 static void refuse(plr_session *s, plr_status status) {
     const plr_message *in = &s->in;
     if (in->kind == PLR_KIND_STEREO)
-        plr_frames_refuse(s, &in->as.stereo, status);
+        plr_send_frame_refusal(s, &in->as.stereo, status);
     else if (in->kind == PLR_KIND_STATE)
         plr_saving_refuse(s, (plr_state_action)in->as.state.action, plr_message_time(in), status);
     else
@@ -188,6 +188,13 @@ static void start(plr_session *s) {
     }
 }
 
+/* Lowers the budget of a STEREO to what can be computed before the deadline. */
+static void limit_frame(plr_session *s) {
+    const uint16_t budget = plr_budget_next(&s->budget);
+    if (s->port.now_ns != NULL && budget < s->in.as.stereo.budget)
+        s->in.as.stereo.budget = budget;
+}
+
 static void handle(plr_session *s) {
     const unsigned row = row_of(&s->in);
     count(s);
@@ -203,7 +210,7 @@ static void handle(plr_session *s) {
     if (rule == IGNORE)
         return;
     if (row == PLR_KIND_STEREO)
-        plr_frames_limit(s);
+        limit_frame(s);
     echo(s, row, rule);
     const plr_status status = check(s, row, rule);
     if (status != PLR_OK)

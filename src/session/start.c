@@ -26,6 +26,7 @@ void plr_start_clear(plr_session *s) {
     s->imu_status = PLR_OK;
     s->imu_faults = 0;
     plr_queue_clear(&s->queue);
+    memset(s->newest_ns, 0, sizeof s->newest_ns);
     memset(&s->order, 0, sizeof s->order);
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)

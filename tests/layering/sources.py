@@ -83,7 +83,7 @@ SESSION_PARTS = (
     "state_store",
 )
 SESSION_FILES = (
-    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "steps", "frames", "events"),
+    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "use", "events"),
     "session",
 )
 # What a public header may include of its siblings: wire.h must stay free of the filter.

@@ -136,12 +136,24 @@ static void test_readings_of_the_clocks_end_take_no_more_room_than_there_is(void
     reading.as.reading.t_ns = UINT64_MAX;
     desk_use_setting("twist-delay", 1);
     desk_begin_drive();
-    desk_send(drive_twist(0));
     for (unsigned i = 0; i < PLR_SESSION_HELD_READINGS + 3; i++)
         desk_send(reading);
     desk_run();
     TEST_ASSERT_EQUAL_UINT32(3, session.totals.held_short);
     TEST_ASSERT_EQUAL_UINT8(PLR_SESSION_HELD_READINGS, session.queue.counts[PLR_EVENT_READING]);
+}
+
+static void test_a_reading_of_another_clock_hurries_nothing(void) {
+    desk_use_setting("twist-delay", 0.5);
+    desk_begin_drive();
+    for (int k = 0; k < 40; k++) {
+        desk_send(drive_twist(0.01 * k));
+        desk_send(drive_position(1000 + 0.01 * k));
+    }
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT8(40, session.queue.counts[PLR_EVENT_STEP]);
+    TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
+    TEST_ASSERT_EQUAL_UINT32(40, session.totals.refused);
 }
 
 static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void) {
