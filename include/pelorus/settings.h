@@ -83,8 +83,8 @@ typedef enum plr_calibrate {
 /* The settings of a filter. Fill it by plr_config_default and change what your robot needs: usually
  * the three noise sigmas and twist_timing.
  *
- * Above each field stands its row in the table: name, unit, default and limits (both included).
- * The table is src/record/settings.def; tests/layering/settings.py compares this text with it.
+ * Above each field stands its row of the table src/record/settings.def: name, unit, limits (both
+ * included) and default. tests/layering/schema.py writes these lines from the table.
  *
  * Within the limits some combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
