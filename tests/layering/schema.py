@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Compares the tables that the library is built from with what is said of them elsewhere: the file
-schema.json, which the Python tools read, and the tables of docs/, each between `<!-- table: NAME -->`
-and `<!-- end -->`, all printed by the program pelorus-schema; and limits and defaults in settings.h.
+"""Compares the tables that the library is built from with what is said of them elsewhere.
+
+schema.json, which the Python tools read, and the tables of docs/, each between
+`<!-- table: NAME -->` and `<!-- end -->`, are printed by the program pelorus-schema. Limits and defaults in settings.h come
+from settings.def.
 
 usage: schema.py PROJECT_ROOT PELORUS_SCHEMA [--write]
 
