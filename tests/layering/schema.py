@@ -3,8 +3,8 @@
 """Compares the tables that the library is built from with what is said of them elsewhere.
 
 schema.json, which the Python tools read, and the tables of docs/, each between
-`<!-- table: NAME -->` and `<!-- end -->`, are printed by the program pelorus-schema. Limits and defaults in settings.h come
-from settings.def.
+`<!-- table: NAME -->` and `<!-- end -->`, are printed by the program pelorus-schema.
+Limits and defaults in settings.h come from settings.def.
 
 usage: schema.py PROJECT_ROOT PELORUS_SCHEMA [--write]
 
