@@ -77,9 +77,9 @@ typedef struct plr_step_order {
     plr_time_ns stepped_ns; /* the time of the last that it took */
     bool used;              /* it took a frame, or a reading of a small sensor */
     plr_time_ns used_ns;    /* of the last that it took, by the clock of the steps */
-    plr_time_ns ahead_ns;   /* so far was that ahead of the steps that had come */
-    plr_time_ns late_ns;    /* the last used_ns that a step came behind; 0: none did */
-    plr_time_ns told_ns;    /* how long frames were to wait, when a TEXT last told of it */
+    plr_time_ns ahead_ns;   /* how far that was ahead of the newest step */
+    plr_time_ns late_ns;    /* used_ns when a step last came too late; 0: none did */
+    plr_time_ns told_ns;    /* the delay that the last TEXT about it asked for */
 } plr_step_order;
 
 /* Landmarks of known position, ascending by id. */

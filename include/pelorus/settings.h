@@ -118,7 +118,7 @@ typedef struct plr_config {
      * Which parts of the camera's calibration are estimated on the way: bits of plr_calibrate. Each
      * begins as the calibration says, with the sigma of its own setting, and is learnt as far as the
      * drive shows it: with an IMU a minute of walking with turns shows all of them, at rest and at
-     * constant speed nothing shows. By twists, whose scale and axes are wrong as easily, less shows, and
+     * constant speed none is observable. With twists less is: their scale and axes may be wrong too, and
      * what successive frames have in common counts as error of the twists. Parts that are not
      * listed are considered: covariances contain their sigma, and estimates do not depend on it. */
     uint8_t calibrate;
@@ -316,7 +316,7 @@ typedef struct plr_config {
 
     /* Setting gyro-noise [rad/s/sqrt(Hz)]: 0 to 10, default 1e-3.
      * Noise density of the gyro, as Kalibr and data sheets give it (1 deg/s/sqrt(Hz) = 0.01745).
-     * It is the least: where the readings scatter by more than twice that, half of their scatter counts,
+     * It is a lower bound: where the readings scatter by more than twice that, half of their scatter counts,
      * because vibration comes on top of the data sheet's figure (docs/NUMERICS.md 13). */
     double gyro_noise;
 

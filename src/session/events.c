@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "session/events.h"
 
+#include "pelorus/assertions.h"
 #include "session/plausible.h"
 #include "session/queue.h"
 #include "session/reanchor.h"
@@ -91,11 +92,13 @@ static void note_arrival(plr_session *s, const plr_event *event) {
         *newest_ns = event->t_ns;
     if (set_back)
         plr_events_use_all(s);
+    PLR_ASSERT(event->t_ns <= *newest_ns);
 }
 
 static void take(plr_session *s, const plr_event *event) {
     const plr_event_kind kind = event->kind;
     const plr_time_ns t_ns = event->t_ns, delay = delay_ns(s, kind);
+    PLR_ASSERT(s->phase >= PLR_PHASE_STARTING);
     if (kind != PLR_EVENT_READING && plr_queue_holds(&s->queue, kind, t_ns)) {
         plr_use_refuse(s, event, PLR_E_TIME); /* doubled by a link */
         return;

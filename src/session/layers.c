@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/layers.h"
 
+#include "pelorus/assertions.h"
+
 /* The prior of an IMU's gyro bias, rad/s, where nothing else is said: real parts have so much. The setting's
  * default is for a gyro beside wheels, which has been calibrated. */
 #define IMU_BIAS_GYRO 0.1
@@ -8,6 +10,7 @@
 /* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
     const plr_setting *setting = plr_setting_by_name(name);
+    PLR_ASSERT(plr_setting_axis(setting, 2) != NULL);
     for (unsigned axis = 0; axis < 3; axis++) {
         const double value = axes[axis] > 0 ? axes[axis] : all;
         if (value >= 0)
@@ -99,6 +102,7 @@ plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
         return PLR_E_CONFIG;
     const plr_setting *setting = plr_setting_by_id(value.id);
     uint8_t kept = 0;
+    PLR_ASSERT(wanted->count <= PLR_WIRE_MAX_SETTINGS);
     for (unsigned i = 0; i < wanted->count; i++) { /* what is set anew goes, for one axis or all */
         const plr_setting *old = plr_setting_by_id(wanted->settings[i].id);
         if (old != setting && plr_setting_of_axis(old) != setting)
@@ -112,6 +116,7 @@ plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
 }
 
 void plr_layers_describe(plr_config_message *message, const plr_config *config) {
+    PLR_ASSERT(plr_setting_count() <= PLR_WIRE_MAX_SETTINGS);
     message->build_fingerprint = plr_build_fingerprint();
     message->max_landmarks = PLR_MAX_LANDMARKS;
     message->max_observations = PLR_MAX_OBSERVATIONS;

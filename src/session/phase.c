@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "session/phase.h"
 
+#include "pelorus/assertions.h"
+
 /* The arrows of the drawing in docs/REPLAY-FORMAT.md, but for END, which leads back from all. */
 static const struct {
     uint8_t from, trigger, to;
@@ -17,6 +19,7 @@ static const struct {
 };
 
 void plr_phase_change(plr_session_phase *phase, plr_phase_trigger trigger) {
+    PLR_ASSERT(*phase < PLR_PHASES);
     if (trigger == PLR_TRIGGER_END) {
         *phase = PLR_PHASE_WAITING;
         return;

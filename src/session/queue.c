@@ -102,6 +102,7 @@ void plr_queue_insert(plr_queue *queue, const plr_event *event) {
     queue->count++;
     queue->counts[event->kind]++;
     store(queue, place, event);
+    PLR_ASSERT(queue->count <= PLR_QUEUE_PLACES);
 }
 
 bool plr_queue_pop_until(plr_queue *queue, plr_time_ns t_ns, plr_event_kind kind,
@@ -110,6 +111,7 @@ bool plr_queue_pop_until(plr_queue *queue, plr_time_ns t_ns, plr_event_kind kind
     if (queue->count == 0 || goes_before(t_ns, kind, queue, place))
         return false;
     load(queue, place, event);
+    PLR_ASSERT(queue->counts[event->kind] > 0);
     queue->count--;
     queue->counts[event->kind]--;
     memmove(queue->order, queue->order + 1, queue->count);

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
 #include "session/line.h"
 #include "session/send.h"
 
@@ -31,6 +32,7 @@ bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status s
     const bool agrees = t_ns > watch->last_ns && t_ns - watch->last_ns <= max_gap_ns;
     watch->agreeing = watch->agreeing > 0 && agrees ? watch->agreeing + 1u : 1u;
     watch->last_ns = t_ns;
+    PLR_ASSERT(watch->agreeing <= PLR_SESSION_AGREEING);
     if (watch->agreeing < PLR_SESSION_AGREEING)
         return false;
     watch->agreeing = 0;
@@ -53,6 +55,7 @@ static double largest3(const double x[3]) {
 /* Adds to the covariance of a pose that it moved by `way` and turned by `turn`, one sigma. */
 static void widen(double P[36], double way, double turn) {
     const double position = way * way, angle = turn * turn;
+    PLR_ASSERT(way >= 0 && turn >= 0);
     for (unsigned i = 0; i < 3; i++) {
         P[7 * i] += position < MAX_POSITION_VARIANCE ? position : MAX_POSITION_VARIANCE;
         P[7 * (i + 3)] += angle < MAX_ANGLE_VARIANCE ? angle : MAX_ANGLE_VARIANCE;

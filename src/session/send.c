@@ -6,7 +6,7 @@
 #include "session/layers.h"
 #include "session/line.h"
 
-#define TOLD_EVERY_NS UINT64_C(1000000000) /* the calibration */
+#define CALIBRATION_EVERY_NS UINT64_C(1000000000)
 
 static void put(plr_session *s, uint32_t bit, const plr_message *message) {
     if (s->port.write == NULL || (s->options.output & bit) == 0)
@@ -41,7 +41,7 @@ static bool describe_covariance(double packed[21], double P[36], plr_status stat
     return true;
 }
 
-/* Trace and variances of the biases are told once a frame: they take as long as the rest. */
+/* Trace and variances of the biases are sent once a frame: they take as long as the rest. */
 static bool describe_pose(plr_pose_message *pose, const plr_filter *f, bool after_update) {
     double P[36];
     if (plr_filter_pose(f, &pose->T_WB) != PLR_OK ||
@@ -111,7 +111,7 @@ void plr_send_calibration(plr_session *s) {
 
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns) {
     put_report(s, PLR_KIND_STEREO, report, compute_ns, PLR_NOTICE_NONE);
-    if (report->t_ns - s->calibration_ns >= TOLD_EVERY_NS)
+    if (report->t_ns - s->calibration_ns >= CALIBRATION_EVERY_NS)
         plr_send_calibration(s);
     if ((s->options.output & PLR_OUTPUT_EVIDENCE) == 0 || report->status != PLR_OK)
         return;

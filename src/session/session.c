@@ -197,6 +197,7 @@ static void limit_frame(plr_session *s) {
 
 static void handle(plr_session *s) {
     const unsigned row = row_of(&s->in);
+    PLR_ASSERT(row < ROWS && s->phase < PLR_PHASES);
     count(s);
     if (table[row].rules[s->phase] == FIRST) {
         plr_phase_change(&s->phase, PLR_TRIGGER_DATA);
@@ -252,6 +253,7 @@ static plr_step feed_reader(plr_session *s) {
     const plr_read_event event = plr_reader_feed(&s->reader, s->chunk + s->chunk_at,
                                                  s->chunk_count - s->chunk_at, &used, &s->in);
     s->chunk_at += (unsigned)used;
+    PLR_ASSERT(s->chunk_at <= s->chunk_count);
     switch (event) {
     case PLR_READ_MESSAGE:
         s->last_skip = PLR_SKIP_NONE;

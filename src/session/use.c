@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "session/use.h"
 
+#include "pelorus/assertions.h"
 #include "session/budget.h"
 #include "session/clock.h"
 #include "session/line.h"
@@ -34,9 +35,10 @@ static bool is_late(const plr_session *s, plr_time_ns t_ns, plr_status status) {
            (!order->stepped || t_ns > order->stepped_ns);
 }
 
-/* Told once, and again where it has become twice as much. */
+/* Reported once, and again when the delay has doubled. */
 static void note_late(plr_session *s, plr_time_ns t_ns) {
     plr_step_order *order = &s->order;
+    PLR_ASSERT(t_ns < order->used_ns);
     plr_text *line = &s->out.as.text;
     const plr_time_ns behind_ns = order->used_ns - t_ns;
     const plr_time_ns needed_ns = behind_ns > order->ahead_ns ? behind_ns : order->ahead_ns;
@@ -64,7 +66,7 @@ static void refuse_step(plr_session *s, plr_time_ns t_ns, plr_status status) {
     s->imu_status = status;
 }
 
-/* Each fault of the IMU is told once in a drive. */
+/* Each fault of the IMU is reported once in a drive. */
 static void report_fault(plr_session *s) {
     const plr_imu_fault fault = plr_filter_imu_fault(&s->filter);
     const uint32_t bit = UINT32_C(1) << fault;
