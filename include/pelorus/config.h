@@ -30,14 +30,14 @@ extern "C" {
 #define PLR_REAL 32
 #endif
 
-/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 25 KB
+/* Most landmarks that a filter can hold: 1 to 1024, default 32. RAM grows with the square: 26 KB
  * for 16 landmarks, 51 KB for 32 (docs/SIZES.md has more). The setting `slots` can use fewer. */
 #ifndef PLR_MAX_LANDMARKS
 #define PLR_MAX_LANDMARKS 32
 #endif
 
 /* Most observations in one frame: 1 to 4096, default 128. A frame with more is refused, so choose
- * the most that the tracker can send. Each takes 4 bytes of RAM in the filter, and 60 in a
+ * the most that the tracker can send. Each takes 4 bytes of RAM in the filter, and 100 in a
  * session. */
 #ifndef PLR_MAX_OBSERVATIONS
 #define PLR_MAX_OBSERVATIONS 128

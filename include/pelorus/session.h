@@ -177,10 +177,9 @@ typedef struct plr_session {
     bool start_pending;        /* `start` sets the pose when its time has come */
     plr_start start;
     uint32_t start_resets;
-    plr_time_ns calibration_ns; /* when the calibration was told last */
-    plr_held_steps held;
-    plr_held_readings held_readings;
-    plr_held_frames held_frames;
+    plr_time_ns calibration_ns; /* when CALIBRATION was sent last */
+    plr_queue queue;
+    plr_time_ns newest_ns[PLR_EVENT_KINDS]; /* the newest time of each kind that arrived */
     plr_step_order order;
     plr_known_map known;
     plr_clock_watch watch;

@@ -34,50 +34,52 @@ typedef union plr_moved_by {
     plr_imu imu;
 } plr_moved_by;
 
-typedef struct plr_held_step {
-    plr_time_ns t_ns;
-    plr_moved_by by;
-    bool leads; /* it is the first of its message */
-} plr_held_step;
+/* Kinds of events, in the order in which those of one time are used. */
+typedef enum plr_event_kind {
+    PLR_EVENT_STEP,    /* the body moved */
+    PLR_EVENT_FRAME,   /* the camera took a stereo pair */
+    PLR_EVENT_READING, /* a small sensor measured */
+    PLR_EVENT_KINDS
+} plr_event_kind;
 
-/* Twists or IMU readings that wait because of twist-delay: a ring, ascending by time. */
-typedef struct plr_held_steps {
-    uint8_t first, count;
-    uint64_t leads; /* bit i: the one at place i is the first of its message */
-    plr_time_ns t_ns[PLR_SESSION_HELD_TWISTS];
-    plr_moved_by by[PLR_SESSION_HELD_TWISTS];
-} plr_held_steps;
+/* What is used in the order of time: src/session/events.h. */
+typedef struct plr_event {
+    plr_time_ns t_ns; /* by the clock of the steps */
+    plr_event_kind kind;
+    bool leads; /* a step that is the first of its message */
+    union {
+        plr_moved_by step;
+        plr_frame frame; /* as it came: t_ns is by the camera's clock */
+        plr_reading reading;
+    } as;
+} plr_event;
 
-/* Readings of small sensors that wait with the twists, ascending by time. */
-typedef struct plr_held_readings {
-    unsigned count;
+enum {
+    PLR_QUEUE_PLACES = PLR_SESSION_HELD_TWISTS + PLR_SESSION_HELD_FRAMES + PLR_SESSION_HELD_READINGS
+};
+
+/* Events that wait: src/session/queue.h. Each kind has places of its own. */
+typedef struct plr_queue {
+    uint8_t count, counts[PLR_EVENT_KINDS]; /* events, and those of each kind */
+    uint8_t order[PLR_QUEUE_PLACES]; /* places: first the events', in order, then the free ones */
+    bool leads[PLR_SESSION_HELD_TWISTS];
+    plr_time_ns t_ns[PLR_QUEUE_PLACES];
+    plr_moved_by steps[PLR_SESSION_HELD_TWISTS];
+    plr_frame frames[PLR_SESSION_HELD_FRAMES];
+    plr_observation observations[PLR_SESSION_HELD_FRAMES][PLR_MAX_OBSERVATIONS];
     plr_reading readings[PLR_SESSION_HELD_READINGS];
-} plr_held_readings;
+} plr_queue;
 
-/* A frame whose time lies beyond the last step: it waits until the steps have come there. */
-typedef struct plr_held_frame {
-    plr_frame frame;      /* as it came; its observations are those below */
-    plr_time_ns moved_ns; /* its time by the clock of the steps: setting camera-offset */
-    plr_observation observations[PLR_MAX_OBSERVATIONS];
-} plr_held_frame;
-
-/* Such frames: a ring, ascending by moved_ns. */
-typedef struct plr_held_frames {
-    uint8_t first, count;
-    plr_held_frame frames[PLR_SESSION_HELD_FRAMES];
-} plr_held_frames;
-
-/* Whether steps and frames come in the order of their times: src/session/steps.h. */
+/* Whether steps and frames come in the order of their times: src/session/use.h. */
 typedef struct plr_step_order {
-    bool came;              /* a step */
-    plr_time_ns newest_ns;  /* the newest time of those that came */
+    bool came;              /* a step arrived */
     bool stepped;           /* the filter took one */
     plr_time_ns stepped_ns; /* the time of the last that it took */
     bool used;              /* it took a frame, or a reading of a small sensor */
     plr_time_ns used_ns;    /* of the last that it took, by the clock of the steps */
-    plr_time_ns ahead_ns;   /* so far was that ahead of the steps that had come */
-    plr_time_ns late_ns;    /* the last used_ns that a step came behind; 0: none did */
-    plr_time_ns told_ns;    /* how long frames were to wait, when a TEXT last told of it */
+    plr_time_ns ahead_ns;   /* how far that was ahead of the newest step */
+    plr_time_ns late_ns;    /* used_ns when a step last came too late; 0: none did */
+    plr_time_ns told_ns;    /* the delay that the last TEXT about it asked for */
 } plr_step_order;
 
 /* Landmarks of known position, ascending by id. */

@@ -83,8 +83,8 @@ typedef enum plr_calibrate {
 /* The settings of a filter. Fill it by plr_config_default and change what your robot needs: usually
  * the three noise sigmas and twist_timing.
  *
- * Above each field stands its row in the table: name, unit, default and limits (both included).
- * The table is src/record/settings.def; tests/layering/settings.py compares this text with it.
+ * Above each field stands its row of the table src/record/settings.def: name, unit, limits (both
+ * included) and default. tests/layering/schema.py writes these lines from the table.
  *
  * Within the limits some combinations are refused too: min_depth_m not below max_range_m;
  * min_depth_m not below a max_depth_m above 0; landmark_sigma_m or the independent landmark_prior
@@ -118,7 +118,7 @@ typedef struct plr_config {
      * Which parts of the camera's calibration are estimated on the way: bits of plr_calibrate. Each
      * begins as the calibration says, with the sigma of its own setting, and is learnt as far as the
      * drive shows it: with an IMU a minute of walking with turns shows all of them, at rest and at
-     * constant speed nothing shows. By twists, whose scale and axes are wrong as easily, less shows, and
+     * constant speed none is observable. With twists less is: their scale and axes may be wrong too, and
      * what successive frames have in common counts as error of the twists. Parts that are not
      * listed are considered: covariances contain their sigma, and estimates do not depend on it. */
     uint8_t calibrate;

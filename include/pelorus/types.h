@@ -290,7 +290,7 @@ typedef enum plr_calibration_error {
 /* The calibration as the filter has estimated it: plr_filter_calibration. */
 typedef struct plr_calibration_result {
     plr_time_ns t_ns;
-    uint16_t estimated;     /* bits 1 << plr_calibration_error: the others are as init was told */
+    uint16_t estimated;     /* bits 1 << plr_calibration_error: the others are as given to init */
     plr_calibration camera; /* with all corrections; the clock's goes to camera-offset */
     double corrected[PLR_CALIBRATION_ERRORS]; /* by how much, since init or reset */
     double sigma[PLR_CALIBRATION_ERRORS];     /* what may be left; 0: taken for exact */

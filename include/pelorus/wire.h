@@ -165,7 +165,7 @@ typedef struct plr_pose_message {
                                 float32 */
 } plr_pose_message;
 
-/* What a REPORT tells besides its status. */
+/* What a REPORT says besides its status. */
 typedef enum plr_notice {
     PLR_NOTICE_NONE = 0,
     PLR_NOTICE_STARTED = 1, /* the sender has just started: whatever it was told before is lost */

@@ -4,6 +4,7 @@
 #ifndef PLR_MATH_LOG_PRODUCT_H
 #define PLR_MATH_LOG_PRODUCT_H
 
+#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 
 /* mantissa * 2^exponent; 1 is {1, 0} */
@@ -12,10 +13,10 @@ typedef struct plr_log_product {
     int exponent;
 } plr_log_product;
 
-/* p <- p * factor. A factor that is not a positive number leaves it as it is. */
+/* p <- p * factor. A factor outside 1e-30 to 1e30, or that is no number, leaves it as it is. */
 static inline void plr_log_product_multiply(plr_log_product *p, plr_real factor) {
     const plr_real large = PLR_R(1048576);
-    if (!(factor > 0) || !(factor < PLR_R(1e30)))
+    if (!(factor > PLR_R(1e-30)) || !(factor < PLR_R(1e30)))
         return;
     p->mantissa *= factor;
     for (; p->mantissa > large; p->exponent += 20)
@@ -29,6 +30,7 @@ static inline void plr_log_product_multiply(plr_log_product *p, plr_real factor)
 static inline plr_real plr_log_product_value(const plr_log_product *p) {
     const plr_real ln_2 = PLR_R(0.6931471805599453);
     plr_real m = p->mantissa;
+    PLR_ASSERT(m > 0);
     int exponent = p->exponent;
     for (; m > PLR_R(1.4142135); exponent++)
         m *= PLR_R(0.5);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "math/order.h"
 
+#include "pelorus/assertions.h"
+
 /* Moves indices[root] down the heap until it comes after both of its children. */
 static void sink(uint16_t *indices, unsigned root, unsigned n, plr_before before,
                  const void *context) {
     const uint16_t moved = indices[root];
+    PLR_ASSERT(root < n);
     for (unsigned child = 2 * root + 1; child < n; child = 2 * root + 1) {
         if (child + 1 < n && before(context, indices[child], indices[child + 1]))
             child++;

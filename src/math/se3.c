@@ -7,6 +7,7 @@
 
 /* A = [R, C; 0, R] */
 static void put_blocks(plr_real A[36], const plr_real R[9], const plr_real C[9]) {
+    PLR_ASSERT(A != R && A != C);
     memset(A, 0, 36 * sizeof *A);
     for (int i = 0; i < 3; i++) {
         memcpy(A + 6 * i, R + 3 * i, 3 * sizeof *R);

@@ -2,6 +2,7 @@
 #include "math/so3.h"
 
 #include "math/small.h"
+#include "pelorus/assertions.h"
 
 enum { TERMS = 16 }; /* at |theta| = pi the last one is below the float64 rounding */
 
@@ -18,6 +19,7 @@ static const plr_real pair[2 * TERMS + 6] = {
  * Nesting keeps tiny factorials, which float32 cannot hold, out of the sum. */
 static plr_real alternating(plr_real x, int j) {
     plr_real sum = 1;
+    PLR_ASSERT(j >= 1 && j <= 5); /* pair ends there */
     for (int k = TERMS - 1; k >= 0; k--)
         sum = PLR_FMA(-x * pair[2 * k + j + 1], sum, PLR_R(1));
     return sum;
@@ -90,7 +92,7 @@ PLR_SELDOM void plr_so3_log(plr_real theta[3], const plr_real R[9]) {
     const plr_real arc = small * (PLR_R(0.7854) + PLR_R(0.273) * (PLR_R(1) - small));
     const plr_real angle = PLR_R(2) * (tangent < 1 ? arc : PLR_R(1.5708) - arc);
     if (!(sine > PLR_R(1e-6)))
-        return; /* small, or half a turn about an axis that the sines do not tell */
+        return; /* small, or half a turn, whose axis the sines do not give */
     for (unsigned i = 0; i < 3; i++)
         theta[i] *= angle / sine;
     for (unsigned step = 0; step < 3; step++) {

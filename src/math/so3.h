@@ -30,7 +30,7 @@ void plr_so3_expm1(plr_real E[9], const plr_real theta[3]);
 /* plr_so3_orthonormalise of R = I + E, computed from the small numbers of E without forming R. */
 void plr_so3_orthonormalise_small(plr_real E[9]);
 
-/* theta with Exp(theta) = R, |theta| < pi; next to nothing for half a turn, whose axis is lost. */
+/* theta with Exp(theta) = R, |theta| < pi; near zero for half a turn, whose axis is lost. */
 void plr_so3_log(plr_real theta[3], const plr_real R[9]);
 
 /* R <- R (3 I - R^T R) / 2: a Newton step towards the nearest rotation, which squares the error. */

@@ -6,6 +6,7 @@
 enum { DELIMITER = 0, FULL_BLOCK = 0xFF };
 
 plr_cobs_step plr_cobs_decode(plr_cobs_decoder *d, uint8_t stuffed, uint8_t *data) {
+    PLR_ASSERT(d->code != 0 || d->left == 0);
     if (stuffed == DELIMITER) {
         plr_cobs_step step = d->code == 0 ? PLR_COBS_EMPTY
                              : d->left    ? PLR_COBS_BROKEN

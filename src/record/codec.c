@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 #include "pelorus/wire.h"
 #include "record/bytes.h"
@@ -62,6 +63,7 @@ static unsigned size_in_memory(unsigned kind) {
 
 /* A number as the processor holds it becomes little-endian bytes, or the other way round. */
 static void reorder(unsigned char *to, const unsigned char *from, unsigned width) {
+    PLR_ASSERT(width <= 8);
     const uint16_t one = 1;
     const bool is_little = *(const unsigned char *)&one == 1;
     for (unsigned i = 0; i < width; i++)
@@ -131,6 +133,7 @@ static void pass_number(plr_codec *c, const plr_field *f, unsigned char *at) {
 
 void plr_codec_numbers(plr_codec *c, plr_field_kind kind, void *numbers, uint32_t count) {
     const plr_field f = {.kind = (uint8_t)kind};
+    PLR_ASSERT(kind <= PLR_FIELD_PRECISE);
     for (uint32_t i = 0; i < count && c->status == PLR_OK; i++)
         pass_number(c, &f, numbers ? (unsigned char *)numbers + i * size_in_memory(kind) : NULL);
 }
@@ -315,6 +318,7 @@ static void pass_field(plr_codec *c, const plr_field *f, unsigned char *at) {
 static void set_unknown(const plr_field *f, unsigned char *at) {
     static const double unknown = -1;
     static const float narrow = -1;
+    PLR_ASSERT(at);
     for (unsigned i = 0; i < f->count; i++) {
         if (f->kind == PLR_FIELD_F64 || f->kind == PLR_FIELD_NARROW)
             memcpy(at + i * sizeof unknown, &unknown, sizeof unknown);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "record/messages.h"
 
+#include "pelorus/assertions.h"
+
 #include <string.h>
 
 /* The fields of each message, and those of its rows. They are counted from the beginning of the
@@ -72,6 +74,7 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
         plr_codec_fail(c, PLR_E_FOREIGN);
         return;
     }
+    PLR_ASSERT(records[kind].count > 0);
     plr_codec_fields(c, content, records[kind].fields, records[kind].count);
     if (kind == PLR_KIND_STEREO)
         pass_observations(c, content, room);
@@ -97,6 +100,7 @@ void plr_message_pass(plr_codec *c, plr_kind kind, void *content,
 
 plr_time_ns plr_message_time(const plr_message *message) {
     const plr_field *first = records[message->kind].fields;
+    PLR_ASSERT(message->kind != PLR_KIND_NONE && (unsigned)message->kind <= PLR_WIRE_KINDS);
     plr_time_ns t_ns = 0;
     if (first->kind == PLR_FIELD_U64)
         memcpy(&t_ns, (const unsigned char *)&message->as + first->offset, sizeof t_ns);

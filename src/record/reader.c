@@ -82,6 +82,7 @@ static plr_cobs_step take_byte(plr_reader *r, uint8_t stuffed) {
         r->crc = 0;
         r->overrun = false;
     }
+    PLR_ASSERT(r->length <= r->buffer_size);
     r->counts.bytes++;
     plr_cobs_step step = plr_cobs_decode(&r->cobs, stuffed, &byte);
     if (step != PLR_COBS_BYTE)

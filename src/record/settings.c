@@ -177,7 +177,8 @@ void plr_config_course(plr_config *config) {
     config->max_depth_m = 30;      /* ours as well */
 }
 
-/* Of each part of the calibration, by the bits of plr_calibrate: its sigma, and how many numbers it is. */
+/* For each part of the calibration, by its bit of plr_calibrate: the setting of its sigma, and how many
+ * numbers it has. */
 static const char *const part_sigmas[] = {"focal-sigma",        "baseline-sigma",
                                           "camera-turn-sigma",  "centre-sigma",
                                           "camera-place-sigma", "camera-clock-sigma"};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "session/budget.h"
 
+#include "pelorus/assertions.h"
 #include "pelorus/config.h"
 
 void plr_budget_init(plr_budget *budget, uint32_t deadline_us) {
@@ -37,4 +38,5 @@ void plr_budget_learn(plr_budget *budget, uint64_t elapsed_ns, unsigned used) {
         budget->cost_ns = cost;
     else
         budget->cost_ns -= (budget->cost_ns - cost + 3u) / 4u;
+    PLR_ASSERT(budget->cost_ns > 0 && budget->cost_ns <= budget->deadline_ns);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "math/finite.h"
+#include "pelorus/assertions.h"
 
 void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capacity) {
     map->landmarks = memory;
@@ -14,6 +15,7 @@ void plr_known_map_init(plr_known_map *map, plr_landmark *memory, unsigned capac
 /* Index of the first landmark whose id is not below this one. */
 static unsigned lower_bound(const plr_known_map *map, uint32_t id) {
     unsigned low = 0, high = map->count;
+    PLR_ASSERT(map->count <= map->capacity);
     while (low < high) {
         const unsigned middle = low + (high - low) / 2u;
         if (map->landmarks[middle].id < id)
@@ -32,6 +34,7 @@ plr_status plr_known_map_add(plr_known_map *map, const plr_landmark *landmark) {
         return PLR_E_EXISTS;
     if (map->count >= map->capacity)
         return PLR_E_FULL;
+    PLR_ASSERT(at == 0 || map->landmarks[at - 1].id < landmark->id);
     memmove(map->landmarks + at + 1, map->landmarks + at,
             (map->count - at) * sizeof *map->landmarks);
     map->landmarks[at] = *landmark;

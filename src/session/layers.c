@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "session/layers.h"
 
+#include "pelorus/assertions.h"
+
 /* With an IMU, where nothing else is said: the prior of its gyro's bias, rad/s, for real parts have so much (the
  * setting's default is for a gyro beside wheels, which has been calibrated); and by how much the times of
  * pictures and readings may differ, s: a trigger and an exposure are hardly known better. */
-#define IMU_BIAS_GYRO    0.1
-#define IMU_CAMERA_CLOCK 2e-3
+#define IMU_BIAS_GYRO 0.1
+#define IMU_CAMERA_CLOCK                                                                           \
+    (PLR_CALIBRATIONS > 5 ? 2e-3 : 0) /* else there is no room for its column */
 
 /* An axis without a value of its own has the one for all axes. */
 static void suggest_axes(plr_config *config, const char *name, double all, const double axes[3]) {
     const plr_setting *setting = plr_setting_by_name(name);
+    PLR_ASSERT(plr_setting_axis(setting, 2) != NULL);
     for (unsigned axis = 0; axis < 3; axis++) {
         const double value = axes[axis] > 0 ? axes[axis] : all;
         if (value >= 0)
@@ -119,6 +123,7 @@ plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
         return PLR_E_CONFIG;
     const plr_setting *setting = plr_setting_by_id(value.id);
     uint8_t kept = 0;
+    PLR_ASSERT(wanted->count <= PLR_WIRE_MAX_SETTINGS);
     for (unsigned i = 0; i < wanted->count; i++) { /* what is set anew goes, for one axis or all */
         const plr_setting *old = plr_setting_by_id(wanted->settings[i].id);
         if (old != setting && plr_setting_of_axis(old) != setting)
@@ -132,6 +137,7 @@ plr_status plr_layers_want(plr_config_message *wanted, plr_wire_setting value) {
 }
 
 void plr_layers_describe(plr_config_message *message, const plr_config *config) {
+    PLR_ASSERT(plr_setting_count() <= PLR_WIRE_MAX_SETTINGS);
     message->build_fingerprint = plr_build_fingerprint();
     message->max_landmarks = PLR_MAX_LANDMARKS;
     message->max_observations = PLR_MAX_OBSERVATIONS;

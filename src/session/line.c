@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
+
 /* The length of UTF-8 text when it is cut to `room` bytes: never inside a character. */
 static size_t whole_characters(const char *added, size_t room) {
     size_t n = 0;
@@ -16,6 +18,7 @@ static size_t whole_characters(const char *added, size_t room) {
 
 void plr_line_text(plr_text *line, const char *added) {
     const size_t at = strlen(line->text);
+    PLR_ASSERT(at <= PLR_WIRE_MAX_TEXT);
     const size_t n = whole_characters(added, PLR_WIRE_MAX_TEXT - at);
     memcpy(line->text + at, added, n);
     line->text[at + n] = '\0';
@@ -31,6 +34,7 @@ void plr_line_begin(plr_text *line, plr_severity severity, const char *words) {
 static void put_digits(plr_text *line, uint64_t number, unsigned width) {
     char digits[21];
     unsigned at = sizeof digits - 1;
+    PLR_ASSERT(width <= at);
     digits[at] = '\0';
     for (unsigned n = 0; number > 0 || n < width; n++) {
         digits[--at] = (char)('0' + number % 10u);
@@ -46,6 +50,7 @@ void plr_line_count(plr_text *line, const char *before, uint64_t number) {
 
 /* digits 10^-decimals, without the zeros at its end. */
 static void put_decimal(plr_text *line, uint32_t digits, unsigned decimals) {
+    PLR_ASSERT(digits < 1000000u && decimals <= 9);
     while (decimals > 0 && digits % 10u == 0) {
         digits /= 10u;
         decimals--;

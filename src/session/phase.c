@@ -1,28 +1,31 @@
 // SPDX-License-Identifier: MIT
 #include "session/phase.h"
 
+#include "pelorus/assertions.h"
+
 /* The arrows of the drawing in docs/REPLAY-FORMAT.md, but for END, which leads back from all. */
 static const struct {
-    uint8_t from, event, to;
+    uint8_t from, trigger, to;
 } arrows[] = {
-    {PLR_PHASE_WAITING, PLR_EVENT_HEADER, PLR_PHASE_READY},
-    {PLR_PHASE_READY, PLR_EVENT_REJECTED, PLR_PHASE_REJECTED},
-    {PLR_PHASE_REJECTED, PLR_EVENT_HEADER, PLR_PHASE_READY},
-    {PLR_PHASE_REJECTED, PLR_EVENT_SETTINGS, PLR_PHASE_READY},
-    {PLR_PHASE_READY, PLR_EVENT_FILTER, PLR_PHASE_STARTING},
-    {PLR_PHASE_STARTING, PLR_EVENT_POSE, PLR_PHASE_RUNNING},
-    {PLR_PHASE_READY, PLR_EVENT_RESTORED, PLR_PHASE_RESTORED},
-    {PLR_PHASE_RESTORED, PLR_EVENT_RESTORE, PLR_PHASE_READY},
-    {PLR_PHASE_RESTORED, PLR_EVENT_DATA, PLR_PHASE_RUNNING},
+    {PLR_PHASE_WAITING, PLR_TRIGGER_HEADER, PLR_PHASE_READY},
+    {PLR_PHASE_READY, PLR_TRIGGER_REJECTED, PLR_PHASE_REJECTED},
+    {PLR_PHASE_REJECTED, PLR_TRIGGER_HEADER, PLR_PHASE_READY},
+    {PLR_PHASE_REJECTED, PLR_TRIGGER_SETTINGS, PLR_PHASE_READY},
+    {PLR_PHASE_READY, PLR_TRIGGER_FILTER, PLR_PHASE_STARTING},
+    {PLR_PHASE_STARTING, PLR_TRIGGER_POSE, PLR_PHASE_RUNNING},
+    {PLR_PHASE_READY, PLR_TRIGGER_RESTORED, PLR_PHASE_RESTORED},
+    {PLR_PHASE_RESTORED, PLR_TRIGGER_RESTORE, PLR_PHASE_READY},
+    {PLR_PHASE_RESTORED, PLR_TRIGGER_DATA, PLR_PHASE_RUNNING},
 };
 
-void plr_phase_change(plr_session_phase *phase, plr_phase_event event) {
-    if (event == PLR_EVENT_END) {
+void plr_phase_change(plr_session_phase *phase, plr_phase_trigger trigger) {
+    PLR_ASSERT(*phase < PLR_PHASES);
+    if (trigger == PLR_TRIGGER_END) {
         *phase = PLR_PHASE_WAITING;
         return;
     }
     for (unsigned i = 0; i < sizeof arrows / sizeof arrows[0]; i++)
-        if (arrows[i].from == *phase && arrows[i].event == event) {
+        if (arrows[i].from == *phase && arrows[i].trigger == trigger) {
             *phase = (plr_session_phase)arrows[i].to;
             return;
         }

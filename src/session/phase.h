@@ -6,19 +6,19 @@
 #include "pelorus/session_parts.h"
 
 /* What can lead to another phase. */
-typedef enum plr_phase_event {
-    PLR_EVENT_HEADER,   /* a HEADER begins a drive */
-    PLR_EVENT_SETTINGS, /* a CONFIG changed what is wanted */
-    PLR_EVENT_REJECTED, /* HEADER and settings make no filter */
-    PLR_EVENT_FILTER,   /* the filter was initialised for the data that came */
-    PLR_EVENT_POSE,     /* it is decided where the pose starts */
-    PLR_EVENT_RESTORE,  /* a restore begins: it replaces one that was done before */
-    PLR_EVENT_RESTORED, /* it brought the state back */
-    PLR_EVENT_DATA,     /* a TWIST, STEREO or TRUTH came */
-    PLR_EVENT_END       /* END, or what stands for it */
-} plr_phase_event;
+typedef enum plr_phase_trigger {
+    PLR_TRIGGER_HEADER,   /* a HEADER begins a drive */
+    PLR_TRIGGER_SETTINGS, /* a CONFIG changed what is wanted */
+    PLR_TRIGGER_REJECTED, /* HEADER and settings make no filter */
+    PLR_TRIGGER_FILTER,   /* the filter was initialised for the data that came */
+    PLR_TRIGGER_POSE,     /* it is decided where the pose starts */
+    PLR_TRIGGER_RESTORE,  /* a restore begins: it replaces one that was done before */
+    PLR_TRIGGER_RESTORED, /* it brought the state back */
+    PLR_TRIGGER_DATA,     /* a TWIST, STEREO or TRUTH came */
+    PLR_TRIGGER_END       /* END, or what stands for it */
+} plr_phase_trigger;
 
-/* The phase that follows; an event that leads nowhere from here changes nothing. */
-void plr_phase_change(plr_session_phase *phase, plr_phase_event event);
+/* The phase that follows; one that leads nowhere from here changes nothing. */
+void plr_phase_change(plr_session_phase *phase, plr_phase_trigger trigger);
 
 #endif

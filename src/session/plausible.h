@@ -5,7 +5,7 @@
 
 #include "pelorus/wire.h"
 
-/* What is looked at as one: the groups of limits.def, with the structs that it names. */
+/* Numbers that are checked together: the groups of limits.def, with the structs that it names. */
 #define LIMIT(name, most, what, unit)
 #define GROUP(name, type, what) PLR_GROUP_##name,
 #define BOUND(group, type, member, count, limit)

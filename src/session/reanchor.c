@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "pelorus/assertions.h"
 #include "session/line.h"
 #include "session/send.h"
 
@@ -31,6 +32,7 @@ bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status s
     const bool agrees = t_ns > watch->last_ns && t_ns - watch->last_ns <= max_gap_ns;
     watch->agreeing = watch->agreeing > 0 && agrees ? watch->agreeing + 1u : 1u;
     watch->last_ns = t_ns;
+    PLR_ASSERT(watch->agreeing <= PLR_SESSION_AGREEING);
     if (watch->agreeing < PLR_SESSION_AGREEING)
         return false;
     watch->agreeing = 0;
@@ -50,14 +52,18 @@ static double largest3(const double x[3]) {
     return pair > x[2] ? pair : x[2];
 }
 
-/* (speed seconds)^2, at most `limit`. */
-static double wandered(double speed, double seconds, double limit) {
-    const double variance = speed * seconds * (speed * seconds);
-    return variance < limit ? variance : limit;
+/* Adds to the covariance of a pose that it moved by `way` and turned by `turn`, one sigma. */
+static void widen(double P[36], double way, double turn) {
+    const double position = way * way, angle = turn * turn;
+    PLR_ASSERT(way >= 0 && turn >= 0);
+    for (unsigned i = 0; i < 3; i++) {
+        P[7 * i] += position < MAX_POSITION_VARIANCE ? position : MAX_POSITION_VARIANCE;
+        P[7 * (i + 3)] += angle < MAX_ANGLE_VARIANCE ? angle : MAX_ANGLE_VARIANCE;
+    }
 }
 
-/* The last pose with a covariance that a gap of so many seconds leaves. */
-static plr_status widen(double P[36], const plr_filter *f, double seconds) {
+/* The covariance of the last pose after a gap of so many seconds. */
+static plr_status covariance_after(double P[36], const plr_filter *f, double seconds) {
     const plr_config *config = plr_filter_config(f);
     double beside_v = 0, beside_w = 0;
     plr_twist u;
@@ -72,20 +78,8 @@ static plr_status widen(double P[36], const plr_filter *f, double seconds) {
         return PLR_E_NOT_READY;
     const double speed = sum3(u.v_B_mps) + beside_v;
     const double rate = sum3(u.w_B_radps) + beside_w;
-    for (unsigned i = 0; i < 3; i++) {
-        P[7 * i] += wandered(speed, seconds, MAX_POSITION_VARIANCE);
-        P[7 * (i + 3)] += wandered(rate, seconds, MAX_ANGLE_VARIANCE);
-    }
+    widen(P, speed * seconds, rate * seconds);
     return PLR_OK;
-}
-
-/* For a covariance that was not positive even before: nothing is known. */
-static void know_nothing(double P[36]) {
-    memset(P, 0, 36 * sizeof *P);
-    for (unsigned i = 0; i < 3; i++) {
-        P[7 * i] = MAX_POSITION_VARIANCE;
-        P[7 * (i + 3)] = MAX_ANGLE_VARIANCE;
-    }
 }
 
 static void report(plr_session *s, plr_time_ns from_ns, plr_time_ns to_ns) {
@@ -103,7 +97,8 @@ static plr_status set_pose(plr_filter *f, plr_time_ns t_ns, const plr_pose *pose
     const plr_status status = plr_filter_set_pose(f, t_ns, pose, P);
     if (status != PLR_E_ARGUMENT)
         return status;
-    know_nothing(P);
+    memset(P, 0, 36 * sizeof *P); /* it was not positive even before: nothing is known */
+    widen(P, 1e30, 1e30);
     return plr_filter_set_pose(f, t_ns, pose, P);
 }
 
@@ -131,7 +126,7 @@ static plr_status carry_pose(plr_session *s, plr_time_ns t_ns, double seconds) {
     double P[36];
     plr_status status = plr_filter_pose(f, &pose);
     if (status == PLR_OK)
-        status = widen(P, f, seconds);
+        status = covariance_after(P, f, seconds);
     if (status == PLR_OK && inertial)
         status = start_anew(f);
     if (status == PLR_OK)

@@ -34,7 +34,7 @@ bool plr_clock_watch_note(plr_clock_watch *watch, plr_time_ns t_ns, plr_status s
 /* The setting max-gap: a time farther off is no pause, but another clock. */
 plr_time_ns plr_clock_max_gap_ns(const plr_session *s);
 
-/* True if t_ns lies further behind newest_ns than that: what waits in order of time is due. */
+/* True if t_ns lies further behind newest_ns than that: the sender's clock was set back. */
 bool plr_clock_was_set_back(const plr_session *s, plr_time_ns newest_ns, plr_time_ns t_ns);
 
 /* After the filter answered data of t_ns with that status: carries the estimate there, if the new

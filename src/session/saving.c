@@ -128,10 +128,10 @@ static plr_status load(plr_session *s, plr_time_ns t_ns, const double moved_vari
 }
 
 /* The restored state is the start: nothing that came before it sets the pose. */
-static void start_from_state(plr_session *s, plr_phase_event event) {
+static void start_from_state(plr_session *s, plr_phase_trigger trigger) {
     plr_send_resets_become(s, 0);
     s->start_pending = false;
-    plr_phase_change(&s->phase, event);
+    plr_phase_change(&s->phase, trigger);
     s->watch.agreeing = 0;
     memset(&s->last, 0, sizeof s->last);
     s->last.t_ns = UINT64_MAX; /* no frame of this session: the next one is not its double */
@@ -145,7 +145,7 @@ static plr_status restore(plr_session *s, const plr_state_message *wanted, plr_s
     const plr_status status = check_moved(wanted);
     if (status != PLR_OK)
         return status;
-    plr_phase_change(&s->phase, PLR_EVENT_RESTORE);
+    plr_phase_change(&s->phase, PLR_TRIGGER_RESTORE);
     if (s->phase == PLR_PHASE_REJECTED || plr_start_filter(s) != PLR_OK)
         return PLR_E_CONFIG;
     return load(s, wanted->t_ns, wanted->moved_variance, stored, of_ns);
@@ -158,7 +158,7 @@ void plr_saving_restore(plr_session *s) {
     const plr_status status = restore(s, &wanted, &stored, &of_ns);
     if (status == PLR_OK) {
         plr_start_announce(s);
-        start_from_state(s, PLR_EVENT_RESTORED);
+        start_from_state(s, PLR_TRIGGER_RESTORED);
     }
     plr_send_echo(s); /* behind the CONFIG in force, as data: a log of it can be replayed */
     if (status == PLR_OK)
@@ -176,6 +176,6 @@ void plr_saving_restore_at_start(plr_session *s, plr_time_ns t_ns) {
         plr_saving_refuse(s, PLR_STATE_RESTORE, t_ns, status);
         return;
     }
-    start_from_state(s, PLR_EVENT_POSE);
+    start_from_state(s, PLR_TRIGGER_POSE);
     answer(s, PLR_NOTICE_RESTORED, &stored, of_ns, t_ns);
 }

@@ -6,7 +6,7 @@
 #include "session/layers.h"
 #include "session/line.h"
 
-#define TOLD_EVERY_NS UINT64_C(1000000000) /* the calibration */
+#define CALIBRATION_EVERY_NS UINT64_C(1000000000)
 
 static void put(plr_session *s, uint32_t bit, const plr_message *message) {
     if (s->port.write == NULL || (s->options.output & bit) == 0)
@@ -41,7 +41,7 @@ static bool describe_covariance(double packed[21], double P[36], plr_status stat
     return true;
 }
 
-/* Trace and variances of the biases are told once a frame: they take as long as the rest. */
+/* Trace and variances of the biases are sent once a frame: they take as long as the rest. */
 static bool describe_pose(plr_pose_message *pose, const plr_filter *f, bool after_update) {
     double P[36];
     if (plr_filter_pose(f, &pose->T_WB) != PLR_OK ||
@@ -111,7 +111,7 @@ void plr_send_calibration(plr_session *s) {
 
 void plr_send_report(plr_session *s, const plr_report *report, uint64_t compute_ns) {
     put_report(s, PLR_KIND_STEREO, report, compute_ns, PLR_NOTICE_NONE);
-    if (report->t_ns - s->calibration_ns >= TOLD_EVERY_NS)
+    if (report->t_ns - s->calibration_ns >= CALIBRATION_EVERY_NS)
         plr_send_calibration(s);
     if ((s->options.output & PLR_OUTPUT_EVIDENCE) == 0 || report->status != PLR_OK)
         return;
@@ -143,6 +143,18 @@ void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_st
     plr_send_answer(s, subject, t_ns, status, PLR_NOTICE_NONE);
     if (s->options.observer.refused != NULL)
         s->options.observer.refused(s->options.observer.context, subject, t_ns, status, culprit);
+}
+
+void plr_send_frame_refusal(plr_session *s, const plr_frame *frame, plr_status status) {
+    plr_report report;
+    memset(&report, 0, sizeof report);
+    report.t_ns = frame->t_ns;
+    report.status = status;
+    report.observations = frame->count;
+    const plr_frame_result result = {frame, &report, NULL, 0};
+    plr_send_refusal(s, PLR_KIND_STEREO, frame->t_ns, status, NULL);
+    if (s->options.observer.frame != NULL)
+        s->options.observer.frame(s->options.observer.context, &result);
 }
 
 void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark) {

@@ -34,6 +34,9 @@ void plr_send_answer(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_sta
 void plr_send_refusal(plr_session *s, plr_kind subject, plr_time_ns t_ns, plr_status status,
                       const plr_setting *culprit);
 
+/* The same of a frame, whose observer is told too. */
+void plr_send_frame_refusal(plr_session *s, const plr_frame *frame, plr_status status);
+
 /* Sends a landmark: a computed one, or one of options.map, so that a log is complete without it. */
 void plr_send_landmark(plr_session *s, plr_landmark_role role, const plr_landmark *landmark);
 

@@ -5,7 +5,8 @@
 
 #include "pelorus/assertions.h"
 #include "record/messages.h"
-#include "session/data.h"
+#include "session/budget.h"
+#include "session/events.h"
 #include "session/layers.h"
 #include "session/line.h"
 #include "session/phase.h"
@@ -13,7 +14,6 @@
 #include "session/saving.h"
 #include "session/send.h"
 #include "session/start.h"
-#include "session/steps.h"
 
 void plr_session_options_default(plr_session_options *options) {
     memset(options, 0, sizeof *options);
@@ -100,13 +100,13 @@ static const struct {
     [PLR_KIND_HEADER]   = {{USE,    NEW,   NEW,     SAME,    SAME,    SAME}, plr_start_begin},
     [PLR_KIND_CONFIG]   = {{EARLY,  USE,   USE,     SAME,    SAME,    SAME}, plr_start_change_settings},
     [PLR_KIND_LANDMARK] = {{EARLY,  USE,   USE,     USE,     USE,     USE},  plr_start_add_landmark},
-    [PLR_KIND_START]    = {{EARLY,  KEEP,  KEEP,    KEEP,    ECHO,    USE},  plr_data_use_start},
+    [PLR_KIND_START]    = {{EARLY,  KEEP,  KEEP,    KEEP,    ECHO,    USE},  plr_events_take_start},
     [RESTORE]           = {{EARLY,  USE,   USE,     LATE,    USE,     LATE}, plr_saving_restore},
-    [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_twist},
-    [PLR_KIND_IMU]      = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_imu},
-    [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_data_use_stereo},
-    [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_data_use_truth},
-    [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_steps_use_reading},
+    [PLR_KIND_TWIST]    = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_twist},
+    [PLR_KIND_IMU]      = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_imu},
+    [PLR_KIND_STEREO]   = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_stereo},
+    [PLR_KIND_TRUTH]    = {{ECHO,   FIRST, ECHO,    USE,     FIRST,   USE},  plr_events_take_truth},
+    [PLR_KIND_READING]  = {{EARLY,  FIRST, EARLY,   USE,     FIRST,   USE},  plr_events_take_reading},
     [PLR_KIND_STATE]    = {{EARLY,  EARLY, EARLY,   USE,     USE,     USE},  save},
     [PLR_KIND_TEXT]     = {{ECHO,   ECHO,  ECHO,    ECHO,    ECHO,    ECHO}, NULL},
     [PLR_KIND_END]      = {{USE,    USE,   USE,     USE,     USE,     USE},  compare_counts},
@@ -166,7 +166,7 @@ static plr_status check(const plr_session *s, unsigned row, plr_rule rule) {
 static void refuse(plr_session *s, plr_status status) {
     const plr_message *in = &s->in;
     if (in->kind == PLR_KIND_STEREO)
-        plr_data_refuse_frame(s, &in->as.stereo, status);
+        plr_send_frame_refusal(s, &in->as.stereo, status);
     else if (in->kind == PLR_KIND_STATE)
         plr_saving_refuse(s, (plr_state_action)in->as.state.action, plr_message_time(in), status);
     else
@@ -177,35 +177,41 @@ static void refuse(plr_session *s, plr_status status) {
 static void start(plr_session *s) {
     if (plr_start_filter(s) != PLR_OK)
         return;
-    plr_phase_change(&s->phase, PLR_EVENT_FILTER);
+    plr_phase_change(&s->phase, PLR_TRIGGER_FILTER);
     plr_start_announce(s);
     plr_start_set_bias(s);
     if (s->options.start == PLR_START_SAVED)
         plr_saving_restore_at_start(s, plr_message_time(&s->in));
     if (plr_filter_config(&s->filter)->mode == PLR_MODE_MAPPING) {
         s->start_pending = false; /* every pose comes as a TRUTH there */
-        plr_phase_change(&s->phase, PLR_EVENT_POSE);
+        plr_phase_change(&s->phase, PLR_TRIGGER_POSE);
     }
+}
+
+/* Lowers the budget of a STEREO to what can be computed before the deadline. */
+static void limit_frame(plr_session *s) {
+    const uint16_t budget = plr_budget_next(&s->budget);
+    if (s->port.now_ns != NULL && budget < s->in.as.stereo.budget)
+        s->in.as.stereo.budget = budget;
 }
 
 static void handle(plr_session *s) {
     const unsigned row = row_of(&s->in);
+    PLR_ASSERT(row < ROWS && s->phase < PLR_PHASES);
     count(s);
     if (table[row].rules[s->phase] == FIRST) {
-        plr_phase_change(&s->phase, PLR_EVENT_DATA);
+        plr_phase_change(&s->phase, PLR_TRIGGER_DATA);
         if (s->phase == PLR_PHASE_READY)
             start(s);
     }
-    const plr_time_ns t_ns = plr_message_time(&s->in);
-    if ((row == PLR_KIND_START || row == PLR_KIND_TRUTH) && s->phase == PLR_PHASE_STARTING &&
-        t_ns > 0)
-        plr_data_use_waiting(s, t_ns - 1); /* it may set the start pose: older frames come before */
+    if ((row == PLR_KIND_START || row == PLR_KIND_TRUTH) && s->phase == PLR_PHASE_STARTING)
+        plr_events_use_frames_before(s, plr_message_time(&s->in)); /* it may set the start pose */
     const plr_rule rule = (plr_rule)table[row].rules[s->phase];
     PLR_ASSERT(rule != FIRST);
     if (rule == IGNORE)
         return;
     if (row == PLR_KIND_STEREO)
-        plr_data_limit_frame(s);
+        limit_frame(s);
     echo(s, row, rule);
     const plr_status status = check(s, row, rule);
     if (status != PLR_OK)
@@ -214,7 +220,6 @@ static void handle(plr_session *s) {
         table[row].use(s);
     else if (rule == KEEP)
         plr_start_keep(s);
-    plr_data_use_waiting(s, s->order.newest_ns); /* to whose time the steps have come */
 }
 
 /* --- the loop --- */
@@ -248,6 +253,7 @@ static plr_step feed_reader(plr_session *s) {
     const plr_read_event event = plr_reader_feed(&s->reader, s->chunk + s->chunk_at,
                                                  s->chunk_count - s->chunk_at, &used, &s->in);
     s->chunk_at += (unsigned)used;
+    PLR_ASSERT(s->chunk_at <= s->chunk_count);
     switch (event) {
     case PLR_READ_MESSAGE:
         s->last_skip = PLR_SKIP_NONE;
@@ -291,8 +297,7 @@ plr_step plr_session_step(plr_session *s) {
 void plr_session_finish(plr_session *s) {
     if (s->phase >= PLR_PHASE_STARTING) {
         plr_landmark landmark;
-        plr_data_use_waiting(s, UINT64_MAX);
-        plr_steps_apply_held(s, UINT64_MAX);
+        plr_events_use_all(s);
         if ((s->options.output & PLR_OUTPUT_STATE) != 0)
             plr_saving_save(s, plr_filter_time(&s->filter));
         plr_send_calibration(s);
@@ -300,6 +305,6 @@ void plr_session_finish(plr_session *s) {
             if (plr_filter_landmark(&s->filter, slot, &landmark) == PLR_OK)
                 plr_send_landmark(s, PLR_LANDMARK_FINAL, &landmark);
     }
-    plr_phase_change(&s->phase, PLR_EVENT_END);
+    plr_phase_change(&s->phase, PLR_TRIGGER_END);
     plr_send_end(s);
 }

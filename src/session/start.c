@@ -10,6 +10,7 @@
 #include "session/line.h"
 #include "session/phase.h"
 #include "session/plausible.h"
+#include "session/queue.h"
 #include "session/send.h"
 
 void plr_start_clear(plr_session *s) {
@@ -24,8 +25,8 @@ void plr_start_clear(plr_session *s) {
     s->predict_ns = 0;
     s->imu_status = PLR_OK;
     s->imu_faults = 0;
-    s->held.count = s->held_frames.count = 0;
-    s->held_readings.count = 0;
+    plr_queue_clear(&s->queue);
+    memset(s->newest_ns, 0, sizeof s->newest_ns);
     memset(&s->order, 0, sizeof s->order);
     plr_known_map_init(&s->known, s->options.known, s->options.known_capacity);
     for (unsigned i = 0; i < s->options.map_count; i++)
@@ -53,7 +54,7 @@ bool plr_start_in_force(const plr_session *s) {
 void plr_start_begin(plr_session *s) {
     plr_start_clear(s);
     s->header = s->in.as.header;
-    plr_phase_change(&s->phase, PLR_EVENT_HEADER);
+    plr_phase_change(&s->phase, PLR_TRIGGER_HEADER);
 }
 
 static void report_setting(plr_session *s, plr_wire_setting given, const plr_setting *setting) {
@@ -77,7 +78,7 @@ static void report_setting(plr_session *s, plr_wire_setting given, const plr_set
 
 void plr_start_change_settings(plr_session *s) {
     const plr_config_message *config = &s->in.as.config;
-    plr_phase_change(&s->phase, PLR_EVENT_SETTINGS);
+    plr_phase_change(&s->phase, PLR_TRIGGER_SETTINGS);
     for (unsigned i = 0; i < config->count; i++) {
         const plr_setting *setting = plr_setting_by_id(config->settings[i].id);
         if (plr_layers_want(&s->wanted, config->settings[i]) == PLR_OK)
@@ -175,7 +176,7 @@ plr_status plr_start_filter(plr_session *s) {
     plr_config config;
     const plr_status status = init_filter(s, &config, &culprit);
     if (status != PLR_OK) {
-        plr_phase_change(&s->phase, PLR_EVENT_REJECTED);
+        plr_phase_change(&s->phase, PLR_TRIGGER_REJECTED);
         tell_contradiction(s, &config);
         plr_send_refusal(s, status == PLR_E_CONFIG ? PLR_KIND_CONFIG : PLR_KIND_HEADER, 0, status,
                          culprit);
@@ -217,7 +218,7 @@ plr_status plr_start_set_pose(plr_session *s, plr_kind subject, plr_time_ns t_ns
     s->watch.agreeing = 0;
     if (s->phase == PLR_PHASE_STARTING)
         plr_send_resets_become(s, 0);
-    plr_phase_change(&s->phase, PLR_EVENT_POSE);
+    plr_phase_change(&s->phase, PLR_TRIGGER_POSE);
     return PLR_OK;
 }
 
@@ -257,5 +258,5 @@ void plr_start_choose(plr_session *s, plr_time_ns t_ns) {
         plr_send_refusal(s, PLR_KIND_START, s->start.t_ns, PLR_E_TIME, NULL);
     }
     if (s->options.start == PLR_START_AUTO || s->options.start == PLR_START_IDENTITY)
-        plr_phase_change(&s->phase, PLR_EVENT_POSE);
+        plr_phase_change(&s->phase, PLR_TRIGGER_POSE);
 }

@@ -48,6 +48,15 @@ void plr_calibration_at_frame(plr_filter *f, const plr_real twist_B[PLR_POSE_DIM
 /* From the body to the camera as it is estimated, and where it was at the time of the last frame. */
 void plr_calibration_place(const plr_filter *f, plr_real R[9], plr_real t[3]);
 
+/* The camera as it is if each estimated error is ds. */
+void plr_calibration_correct(plr_filter *f, const plr_real *ds);
+
+/* The camera as it was given to init. */
+void plr_calibration_put_back(plr_filter *f);
+
+/* True if estimated error k is refused. */
+bool plr_calibration_refuses(const plr_filter *f, unsigned k);
+
 /* Nothing is known but the prior; the estimate stays. */
 void plr_calibration_forget(plr_filter *f);
 

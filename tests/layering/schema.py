@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Compares the tables that the library is built from with what is said of them elsewhere: the file
+"""Compares the tables that the library is built from with what is said of them elsewhere.
+
 schema.json, which the Python tools read, and the tables of docs/, each between
-`<!-- table: NAME -->` and `<!-- end -->`. All of it is printed by the program pelorus-schema.
+`<!-- table: NAME -->` and `<!-- end -->`, are printed by the program pelorus-schema.
+Limits and defaults in settings.h come from settings.def.
 
 usage: schema.py PROJECT_ROOT PELORUS_SCHEMA [--write]
 
@@ -16,7 +18,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from settings import faults_of, header_from
+
 SCHEMA = "tools/pelorus/schema.json"
+TABLE_OF_SETTINGS = "src/record/settings.def"
+SETTINGS = "include/pelorus/settings.h"
 PAGES = ("docs/REPLAY-FORMAT.md", "docs/STATE-FORMAT.md", "docs/SUPERVISION.md")
 TABLE = re.compile(r"(?<=<!-- table: )(\w+) -->\n(.*?)(?=<!-- end -->)", re.DOTALL)
 
@@ -36,6 +42,10 @@ def expected(root: Path, program: str) -> dict[Path, str]:
         files[page] = TABLE.sub(
             lambda found: f"{found[1]} -->\n{printed(program, 'markdown', found[1])}", text
         )
+    rows, header = (
+        (root / name).read_text(encoding="utf-8") for name in (TABLE_OF_SETTINGS, SETTINGS)
+    )
+    files[root / SETTINGS] = header_from(rows, header)
     return files
 
 
@@ -64,7 +74,8 @@ def main() -> int:
     if len(sys.argv) not in (3, 4) or sys.argv[3:] not in ([], ["--write"]):
         print(__doc__, file=sys.stderr)
         return 2
-    files = expected(Path(sys.argv[1]).resolve(), sys.argv[2])
+    root = Path(sys.argv[1]).resolve()
+    files = expected(root, sys.argv[2])
     wrong = 0
     for path, text in files.items():
         if path.is_file() and path.read_text(encoding="utf-8") == text:
@@ -74,7 +85,12 @@ def main() -> int:
             print(f"{path}: written")
         else:
             wrong += 1
-            print(f"{path}: is not what {sys.argv[2]} prints; {sys.argv[0]} ... --write does it")
+            print(f"{path}: is not what the tables say; {sys.argv[0]} ... --write does it")
+    for fault in faults_of(
+        (root / TABLE_OF_SETTINGS).read_text(encoding="utf-8"), files[root / SETTINGS]
+    ):
+        wrong += 1
+        print(fault)
     for name in tables_without_a_place(files):
         wrong += 1
         print(f"no page has the table {name}: <!-- table: {name} --> and <!-- end --> make one")

@@ -76,14 +76,14 @@ SESSION_PARTS = (
     "line",
     "plausible",
     "known_map",
-    "held",
+    "queue",
     "budget",
     "layers",
     "phase",
     "state_store",
 )
 SESSION_FILES = (
-    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "steps", "data"),
+    *(*SESSION_PARTS, "clock", "send", "reanchor", "start", "saving", "use", "events"),
     "session",
 )
 # What a public header may include of its siblings: wire.h must stay free of the filter.

@@ -117,6 +117,45 @@ static void test_positions_wait_with_the_twists_for_a_late_camera(void) {
     TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
 }
 
+static void test_a_reading_does_not_overtake_one_that_waits(void) {
+    desk_use_setting("camera-offset", 0.05);
+    desk_begin_drive();
+    desk_send(drive_twist(0));
+    desk_send(drive_stereo(0));      /* 0.05 s by the clock of the twists: it waits for them */
+    desk_send(drive_position(0.08)); /* and this one with it */
+    desk_send(drive_twist(0.06));    /* the frame is used, the position is newer */
+    desk_send(drive_position(0.09)); /* nothing waits but the one before it */
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT32(2, session.filter.totals.readings);
+    TEST_ASSERT_EQUAL_UINT8(0, session.queue.counts[PLR_EVENT_READING]);
+    desk_assert_nothing_refused();
+}
+
+static void test_readings_of_the_clocks_end_take_no_more_room_than_there_is(void) {
+    plr_message reading = drive_position(0);
+    reading.as.reading.t_ns = UINT64_MAX;
+    desk_use_setting("twist-delay", 1);
+    desk_begin_drive();
+    for (unsigned i = 0; i < PLR_SESSION_HELD_READINGS + 3; i++)
+        desk_send(reading);
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT32(3, session.totals.held_short);
+    TEST_ASSERT_EQUAL_UINT8(PLR_SESSION_HELD_READINGS, session.queue.counts[PLR_EVENT_READING]);
+}
+
+static void test_a_reading_of_another_clock_hurries_nothing(void) {
+    desk_use_setting("twist-delay", 0.5);
+    desk_begin_drive();
+    for (int k = 0; k < 40; k++) {
+        desk_send(drive_twist(0.01 * k));
+        desk_send(drive_position(1000 + 0.01 * k));
+    }
+    desk_run();
+    TEST_ASSERT_EQUAL_UINT8(40, session.queue.counts[PLR_EVENT_STEP]);
+    TEST_ASSERT_EQUAL_UINT32(0, session.totals.held_short);
+    TEST_ASSERT_EQUAL_UINT32(40, session.totals.refused);
+}
+
 static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void) {
     plr_wire_setting override = {plr_setting_by_name("twist-delay")->id, 5};
     options.overrides = &override;
@@ -126,7 +165,7 @@ static void test_a_delay_that_holds_more_than_fits_is_cut_short_and_counted(void
         desk_send(drive_twist(0.01 * k));
     desk_run();
     TEST_ASSERT_EQUAL_UINT32(10, session.totals.held_short);
-    TEST_ASSERT_EQUAL_UINT(PLR_SESSION_HELD_TWISTS, session.held.count);
+    TEST_ASSERT_EQUAL_UINT(PLR_SESSION_HELD_TWISTS, session.queue.counts[PLR_EVENT_STEP]);
     desk_assert_nothing_refused();
 }
 
@@ -139,7 +178,7 @@ static void test_a_delay_does_not_hold_twists_for_ever_when_time_goes_back(void)
     desk_send(drive_twist(50));
     desk_run();
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(100), plr_filter_time(&session.filter));
-    TEST_ASSERT_EQUAL_UINT(1, session.held.count);
+    TEST_ASSERT_EQUAL_UINT(1, session.queue.counts[PLR_EVENT_STEP]);
 }
 
 /* --- a deadline --- */

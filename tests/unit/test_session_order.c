@@ -232,7 +232,7 @@ static void test_frames_that_wait_in_vain_are_used_when_the_delay_is_over(void) 
     for (unsigned k = 0; k < 6; k++) {
         if (k == 4) {
             TEST_ASSERT_FALSE(faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer));
-            TEST_ASSERT_EQUAL_UINT8(2, session.held_frames.count);
+            TEST_ASSERT_EQUAL_UINT8(2, session.queue.counts[PLR_EVENT_FRAME]);
             plr_session_finish(&session);
         }
         TEST_ASSERT_TRUE(faulty_port_answer_of(&port, PLR_KIND_REPORT, &answer));
@@ -274,15 +274,15 @@ static void test_a_clock_that_is_set_back_keeps_no_frame_waiting(void) {
     desk_send(drive_stereo(1000));
     desk_send(drive_stereo(1000.1));
     desk_run();
-    TEST_ASSERT_EQUAL_UINT8(2, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(2, session.queue.counts[PLR_EVENT_FRAME]);
     desk_send(drive_stereo(0.1));
     desk_run();
-    TEST_ASSERT_EQUAL_UINT8(1, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(1, session.queue.counts[PLR_EVENT_FRAME]);
     desk_assert_refused(PLR_KIND_STEREO, PLR_E_GAP);
     desk_assert_refused(PLR_KIND_STEREO, PLR_E_GAP);
     desk_send(drive_imu(0.01, 10, INERTIAL_READING_S));
     desk_run();
-    TEST_ASSERT_EQUAL_UINT8(0, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(0, session.queue.counts[PLR_EVENT_FRAME]);
     desk_assert_nothing_refused();
 }
 
@@ -303,17 +303,17 @@ static void wait_for_start(plr_message message) {
 static void test_a_start_behind_frames_that_wait_is_no_start_for_them(void) {
     wait_for_start(
         drive_truth(0.2)); /* by then both are used, at the identity, as without a wait */
-    TEST_ASSERT_EQUAL_UINT8(0, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(0, session.queue.counts[PLR_EVENT_FRAME]);
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_RUNNING, session.phase);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0.1), plr_filter_time(&session.filter));
     wait_for_start(drive_truth(0)); /* and of the frame's own time it is one */
-    TEST_ASSERT_EQUAL_UINT8(2, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(2, session.queue.counts[PLR_EVENT_FRAME]);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0), plr_filter_time(&session.filter));
     wait_for_start(drive_start(0.2));
-    TEST_ASSERT_EQUAL_UINT8(0, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(0, session.queue.counts[PLR_EVENT_FRAME]);
     TEST_ASSERT_EQUAL_UINT64(drive_time_ns(0.2), plr_filter_time(&session.filter));
     wait_for_start(drive_start(0));
-    TEST_ASSERT_EQUAL_UINT8(2, session.held_frames.count);
+    TEST_ASSERT_EQUAL_UINT8(2, session.queue.counts[PLR_EVENT_FRAME]);
     TEST_ASSERT_EQUAL_INT(PLR_PHASE_STARTING, session.phase);
     desk_assert_nothing_refused();
 }
@@ -326,7 +326,7 @@ static void test_in_mapping_no_frame_waits(void) {
         desk_send(drive_truth(INERTIAL_FRAME_S * k));
         desk_send(drive_stereo(INERTIAL_FRAME_S * k));
         desk_run();
-        TEST_ASSERT_EQUAL_UINT8(0, session.held_frames.count);
+        TEST_ASSERT_EQUAL_UINT8(0, session.queue.counts[PLR_EVENT_FRAME]);
     }
     desk_assert_nothing_refused();
 }

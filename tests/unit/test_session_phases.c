@@ -207,23 +207,23 @@ static void test_a_restore_that_fails_leads_back_to_ready(void) {
 static void test_an_event_that_leads_nowhere_changes_nothing(void) {
     static const struct {
         plr_session_phase from;
-        plr_phase_event event;
+        plr_phase_trigger event;
         plr_session_phase to;
     } arrows[] = {
-        {WAITING, PLR_EVENT_HEADER, READY},    {REJECTED, PLR_EVENT_HEADER, READY},
-        {REJECTED, PLR_EVENT_SETTINGS, READY}, {READY, PLR_EVENT_REJECTED, REJECTED},
-        {READY, PLR_EVENT_FILTER, STARTING},   {STARTING, PLR_EVENT_POSE, RUNNING},
-        {READY, PLR_EVENT_RESTORED, RESTORED}, {RESTORED, PLR_EVENT_RESTORE, READY},
-        {RESTORED, PLR_EVENT_DATA, RUNNING},
+        {WAITING, PLR_TRIGGER_HEADER, READY},    {REJECTED, PLR_TRIGGER_HEADER, READY},
+        {REJECTED, PLR_TRIGGER_SETTINGS, READY}, {READY, PLR_TRIGGER_REJECTED, REJECTED},
+        {READY, PLR_TRIGGER_FILTER, STARTING},   {STARTING, PLR_TRIGGER_POSE, RUNNING},
+        {READY, PLR_TRIGGER_RESTORED, RESTORED}, {RESTORED, PLR_TRIGGER_RESTORE, READY},
+        {RESTORED, PLR_TRIGGER_DATA, RUNNING},
     };
     for (unsigned from = 0; from < PLR_PHASES; from++)
-        for (unsigned event = 0; event <= PLR_EVENT_END; event++) {
-            unsigned to = event == PLR_EVENT_END ? WAITING : from;
+        for (unsigned event = 0; event <= PLR_TRIGGER_END; event++) {
+            unsigned to = event == PLR_TRIGGER_END ? WAITING : from;
             for (unsigned i = 0; i < sizeof arrows / sizeof arrows[0]; i++)
                 if (arrows[i].from == from && arrows[i].event == event)
                     to = arrows[i].to;
             plr_session_phase phase = (plr_session_phase)from;
-            plr_phase_change(&phase, (plr_phase_event)event);
+            plr_phase_change(&phase, (plr_phase_trigger)event);
             TEST_ASSERT_EQUAL_INT(to, phase);
         }
 }
