@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`pelorus check` of wheels beside an IMU: a wrong radius and a wrong distance are told."""
+"""Wheels beside an IMU: `pelorus check` tells a wrong radius and a wrong distance, `explain` that
+they slip.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,11 @@ import numpy as np
 import pytest
 from pelorus.check import wheels
 from pelorus.check.verdict import Grade, Remark
+from pelorus.explain import explain
+from pelorus.explain.finding import Cause
 from pelorus.frames import Reading
 from pelorus.recording import Recording
+from pelorus.replay import replayed
 from pelorus.simulation.imu import Imu
 from pelorus.simulation.readings import Sensing
 from pelorus.simulation.simulate import Options, simulate
@@ -81,3 +86,28 @@ def test_wheels_that_stand_elsewhere_than_was_told_are_named(drive: Recording) -
 def test_a_sigma_that_is_too_small_is_told(drive: Recording) -> None:
     sure = [replace(m, sigma=0.2 * m.sigma) for m in drive.readings]
     assert any("times their sigma: tell a larger one" in one.text for one in said(drive, sure))
+
+
+def test_wheels_that_slip_are_an_event_with_both_speeds(drive: Recording) -> None:
+    program = BIN / "pelorus-replay"
+    if not program.exists():
+        pytest.skip(f"{program} is not built")
+
+    def told(readings: list[Reading]) -> list[tuple[Cause, str, float, float]]:
+        messages = list(replace(drive, readings=readings).messages())
+        found = explain(replayed(program, messages, ()))
+        seconds = (found.seconds(e.to_ns) for e in found.episodes)
+        return [
+            (e.first.cause, e.first.words, found.seconds(e.from_ns), to_s)
+            for e, to_s in zip(found.episodes, seconds, strict=True)
+        ]
+
+    assert told(list(drive.readings)) == []
+    readings = list(drive.readings)
+    readings[1000:1250] = scaled(readings[1000:1250], 0.5)  # from 20 to 25 s
+    ((cause, words, from_s, to_s),) = told(readings)
+    assert cause is Cause.READINGS_OFF
+    assert from_s == pytest.approx(20.0, abs=0.2)
+    assert 24.9 < to_s < 26.5
+    wheels_mps, body_mps = (float(word) for word in words.split() if word[0].isdigit())
+    assert wheels_mps == pytest.approx(0.5 * body_mps, abs=0.03)
