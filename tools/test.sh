@@ -158,7 +158,7 @@ run_ctest() {
 }
 
 check_format() {
-    find include src port tests tools -name '*.[ch]' -print0 |
+    find include src port tests tools examples -name '*.[ch]' -print0 |
         xargs -0 clang-format-14 --dry-run --Werror && echo 'every C file is formatted'
 }
 
