@@ -5,13 +5,15 @@
 # board. It publishes nothing.
 #
 # usage: tools/release.sh
+#
+# SYSTEMS='win_amd64' or BOARDS='stm32f405' in the environment: these wheels and boards alone.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 case ${1-} in
 '') ;;
 *)
-    sed -n '3,7s/^# \{0,1\}//p' "$0"
+    sed -n '3,9s/^# \{0,1\}//p' "$0"
     exit 0
     ;;
 esac
@@ -26,7 +28,7 @@ rm -rf "$out"
 mkdir -p "$out"
 
 heading 'Wheels'
-PYTHONPATH=$ROOT/tools "$VENV/bin/python" "$ROOT/tools/wheels.py" --out "$out"
+PYTHONPATH=$ROOT/tools "$VENV/bin/python" "$ROOT/tools/wheels.py" --out "$out" ${SYSTEMS-}
 
 heading 'Sources'
 (cd "$ROOT" && "$VENV/bin/python" -c \
@@ -37,7 +39,7 @@ PYTHONPATH=$ROOT/tools "$VENV/bin/python" "$ROOT/tools/amalgamate.py" "$two"
 (cd "$two" && "$VENV/bin/python" -m zipfile -c "$out/pelorus-$version-c.zip" pelorus.h pelorus.c)
 
 heading 'Firmware'
-boards=$(cd "$ROOT/port/cortex_m/boards" && echo */ | tr -d /)
+boards=${BOARDS:-$(cd "$ROOT/port/cortex_m/boards" && echo */ | tr -d /)}
 images=()
 for board in $boards; do
     images+=("pelorus-$board-n32")

@@ -194,6 +194,10 @@ def test_two_wheels_of_a_bag_measure_the_turn_by_where_they_sit(
         (("--wheel-topic", "/odom", "--wheel-axes", "w"), "--wheel-axes is w: some of the letters"),
         (("--wheel-topic", "/odom", "--wheel-sigma", -1), "--wheel-sigma is -1: more than 0"),
         (("--wheel-topic", "/imu"), "/imu holds"),
+        (
+            ("--wheel-topic", "/odom", "--twists", "v.csv", "--measured", "vx"),
+            "--twists moves the body, and --wheel-topic goes beside an IMU",
+        ),
         (("--wheel-topic", "/wheels"), "has no topic /wheels"),
     ],
 )
@@ -201,6 +205,10 @@ def test_wheels_that_make_no_sense_are_refused_by_option(
     words: tuple[Any, ...], said: str, given: list[Any], tmp_path: Path, pelorus: Run
 ) -> None:
     target = tmp_path / "out.plr"
+    speed = {"t_s": [0.0, 30.0], "vx_mps": [1.0, 1.0]}
+    words = tuple(
+        write_csv(tmp_path / "v.csv", speed) if word == "v.csv" else word for word in words
+    )
     assert said in pelorus(*given, target, *words, status=1).err
     assert not target.exists()
 

@@ -42,6 +42,8 @@ def read(bag: Bag, topics: Topics, asked: Asked) -> Streams:
     small = []
     body = bare(topics.moving.frame) or motion.frame
     if topics.wheels is not None:
+        if isinstance(motion, Twists):
+            raise PelorusError("--twists moves the body, and --wheel-topic goes beside an IMU")
         small += ros_wheels.read(bag, topics.wheels, body, tree, remarks)
     if topics.position:
         known = topics.position, topics.position_sigma_m
