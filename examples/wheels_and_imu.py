@@ -75,10 +75,9 @@ def main() -> None:
             p = filter.pose().p
             off = np.linalg.norm(p - truth(t_s)[1])
             sigma = np.sqrt(np.trace(filter.pose_covariance()[:3, :3]))
-            why = "|".join(reason.name or "" for reason in report.reasons)
             print(
                 f"{t_s:4.0f} s  x {p[0]:6.2f}  y {p[1]:6.2f} m  off {off:5.3f} m, "
-                f"sigma {sigma:5.3f} m  {why}"
+                f"sigma {sigma:5.3f} m  {report.reasons}"
             )
 
 

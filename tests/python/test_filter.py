@@ -316,6 +316,8 @@ def test_reasons_are_flags_with_names() -> None:
     assert {reason.name: reason.value for reason in Reason} == {
         name: bit for bit, name in REASON_NAMES.items()
     }
+    assert (str(Reason(0)), str(Reason.NO_FRAMES)) == ("none", "NO_FRAMES")
+    assert str(Reason.NO_FRAMES | Reason.BUDGET) == "BUDGET|NO_FRAMES"
     later = Reason(1 << 30 | 1)  # of a library of another version
     assert Reason.FEW_OBSERVATIONS in later
     assert later.words == (REASONS[1],)

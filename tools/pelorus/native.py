@@ -54,7 +54,7 @@ def _told(name: str, value: Any) -> str:
     if name == "health":
         return schema.HEALTHS.get(value, str(value))
     if isinstance(value, Reason):
-        return value.name or "none"
+        return str(value)
     if isinstance(value, float):
         return f"{value:.6g}"
     return repr(list(value)) if isinstance(value, c.Array) else repr(value)

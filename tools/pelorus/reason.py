@@ -40,6 +40,10 @@ class Reason(IntFlag):
     NOISE_MISFIT = 1 << 27
     CALIBRATION_OFF = 1 << 28
 
+    def __str__(self) -> str:
+        """`FROZEN_IMAGE|NO_TWISTS`; `none` where there is nothing."""
+        return self.name or "none"
+
     @property
     def words(self) -> tuple[str, ...]:
         """What each of them means; include/pelorus/types.h says causes and remedies."""
